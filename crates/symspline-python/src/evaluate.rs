@@ -1,0 +1,94 @@
+//! Evaluation, called from Python.
+
+use crate::errors::invalid;
+use crate::space::Handle;
+use crate::validate::of_curve;
+use crate::watch::watched;
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use symspline::curve::{Curves, Outside, Quantity, Times, evaluate as run};
+use symspline::space::Space;
+use symspline::with_space;
+
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+
+/// Evaluates curves: the result is batch axes + axes of one curve's times + axes of a point (or none).
+#[pyfunction]
+#[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, progress=None))]
+pub fn evaluate<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    velocities: Array<'py>,
+    x: Array<'py>,
+    quantity: &str,
+    outside: &str,
+    per_curve: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let quantity = match quantity {
+        "point" => Quantity::Point,
+        "velocity" => Quantity::Velocity,
+        "acceleration" => Quantity::Acceleration,
+        "speed" => Quantity::Speed,
+        "bend" => Quantity::Bend,
+        _ => return Err(invalid(format!("unknown quantity {quantity:?}"))),
+    };
+    let (policy, strict) = match outside {
+        "raise" => (Outside::Continue, true),
+        "continue" => (Outside::Continue, false),
+        "geodesic" => (Outside::Geodesic, false),
+        "periodic" => (Outside::Wrap, false),
+        _ => return Err(invalid(format!("unknown extrapolation {outside:?}"))),
+    };
+    let len = with_space!(&handle.space, s => s.point_len());
+    let point_axes = handle.point_axes();
+    let nodes = t.shape()[t.ndim() - 1];
+    let batch = &points.shape()[..points.ndim() - point_axes - 1];
+    let count_axes = if per_curve { &x.shape()[batch.len()..] } else { x.shape() };
+    let curves =
+        Curves { t: t.as_slice()?, nodes, points: points.as_slice()?, velocities: velocities.as_slice()? };
+    let count = count_axes.iter().product();
+    let times = Times { x: x.as_slice()?, count };
+    let number = curves.points.len() / (nodes * len).max(1);
+    check_times(&curves, &times, number, strict)?;
+
+    let mut shape = [batch, count_axes].concat();
+    if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
+        shape.extend_from_slice(&points.shape()[points.ndim() - point_axes..]);
+    }
+    let out = PyArrayDyn::zeros(py, shape, false);
+    let mut write = out.readwrite();
+    let result = write.as_slice_mut()?;
+    watched(py, progress, number * count, |monitor| {
+        with_space!(&handle.space, s => run(s, &curves, &times, quantity, policy, monitor, result));
+    })?;
+    drop(write);
+    Ok(out)
+}
+
+/// Times must be numbers, and inside the knots if `strict`.
+fn check_times(curves: &Curves, times: &Times, number: usize, strict: bool) -> PyResult<()> {
+    let Times { x, count } = *times;
+    let own_times = x.len() != count;
+    let shared = curves.t.len() == curves.nodes;
+    let rounds = if own_times || (!shared && strict) { number } else { number.min(1) };
+    for c in 0..rounds {
+        let x = if own_times { &x[c * count..(c + 1) * count] } else { x };
+        let (start, end) = curves.domain(if shared { 0 } else { c });
+        let good = |x: f64| if strict { start <= x && x <= end } else { x.is_finite() };
+        let Some(i) = x.iter().position(|&x| !good(x)) else { continue };
+        let of = of_curve(c, if own_times || !shared { number } else { 1 });
+        return Err(invalid(if !x[i].is_finite() {
+            format!("x[{i}]{of} is {}; times must be finite", x[i])
+        } else {
+            format!(
+                "x[{i}]{of} = {} is outside the knots [{start}, {end}] (counted from the first time); pass \
+                 extrapolate=True, 'geodesic' or 'periodic' to say what is meant there",
+                x[i]
+            )
+        }));
+    }
+    Ok(())
+}

@@ -1,0 +1,158 @@
+//! Fitting, called from Python.
+
+use crate::errors::invalid;
+use crate::space::Handle;
+use crate::validate;
+use crate::watch::watched;
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use symspline::fit::{End, Ends, Method, Options, Problem, Report, Status, fit as solve};
+use symspline::space::Space;
+use symspline::with_space;
+
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+
+/// What a fit gives back: points on the space, velocities, the arrays of the report, and per failed
+/// curve (index, kind, message).
+type Fitted<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyTuple>,
+    Vec<(usize, &'static str, String)>,
+);
+
+/// Fits curves. `points` are contiguous with the point's numbers last; `offsets` are the nodes before
+/// each curve when they differ in length (then `points` is one long list of points).
+#[pyfunction]
+#[pyo3(signature = (handle, t, points, ends, method, tol, max_iter, check, point_tol, offsets=None, progress=None))]
+pub fn fit<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    ends: Option<[(String, Option<Array<'py>>); 2]>,
+    method: &str,
+    tol: f64,
+    max_iter: Option<usize>,
+    check: bool,
+    point_tol: f64,
+    offsets: Option<Vec<usize>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Fitted<'py>> {
+    let method = match method {
+        "auto" => Method::Auto,
+        "fixed-point" => Method::FixedPoint,
+        "quasi-newton" => Method::QuasiNewton,
+        _ => {
+            return Err(invalid(format!(
+                "method must be 'auto', 'fixed-point' or 'quasi-newton', not {method:?}"
+            )));
+        }
+    };
+    if !(tol >= 0.0 && tol.is_finite()) {
+        return Err(invalid(format!("tol must be a number >= 0, not {tol}")));
+    }
+    if max_iter == Some(0) {
+        return Err(invalid("max_iter must be at least 1"));
+    }
+    let options = Options { method, tol, max_iter };
+    let len = with_space!(&handle.space, s => s.point_len());
+    let nodes = points.len() / len;
+    let t_slice = t.as_slice()?;
+    let (offsets, shared) = match offsets {
+        Some(offsets) => (offsets, false),
+        None => {
+            let n = t.shape()[t.ndim() - 1];
+            ((0..=nodes / n).map(|c| c * n).collect(), t.ndim() == 1)
+        }
+    };
+    let curves = offsets.len() - 1;
+
+    let out = PyArrayDyn::zeros(py, points.shape(), false);
+    let velocities = PyArrayDyn::zeros(py, points.shape(), false);
+    let (mut out_write, mut velocities_write) = (out.readwrite(), velocities.readwrite());
+    let (p, u) = (out_write.as_slice_mut()?, velocities_write.as_slice_mut()?);
+    p.copy_from_slice(points.as_slice()?);
+
+    if check {
+        let count = if shared { 1 } else { curves };
+        for c in 0..count {
+            let t = if shared { t_slice } else { &t_slice[offsets[c]..offsets[c + 1]] };
+            validate::knots(t, c, count)?;
+        }
+        with_space!(&handle.space, s => validate::points(s, p, &offsets, point_tol))?;
+    }
+    let ends_now = match &ends {
+        None => Ends::Periodic,
+        Some([a, b]) => Ends::Open([end(a)?, end(b)?]),
+    };
+    let problem = Problem { t: t_slice, shared, points: p, offsets: &offsets, ends: ends_now };
+    if check {
+        with_space!(&handle.space, s => validate::ends(s, &problem, point_tol))?;
+    }
+    let reports = watched(
+        py,
+        progress,
+        nodes,
+        |monitor| with_space!(&handle.space, s => solve(s, &problem, &options, monitor, u)),
+    )?;
+    let faults = faults(handle, &options, &reports);
+    drop((out_write, velocities_write));
+    Ok((out, velocities, arrays(py, &reports)?, faults))
+}
+
+fn end<'a>((kind, value): &'a (String, Option<Array>)) -> PyResult<End<'a>> {
+    Ok(match (kind.as_str(), value) {
+        ("natural", _) => End::Natural,
+        ("not-a-knot", _) => End::NotAKnot,
+        ("velocity", Some(v)) => End::Velocity(v.as_slice()?),
+        ("acceleration", Some(v)) => End::Acceleration(v.as_slice()?),
+        _ => return Err(invalid(format!("unknown end condition {kind:?}"))),
+    })
+}
+
+/// The report's columns: converged, iterations, residual, max_step, rate.
+fn arrays<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyTuple>> {
+    let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
+    let converged = PyArray1::from_iter(py, reports.iter().map(|r| r.status == Status::Converged));
+    let iterations = PyArray1::from_iter(py, reports.iter().map(|r| r.iterations as i64));
+    (converged, iterations, column(|r| r.residual), column(|r| r.max_step), column(|r| r.rate))
+        .into_pyobject(py)
+}
+
+fn faults(handle: &Handle, options: &Options, reports: &[Report]) -> Vec<(usize, &'static str, String)> {
+    let limit = with_space!(&handle.space, s => s.cut_angle());
+    let curves = reports.len();
+    let describe = |(c, r): (usize, &Report)| {
+        let of = validate::of_curve(c, curves);
+        let (kind, message) = match r.status {
+            Status::Converged | Status::Stopped => return None,
+            Status::CutLocus { index, angle } => (
+                "cut-locus",
+                format!(
+                    "points[{index}] and points[{}]{of} lie at or past each other's cut locus: angle {angle}, \
+                     limit {limit}; put a point between them, or check their sign",
+                    index + 1
+                ),
+            ),
+            Status::LongLeg { index, angle } => (
+                "cut-locus",
+                format!(
+                    "the control leg at points[{index}]{of} passes the cut locus: angle {angle}, limit {limit}; \
+                     put more points there, or give times that suit the distances"
+                ),
+            ),
+            Status::Unconverged => (
+                "unconverged",
+                format!(
+                    "no convergence{of}: residual {:.3e} after {} iterations (tol {:.1e}, longest step {:.3}); \
+                     put more points where steps are long, choose times that suit the distances, or raise max_iter",
+                    r.residual, r.iterations, options.tol, r.max_step
+                ),
+            ),
+        };
+        Some((c, kind, message))
+    };
+    reports.iter().enumerate().filter_map(describe).collect()
+}

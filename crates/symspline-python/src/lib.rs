@@ -1,0 +1,40 @@
+//! The compiled module `symspline._core`: arrays in, arrays out, validation; no mathematics.
+
+mod errors;
+mod evaluate;
+mod fit;
+mod space;
+mod validate;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// Found in the compiled file by `symspline/_cpu.py`, without running any of its code.
+#[used]
+static BUILT_FOR: &[u8] = if cfg!(all(target_arch = "x86_64", target_feature = "avx2")) {
+    b"symspline built for x86-64-v3"
+} else {
+    b"symspline built for any processor"
+};
+
+/// Limits the number of threads; 0 stands for all cores.
+#[pyfunction]
+fn set_num_threads(n: usize) {
+    symspline::parallel::set_num_threads(n);
+}
+
+/// The number of threads that parallel work uses.
+#[pyfunction]
+fn num_threads() -> usize {
+    symspline::parallel::num_threads()
+}
+
+#[pymodule]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<space::Handle>()?;
+    m.add_function(wrap_pyfunction!(fit::fit, m)?)?;
+    m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)?;
+    m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
+    m.add_function(wrap_pyfunction!(num_threads, m)?)?;
+    errors::register(m)
+}

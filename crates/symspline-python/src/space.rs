@@ -1,0 +1,130 @@
+//! The compiled side of a space.
+
+use crate::errors::{CutLocusError, invalid};
+use crate::watch::watched;
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use symspline::rows::{Operation, apply, project_points, tangent_defects};
+use symspline::space::{AnySpace, Space};
+use symspline::with_space;
+
+/// A space, as the compiled code sees it.
+#[pyclass(frozen, module = "symspline._core")]
+pub struct Handle {
+    pub space: AnySpace,
+}
+
+impl Handle {
+    /// Number of axes of a point's array of doubles.
+    pub fn point_axes(&self) -> usize {
+        with_space!(&self.space, s => s.point_shape().len())
+    }
+}
+
+#[pymethods]
+impl Handle {
+    #[new]
+    fn new(name: &str, parameters: Vec<usize>) -> PyResult<Self> {
+        AnySpace::new(name, &parameters).map(|space| Handle { space }).map_err(invalid)
+    }
+
+    /// The canonical name and the parameters.
+    fn name(&self) -> (&'static str, Vec<usize>) {
+        self.space.name()
+    }
+
+    /// All names of all spaces.
+    #[staticmethod]
+    fn names() -> Vec<Vec<&'static str>> {
+        AnySpace::NAMES.iter().map(|names| names.to_vec()).collect()
+    }
+
+    fn point_shape(&self) -> Vec<usize> {
+        with_space!(&self.space, s => s.point_shape())
+    }
+    fn dim(&self) -> usize {
+        with_space!(&self.space, s => s.dim())
+    }
+    fn injectivity_radius(&self) -> f64 {
+        with_space!(&self.space, s => s.injectivity_radius())
+    }
+    fn curvature(&self) -> f64 {
+        with_space!(&self.space, s => s.curvature())
+    }
+
+    /// Applies an operation to rows: arrays of equal shape (rows, numbers of a point).
+    #[pyo3(signature = (operation, inputs, t=None))]
+    fn apply<'py>(
+        &self,
+        py: Python<'py>,
+        operation: &str,
+        inputs: Vec<PyReadonlyArrayDyn<'py, f64>>,
+        t: Option<PyReadonlyArrayDyn<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let operation = match operation {
+            "exp" => Operation::Exp,
+            "log" => Operation::Log,
+            "geodesic" => Operation::Geodesic,
+            "distance" => Operation::Distance,
+            "transvection" => Operation::Transvection,
+            "transport" => Operation::Transport,
+            "inner" => Operation::Inner,
+            "project" => Operation::Project,
+            "project_tangent" => Operation::ProjectTangent,
+            "scatter" => Operation::Scatter,
+            "random_tangent" => Operation::RandomTangent,
+            _ => return Err(invalid(format!("unknown operation {operation:?}"))),
+        };
+        let slices = inputs.iter().map(|a| a.as_slice()).collect::<Result<Vec<_>, _>>()?;
+        let t = t.as_ref().map_or(Ok(&[][..]), |t| t.as_slice())?;
+        let len = with_space!(&self.space, s => s.point_len());
+        let rows = slices[0].len() / len;
+        let out = PyArray1::zeros(py, rows * operation.row_len(len), false);
+        let mut write = out.readwrite();
+        let result = write.as_slice_mut()?;
+        let done = watched(
+            py,
+            None,
+            rows,
+            |monitor| with_space!(&self.space, s => apply(s, operation, &slices, t, monitor, result)),
+        )?;
+        drop(write);
+        done.map_err(|(row, angle)| {
+            let limit = with_space!(&self.space, s => s.cut_angle());
+            CutLocusError::new_err(format!(
+                "pair {row}: the points lie at or past each other's cut locus: angle {angle}, limit {limit}; \
+                 the geodesic between them is not unique"
+            ))
+        })?;
+        Ok(out)
+    }
+
+    /// Raises unless every row is a point within `tol`.
+    fn check_points(&self, points: PyReadonlyArrayDyn<f64>, tol: f64) -> PyResult<()> {
+        let mut copy = points.as_slice()?.to_vec();
+        with_space!(&self.space, s => project_points(s, &mut copy, tol))
+            .map_err(|(row, off, why)| off_space(&format!("point {row}"), off, tol, &why))
+    }
+
+    /// How far rows are from being tangent, relative to their size.
+    fn tangent_defects<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArrayDyn<'py, f64>,
+        vectors: PyReadonlyArrayDyn<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let defects =
+            with_space!(&self.space, s => tangent_defects(s, points.as_slice()?, vectors.as_slice()?));
+        let shape = [points.shape()[0]];
+        PyArray1::from_vec(py, defects).reshape(shape).map(|a| a.to_dyn().clone())
+    }
+}
+
+/// The error for a point that is off its space.
+pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> PyErr {
+    let size = if off.is_finite() { format!(" by {off:.3e}") } else { String::new() };
+    invalid(format!(
+        "{which} is off the space{size}: {why}. Points within {tol:.0e} are projected; use space.project(x) \
+         if these are meant to be points"
+    ))
+}

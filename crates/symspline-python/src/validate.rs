@@ -1,0 +1,115 @@
+//! What every call checks before any work is done.
+
+use crate::errors::invalid;
+use crate::space::off_space;
+use pyo3::prelude::*;
+use symspline::fit::{End, Ends, Problem};
+use symspline::monitor::Monitor;
+use symspline::rows::{Operation, apply, project_points, tangent_defects};
+use symspline::space::Space;
+
+/// Where a curve stands in a batch, for messages; nothing for a single curve.
+pub fn of_curve(curve: usize, curves: usize) -> String {
+    if curves > 1 { format!(" of curve {curve}") } else { String::new() }
+}
+
+/// Knots must be finite and increasing.
+pub fn knots(t: &[f64], curve: usize, curves: usize) -> PyResult<()> {
+    let of = if curves > 1 { format!("[{curve}]") } else { String::new() };
+    if let Some(i) = t.iter().position(|x| !x.is_finite()) {
+        return Err(invalid(format!("t{of}[{i}] is {}; times must be finite", t[i])));
+    }
+    if let Some(i) = (1..t.len()).find(|&i| t[i] <= t[i - 1]) {
+        let (a, b) = (t[i - 1], t[i]);
+        let hint = if a == b {
+            "remove one of two points with the same time, or give them different times"
+        } else {
+            "sort times and points together, e.g. order = np.argsort(t)"
+        };
+        let what = if a == b { "repeats" } else { "is before" };
+        return Err(invalid(format!(
+            "t{of}[{i}] = {b} {what} t{of}[{}] = {a} (counted from the first time); times must increase: {hint}",
+            i - 1
+        )));
+    }
+    if !(t[t.len() - 1] - t[0]).is_finite() {
+        return Err(invalid(format!("t{of} spans more than a double can hold")));
+    }
+    Ok(())
+}
+
+/// Points are projected in place, or the first that is off the space is named.
+pub fn points<M: Space>(space: &M, points: &mut [f64], offsets: &[usize], tol: f64) -> PyResult<()> {
+    project_points(space, points, tol).map_err(|(row, off, why)| {
+        let curve = offsets.partition_point(|&o| o <= row) - 1;
+        let which = format!("points[{}]{}", row - offsets[curve], of_curve(curve, offsets.len() - 1));
+        off_space(&which, off, tol, &why)
+    })
+}
+
+/// End vectors must be tangent and velocities not too fast; closed curves must be closed.
+pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
+    let len = space.point_len();
+    let curves = problem.offsets.len() - 1;
+    let mut first = Vec::with_capacity(curves * len);
+    let mut last = Vec::with_capacity(curves * len);
+    for c in 0..curves {
+        let (from, to) = (problem.offsets[c] * len, problem.offsets[c + 1] * len);
+        first.extend_from_slice(&problem.points[from..from + len]);
+        last.extend_from_slice(&problem.points[to - len..to]);
+    }
+    let quiet = |_| true;
+    let monitor = Monitor::new(&quiet);
+    let Ends::Open(ends) = problem.ends else {
+        let mut distance = vec![0.0; curves];
+        let _ = apply(space, Operation::Distance, &[&first, &last], &[], &monitor, &mut distance);
+        return match distance.iter().position(|d| !(*d <= tol)) {
+            Some(c) => Err(invalid(format!(
+                "bc_type='periodic' needs a closed curve, but first and last point{} are {:.3e} apart \
+                 (allowed: {tol:.0e}); repeat the first point at the end",
+                of_curve(c, curves),
+                distance[c]
+            ))),
+            None => Ok(()),
+        };
+    };
+    for (e, end) in ends.iter().enumerate() {
+        let (name, p) = if e == 0 { ("start", &first) } else { ("end", &last) };
+        let (order, v) = match end {
+            End::Velocity(v) => ("velocity", v),
+            End::Acceleration(v) => ("acceleration", v),
+            End::Natural | End::NotAKnot => continue,
+        };
+        if let Some(i) = v.iter().position(|x| !x.is_finite()) {
+            let of = of_curve(i / len, curves);
+            return Err(invalid(format!("the {name} {order}{of} holds {}; it must be finite", v[i])));
+        }
+        let defects = tangent_defects(space, p, v);
+        if let Some(c) = defects.iter().position(|d| !(*d <= tol)) {
+            return Err(invalid(format!(
+                "the {name} {order}{} is not tangent at its point: a part of {:.3e} of it points off the space \
+                 (allowed: {tol:.0e}); use space.project_tangent(p, v)",
+                of_curve(c, curves),
+                defects[c]
+            )));
+        }
+        if order == "velocity" && space.injectivity_radius().is_finite() {
+            let mut square = vec![0.0; curves];
+            let _ = apply(space, Operation::Inner, &[p, v, v], &[], &monitor, &mut square);
+            for (c, square) in square.iter().enumerate() {
+                let t = problem.knots(c);
+                let h = if e == 0 { t[1] - t[0] } else { t[t.len() - 1] - t[t.len() - 2] };
+                let largest = 3.0 * space.injectivity_radius() / h;
+                if square.sqrt() >= largest {
+                    return Err(invalid(format!(
+                        "the {name} velocity{} has speed {:.6}, too fast for its segment of length {h}: its \
+                         control leg would pass the cut locus; the speed must stay below {largest:.6}",
+                        of_curve(c, curves),
+                        square.sqrt()
+                    )));
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,57 @@
+//! De Casteljau's algorithm with geodesics, (8).
+
+use crate::scalar::{Lane, Scalar, lane};
+use crate::space::Space;
+
+/// One cubic Bézier segment on each lane, by its end points and outer legs; reused.
+pub struct Segment<S> {
+    /// `p_i` and `p_{i+1}`.
+    pub ends: [Vec<Lane>; 2],
+    /// `log_{p_i}(q⁺)` and `−log_{p_{i+1}}(q⁻)`: h/3 times the end velocities.
+    pub legs: [Vec<Lane>; 2],
+    /// The control points q⁺ and q⁻.
+    pub controls: [Vec<Lane>; 2],
+    middle: Vec<Lane>,
+    level: [Vec<S>; 3],
+}
+
+impl<S: Scalar> Segment<S> {
+    /// Room for points of `len` numbers.
+    pub fn new(len: usize) -> Self {
+        let lanes = || vec![Lane::ZERO; len];
+        let points = || vec![S::constant(Lane::ZERO); len];
+        Segment {
+            ends: [lanes(), lanes()],
+            legs: [lanes(), lanes()],
+            controls: [lanes(), lanes()],
+            middle: lanes(),
+            level: [points(), points(), points()],
+        }
+    }
+
+    /// Computes the control points from ends and legs.
+    #[inline(always)]
+    pub fn control<M: Space>(&mut self, space: &M) {
+        let Segment { ends: [p0, p1], legs: [a, b], controls: [q0, q1], .. } = self;
+        space.ray(p0, a, Lane::ONE, q0);
+        space.ray(p1, b, lane(-1.0), q1);
+    }
+
+    /// γ(t), for t in units of the segment.
+    ///
+    /// The first three geodesics start at fixed points with known velocities: the outer ones are
+    /// never put through a logarithm, which keeps legs exact that come near the cut locus.
+    #[inline(always)]
+    pub fn at<M: Space>(&mut self, space: &M, t: S, gamma: &mut [S]) {
+        self.control(space);
+        let Segment { ends: [p0, p1], legs: [a, b], controls: [q0, q1], middle, level: [x, y, z] } = self;
+        space.log(q0, q1, middle);
+        space.ray(p0, a, t, x);
+        space.ray(q0, middle, t, y);
+        space.ray(p1, b, t - Lane::ONE, z);
+        space.geodesic(x, y, t, gamma);
+        space.geodesic(y, z, t, x);
+        space.geodesic(gamma, x, t, y);
+        gamma.copy_from_slice(y);
+    }
+}

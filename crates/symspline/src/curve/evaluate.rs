@@ -1,0 +1,304 @@
+//! Values and derivatives of spline curves at many times.
+
+use super::bezier::Segment;
+use super::locate::Locator;
+use crate::fit::gather;
+use crate::monitor::Monitor;
+use crate::parallel;
+use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, lane, max_or_nan};
+use crate::space::Space;
+
+/// Spline curves with equally many knots: the triple (t, p, u).
+pub struct Curves<'a> {
+    /// Knots of each curve, or of one for all.
+    pub t: &'a [f64],
+    /// Number of knots of a curve.
+    pub nodes: usize,
+    /// Points, curve after curve.
+    pub points: &'a [f64],
+    /// Velocities in the same layout.
+    pub velocities: &'a [f64],
+}
+
+/// Times to evaluate at.
+pub struct Times<'a> {
+    /// The times, of each curve or of all.
+    pub x: &'a [f64],
+    /// Times of one curve.
+    pub count: usize,
+}
+
+/// What to compute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// γ
+    Point,
+    /// γ'
+    Velocity,
+    /// ∇γ'
+    Acceleration,
+    /// |γ'|
+    Speed,
+    /// |∇γ'|
+    Bend,
+}
+
+/// What happens at times outside the knots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outside {
+    /// The last Bézier segment goes on.
+    Continue,
+    /// The curve goes on with constant velocity.
+    Geodesic,
+    /// Time wraps around.
+    Wrap,
+}
+
+/// Samples evaluated by one thread at a time.
+const BLOCK: usize = 2048;
+/// Samples times numbers from which threads pay.
+const PARALLEL: usize = 1 << 16;
+
+impl Curves<'_> {
+    fn knots(&self, curve: usize) -> &[f64] {
+        if self.t.len() == self.nodes {
+            self.t
+        } else {
+            &self.t[curve * self.nodes..(curve + 1) * self.nodes]
+        }
+    }
+
+    /// First and last knot of a curve.
+    pub fn domain(&self, curve: usize) -> (f64, f64) {
+        let t = self.knots(curve);
+        (t[0], t[self.nodes - 1])
+    }
+}
+
+/// Evaluates every curve at its times: `out` holds, curve by curve and time by time, a point or
+/// vector, or one number for [`Quantity::Speed`] and [`Quantity::Bend`].
+pub fn evaluate<M: Space>(
+    space: &M,
+    curves: &Curves,
+    times: &Times,
+    quantity: Quantity,
+    outside: Outside,
+    monitor: &Monitor,
+    out: &mut [f64],
+) {
+    let size = match quantity {
+        Quantity::Speed | Quantity::Bend => 1,
+        _ => space.point_len(),
+    };
+    let samples = out.len() / size;
+    if samples == 0 {
+        return;
+    }
+    // A table over the knots pays for itself once there are about as many times as knots.
+    let shared = curves.t.len() == curves.nodes;
+    let locator = shared.then(|| Locator::new(curves.t, samples > 8 && samples >= curves.nodes / 4));
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * size).enumerate().collect();
+    let parallel = samples * space.point_len() > PARALLEL;
+    parallel::for_each(blocks, parallel, monitor, |(block, out)| {
+        let job = Job { space, curves, times, outside, locator: locator.as_ref(), first: block * BLOCK };
+        match quantity {
+            Quantity::Point => job.run::<Lane>(out, size, |gamma, row| row.copy_from_slice(gamma)),
+            Quantity::Velocity => job.derivatives::<Dual>(out, size, Wanted::Velocity),
+            Quantity::Speed => job.derivatives::<Dual>(out, size, Wanted::Speed),
+            Quantity::Acceleration => job.derivatives::<Jet>(out, size, Wanted::Acceleration),
+            Quantity::Bend => job.derivatives::<Jet>(out, size, Wanted::Bend),
+        }
+        monitor.advance(out.len() / size);
+    });
+}
+
+#[derive(Clone, Copy)]
+enum Wanted {
+    Velocity,
+    Acceleration,
+    Speed,
+    Bend,
+}
+
+/// A scalar that carries derivatives in t.
+trait Derivatives: Scalar {
+    fn time(t: Lane, rate: Lane) -> Self;
+    fn jet(self) -> Jet;
+}
+
+impl Derivatives for Lane {
+    #[inline(always)]
+    fn time(t: Lane, _rate: Lane) -> Self {
+        t
+    }
+    #[inline(always)]
+    fn jet(self) -> Jet {
+        Jet::constant(self)
+    }
+}
+
+impl Derivatives for Dual {
+    #[inline(always)]
+    fn time(t: Lane, rate: Lane) -> Self {
+        Dual { v: t, d: rate }
+    }
+    #[inline(always)]
+    fn jet(self) -> Jet {
+        Jet { v: self.v, d: self.d, dd: Lane::ZERO }
+    }
+}
+
+impl Derivatives for Jet {
+    #[inline(always)]
+    fn time(t: Lane, rate: Lane) -> Self {
+        Jet { v: t, d: rate, dd: Lane::ZERO }
+    }
+    #[inline(always)]
+    fn jet(self) -> Jet {
+        self
+    }
+}
+
+struct Job<'a, M> {
+    space: &'a M,
+    curves: &'a Curves<'a>,
+    times: &'a Times<'a>,
+    outside: Outside,
+    locator: Option<&'a Locator<'a>>,
+    first: usize,
+}
+
+/// Where one sample falls.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    curve: usize,
+    segment: usize,
+    h: f64,
+    /// Time in units of the segment.
+    tau: f64,
+    /// Time beyond the last (positive) or before the first knot.
+    beyond: f64,
+}
+
+impl<M: Space> Job<'_, M> {
+    #[inline(always)]
+    fn place(&self, sample: usize, hint: usize) -> Place {
+        let Times { x, count } = *self.times;
+        let curve = sample / count;
+        let x = if x.len() == count { x[sample % count] } else { x[sample] };
+        let t = self.curves.knots(curve);
+        let (start, end) = (t[0], t[t.len() - 1]);
+        let mut place = Place { curve, ..Place::default() };
+        let mut x = x;
+        if x < start || x > end {
+            match self.outside {
+                Outside::Continue => {}
+                Outside::Geodesic => {
+                    place.beyond = if x < start { x - start } else { x - end };
+                    x = x.clamp(start, end);
+                }
+                Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).clamp(start, end),
+            }
+        }
+        let k = match self.locator {
+            Some(locator) => locator.find(x, hint),
+            None => Locator::new(t, false).find(x, hint.min(t.len() - 2)),
+        };
+        place.segment = k;
+        place.h = t[k + 1] - t[k];
+        // Exactly 1 at the last knot.
+        place.tau = if x == t[k + 1] { 1.0 } else { (x - t[k]) / place.h };
+        place
+    }
+
+    fn derivatives<S: Derivatives>(&self, out: &mut [f64], size: usize, wanted: Wanted) {
+        let len = self.space.point_len();
+        let (mut jets, mut p) = (vec![Jet::constant(Lane::ZERO); len], vec![Lane::ZERO; len]);
+        let (mut velocity, mut acceleration) = (p.clone(), p.clone());
+        self.run::<S>(out, size, |gamma, row| {
+            for i in 0..len {
+                jets[i] = gamma[i].jet();
+                p[i] = jets[i].v;
+            }
+            self.space.covariant(&jets, &mut velocity, &mut acceleration);
+            let norm = |v: &[Lane]| max_or_nan(self.space.inner(&p, v, v), Lane::ZERO).sqrt();
+            match wanted {
+                Wanted::Velocity => row.copy_from_slice(&velocity),
+                Wanted::Acceleration => row.copy_from_slice(&acceleration),
+                Wanted::Speed => row[0] = norm(&velocity),
+                Wanted::Bend => row[0] = norm(&acceleration),
+            }
+        });
+    }
+
+    /// Evaluates a block of samples, eight at a time, whatever segments they fall in.
+    #[inline(always)]
+    fn run<S: Derivatives>(&self, out: &mut [f64], size: usize, mut finish: impl FnMut(&[S], &mut [Lane])) {
+        let (space, curves) = (self.space, self.curves);
+        let len = space.point_len();
+        let mut segment = Segment::<S>::new(len);
+        let mut gamma = vec![S::constant(Lane::ZERO); len];
+        let mut row = vec![Lane::ZERO; size];
+        let samples = out.len() / size;
+        let mut hint = 0;
+        for (group, out) in out.chunks_mut(LANES * size).enumerate() {
+            let first = group * LANES;
+            let mut places = [Place::default(); LANES];
+            for (l, place) in places.iter_mut().enumerate() {
+                // Lanes that are left over repeat the last sample.
+                *place = self.place(self.first + (first + l).min(samples - 1), hint);
+                hint = place.segment;
+            }
+            let at: [usize; LANES] = places.map(|p| (p.curve * curves.nodes + p.segment) * len);
+            let h = Lane::new(places.map(|p| p.h));
+            let tau = Lane::new(places.map(|p| p.tau));
+            let third = h * lane(1.0 / 3.0);
+            let Segment { ends: [p0, p1], legs: [a, b], .. } = &mut segment;
+            gather(at.map(|i| &curves.points[i..i + len]), p0);
+            gather(at.map(|i| &curves.points[i + len..i + 2 * len]), p1);
+            gather(at.map(|i| &curves.velocities[i..i + len]), a);
+            gather(at.map(|i| &curves.velocities[i + len..i + 2 * len]), b);
+            a.iter_mut().chain(b).for_each(|u| *u *= third);
+            segment.at(space, S::time(tau, Lane::ONE / h), &mut gamma);
+            if self.outside == Outside::Geodesic && places.iter().any(|p| p.beyond != 0.0) {
+                self.go_straight(&places, third, &mut segment, &mut gamma);
+            }
+            finish(&gamma, &mut row);
+            scatter(&row, out);
+        }
+    }
+
+    /// Replaces the lanes outside the knots by the geodesic that leaves the end.
+    #[cold]
+    fn go_straight<S: Derivatives>(
+        &self,
+        places: &[Place; LANES],
+        third: Lane,
+        segment: &mut Segment<S>,
+        gamma: &mut [S],
+    ) {
+        let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
+        let beyond = Lane::new(places.map(|p| p.beyond));
+        let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
+        for i in 0..p0.len() {
+            p0[i] = before.select(p0[i], p1[i]);
+            a[i] = before.select(a[i], b[i]) / third;
+        }
+        let mut straight = gamma.to_vec();
+        self.space.ray(p0, a, S::time(beyond, Lane::ONE), &mut straight);
+        for (g, s) in gamma.iter_mut().zip(&straight) {
+            *g = S::select(before | behind, *s, *g);
+        }
+    }
+}
+
+/// Writes lanes of a row as consecutive rows; the last group may be short.
+#[inline(always)]
+fn scatter(row: &[Lane], out: &mut [f64]) {
+    for (c, x) in row.iter().enumerate() {
+        let values = x.as_array();
+        for (l, out) in out.chunks_exact_mut(row.len()).enumerate() {
+            out[c] = values[l];
+        }
+    }
+}

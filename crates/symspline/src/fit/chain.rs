@@ -1,0 +1,216 @@
+//! The interpolation polygon, unrolled into a moving frame.
+//!
+//! The frame at p₀ is carried in parallel along the geodesics p₀p₁, p₁p₂, … Seen from the frames
+//! every node is the origin, the polygon is its chords dᵢ (coordinates of `log_{pᵢ}(pᵢ₊₁)`), velocities
+//! are coordinate vectors, and transport between neighbours is the identity.
+//!
+//! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
+//! long curve.
+
+use crate::scalar::{LANES, Lane, lane, max_or_nan};
+use crate::space::Space;
+
+/// After this many steps the rounding errors of a frame are removed. Between neighbours, which is
+/// all that matters, frames are exact to rounding whatever this number is.
+const TIDY_EVERY: usize = 32;
+
+/// What one lane of a chain is made of: a run of nodes of a curve, counted around the curve when
+/// it is closed.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    /// All knots of the curve.
+    pub t: &'a [f64],
+    /// All points of the curve, one after another.
+    pub points: &'a [f64],
+    /// The first node.
+    pub first: usize,
+}
+
+impl<'a> Run<'a> {
+    /// Length of the segment behind the i-th node.
+    fn h(&self, i: usize) -> f64 {
+        let k = (self.first + i) % (self.t.len() - 1);
+        self.t[k + 1] - self.t[k]
+    }
+
+    /// The point of the i-th node.
+    fn point(&self, i: usize, len: usize) -> &'a [f64] {
+        let last = self.t.len() - 1;
+        let k = self.first + i;
+        let k = if k <= last { k } else { k % last };
+        &self.points[k * len..(k + 1) * len]
+    }
+}
+
+/// One row of numbers from each of eight arrays, side by side.
+#[inline(always)]
+pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
+    for (c, x) in out.iter_mut().enumerate() {
+        *x = Lane::new(std::array::from_fn(|l| rows[l][c]));
+    }
+}
+
+/// A frame on its way along the polygon.
+#[derive(Default)]
+struct Walker {
+    frame: Vec<Lane>,
+    p: Vec<Lane>,
+    q: Vec<Lane>,
+    node: usize,
+}
+
+impl Walker {
+    fn start<M: Space>(&mut self, space: &M, runs: &[Run; LANES]) {
+        let len = space.point_len();
+        self.frame.resize(space.frame_len(), Lane::ZERO);
+        self.p.resize(len, Lane::ZERO);
+        self.q.resize(len, Lane::ZERO);
+        self.node = 0;
+        gather(runs.map(|r| r.point(0, len)), &mut self.p);
+        space.lift(&self.p, &mut self.frame);
+    }
+
+    /// One node on; returns the deciding angle of the chord.
+    #[inline(always)]
+    fn advance<M: Space>(&mut self, space: &M, runs: &[Run; LANES], chord: &mut [Lane]) -> Lane {
+        self.node += 1;
+        let len = self.p.len();
+        gather(runs.map(|r| r.point(self.node, len)), &mut self.q);
+        let angle = space.step(&mut self.frame, &self.p, &self.q, chord);
+        std::mem::swap(&mut self.p, &mut self.q);
+        if self.node.is_multiple_of(TIDY_EVERY) {
+            space.tidy(&mut self.frame, &self.p);
+        }
+        angle
+    }
+}
+
+/// Eight unrolled polygons and everything the solvers keep of them. Reused from fit to fit.
+#[derive(Default)]
+pub struct Chain {
+    /// Number of segments.
+    pub n: usize,
+    /// Dimension of the space.
+    pub m: usize,
+    /// Segment lengths hᵢ.
+    pub h: Vec<Lane>,
+    /// Chords dᵢ, m numbers each.
+    pub chord: Vec<Lane>,
+    /// What [`Space::prepare`] keeps of each chord.
+    pub prepared: Vec<Lane>,
+    /// The unknown velocities uᵢ.
+    pub u: Vec<Lane>,
+    /// The C² defect at each node.
+    pub r: Vec<Lane>,
+    /// Prescribed end vectors, in the frames of the ends.
+    pub end_values: [Vec<Lane>; 2],
+    /// The longest chord of each lane.
+    pub max_step: Lane,
+    /// By how much rounding errors may grow in each lane, see [`Space::condition`].
+    pub condition: Lane,
+    /// Where neighbours lie at or past the cut locus: the first segment and its deciding angle.
+    pub cut: [Option<(usize, f64)>; LANES],
+    walker: Walker,
+    /// Frame and point at the first node.
+    start: (Vec<Lane>, Vec<Lane>),
+    ambient: Vec<Lane>,
+}
+
+impl Chain {
+    /// Unrolls `n` segments of eight polygons. `ends` are prescribed ambient vectors at the ends.
+    pub fn unroll<M: Space>(
+        &mut self,
+        space: &M,
+        runs: &[Run; LANES],
+        n: usize,
+        ends: [Option<[&[f64]; LANES]>; 2],
+    ) {
+        let (m, len, keep) = (space.dim(), space.point_len(), space.chord_len());
+        (self.n, self.m) = (n, m);
+        for (vector, size) in [
+            (&mut self.h, n),
+            (&mut self.chord, n * m),
+            (&mut self.prepared, n * keep),
+            (&mut self.u, (n + 1) * m),
+            (&mut self.r, (n + 1) * m),
+            (&mut self.ambient, len),
+        ] {
+            vector.resize(size, Lane::ZERO);
+        }
+        self.u.fill(Lane::ZERO);
+        (self.max_step, self.condition, self.cut) = (Lane::ZERO, Lane::ONE, [None; LANES]);
+        // Angles carry a few rounding errors; what is within them of the cut locus is on it.
+        let limit = lane(space.cut_angle() * (1.0 - 4.0 * f64::EPSILON));
+
+        self.walker.start(space, runs);
+        self.start.0.clone_from(&self.walker.frame);
+        self.start.1.clone_from(&self.walker.p);
+        self.read_end(space, 0, ends[0]);
+        for i in 0..n {
+            self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i)));
+            let d = &mut self.chord[i * m..(i + 1) * m];
+            let angle = self.walker.advance(space, runs, d);
+            space.prepare(d, &mut self.prepared[i * keep..(i + 1) * keep]);
+            self.max_step = max_or_nan(self.max_step, space.norm2(d));
+            self.condition = max_or_nan(self.condition, space.condition(d));
+            let inside = angle.simd_lt(limit);
+            if !inside.all() {
+                for l in 0..LANES {
+                    if inside.to_bitmask() >> l & 1 == 0 {
+                        self.cut[l].get_or_insert((i, angle.to_array()[l]));
+                    }
+                }
+            }
+        }
+        self.max_step = self.max_step.sqrt();
+        self.read_end(space, 1, ends[1]);
+    }
+
+    /// The prescribed vector at an end, in the frame there; the walker must stand at that end.
+    fn read_end<M: Space>(&mut self, space: &M, end: usize, value: Option<[&[f64]; LANES]>) {
+        self.end_values[end].resize(self.m, Lane::ZERO);
+        match value {
+            Some(rows) => {
+                gather(rows, &mut self.ambient);
+                let Walker { frame, p, .. } = &self.walker;
+                space.to_frame(frame, p, &self.ambient, &mut self.end_values[end]);
+            }
+            None => self.end_values[end].fill(Lane::ZERO),
+        }
+    }
+
+    /// Carries coordinates across the seam of a closed curve: from the frame at its first node to
+    /// that at its last, or back.
+    pub fn across_seam<M: Space>(&mut self, space: &M, to_last: bool, x: &mut [Lane]) {
+        let first = (&self.start.0, &self.start.1);
+        let last = (&self.walker.frame, &self.walker.p);
+        let (from, to) = if to_last { (first, last) } else { (last, first) };
+        space.from_frame(from.0, from.1, x, &mut self.ambient);
+        space.to_frame(to.0, to.1, &self.ambient, x);
+    }
+
+    /// Hands out the velocities as ambient tangent vectors, node by node.
+    pub fn roll_up<M: Space>(
+        &mut self,
+        space: &M,
+        runs: &[Run; LANES],
+        mut visit: impl FnMut(usize, &[Lane]),
+    ) {
+        let m = self.m;
+        self.walker.start(space, runs);
+        for i in 0..=self.n {
+            let Walker { frame, p, .. } = &self.walker;
+            space.from_frame(frame, p, &self.u[i * m..(i + 1) * m], &mut self.ambient);
+            visit(i, &self.ambient);
+            if i < self.n {
+                // The chords are known; the residual is no longer needed and takes them.
+                self.walker.advance(space, runs, &mut self.r[..m]);
+            }
+        }
+    }
+
+    /// The number of numbers kept of each chord.
+    pub fn keep(&self) -> usize {
+        self.prepared.len() / self.n
+    }
+}

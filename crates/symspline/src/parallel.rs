@@ -1,0 +1,87 @@
+//! Independent pieces of work on all cores.
+
+use crate::monitor::Monitor;
+use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex};
+use std::time::Duration;
+
+/// A pool belongs to one process: after a fork its threads are gone, and the child makes its own.
+struct Pool {
+    process: u32,
+    threads: usize,
+    pool: rayon::ThreadPool,
+}
+
+static POOL: AtomicPtr<Pool> = AtomicPtr::new(std::ptr::null_mut());
+static THREADS: AtomicUsize = AtomicUsize::new(0);
+
+/// Limits the number of threads; 0 stands for all cores.
+pub fn set_num_threads(n: usize) {
+    THREADS.store(n, Ordering::Relaxed);
+}
+
+/// The number of threads that parallel work uses.
+pub fn num_threads() -> usize {
+    match THREADS.load(Ordering::Relaxed) {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    }
+}
+
+fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
+    let current = POOL.load(Ordering::Acquire);
+    // A pool, once stored, is never freed: others may be working in it.
+    #[allow(unsafe_code)]
+    let current: Option<&'static Pool> = unsafe { current.as_ref() };
+    if let Some(found) = current
+        && found.process == std::process::id()
+        && found.threads == threads
+    {
+        return Some(&found.pool);
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
+    let made = Box::leak(Box::new(Pool { process: std::process::id(), threads, pool }));
+    POOL.store(made, Ordering::Release);
+    Some(&made.pool)
+}
+
+/// Calls `work` on every item, on all cores if `parallel` says that this pays. Stops early when the
+/// monitor is cancelled.
+pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
+    let threads = num_threads().min(items.len());
+    let pool = if parallel && threads > 1 { pool(num_threads()) } else { None };
+    let Some(pool) = pool else {
+        for item in items {
+            if monitor.poll() {
+                return;
+            }
+            work(item);
+        }
+        return;
+    };
+    let queue = Mutex::new(items.into_iter());
+    let (busy, wake) = (Mutex::new(threads), Condvar::new());
+    pool.in_place_scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|_| {
+                while !monitor.cancelled()
+                    && let Some(item) = take(&queue)
+                {
+                    work(item);
+                }
+                *busy.lock().unwrap_or_else(|e| e.into_inner()) -= 1;
+                wake.notify_one();
+            });
+        }
+        // The caller's thread only watches: it is the one that may be asked to stop.
+        let mut left = busy.lock().unwrap_or_else(|e| e.into_inner());
+        while *left > 0 {
+            (left, _) = wake.wait_timeout(left, Duration::from_millis(20)).unwrap_or_else(|e| e.into_inner());
+            monitor.poll();
+        }
+    });
+}
+
+fn take<T>(queue: &Mutex<std::vec::IntoIter<T>>) -> Option<T> {
+    queue.lock().unwrap_or_else(|e| e.into_inner()).next()
+}

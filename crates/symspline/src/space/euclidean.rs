@@ -1,0 +1,114 @@
+//! Flat space Rⁿ, κ = 0: there the spline is the classical cubic spline.
+
+use super::Space;
+use crate::scalar::{Jet, Lane, Scalar, dot};
+
+/// Rⁿ with its usual inner product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Euclidean {
+    n: usize,
+}
+
+impl Euclidean {
+    /// Rⁿ
+    pub fn new(n: usize) -> Result<Self, String> {
+        if n == 0 { Err("Euclidean(n) needs n >= 1".into()) } else { Ok(Euclidean { n }) }
+    }
+
+    /// n
+    pub fn parameters(&self) -> [usize; 1] {
+        [self.n]
+    }
+}
+
+impl Space for Euclidean {
+    fn point_len(&self) -> usize {
+        self.n
+    }
+    fn dim(&self) -> usize {
+        self.n
+    }
+    fn frame_len(&self) -> usize {
+        0
+    }
+    fn cut_angle(&self) -> f64 {
+        f64::INFINITY
+    }
+    fn curvature(&self) -> f64 {
+        0.0
+    }
+
+    #[inline(always)]
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        for i in 0..self.n {
+            out[i] = t * v[i] + p[i];
+        }
+    }
+    #[inline(always)]
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        for i in 0..self.n {
+            out[i] = q[i] - p[i];
+        }
+        dot(out, out).sqrt()
+    }
+    #[inline(always)]
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        for i in 0..self.n {
+            out[i] = t.fma(q[i] - p[i], p[i]);
+        }
+    }
+    fn transvect(&self, _p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        for i in 0..self.n {
+            out[i] = x[i] + v[i];
+        }
+    }
+    fn carry(&self, _p: &[Lane], _v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        out.copy_from_slice(x);
+    }
+    #[inline(always)]
+    fn covariant(&self, gamma: &[Jet], velocity: &mut [Lane], acceleration: &mut [Lane]) {
+        for (i, g) in gamma.iter().enumerate() {
+            (velocity[i], acceleration[i]) = (g.d, g.dd);
+        }
+    }
+    fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        dot(u, v)
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        // NaN and infinity stay what they are: ∞ − ∞ is NaN.
+        x.iter().fold(Lane::ZERO, |sum, x| sum + (*x - *x))
+    }
+    fn project_tangent(&self, _p: &[Lane], v: &mut [Lane]) -> Lane {
+        self.project(v)
+    }
+    fn scatter(&self, _noise: &mut [Lane]) {}
+    fn complaint(&self, _x: &[f64]) -> String {
+        "it is not finite".into()
+    }
+
+    // Frames of flat space are all the same and hold nothing.
+    fn lift(&self, _p: &[Lane], _frame: &mut [Lane]) {}
+    #[inline(always)]
+    fn step(&self, _frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        self.log(p, q, chord)
+    }
+    fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
+    #[inline(always)]
+    fn to_frame(&self, _frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        x.copy_from_slice(v);
+    }
+    #[inline(always)]
+    fn from_frame(&self, _frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        v.copy_from_slice(x);
+    }
+
+    #[inline(always)]
+    fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+        for i in 0..self.n {
+            w_plus[i] = -(a[i] + b[i]) + d[i];
+            w_minus[i] = -w_plus[i];
+        }
+    }
+    #[inline(always)]
+    fn stretch<S: Scalar>(&self, _v: &[S], _x: &mut [S]) {}
+}

@@ -1,0 +1,174 @@
+//! The trait of a symmetric space, and the list of all of them.
+//!
+//! A page below this folder is one space. Its formulas come in three groups:
+//!
+//! * in the ambient array (exponential, logarithm, geodesic, transvection), for a user's calls and
+//!   for evaluating a curve;
+//! * with a *moving frame*: an element g of the group with g·o = p that is carried in parallel from
+//!   point to point. In frames every tangent vector is a coordinate vector of 𝔪 = T_oM and parallel
+//!   transport is the identity;
+//! * at the origin o, on coordinates of 𝔪: there the C² condition is solved.
+//!
+//! Adding a space is one page and one line in [`spaces!`].
+
+mod constant_curvature;
+mod euclidean;
+mod hyperbolic;
+mod sphere;
+
+pub use euclidean::Euclidean;
+pub use hyperbolic::Hyperbolic;
+pub use sphere::Sphere;
+
+use crate::scalar::{Jet, Lane, Scalar, dot, max_or_nan};
+
+/// A symmetric space: the paper's §2.1–2.4.
+///
+/// Points and tangent vectors are ambient arrays of [`point_len`](Space::point_len) numbers (a
+/// complex number is two), coordinates at the origin are [`dim`](Space::dim) numbers, orthonormal
+/// for [`norm2`](Space::norm2).
+pub trait Space: Copy + Send + Sync + 'static {
+    /// Numbers in the array of a point.
+    fn point_len(&self) -> usize;
+    /// Dimension of the space.
+    fn dim(&self) -> usize;
+    /// Numbers in a frame.
+    fn frame_len(&self) -> usize;
+    /// Numbers that [`prepare`](Space::prepare) keeps of a chord.
+    fn chord_len(&self) -> usize {
+        0
+    }
+    /// The deciding angle at which the cut locus is met; infinite where there is none.
+    fn cut_angle(&self) -> f64;
+    /// K of (22).
+    fn curvature(&self) -> f64;
+    /// Shape of the array of a point.
+    fn point_shape(&self) -> Vec<usize> {
+        vec![self.point_len()]
+    }
+    /// Distance below which the logarithm is defined whatever the direction.
+    fn injectivity_radius(&self) -> f64 {
+        self.cut_angle()
+    }
+
+    // ---- in the ambient array -------------------------------------------------------------
+
+    /// `exp_p(t v)`: the geodesic from p with velocity v.
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]);
+    /// `log_p(q)`, (11); returns the deciding angle.
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
+    /// Distance, given `log_p(q)` and the deciding angle; defined past the cut locus too.
+    fn distance(&self, p: &[Lane], _q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
+        max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt()
+    }
+    /// `[p, q]_t`, (7), between points that may move with t.
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]);
+    /// The transvection `E_p(v)` of (10) applied to a point x.
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
+    /// `E_p(v)` applied to a tangent vector x at p: parallel transport to `exp_p(v)`.
+    fn carry(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        self.transvect(p, v, x, out);
+    }
+    /// Velocity γ' and covariant acceleration ∇γ' from the derivatives of the ambient array.
+    fn covariant(&self, gamma: &[Jet], velocity: &mut [Lane], acceleration: &mut [Lane]);
+    /// Inner product of two tangent vectors at p.
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
+    /// Replaces x by a point of the space beside it; returns how far it was, relative to its size.
+    fn project(&self, x: &mut [Lane]) -> Lane;
+    /// Replaces v by its tangential part at p; returns how far it was, relative to its size.
+    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane;
+    /// Turns independent standard normal numbers into a random point.
+    fn scatter(&self, noise: &mut [Lane]);
+    /// Says in words and numbers why x is not a point.
+    fn complaint(&self, x: &[f64]) -> String;
+
+    // ---- moving frame ---------------------------------------------------------------------
+
+    /// A frame at p.
+    fn lift(&self, p: &[Lane], frame: &mut [Lane]);
+    /// Moves a frame at p along the geodesic to q, in parallel; `chord` becomes the coordinates of
+    /// `log_p(q)`. Returns the deciding angle.
+    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane;
+    /// Removes the rounding errors that a frame at p has gathered.
+    fn tidy(&self, frame: &mut [Lane], p: &[Lane]);
+    /// Coordinates of a tangent vector at p.
+    fn to_frame(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
+    /// The tangent vector at p with given coordinates.
+    fn from_frame(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
+
+    // ---- at the origin --------------------------------------------------------------------
+
+    /// Computes once for a chord what every call of [`legs`](Space::legs) needs of it.
+    fn prepare(&self, _chord: &[Lane], _prepared: &mut [Lane]) {}
+    /// With `M = E(−a) E(d) E(−b)` for the chord d: `w⁺ = log_o(M·o)` and `w⁻ = log_o(M⁻¹·o)`.
+    ///
+    /// These are the two logarithms of the C² condition (13), seen from either end of a segment
+    /// whose end velocities are `3a` and `3b`.
+    fn legs<S: Scalar>(
+        &self,
+        chord: &[Lane],
+        prepared: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    );
+    /// `S(v) x` with `S(v) = sinh(ad_v)/ad_v` of Lemma A.2.
+    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]);
+    /// Squared length of a coordinate vector.
+    fn norm2(&self, x: &[Lane]) -> Lane {
+        dot(x, x)
+    }
+    /// The deciding angle of `exp_o(v)`.
+    fn angle(&self, v: &[Lane]) -> Lane {
+        self.norm2(v).sqrt()
+    }
+    /// By how much rounding errors may grow in [`legs`](Space::legs) over a chord.
+    fn condition(&self, _chord: &[Lane]) -> Lane {
+        Lane::ONE
+    }
+}
+
+/// The list of spaces: makes the enum that dispatches once a call, and the names.
+macro_rules! spaces {
+    ($($space:ident($($parameter:ident),+) = $($name:literal)|+;)+) => {
+        /// Any of the spaces.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum AnySpace { $(#[allow(missing_docs)] $space($space)),+ }
+
+        impl AnySpace {
+            /// The space with a name (short or long) and parameters, e.g. `"sphere"`, `[2]`.
+            pub fn new(name: &str, parameters: &[usize]) -> Result<Self, String> {
+                match (name, parameters) {
+                    $(($($name)|+, &[$($parameter),+]) => $space::new($($parameter),+).map(Self::$space),)+
+                    $(($($name)|+, _) => Err(format!(
+                        "{name} takes {} number(s) ({}), got {}",
+                        [$(stringify!($parameter)),+].len(), [$(stringify!($parameter)),+].join(", "), parameters.len())),)+
+                    _ => Err(format!("unknown space {name:?}; known are {}", Self::NAMES.map(|n| n.join(" or ")).join(", "))),
+                }
+            }
+
+            /// All names, one row a space, the first of a row being the canonical one.
+            pub const NAMES: [&[&str]; [$(stringify!($space)),+].len()] = [$(&[$($name),+]),+];
+
+            /// The canonical name and the parameters.
+            pub fn name(&self) -> (&'static str, Vec<usize>) {
+                match self { $(Self::$space(space) => ([$($name),+][0], space.parameters().to_vec())),+ }
+            }
+        }
+
+        /// Runs an expression with the concrete space behind an [`AnySpace`].
+        #[macro_export]
+        macro_rules! with_space {
+            ($any:expr, $bound:ident => $body:expr) => {
+                match $any { $($crate::space::AnySpace::$space($bound) => $body),+ }
+            };
+        }
+    };
+}
+
+spaces! {
+    Euclidean(n) = "euclidean" | "r";
+    Sphere(n) = "sphere" | "s";
+    Hyperbolic(n) = "hyperbolic" | "h";
+}

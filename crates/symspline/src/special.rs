@@ -1,0 +1,207 @@
+//! Functions of a squared argument.
+//!
+//! On every constant-curvature space, and through the eigenvalues of a Hermitian matrix on every
+//! other, exponential, logarithm and transvection need cos√x, sin√x/√x and their relatives: entire
+//! functions of x, whose values at x < 0 are the hyperbolic functions. Written in x (and the
+//! logarithm in y = 1 − cos θ) nothing is singular at 0 and flat, spherical and hyperbolic space
+//! are one formula.
+//!
+//! Small arguments use the Taylor series, others the library functions. Which of the two a lane
+//! gets depends on its own argument only, so that a result never depends on its neighbours.
+
+use crate::scalar::{Lane, Scalar, lane};
+
+/// Largest |x| for which [`Trig`] uses its Taylor series: 12 terms leave less than 1e-19 there.
+const TRIG_SERIES: f64 = 2.5;
+/// Below this |x| six terms suffice.
+const TRIG_SHORT: f64 = 0.1;
+/// Largest |y| for which [`theta_over_sin`] uses its series.
+const ARC_SERIES: f64 = 0.09;
+/// Below this |y| seven terms suffice.
+const ARC_SHORT: f64 = 0.0075;
+
+const fn factorial(n: usize) -> f64 {
+    let mut product = 1.0;
+    let mut i = 2;
+    while i <= n {
+        product *= i as f64;
+        i += 1;
+    }
+    product
+}
+
+/// (−1)ʲ / (2j + `shift`)!
+const fn alternating<const N: usize>(shift: usize) -> [f64; N] {
+    let mut c = [0.0; N];
+    let mut j = 0;
+    while j < N {
+        c[j] = if j % 2 == 0 { 1.0 } else { -1.0 } / factorial(2 * j + shift);
+        j += 1;
+    }
+    c
+}
+
+/// (1 − cos√x)/x = Σ (−x)ʲ/(2j+2)!
+const VERSINE: [f64; 12] = alternating(2);
+/// (1 − sin√x/√x)/x = Σ (−x)ʲ/(2j+3)!
+const SINC_DEFECT: [f64; 12] = alternating(3);
+/// θ/sin θ = Σ yʲ Πᵢ i/(2i+1) with y = 1 − cos θ, the series of asin(z)/(z√(1−z²)) at z² = y/2.
+const ARC: [f64; 16] = {
+    let mut c = [1.0; 16];
+    let mut j = 1;
+    while j < 16 {
+        c[j] = c[j - 1] * j as f64 / (2 * j + 1) as f64;
+        j += 1;
+    }
+    c
+};
+
+/// The polynomial `Σ cᵢ xⁱ` with as many derivatives as S carries.
+#[inline(always)]
+fn polynomial<S: Scalar>(c: &[f64], x: Lane) -> [Lane; 3] {
+    let mut p = [lane(c[c.len() - 1]), Lane::ZERO, Lane::ZERO];
+    for &coefficient in c[..c.len() - 1].iter().rev() {
+        if S::ORDER > 1 {
+            p[2] = p[2].mul_add(x, p[1] + p[1]);
+        }
+        if S::ORDER > 0 {
+            p[1] = p[1].mul_add(x, p[0]);
+        }
+        p[0] = p[0].mul_add(x, lane(coefficient));
+    }
+    p
+}
+
+#[inline(always)]
+fn select<S: Scalar>(mask: Lane, a: [Lane; 3], b: [Lane; 3]) -> [Lane; 3] {
+    // The derivatives that S does not carry are never read.
+    [
+        mask.select(a[0], b[0]),
+        if S::ORDER > 0 { mask.select(a[1], b[1]) } else { Lane::ZERO },
+        if S::ORDER > 1 { mask.select(a[2], b[2]) } else { Lane::ZERO },
+    ]
+}
+
+/// The entire functions of x = θ² that exponential and transvection consist of.
+#[derive(Clone, Copy, Debug)]
+pub struct Trig<S> {
+    /// cos√x
+    pub c: S,
+    /// sin√x / √x
+    pub s: S,
+    /// (cos√x − 1)/x
+    pub k: S,
+    /// (1 − sin√x/√x)/x
+    pub j: S,
+}
+
+impl<S: Scalar> Trig<S> {
+    /// All four at x, which may have either sign: at x < 0 they are cosh√−x, sinh√−x/√−x, …
+    #[inline(always)]
+    pub fn new(x: S) -> Self {
+        let xv = x.value();
+        let ax = xv.abs();
+        let series = ax.simd_le(lane(TRIG_SERIES));
+        let (versine, defect) = if ax.simd_le(lane(TRIG_SHORT)).all() {
+            // On this range the two tiers agree to rounding but not bit for bit; every lane that
+            // is short takes the short tier in the mixed case too (see `taylor`).
+            (polynomial::<S>(&VERSINE[..6 + S::ORDER], xv), polynomial::<S>(&SINC_DEFECT[..6 + S::ORDER], xv))
+        } else if series.all() {
+            taylor::<S>(xv)
+        } else {
+            let (a, b) = taylor::<S>(xv);
+            let (c, d) = full_range::<S>(xv);
+            (select::<S>(series, a, c), select::<S>(series, b, d))
+        };
+        let k = -x.compose(versine);
+        let j = x.compose(defect);
+        Trig { c: k.fma(x, S::constant(Lane::ONE)), s: (-j).fma(x, S::constant(Lane::ONE)), k, j }
+    }
+}
+
+#[inline(always)]
+fn taylor<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
+    let short = x.abs().simd_le(lane(TRIG_SHORT));
+    let n = 6 + S::ORDER;
+    let long = (polynomial::<S>(&VERSINE, x), polynomial::<S>(&SINC_DEFECT, x));
+    if short.none() {
+        return long;
+    }
+    (
+        select::<S>(short, polynomial::<S>(&VERSINE[..n], x), long.0),
+        select::<S>(short, polynomial::<S>(&SINC_DEFECT[..n], x), long.1),
+    )
+}
+
+/// (1 − cos√x)/x and (1 − sin√x/√x)/x away from 0, with derivatives in x.
+#[inline(never)]
+fn full_range<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
+    let r = x.abs().sqrt();
+    let (sin, cos) = r.sin_cos();
+    let (e, positive) = (r.exp(), x.simd_gt(Lane::ZERO));
+    let inverse = Lane::ONE / e;
+    let half = lane(0.5);
+    let c = positive.select(cos, half * (e + inverse));
+    let s = positive.select(sin, half * (e - inverse)) / r;
+    let (v, d) = ((Lane::ONE - c) / x, (Lane::ONE - s) / x);
+    // c' = −s/2, s' = (c − s)/(2x); the quotient rule gives the rest.
+    let s1 = half * (c - s) / x;
+    let s2 = (-half * s - lane(3.0) * s1) * half / x;
+    let v1 = (half * s - v) / x;
+    let v2 = (half * s1 - lane(2.0) * v1) / x;
+    let d1 = (-s1 - d) / x;
+    let d2 = (-s2 - lane(2.0) * d1) / x;
+    ([v, v1, v2], [d, d1, d2])
+}
+
+/// θ/sin θ as a function of y = 1 − cos θ; at y < 0 it is d/sinh d with y = 1 − cosh d.
+///
+/// `rest` = 2 − y = 1 + cos θ, given apart because near the cut locus, θ = π, the caller may know
+/// it to more digits than y can carry.
+#[inline(always)]
+pub fn theta_over_sin<S: Scalar>(y: S, rest: Lane) -> S {
+    let yv = y.value();
+    let ay = yv.abs();
+    let f = if ay.simd_le(lane(ARC_SHORT)).all() {
+        polynomial::<S>(&ARC[..7 + S::ORDER], yv)
+    } else {
+        let short = ay.simd_le(lane(ARC_SHORT));
+        let series = ay.simd_le(lane(ARC_SERIES));
+        let mut f = polynomial::<S>(&ARC[..14 + S::ORDER], yv);
+        if short.any() {
+            f = select::<S>(short, polynomial::<S>(&ARC[..7 + S::ORDER], yv), f);
+        }
+        if !series.all() {
+            f = select::<S>(series, f, arc_full_range(yv, rest));
+        }
+        f
+    };
+    y.compose(f)
+}
+
+#[inline(never)]
+fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
+    let cos = y.simd_lt(Lane::ONE).select(Lane::ONE - y, rest - Lane::ONE);
+    let sin2 = y * rest;
+    let sin = sin2.abs().sqrt();
+    let theta = y.simd_gt(Lane::ZERO).select(sin.atan2(cos), (cos + sin).ln());
+    let f = theta / sin;
+    // f sin θ = θ with dy = sin θ dθ gives f' sin²θ = 1 − f cos θ, and once more for f''.
+    let f1 = (Lane::ONE - f * cos) / sin2;
+    let f2 = (f - lane(3.0) * cos * f1) / sin2;
+    [f, f1, f2]
+}
+
+/// sin((1−t)θ)/sin θ and sin(tθ)/sin θ, the weights of a geodesic between two points whose
+/// y = 1 − cos θ; at y < 0 the hyperbolic ones, at y = 0 the weights 1 − t and t of a line.
+#[inline(always)]
+pub fn slerp<S: Scalar>(t: S, y: S, rest: Lane) -> [S; 2] {
+    let f = theta_over_sin(y, rest);
+    // θ² = f² sin²θ
+    let theta2 = f * f * y * (S::constant(rest) - (y - y.value()));
+    let weight = |t: S| {
+        let x = t * t * theta2;
+        f * t * Trig::new(x).s
+    };
+    [weight(-t + Lane::ONE), weight(t)]
+}

@@ -1,0 +1,51 @@
+"""Smooth C² curves through points on curved spaces.
+
+>>> import symspline as ss
+>>> spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
+>>> spline(0.5).round(8)
+array([ 0.61308303,  0.76368565, -0.20227067])
+
+The method is that of Bogfjellmo, Modin and Verdier, *A Numerical Algorithm for C²-splines on
+Symmetric Spaces* (2018), extended to any knots and many end conditions.
+"""
+
+import os as _os
+from pathlib import Path as _Path
+
+from . import _cpu
+
+_cpu.check(_Path(__file__).parent)
+
+from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads, set_num_threads  # noqa: E402
+from .files import load  # noqa: E402
+from .product import Product  # noqa: E402
+from .report import ConvergenceWarning, Report  # noqa: E402
+from .spaces import Euclidean, Hyperbolic, Space, Sphere, space  # noqa: E402
+from .spline import CubicSpline, evaluate, fit, fit_many  # noqa: E402
+
+__version__ = "0.1.0"
+__all__ = [
+    "ConvergenceError",
+    "ConvergenceWarning",
+    "CubicSpline",
+    "CutLocusError",
+    "Euclidean",
+    "Hyperbolic",
+    "Product",
+    "Report",
+    "Space",
+    "Sphere",
+    "ValidationError",
+    "evaluate",
+    "fit",
+    "fit_many",
+    "load",
+    "num_threads",
+    "set_num_threads",
+    "space",
+]
+
+if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):
+    if not _threads.isdecimal():
+        raise ImportError(f"SYMSPLINE_NUM_THREADS must be a whole number, not {_threads!r}")
+    set_num_threads(int(_threads))

@@ -1,0 +1,59 @@
+"""The compiled core. Its arrays are contiguous doubles; complex numbers are pairs of them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Doubles = NDArray[np.float64]
+_Progress = Callable[[int, int], object]
+
+class ValidationError(ValueError): ...
+
+class CutLocusError(ValueError):
+    spline: Any
+
+class ConvergenceError(RuntimeError):
+    spline: Any
+
+@final
+class Handle:
+    def __new__(cls, name: str, parameters: Sequence[int]) -> Handle: ...
+    def name(self) -> tuple[str, list[int]]: ...
+    @staticmethod
+    def names() -> list[list[str]]: ...
+    def point_shape(self) -> list[int]: ...
+    def dim(self) -> int: ...
+    def injectivity_radius(self) -> float: ...
+    def curvature(self) -> float: ...
+    def apply(self, operation: str, inputs: Sequence[_Doubles], t: _Doubles | None = None) -> _Doubles: ...
+    def check_points(self, points: _Doubles, tol: float) -> None: ...
+    def tangent_defects(self, points: _Doubles, vectors: _Doubles) -> _Doubles: ...
+
+def fit(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    ends: Sequence[tuple[str, _Doubles | None]] | None,
+    method: str,
+    tol: float,
+    max_iter: int | None,
+    check: bool,
+    point_tol: float,
+    offsets: Sequence[int] | None = None,
+    progress: _Progress | None = None,
+) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...], list[tuple[int, str, str]]]: ...
+def evaluate(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    velocities: _Doubles,
+    x: _Doubles,
+    quantity: str,
+    outside: str,
+    per_curve: bool,
+    progress: _Progress | None = None,
+) -> _Doubles: ...
+def set_num_threads(n: int) -> None: ...
+def num_threads() -> int: ...

@@ -1,0 +1,83 @@
+"""Curves of different lengths in one call of the core."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import _core, spline
+from ._core import ValidationError
+from ._ends import ends_of
+from .report import shaped
+from .spaces import Space
+from .spline import CubicSpline
+
+
+def fit_many(
+    curves: list[tuple[Any, Any]],
+    space: Space,
+    *,
+    bc_type: Any = "natural",
+    method: str = "auto",
+    tol: float = 1e-12,
+    max_iter: int | None = None,
+    extrapolate: bool | str | None = None,
+    on_failure: str = "raise",
+    check: bool = True,
+    progress: spline.Progress | None = None,
+) -> list[CubicSpline]:
+    """See `symspline.fit_many`."""
+    policy = spline._policy(extrapolate)
+    spline._check_choice("on_failure", on_failure, ("raise", "warn", "ignore"))
+    if hasattr(space, "factors"):
+        from .product import fit_many as product_many
+
+        options = {"method": method, "tol": tol, "max_iter": max_iter, "check": check, "progress": progress}
+        return product_many(curves, space, bc_type, policy, on_failure, options)
+    if not curves:
+        return []
+    prepared = []
+    point_tol = 0.0
+    for number, curve in enumerate(curves):
+        try:
+            t, points = curve
+            doubles, tol_here = spline._points(points, space)
+            if doubles.ndim != len(space.point_shape) + 1:
+                raise ValidationError(f"points has shape {doubles.shape}; each curve here is a single one")
+            prepared.append((*spline._knots(t, (), doubles.shape[0]), doubles))
+        except (ValidationError, TypeError, ValueError) as error:
+            raise ValidationError(f"curve {number}: {error}") from None
+        point_tol = max(point_tol, tol_here)
+    offsets = np.cumsum([0, *(len(p) for *_, p in prepared)])
+    all_points, all_velocities, columns, faults = _core.fit(
+        space._handle,
+        np.concatenate([times for _, _, times, _ in prepared]),
+        np.concatenate([p for *_, p in prepared]),
+        ends_of(bc_type, space, (len(curves),)),
+        method,
+        tol,
+        max_iter,
+        check,
+        point_tol,
+        offsets.tolist(),
+        progress,
+    )
+    reports = shaped(spline._solver(method), columns, (len(curves),), space.curvature)
+    fitted = [
+        CubicSpline._made(
+            space,
+            clock,
+            t,
+            times,
+            all_points[offsets[i] : offsets[i + 1]],
+            all_velocities[offsets[i] : offsets[i + 1]],
+            spline._pick_ends(bc_type, i, 1, space),
+            policy,
+            reports._map(lambda column, i=i: column[i].item()),
+        )
+        for i, (clock, t, times, _) in enumerate(prepared)
+    ]
+    if faults:
+        spline._fail(faults, on_failure, fitted)
+    return fitted

@@ -1,0 +1,289 @@
+"""Products of spaces: curves that run in several spaces at once, on the same knots."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import spline as _spline
+from ._core import ConvergenceError, CutLocusError, ValidationError
+from .report import Report
+from .spaces import Space
+from .spaces import space as space_named
+from .spline import CubicSpline
+
+Tuple = tuple[Any, ...]
+
+
+class Product(Space):
+    """The product of spaces: a point is a tuple with one point of each.
+
+    Distances add as in Pythagoras' theorem; geodesics and splines run in every factor on its own.
+
+    >>> import symspline as ss
+    >>> ss.Product(ss.Sphere(3), ss.Euclidean(3))
+    Product(Sphere(3), Euclidean(3))
+    >>> str(ss.space("sphere:3 x r:3"))
+    'sphere:3 x euclidean:3'
+    """
+
+    def __init__(self, *factors: Space | str) -> None:
+        spaces = [space_named(factor) for factor in factors]
+        if len(spaces) < 2:
+            raise ValidationError("a Product needs at least two factors")
+        flat = [part for s in spaces for part in (s.factors if isinstance(s, Product) else (s,))]
+        self.factors: tuple[Space, ...] = tuple(flat)
+
+    @property
+    def point_shape(self) -> Tuple:
+        """Shapes of the arrays of one point, a tuple of tuples."""
+        return tuple(f.point_shape for f in self.factors)
+
+    @property
+    def dim(self) -> int:
+        """Sum of the factors' dimensions."""
+        return sum(f.dim for f in self.factors)
+
+    @property
+    def injectivity_radius(self) -> float:
+        """The smallest of the factors'."""
+        return min(f.injectivity_radius for f in self.factors)
+
+    @property
+    def curvature(self) -> float:
+        """The largest K of the factors."""
+        return max(f.curvature for f in self.factors)
+
+    def __str__(self) -> str:
+        return " x ".join(map(str, self.factors))
+
+    def __repr__(self) -> str:
+        return f"Product({', '.join(map(repr, self.factors))})"
+
+    def __reduce__(self) -> Tuple:
+        return Product, self.factors
+
+    def _each(self, method: str, *arguments: Any, **shared: Any) -> Tuple:
+        """Calls a method of every factor with its parts of the arguments."""
+        for value in arguments:
+            if not isinstance(value, (tuple, list)) or len(value) != len(self.factors):
+                raise ValidationError(f"{self!r} needs tuples of {len(self.factors)} arrays, one a factor")
+        parts = zip(*arguments, strict=True) if arguments else [()] * len(self.factors)
+        return tuple(
+            getattr(factor, method)(*part, **shared) for factor, part in zip(self.factors, parts, strict=True)
+        )
+
+    def exp(self, p: Any, v: Any) -> Any:
+        return self._each("exp", p, v)
+
+    def log(self, p: Any, q: Any) -> Any:
+        return self._each("log", p, q)
+
+    def geodesic(self, p: Any, q: Any, t: ArrayLike) -> Any:
+        return self._each("geodesic", p, q, t=t)
+
+    def distance(self, p: Any, q: Any) -> Any:
+        return np.sqrt(sum(np.square(d) for d in self._each("distance", p, q)))
+
+    def transvection(self, p: Any, v: Any, x: Any) -> Any:
+        return self._each("transvection", p, v, x)
+
+    def transport(self, p: Any, q: Any, v: Any) -> Any:
+        return self._each("transport", p, q, v)
+
+    def inner(self, p: Any, u: Any, v: Any) -> Any:
+        return sum(self._each("inner", p, u, v))
+
+    def norm(self, p: Any, v: Any) -> Any:
+        return np.sqrt(sum(np.square(n) for n in self._each("norm", p, v)))
+
+    def project(self, x: Any) -> Any:
+        return self._each("project", x)
+
+    def project_tangent(self, p: Any, v: Any) -> Any:
+        return self._each("project_tangent", p, v)
+
+    def check_point(self, p: Any) -> None:
+        self._each("check_point", p)
+
+    def check_tangent(self, p: Any, v: Any) -> None:
+        self._each("check_tangent", p, v)
+
+    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Any:
+        return tuple(factor.random_point(rng, shape) for factor in self.factors)
+
+    def random_tangent(self, rng: np.random.Generator, p: Any) -> Any:
+        return tuple(factor.random_tangent(rng, q) for factor, q in zip(self.factors, p, strict=True))
+
+
+class ProductSpline(CubicSpline):
+    """A spline in a product of spaces: one spline in every factor. Made by `CubicSpline`."""
+
+    _space: Product  # type: ignore[assignment]
+    _parts: tuple[CubicSpline, ...]
+
+    def __init__(
+        self,
+        t: Any,
+        points: Any,
+        space: Any,
+        *,
+        bc_type: Any = "natural",
+        on_failure: str = "raise",
+        **options: Any,
+    ) -> None:
+        space = space_named(space)
+        _spline._check_choice("on_failure", on_failure, ("raise", "warn", "ignore"))
+        _check_tuple(points, space, "points")
+        ends = _split_ends(bc_type, space)
+        parts, errors = [], []
+        for factor, p, bc in zip(space.factors, points, ends, strict=True):
+            part, error = _try(t, p, factor, bc, options)
+            parts.append(part)
+            errors += [error] if error else []
+        self._join(space, tuple(parts), bc_type)
+        if len({part._batch for part in parts}) > 1:
+            raise ValidationError(f"the factors' batch axes differ: {[part._batch for part in parts]}")
+        if errors:
+            _spline._fail([(0, _kind(errors[0]), str(errors[0]))], on_failure, self)
+
+    def _join(self, space: Product, parts: tuple[CubicSpline, ...], bc_type: Any) -> None:
+        self._space, self._parts, self._bc_type = space, parts, bc_type
+        first = parts[0]
+        self._t, self._times, self._clock = first._t, first._times, first._clock
+        self._extrapolate = first._extrapolate
+        self._report = _worst([part.report for part in parts], space)
+
+    @classmethod
+    def _of_parts(cls, space: Product, parts: tuple[CubicSpline, ...], bc_type: Any) -> ProductSpline:
+        self = object.__new__(cls)
+        self._join(space, parts, bc_type)
+        return self
+
+    def _evaluate(self, *arguments: Any) -> Any:
+        values = tuple(part._evaluate(*arguments) for part in self._parts)
+        if arguments[1] in ("speed", "bend"):
+            return np.sqrt(sum(np.square(value) for value in values))
+        return values
+
+    @property
+    def points(self) -> Tuple:
+        """The points, a tuple with one array a factor."""
+        return tuple(part.points for part in self._parts)
+
+    @property
+    def velocities(self) -> Tuple:
+        """Velocities at the knots, a tuple with one array a factor."""
+        return tuple(part.velocities for part in self._parts)
+
+    @property
+    def control_points(self) -> Tuple:
+        """Control points, a tuple with one array a factor."""
+        return tuple(part.control_points for part in self._parts)
+
+    @property
+    def _batch(self) -> tuple[int, ...]:
+        return self._parts[0]._batch
+
+    def __getitem__(self, index: Any) -> ProductSpline:
+        parts = tuple(part[index] for part in self._parts)
+        ends = [part.bc_type for part in parts]
+        return ProductSpline._of_parts(self._space, parts, _join_ends(ends))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, CubicSpline):
+            return NotImplemented
+        return isinstance(other, ProductSpline) and self._parts == other._parts
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def fit_many(
+    curves: list[Tuple], space: Any, bc_type: Any, policy: Any, on_failure: str, options: dict[str, Any]
+) -> list[CubicSpline]:
+    """`symspline.fit_many` in a product: one parallel call a factor."""
+    for number, curve in enumerate(curves):
+        _check_tuple(curve[1], space, f"curve {number}: points")
+    columns, errors = [], []
+    for i, (factor, bc) in enumerate(zip(space.factors, _split_ends(bc_type, space), strict=True)):
+        part = [(t, points[i]) for t, points in curves]
+        try:
+            fitted = _spline.fit_many(part, factor, bc_type=bc, extrapolate=policy, **options)
+        except (CutLocusError, ConvergenceError) as error:
+            errors.append(error)
+            fitted = error.spline
+        columns.append(fitted)
+    made: list[CubicSpline] = [
+        ProductSpline._of_parts(space, parts, _join_ends([part.bc_type for part in parts]))
+        for parts in zip(*columns, strict=True)
+    ]
+    if errors:
+        _spline._fail([(0, _kind(errors[0]), str(errors[0]))], on_failure, made)
+    return made
+
+
+def _try(t: Any, points: Any, factor: Space, bc: Any, options: dict[str, Any]) -> tuple[CubicSpline, Any]:
+    """A fit whose failure is kept beside what it reached."""
+    try:
+        return CubicSpline(t, points, factor, bc_type=bc, **options), None
+    except (CutLocusError, ConvergenceError) as error:
+        return error.spline, error
+
+
+def _kind(error: Exception) -> str:
+    return "cut-locus" if isinstance(error, CutLocusError) else "unconverged"
+
+
+def _check_tuple(points: Any, space: Product, name: str) -> None:
+    if not isinstance(points, (tuple, list)) or len(points) != len(space.factors):
+        raise ValidationError(f"{name} must be a tuple of {len(space.factors)} arrays, one a factor of {space!r}")
+
+
+def _split_ends(bc_type: Any, space: Product) -> list[Any]:
+    """End conditions for each factor; prescribed vectors are tuples."""
+    if isinstance(bc_type, str):
+        return [bc_type] * len(space.factors)
+    if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
+        raise ValidationError(f"bc_type must be a word or a pair, not {bc_type!r}")
+
+    def part(end: Any, i: int) -> Any:
+        if isinstance(end, str):
+            return end
+        if not isinstance(end, (tuple, list)) or len(end) != 2:
+            raise ValidationError(f"an end condition is a word or a pair (order, tuple of vectors), not {end!r}")
+        _check_tuple(end[1], space, "an end vector")
+        return (end[0], end[1][i])
+
+    return [tuple(part(end, i) for end in bc_type) for i in range(len(space.factors))]
+
+
+def _join_ends(ends: list[Any]) -> Any:
+    """The inverse of `_split_ends`."""
+    if isinstance(ends[0], str):
+        return ends[0]
+
+    def both(e: int) -> Any:
+        first = ends[0][e]
+        return first if isinstance(first, str) else (first[0], tuple(end[e][1] for end in ends))
+
+    return (both(0), both(1))
+
+
+def _worst(reports: list[Report], space: Product) -> Report:
+    def largest(values: list[Any]) -> Any:
+        result: NDArray[Any] = np.max(np.stack(values), axis=0)
+        return result.item() if result.ndim == 0 else result
+
+    converged: Any = np.all(np.stack([np.asarray(r.converged) for r in reports]), axis=0)
+    return replace(
+        reports[0],
+        converged=bool(converged) if np.ndim(converged) == 0 else converged,
+        iterations=largest([r.iterations for r in reports]),
+        residual=largest([r.residual for r in reports]),
+        max_step=np.sqrt(sum(np.square(r.max_step) for r in reports)),
+        curvature=space.curvature,
+        rate=largest([r.rate for r in reports]),
+    )

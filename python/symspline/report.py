@@ -1,0 +1,86 @@
+"""What a fit says about itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Number = float | NDArray[np.float64]
+
+
+class ConvergenceWarning(UserWarning):
+    """A curve did not converge, or passes a cut locus, and ``on_failure="warn"``."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """How a fit went. For a batch of curves every field but ``method`` and ``curvature`` is an array
+    with the batch axes.
+
+    Attributes:
+        method: the solver that was used.
+        converged: whether the residual is below the tolerance, or at the rounding floor (256 ε times
+            the condition of the data).
+        iterations: how often the C² residual was evaluated.
+        residual: the C² defect of a knot divided by 1/hᵢ₋₁ + 1/hᵢ, relative to the largest speed; the
+            largest of all knots.
+        max_step: D of (21), the longest distance between neighbouring points.
+        curvature: K of (22).
+        invariant_radius: the smallest V of (38), or None where Theorem 3.1 says nothing.
+        rate: mean contraction of the residual per iteration.
+    """
+
+    method: str
+    converged: bool | NDArray[np.bool_]
+    iterations: int | NDArray[np.int64]
+    residual: Number
+    max_step: Number
+    curvature: float
+    invariant_radius: Number | None
+    rate: Number
+
+    def __str__(self) -> str:
+        converged = np.asarray(self.converged)
+        residual, iterations = np.max(self.residual), np.max(self.iterations)
+        if converged.ndim == 0:
+            state = "converged" if converged else "NOT converged"
+            many = ""
+        else:
+            state = f"{np.count_nonzero(converged)} of {converged.size} curves converged"
+            many = "at most " if converged.size > 1 else ""
+        return (
+            f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
+            f"longest step {np.max(self.max_step):.3g}, contraction {np.max(self.rate):.2g}"
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Report):
+            return NotImplemented
+        names = [field.name for field in fields(self)]
+        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
+
+    def _map(self, function: Any) -> Report:
+        """The report with a function applied to the fields that are per curve."""
+        names = ["converged", "iterations", "residual", "max_step", "rate"]
+        return replace(self, **{name: function(getattr(self, name)) for name in names})
+
+
+def _same(a: Any, b: Any) -> bool:
+    if a is None or b is None or isinstance(a, str):
+        return bool(a == b)
+    return np.array_equal(a, b, equal_nan=True)
+
+
+def shaped(
+    method: str, columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float
+) -> Report:
+    """A report from the compiled core's columns."""
+    if batch == ():
+        values = [column.item() for column in columns]
+    else:
+        values = [column.reshape(batch) for column in columns]
+    converged, iterations, residual, max_step, rate = values
+    return Report(method, converged, iterations, residual, max_step, curvature, None, rate)

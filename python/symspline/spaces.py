@@ -1,0 +1,307 @@
+"""The spaces: where points live, and their geometry."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import Handle, ValidationError
+
+Array = NDArray[Any]
+
+POINT_TOL = 1e-8
+POINT_TOL_FLOAT32 = 1e-4
+
+
+class Space:
+    """A symmetric space. Every method works on arrays of points: leading axes broadcast.
+
+    Tangent vectors are arrays of the point's shape. ``str(space)`` is the name that
+    `symspline.space` reads back, ``repr(space)`` the constructor call.
+    """
+
+    _name: ClassVar[str]
+    _handle: Handle
+    _parameters: tuple[int, ...]
+    _dtype: ClassVar[type[np.generic]] = np.float64
+
+    def __init__(self, *parameters: int) -> None:
+        for value in parameters:
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
+                raise ValidationError(f"{type(self).__name__} takes whole numbers, not {value!r}")
+        self._parameters = tuple(int(value) for value in parameters)
+        self._handle = Handle(self._name, list(self._parameters))
+        self._point_shape = tuple(self._handle.point_shape())
+
+    # ---- what it is ----
+
+    @property
+    def point_shape(self) -> tuple[int, ...]:
+        """Shape of the array of one point."""
+        return self._point_shape
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space."""
+        return self._handle.dim()
+
+    @property
+    def injectivity_radius(self) -> float:
+        """Distance below which the geodesic between two points is unique, whatever its direction."""
+        return self._handle.injectivity_radius()
+
+    @property
+    def curvature(self) -> float:
+        """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r."""
+        return self._handle.curvature()
+
+    def __str__(self) -> str:
+        return f"{self._name}:{','.join(map(str, self._parameters))}"
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(map(str, self._parameters))})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and str(self) == str(other)
+
+    def __hash__(self) -> int:
+        return hash(str(self))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self._parameters
+
+    # ---- geometry ----
+
+    def exp(self, p: ArrayLike, v: ArrayLike) -> Array:
+        """The point reached from p in unit time on the geodesic with velocity v.
+
+        Args:
+            p: points, shape (..., *point_shape).
+            v: tangent vectors at p, shape (..., *point_shape).
+
+        >>> import symspline as ss
+        >>> ss.Sphere(2).exp([1, 0, 0], [0, ss.Sphere(2).injectivity_radius / 2, 0]).round(15)
+        array([0., 1., 0.])
+        """
+        return self._apply("exp", p=p, v=v)
+
+    def log(self, p: ArrayLike, q: ArrayLike) -> Array:
+        """The velocity at p of the geodesic that reaches q in unit time; inverse of `exp`.
+
+        Raises:
+            CutLocusError: the two points lie at or past each other's cut locus.
+        """
+        return self._apply("log", p=p, q=q)
+
+    def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> Array:
+        """The geodesic from p (t = 0) to q (t = 1), the paper's [p, q]_t.
+
+        ``t`` broadcasts against the leading axes of p and q.
+
+        Raises:
+            CutLocusError: the two points lie at or past each other's cut locus.
+        """
+        return self._apply("geodesic", t=np.asarray(t, dtype=np.float64), p=p, q=q)
+
+    def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
+        """Length of the shortest geodesic between p and q; shape of the leading axes."""
+        return self._apply("distance", p=p, q=q)
+
+    def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> Array:
+        """The transvection E_p(v) of (10), applied to the point x: it moves p to exp_p(v)."""
+        return self._apply("transvection", p=p, v=v, x=x)
+
+    def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> Array:
+        """Parallel transport of the tangent vector v from p to q along the geodesic between them.
+
+        Raises:
+            CutLocusError: the two points lie at or past each other's cut locus.
+        """
+        return self._apply("transport", p=p, q=q, v=v)
+
+    def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
+        """Inner product of two tangent vectors at p; shape of the leading axes."""
+        return self._apply("inner", p=p, u=u, v=v)
+
+    def norm(self, p: ArrayLike, v: ArrayLike) -> Array:
+        """Length of the tangent vector v at p; shape of the leading axes."""
+        result: Array = np.sqrt(np.maximum(self._apply("inner", p=p, v=v, again=v), 0.0))
+        return result
+
+    # ---- membership ----
+
+    def project(self, x: ArrayLike) -> Array:
+        """A point of the space close to x, for x near the space.
+
+        Raises:
+            ValidationError: no point is close to x (a zero vector, or not finite).
+        """
+        result = self._apply("project", x=x)
+        if not np.all(np.isfinite(result)):
+            bad = np.argwhere(~np.isfinite(result).all(axis=self._point_axes(result)))[0].tolist()
+            raise ValidationError(f"x{bad or ''} cannot be projected: it is zero or not finite")
+        return result
+
+    def project_tangent(self, p: ArrayLike, v: ArrayLike) -> Array:
+        """The tangential part of v at p."""
+        return self._apply("project_tangent", p=p, v=v)
+
+    def check_point(self, p: ArrayLike) -> None:
+        """Raise ValidationError unless p (or every one of an array of points) is a point."""
+        array = self._doubles(p, "p")
+        self._handle.check_points(self._rows(array, array.shape), POINT_TOL)
+
+    def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
+        """Raise ValidationError unless v is a tangent vector at the point p."""
+        self.check_point(p)
+        points, vectors = self._doubles(p, "p"), self._doubles(v, "v")
+        shape = np.broadcast_shapes(points.shape, vectors.shape)
+        defects = self._handle.tangent_defects(self._rows(points, shape), self._rows(vectors, shape))
+        bad = np.flatnonzero(~(defects <= POINT_TOL))
+        if bad.size:
+            raise ValidationError(
+                f"vector {bad[0]} is not tangent at its point: a part of {defects[bad[0]]:.3e} of it points "
+                f"off the space (allowed: {POINT_TOL:.0e}); use space.project_tangent(p, v)"
+            )
+
+    # ---- chance ----
+
+    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
+        """Random points, shape ``shape + point_shape``: uniform on a compact space."""
+        shape = (shape,) if isinstance(shape, int) else tuple(shape)
+        return self._apply("scatter", x=rng.standard_normal(shape + self.point_shape))
+
+    def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
+        """Standard normal tangent vectors at the points p."""
+        noise = rng.standard_normal(np.shape(p))
+        return self._apply("random_tangent", p=p, noise=noise)
+
+    # ---- arrays ----
+
+    def _point_axes(self, array: Array) -> tuple[int, ...]:
+        return tuple(range(array.ndim - len(self.point_shape), array.ndim))
+
+    def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
+        """The value as an array of doubles whose last axes are those of a point."""
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            raise ValidationError(f"{name} must be an array of real numbers, not of {array.dtype}")
+        shape = self.point_shape
+        if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
+            raise ValidationError(
+                f"{name} has shape {array.shape}, but {self!r} needs shape (..., {', '.join(map(str, shape))})"
+            )
+        return np.asarray(array, dtype=np.float64, order="C")
+
+    def _rows(self, array: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+        rows = np.broadcast_to(array, shape).reshape(-1, int(np.prod(self.point_shape)))
+        return np.ascontiguousarray(rows)
+
+    def _apply(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+        arrays = {name: self._doubles(value, name) for name, value in inputs.items()}
+        axes = len(self.point_shape)
+        try:
+            lead = np.broadcast_shapes(
+                *(a.shape[: a.ndim - axes] for a in arrays.values()), () if t is None else t.shape
+            )
+        except ValueError:
+            shapes = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
+            raise ValidationError(f"the leading axes do not broadcast: {shapes}") from None
+        shape = lead + self.point_shape
+        rows = [self._rows(a, shape) for a in arrays.values()]
+        times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
+        result = self._handle.apply(operation, rows, times)
+        if operation in ("distance", "inner"):
+            return result.reshape(lead)[()]
+        return result.reshape(shape)
+
+    def __init_subclass__(cls) -> None:
+        if hasattr(cls, "_name"):
+            _CLASSES[cls._name] = cls
+
+
+_CLASSES: dict[str, type[Space]] = {}
+
+
+class Euclidean(Space):
+    """Flat space Rⁿ: points are arrays of n numbers, splines the classical ones.
+
+    >>> import symspline as ss
+    >>> ss.Euclidean(3)
+    Euclidean(3)
+    """
+
+    _name = "euclidean"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Sphere(Space):
+    """The unit sphere Sⁿ: points are unit vectors of n + 1 numbers.
+
+    S² are directions or places on a globe, S³ unit quaternions. Distance is the angle.
+
+    >>> import symspline as ss
+    >>> ss.Sphere(2).distance([1, 0, 0], [0, 1, 0]).round(8)
+    np.float64(1.57079633)
+    """
+
+    _name = "sphere"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Hyperbolic(Space):
+    """Hyperbolic space Hⁿ: points are arrays (x₀, x₁, …, xₙ) on the hyperboloid
+    −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first.
+
+    >>> import numpy as np, symspline as ss
+    >>> ss.Hyperbolic(1).distance([1, 0], [np.cosh(2), np.sinh(2)]).round(8)
+    np.float64(2.0)
+    """
+
+    _name = "hyperbolic"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+def space(name: str | Space) -> Space:
+    """The space with a name, e.g. ``"sphere:2"``, ``"h:3"``, or ``"sphere:3 x r:3"`` for a product.
+
+    Args:
+        name: the name in long or short form, a colon, and the parameters; a space is returned as it is.
+
+    >>> import symspline as ss
+    >>> ss.space("sphere:2")
+    Sphere(2)
+    """
+    if isinstance(name, Space):
+        return name
+    if not isinstance(name, str):
+        raise ValidationError(f"a space or its name is needed, not {name!r}")
+    factors = name.split(" x ")
+    if len(factors) > 1:
+        from .product import Product
+
+        return Product(*map(space, factors))
+    word, _, parameters = name.strip().partition(":")
+    names = {alias: row[0] for row in Handle.names() for alias in row}
+    if word.lower() not in names:
+        known = ", ".join(" or ".join(row) for row in Handle.names())
+        raise ValidationError(f"unknown space {name!r}; known are {known}, e.g. 'sphere:2'")
+    values = [part.strip() for part in parameters.split(",")]
+    if not all(value.isdecimal() for value in values):
+        raise ValidationError(f"{name!r}: behind the colon come whole numbers, e.g. 'sphere:2'")
+    cls: Any = _CLASSES[names[word.lower()]]
+    try:
+        made: Space = cls(*map(int, values))
+    except TypeError:
+        raise ValidationError(f"{name!r}: {cls.__name__} does not take {len(values)} numbers") from None
+    return made
+
+

@@ -1,0 +1,500 @@
+"""C² cubic splines."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._core import ConvergenceError, CutLocusError, ValidationError
+from ._ends import ends_of
+from ._integrals import integrate
+from ._times import Clock, clock_of
+from .report import ConvergenceWarning, Report, shaped
+from .spaces import POINT_TOL, POINT_TOL_FLOAT32, Space
+from .spaces import space as space_named
+
+Array = NDArray[Any]
+Progress = Callable[[int, int], object]
+
+_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
+_QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
+_FAULTS: dict[str, type[Exception]] = {"cut-locus": CutLocusError, "unconverged": ConvergenceError}
+
+
+class CubicSpline:
+    """The C² cubic spline through points of a space.
+
+    Between two points the curve is a cubic Bézier curve made of geodesics (de Casteljau's algorithm,
+    (8) of the paper); at the points value, velocity and covariant acceleration agree from both sides,
+    (13). In flat space it is SciPy's ``CubicSpline``.
+
+    Args:
+        t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one
+            row per curve. Numbers or ``datetime64``; for dates rates are per second.
+        points: shape (..., N+1, *space.point_shape), N >= 1; leading axes are independent curves. Points
+            within 1e-8 of the space (1e-4 for float32) are projected. For a `Product` a tuple of arrays.
+        space: a space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+        bc_type: conditions at the ends: ``"natural"`` (zero covariant acceleration, the paper's default),
+            ``"not-a-knot"`` (the better choice for a smooth curve: order 4 instead of 2 near the ends),
+            ``"clamped"`` (zero velocity, as in SciPy), ``"periodic"`` (the last point is the first), or a
+            pair with one of ``"natural"``, ``"clamped"``, ``"not-a-knot"``, ``(1, velocity)``,
+            ``(2, acceleration)`` for either end. The paper's clamped spline is ``((1, v0), (1, vN))``.
+            Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
+        method: ``"auto"``, ``"quasi-newton"``, or ``"fixed-point"`` (the paper's Algorithm 1).
+        tol: largest relative C² defect that counts as converged, see `Report.residual`.
+        max_iter: largest number of iterations; None for the method's own.
+        extrapolate: what happens outside the knots: None raises (and wraps for periodic curves), True
+            continues the last segment, ``"geodesic"`` goes on with constant velocity, ``"periodic"`` wraps.
+        on_failure: what happens when a curve does not converge or meets a cut locus: ``"raise"``,
+            ``"warn"`` or ``"ignore"``. The exception's ``.spline`` holds all good curves; an unconverged
+            curve keeps its best iterate, a curve with a cut-locus fault is NaN.
+        check: whether to validate the input.
+        progress: called from time to time with the finished and the total number of points.
+
+    Raises:
+        ValidationError: the input is not what is described above.
+        CutLocusError: the geodesic between two neighbours, or to a control point, is not unique.
+        ConvergenceError: the solver did not reach ``tol``.
+
+    >>> import symspline as ss
+    >>> spline = ss.CubicSpline([0, 1, 3], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
+    >>> spline(1).round(12) + 0.0
+    array([0., 1., 0.])
+    >>> spline([0.5, 2.0], nu=1).shape
+    (2, 3)
+    """
+
+    _space: Space
+    _clock: Clock
+    _t: Array
+    _times: NDArray[np.float64]
+    _points: NDArray[np.float64]
+    _velocities: NDArray[np.float64]
+    _bc_type: Any
+    _extrapolate: Any
+    _report: Report
+
+    def __new__(cls, t: Any = None, points: Any = None, space: Any = None, **options: Any) -> Self:
+        if cls is CubicSpline and space is not None and not isinstance(space, Space):
+            space = space_named(space)
+        if cls is CubicSpline and hasattr(space, "factors"):
+            from .product import ProductSpline
+
+            return object.__new__(ProductSpline)  # type: ignore[return-value]
+        return object.__new__(cls)
+
+    def __init__(
+        self,
+        t: ArrayLike | None,
+        points: Any,
+        space: Space | str,
+        *,
+        bc_type: Any = "natural",
+        method: str = "auto",
+        tol: float = 1e-12,
+        max_iter: int | None = None,
+        extrapolate: bool | str | None = None,
+        on_failure: str = "raise",
+        check: bool = True,
+        progress: Progress | None = None,
+    ) -> None:
+        self._space = space = space_named(space)
+        self._extrapolate = _policy(extrapolate)
+        _check_choice("on_failure", on_failure, ("raise", "warn", "ignore"))
+        doubles, point_tol = _points(points, space)
+        axes = doubles.ndim - len(space.point_shape) - 1
+        batch, nodes = doubles.shape[:axes], doubles.shape[axes]
+        self._clock, self._t, self._times = _knots(t, batch, nodes)
+        self._bc_type = bc_type
+        self._points, self._velocities, columns, faults = _core.fit(
+            space._handle,
+            self._times,
+            doubles,
+            ends_of(bc_type, space, batch),
+            method,
+            tol,
+            max_iter,
+            check,
+            point_tol,
+            None,
+            progress,
+        )
+        self._points.flags.writeable = self._velocities.flags.writeable = False
+        self._report = shaped(_solver(method), columns, batch, space.curvature)
+        if faults:
+            _fail(faults, on_failure, self)
+
+    @classmethod
+    def _made(
+        cls,
+        space: Space,
+        clock: Clock,
+        t: Array,
+        times: NDArray[np.float64],
+        points: NDArray[np.float64],
+        velocities: NDArray[np.float64],
+        bc_type: Any,
+        extrapolate: Any,
+        report: Report,
+    ) -> CubicSpline:
+        """A spline from its parts, without a fit."""
+        self = object.__new__(CubicSpline)
+        self._space, self._clock, self._t, self._times = space, clock, t, times
+        self._points, self._velocities = points, velocities
+        self._points.flags.writeable = self._velocities.flags.writeable = False
+        self._bc_type, self._extrapolate, self._report = bc_type, extrapolate, report
+        return self
+
+    # ---- the curve ----
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        nu: int = 0,
+        *,
+        extrapolate: bool | str | None = None,
+        per_curve: bool = False,
+    ) -> Any:
+        """The curve at times x.
+
+        Args:
+            x: times, any shape and order; ``datetime64`` if the knots are.
+            nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+            extrapolate: as for the constructor, whose choice holds if None.
+            per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
+
+        Returns:
+            Shape batch axes + x.shape + point_shape (x.shape without its batch axes if ``per_curve``).
+
+        Raises:
+            ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None.
+        """
+        if nu not in _QUANTITIES:
+            raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}")
+        times = self._clock.doubles(x, "x")
+        return self._evaluate(times, _QUANTITIES[nu], extrapolate, per_curve)
+
+    def speed(
+        self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
+    ) -> Array:
+        """|γ'| at times x, shape batch axes + x.shape."""
+        times = self._clock.doubles(x, "x")
+        return self._evaluate(times, "speed", extrapolate, per_curve)
+
+    def length(self) -> Any:
+        """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
+        return integrate(self._times, lambda x: self._evaluate(x, "speed", None, True), self._batch)
+
+    def bending_energy(self) -> Any:
+        """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
+        return integrate(
+            self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch
+        )
+
+    def _evaluate(
+        self, x: NDArray[np.float64], quantity: str, extrapolate: bool | str | None, per_curve: bool
+    ) -> Array:
+        policy = self._extrapolate if extrapolate is None else _policy(extrapolate)
+        if policy is None and isinstance(self._bc_type, str) and self._bc_type == "periodic":
+            policy = "periodic"
+        if per_curve and x.shape[: len(self._batch)] != self._batch:
+            raise ValidationError(
+                f"with per_curve=True the shape of x must begin with the batch axes {self._batch}; got {x.shape}"
+            )
+        return _core.evaluate(
+            self._space._handle,
+            self._times,
+            self._points,
+            self._velocities,
+            x,
+            quantity,
+            _OUTSIDE[policy],
+            per_curve,
+        )
+
+    # ---- what it is made of ----
+
+    @property
+    def t(self) -> Array:
+        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given."""
+        return _read_only(self._t)
+
+    @property
+    def points(self) -> Any:
+        """The points, shape (..., N+1, *point_shape)."""
+        return self._points
+
+    @property
+    def velocities(self) -> Any:
+        """Velocities γ' at the knots, the shape of the points. Together with knots and points they are
+        the whole curve."""
+        return self._velocities
+
+    @property
+    def control_points(self) -> Any:
+        """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
+        axis = len(self._batch)
+        h = np.diff(self._times)
+        third = h.reshape(h.shape + (1,) * len(self._space.point_shape)) / 3
+        first, last = (slice(None, -1), slice(1, None))
+        index = (slice(None),) * axis
+        p, q = self._points[(*index, first)], self._points[(*index, last)]
+        u, w = self._velocities[(*index, first)], self._velocities[(*index, last)]
+        inner = self._space.exp(p, third * u), self._space.exp(q, -third * w)
+        return np.stack([p, *inner, q], axis=axis + 1)
+
+    @property
+    def space(self) -> Space:
+        """The space."""
+        return self._space
+
+    @property
+    def bc_type(self) -> Any:
+        """The end conditions, as they were given."""
+        return self._bc_type
+
+    @property
+    def extrapolate(self) -> Any:
+        """What happens outside the knots, as it was given."""
+        return self._extrapolate
+
+    @property
+    def report(self) -> Report:
+        """How the fit went."""
+        return self._report
+
+    @property
+    def _batch(self) -> tuple[int, ...]:
+        return self._points.shape[: self._points.ndim - len(self._space.point_shape) - 1]
+
+    # ---- a batch as a sequence ----
+
+    def __len__(self) -> int:
+        if not self._batch:
+            raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
+        return self._batch[0]
+
+    def __getitem__(self, index: Any) -> CubicSpline:
+        """A curve, or a slice of curves, of a batch."""
+        if not self._batch:
+            raise TypeError("this is one curve; only a batch of curves can be indexed")
+        if not isinstance(index, (int, np.integer, slice)):
+            raise TypeError(f"a curve is picked by a whole number or a slice, not {index!r}")
+        own = self._times.ndim > 1
+        return CubicSpline._made(
+            self._space,
+            self._clock,
+            self._t[index] if own else self._t,
+            np.ascontiguousarray(self._times[index]) if own else self._times,
+            np.ascontiguousarray(self._points[index]),
+            np.ascontiguousarray(self._velocities[index]),
+            _pick_ends(self._bc_type, index, len(self._batch), self._space),
+            self._extrapolate,
+            self._report._map(lambda column: column[index]),
+        )
+
+    def __iter__(self) -> Iterator[CubicSpline]:
+        return (self[i] for i in range(len(self)))
+
+    # ---- as a value ----
+
+    def __eq__(self, other: object) -> bool:
+        """Equal space, knots, points and velocities, to the last bit."""
+        if not isinstance(other, CubicSpline):
+            return NotImplemented
+        return (
+            self._space == other._space
+            and self._t.dtype == other._t.dtype
+            and np.array_equal(self._t, other._t)
+            and np.array_equal(self._points, other._points, equal_nan=True)
+            and np.array_equal(self._velocities, other._velocities, equal_nan=True)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        knots = self._times.shape[-1]
+        curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
+        bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
+        return f"<CubicSpline on {self._space!r}: {curves}{knots} points, {bc}>"
+
+    def save(self, file: Any) -> None:
+        """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
+        from .files import save
+
+        save(self, file)
+
+
+def fit(
+    t: ArrayLike | None, points: Any, space: Space | str, **options: Any
+) -> tuple[Any, Report]:
+    """The velocities of the C² spline through points, as plain arrays.
+
+    Takes the arguments of `CubicSpline`.
+
+    Returns:
+        The velocities, of the shape of the points, and the report.
+
+    >>> import symspline as ss
+    >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
+    >>> u.shape, report.converged
+    ((3, 3), True)
+    """
+    spline = CubicSpline(t, points, space, **options)
+    return spline.velocities, spline.report
+
+
+def evaluate(
+    x: ArrayLike,
+    t: ArrayLike | None,
+    points: Any,
+    u: Any,
+    space: Space | str,
+    nu: int = 0,
+    *,
+    extrapolate: bool | str | None = None,
+    per_curve: bool = False,
+) -> Any:
+    """The curve with given knots, points and velocities at times x, as plain arrays.
+
+    Args:
+        x: times, any shape and order.
+        t: knots, as for `CubicSpline`.
+        points, u: points and velocities, shape (..., N+1, *point_shape).
+        space: the space or its name.
+        nu, extrapolate, per_curve: as for calling a `CubicSpline`.
+
+    >>> import symspline as ss
+    >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> u, _ = ss.fit(None, p, "sphere:2")
+    >>> ss.evaluate(0.5, None, p, u, "sphere:2").round(8)
+    array([ 0.61308303,  0.76368565, -0.20227067])
+    """
+    space = space_named(space)
+    if hasattr(space, "factors"):
+        pieces = zip(points, u, space.factors, strict=True)
+        options = {"extrapolate": extrapolate, "per_curve": per_curve}
+        return tuple(evaluate(x, t, p, v, factor, nu, **options) for p, v, factor in pieces)  # type: ignore[arg-type]
+    doubles, _ = _points(points, space)
+    velocities = space._doubles(u, "u")
+    if velocities.shape != doubles.shape:
+        raise ValidationError(f"u has shape {velocities.shape}, but points {doubles.shape}")
+    axes = doubles.ndim - len(space.point_shape) - 1
+    clock, knots, times = _knots(t, doubles.shape[:axes], doubles.shape[axes])
+    report = Report("given", True, 0, 0.0, 0.0, space.curvature, None, 0.0)
+    spline = CubicSpline._made(
+        space, clock, knots, times, doubles.copy(), velocities.copy(), "given", None, report
+    )
+    return spline(x, nu, extrapolate=extrapolate, per_curve=per_curve)
+
+
+def fit_many(
+    curves: Iterable[tuple[ArrayLike | None, Any]], space: Space | str, **options: Any
+) -> list[CubicSpline]:
+    """Fit curves of different lengths in one parallel call.
+
+    Args:
+        curves: pairs (t, points), one a curve; see `CubicSpline`.
+        space: the space of all curves, or its name.
+        options: the options of `CubicSpline`, for all curves alike.
+
+    Returns:
+        One `CubicSpline` a curve. If curves fail and ``on_failure="raise"``, the exception's ``.spline``
+        is this list.
+
+    >>> import symspline as ss
+    >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+    >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
+    [4, 2]
+    """
+    from ._many import fit_many as run
+
+    return run(list(curves), space_named(space), **options)
+
+
+def _points(points: Any, space: Space) -> tuple[NDArray[np.float64], float]:
+    """Points as doubles, and how far off the space they may be."""
+    array = np.asarray(points)
+    if array.ndim == 0 or array.size == 0:
+        raise ValidationError("no points given; a curve needs at least two")
+    doubles = space._doubles(array, "points")
+    axes = doubles.ndim - len(space.point_shape)
+    if axes == 0:
+        raise ValidationError(
+            f"points has shape {array.shape}, which is one point; a curve needs shape (..., N+1, *point_shape)"
+        )
+    if doubles.shape[axes - 1] < 2:
+        raise ValidationError("a curve needs at least two points; got one")
+    return doubles, POINT_TOL_FLOAT32 if array.dtype in (np.float32, np.float16) else POINT_TOL
+
+
+def _knots(
+    t: ArrayLike | None, batch: tuple[int, ...], nodes: int
+) -> tuple[Clock, Array, NDArray[np.float64]]:
+    """The clock, the knots as shown and as the core counts them."""
+    if t is None:
+        knots = np.arange(nodes, dtype=np.float64)
+        return Clock(), knots, knots
+    clock, shown = clock_of(t)
+    if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
+        own = f" or {(*batch, nodes)}" if batch else ""
+        raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
+    return clock, shown, clock.doubles(shown, "t")
+
+
+def _policy(extrapolate: Any) -> Any:
+    if extrapolate is not None and extrapolate is not True and extrapolate not in ("geodesic", "periodic"):
+        raise ValidationError(
+            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {extrapolate!r}"
+        )
+    return extrapolate
+
+
+def _check_choice(name: str, value: Any, choices: Sequence[str]) -> None:
+    if value not in choices:
+        raise ValidationError(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}")
+
+
+def _solver(method: str) -> str:
+    return "quasi-newton" if method == "auto" else method
+
+
+def _pick_ends(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
+    """The end conditions of part of a batch: prescribed vectors may have a batch axis."""
+    if isinstance(bc_type, str):
+        return bc_type
+
+    def pick(end: Any) -> Any:
+        if isinstance(end, str):
+            return end
+        vector = np.asarray(end[1])
+        own = vector.ndim == batch_axes + len(space.point_shape) and vector.shape[0] != 1
+        return (end[0], vector[index]) if own else (end[0], vector)
+
+    return tuple(pick(end) for end in bc_type)
+
+
+def _fail(faults: list[tuple[int, str, str]], on_failure: str, spline: Any) -> None:
+    """Raise or warn, with the good curves attached."""
+    if on_failure == "ignore":
+        return
+    _, kind, message = faults[0]
+    if len(faults) > 1:
+        message += f" (and {len(faults) - 1} more curves failed)"
+    if on_failure == "warn":
+        warnings.warn(message, ConvergenceWarning, stacklevel=3)
+        return
+    error: Any = _FAULTS[kind](message)
+    error.spline = spline
+    raise error
+
+
+def _read_only(array: Array) -> Array:
+    view = array.view()
+    view.flags.writeable = False
+    return view
