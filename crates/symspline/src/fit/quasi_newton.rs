@@ -58,9 +58,15 @@ impl Anderson {
         self.active = lanes.select(Lane::ZERO, self.active);
     }
 
-    /// Replaces the update f(u) by the mixed one. `contraction` is how the last iteration did.
-    pub fn mix(&mut self, contraction: Lane, u: &[Lane], f: &mut [Lane]) {
-        let slow = contraction.simd_gt(lane(MIX_ABOVE));
+    /// The lanes that take part.
+    pub fn active(&self) -> Lane {
+        self.active
+    }
+
+    /// Replaces the update f(u) by the mixed one. `contraction` is how the last iteration did; lanes
+    /// in `idle` do not take part now.
+    pub fn mix(&mut self, contraction: Lane, idle: Lane, u: &[Lane], f: &mut [Lane]) {
+        let slow = contraction.simd_gt(lane(MIX_ABOVE)) & !idle;
         if self.active.none() && slow.none() {
             return;
         }

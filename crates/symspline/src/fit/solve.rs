@@ -12,8 +12,15 @@ use crate::space::Space;
 /// Defects of this many ε times the condition of the chords are rounding: an iteration that stops
 /// improving below has converged.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
-/// So many iterations without halving the residual are a standstill.
-const PATIENCE: f64 = 4.0;
+/// Residuals are brought to this part of the tolerance: the jump of the acceleration at a knot is
+/// about twelve times the residual.
+const AIM: f64 = 1.0 / 40.0;
+/// By how much a mixed step may let the defect grow before it is taken back.
+const GROWTH_MIXED: f64 = 2.0;
+/// How often a step is halved before it is taken as it is.
+const MAX_TRIES: f64 = 6.0;
+/// So many iterations without lowering the residual by 30 % are a standstill.
+const PATIENCE: f64 = 8.0;
 /// Outer legs are kept within this part of the distance to the cut locus while iterating.
 const LEG_LIMIT: f64 = 0.95;
 
@@ -41,6 +48,7 @@ pub struct Workspace {
     vectors: NodeVectors,
     anderson: Anderson,
     step: Vec<Lane>,
+    next_step: Vec<Lane>,
     best: Vec<Lane>,
 }
 
@@ -54,24 +62,29 @@ pub fn solve<M: Space>(
     work: &mut Workspace,
     monitor: &Monitor,
 ) -> Outcome {
-    let Workspace { t, vectors, anderson, step, best } = work;
+    let Workspace { t, vectors, anderson, step, next_step, best } = work;
     t.new(chain, ends);
     anderson.restart();
     best.clear();
-    step.resize(chain.u.len(), Lane::ZERO);
-    let tol = lane(options.tol);
-    let floor = chain.condition * lane(ROUNDING);
+    for vector in [&mut *step, &mut *next_step] {
+        vector.resize(chain.u.len(), Lane::ZERO);
+    }
+    let (tol, aim) = (lane(options.tol), lane(options.tol * AIM));
+    let floor = (chain.condition * lane(ROUNDING)).max(tol);
     let infinity = lane(f64::INFINITY);
+    let limit = space.cut_angle() * LEG_LIMIT;
 
     let mut done = idle;
     let mut converged = Lane::ZERO;
-    let (mut first, mut last, mut lowest) = (infinity, infinity, infinity);
-    let mut waiting = Lane::ZERO;
     let mut residuals = infinity;
-    let mut kept = infinity;
     let mut legs = Lane::ZERO;
     let mut iterations = [0; LANES];
-    let limit = space.cut_angle() * LEG_LIMIT;
+    // Of the relative residual: the second one, the one to fall below, how long that has not
+    // happened, and that of the kept iterate.
+    let (mut second, mut mark, mut waiting, mut kept) = (infinity, infinity, Lane::ZERO, infinity);
+    // Of the line search: the defect it must not exceed, how often it went back, and that defect's
+    // quotient by the one before.
+    let (mut last, mut tries, mut contraction) = (infinity, Lane::ZERO, Lane::ZERO);
 
     for iteration in 1.. {
         let Defect { defect, speed, leg } = residual(space, chain, ends, vectors);
@@ -81,40 +94,53 @@ pub fn solve<M: Space>(
         legs = done.select(legs, leg);
         mask_bits(done).iter().zip(&mut iterations).for_each(|(done, i)| *i += usize::from(!done));
 
-        let improved = now.simd_lt(lowest * lane(0.5));
-        waiting = improved.select(Lane::ZERO, waiting + Lane::ONE);
+        let fallen = now.simd_lt(mark * lane(0.7));
+        (mark, waiting) = (fallen.select(now, mark), fallen.select(Lane::ZERO, waiting + Lane::ONE));
+        second = if iteration == 2 { now } else { second };
+        let stagnant = waiting.simd_ge(lane(PATIENCE)) & now.simd_le(floor);
+        let arrived = (now.simd_le(aim) | stagnant) & !done;
+        converged |= arrived;
+        done |= arrived;
+        let last_round = iteration >= options.max_iter() || monitor.poll();
+        if done.all() || last_round {
+            converged |= now.simd_le(tol) & !done;
+            break;
+        }
         if iteration > EASY || options.max_iter() <= EASY {
             let better = now.simd_lt(kept) & !done;
             keep_best(best, &chain.u, better);
             kept = better.select(now, kept);
         }
-        lowest = now.simd_lt(lowest).select(now, lowest);
-        let at_floor = waiting.simd_ge(lane(PATIENCE)) & lowest.simd_le(floor) & now.simd_le(floor);
-        let arrived = (now.simd_le(tol) | at_floor) & !done;
-        converged |= arrived;
-        done |= arrived | now.is_nan();
-        if done.all() || iteration >= options.max_iter() || monitor.poll() {
-            break;
-        }
 
-        match options.method {
-            Method::FixedPoint => fixed_point::update(space, chain, ends, t, step),
-            Method::Auto | Method::QuasiNewton => {
-                quasi_newton::update(space, chain, ends, t, step);
-                let contraction = now / last;
-                let lost = contraction.simd_gt(lane(10.0)) & !done;
-                if lost.any() {
-                    anderson.forget(lost);
-                }
-                if iteration > 1 {
-                    anderson.mix(contraction, &chain.u, step);
+        let mixing = anderson.active();
+        let allowed = last * mixing.select(lane(GROWTH_MIXED), Lane::ONE);
+        let worse =
+            !defect.simd_le(allowed) & !done & tries.simd_lt(lane(MAX_TRIES)) & iteration_mask(iteration);
+        if !worse.all() {
+            contraction = worse.select(contraction, defect / last);
+            last = worse.select(last, defect);
+            match options.method {
+                Method::FixedPoint => fixed_point::update(space, chain, ends, t, next_step),
+                Method::Auto | Method::QuasiNewton => {
+                    quasi_newton::update(space, chain, ends, t, next_step);
+                    if iteration > 1 {
+                        anderson.mix(contraction, worse, &chain.u, next_step);
+                    }
                 }
             }
         }
-        first = if iteration == 2 { now } else { first };
-        last = now;
-        for (u, s) in chain.u.iter_mut().zip(&*step) {
-            *u = done.select(*u, *u + *s);
+        if worse.any() {
+            // Half of the last step is taken back.
+            anderson.forget(worse);
+            for (n, s) in next_step.iter_mut().zip(&*step) {
+                *n = worse.select(*s * lane(-0.5), *n);
+            }
+        }
+        tries = worse.select(tries + Lane::ONE, Lane::ZERO);
+        for ((u, s), n) in chain.u.iter_mut().zip(&mut *step).zip(&*next_step) {
+            *u = done.select(*u, *u + *n);
+            // After going back, what is left of the step is as long as what was taken back.
+            *s = worse.select(-*n, *n);
         }
         if legs.simd_gt(lane(0.5 * limit)).any() {
             shorten(space, chain, limit, done);
@@ -128,7 +154,7 @@ pub fn solve<M: Space>(
         }
         residuals = better.select(kept, residuals);
     }
-    let rate = mean_rate(first, residuals, &iterations);
+    let rate = mean_rate(second, residuals, &iterations);
     Outcome { iterations, residual: residuals, converged: mask_bits(converged), rate, leg: legs }
 }
 
@@ -145,6 +171,11 @@ fn shorten<M: Space>(space: &M, chain: &mut Chain, limit: f64, done: Lane) {
             u.iter_mut().for_each(|x| *x = long.select(*x * lane(limit) / leg, *x));
         }
     }
+}
+
+/// The first two residuals belong to no step that could be judged.
+fn iteration_mask(iteration: usize) -> Lane {
+    crate::scalar::mask_from(|_| iteration > 2)
 }
 
 fn keep_best(best: &mut Vec<Lane>, u: &[Lane], lanes: Lane) {
