@@ -84,7 +84,14 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
             let of = of_curve(i / len, curves);
             return Err(invalid(format!("the {name} {order}{of} holds {}; it must be finite", v[i])));
         }
-        let defects = tangent_defects(space, p, v);
+        // In units of the segment, so that a vector as small as the rounding of the points passes.
+        let mut scaled = v.to_vec();
+        for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
+            let h = end_segment(problem, c, e);
+            let scale = if order == "velocity" { h } else { h * h };
+            v.iter_mut().for_each(|x| *x *= scale);
+        }
+        let defects = tangent_defects(space, p, &scaled);
         if let Some(c) = defects.iter().position(|d| !(*d <= tol)) {
             return Err(invalid(format!(
                 "the {name} {order}{} is not tangent at its point: a part of {:.3e} of it points off the space \
@@ -97,8 +104,7 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
             let mut square = vec![0.0; curves];
             let _ = apply(space, Operation::Inner, &[p, v, v], &[], &monitor, &mut square);
             for (c, square) in square.iter().enumerate() {
-                let t = problem.knots(c);
-                let h = if e == 0 { t[1] - t[0] } else { t[t.len() - 1] - t[t.len() - 2] };
+                let h = end_segment(problem, c, e);
                 let largest = 3.0 * space.injectivity_radius() / h;
                 if square.sqrt() >= largest {
                     return Err(invalid(format!(
@@ -112,4 +118,10 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
         }
     }
     Ok(())
+}
+
+/// Length of the first or last segment.
+fn end_segment(problem: &Problem, curve: usize, end: usize) -> f64 {
+    let t = problem.knots(curve);
+    if end == 0 { t[1] - t[0] } else { t[t.len() - 1] - t[t.len() - 2] }
 }

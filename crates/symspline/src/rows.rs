@@ -153,7 +153,8 @@ pub fn project_points<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Resu
     Ok(())
 }
 
-/// How far vectors are from being tangent at their points, relative to their size, row by row.
+/// How far vectors are from being tangent at their points, row by row: relative to their size, or to
+/// the rounding of the point if that is all they are.
 pub fn tangent_defects<M: Space>(space: &M, points: &[f64], vectors: &[f64]) -> Vec<f64> {
     let len = space.point_len();
     let rows = points.len() / len;

@@ -3,7 +3,7 @@
 //! Rounding errors of a point p at distance r from the apex are ε|p|² ≈ ε e²ʳ/4: that is how far
 //! apart neighbouring floating-point points are.
 
-use super::{Space, constant_curvature as cc};
+use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
 use crate::scalar::{Jet, Lane, Scalar, dot, lane};
 
 const K: i32 = -1;
@@ -45,7 +45,7 @@ impl Space for Hyperbolic {
         // Relative to |p||v|, which is what rounding of v amounts to in ⟨p,v⟩.
         let size = (dot(v, v) * dot(p, p)).sqrt();
         let off = cc::tangential::<K, Lane>(p, |x| x, v).abs();
-        size.simd_eq(Lane::ZERO).select(Lane::ZERO, off / size)
+        off / (size + ROUNDING_SIZE)
     }
 
     fn complaint(&self, x: &[f64]) -> String {

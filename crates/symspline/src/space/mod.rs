@@ -22,6 +22,10 @@ pub use sphere::Sphere;
 
 use crate::scalar::{Jet, Lane, Scalar, dot, max_or_nan};
 
+/// Vectors of this size and smaller, at points of size one, may be rounding errors as to direction: a
+/// defect is measured against it where a vector is smaller still.
+pub(crate) const ROUNDING_SIZE: Lane = Lane::splat(1e-7);
+
 /// A symmetric space: the paper's §2.1–2.4.
 ///
 /// Points and tangent vectors are ambient arrays of [`point_len`](Space::point_len) numbers (a
@@ -75,7 +79,8 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
     /// Replaces x by a point of the space beside it; returns how far it was, relative to its size.
     fn project(&self, x: &mut [Lane]) -> Lane;
-    /// Replaces v by its tangential part at p; returns how far it was, relative to its size.
+    /// Replaces v by its tangential part at p; returns how far it was, relative to its size (or to
+    /// [`ROUNDING_SIZE`]).
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane;
     /// Turns independent standard normal numbers into a random point.
     fn scatter(&self, noise: &mut [Lane]);

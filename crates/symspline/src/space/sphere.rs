@@ -1,6 +1,6 @@
 //! The sphere Sⁿ = {x ∈ Rⁿ⁺¹ : |x| = 1}, G = O(n+1), κ = 1.
 
-use super::{Space, constant_curvature as cc};
+use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
 use crate::scalar::{Jet, Lane, Scalar, dot};
 
 const K: i32 = 1;
@@ -40,7 +40,7 @@ impl Space for Sphere {
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         let size = dot(v, v).sqrt();
         let off = cc::tangential::<K, Lane>(p, |x| x, v).abs();
-        size.simd_eq(Lane::ZERO).select(Lane::ZERO, off / size)
+        off / (size + ROUNDING_SIZE)
     }
 
     fn complaint(&self, x: &[f64]) -> String {
