@@ -35,9 +35,9 @@ CASES = [
     Case("sphere:2"),
     Case("sphere:3"),
     Case("sphere:7"),
-    Case("hyperbolic:1", far=2.0, smooth=False),
-    Case("hyperbolic:2", far=2.0),
-    Case("hyperbolic:5", far=2.0),
+    Case("hyperbolic:1", far=1.5, smooth=False),
+    Case("hyperbolic:2", far=1.5),
+    Case("hyperbolic:5", far=1.5),
 ]
 
 

@@ -15,10 +15,9 @@ use crate::scalar::{Lane, Scalar, lane};
 const TRIG_SERIES: f64 = 2.5;
 /// Below this |x| six terms suffice.
 const TRIG_SHORT: f64 = 0.1;
-/// Largest |y| for which [`theta_over_sin`] uses its series.
-const ARC_SERIES: f64 = 0.09;
-/// Below this |y| seven terms suffice.
-const ARC_SHORT: f64 = 0.0075;
+/// Up to these |y| [`theta_over_sin`] uses so many terms of its series, and one more for every
+/// derivative. Beyond the last, derivatives lose no more than a digit in the quotients by sin²θ.
+const ARC_TIERS: [(f64, usize); 3] = [(0.0075, 7), (0.09, 14), (0.3, 22)];
 
 const fn factorial(n: usize) -> f64 {
     let mut product = 1.0;
@@ -46,10 +45,10 @@ const VERSINE: [f64; 12] = alternating(2);
 /// (1 − sin√x/√x)/x = Σ (−x)ʲ/(2j+3)!
 const SINC_DEFECT: [f64; 12] = alternating(3);
 /// θ/sin θ = Σ yʲ Πᵢ i/(2i+1) with y = 1 − cos θ, the series of asin(z)/(z√(1−z²)) at z² = y/2.
-const ARC: [f64; 16] = {
-    let mut c = [1.0; 16];
+const ARC: [f64; 24] = {
+    let mut c = [1.0; 24];
     let mut j = 1;
-    while j < 16 {
+    while j < 24 {
         c[j] = c[j - 1] * j as f64 / (2 * j + 1) as f64;
         j += 1;
     }
@@ -162,17 +161,21 @@ fn full_range<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
 pub fn theta_over_sin<S: Scalar>(y: S, rest: Lane) -> S {
     let yv = y.value();
     let ay = yv.abs();
-    let f = if ay.simd_le(lane(ARC_SHORT)).all() {
-        polynomial::<S>(&ARC[..7 + S::ORDER], yv)
+    let within = ARC_TIERS.map(|(limit, _)| ay.simd_le(lane(limit)));
+    let series = |tier: usize| polynomial::<S>(&ARC[..ARC_TIERS[tier].1 + S::ORDER], yv);
+    let f = if within[0].all() {
+        series(0)
     } else {
-        let short = ay.simd_le(lane(ARC_SHORT));
-        let series = ay.simd_le(lane(ARC_SERIES));
-        let mut f = polynomial::<S>(&ARC[..14 + S::ORDER], yv);
-        if short.any() {
-            f = select::<S>(short, polynomial::<S>(&ARC[..7 + S::ORDER], yv), f);
+        // From the widest range to the narrowest, so that each lane ends with its own tier.
+        let mut f = series(1);
+        if !within[1].all() {
+            f = select::<S>(within[1], f, series(2));
+            if !within[2].all() {
+                f = select::<S>(within[2], f, arc_full_range(yv, rest));
+            }
         }
-        if !series.all() {
-            f = select::<S>(series, f, arc_full_range(yv, rest));
+        if within[0].any() {
+            f = select::<S>(within[0], series(0), f);
         }
         f
     };

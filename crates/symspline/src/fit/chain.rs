@@ -10,9 +10,11 @@
 use crate::scalar::{LANES, Lane, lane, max_or_nan};
 use crate::space::Space;
 
-/// After this many steps the rounding errors of a frame are removed. Between neighbours, which is
-/// all that matters, frames are exact to rounding whatever this number is.
-const TIDY_EVERY: usize = 32;
+/// After this many steps the rounding errors of a frame are removed, which costs the cube of the
+/// dimension: one step costs its square.
+fn tidy_every(dim: usize) -> usize {
+    dim.max(8)
+}
 
 /// What one lane of a chain is made of: a run of nodes of a curve, counted around the curve when
 /// it is closed.
@@ -78,7 +80,7 @@ impl Walker {
         gather(runs.map(|r| r.point(self.node, len)), &mut self.q);
         let angle = space.step(&mut self.frame, &self.p, &self.q, chord);
         std::mem::swap(&mut self.p, &mut self.q);
-        if self.node.is_multiple_of(TIDY_EVERY) {
+        if self.node.is_multiple_of(tidy_every(chord.len())) {
             space.tidy(&mut self.frame, &self.p);
         }
         angle

@@ -153,13 +153,17 @@ pub fn step<const K: i32>(frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mu
     let f = theta_over_sin(y, rest);
     let scale = kappa::<K>() / rest;
     for (j, row) in frame.chunks_exact_mut(n).enumerate() {
+        // ⟨e, q − p⟩ is exact for near points. The frame moves by ⟨e, q⟩, the same number for e
+        // orthogonal to p, because that makes the new e orthogonal to q whatever e was.
         let d = q[0] - p[0];
         let mut along = if K < 0 { -row[0] * d } else { row[0] * d };
+        let mut reach = if K < 0 { -row[0] * q[0] } else { row[0] * q[0] };
         for i in 1..n {
             along = row[i].mul_add(q[i] - p[i], along);
+            reach = row[i].mul_add(q[i], reach);
         }
         chord[j] = f * along;
-        let factor = along * scale;
+        let factor = reach * scale;
         for i in 0..n {
             row[i] -= factor * (p[i] + q[i]);
         }

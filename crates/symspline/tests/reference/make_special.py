@@ -23,7 +23,7 @@ FUNCTIONS = {
     "j": lambda x: (1 - trig(x)[1]) / x,
     "arc": lambda y: acos(1 - y) / sin(acos(1 - y)) if y > 0 else acosh(1 - y) / sinh(acosh(1 - y)),
 }
-SWITCHES = {"trig": [0.1, 2.5], "arc": [0.0075, 0.09]}
+SWITCHES = {"trig": [0.1, 2.5], "arc": [0.0075, 0.09, 0.3]}
 
 
 def arguments(kind):
