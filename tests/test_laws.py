@@ -138,7 +138,9 @@ def end_conditions(kind, space, p):
 
 
 def knots(kind, n, rng):
-    return np.concatenate([[0.0], np.cumsum(np.ones(n - 1) if kind == "uniform" else rng.uniform(0.7, 1.3, n - 1))])
+    return np.concatenate(
+        [[0.0], np.cumsum(np.ones(n - 1) if kind == "uniform" else rng.uniform(0.7, 1.3, n - 1))]
+    )
 
 
 @every
@@ -273,7 +275,9 @@ def test_a_smooth_curve_is_recovered(case, ends, order):
             difference = np.array([1, -8, 8, -1]) / 12e-3
             around = [smooth_curve(space, end + e, False) for end in (0.0, 1.0)]
             # Fourth-order differences: 1e-12, far below the curve's own error.
-            bc = [(1, space.project_tangent(p[i], difference @ a)) for i, a in zip((0, -1), around, strict=True)]
+            bc = [
+                (1, space.project_tangent(p[i], difference @ a)) for i, a in zip((0, -1), around, strict=True)
+            ]
         spline = ss.CubicSpline(t, p, space, bc_type=bc)
         errors.append(space.distance(spline(x), smooth_curve(space, x, ends == "periodic")).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
@@ -309,7 +313,9 @@ def test_flat_space_is_scipy(ends, n, rng):
     for nu in range(3):
         assert np.abs(ours(x, nu) - flat(x, nu)).max() <= 200 * EPS * np.abs(p).max() / h**nu
     outside = [t[0] - 0.5, t[-1] + 0.7]
-    assert np.allclose(ours(outside, extrapolate=True), flat(outside, extrapolate=True), rtol=1e-11, atol=1e-11)
+    assert np.allclose(
+        ours(outside, extrapolate=True), flat(outside, extrapolate=True), rtol=1e-11, atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("ends", ["natural", "not-a-knot", "clamped", "periodic"])

@@ -34,7 +34,9 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
         total = total + better[..., ~rough].sum(axis=-1)
         if not rough.any():
             return total[()]
-        a, b = (np.concatenate([x[..., rough], y[..., rough]], axis=-1) for x, y in ((a, middle), (middle, b)))
+        a, b = (
+            np.concatenate([x[..., rough], y[..., rough]], axis=-1) for x, y in ((a, middle), (middle, b))
+        )
         whole = np.concatenate([half[..., rough] for half in halves], axis=-1)
     return (total + whole.sum(axis=-1))[()]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import ValidationError
-from ._times import Clock, clock_of
+from ._times import clock_of
 from .product import Product, ProductSpline
 from .report import Report
 from .spaces import space as space_named
@@ -100,7 +100,15 @@ def load(file: Any) -> CubicSpline:
         raise
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
-    except (zipfile.BadZipFile, ValueError, KeyError, EOFError, TypeError, IndexError, AttributeError) as error:
+    except (
+        zipfile.BadZipFile,
+        ValueError,
+        KeyError,
+        EOFError,
+        TypeError,
+        IndexError,
+        AttributeError,
+    ) as error:
         raise ValidationError(f"{name} is damaged or not a symspline curve: {error}") from None
     except Exception as error:
         # zlib and struct report damage with exceptions of their own.
@@ -114,7 +122,9 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
         raise ValidationError(f"format {str(arrays['format'])!r}, expected {_FORMAT!r}")
     version = int(arrays["version"])
     if version != _VERSION:
-        raise ValidationError(f"version {version}; this symspline reads version {_VERSION}, a newer one may read it")
+        raise ValidationError(
+            f"version {version}; this symspline reads version {_VERSION}, a newer one may read it"
+        )
     space = space_named(str(arrays["space"]))
     factors = space.factors if isinstance(space, Product) else (space,)
     bc_type = _rich(json.loads(str(arrays["bc_type"])))

@@ -122,7 +122,7 @@ class Product(Space):
 class ProductSpline(CubicSpline):
     """A spline in a product of spaces: one spline in every factor. Made by `CubicSpline`."""
 
-    _space: Product  # type: ignore[assignment]
+    _space: Product
     _parts: tuple[CubicSpline, ...]
 
     def __init__(
@@ -198,7 +198,7 @@ class ProductSpline(CubicSpline):
             return NotImplemented
         return isinstance(other, ProductSpline) and self._parts == other._parts
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
 
 def fit_many(
@@ -239,7 +239,9 @@ def _kind(error: Exception) -> str:
 
 def _check_tuple(points: Any, space: Product, name: str) -> None:
     if not isinstance(points, (tuple, list)) or len(points) != len(space.factors):
-        raise ValidationError(f"{name} must be a tuple of {len(space.factors)} arrays, one a factor of {space!r}")
+        raise ValidationError(
+            f"{name} must be a tuple of {len(space.factors)} arrays, one a factor of {space!r}"
+        )
 
 
 def _split_ends(bc_type: Any, space: Product) -> list[Any]:
@@ -253,7 +255,9 @@ def _split_ends(bc_type: Any, space: Product) -> list[Any]:
         if isinstance(end, str):
             return end
         if not isinstance(end, (tuple, list)) or len(end) != 2:
-            raise ValidationError(f"an end condition is a word or a pair (order, tuple of vectors), not {end!r}")
+            raise ValidationError(
+                f"an end condition is a word or a pair (order, tuple of vectors), not {end!r}"
+            )
         _check_tuple(end[1], space, "an end vector")
         return (end[0], end[1][i])
 

@@ -303,5 +303,3 @@ def space(name: str | Space) -> Space:
     except TypeError:
         raise ValidationError(f"{name!r}: {cls.__name__} does not take {len(values)} numbers") from None
     return made
-
-

@@ -179,9 +179,7 @@ class CubicSpline:
         times = self._clock.doubles(x, "x")
         return self._evaluate(times, _QUANTITIES[nu], extrapolate, per_curve)
 
-    def speed(
-        self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
-    ) -> Array:
+    def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Array:
         """|γ'| at times x, shape batch axes + x.shape."""
         times = self._clock.doubles(x, "x")
         return self._evaluate(times, "speed", extrapolate, per_curve)
@@ -192,9 +190,7 @@ class CubicSpline:
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return integrate(
-            self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch
-        )
+        return integrate(self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch)
 
     def _evaluate(
         self, x: NDArray[np.float64], quantity: str, extrapolate: bool | str | None, per_curve: bool
@@ -330,9 +326,7 @@ class CubicSpline:
         save(self, file)
 
 
-def fit(
-    t: ArrayLike | None, points: Any, space: Space | str, **options: Any
-) -> tuple[Any, Report]:
+def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
     """The velocities of the C² spline through points, as plain arrays.
 
     Takes the arguments of `CubicSpline`.

@@ -105,7 +105,7 @@ pub fn apply<M: Space>(
                 }
                 Operation::RandomTangent => {
                     space.lift(a, &mut frame);
-                    space.from_frame(&frame, a, &b[..space.dim()], &mut result);
+                    space.tangent(&frame, a, &b[..space.dim()], &mut result);
                 }
                 Operation::ProjectTangent => {
                     space.project_tangent(a, b);

@@ -109,7 +109,7 @@ impl<S: Scalar> Trig<S> {
             taylor::<S>(xv)
         } else {
             let (a, b) = taylor::<S>(xv);
-            let (c, d) = full_range::<S>(xv);
+            let (c, d) = full_range(xv);
             (select::<S>(series, a, c), select::<S>(series, b, d))
         };
         let k = -x.compose(versine);
@@ -134,7 +134,7 @@ fn taylor<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
 
 /// (1 − cos√x)/x and (1 − sin√x/√x)/x away from 0, with derivatives in x.
 #[inline(never)]
-fn full_range<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
+fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
     let r = x.abs().sqrt();
     let (sin, cos) = r.sin_cos();
     let (e, positive) = (r.exp(), x.simd_gt(Lane::ZERO));

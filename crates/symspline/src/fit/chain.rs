@@ -175,7 +175,7 @@ impl Chain {
             Some(rows) => {
                 gather(rows, &mut self.ambient);
                 let Walker { frame, p, .. } = &self.walker;
-                space.to_frame(frame, p, &self.ambient, &mut self.end_values[end]);
+                space.coordinates(frame, p, &self.ambient, &mut self.end_values[end]);
             }
             None => self.end_values[end].fill(Lane::ZERO),
         }
@@ -187,8 +187,8 @@ impl Chain {
         let first = (&self.start.0, &self.start.1);
         let last = (&self.walker.frame, &self.walker.p);
         let (from, to) = if to_last { (first, last) } else { (last, first) };
-        space.from_frame(from.0, from.1, x, &mut self.ambient);
-        space.to_frame(to.0, to.1, &self.ambient, x);
+        space.tangent(from.0, from.1, x, &mut self.ambient);
+        space.coordinates(to.0, to.1, &self.ambient, x);
     }
 
     /// Hands out the velocities as ambient tangent vectors, node by node.
@@ -202,7 +202,7 @@ impl Chain {
         self.walker.start(space, runs);
         for i in 0..=self.n {
             let Walker { frame, p, .. } = &self.walker;
-            space.from_frame(frame, p, &self.u[i * m..(i + 1) * m], &mut self.ambient);
+            space.tangent(frame, p, &self.u[i * m..(i + 1) * m], &mut self.ambient);
             visit(i, &self.ambient);
             if i < self.n {
                 // The chords are known; the residual is no longer needed and takes them.

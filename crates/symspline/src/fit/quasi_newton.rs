@@ -131,7 +131,7 @@ impl Anderson {
         }
         for i in 0..k {
             for l in 0..i {
-                gamma[i] = gamma[i] - gram[i][l] * inverse[l] * gamma[l];
+                gamma[i] -= gram[i][l] * inverse[l] * gamma[l];
             }
         }
         for i in 0..k {
@@ -139,7 +139,7 @@ impl Anderson {
         }
         for i in (0..k).rev() {
             for l in i + 1..k {
-                gamma[i] = gamma[i] - gram[l][i] * inverse[i] * gamma[l];
+                gamma[i] -= gram[l][i] * inverse[i] * gamma[l];
             }
         }
         for i in 0..k {

@@ -63,7 +63,7 @@ pub fn solve<M: Space>(
     monitor: &Monitor,
 ) -> Outcome {
     let Workspace { t, vectors, anderson, step, next_step, best } = work;
-    t.new(chain, ends);
+    t.build(chain, ends);
     anderson.restart();
     best.clear();
     for vector in [&mut *step, &mut *next_step] {

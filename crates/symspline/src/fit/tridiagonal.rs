@@ -27,7 +27,7 @@ const TWO: Lane = lane(2.0);
 
 impl Tridiagonal {
     /// Builds and factors T.
-    pub fn new(&mut self, chain: &Chain, ends: &ChainEnds) {
+    pub fn build(&mut self, chain: &Chain, ends: &ChainEnds) {
         let n = chain.n;
         for v in [&mut self.diagonal, &mut self.lower, &mut self.upper, &mut self.inverse_pivot] {
             v.resize(n + 1, Lane::ZERO);

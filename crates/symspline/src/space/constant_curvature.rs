@@ -167,6 +167,10 @@ pub fn step<const K: i32>(frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mu
         for i in 0..n {
             row[i] -= factor * (p[i] + q[i]);
         }
+        // One step of Newton's method for 1/|e|: an error of the norm would go into the velocity,
+        // and from there eightfold into a jump of the acceleration.
+        let shorten = lane(-0.5).mul_add(product::<K, Lane>(row, row), lane(1.5));
+        row.iter_mut().for_each(|x| *x *= shorten);
     }
     angle(y, rest, f)
 }
@@ -191,14 +195,14 @@ pub fn tidy<const K: i32>(frame: &mut [Lane], p: &[Lane]) {
 }
 
 #[inline(always)]
-pub fn to_frame<const K: i32>(frame: &[Lane], v: &[Lane], x: &mut [Lane]) {
+pub fn coordinates<const K: i32>(frame: &[Lane], v: &[Lane], x: &mut [Lane]) {
     for (x, row) in x.iter_mut().zip(frame.chunks_exact(v.len())) {
         *x = product::<K, Lane>(row, v);
     }
 }
 
 #[inline(always)]
-pub fn from_frame(frame: &[Lane], x: &[Lane], v: &mut [Lane]) {
+pub fn tangent(frame: &[Lane], x: &[Lane], v: &mut [Lane]) {
     v.fill(Lane::ZERO);
     for (x, row) in x.iter().zip(frame.chunks_exact(v.len())) {
         for i in 0..v.len() {
@@ -345,12 +349,12 @@ macro_rules! curved_methods {
             cc::tidy::<K>(frame, p);
         }
         #[inline(always)]
-        fn to_frame(&self, frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
-            cc::to_frame::<K>(frame, v, x);
+        fn coordinates(&self, frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+            cc::coordinates::<K>(frame, v, x);
         }
         #[inline(always)]
-        fn from_frame(&self, frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
-            cc::from_frame(frame, x, v);
+        fn tangent(&self, frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+            cc::tangent(frame, x, v);
         }
         #[inline(always)]
         fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {

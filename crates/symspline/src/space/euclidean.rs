@@ -75,8 +75,8 @@ impl Space for Euclidean {
         dot(u, v)
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
-        // NaN and infinity stay what they are: ∞ − ∞ is NaN.
-        x.iter().fold(Lane::ZERO, |sum, x| sum + (*x - *x))
+        // NaN and infinity stay what they are: 0·∞ is NaN.
+        x.iter().fold(Lane::ZERO, |sum, x| sum + *x * Lane::ZERO)
     }
     fn project_tangent(&self, _p: &[Lane], v: &mut [Lane]) -> Lane {
         self.project(v)
@@ -94,11 +94,11 @@ impl Space for Euclidean {
     }
     fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
     #[inline(always)]
-    fn to_frame(&self, _frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+    fn coordinates(&self, _frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         x.copy_from_slice(v);
     }
     #[inline(always)]
-    fn from_frame(&self, _frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+    fn tangent(&self, _frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
         v.copy_from_slice(x);
     }
 

@@ -97,9 +97,9 @@ pub trait Space: Copy + Send + Sync + 'static {
     /// Removes the rounding errors that a frame at p has gathered.
     fn tidy(&self, frame: &mut [Lane], p: &[Lane]);
     /// Coordinates of a tangent vector at p.
-    fn to_frame(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
+    fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
     /// The tangent vector at p with given coordinates.
-    fn from_frame(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
+    fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
 
     // ---- at the origin --------------------------------------------------------------------
 

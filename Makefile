@@ -1,0 +1,35 @@
+# Each target sets up what it needs: a virtual environment in .venv, and the compiled module.
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+BIN := .venv/bin
+RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/config.toml
+# Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test check-tools clean
+
+demo: .venv/built
+	$(BIN)/python -m symspline.demo --out demo-output
+
+test: .venv/built
+	cargo fmt --all --check
+	cargo clippy --quiet --all-targets -- -D warnings
+	cargo test --quiet -p symspline
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest --doctest-modules python tests
+
+.venv/built: pyproject.toml $(RUST) | check-tools
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(INSTALL) --editable '.[test]'
+	touch $@
+
+check-tools:
+	@test -n "$(PYTHON)" || { echo "symspline needs Python 3.11 or newer (set PYTHON=/path/to/python)"; exit 1; }
+	@command -v cargo >/dev/null || { echo "symspline needs a Rust toolchain: see https://rustup.rs"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+		{ echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian: python3-venv)"; exit 1; }
+
+clean:
+	rm -rf .venv target demo-output
