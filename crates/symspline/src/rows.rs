@@ -1,9 +1,8 @@
 //! Operations of a space on arrays of points and tangent vectors, eight rows at a time.
 
-use crate::fit::gather;
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{LANES, Lane, lane};
+use crate::scalar::{LANES, Lane, gather, lane, scatter};
 use crate::space::Space;
 
 /// Rows worked on by one thread at a time.
@@ -121,9 +120,7 @@ pub fn apply<M: Space>(
                     *first = Some((at[l], angle[l]));
                 }
             }
-            for (l, out) in out.chunks_exact_mut(size).enumerate() {
-                out.iter_mut().zip(&result).for_each(|(o, r)| *o = r.as_array()[l]);
-            }
+            scatter(&result[..size], out);
         }
     });
     faults.into_inner().ok().flatten().map_or(Ok(()), Err)
@@ -146,9 +143,7 @@ pub fn project_points<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Resu
                 return Err((group * LANES + l, off[l], space.complaint(&rows[l * len..(l + 1) * len])));
             }
         }
-        for (l, row) in rows.chunks_exact_mut(len).enumerate() {
-            row.iter_mut().zip(&x).for_each(|(r, x)| *r = x.as_array()[l]);
-        }
+        scatter(&x, rows);
     }
     Ok(())
 }

@@ -2,10 +2,9 @@
 
 use super::bezier::Segment;
 use super::locate::Locator;
-use crate::fit::gather;
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, lane, max_or_nan};
+use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
 use crate::space::Space;
 
 /// Spline curves with equally many knots: the triple (t, p, u).
@@ -288,17 +287,6 @@ impl<M: Space> Job<'_, M> {
         self.space.ray(p0, a, S::time(beyond, Lane::ONE), &mut straight);
         for (g, s) in gamma.iter_mut().zip(&straight) {
             *g = S::select(before | behind, *s, *g);
-        }
-    }
-}
-
-/// Writes lanes of a row as consecutive rows; the last group may be short.
-#[inline(always)]
-fn scatter(row: &[Lane], out: &mut [f64]) {
-    for (c, x) in row.iter().enumerate() {
-        let values = x.as_array();
-        for (l, out) in out.chunks_exact_mut(row.len()).enumerate() {
-            out[c] = values[l];
         }
     }
 }

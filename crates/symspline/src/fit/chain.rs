@@ -7,7 +7,7 @@
 //! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
 //! long curve.
 
-use crate::scalar::{LANES, Lane, lane, max_or_nan};
+use crate::scalar::{LANES, Lane, gather, lane, max_or_nan};
 use crate::space::Space;
 
 /// After this many steps the rounding errors of a frame are removed, which costs the cube of the
@@ -41,14 +41,6 @@ impl<'a> Run<'a> {
         let k = self.first + i;
         let k = if k <= last { k } else { k % last };
         &self.points[k * len..(k + 1) * len]
-    }
-}
-
-/// One row of numbers from each of eight arrays, side by side.
-#[inline(always)]
-pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
-    for (c, x) in out.iter_mut().enumerate() {
-        *x = Lane::new(std::array::from_fn(|l| rows[l][c]));
     }
 }
 
@@ -209,10 +201,5 @@ impl Chain {
                 self.walker.advance(space, runs, &mut self.r[..m]);
             }
         }
-    }
-
-    /// The number of numbers kept of each chord.
-    pub fn keep(&self) -> usize {
-        self.prepared.len() / self.n
     }
 }

@@ -14,6 +14,7 @@
 use super::chain::Chain;
 use crate::scalar::{LANES, Lane, lane, max_or_nan};
 use crate::space::Space;
+use crate::with_size;
 
 /// A condition at one end of an open curve, as it is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,22 +74,35 @@ const THIRD: Lane = lane(1.0 / 3.0);
 
 /// Fills `chain.r` with right side minus left side of the C² condition at every node.
 pub fn residual<M: Space>(space: &M, chain: &mut Chain, ends: &ChainEnds, work: &mut NodeVectors) -> Defect {
-    let (n, m, keep) = (chain.n, chain.m, chain.keep());
-    work.resize(m);
+    work.resize(chain.m);
+    with_size!(chain.m, m => inside(space, chain, ends, work, m))
+}
+
+#[inline(always)]
+fn inside<M: Space>(
+    space: &M,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    work: &mut NodeVectors,
+    m: usize,
+) -> Defect {
+    let (n, keep) = (chain.n, space.chord_len());
     let NodeVectors { a, b, left, right, next_left } = work;
+    let (a, b) = (&mut a[..m], &mut b[..m]);
+    let (mut left, mut right, mut next_left) = (&mut left[..m], &mut right[..m], &mut next_left[..m]);
     let mut result = Defect { defect: Lane::ZERO, speed: Lane::ZERO, leg: Lane::ZERO };
     let mut first_right = Lane::ZERO;
     for i in 0..=n {
         let (h_left, h_right) = (chain.h[i.max(1) - 1], chain.h[i.min(n - 1)]);
-        let u = &chain.u[i * m..];
+        let u = &chain.u[i * m..][..if i < n { 2 * m } else { m }];
         if i < n {
             let third = h_right * THIRD;
             for c in 0..m {
                 a[c] = u[c] * third;
                 b[c] = u[m + c] * third;
             }
-            let prepared = &chain.prepared[i * keep..(i + 1) * keep];
-            space.legs(&chain.chord[i * m..(i + 1) * m], prepared, a, b, right, next_left);
+            let prepared = &chain.prepared[i * keep..][..keep];
+            space.legs(&chain.chord[i * m..][..m], prepared, a, b, right, next_left);
             let scale = Lane::ONE / (h_right * h_right);
             for c in 0..m {
                 right[c] = (right[c] - a[c]) * scale;
@@ -100,19 +114,19 @@ pub fn residual<M: Space>(space: &M, chain: &mut Chain, ends: &ChainEnds, work: 
         let h = h_left.max(h_right) * THIRD;
         result.leg = max_or_nan(result.leg, h * h * speed2);
 
-        let r = &mut chain.r[i * m..(i + 1) * m];
+        let r = &mut chain.r[i * m..][..m];
         if i > 0 && i < n {
             join(space, h_left, h_right, &u[..m], left, right, r);
             let weight = h_left * h_right / (h_left + h_right);
             result.defect = max_or_nan(result.defect, space.norm2(r) * (weight * weight));
         } else {
             // An end: keep the side that is there, the end condition comes below.
-            r.copy_from_slice(if i == 0 { right } else { left });
+            r.copy_from_slice(if i == 0 { &*right } else { &*left });
             if i == 0 {
                 first_right = h_right;
             }
         }
-        std::mem::swap(left, next_left);
+        std::mem::swap(&mut left, &mut next_left);
     }
     let at_ends = match ends {
         ChainEnds::Periodic => close(space, chain, work, first_right),

@@ -8,7 +8,6 @@ mod quasi_newton;
 mod solve;
 mod tridiagonal;
 
-pub use chain::gather;
 pub use condition::EndKind;
 pub use pieces::fit;
 

@@ -7,6 +7,7 @@ use super::chain::Chain;
 use super::condition::{ChainEnds, EndKind, of_kind};
 use crate::scalar::{LANES, Lane, lane};
 use crate::space::Space;
+use crate::with_size;
 
 /// T, factored by elimination without pivots (T is diagonally dominant but for not-a-knot rows,
 /// which are safe too: their first pivot is 1/h₀ + 1/h₁).
@@ -66,21 +67,25 @@ impl Tridiagonal {
     }
 
     /// Solves on the rows `first..=last` in place, for vectors of m numbers.
-    #[inline(always)]
     fn solve_open(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
-        for i in first..=last {
-            let (before, here) = x.split_at_mut(i * m);
-            let pivot = self.inverse_pivot[i];
+        with_size!(m, m => self.solve_rows(first, last, m, x));
+    }
+
+    #[inline(always)]
+    fn solve_rows(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
+        x[first * m..][..m].iter_mut().for_each(|x| *x *= self.inverse_pivot[first]);
+        for i in first + 1..=last {
+            let (before, here) = x[(i - 1) * m..][..2 * m].split_at_mut(m);
+            let (lower, pivot) = (self.lower[i], self.inverse_pivot[i]);
             for c in 0..m {
-                let eliminated = if i > first { self.lower[i] * before[(i - 1) * m + c] } else { Lane::ZERO };
-                here[c] = (here[c] - eliminated) * pivot;
+                here[c] = lower.mul_neg_add(before[c], here[c]) * pivot;
             }
         }
         for i in (first..last).rev() {
-            let (here, behind) = x.split_at_mut((i + 1) * m);
-            let factor = -(self.upper[i] * self.inverse_pivot[i]);
+            let (here, behind) = x[i * m..][..2 * m].split_at_mut(m);
+            let factor = self.upper[i] * self.inverse_pivot[i];
             for c in 0..m {
-                here[i * m + c] = factor.mul_add(behind[c], here[i * m + c]);
+                here[c] = factor.mul_neg_add(behind[c], here[c]);
             }
         }
     }

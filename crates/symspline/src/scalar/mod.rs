@@ -7,9 +7,11 @@
 
 mod dual;
 mod jet;
+mod rows;
 
 pub use dual::Dual;
 pub use jet::Jet;
+pub use rows::{gather, scatter};
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -125,4 +127,27 @@ pub fn mask_bits(mask: Lane) -> [bool; LANES] {
 pub fn mask_from(f: impl Fn(usize) -> bool) -> Lane {
     let array: [f64; LANES] = std::array::from_fn(|i| if f(i) { 1.0 } else { 0.0 });
     Lane::new(array).simd_gt(Lane::ZERO)
+}
+
+/// Calls a function of a size with the common small sizes as constants: inlined into it, loops over
+/// coordinates unroll and small vectors stay in registers.
+#[macro_export]
+macro_rules! with_size {
+    ($size:expr, $m:ident => $body:expr) => {
+        match $size {
+            2 => {
+                let $m = 2;
+                $body
+            }
+            3 => {
+                let $m = 3;
+                $body
+            }
+            4 => {
+                let $m = 4;
+                $body
+            }
+            $m => $body,
+        }
+    };
 }

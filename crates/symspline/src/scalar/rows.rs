@@ -1,0 +1,74 @@
+//! Eight rows of numbers in memory, and the same numbers side by side in lanes.
+
+use super::{LANES, Lane};
+use wide::bytemuck::cast;
+use wide::f64x4;
+
+/// Reads one row of numbers from each of eight arrays: `out[c]` gets column c.
+#[inline(always)]
+pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
+    let len = out.len();
+    let rows = rows.map(|row| &row[..len]);
+    let mut c = 0;
+    // Four columns at a time are a transposition in registers.
+    while c + 4 <= len {
+        let row = |l: usize| f64x4::new([rows[l][c], rows[l][c + 1], rows[l][c + 2], rows[l][c + 3]]);
+        let low = f64x4::transpose([row(0), row(1), row(2), row(3)]);
+        let high = f64x4::transpose([row(4), row(5), row(6), row(7)]);
+        for k in 0..4 {
+            out[c + k] = cast([low[k], high[k]]);
+        }
+        c += 4;
+    }
+    while c < len {
+        out[c] = Lane::new(std::array::from_fn(|l| rows[l][c]));
+        c += 1;
+    }
+}
+
+/// Writes lanes as consecutive rows; `out` may hold fewer than eight.
+#[inline(always)]
+pub fn scatter(lanes: &[Lane], out: &mut [f64]) {
+    let len = lanes.len();
+    let mut c = 0;
+    if out.len() == LANES * len {
+        while c + 4 <= len {
+            let [[a, b], [d, e], [f, g], [h, i]]: [[f64x4; 2]; 4] =
+                [cast(lanes[c]), cast(lanes[c + 1]), cast(lanes[c + 2]), cast(lanes[c + 3])];
+            let low = f64x4::transpose([a, d, f, h]);
+            let high = f64x4::transpose([b, e, g, i]);
+            for (l, row) in low.into_iter().chain(high).enumerate() {
+                out[l * len + c..][..4].copy_from_slice(row.as_array());
+            }
+            c += 4;
+        }
+    }
+    while c < len {
+        let column = lanes[c].to_array();
+        for (row, x) in out.chunks_exact_mut(len).zip(column) {
+            row[c] = x;
+        }
+        c += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn scatter_undoes_gather(len in 1..11_usize, rows in 1..=LANES) {
+            let data: Vec<f64> = (0..LANES * len).map(|i| i as f64).collect();
+            let mut lanes = vec![Lane::ZERO; len];
+            gather(std::array::from_fn(|l| &data[l * len..(l + 1) * len]), &mut lanes);
+            for c in 0..len {
+                prop_assert_eq!(lanes[c].to_array(), std::array::from_fn(|l| (l * len + c) as f64));
+            }
+            let mut out = vec![0.0; rows * len];
+            scatter(&lanes, &mut out);
+            prop_assert_eq!(&out[..], &data[..rows * len]);
+        }
+    }
+}

@@ -1,0 +1,36 @@
+"""Longitude and latitude in degrees, and unit vectors of S²."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
+    """The unit vectors of places on a globe.
+
+    Args:
+        lon, lat: degrees east and north, shape (...).
+
+    Returns:
+        Shape (..., 3): x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
+
+    >>> from_lonlat(90, 0).round(15)
+    array([0., 1., 0.])
+    """
+    east, north = np.radians(np.asarray(lon, dtype=float)), np.radians(np.asarray(lat, dtype=float))
+    x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
+    return np.stack([x, y, z], axis=-1)
+
+
+def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
+    """Longitude in (-180, 180] and latitude, in degrees, of unit vectors of shape (..., 3).
+
+    >>> lon, lat = to_lonlat([0, 1, 0])
+    >>> float(lon), float(lat)
+    (90.0, 0.0)
+    """
+    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))

@@ -1,0 +1,162 @@
+"""The demo: storm tracks on a globe."""
+
+import csv
+import sys
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline import _tracks as tracks
+from symspline import demo, hurdat
+from symspline.lonlat import from_lonlat, to_lonlat
+
+HOUR = np.timedelta64(1, "h")
+
+
+@pytest.fixture(scope="module")
+def storms():
+    return [storm.spaced(HOUR) for storm in hurdat.read_sample()]
+
+
+@pytest.fixture(scope="module")
+def splines(storms):
+    return tracks.fit_tracks(storms)
+
+
+def test_sample_is_read_completely():
+    sample = hurdat.read_sample()
+    assert len(sample) == 37
+    assert sum(map(len, sample)) == 1073
+    assert (min(map(len, sample)), max(map(len, sample))) == (6, 62)
+    assert len({storm.label for storm in sample}) == 37
+    ida = next(storm for storm in sample if storm.label == "Ida 2021")
+    assert ida.key == "AL092021"
+    landfall = np.flatnonzero(ida.times == np.datetime64("2021-08-29T16:55"))
+    assert ida.lat[landfall] == 29.1 and ida.lon[landfall] == -90.2
+
+
+def test_hemispheres_and_times():
+    (storm,) = hurdat.parse(
+        "SH012021, SOUTH, 2,\n20210101, 0000, , TS, 10.5S, 179.5E, 0\n20210101, 0630, , TS, 1.0N, 0.5W, 0"
+    )
+    assert storm.lat.tolist() == [-10.5, 1.0] and storm.lon.tolist() == [179.5, -0.5]
+    assert storm.times[1] - storm.times[0] == np.timedelta64(390, "m")
+
+
+def test_only_extra_fixes_close_to_another_are_left_out(storms):
+    for before, after in zip(hurdat.read_sample(), storms, strict=True):
+        assert np.diff(after.times).min() >= HOUR
+        left_out = before.times[~np.isin(before.times, after.times)]
+        assert (left_out.astype(int) % 360 > 0).all()  # in minutes: none is a six-hourly fix
+    assert sum(map(len, storms)) == 1064
+
+
+def test_lonlat_round_trip():
+    lon, lat = np.array([-180 + 1e-9, -90, 0, 90, 180]), np.array([-89.0, -30, 0, 45, 89.9])
+    points = from_lonlat(lon[:, None], lat)
+    assert points.shape == (5, 5, 3)
+    back = to_lonlat(points)
+    np.testing.assert_allclose(back[0], np.broadcast_to(lon[:, None], (5, 5)), atol=1e-12)
+    np.testing.assert_allclose(back[1], np.broadcast_to(lat, (5, 5)), atol=1e-12)
+
+
+def test_tracks_are_twice_continuously_differentiable(storms, splines):
+    for storm, spline in zip(storms, splines, strict=True):
+        row = tracks.summary(storm, spline)
+        assert spline.report.converged
+        assert max(row.jumps[:2]) < 1e-12 and row.jumps[2] < 1e-11
+        assert 10 < row.mean_speed <= row.top_speed < 1.2 * row.mean_speed < 140
+        assert spline.t[0] <= row.top_time <= spline.t[-1]
+
+
+def test_jumps_are_found_where_there_are_some(splines):
+    spline = splines[0]
+    bent = spline.velocities.copy()
+    bent[3] *= 1.01
+    pieces = tracks.Pieces(*map(tracks._pairs, (spline.t, spline.points, bent)))
+    assert tracks._largest_jump(pieces.at(pieces.t, 1)) < 1e-12
+    assert tracks._largest_jump(pieces.at(pieces.t, 2)) > 1e-3
+    slerp = tracks.slerp_pieces(spline)
+    assert tracks._largest_jump(slerp.at(slerp.t)) < 1e-12
+    assert tracks._largest_jump(slerp.at(slerp.t, 1)) > 1e-2
+
+
+def test_natural_ends_follow_rounded_fixes_better(storms, splines):
+    """Tracks cut at an inner fix: how well is the velocity of the whole track met there?"""
+    places = [(s, f, k) for s, f in zip(storms, splines, strict=True) for k in range(4, len(s) - 5)]
+    cut = [(storm.times[: k + 1], spline.points[: k + 1]) for storm, spline, k in places]
+    whole = np.array([spline.velocities[k] for _, spline, k in places])
+
+    def error(bc_type):
+        ends = np.array([f.velocities[-1] for f in ss.fit_many(cut, "sphere:2", bc_type=bc_type)])
+        return np.sqrt(np.square(ends - whole).sum(-1).mean())
+
+    assert error("natural") < 0.6 * error("not-a-knot")
+
+
+def test_motion_of_a_circle_of_latitude():
+    """At 60 degrees north, once round in a day eastwards: the turn is to the left."""
+    rate, lat = 2 * np.pi / 86400, np.radians(60)
+    point = from_lonlat(0, 60)
+    velocity = rate * np.cos(lat) * np.array([0, 1, 0])
+    acceleration = ss.Sphere(2).project_tangent(point, -(rate**2) * np.cos(lat) * np.array([1, 0, 0]))
+    motion = tracks.motion(point, velocity, acceleration)
+    assert motion.speed == pytest.approx(6371 * np.cos(lat) * 2 * np.pi / 24)
+    assert motion.course == pytest.approx(90)
+    assert motion.turn == pytest.approx(-np.sin(lat) * 15)
+
+
+def test_great_circles_and_linear_lonlat_jump(storms, splines):
+    compared = tracks.comparison(storms[27], splines[27])
+    assert storms[27].label == "Gaston 2022"
+    assert max(compared.steps("C2 spline")) < 1e-9
+    for name in ("great circles (Slerp)", "linear lon/lat"):
+        speed, course = compared.steps(name)
+        assert 5 < speed < 20 and 30 < course < 90
+    slerp, spline = compared.motions["great circles (Slerp)"], compared.motions["C2 spline"]
+    assert np.abs(slerp.turn).max() < 1e-9
+    assert np.ptp(slerp.speed, axis=1).max() < 1e-9
+    # Turn rate is the rate of the course, but for the convergence of the meridians.
+    hours = np.diff(compared.times, axis=1) / HOUR
+    assert np.abs(np.diff(spline.course, axis=1) / hours - spline.turn[:, 1:]).max() < 2
+
+
+def test_demo_writes_its_files(tmp_path, capsys):
+    assert demo.main(["--out", str(tmp_path / "new" / "folder")]) == 0
+    folder = tmp_path / "new" / "folder"
+    text = capsys.readouterr().out
+    assert text.isascii()
+    assert "37 storms, 1073 fixes; 9 landfalls" in " ".join(text.split())
+    with (folder / "tracks.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with np.load(folder / "tracks.npz") as arrays:
+        assert list(arrays) == list(rows[0]) == ["storm", "time", "lon", "lat", "speed_kmh"]
+        assert len(rows) == len(arrays["time"]) == 6007
+        np.testing.assert_array_equal([row["storm"] for row in rows], arrays["storm"])
+        np.testing.assert_array_equal(
+            np.array([row["time"] for row in rows], "datetime64[m]"), arrays["time"]
+        )
+        for name, error in (("lon", 6e-6), ("lat", 6e-6), ("speed_kmh", 6e-4)):
+            np.testing.assert_allclose([float(row[name]) for row in rows], arrays[name], rtol=0, atol=error)
+        own = arrays["storm"] == "Gaston 2022"
+        spline = ss.load(folder / "gaston-2022.npz")
+        points = from_lonlat(arrays["lon"][own], arrays["lat"][own])
+        np.testing.assert_allclose(spline(arrays["time"][own]), points, atol=1e-13)
+    for name in ("tracks", "three-points", "c2"):
+        picture = (folder / f"{name}.png").read_bytes()
+        assert picture.startswith(b"\x89PNG") and len(picture) > 50_000
+
+
+def test_demo_without_matplotlib(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert demo.main(["--out", str(tmp_path)]) == 0
+    assert "pip install 'symspline[plot]'" in capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gaston-2022.npz", "tracks.csv", "tracks.npz"]
+
+
+def test_folder_that_cannot_be(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    with pytest.raises(SystemExit, match="2"):
+        demo.main(["--out", str(tmp_path / "file")])
+    assert "cannot make the folder" in capsys.readouterr().err
