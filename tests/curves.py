@@ -59,3 +59,15 @@ def run_python(code, *arguments, timeout=20, **environment):
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
+
+
+def at_node(space, value, i):
+    """Points or vectors of node i of every curve."""
+    if isinstance(space, ss.Product):
+        return tuple(at_node(f, v, i) for f, v in zip(space.factors, value, strict=True))
+    return np.take(value, i, axis=-1 - len(space.point_shape))
+
+
+def tangents_at(space, points, size=0.3, seed=5):
+    """Random tangent vectors at points."""
+    return each(lambda v: size * v, space.random_tangent(np.random.default_rng(seed), points))

@@ -202,9 +202,11 @@ pub fn slerp<S: Scalar>(t: S, y: S, rest: Lane) -> [S; 2] {
     let f = theta_over_sin(y, rest);
     // θ² = f² sin²θ
     let theta2 = f * f * y * (S::constant(rest) - (y - y.value()));
-    let weight = |t: S| {
-        let x = t * t * theta2;
-        f * t * Trig::new(x).s
-    };
-    [weight(-t + Lane::ONE), weight(t)]
+    [slerp_weight(-t + Lane::ONE, theta2, f), slerp_weight(t, theta2, f)]
+}
+
+/// sin(tθ)/sin θ = t · sin(tθ)/(tθ) · θ/sin θ
+#[inline(always)]
+fn slerp_weight<S: Scalar>(t: S, theta2: S, f: S) -> S {
+    f * t * Trig::new(t * t * theta2).s
 }

@@ -10,7 +10,8 @@ pub struct Segment<S> {
     /// `log_{p_i}(q⁺)` and `−log_{p_{i+1}}(q⁻)`: h/3 times the end velocities.
     pub legs: [Vec<Lane>; 2],
     /// The control points q⁺ and q⁻.
-    pub controls: [Vec<Lane>; 2],
+    controls: [Vec<Lane>; 2],
+    /// `log_{q⁺}(q⁻)`.
     middle: Vec<Lane>,
     level: [Vec<S>; 3],
 }
@@ -29,12 +30,15 @@ impl<S: Scalar> Segment<S> {
         }
     }
 
-    /// Computes the control points from ends and legs.
+    /// Computes control points and middle leg from ends and outer legs.
     #[inline(always)]
-    pub fn control<M: Space>(&mut self, space: &M) {
-        let Segment { ends: [p0, p1], legs: [a, b], controls: [q0, q1], .. } = self;
+    pub fn prepare<M: Space>(&mut self, space: &M, len: usize) {
+        let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
+        let [a, b] = self.legs.each_ref().map(|x| &x[..len]);
+        let [q0, q1] = self.controls.each_mut().map(|x| &mut x[..len]);
         space.ray(p0, a, Lane::ONE, q0);
         space.ray(p1, b, lane(-1.0), q1);
+        space.log(q0, q1, &mut self.middle[..len]);
     }
 
     /// γ(t), for t in units of the segment.
@@ -42,12 +46,13 @@ impl<S: Scalar> Segment<S> {
     /// The first three geodesics start at fixed points with known velocities: the outer ones are
     /// never put through a logarithm, which keeps legs exact that come near the cut locus.
     #[inline(always)]
-    pub fn at<M: Space>(&mut self, space: &M, t: S, gamma: &mut [S]) {
-        self.control(space);
-        let Segment { ends: [p0, p1], legs: [a, b], controls: [q0, q1], middle, level: [x, y, z] } = self;
-        space.log(q0, q1, middle);
+    pub fn at<M: Space>(&mut self, space: &M, len: usize, t: S, gamma: &mut [S]) {
+        let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
+        let [a, b] = self.legs.each_ref().map(|x| &x[..len]);
+        let [x, y, z] = self.level.each_mut().map(|x| &mut x[..len]);
+        let gamma = &mut gamma[..len];
         space.ray(p0, a, t, x);
-        space.ray(q0, middle, t, y);
+        space.ray(&self.controls[0][..len], &self.middle[..len], t, y);
         space.ray(p1, b, t - Lane::ONE, z);
         space.geodesic(x, y, t, gamma);
         space.geodesic(y, z, t, x);

@@ -6,6 +6,7 @@ use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
 use crate::space::Space;
+use crate::with_size;
 
 /// Spline curves with equally many knots: the triple (t, p, u).
 pub struct Curves<'a> {
@@ -180,20 +181,19 @@ struct Place {
 }
 
 impl<M: Space> Job<'_, M> {
+    /// Where a sample falls: the i-th time of a curve.
     #[inline(always)]
-    fn place(&self, sample: usize, hint: usize) -> Place {
+    fn place(&self, curve: usize, i: usize, hint: usize) -> Place {
         let Times { x, count } = *self.times;
-        let curve = sample / count;
-        let x = if x.len() == count { x[sample % count] } else { x[sample] };
+        let mut x = if x.len() == count { x[i] } else { x[curve * count + i] };
         let t = self.curves.knots(curve);
         let (start, end) = (t[0], t[t.len() - 1]);
-        let mut place = Place { curve, ..Place::default() };
-        let mut x = x;
+        let mut beyond = 0.0;
         if x < start || x > end {
             match self.outside {
                 Outside::Continue => {}
                 Outside::Geodesic => {
-                    place.beyond = if x < start { x - start } else { x - end };
+                    beyond = if x < start { x - start } else { x - end };
                     x = x.clamp(start, end);
                 }
                 Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).clamp(start, end),
@@ -201,13 +201,12 @@ impl<M: Space> Job<'_, M> {
         }
         let k = match self.locator {
             Some(locator) => locator.find(x, hint),
-            None => Locator::new(t, false).find(x, hint.min(t.len() - 2)),
+            None => Locator::new(t, false).find(x, hint),
         };
-        place.segment = k;
-        place.h = t[k + 1] - t[k];
+        let h = t[k + 1] - t[k];
         // Exactly 1 at the last knot.
-        place.tau = if x == t[k + 1] { 1.0 } else { (x - t[k]) / place.h };
-        place
+        let tau = if x == t[k + 1] { 1.0 } else { (x - t[k]) / h };
+        Place { curve, segment: k, h, tau, beyond }
     }
 
     fn derivatives<S: Derivatives>(&self, out: &mut [f64], size: usize, wanted: Wanted) {
@@ -215,54 +214,82 @@ impl<M: Space> Job<'_, M> {
         let (mut jets, mut p) = (vec![Jet::constant(Lane::ZERO); len], vec![Lane::ZERO; len]);
         let (mut velocity, mut acceleration) = (p.clone(), p.clone());
         self.run::<S>(out, size, |gamma, row| {
-            for i in 0..len {
+            for i in 0..gamma.len() {
                 jets[i] = gamma[i].jet();
                 p[i] = jets[i].v;
             }
-            self.space.covariant(&jets, &mut velocity, &mut acceleration);
+            let len = gamma.len();
+            let (velocity, acceleration) = (&mut velocity[..len], &mut acceleration[..len]);
+            self.space.covariant(&jets[..len], velocity, acceleration);
             let norm = |v: &[Lane]| max_or_nan(self.space.inner(&p, v, v), Lane::ZERO).sqrt();
             match wanted {
-                Wanted::Velocity => row.copy_from_slice(&velocity),
-                Wanted::Acceleration => row.copy_from_slice(&acceleration),
-                Wanted::Speed => row[0] = norm(&velocity),
-                Wanted::Bend => row[0] = norm(&acceleration),
+                Wanted::Velocity => row.copy_from_slice(velocity),
+                Wanted::Acceleration => row.copy_from_slice(acceleration),
+                Wanted::Speed => row[0] = norm(velocity),
+                Wanted::Bend => row[0] = norm(acceleration),
             }
         });
     }
 
     /// Evaluates a block of samples, eight at a time, whatever segments they fall in.
     #[inline(always)]
-    fn run<S: Derivatives>(&self, out: &mut [f64], size: usize, mut finish: impl FnMut(&[S], &mut [Lane])) {
+    fn run<S: Derivatives>(&self, out: &mut [f64], size: usize, finish: impl FnMut(&[S], &mut [Lane])) {
+        with_size!(self.space.point_len(), len => self.run_sized::<S>(out, size, len, finish));
+    }
+
+    #[inline(always)]
+    fn run_sized<S: Derivatives>(
+        &self,
+        out: &mut [f64],
+        size: usize,
+        len: usize,
+        mut finish: impl FnMut(&[S], &mut [Lane]),
+    ) {
         let (space, curves) = (self.space, self.curves);
-        let len = space.point_len();
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
         let mut row = vec![Lane::ZERO; size];
-        let samples = out.len() / size;
-        let mut hint = 0;
-        for (group, out) in out.chunks_mut(LANES * size).enumerate() {
-            let first = group * LANES;
-            let mut places = [Place::default(); LANES];
-            for (l, place) in places.iter_mut().enumerate() {
-                // Lanes that are left over repeat the last sample.
-                *place = self.place(self.first + (first + l).min(samples - 1), hint);
+        let mut left = out.len() / size;
+        let (mut curve, mut i) = (self.first / self.times.count, self.first % self.times.count);
+        let mut places = [Place::default(); LANES];
+        let mut loaded = [usize::MAX; LANES];
+        let (mut h, mut rate) = (Lane::ONE, Lane::ONE);
+        for out in out.chunks_mut(LANES * size) {
+            let mut hint = places[LANES - 1].segment;
+            for place in &mut places {
+                *place = self.place(curve, i, hint);
                 hint = place.segment;
+                // Lanes that are left over repeat the last sample.
+                if left > 1 {
+                    left -= 1;
+                    i += 1;
+                    if i == self.times.count {
+                        (curve, i) = (curve + 1, 0);
+                    }
+                }
             }
-            let at: [usize; LANES] = places.map(|p| (p.curve * curves.nodes + p.segment) * len);
-            let h = Lane::new(places.map(|p| p.h));
+            let at = places.map(|p| (p.curve * curves.nodes + p.segment) * len);
+            // Dense samples often fall in the segments of the samples before.
+            if at != loaded {
+                loaded = at;
+                h = Lane::new(places.map(|p| p.h));
+                rate = Lane::ONE / h;
+                let third = h * lane(1.0 / 3.0);
+                let Segment { ends: [p0, p1], legs: [a, b], .. } = &mut segment;
+                let (p, u) = (curves.points, curves.velocities);
+                gather(at.map(|i| &p[i..][..len]), &mut p0[..len]);
+                gather(at.map(|i| &p[i + len..][..len]), &mut p1[..len]);
+                gather(at.map(|i| &u[i..][..len]), &mut a[..len]);
+                gather(at.map(|i| &u[i + len..][..len]), &mut b[..len]);
+                a.iter_mut().chain(b).for_each(|u| *u *= third);
+                segment.prepare(space, len);
+            }
             let tau = Lane::new(places.map(|p| p.tau));
-            let third = h * lane(1.0 / 3.0);
-            let Segment { ends: [p0, p1], legs: [a, b], .. } = &mut segment;
-            gather(at.map(|i| &curves.points[i..i + len]), p0);
-            gather(at.map(|i| &curves.points[i + len..i + 2 * len]), p1);
-            gather(at.map(|i| &curves.velocities[i..i + len]), a);
-            gather(at.map(|i| &curves.velocities[i + len..i + 2 * len]), b);
-            a.iter_mut().chain(b).for_each(|u| *u *= third);
-            segment.at(space, S::time(tau, Lane::ONE / h), &mut gamma);
+            segment.at(space, len, S::time(tau, rate), &mut gamma);
             if self.outside == Outside::Geodesic && places.iter().any(|p| p.beyond != 0.0) {
-                self.go_straight(&places, third, &mut segment, &mut gamma);
+                self.go_straight(&places, h * lane(1.0 / 3.0), &segment, &mut gamma);
             }
-            finish(&gamma, &mut row);
+            finish(&gamma[..len], &mut row);
             scatter(&row, out);
         }
     }
@@ -273,18 +300,18 @@ impl<M: Space> Job<'_, M> {
         &self,
         places: &[Place; LANES],
         third: Lane,
-        segment: &mut Segment<S>,
+        segment: &Segment<S>,
         gamma: &mut [S],
     ) {
         let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
         let beyond = Lane::new(places.map(|p| p.beyond));
         let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
-        for i in 0..p0.len() {
-            p0[i] = before.select(p0[i], p1[i]);
-            a[i] = before.select(a[i], b[i]) / third;
-        }
+        let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
+            x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
+        };
+        let velocity: Vec<Lane> = pick(a, b).iter().map(|leg| *leg / third).collect();
         let mut straight = gamma.to_vec();
-        self.space.ray(p0, a, S::time(beyond, Lane::ONE), &mut straight);
+        self.space.ray(&pick(p0, p1), &velocity, S::time(beyond, Lane::ONE), &mut straight);
         for (g, s) in gamma.iter_mut().zip(&straight) {
             *g = S::select(before | behind, *s, *g);
         }
