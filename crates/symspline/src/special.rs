@@ -155,10 +155,10 @@ fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
 
 /// θ/sin θ as a function of y = 1 − cos θ; at y < 0 it is d/sinh d with y = 1 − cosh d.
 ///
-/// `rest` = 2 − y = 1 + cos θ, given apart because near the cut locus, θ = π, the caller may know
-/// it to more digits than y can carry.
+/// `rest` gives 2 − y = 1 + cos θ: near the cut locus, θ = π, the caller may know it to more digits
+/// than y can carry. It is asked for only where it matters.
 #[inline(always)]
-pub fn theta_over_sin<S: Scalar>(y: S, rest: Lane) -> S {
+pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
     let yv = y.value();
     let ay = yv.abs();
     let within = ARC_TIERS.map(|(limit, _)| ay.simd_le(lane(limit)));
@@ -171,7 +171,7 @@ pub fn theta_over_sin<S: Scalar>(y: S, rest: Lane) -> S {
         if !within[1].all() {
             f = select::<S>(within[1], f, series(2));
             if !within[2].all() {
-                f = select::<S>(within[2], f, arc_full_range(yv, rest));
+                f = select::<S>(within[2], f, arc_full_range(yv, rest()));
             }
         }
         if within[0].any() {
@@ -198,10 +198,14 @@ fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
 /// sin((1−t)θ)/sin θ and sin(tθ)/sin θ, the weights of a geodesic between two points whose
 /// y = 1 − cos θ; at y < 0 the hyperbolic ones, at y = 0 the weights 1 − t and t of a line.
 #[inline(always)]
-pub fn slerp<S: Scalar>(t: S, y: S, rest: Lane) -> [S; 2] {
-    let f = theta_over_sin(y, rest);
+pub fn slerp<S: Scalar>(t: S, y: S, rest: impl Fn() -> Lane) -> [S; 2] {
+    let f = theta_over_sin(y, &rest);
+    let yv = y.value();
+    let far = yv.simd_gt(Lane::ONE);
+    let two = lane(2.0);
+    let rest = if far.any() { far.select(rest(), two - yv) } else { two - yv };
     // θ² = f² sin²θ
-    let theta2 = f * f * y * (S::constant(rest) - (y - y.value()));
+    let theta2 = f * f * y * (S::constant(rest) - (y - yv));
     [slerp_weight(-t + Lane::ONE, theta2, f), slerp_weight(t, theta2, f)]
 }
 

@@ -100,30 +100,23 @@ pub fn evaluate<M: Space>(
     let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * size).enumerate().collect();
     let parallel = samples * space.point_len() > PARALLEL;
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
-        let job = Job { space, curves, times, outside, locator: locator.as_ref(), first: block * BLOCK };
+        let locator = locator.as_ref();
+        let job = Job { space, curves, times, quantity, outside, locator, first: block * BLOCK };
         match quantity {
-            Quantity::Point => job.run::<Lane>(out, size, |gamma, row| row.copy_from_slice(gamma)),
-            Quantity::Velocity => job.derivatives::<Dual>(out, size, Wanted::Velocity),
-            Quantity::Speed => job.derivatives::<Dual>(out, size, Wanted::Speed),
-            Quantity::Acceleration => job.derivatives::<Jet>(out, size, Wanted::Acceleration),
-            Quantity::Bend => job.derivatives::<Jet>(out, size, Wanted::Bend),
+            Quantity::Point => job.run::<Lane>(out, size),
+            Quantity::Velocity | Quantity::Speed => job.run::<Dual>(out, size),
+            Quantity::Acceleration | Quantity::Bend => job.run::<Jet>(out, size),
         }
         monitor.advance(out.len() / size);
     });
 }
 
-#[derive(Clone, Copy)]
-enum Wanted {
-    Velocity,
-    Acceleration,
-    Speed,
-    Bend,
-}
-
 /// A scalar that carries derivatives in t.
 trait Derivatives: Scalar {
+    /// Time in units of a segment, and by how much it grows a unit of time.
     fn time(t: Lane, rate: Lane) -> Self;
-    fn jet(self) -> Jet;
+    fn first(self) -> Lane;
+    fn second(self) -> Lane;
 }
 
 impl Derivatives for Lane {
@@ -132,8 +125,12 @@ impl Derivatives for Lane {
         t
     }
     #[inline(always)]
-    fn jet(self) -> Jet {
-        Jet::constant(self)
+    fn first(self) -> Lane {
+        Lane::ZERO
+    }
+    #[inline(always)]
+    fn second(self) -> Lane {
+        Lane::ZERO
     }
 }
 
@@ -143,8 +140,12 @@ impl Derivatives for Dual {
         Dual { v: t, d: rate }
     }
     #[inline(always)]
-    fn jet(self) -> Jet {
-        Jet { v: self.v, d: self.d, dd: Lane::ZERO }
+    fn first(self) -> Lane {
+        self.d
+    }
+    #[inline(always)]
+    fn second(self) -> Lane {
+        Lane::ZERO
     }
 }
 
@@ -154,8 +155,12 @@ impl Derivatives for Jet {
         Jet { v: t, d: rate, dd: Lane::ZERO }
     }
     #[inline(always)]
-    fn jet(self) -> Jet {
-        self
+    fn first(self) -> Lane {
+        self.d
+    }
+    #[inline(always)]
+    fn second(self) -> Lane {
+        self.dd
     }
 }
 
@@ -163,6 +168,7 @@ struct Job<'a, M> {
     space: &'a M,
     curves: &'a Curves<'a>,
     times: &'a Times<'a>,
+    quantity: Quantity,
     outside: Outside,
     locator: Option<&'a Locator<'a>>,
     first: usize,
@@ -209,46 +215,17 @@ impl<M: Space> Job<'_, M> {
         Place { curve, segment: k, h, tau, beyond }
     }
 
-    fn derivatives<S: Derivatives>(&self, out: &mut [f64], size: usize, wanted: Wanted) {
-        let len = self.space.point_len();
-        let (mut jets, mut p) = (vec![Jet::constant(Lane::ZERO); len], vec![Lane::ZERO; len]);
-        let (mut velocity, mut acceleration) = (p.clone(), p.clone());
-        self.run::<S>(out, size, |gamma, row| {
-            for i in 0..gamma.len() {
-                jets[i] = gamma[i].jet();
-                p[i] = jets[i].v;
-            }
-            let len = gamma.len();
-            let (velocity, acceleration) = (&mut velocity[..len], &mut acceleration[..len]);
-            self.space.covariant(&jets[..len], velocity, acceleration);
-            let norm = |v: &[Lane]| max_or_nan(self.space.inner(&p, v, v), Lane::ZERO).sqrt();
-            match wanted {
-                Wanted::Velocity => row.copy_from_slice(velocity),
-                Wanted::Acceleration => row.copy_from_slice(acceleration),
-                Wanted::Speed => row[0] = norm(velocity),
-                Wanted::Bend => row[0] = norm(acceleration),
-            }
-        });
-    }
-
     /// Evaluates a block of samples, eight at a time, whatever segments they fall in.
-    #[inline(always)]
-    fn run<S: Derivatives>(&self, out: &mut [f64], size: usize, finish: impl FnMut(&[S], &mut [Lane])) {
-        with_size!(self.space.point_len(), len => self.run_sized::<S>(out, size, len, finish));
+    fn run<S: Derivatives>(&self, out: &mut [f64], size: usize) {
+        with_size!(self.space.point_len(), len => self.run_sized::<S>(out, size, len));
     }
 
     #[inline(always)]
-    fn run_sized<S: Derivatives>(
-        &self,
-        out: &mut [f64],
-        size: usize,
-        len: usize,
-        mut finish: impl FnMut(&[S], &mut [Lane]),
-    ) {
+    fn run_sized<S: Derivatives>(&self, out: &mut [f64], size: usize, len: usize) {
         let (space, curves) = (self.space, self.curves);
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
-        let mut row = vec![Lane::ZERO; size];
+        let mut vectors = vec![Lane::ZERO; 3 * len];
         let mut left = out.len() / size;
         let (mut curve, mut i) = (self.first / self.times.count, self.first % self.times.count);
         let mut places = [Place::default(); LANES];
@@ -289,8 +266,25 @@ impl<M: Space> Job<'_, M> {
             if self.outside == Outside::Geodesic && places.iter().any(|p| p.beyond != 0.0) {
                 self.go_straight(&places, h * lane(1.0 / 3.0), &segment, &mut gamma);
             }
-            finish(&gamma[..len], &mut row);
-            scatter(&row, out);
+            let (p, derivatives) = vectors.split_at_mut(len);
+            let (d, dd) = derivatives.split_at_mut(len);
+            let (d, dd) = (&mut d[..len], &mut dd[..len]);
+            for (i, g) in gamma[..len].iter().enumerate() {
+                (p[i], d[i], dd[i]) = (g.value(), g.first(), g.second());
+            }
+            let norm = |v: &[Lane]| max_or_nan(space.inner(p, v, v), Lane::ZERO).sqrt();
+            match self.quantity {
+                Quantity::Velocity | Quantity::Speed => space.velocity(p, d),
+                Quantity::Acceleration | Quantity::Bend => space.acceleration(p, d, dd),
+                Quantity::Point => {}
+            }
+            match self.quantity {
+                Quantity::Point => scatter(p, out),
+                Quantity::Velocity => scatter(d, out),
+                Quantity::Acceleration => scatter(dd, out),
+                Quantity::Speed => scatter(&[norm(d)], out),
+                Quantity::Bend => scatter(&[norm(dd)], out),
+            }
         }
     }
 

@@ -89,7 +89,7 @@ fn inside<M: Space>(
     let (n, keep) = (chain.n, space.chord_len());
     let NodeVectors { a, b, left, right, next_left } = work;
     let (a, b) = (&mut a[..m], &mut b[..m]);
-    let (mut left, mut right, mut next_left) = (&mut left[..m], &mut right[..m], &mut next_left[..m]);
+    let (mut left, right, mut next_left) = (&mut left[..m], &mut right[..m], &mut next_left[..m]);
     let mut result = Defect { defect: Lane::ZERO, speed: Lane::ZERO, leg: Lane::ZERO };
     let mut first_right = Lane::ZERO;
     for i in 0..=n {

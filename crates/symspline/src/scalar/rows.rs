@@ -37,8 +37,9 @@ pub fn scatter(lanes: &[Lane], out: &mut [f64]) {
                 [cast(lanes[c]), cast(lanes[c + 1]), cast(lanes[c + 2]), cast(lanes[c + 3])];
             let low = f64x4::transpose([a, d, f, h]);
             let high = f64x4::transpose([b, e, g, i]);
-            for (l, row) in low.into_iter().chain(high).enumerate() {
-                out[l * len + c..][..4].copy_from_slice(row.as_array());
+            for l in 0..4 {
+                out[l * len + c..][..4].copy_from_slice(low[l].as_array());
+                out[(l + 4) * len + c..][..4].copy_from_slice(high[l].as_array());
             }
             c += 4;
         }

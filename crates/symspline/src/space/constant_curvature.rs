@@ -4,7 +4,7 @@
 //! ⟨p,q⟩ = κ cos θ with cos θ read as cosh d at κ = −1. At κ = 0 they become the flat formulas,
 //! which `euclidean.rs` spells out.
 
-use crate::scalar::{Jet, Lane, Scalar, dot, lane};
+use crate::scalar::{Lane, Scalar, dot, lane};
 use crate::special::{Trig, slerp, theta_over_sin};
 
 /// κ as a lane.
@@ -46,17 +46,22 @@ fn versine_rest<const K: i32, S: Scalar>(p: &[S], q: &[S]) -> Lane {
 /// cos(tθ) p + t sin(tθ)/(tθ) v.
 #[inline(always)]
 pub fn ray<const K: i32, S: Scalar>(p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-    let Trig { c, s, .. } = Trig::new(t * t * (product::<K, _>(v, v) * kappa::<K>()));
-    let s = s * t;
+    let square = product::<K, _>(v, v) * kappa::<K>();
+    let tv = t.value();
+    let Trig { c, s, .. } = Trig::new(tv * tv * square);
+    // With α = cos(tθ) and β = t sin(tθ)/(tθ): α' = −θ²β, β' = α.
+    let beta = tv * s;
+    let (to_p, to_v) = (-(square * beta), -(square * c));
+    let (alpha, beta) = (t.compose([c, to_p, to_v]), t.compose([beta, c, to_p]));
     for i in 0..p.len() {
-        out[i] = s.fma_lane(v[i], c * p[i]);
+        out[i] = beta.fma_lane(v[i], alpha * p[i]);
     }
 }
 
 /// [p, q]_t by the slerp weights.
 #[inline(always)]
 pub fn geodesic<const K: i32, S: Scalar>(p: &[S], q: &[S], t: S, out: &mut [S]) {
-    let [from, to] = slerp(t, versine::<K, S>(p, q), versine_rest::<K, S>(p, q));
+    let [from, to] = slerp(t, versine::<K, S>(p, q), || versine_rest::<K, S>(p, q));
     for i in 0..p.len() {
         out[i] = to.fma(q[i], from * p[i]);
     }
@@ -75,7 +80,7 @@ fn angle(y: Lane, rest: Lane, f: Lane) -> Lane {
 #[inline(always)]
 pub fn log<const K: i32>(p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
     let (y, rest) = (versine::<K, Lane>(p, q), versine_rest::<K, Lane>(p, q));
-    let f = theta_over_sin(y, rest);
+    let f = theta_over_sin(y, || rest);
     let near = y.simd_le(Lane::ONE);
     for i in 0..p.len() {
         // Both are q − cos θ p; each is a sum of small terms on its own side.
@@ -100,28 +105,12 @@ pub fn transvect<const K: i32>(p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [La
     }
 }
 
-/// Tangential parts of γ' and γ''.
-#[inline(always)]
-pub fn covariant<const K: i32>(gamma: &[Jet], velocity: &mut [Lane], acceleration: &mut [Lane]) {
-    for (i, g) in gamma.iter().enumerate() {
-        (velocity[i], acceleration[i]) = (g.d, g.dd);
-    }
-    for vector in [velocity, acceleration] {
-        tangential::<K, _>(gamma, |g| g.v, vector);
-    }
-}
-
 /// Removes from v its part along p; returns the coefficient of that part.
 #[inline(always)]
-pub fn tangential<const K: i32, T: Copy>(p: &[T], value: impl Fn(T) -> Lane, v: &mut [Lane]) -> Lane {
-    let first = value(p[0]) * v[0];
-    let mut along = if K < 0 { -first } else { first };
-    for i in 1..v.len() {
-        along = value(p[i]).mul_add(v[i], along);
-    }
-    along *= kappa::<K>();
+pub fn tangential<const K: i32>(p: &[Lane], v: &mut [Lane]) -> Lane {
+    let along = product::<K, Lane>(p, v) * kappa::<K>();
     for i in 0..v.len() {
-        v[i] -= along * value(p[i]);
+        v[i] = along.mul_neg_add(p[i], v[i]);
     }
     along
 }
@@ -150,7 +139,7 @@ pub fn lift<const K: i32>(p: &[Lane], frame: &mut [Lane]) {
 pub fn step<const K: i32>(frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
     let n = p.len();
     let (y, rest) = (versine::<K, Lane>(p, q), versine_rest::<K, Lane>(p, q));
-    let f = theta_over_sin(y, rest);
+    let f = theta_over_sin(y, || rest);
     let scale = kappa::<K>() / rest;
     for (j, row) in frame.chunks_exact_mut(n).enumerate() {
         // ⟨e, q − p⟩ is exact for near points. The frame moves by ⟨e, q⟩, the same number for e
@@ -182,7 +171,7 @@ pub fn tidy<const K: i32>(frame: &mut [Lane], p: &[Lane]) {
     for j in 0..n - 1 {
         let (before, row) = frame.split_at_mut(j * n);
         let row = &mut row[..n];
-        tangential::<K, Lane>(p, |x| x, row);
+        tangential::<K>(p, row);
         for other in before.chunks_exact(n) {
             let along = product::<K, _>(other, row);
             for i in 0..n {
@@ -249,7 +238,7 @@ pub fn legs<const K: i32, S: Scalar>(
     let (plus, height) = leg::<K, S>(chord, ta, tb, ab, ad, bd);
     // M⁻¹ = E(b) E(−d) E(a) is M with d, a, b replaced by −d, −b, −a.
     let (minus, _) = leg::<K, S>(chord, tb, ta, ab, bd, ad);
-    let f = theta_over_sin(-height + Lane::ONE, height.value() + Lane::ONE);
+    let f = theta_over_sin(-height + Lane::ONE, || height.value() + Lane::ONE);
     let (plus, minus) = (plus.map(|x| f * x), minus.map(|x| -(f * x)));
     for i in 0..d.len() {
         w_plus[i] = plus[0].fma_lane(d[i], plus[1].fma(a[i], plus[2] * b[i]));
@@ -327,8 +316,12 @@ macro_rules! curved_methods {
             cc::transvect::<K>(p, v, x, out);
         }
         #[inline(always)]
-        fn covariant(&self, gamma: &[Jet], velocity: &mut [Lane], acceleration: &mut [Lane]) {
-            cc::covariant::<K>(gamma, velocity, acceleration);
+        fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+            cc::tangential::<K>(gamma, d);
+        }
+        #[inline(always)]
+        fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
+            cc::tangential::<K>(gamma, dd);
         }
         fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
             cc::product::<K, Lane>(u, v)

@@ -1,7 +1,7 @@
 //! Flat space Rⁿ, κ = 0: there the spline is the classical cubic spline.
 
 use super::Space;
-use crate::scalar::{Jet, Lane, Scalar, dot};
+use crate::scalar::{Lane, Scalar, dot};
 
 /// Rⁿ with its usual inner product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,11 +66,9 @@ impl Space for Euclidean {
         out.copy_from_slice(x);
     }
     #[inline(always)]
-    fn covariant(&self, gamma: &[Jet], velocity: &mut [Lane], acceleration: &mut [Lane]) {
-        for (i, g) in gamma.iter().enumerate() {
-            (velocity[i], acceleration[i]) = (g.d, g.dd);
-        }
-    }
+    fn velocity(&self, _gamma: &[Lane], _d: &mut [Lane]) {}
+    #[inline(always)]
+    fn acceleration(&self, _gamma: &[Lane], _d: &[Lane], _dd: &mut [Lane]) {}
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         dot(u, v)
     }

@@ -4,7 +4,7 @@
 //! apart neighbouring floating-point points are.
 
 use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
-use crate::scalar::{Jet, Lane, Scalar, dot, lane};
+use crate::scalar::{Lane, Scalar, dot, lane};
 
 const K: i32 = -1;
 
@@ -44,7 +44,7 @@ impl Space for Hyperbolic {
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         // Relative to |p||v|, which is what rounding of v amounts to in ⟨p,v⟩.
         let size = (dot(v, v) * dot(p, p)).sqrt();
-        let off = cc::tangential::<K, Lane>(p, |x| x, v).abs();
+        let off = cc::tangential::<K>(p, v).abs();
         off / (size + ROUNDING_SIZE)
     }
 

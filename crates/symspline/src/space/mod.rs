@@ -20,7 +20,7 @@ pub use euclidean::Euclidean;
 pub use hyperbolic::Hyperbolic;
 pub use sphere::Sphere;
 
-use crate::scalar::{Jet, Lane, Scalar, dot, max_or_nan};
+use crate::scalar::{Lane, Scalar, dot, max_or_nan};
 
 /// Vectors of this size and smaller, at points of size one, may be rounding errors as to direction: a
 /// defect is measured against it where a vector is smaller still.
@@ -73,8 +73,11 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn carry(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         self.transvect(p, v, x, out);
     }
-    /// Velocity γ' and covariant acceleration ∇γ' from the derivatives of the ambient array.
-    fn covariant(&self, gamma: &[Jet], velocity: &mut [Lane], acceleration: &mut [Lane]);
+    /// Turns the derivative of the ambient array at γ into the velocity γ', in place.
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]);
+    /// Turns the second derivative of the ambient array into the covariant acceleration ∇γ', in place;
+    /// `d` is the first derivative.
+    fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]);
     /// Inner product of two tangent vectors at p.
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
     /// Replaces x by a point of the space beside it; returns how far it was, relative to its size.

@@ -1,7 +1,7 @@
 //! The sphere Sⁿ = {x ∈ Rⁿ⁺¹ : |x| = 1}, G = O(n+1), κ = 1.
 
 use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
-use crate::scalar::{Jet, Lane, Scalar, dot};
+use crate::scalar::{Lane, Scalar, dot};
 
 const K: i32 = 1;
 
@@ -39,7 +39,7 @@ impl Space for Sphere {
 
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         let size = dot(v, v).sqrt();
-        let off = cc::tangential::<K, Lane>(p, |x| x, v).abs();
+        let off = cc::tangential::<K>(p, v).abs();
         off / (size + ROUNDING_SIZE)
     }
 
