@@ -6,7 +6,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check-tools clean
+.PHONY: demo test bench check-tools clean
 
 demo: .venv/built
 	$(BIN)/python -m symspline.demo --out demo-output
@@ -20,9 +20,13 @@ test: .venv/built
 	$(BIN)/mypy
 	$(BIN)/python -m pytest --doctest-modules python tests
 
+# Some minutes; the machine should have nothing else to do.
+bench: .venv/built
+	$(BIN)/python -m benchmarks
+
 .venv/built: pyproject.toml $(RUST) | check-tools
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(INSTALL) --editable '.[test]'
+	$(INSTALL) --editable '.[bench,test]'
 	touch $@
 
 check-tools:

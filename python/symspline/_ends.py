@@ -41,9 +41,10 @@ def _end(end: Any, name: str, space: Space, batch: tuple[int, ...]) -> End:
         if end not in _WORDS:
             raise ValidationError(f"{_HELP}; the {name} is {end!r}")
         return ("velocity", np.zeros(shape)) if end == "clamped" else (end, None)
-    if not isinstance(end, (tuple, list)) or len(end) != 2 or end[0] not in _ORDERS:
+    pair = isinstance(end, (tuple, list)) and len(end) == 2
+    if not pair or not isinstance(end[0], (int, np.integer)) or end[0] not in _ORDERS:
         raise ValidationError(f"{_HELP}; the {name} is {end!r}")
-    kind = _ORDERS[end[0]]
+    kind = _ORDERS[int(end[0])]
     value = space._doubles(end[1], f"the {name} {kind}")
     try:
         return kind, np.ascontiguousarray(np.broadcast_to(value, shape))
@@ -51,3 +52,38 @@ def _end(end: Any, name: str, space: Space, batch: tuple[int, ...]) -> End:
         raise ValidationError(
             f"the {name} {kind} has shape {value.shape}, which does not broadcast to {shape}"
         ) from None
+
+
+def kept(bc_type: Any) -> Any:
+    """End conditions with copies of their vectors, which the caller may change."""
+    if isinstance(bc_type, str):
+        return bc_type
+    return tuple(end if isinstance(end, str) else (int(end[0]), _copy(end[1])) for end in bc_type)
+
+
+def _copy(vector: Any) -> Any:
+    """A read-only copy; for a product a tuple of them."""
+    if isinstance(vector, tuple):
+        return tuple(_copy(part) for part in vector)
+    array = np.array(vector, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
+    """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
+    if isinstance(bc_type, str):
+        return bc_type
+
+    def pick(end: Any) -> Any:
+        if isinstance(end, str):
+            return end
+        vector = end[1]
+        if vector.ndim < batch_axes + len(space.point_shape):
+            return end
+        if vector.shape[0] == 1:
+            # It broadcast along this axis.
+            return (end[0], vector if isinstance(index, slice) else vector[0])
+        return (end[0], vector[index])
+
+    return tuple(pick(end) for end in bc_type)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from . import _core, spline
+from ._arrays import whole_number
 from ._core import ValidationError
-from ._ends import ends_of
+from ._ends import ends_of, kept, picked
 from .report import shaped
 from .spaces import Space
 from .spline import CubicSpline
@@ -29,7 +30,9 @@ def fit_many(
 ) -> list[CubicSpline]:
     """See `symspline.fit_many`."""
     policy = spline._policy(extrapolate)
-    spline._check_choice("on_failure", on_failure, ("raise", "warn", "ignore"))
+    spline._check_options(on_failure, progress)
+    if max_iter is not None:
+        max_iter = whole_number(max_iter, "max_iter", 1)
     if hasattr(space, "factors"):
         from .product import fit_many as product_many
 
@@ -63,6 +66,7 @@ def fit_many(
         offsets.tolist(),
         progress,
     )
+    ends_kept = kept(bc_type)
     reports = shaped(spline._solver(method), columns, (len(curves),), space.curvature)
     fitted = [
         CubicSpline._made(
@@ -72,7 +76,7 @@ def fit_many(
             times,
             all_points[offsets[i] : offsets[i + 1]],
             all_velocities[offsets[i] : offsets[i + 1]],
-            spline._pick_ends(bc_type, i, 1, space),
+            picked(ends_kept, i, 1, space),
             policy,
             reports._map(lambda column, i=i: column[i].item()),
         )

@@ -8,68 +8,114 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._arrays import as_array
 from ._core import ValidationError
+
+Doubles = NDArray[np.float64]
 
 # Integers up to here are exact as doubles.
 _EXACT = 2**53
+_SECONDS = {
+    "W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0,
+    "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "fs": 1e15, "as": 1e18,
+}  # fmt: skip
+_MULTIPLES = ("W", "D", "h", "m", "s")
 
 
 @dataclass(frozen=True)
 class Clock:
-    """How times become doubles: dates as seconds, large integers as differences, since ``origin``."""
+    """How times become doubles.
+
+    Numbers are taken as they are. Dates become seconds, and integers too large for a double
+    differences, since the first knot of each curve: ``origin``, of shape batch + (1,) where curves
+    have their own knots.
+    """
 
     origin: Any = None
-    unit: str = ""
+    dates: bool = False
 
-    def doubles(self, times: ArrayLike, name: str) -> NDArray[np.float64]:
-        """Times as the core counts them, C-contiguous."""
-        array = np.asarray(times)
-        if self.unit:
-            if array.dtype.kind != "M":
-                raise ValidationError(f"the knots are dates, so {name} must be datetime64, not {array.dtype}")
-            return _seconds(array, self.origin, name)
-        if array.dtype.kind == "f":
-            array = array if self.origin is None else array - float(self.origin)
-        elif array.dtype.kind in "iub":
-            if self.origin is not None:
-                array = array.astype(np.int64) - self.origin
-        elif array.dtype.kind == "M":
-            raise ValidationError(f"{name} is datetime64, but the knots are numbers")
-        else:
-            raise ValidationError(f"{name} must be numbers or datetime64, not {array.dtype}")
+    def knots(self, knots: NDArray[Any]) -> Doubles:
+        """Knots as the core counts them."""
+        return self._doubles(knots, self.origin, "t")
+
+    def at(self, x: ArrayLike, batch: tuple[int, ...], per_curve: bool) -> tuple[Doubles, bool]:
+        """Times to evaluate at, and whether every curve now has its own."""
+        array = as_array(x, "x")
+        if array.dtype.kind not in ("M" if self.dates else "iufb"):
+            wanted = "dates, so x must be datetime64" if self.dates else "numbers, so x must be numbers"
+            raise ValidationError(f"the knots are {wanted}, not {array.dtype}")
+        if np.ndim(self.origin) == 0:
+            return self._doubles(array, self.origin, "x"), per_curve
+        # Every curve counts from its own first knot.
+        own = array.shape[len(batch) :] if per_curve else array.shape
+        origin = self.origin.reshape(batch + (1,) * len(own))
+        return self._doubles(np.broadcast_to(array, batch + own), origin, "x"), True
+
+    def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
+        if self.dates:
+            return _seconds(array, origin, name)
+        if origin is not None:
+            array = _difference(array, origin) if array.dtype.kind in "iub" else array - np.float64(origin)
         return np.asarray(array, dtype=np.float64, order="C")
 
-
-def _seconds(array: NDArray[Any], origin: Any, name: str) -> NDArray[np.float64]:
-    if np.isnat(array).any():
-        index = np.argwhere(np.isnat(array))[0].tolist()
-        raise ValidationError(f"{name}{index} is NaT (not a time)")
-    difference = array - origin
-    # The difference is exact in the finer of the two units; one rounding makes it seconds.
-    unit, step = np.datetime_data(difference.dtype)
-    ticks = difference.astype(np.int64).astype(np.float64) * step
-    per_second = {"ns": 1e9, "us": 1e6, "ms": 1e3, "ps": 1e12, "fs": 1e15, "as": 1e18}
-    if unit in per_second:
-        return np.asarray(ticks / per_second[unit], order="C")
-    seconds = {"s": 1.0, "m": 60.0, "h": 3600.0, "D": 86400.0, "W": 604800.0}
-    if unit not in seconds:
-        raise ValidationError(f"{name} has the unit {unit!r}, which has no fixed length; use days or finer")
-    return np.asarray(ticks * seconds[unit], order="C")
+    def explain(self, error: ValidationError) -> ValidationError:
+        """The error, saying from where its times are counted."""
+        if self.origin is None:
+            return error
+        since = np.ravel(self.origin)[0]
+        what = "seconds" if self.dates else "differences"
+        more = "" if np.ndim(self.origin) == 0 else " (the first curve; the others from their own first time)"
+        return ValidationError(f"{error}; times are {what} since {since}{more}")
 
 
 def clock_of(knots: ArrayLike) -> tuple[Clock, NDArray[Any]]:
     """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
-    array = np.asarray(knots)
+    array = as_array(knots, "t")
     if array.size == 0:
         raise ValidationError("t is empty; a curve needs at least two points")
+    first = array[..., :1] if array.ndim > 1 else array.flat[0]
     if array.dtype.kind == "M":
-        unit = np.datetime_data(array.dtype)[0]
-        if unit in ("Y", "M"):
+        if np.datetime_data(array.dtype)[0] in ("Y", "M", "generic"):
             array = array.astype("datetime64[D]")
-        return Clock(array.flat[0], np.datetime_data(array.dtype)[0]), array.copy()
+            first = first.astype("datetime64[D]")
+        return Clock(np.array(first)[()], dates=True), array.copy()
     if array.dtype.kind in "iu" and (int(array.max()) > _EXACT or int(array.min()) < -_EXACT):
-        array = array.astype(np.int64)
-        return Clock(np.int64(array.flat[0])), array
+        return Clock(np.array(first)[()]), array.copy()
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"t must be numbers or datetime64, not {array.dtype}")
     return Clock(), array.astype(np.float64)
+
+
+def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
+    """array − origin, exact for differences below 2**63 whatever the integer types: modulo 2**64."""
+    modular = array.astype(np.uint64) - np.asarray(origin).astype(np.uint64)
+    return modular.view(np.int64) if modular.ndim else modular.astype(np.int64)
+
+
+def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
+    if np.isnat(array).any():
+        index = np.argwhere(np.isnat(array))[0].tolist()
+        raise ValidationError(f"{name}{index or ''} is NaT (not a time)")
+    origin = np.asarray(origin)
+    fine = np.promote_types(array.dtype, origin.dtype)
+    exact = [x.astype(fine) for x in (array, origin)]
+    if all(np.array_equal(e.astype(x.dtype), x) for e, x in zip(exact, (array, origin), strict=True)):
+        difference = exact[0] - exact[1]
+        # The difference itself may be too long for the finer unit.
+        if np.array_equal(exact[1] + difference, exact[0]) and np.all(
+            (difference >= 0) == (exact[0] >= exact[1])
+        ):
+            return _in_seconds(difference)
+    # Times too far apart for their finer unit: whole days, and what is left of the day.
+    days = [x.astype("datetime64[D]") for x in (array, origin)]
+    rest = [_in_seconds(x - d) for x, d in zip((array, origin), days, strict=True)]
+    return np.asarray(_in_seconds(days[0] - days[1]) + (rest[0] - rest[1]), order="C")
+
+
+def _in_seconds(difference: Any) -> Doubles:
+    unit, step = np.datetime_data(difference.dtype)
+    if unit not in _SECONDS:
+        raise ValidationError(f"dates in units of {unit!r} have no fixed length; use days or finer")
+    ticks = np.asarray(difference).astype(np.int64).astype(np.float64) * step
+    # Dividing by a power of ten is rounded once; multiplying by 1e-9 would be twice.
+    return np.asarray(ticks * _SECONDS[unit] if unit in _MULTIPLES else ticks / _SECONDS[unit], order="C")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-import zipfile
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import ValidationError
+from ._ends import ends_of
 from ._times import clock_of
 from .product import Product, ProductSpline
 from .report import Report
+from .spaces import Space
 from .spaces import space as space_named
 from .spline import CubicSpline, _policy
 
@@ -27,13 +28,13 @@ _VERSION = 1
 def save(spline: CubicSpline, file: Any) -> None:
     """See `CubicSpline.save`."""
     parts = spline._parts if isinstance(spline, ProductSpline) else (spline,)
-    unit = spline._clock.unit
+    unit = _unit(spline._t.dtype) if spline._clock.dates else ""
     arrays: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,
         "space": str(spline.space),
         "t": spline._t.astype(np.int64) if unit else spline._t,
-        "t_unit": np.datetime_data(spline._t.dtype)[0] if unit else "",
+        "t_unit": unit,
         "bc_type": json.dumps(_plain(spline.bc_type)),
         "extrapolate": json.dumps(spline.extrapolate),
         "report": json.dumps([_plain(vars(part.report)) for part in parts]),
@@ -90,31 +91,34 @@ def load(file: Any) -> CubicSpline:
     True
     """
     name = getattr(file, "name", file if isinstance(file, (str, os.PathLike)) else "the file")
+    if not hasattr(file, "read") and not isinstance(file, (str, os.PathLike)):
+        raise TypeError(f"a path or an open file is needed, not {file!r}")
     try:
-        with np.load(file, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile) or "format" not in archive:
-                raise ValidationError(f"{name} is not a symspline curve")
-            arrays = {key: archive[key] for key in archive.files}
-        return _read(arrays)
-    except OSError:
+        if hasattr(file, "read"):
+            return _read(_arrays_of(file))
+        with open(file, "rb") as opened:
+            return _read(_arrays_of(opened))
+    except (OSError, MemoryError):
         raise
     except ValidationError as error:
         raise ValidationError(f"{name}: {error}") from None
-    except (
-        zipfile.BadZipFile,
-        ValueError,
-        KeyError,
-        EOFError,
-        TypeError,
-        IndexError,
-        AttributeError,
-    ) as error:
-        raise ValidationError(f"{name} is damaged or not a symspline curve: {error}") from None
     except Exception as error:
-        # zlib and struct report damage with exceptions of their own.
-        if type(error).__module__ in ("zlib", "struct", "_struct", "tokenize", "builtins"):
-            raise ValidationError(f"{name} is damaged: {error}") from None
-        raise
+        # Damage shows as errors of zipfile, of its decompressors, of NumPy and of JSON.
+        raise ValidationError(f"{name} is damaged or not a symspline curve: {error}") from None
+
+
+def _unit(dtype: np.dtype[Any]) -> str:
+    """The unit of dates: "ns", or "10m" if they count in tens of minutes."""
+    unit, step = np.datetime_data(dtype)
+    return unit if step == 1 else f"{step}{unit}"
+
+
+def _arrays_of(file: Any) -> dict[str, NDArray[Any]]:
+    archive = np.load(file, allow_pickle=False)
+    if not isinstance(archive, np.lib.npyio.NpzFile) or "format" not in archive:
+        raise ValidationError("this is not a symspline curve")
+    with archive:
+        return {key: archive[key] for key in archive.files}
 
 
 def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
@@ -132,7 +136,7 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
     unit = str(arrays["t_unit"])
     shown = arrays["t"].astype(f"datetime64[{unit}]") if unit else arrays["t"]
     clock, shown = clock_of(shown)
-    times = clock.doubles(shown, "t")
+    times = clock.knots(shown)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("the knots do not increase")
     parts = []
@@ -146,18 +150,29 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
             raise ValidationError(
                 f"shapes do not fit: t {times.shape}, points {points.shape}, velocities {velocities.shape}"
             )
-        good = np.isfinite(velocities)
+        if nodes[-1] < 2:
+            raise ValidationError("a curve needs at least two points")
         factor.check_point(points)
         report = _report(json.loads(str(arrays["report"]))[i], nodes[:-1])
-        if not good.all() and np.all(report.converged):
-            raise ValidationError("velocities are not finite")
+        _check_velocities(factor, points, velocities, report)
         ends = bc_type if len(factors) == 1 else _factor_ends(bc_type, i)
+        ends_of(ends, factor, nodes[:-1])
         parts.append(
             CubicSpline._made(factor, clock, shown, times, points, velocities, ends, extrapolate, report)
         )
     if isinstance(space, Product):
         return ProductSpline._of_parts(space, tuple(parts), bc_type)
     return parts[0]
+
+
+def _check_velocities(space: Space, points: Any, velocities: Any, report: Report) -> None:
+    """They are tangent; only curves that failed may be NaN."""
+    finite = np.isfinite(velocities).all(axis=tuple(range(-1 - len(space.point_shape), 0)))
+    if not (finite | ~np.asarray(report.converged)).all():
+        raise ValidationError("velocities are not finite")
+    off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
+    if np.abs(off).max(initial=0.0) > 1e-8 * np.abs(velocities[finite]).max(initial=1e-8):
+        raise ValidationError("velocities are not tangent")
 
 
 def _factor_ends(bc_type: Any, i: int) -> Any:
@@ -167,12 +182,17 @@ def _factor_ends(bc_type: Any, i: int) -> Any:
 
 
 def _report(plain: dict[str, Any], batch: tuple[int, ...]) -> Report:
-    def column(value: Any) -> Any:
-        if isinstance(value, list):
-            return np.asarray(value).reshape(batch)
-        return value
+    kinds = {"converged": "b", "iterations": "i", "residual": "f", "max_step": "f", "rate": "f"}
 
-    return Report(**{key: column(value) for key, value in plain.items()})
+    def column(key: str, value: Any) -> Any:
+        array = np.asarray(value)
+        if key in kinds and (array.shape != batch or array.dtype.kind != kinds[key]):
+            raise ValidationError(f"the report's {key} is {value!r}")
+        return array if key in kinds and batch else value
+
+    if not isinstance(plain["method"], str):
+        raise ValidationError(f"the report's method is {plain['method']!r}")
+    return Report(**{key: column(key, value) for key, value in plain.items()})
 
 
 def _plain(value: Any) -> Any:

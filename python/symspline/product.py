@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import spline as _spline
 from ._core import ConvergenceError, CutLocusError, ValidationError
+from ._ends import kept
 from .report import Report
 from .spaces import Space
 from .spaces import space as space_named
@@ -136,17 +137,16 @@ class ProductSpline(CubicSpline):
         **options: Any,
     ) -> None:
         space = space_named(space)
-        _spline._check_choice("on_failure", on_failure, ("raise", "warn", "ignore"))
+        _spline._check_options(on_failure, options.get("progress"))
         _check_tuple(points, space, "points")
         ends = _split_ends(bc_type, space)
+        _validate(t, points, space, ends, options)
         parts, errors = [], []
         for factor, p, bc in zip(space.factors, points, ends, strict=True):
             part, error = _try(t, p, factor, bc, options)
             parts.append(part)
             errors += [error] if error else []
-        self._join(space, tuple(parts), bc_type)
-        if len({part._batch for part in parts}) > 1:
-            raise ValidationError(f"the factors' batch axes differ: {[part._batch for part in parts]}")
+        self._join(space, tuple(parts), kept(bc_type))
         if errors:
             _spline._fail([(0, _kind(errors[0]), str(errors[0]))], on_failure, self)
 
@@ -155,7 +155,7 @@ class ProductSpline(CubicSpline):
         first = parts[0]
         self._t, self._times, self._clock = first._t, first._times, first._clock
         self._extrapolate = first._extrapolate
-        self._report = _worst([part.report for part in parts], space)
+        self._report = _worst(parts, space)
 
     @classmethod
     def _of_parts(cls, space: Product, parts: tuple[CubicSpline, ...], bc_type: Any) -> ProductSpline:
@@ -200,6 +200,9 @@ class ProductSpline(CubicSpline):
 
     __hash__ = None
 
+    def __reduce__(self) -> Tuple:
+        return ProductSpline._of_parts, (self._space, self._parts, self._bc_type)
+
 
 def fit_many(
     curves: list[Tuple], space: Any, bc_type: Any, policy: Any, on_failure: str, options: dict[str, Any]
@@ -223,6 +226,24 @@ def fit_many(
     if errors:
         _spline._fail([(0, _kind(errors[0]), str(errors[0]))], on_failure, made)
     return made
+
+
+def _validate(t: Any, points: Any, space: Product, ends: list[Any], options: dict[str, Any]) -> None:
+    """Raise before any work if one of the factors would."""
+    check = options.get("check", True)
+    method, tol = options.get("method", "auto"), options.get("tol", 1e-12)
+    shapes = []
+    for i, (factor, p, bc) in enumerate(zip(space.factors, points, ends, strict=True)):
+        part = object.__new__(CubicSpline)
+        part._space, part._extrapolate = factor, None
+        try:
+            part._fill(t, p, bc, method, tol, options.get("max_iter"), check, None, dry=True)
+        except ValidationError as error:
+            raise ValidationError(f"factor {i}, {factor!r}: {error}") from None
+        shapes.append((part._batch, part._times.shape[-1]))
+    if len(set(shapes)) > 1:
+        described = ", ".join(f"{nodes} points, batch axes {batch}" for batch, nodes in shapes)
+        raise ValidationError(f"points: the factors differ in length, or batch axes differ: {described}")
 
 
 def _try(t: Any, points: Any, factor: Space, bc: Any, options: dict[str, Any]) -> tuple[CubicSpline, Any]:
@@ -276,7 +297,9 @@ def _join_ends(ends: list[Any]) -> Any:
     return (both(0), both(1))
 
 
-def _worst(reports: list[Report], space: Product) -> Report:
+def _worst(parts: tuple[CubicSpline, ...], space: Product) -> Report:
+    reports = [part.report for part in parts]
+
     def largest(values: list[Any]) -> Any:
         result: NDArray[Any] = np.max(np.stack(values), axis=0)
         return result.item() if result.ndim == 0 else result
@@ -287,7 +310,18 @@ def _worst(reports: list[Report], space: Product) -> Report:
         converged=bool(converged) if np.ndim(converged) == 0 else converged,
         iterations=largest([r.iterations for r in reports]),
         residual=largest([r.residual for r in reports]),
-        max_step=np.sqrt(sum(np.square(r.max_step) for r in reports)),
+        max_step=_longest_step(parts),
         curvature=space.curvature,
         rate=largest([r.rate for r in reports]),
     )
+
+
+def _longest_step(parts: tuple[CubicSpline, ...]) -> Any:
+    """D of (21): distances of the factors add as in Pythagoras' theorem, step by step."""
+    square: Any = 0.0
+    for part in parts:
+        index = (slice(None),) * len(part._batch)
+        p, q = part.points[(*index, slice(None, -1))], part.points[(*index, slice(1, None))]
+        square = square + part.space.distance(p, q) ** 2
+    longest = np.sqrt(np.max(square, axis=-1))
+    return float(longest) if np.ndim(longest) == 0 else longest

@@ -44,6 +44,8 @@ class Report:
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
+        if converged.size == 0:
+            return f"no curves: {self.method}"
         residual, iterations = np.max(self.residual), np.max(self.iterations)
         if converged.ndim == 0:
             state = "converged" if converged else "NOT converged"
@@ -78,9 +80,6 @@ def shaped(
     method: str, columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float
 ) -> Report:
     """A report from the compiled core's columns."""
-    if batch == ():
-        values = [column.item() for column in columns]
-    else:
-        values = [column.reshape(batch) for column in columns]
+    values = [column.item() if batch == () else column.reshape(batch) for column in columns]
     converged, iterations, residual, max_step, rate = values
     return Report(method, converged, iterations, residual, max_step, curvature, None, rate)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._arrays import as_array
 from ._core import Handle, ValidationError
 
 Array = NDArray[Any]
@@ -32,7 +33,10 @@ class Space:
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
                 raise ValidationError(f"{type(self).__name__} takes whole numbers, not {value!r}")
         self._parameters = tuple(int(value) for value in parameters)
-        self._handle = Handle(self._name, list(self._parameters))
+        try:
+            self._handle = Handle(self._name, list(self._parameters))
+        except OverflowError:
+            raise ValidationError(f"{self!r} is too large") from None
         self._point_shape = tuple(self._handle.point_shape())
 
     # ---- what it is ----
@@ -103,7 +107,10 @@ class Space:
         Raises:
             CutLocusError: the two points lie at or past each other's cut locus.
         """
-        return self._apply("geodesic", t=np.asarray(t, dtype=np.float64), p=p, q=q)
+        times = as_array(t, "t")
+        if times.dtype.kind not in "biuf":
+            raise ValidationError(f"t must be real numbers, not {times.dtype}")
+        return self._apply("geodesic", t=times.astype(np.float64), p=p, q=q)
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
         """Length of the shortest geodesic between p and q; shape of the leading axes."""
@@ -139,8 +146,9 @@ class Space:
             ValidationError: no point is close to x (a zero vector, or not finite).
         """
         result = self._apply("project", x=x)
-        if not np.all(np.isfinite(result)):
-            bad = np.argwhere(~np.isfinite(result).all(axis=self._point_axes(result)))[0].tolist()
+        good = np.isfinite(result) & np.isfinite(np.asarray(x, dtype=np.float64))
+        if not good.all():
+            bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
             raise ValidationError(f"x{bad or ''} cannot be projected: it is zero or not finite")
         return result
 
@@ -151,13 +159,17 @@ class Space:
     def check_point(self, p: ArrayLike) -> None:
         """Raise ValidationError unless p (or every one of an array of points) is a point."""
         array = self._doubles(p, "p")
-        self._handle.check_points(self._rows(array, array.shape), POINT_TOL)
+        lead = array.shape[: array.ndim - len(self.point_shape)]
+        self._handle.check_points(self._rows(array, array.shape), lead, POINT_TOL)
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
         """Raise ValidationError unless v is a tangent vector at the point p."""
         self.check_point(p)
         points, vectors = self._doubles(p, "p"), self._doubles(v, "v")
-        shape = np.broadcast_shapes(points.shape, vectors.shape)
+        try:
+            shape = np.broadcast_shapes(points.shape, vectors.shape)
+        except ValueError:
+            raise ValidationError(f"p {points.shape} and v {vectors.shape} do not broadcast") from None
         defects = self._handle.tangent_defects(self._rows(points, shape), self._rows(vectors, shape))
         bad = np.flatnonzero(~(defects <= POINT_TOL))
         if bad.size:
@@ -185,7 +197,7 @@ class Space:
 
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
         """The value as an array of doubles whose last axes are those of a point."""
-        array = np.asarray(value)
+        array = as_array(value, name)
         if array.dtype.kind not in "biuf":
             raise ValidationError(f"{name} must be an array of real numbers, not of {array.dtype}")
         shape = self.point_shape

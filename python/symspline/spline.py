@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Self
+from collections.abc import Callable, Iterable, Iterator
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from ._arrays import as_array, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._ends import ends_of
+from ._ends import ends_of, kept, picked
 from ._integrals import integrate
 from ._times import Clock, clock_of
 from .report import ConvergenceWarning, Report, shaped
 from .spaces import POINT_TOL, POINT_TOL_FLOAT32, Space
 from .spaces import space as space_named
+
+_PACKAGE = os.path.dirname(__file__)
 
 Array = NDArray[Any]
 Progress = Callable[[int, int], object]
@@ -78,6 +84,7 @@ class CubicSpline:
     _bc_type: Any
     _extrapolate: Any
     _report: Report
+    _faults: list[tuple[int, str, str]]
 
     def __new__(cls, t: Any = None, points: Any = None, space: Any = None, **options: Any) -> Self:
         if cls is CubicSpline and space is not None and not isinstance(space, Space):
@@ -105,29 +112,53 @@ class CubicSpline:
     ) -> None:
         self._space = space = space_named(space)
         self._extrapolate = _policy(extrapolate)
-        _check_choice("on_failure", on_failure, ("raise", "warn", "ignore"))
+        _check_options(on_failure, progress)
+        self._fill(t, points, bc_type, method, tol, max_iter, check, progress)
+        if self._faults:
+            _fail(self._faults, on_failure, self)
+
+    def _fill(
+        self,
+        t: ArrayLike | None,
+        points: Any,
+        bc_type: Any,
+        method: str,
+        tol: float,
+        max_iter: int | None,
+        check: bool,
+        progress: Progress | None,
+        dry: bool = False,
+    ) -> None:
+        """Validate, and solve unless ``dry``."""
+        space = self._space
         doubles, point_tol = _points(points, space)
         axes = doubles.ndim - len(space.point_shape) - 1
         batch, nodes = doubles.shape[:axes], doubles.shape[axes]
         self._clock, self._t, self._times = _knots(t, batch, nodes)
-        self._bc_type = bc_type
-        self._points, self._velocities, columns, faults = _core.fit(
-            space._handle,
-            self._times,
-            doubles,
-            ends_of(bc_type, space, batch),
-            method,
-            tol,
-            max_iter,
-            check,
-            point_tol,
-            None,
-            progress,
-        )
+        ends = ends_of(bc_type, space, batch)
+        self._bc_type = kept(bc_type)
+        if max_iter is not None:
+            max_iter = whole_number(max_iter, "max_iter", 1)
+        try:
+            self._points, self._velocities, columns, self._faults = _core.fit(
+                space._handle,
+                self._times,
+                doubles,
+                ends,
+                method,
+                tol,
+                max_iter,
+                check,
+                point_tol,
+                None,
+                progress,
+                dry,
+            )
+        except ValidationError as error:
+            raise self._clock.explain(error) from None
         self._points.flags.writeable = self._velocities.flags.writeable = False
-        self._report = shaped(_solver(method), columns, batch, space.curvature)
-        if faults:
-            _fail(faults, on_failure, self)
+        if not dry:
+            self._report = shaped(_solver(method), columns, batch, space.curvature)
 
     @classmethod
     def _made(
@@ -174,15 +205,14 @@ class CubicSpline:
         Raises:
             ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None.
         """
-        if nu not in _QUANTITIES:
+        if not isinstance(nu, (int, np.integer)) or nu not in _QUANTITIES:
             raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}")
-        times = self._clock.doubles(x, "x")
-        return self._evaluate(times, _QUANTITIES[nu], extrapolate, per_curve)
+        return self._at(x, _QUANTITIES[nu], extrapolate, per_curve)
 
     def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Array:
         """|γ'| at times x, shape batch axes + x.shape."""
-        times = self._clock.doubles(x, "x")
-        return self._evaluate(times, "speed", extrapolate, per_curve)
+        result: Array = self._at(x, "speed", extrapolate, per_curve)
+        return result
 
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
@@ -191,6 +221,14 @@ class CubicSpline:
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
         return integrate(self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch)
+
+    def _at(self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Any:
+        """A quantity at times as the user gives them."""
+        times, per_curve = self._clock.at(x, self._batch, per_curve)
+        try:
+            return self._evaluate(times, quantity, extrapolate, per_curve)
+        except ValidationError as error:
+            raise self._clock.explain(error) from None
 
     def _evaluate(
         self, x: NDArray[np.float64], quantity: str, extrapolate: bool | str | None, per_curve: bool
@@ -284,12 +322,14 @@ class CubicSpline:
         own = self._times.ndim > 1
         return CubicSpline._made(
             self._space,
-            self._clock,
+            Clock(self._clock.origin[index][()], self._clock.dates)
+            if np.ndim(self._clock.origin)
+            else self._clock,
             self._t[index] if own else self._t,
             np.ascontiguousarray(self._times[index]) if own else self._times,
             np.ascontiguousarray(self._points[index]),
             np.ascontiguousarray(self._velocities[index]),
-            _pick_ends(self._bc_type, index, len(self._batch), self._space),
+            picked(self._bc_type, index, len(self._batch), self._space),
             self._extrapolate,
             self._report._map(lambda column: column[index]),
         )
@@ -313,6 +353,19 @@ class CubicSpline:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CubicSpline._made, (
+            self._space,
+            self._clock,
+            self._t,
+            self._times,
+            self._points,
+            self._velocities,
+            self._bc_type,
+            self._extrapolate,
+            self._report,
+        )
+
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
@@ -324,6 +377,29 @@ class CubicSpline:
         from .files import save
 
         save(self, file)
+
+    def plot(self, file: Any = None) -> Figure:
+        """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.
+
+        The picture depends on the space: a globe and a map on S², rotated frames on S³ (unit quaternions,
+        scalar first), the Poincaré disk for H², the curve or its graph in R¹, R² and R³, and otherwise the
+        components against time. Of a batch at most 50 curves are drawn. Neither pyplot nor any setting of
+        matplotlib is touched.
+
+        Args:
+            file: where to save the figure, if anywhere: a name such as ``"curve.pdf"``, or an open file.
+
+        Returns:
+            The figure, to change or to save.
+
+        Raises:
+            ImportError: matplotlib is not installed.
+        """
+        if find_spec("matplotlib") is None:
+            raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")
+        from .plotting import plot
+
+        return plot(self, file)
 
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
@@ -374,16 +450,16 @@ def evaluate(
         pieces = zip(points, u, space.factors, strict=True)
         options = {"extrapolate": extrapolate, "per_curve": per_curve}
         return tuple(evaluate(x, t, p, v, factor, nu, **options) for p, v, factor in pieces)  # type: ignore[arg-type]
-    doubles, _ = _points(points, space)
     velocities = space._doubles(u, "u")
-    if velocities.shape != doubles.shape:
-        raise ValidationError(f"u has shape {velocities.shape}, but points {doubles.shape}")
-    axes = doubles.ndim - len(space.point_shape) - 1
-    clock, knots, times = _knots(t, doubles.shape[:axes], doubles.shape[axes])
-    report = Report("given", True, 0, 0.0, 0.0, space.curvature, None, 0.0)
-    spline = CubicSpline._made(
-        space, clock, knots, times, doubles.copy(), velocities.copy(), "given", None, report
-    )
+    if velocities.shape != np.shape(points):
+        raise ValidationError(f"u has shape {velocities.shape}, but points {np.shape(points)}")
+    if not np.isfinite(velocities).all():
+        index = np.argwhere(~np.isfinite(velocities))[0].tolist()
+        raise ValidationError(f"u{index} is not finite")
+    spline = object.__new__(CubicSpline)
+    spline._space, spline._extrapolate = space, None
+    spline._fill(t, points, "natural", "auto", 0.0, None, True, None, dry=True)
+    spline._velocities = velocities
     return spline(x, nu, extrapolate=extrapolate, per_curve=per_curve)
 
 
@@ -413,7 +489,7 @@ def fit_many(
 
 def _points(points: Any, space: Space) -> tuple[NDArray[np.float64], float]:
     """Points as doubles, and how far off the space they may be."""
-    array = np.asarray(points)
+    array = as_array(points, "points")
     if array.ndim == 0 or array.size == 0:
         raise ValidationError("no points given; a curve needs at least two")
     doubles = space._doubles(array, "points")
@@ -438,39 +514,27 @@ def _knots(
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""
         raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
-    return clock, shown, clock.doubles(shown, "t")
+    return clock, shown, clock.knots(shown)
 
 
 def _policy(extrapolate: Any) -> Any:
-    if extrapolate is not None and extrapolate is not True and extrapolate not in ("geodesic", "periodic"):
+    known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
+    if extrapolate is not None and extrapolate is not True and not known:
         raise ValidationError(
             f"extrapolate must be None, True, 'geodesic' or 'periodic', not {extrapolate!r}"
         )
     return extrapolate
 
 
-def _check_choice(name: str, value: Any, choices: Sequence[str]) -> None:
-    if value not in choices:
-        raise ValidationError(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}")
+def _check_options(on_failure: Any, progress: Any) -> None:
+    if on_failure not in ("raise", "warn", "ignore"):
+        raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {on_failure!r}")
+    if progress is not None and not callable(progress):
+        raise ValidationError(f"progress must be a function of two numbers, not {progress!r}")
 
 
 def _solver(method: str) -> str:
     return "quasi-newton" if method == "auto" else method
-
-
-def _pick_ends(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
-    """The end conditions of part of a batch: prescribed vectors may have a batch axis."""
-    if isinstance(bc_type, str):
-        return bc_type
-
-    def pick(end: Any) -> Any:
-        if isinstance(end, str):
-            return end
-        vector = np.asarray(end[1])
-        own = vector.ndim == batch_axes + len(space.point_shape) and vector.shape[0] != 1
-        return (end[0], vector[index]) if own else (end[0], vector)
-
-    return tuple(pick(end) for end in bc_type)
 
 
 def _fail(faults: list[tuple[int, str, str]], on_failure: str, spline: Any) -> None:
@@ -481,11 +545,19 @@ def _fail(faults: list[tuple[int, str, str]], on_failure: str, spline: Any) -> N
     if len(faults) > 1:
         message += f" (and {len(faults) - 1} more curves failed)"
     if on_failure == "warn":
-        warnings.warn(message, ConvergenceWarning, stacklevel=3)
+        warnings.warn(message, ConvergenceWarning, stacklevel=_callers_level())
         return
     error: Any = _FAULTS[kind](message)
     error.spline = spline
     raise error
+
+
+def _callers_level() -> int:
+    """How many frames up the code is that called this package."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _read_only(array: Array) -> Array:

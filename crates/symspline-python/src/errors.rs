@@ -31,6 +31,26 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("ConvergenceError", py.get_type::<ConvergenceError>())
 }
 
+/// A number for a message: never hundreds of digits.
+pub fn number(x: f64) -> String {
+    if x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite() {
+        format!("{x}")
+    } else {
+        format!("{x:e}")
+    }
+}
+
+/// The index of an element of an array with a shape, as it is written in Python.
+pub fn place(mut index: usize, shape: &[usize]) -> String {
+    let mut axes: Vec<String> = Vec::with_capacity(shape.len());
+    for &size in shape.iter().rev() {
+        axes.push((index % size).to_string());
+        index /= size;
+    }
+    axes.reverse();
+    axes.join(",")
+}
+
 /// A [`ValidationError`] with a message.
 pub fn invalid(message: impl Into<String>) -> PyErr {
     ValidationError::new_err(message.into())

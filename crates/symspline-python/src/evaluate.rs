@@ -1,13 +1,12 @@
 //! Evaluation, called from Python.
 
-use crate::errors::invalid;
+use crate::errors::{invalid, number, place};
 use crate::space::Handle;
 use crate::validate::of_curve;
 use crate::watch::watched;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline::curve::{Curves, Outside, Quantity, Times, evaluate as run};
-use symspline::space::Space;
 use symspline::with_space;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -42,7 +41,6 @@ pub fn evaluate<'py>(
         "periodic" => (Outside::Wrap, false),
         _ => return Err(invalid(format!("unknown extrapolation {outside:?}"))),
     };
-    let len = with_space!(&handle.space, s => s.point_len());
     let point_axes = handle.point_axes();
     let nodes = t.shape()[t.ndim() - 1];
     let batch = &points.shape()[..points.ndim() - point_axes - 1];
@@ -51,8 +49,7 @@ pub fn evaluate<'py>(
         Curves { t: t.as_slice()?, nodes, points: points.as_slice()?, velocities: velocities.as_slice()? };
     let count = count_axes.iter().product();
     let times = Times { x: x.as_slice()?, count };
-    let number = curves.points.len() / (nodes * len).max(1);
-    check_times(&curves, &times, number, strict)?;
+    check_times(&curves, &times, batch, x.shape(), strict)?;
 
     let mut shape = [batch, count_axes].concat();
     if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
@@ -61,7 +58,7 @@ pub fn evaluate<'py>(
     let out = PyArrayDyn::zeros(py, shape, false);
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    watched(py, progress, number * count, |monitor| {
+    watched(py, progress, result.len(), |monitor| {
         with_space!(&handle.space, s => run(s, &curves, &times, quantity, policy, monitor, result));
     })?;
     drop(write);
@@ -69,26 +66,39 @@ pub fn evaluate<'py>(
 }
 
 /// Times must be numbers, and inside the knots if `strict`.
-fn check_times(curves: &Curves, times: &Times, number: usize, strict: bool) -> PyResult<()> {
+fn check_times(
+    curves: &Curves,
+    times: &Times,
+    batch: &[usize],
+    shape: &[usize],
+    strict: bool,
+) -> PyResult<()> {
     let Times { x, count } = *times;
+    let number_of_curves: usize = batch.iter().product();
     let own_times = x.len() != count;
     let shared = curves.t.len() == curves.nodes;
-    let rounds = if own_times || (!shared && strict) { number } else { number.min(1) };
+    let rounds = if own_times || (!shared && strict) { number_of_curves } else { number_of_curves.min(1) };
     for c in 0..rounds {
-        let x = if own_times { &x[c * count..(c + 1) * count] } else { x };
+        let row = if own_times { &x[c * count..(c + 1) * count] } else { x };
         let (start, end) = curves.domain(if shared { 0 } else { c });
         let good = |x: f64| if strict { start <= x && x <= end } else { x.is_finite() };
-        let Some(i) = x.iter().position(|&x| !good(x)) else { continue };
-        let of = of_curve(c, if own_times || !shared { number } else { 1 });
-        return Err(invalid(if !x[i].is_finite() {
-            format!("x[{i}]{of} is {}; times must be finite", x[i])
+        let Some(i) = row.iter().position(|&x| !good(x)) else { continue };
+        let name = if shape.is_empty() {
+            "x".to_string()
         } else {
-            format!(
-                "x[{i}]{of} = {} is outside the knots [{start}, {end}] (counted from the first time); pass \
-                 extrapolate=True, 'geodesic' or 'periodic' to say what is meant there",
-                x[i]
-            )
-        }));
+            format!("x[{}]", place(if own_times { c * count + i } else { i }, shape))
+        };
+        let found = number(row[i]);
+        if !row[i].is_finite() {
+            return Err(invalid(format!("{name} is {found}; times must be finite")));
+        }
+        let of = if own_times || shared { String::new() } else { of_curve(c, batch) };
+        return Err(invalid(format!(
+            "{name} = {found} is outside the knots [{}, {}]{of}; pass extrapolate=True, 'geodesic' or \
+             'periodic' to say what is meant there",
+            number(start),
+            number(end),
+        )));
     }
     Ok(())
 }

@@ -23,9 +23,10 @@ type Fitted<'py> = (
 );
 
 /// Fits curves. `points` are contiguous with the point's numbers last; `offsets` are the nodes before
-/// each curve when they differ in length (then `points` is one long list of points).
+/// each curve when they differ in length (then `points` is one long list of points). A dry run only
+/// validates.
 #[pyfunction]
-#[pyo3(signature = (handle, t, points, ends, method, tol, max_iter, check, point_tol, offsets=None, progress=None))]
+#[pyo3(signature = (handle, t, points, ends, method, tol, max_iter, check, point_tol, offsets=None, progress=None, dry=false))]
 pub fn fit<'py>(
     py: Python<'py>,
     handle: &Handle,
@@ -39,6 +40,7 @@ pub fn fit<'py>(
     point_tol: f64,
     offsets: Option<Vec<usize>>,
     progress: Option<Py<PyAny>>,
+    dry: bool,
 ) -> PyResult<Fitted<'py>> {
     let method = match method {
         "auto" => Method::Auto,
@@ -60,6 +62,7 @@ pub fn fit<'py>(
     let len = with_space!(&handle.space, s => s.point_len());
     let nodes = points.len() / len;
     let t_slice = t.as_slice()?;
+    let different = offsets.is_some();
     let (offsets, shared) = match offsets {
         Some(offsets) => (offsets, false),
         None => {
@@ -68,6 +71,8 @@ pub fn fit<'py>(
         }
     };
     let curves = offsets.len() - 1;
+    let lead = points.ndim() - handle.point_axes() - 1;
+    let batch = if different { vec![curves] } else { points.shape()[..lead].to_vec() };
 
     let out = PyArrayDyn::zeros(py, points.shape(), false);
     let velocities = PyArrayDyn::zeros(py, points.shape(), false);
@@ -79,9 +84,9 @@ pub fn fit<'py>(
         let count = if shared { 1 } else { curves };
         for c in 0..count {
             let t = if shared { t_slice } else { &t_slice[offsets[c]..offsets[c + 1]] };
-            validate::knots(t, c, count)?;
+            validate::knots(t, c, if shared { &[] } else { &batch })?;
         }
-        with_space!(&handle.space, s => validate::points(s, p, &offsets, point_tol))?;
+        with_space!(&handle.space, s => validate::points(s, p, &offsets, &batch, point_tol))?;
     }
     let ends_now = match &ends {
         None => Ends::Periodic,
@@ -89,7 +94,11 @@ pub fn fit<'py>(
     };
     let problem = Problem { t: t_slice, shared, points: p, offsets: &offsets, ends: ends_now };
     if check {
-        with_space!(&handle.space, s => validate::ends(s, &problem, point_tol))?;
+        with_space!(&handle.space, s => validate::ends(s, &problem, &batch, point_tol))?;
+    }
+    if dry {
+        drop((out_write, velocities_write));
+        return Ok((out, velocities, arrays(py, &[])?, Vec::new()));
     }
     let reports = watched(
         py,
@@ -97,7 +106,7 @@ pub fn fit<'py>(
         nodes,
         |monitor| with_space!(&handle.space, s => solve(s, &problem, &options, monitor, u)),
     )?;
-    let faults = faults(handle, &options, &reports);
+    let faults = faults(handle, &options, &reports, &batch);
     drop((out_write, velocities_write));
     Ok((out, velocities, arrays(py, &reports)?, faults))
 }
@@ -121,11 +130,15 @@ fn arrays<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyTup
         .into_pyobject(py)
 }
 
-fn faults(handle: &Handle, options: &Options, reports: &[Report]) -> Vec<(usize, &'static str, String)> {
+fn faults(
+    handle: &Handle,
+    options: &Options,
+    reports: &[Report],
+    batch: &[usize],
+) -> Vec<(usize, &'static str, String)> {
     let limit = with_space!(&handle.space, s => s.cut_angle());
-    let curves = reports.len();
     let describe = |(c, r): (usize, &Report)| {
-        let of = validate::of_curve(c, curves);
+        let of = validate::of_curve(c, batch);
         let (kind, message) = match r.status {
             Status::Converged | Status::Stopped => return None,
             Status::CutLocus { index, angle } => (

@@ -1,6 +1,6 @@
 //! The compiled side of a space.
 
-use crate::errors::{CutLocusError, invalid};
+use crate::errors::{CutLocusError, invalid, place};
 use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -90,6 +90,11 @@ impl Handle {
         )?;
         drop(write);
         done.map_err(|(row, angle)| {
+            if angle.is_nan() {
+                return invalid(format!(
+                    "pair {row} holds a number that is not finite, or no point of the space"
+                ));
+            }
             let limit = with_space!(&self.space, s => s.cut_angle());
             CutLocusError::new_err(format!(
                 "pair {row}: the points lie at or past each other's cut locus: angle {angle}, limit {limit}; \
@@ -99,11 +104,11 @@ impl Handle {
         Ok(out)
     }
 
-    /// Raises unless every row is a point within `tol`.
-    fn check_points(&self, points: PyReadonlyArrayDyn<f64>, tol: f64) -> PyResult<()> {
+    /// Raises unless every row is a point within `tol`; `shape` is how the rows were laid out.
+    fn check_points(&self, points: PyReadonlyArrayDyn<f64>, shape: Vec<usize>, tol: f64) -> PyResult<()> {
         let mut copy = points.as_slice()?.to_vec();
         with_space!(&self.space, s => project_points(s, &mut copy, tol))
-            .map_err(|(row, off, why)| off_space(&format!("point {row}"), off, tol, &why))
+            .map_err(|(row, off, why)| off_space(&format!("point {}", place(row, &shape)), off, tol, &why))
     }
 
     /// How far rows are from being tangent, relative to their size.

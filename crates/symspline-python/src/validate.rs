@@ -1,6 +1,6 @@
 //! What every call checks before any work is done.
 
-use crate::errors::invalid;
+use crate::errors::{invalid, number, place};
 use crate::space::off_space;
 use pyo3::prelude::*;
 use symspline::fit::{End, Ends, Problem};
@@ -9,15 +9,15 @@ use symspline::rows::{Operation, apply, project_points, tangent_defects};
 use symspline::space::Space;
 
 /// Where a curve stands in a batch, for messages; nothing for a single curve.
-pub fn of_curve(curve: usize, curves: usize) -> String {
-    if curves > 1 { format!(" of curve {curve}") } else { String::new() }
+pub fn of_curve(curve: usize, batch: &[usize]) -> String {
+    if batch.is_empty() { String::new() } else { format!(" of curve {}", place(curve, batch)) }
 }
 
 /// Knots must be finite and increasing.
-pub fn knots(t: &[f64], curve: usize, curves: usize) -> PyResult<()> {
-    let of = if curves > 1 { format!("[{curve}]") } else { String::new() };
+pub fn knots(t: &[f64], curve: usize, batch: &[usize]) -> PyResult<()> {
+    let of = if batch.is_empty() { String::new() } else { format!("[{}]", place(curve, batch)) };
     if let Some(i) = t.iter().position(|x| !x.is_finite()) {
-        return Err(invalid(format!("t{of}[{i}] is {}; times must be finite", t[i])));
+        return Err(invalid(format!("t{of}[{i}] is {}; times must be finite", number(t[i]))));
     }
     if let Some(i) = (1..t.len()).find(|&i| t[i] <= t[i - 1]) {
         let (a, b) = (t[i - 1], t[i]);
@@ -28,8 +28,10 @@ pub fn knots(t: &[f64], curve: usize, curves: usize) -> PyResult<()> {
         };
         let what = if a == b { "repeats" } else { "is before" };
         return Err(invalid(format!(
-            "t{of}[{i}] = {b} {what} t{of}[{}] = {a} (counted from the first time); times must increase: {hint}",
-            i - 1
+            "t{of}[{i}] = {} {what} t{of}[{}] = {}; times must increase: {hint}",
+            number(b),
+            i - 1,
+            number(a)
         )));
     }
     if !(t[t.len() - 1] - t[0]).is_finite() {
@@ -39,16 +41,22 @@ pub fn knots(t: &[f64], curve: usize, curves: usize) -> PyResult<()> {
 }
 
 /// Points are projected in place, or the first that is off the space is named.
-pub fn points<M: Space>(space: &M, points: &mut [f64], offsets: &[usize], tol: f64) -> PyResult<()> {
+pub fn points<M: Space>(
+    space: &M,
+    points: &mut [f64],
+    offsets: &[usize],
+    batch: &[usize],
+    tol: f64,
+) -> PyResult<()> {
     project_points(space, points, tol).map_err(|(row, off, why)| {
         let curve = offsets.partition_point(|&o| o <= row) - 1;
-        let which = format!("points[{}]{}", row - offsets[curve], of_curve(curve, offsets.len() - 1));
+        let which = format!("points[{}]{}", row - offsets[curve], of_curve(curve, batch));
         off_space(&which, off, tol, &why)
     })
 }
 
 /// End vectors must be tangent and velocities not too fast; closed curves must be closed.
-pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
+pub fn ends<M: Space>(space: &M, problem: &Problem, batch: &[usize], tol: f64) -> PyResult<()> {
     let len = space.point_len();
     let curves = problem.offsets.len() - 1;
     let mut first = Vec::with_capacity(curves * len);
@@ -67,7 +75,7 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
             Some(c) => Err(invalid(format!(
                 "bc_type='periodic' needs a closed curve, but first and last point{} are {:.3e} apart \
                  (allowed: {tol:.0e}); repeat the first point at the end",
-                of_curve(c, curves),
+                of_curve(c, batch),
                 distance[c]
             ))),
             None => Ok(()),
@@ -81,8 +89,8 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
             End::Natural | End::NotAKnot => continue,
         };
         if let Some(i) = v.iter().position(|x| !x.is_finite()) {
-            let of = of_curve(i / len, curves);
-            return Err(invalid(format!("the {name} {order}{of} holds {}; it must be finite", v[i])));
+            let of = of_curve(i / len, batch);
+            return Err(invalid(format!("the {name} {order}{of} holds {}; it must be finite", number(v[i]))));
         }
         // In units of the segment, so that a vector as small as the rounding of the points passes.
         let mut scaled = v.to_vec();
@@ -96,7 +104,7 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
             return Err(invalid(format!(
                 "the {name} {order}{} is not tangent at its point: a part of {:.3e} of it points off the space \
                  (allowed: {tol:.0e}); use space.project_tangent(p, v)",
-                of_curve(c, curves),
+                of_curve(c, batch),
                 defects[c]
             )));
         }
@@ -108,10 +116,11 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, tol: f64) -> PyResult<()> {
                 let largest = 3.0 * space.injectivity_radius() / h;
                 if square.sqrt() >= largest {
                     return Err(invalid(format!(
-                        "the {name} velocity{} has speed {:.6}, too fast for its segment of length {h}: its \
+                        "the {name} velocity{} has speed {:.6}, too fast for its segment of length {}: its \
                          control leg would pass the cut locus; the speed must stay below {largest:.6}",
-                        of_curve(c, curves),
-                        square.sqrt()
+                        of_curve(c, batch),
+                        square.sqrt(),
+                        number(h)
                     )));
                 }
             }

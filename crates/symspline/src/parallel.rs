@@ -6,10 +6,13 @@ use std::sync::{Condvar, Mutex};
 use std::time::Duration;
 
 /// A pool belongs to one process: after a fork its threads are gone, and the child makes its own.
+/// Pools are never freed, since others may be working in them; there is one for every number of
+/// threads that was asked for.
 struct Pool {
     process: u32,
     threads: usize,
     pool: rayon::ThreadPool,
+    older: Option<&'static Pool>,
 }
 
 static POOL: AtomicPtr<Pool> = AtomicPtr::new(std::ptr::null_mut());
@@ -29,18 +32,18 @@ pub fn num_threads() -> usize {
 }
 
 fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
-    let current = POOL.load(Ordering::Acquire);
-    // A pool, once stored, is never freed: others may be working in it.
+    // What is stored was leaked, and stays.
     #[allow(unsafe_code)]
-    let current: Option<&'static Pool> = unsafe { current.as_ref() };
-    if let Some(found) = current
-        && found.process == std::process::id()
-        && found.threads == threads
-    {
-        return Some(&found.pool);
+    let newest: Option<&'static Pool> = unsafe { POOL.load(Ordering::Acquire).as_ref() };
+    let mut next = newest;
+    while let Some(found) = next {
+        if found.process == std::process::id() && found.threads == threads {
+            return Some(&found.pool);
+        }
+        next = found.older;
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()?;
-    let made = Box::leak(Box::new(Pool { process: std::process::id(), threads, pool }));
+    let made = Box::leak(Box::new(Pool { process: std::process::id(), threads, pool, older: newest }));
     POOL.store(made, Ordering::Release);
     Some(&made.pool)
 }

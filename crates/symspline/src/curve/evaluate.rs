@@ -200,9 +200,9 @@ impl<M: Space> Job<'_, M> {
                 Outside::Continue => {}
                 Outside::Geodesic => {
                     beyond = if x < start { x - start } else { x - end };
-                    x = x.clamp(start, end);
+                    x = x.max(start).min(end);
                 }
-                Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).clamp(start, end),
+                Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
             }
         }
         let k = match self.locator {

@@ -22,7 +22,7 @@ impl<'a> Locator<'a> {
                     buckets.push(k.saturating_sub(1) as u32);
                 }
             }
-            buckets.push(n as u32 - 1);
+            buckets.resize(n + 2, n as u32 - 1);
         }
         Locator { t, buckets, per_time }
     }

@@ -1,7 +1,7 @@
 //! The sphere Sⁿ = {x ∈ Rⁿ⁺¹ : |x| = 1}, G = O(n+1), κ = 1.
 
 use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
-use crate::scalar::{Lane, Scalar, dot};
+use crate::scalar::{Lane, Scalar, dot, lane};
 
 const K: i32 = 1;
 
@@ -32,9 +32,12 @@ impl Space for Sphere {
 
     fn project(&self, x: &mut [Lane]) -> Lane {
         let norm = dot(x, x).sqrt();
-        let scale = Lane::ONE / norm;
+        let off = (norm - Lane::ONE).abs();
+        // What is a unit vector up to the rounding of its norm stays as it is.
+        let rounding = lane((1.5 + self.n as f64 / 8.0) * f64::EPSILON);
+        let scale = off.simd_le(rounding).select(Lane::ONE, Lane::ONE / norm);
         x.iter_mut().for_each(|x| *x *= scale);
-        (norm - Lane::ONE).abs()
+        off
     }
 
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {

@@ -1,0 +1,1 @@
+"""How long symspline takes, beside SciPy and ``splines``: ``python -m benchmarks [--quick]``."""

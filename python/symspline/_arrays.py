@@ -1,0 +1,27 @@
+"""Arrays as a user gives them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import ValidationError
+
+
+def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
+    """The value as an array; ragged nested lists are an error of the caller's."""
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ValidationError(f"{name} is not an array of equally long rows: {error}") from None
+
+
+def whole_number(value: Any, name: str, least: int) -> int:
+    """A whole number that fits into a machine word."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ValidationError(f"{name} must be a whole number, not {value!r}")
+    if not least <= int(value) < 2**62:
+        raise ValidationError(f"{name} must be at least {least} and not beyond 2**62, not {value}")
+    return int(value)

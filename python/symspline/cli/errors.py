@@ -1,0 +1,52 @@
+"""What can go wrong for a user, in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+
+from ..files import replacing
+
+
+class Problem(Exception):
+    """Bad input or usage; the message is for the user."""
+
+
+def did_you_mean(name: str, names: Sequence[str]) -> str:
+    """Half a sentence with the name that was probably meant, or with all there are."""
+    plain = {known.lower(): known for known in names}
+    close = get_close_matches(name.lower(), plain, 1)
+    if close:
+        return f"did you mean {plain[close[0]]!r}?"
+    return f"there are {listed(names)}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """The names, or the first of very many."""
+    shown = ", ".join(names[:12])
+    return shown if len(names) <= 12 else f"{shown}, … ({len(names)})"
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Says which file could not be read."""
+    try:
+        yield
+    except OSError as error:
+        raise Problem(f"cannot read {path}: {error.strerror or error}") from None
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """A temporary file that becomes ``path`` if all goes well."""
+    if path.is_dir():
+        raise Problem(f"cannot write {path}: it is a folder")
+    if not path.parent.is_dir():
+        raise Problem(f"cannot write {path}: there is no folder {path.parent}")
+    try:
+        with replacing(path) as temporary:
+            yield temporary
+    except OSError as error:
+        raise Problem(f"cannot write {path}: {error.strerror or error}") from None

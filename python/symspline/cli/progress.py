@@ -1,0 +1,38 @@
+"""How far long work has come, on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Self
+
+_WAIT = 0.3
+"""Seconds between two lines; shorter work shows nothing."""
+
+
+class Progress:
+    """Writes and rewrites one line on stderr if that is a terminal; at the end the line is wiped.
+
+    An instance may be called, with what is done and the total, from any loop or by the library.
+    """
+
+    def __init__(self, work: str) -> None:
+        self._work = work
+        self._width = 0
+
+    def __enter__(self) -> Self:
+        self._next = time.monotonic() + _WAIT
+        self._shows = sys.stderr.isatty()
+        return self
+
+    def __call__(self, done: int, total: int) -> None:
+        if not self._shows or total <= 0 or time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _WAIT
+        line = f"{self._work}: {100 * done // total} %"
+        self._width = max(self._width, len(line))
+        print("\r" + line, end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._width:
+            print("\r" + " " * self._width, end="\r", file=sys.stderr, flush=True)

@@ -1,0 +1,141 @@
+"""Curves, sampled to be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.dates import date2num
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from ..spline import CubicSpline
+from .style import INK, colors
+
+Doubles = NDArray[np.float64]
+
+MOST = 50
+"""The largest number of curves of a batch that are drawn."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve and how it is drawn.
+
+    Attributes:
+        spline: one curve, not a batch.
+        x: times, as the core counts them; among them all knots.
+        color: of its line.
+        alone: whether it is the only curve of the figure.
+    """
+
+    spline: CubicSpline
+    x: Doubles
+    color: Any
+    alone: bool
+
+    @cached_property
+    def points(self) -> Any:
+        """The points at the times x."""
+        return self._at("point")
+
+    @cached_property
+    def speed(self) -> Doubles:
+        """|γ'| at the times x."""
+        return self._at("speed")
+
+    @cached_property
+    def bend(self) -> Doubles:
+        """|∇γ'| at the times x."""
+        return self._at("bend")
+
+    @cached_property
+    def times(self) -> Doubles:
+        """The times x where matplotlib puts them on an axis."""
+        first = self.spline.t[0]
+        if self.dates:
+            return np.asarray(date2num(first + np.rint(1e6 * self.x).astype("timedelta64[us]")))
+        return float(first) + (self.x - self.x[0])
+
+    @property
+    def knots(self) -> slice:
+        """Where the knots are among the times x."""
+        return slice(None, None, (len(self.x) - 1) // (len(self.spline.t) - 1))
+
+    @property
+    def dates(self) -> bool:
+        """Whether times are dates."""
+        return bool(self.spline.t.dtype.kind == "M")
+
+    def part(self, number: int) -> Curve:
+        """The curve in one factor of a product."""
+        return replace(self, spline=self.spline._parts[number])  # type: ignore[attr-defined]
+
+    def _at(self, quantity: str) -> Any:
+        return self.spline._evaluate(self.x, quantity, None, False)
+
+    # ---- on axes of two or three dimensions ----
+
+    def draw_line(self, axes: Axes, places: Doubles, **look: Any) -> None:
+        """A line through places of shape (m, 2) or (m, 3)."""
+        look = {"color": self.color, "linewidth": 2.4 if self.alone else 1.4, "zorder": 4} | look
+        axes.plot(*places.T, **look)
+
+    def draw_dots(self, axes: Axes, places: Doubles) -> None:
+        """The given points, shape (N+1, 2) or (N+1, 3); the first is white."""
+        size = float(np.clip(30 / np.sqrt(len(places)), 2, 6.5)) * (1 if self.alone else 0.6)
+        color = INK if self.alone else self.color
+        axes.plot(*places.T, "o", color=color, markersize=size, zorder=6)
+        axes.plot(
+            *places[:1].T, "o", color="white", markersize=size, markeredgecolor=color, markeredgewidth=1.2, zorder=7
+        )
+
+
+def curves_of(spline: CubicSpline) -> tuple[list[Curve], str]:
+    """The curves to draw, and in words which they are.
+
+    Raises:
+        ValidationError: no curve is finite.
+    """
+    batch = spline._batch
+    everything = int(np.prod(batch))
+    good = np.flatnonzero(_finite(spline))
+    if not good.size:
+        raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
+    chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), MOST)).astype(int))]
+    words = f"{len(chosen)} of {everything} curves, " if len(chosen) < everything else f"{everything} curves, "
+    if len(good) < everything:
+        words += f"{everything - len(good)} failed, "
+    picked = [_pick(spline, np.unravel_index(number, batch)) for number in chosen]
+    alone = len(picked) == 1
+    curves = [
+        Curve(curve, _samples(curve._times), color, alone)
+        for curve, color in zip(picked, colors(len(picked)), strict=True)
+    ]
+    return curves, words if batch else ""
+
+
+def _finite(spline: CubicSpline) -> NDArray[np.bool_]:
+    """Which curves are finite, one after the other."""
+    batch, times = spline._batch, spline._times
+    start = np.broadcast_to(times, (*batch, times.shape[-1]))[..., :1]
+    finite: NDArray[np.bool_] = np.isfinite(spline._evaluate(np.ascontiguousarray(start), "speed", None, True))
+    return finite.ravel()
+
+
+def _pick(spline: CubicSpline, index: Sequence[Any]) -> CubicSpline:
+    for i in index:
+        spline = spline[i]
+    return spline
+
+
+def _samples(knots: Doubles) -> Doubles:
+    """Times that divide every segment evenly."""
+    segments = len(knots) - 1
+    number = max(1200 // segments, 16 if segments <= 10_000 else 1)
+    inner = knots[:-1, None] + np.diff(knots)[:, None] * np.arange(number) / number
+    return np.append(inner.ravel(), knots[-1])

@@ -1,0 +1,72 @@
+"""Curves in the hyperbolic plane, in the Poincaré disk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from ..spaces import Hyperbolic
+from .curves import Curve
+from .style import EDGE, GRID, INK, PAPER, inside
+
+Array = NDArray[np.float64]
+
+_PLANE = Hyperbolic(2)
+_ORIGIN = np.array([1.0, 0.0, 0.0])
+_STEPS = np.array([1, 2, 5]) * 10.0 ** np.arange(-9, 3)[:, None]
+
+
+def draw_disk(panel: FigureBase, curves: Sequence[Curve]) -> None:
+    """The disk, with two families of geodesics at right angles to the axes.
+
+    A curve that is far from the middle is moved there, and a small one is enlarged.
+    """
+    everything = np.concatenate([curve.points for curve in curves])
+    centre, reach = _centre(everything)
+    half = 1.04 if reach > 0.5 or reach < 1e-7 else 1.4 * np.tanh(reach / 2)
+    axes = panel.add_axes(inside(panel, 0.25, 0.45, 0.25, 0.1))
+    axes.set_axis_off()
+    axes.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
+    spacing = 0.5 if half > 1 else _nice(0.6 * reach)
+    _draw_grid(axes, spacing, half)
+    for curve in curves:
+        curve.draw_line(axes, flat(curve.points, centre))
+        curve.draw_dots(axes, flat(curve.spline.points, centre))
+    note = f"Poincaré disk; geodesics that cross the axes every {spacing:g}"
+    if not np.array_equal(centre, _ORIGIN):
+        note += "\nmiddle: " + "(" + ", ".join(f"{x:.4g}" for x in centre) + ")"
+    panel.text(0.5, 0.02, note, ha="center", color=INK, fontsize=9)
+
+
+def flat(points: Array, centre: Array) -> Array:
+    """Where points are in the disk whose middle is ``centre``, shape (..., 2)."""
+    moved = _PLANE.transvection(centre, _PLANE.log(centre, _ORIGIN), points)
+    return moved[..., 1:] / (1 + moved[..., :1])
+
+
+def _centre(points: Array) -> tuple[Array, float]:
+    """The middle of the disk, and the distance to the farthest point."""
+    middle = _PLANE.project(points.mean(axis=0))
+    around, beside = (_PLANE.distance(place, points).max() for place in (_ORIGIN, middle))
+    return (middle, float(beside)) if beside < 0.6 * around else (_ORIGIN, float(around))
+
+
+def _nice(value: float) -> float:
+    return float(_STEPS.ravel()[np.abs(np.log(_STEPS.ravel() / value)).argmin()])
+
+
+def _draw_grid(axes: Axes, spacing: float, half: float) -> None:
+    rim = Circle((0, 0), 1, facecolor=PAPER, edgecolor=EDGE, linewidth=1, zorder=0)
+    axes.add_patch(rim)
+    look = {"fill": False, "edgecolor": GRID, "linewidth": 0.6, "zorder": 1, "clip_path": rim}
+    axes.plot([-1, 1, np.nan, 0, 0], [0, 0, np.nan, -1, 1], color=GRID, linewidth=0.9, zorder=1)
+    for number in range(1, 11):
+        distance = number * spacing
+        middle, radius = 1 / np.tanh(distance), 1 / np.sinh(distance)
+        for x, y in ((middle, 0), (-middle, 0), (0, middle), (0, -middle)):
+            axes.add_patch(Circle((x, y), radius, **look))

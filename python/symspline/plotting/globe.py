@@ -1,0 +1,150 @@
+"""A globe seen from far away, with a graticule: for places, directions and whatever lives on S²."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from ..lonlat import from_lonlat, to_lonlat
+from .style import EDGE, GRID, INK, PAPER
+
+Array = NDArray[np.float64]
+
+SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
+_STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(), [10, 15, 30, 45, 90])
+
+
+@dataclass(frozen=True)
+class View:
+    """A globe seen from far above a place: unit vectors to the east, to the north and up."""
+
+    east: Array
+    north: Array
+    up: Array
+
+    @classmethod
+    def above(cls, lon: float, lat: float) -> View:
+        """The view with a place in the middle."""
+        return cls(from_lonlat(lon + 90, 0), from_lonlat(lon, lat + 90), from_lonlat(lon, lat))
+
+    def flat(self, points: Array) -> Array:
+        """The orthographic projection, shape (..., 2)."""
+        return np.stack([points @ self.east, points @ self.north], axis=-1)
+
+    def visible(self, points: Array) -> Array:
+        """The projection of what is on the near side; NaN, which breaks a line, on the far side."""
+        return np.where((points @ self.up > 0)[..., None], self.flat(points), np.nan)
+
+    def hidden(self, points: Array) -> Array:
+        """The projection of what is on the far side; NaN on the near side."""
+        return np.where((points @ self.up > 0)[..., None], np.nan, self.flat(points))
+
+    def outline(self, ring: Array) -> Array:
+        """The projection of a ring of points, its far part pressed onto the horizon."""
+        flat = self.flat(ring)
+        horizon = flat / np.linalg.norm(flat, axis=-1, keepdims=True)
+        return np.where((ring @ self.up > 0)[..., None], flat, horizon)
+
+
+def middle_of(points: Array) -> tuple[float, float]:
+    """Longitude and latitude of the place above which points, shape (m, 3), are seen well."""
+    mean = points.mean(axis=0)
+    if np.linalg.norm(mean) < 0.2:
+        # All around: oblique to the plane that comes closest to the points.
+        normal = np.linalg.svd(points, full_matrices=False)[2][2]
+        start = points[0] - (points[0] @ normal) * normal
+        mean = start / np.linalg.norm(start) + (0.6 if normal[2] >= 0 else -0.6) * normal
+    lon, lat = to_lonlat(mean)
+    return float(lon), float(lat)
+
+
+def draw_globe(axes: Axes, view: View, spacing: int) -> None:
+    """A shaded globe with a graticule."""
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_xlim(-1.06, 1.06)
+    axes.set_ylim(-1.06, 1.06)
+    x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
+    light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
+    shade = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
+    shade.set_clip_path(Circle((0, 0), 1, transform=axes.transData))
+    axes.add_patch(Circle((0, 0), 1, fill=False, edgecolor=EDGE, linewidth=1, zorder=3))
+    steps = np.linspace(-180, 180, 721)
+    lines = [from_lonlat(steps, lat) for lat in range(spacing - 90, 90, spacing)]
+    lines += [from_lonlat(lon, steps / 2) for lon in range(-180, 180, spacing)]
+    for line in lines:
+        axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, zorder=2)
+
+
+def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:
+    """A square frame, with a graticule that is labelled at the left and at the bottom.
+
+    Args:
+        middle, half: where the frame is in the projection, and half its width.
+    """
+    (west, south), (east, north) = middle - half, middle + half
+    lon, lat = (float(value) for value in to_lonlat(view.up))
+    reach = np.degrees(np.arcsin(min(1.0, float(np.linalg.norm(middle)) + 1.45 * half)))
+    around = 180.0 if abs(lat) + reach > 80 else reach / np.cos(np.radians(abs(lat) + reach))
+    spacing = _nice(np.degrees(2 * half) / 5)
+    parallels = _multiples(spacing, max(lat - reach, -90), min(lat + reach, 90))
+    meridians = _multiples(_nice(spacing / np.cos(np.radians(min(abs(lat), 85)))), lon - around, lon + around)
+    steps = np.linspace(-1, 1, 721)
+    bottom = [view.visible(from_lonlat(x, np.clip(lat + reach * steps, -90, 90))) for x in meridians]
+    left = [view.visible(from_lonlat(lon + around * steps, y)) for y in parallels]
+    for line in (*bottom, *left):
+        axes.plot(*line.T, color=GRID, linewidth=0.7, zorder=2)
+    axes.set_xticks(*_labels([_crossings(line, south) for line in bottom], meridians, "E", "W", west, east))
+    axes.set_yticks(
+        *_labels([_crossings(line[:, ::-1], west) for line in left], parallels, "N", "S", south, north)
+    )
+    axes.set(aspect="equal", xlim=(west, east), ylim=(south, north), facecolor=PAPER)
+    axes.tick_params(length=0, labelcolor=INK)
+
+
+def _nice(value: float) -> float:
+    """The step, in degrees, that comes closest."""
+    return float(_STEPS[np.abs(np.log(_STEPS / value)).argmin()])
+
+
+def _multiples(step: float, low: float, high: float) -> list[float]:
+    """Multiples of a step that divides a turn, each direction once."""
+    numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    return [round(float(step * number), 9) for number in numbers if low + 360 - step * number > 1e-9]
+
+
+def _crossings(line: Array, level: float) -> Array:
+    """The first coordinates of where a line crosses a level of the second."""
+    above = line[:, 1] > level
+    (i,) = np.nonzero((above[1:] != above[:-1]) & np.isfinite(line[1:, 1] - line[:-1, 1]))
+    share = (level - line[i, 1]) / (line[i + 1, 1] - line[i, 1])
+    return line[i, 0] + share * (line[i + 1, 0] - line[i, 0])
+
+
+def _labels(
+    crossings: Iterable[Array], values: Iterable[float], positive: str, negative: str, low: float, high: float
+) -> tuple[list[float], list[str]]:
+    """Ticks and their labels, those left out that would come too close to another."""
+    found = sorted(
+        (float(place), value)
+        for places, value in zip(crossings, values, strict=True)
+        for place in places
+        if low <= place <= high
+    )
+    kept: list[tuple[float, float]] = []
+    for place, value in found:
+        if not kept or place - kept[-1][0] > 0.08 * (high - low):
+            kept.append((place, value))
+    return [place for place, _ in kept], [degrees(value, positive, negative) for _, value in kept]
+
+
+def degrees(value: float, positive: str, negative: str) -> str:
+    """``-30`` is 30°W or 30°S; 190 is 170°W."""
+    value = value - 360 * np.ceil((value - 180) / 360)
+    return f"{abs(value):.10g}°" + ("" if value in (0, 180) else positive if value > 0 else negative)

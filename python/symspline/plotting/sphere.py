@@ -1,0 +1,107 @@
+"""Curves on the circle S¹ and on the sphere S²."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import FigureBase
+from numpy.typing import NDArray
+
+from ..lonlat import to_lonlat
+from .curves import Curve
+from .globe import View, degrees, draw_frame, draw_globe, middle_of
+from .style import GRID, PAPER, inside, plain, size, window
+from .timeline import timelines
+
+Array = NDArray[np.float64]
+
+_SMALL = np.radians(25)
+_POLE = 60
+"""Neighbouring samples whose longitudes differ by more have the pole between them."""
+
+
+def draw_angle(panel: FigureBase, curves: Sequence[Curve]) -> None:
+    """S¹: the angle against time, without jumps."""
+    (axes,) = timelines(panel, curves, ["angle, degrees"])
+    for curve in curves:
+        angle = np.degrees(np.unwrap(np.arctan2(curve.points[:, 1], curve.points[:, 0])))
+        graph = np.column_stack([curve.times, angle])
+        curve.draw_line(axes, graph)
+        curve.draw_dots(axes, graph[curve.knots])
+
+
+def draw_sphere(panel: FigureBase, curves: Sequence[Curve]) -> None:
+    """S²: a globe and, if there is room, a map of all longitudes and latitudes."""
+    width, height = size(panel)
+    room = min(width, height)
+    draw_ball(panel, curves, room)
+    if width > 2 * height:
+        _draw_map(panel, curves, room)
+
+
+def draw_ball(panel: FigureBase, curves: Sequence[Curve], room: float) -> None:
+    """Curves on a globe in the left of a panel, dashed on its far side; where they are small, a part of it.
+
+    Args:
+        room: width of what may be used of the panel, in inches.
+    """
+    everything = np.concatenate([curve.points for curve in curves])
+    view = View.above(*middle_of(everything))
+    far = np.arctan2(np.linalg.norm(view.flat(everything), axis=-1), everything @ view.up).max()
+    width, height = size(panel)
+    if 1e-7 < far < _SMALL:
+        side = min(room - 0.9, height - 0.7)
+        axes = panel.add_axes((0.8 / width, 0.5 / height, side / width, side / height))
+        draw_frame(axes, view, *window(view.flat(everything), 1.22))
+        axes.tick_params(labelsize=9)
+    else:
+        side = min(room, height) - 0.2
+        axes = panel.add_axes((0.5 * (room - side) / width, 0.5 - 0.5 * side / height, side / width, side / height))
+        draw_globe(axes, view, 15)
+    for curve in curves:
+        curve.draw_line(axes, view.hidden(curve.points), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
+        curve.draw_line(axes, view.visible(curve.points))
+        curve.draw_dots(axes, view.visible(curve.spline.points))
+
+
+def _draw_map(panel: FigureBase, curves: Sequence[Curve], left: float) -> None:
+    axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.3, 0.2))
+    plain(axes)
+    axes.set(aspect="equal", xlim=(-180, 180), ylim=(-90, 90), facecolor=PAPER, label="map")
+    axes.set_xticks(range(-180, 181, 60), [degrees(x, "E", "W") for x in range(-180, 181, 60)])
+    axes.set_yticks(range(-90, 91, 30), [degrees(y, "N", "S") for y in range(-90, 91, 30)])
+    axes.set_xticks(range(-180, 181, 30), minor=True)
+    axes.grid(which="minor", color=GRID, linewidth=0.6)
+    axes.tick_params(which="minor", length=0)
+    for curve in curves:
+        places = lonlat_of(curve.points)
+        curve.draw_line(axes, broken(places))
+        curve.draw_dots(axes, places[curve.knots])
+
+
+def lonlat_of(points: Array) -> Array:
+    """Longitude and latitude of samples of a curve, shape (m, 2); at a pole the longitude from before."""
+    lon, lat = to_lonlat(points)
+    known = np.hypot(points[:, 0], points[:, 1]) > 1e-9
+    last = np.maximum.accumulate(np.where(known, np.arange(len(points)), -1))
+    return np.column_stack([lon[np.where(last < 0, known.argmax(), last)], lat])
+
+
+def broken(places: Array) -> Array:
+    """A line of longitudes and latitudes broken, by NaN, at the date line and at the poles."""
+    step = np.diff(places[:, 0])
+    short = step - 360 * np.rint(step / 360)
+    (jumps,) = np.nonzero((np.abs(step) > 180) | (np.abs(short) > _POLE))
+    gaps = [_gap(places[i], places[i + 1], short[i]) for i in jumps]
+    return np.insert(places, np.repeat(jumps + 1, 3), np.reshape(gaps, (-1, 2)), axis=0)
+
+
+def _gap(before: Array, after: Array, step: float) -> list[Array]:
+    """Where a line that goes ``step`` degrees to the east leaves the map, NaN, and where it comes back."""
+    if abs(step) > _POLE:
+        pole = np.copysign(90, before[1])
+        return [np.array([before[0], pole]), np.full(2, np.nan), np.array([after[0], pole])]
+    edge = np.copysign(180, step)
+    lat = before[1] + (edge - before[0]) / step * (after[1] - before[1])
+    return [np.array([edge, lat]), np.full(2, np.nan), np.array([-edge, lat])]
