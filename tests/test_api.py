@@ -103,14 +103,11 @@ def test_epoch_nanoseconds_lose_nothing(dtype):
     t = np.array(EPOCH + small, dtype)
     spline, reference = ss.CubicSpline(t, p, S2), ss.CubicSpline(small, p, S2)
     assert same(spline.velocities, reference.velocities)
-    assert spline.t.dtype.kind == "i" and np.array_equal(spline.t, t)
+    assert spline.t.dtype.kind in "iu" and np.array_equal(spline.t, t)
     assert same(spline(t), reference(small))
     assert same(spline(t[1], nu=1), reference(1, nu=1))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="times are counted from the first row's start: rows that start elsewhere are rounded"
-)
 @pytest.mark.parametrize("kind", ["int", "date"])
 def test_epoch_nanoseconds_lose_nothing_in_every_row(kind):
     p, small = points_on(S2, 4, (2,)), np.array([0, 1, 3, 4])
@@ -129,7 +126,6 @@ def test_epoch_nanoseconds_lose_nothing_in_every_row(kind):
     # The short way of saying it: no row is rounded to the grid of doubles near 2000.
 
 
-@pytest.mark.xfail(strict=True, reason="unsigned times above 2**63 are shown as negative numbers")
 def test_unsigned_times_are_shown_as_given():
     t = np.array([2**63 + 1, 2**63 + 2, 2**63 + 4], np.uint64)
     assert ss.CubicSpline(t, THREE, S2).t.tolist() == t.tolist()
@@ -168,7 +164,6 @@ def test_months_and_years_become_days():
     assert np.array_equal(spline.t, np.array(["2024-01-01", "2024-02-01", "2024-04-01"], "M8[D]"))
 
 
-@pytest.mark.xfail(strict=True, reason="x in nanoseconds far from knots in days overflows silently")
 def test_dates_in_different_units_far_apart():
     t = np.array(["1500-01-01", "1500-01-02", "2500-01-04"], "M8[D]")
     spline = ss.CubicSpline(t, [[0.0], [1.0], [2.0]], "r:1")
@@ -266,9 +261,6 @@ def test_a_spline_does_not_depend_on_its_input_arrays():
     assert same(spline.points, points) and same(spline.t, knots)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="bc_type keeps the caller's array, so the file says what was never fitted"
-)
 def test_end_conditions_do_not_depend_on_their_input_array():
     v = np.array([0.0, 0.1, 0.0])
     spline = ss.CubicSpline(None, THREE, S2, bc_type=((1, v), "natural"))
@@ -636,7 +628,6 @@ def test_on_failure_warn(kind):
     assert spline.report.converged.tolist() == [True, False, True]
 
 
-@pytest.mark.xfail(strict=True, reason="the warning is attributed to the library's own files")
 @pytest.mark.parametrize("function", ["fit", "fit_many"])
 def test_warnings_of_functions_point_at_the_caller(function):
     p, options = failing("cut locus")
@@ -788,7 +779,6 @@ def test_max_step_is_the_longest_distance(space, batch):
     assert np.allclose(found, steps, rtol=1e-13, atol=0)
 
 
-@pytest.mark.xfail(strict=True, reason="max_step of a product adds the longest steps of different segments")
 def test_max_step_of_a_product():
     space = ss.Product("r:1", "r:1")
     p = np.array([[0.0], [3], [3]]), np.array([[0.0], [0], [4]])
@@ -1075,9 +1065,6 @@ def test_the_arrays_of_a_spline_cannot_be_changed():
             array[0] = 0
 
 
-@pytest.mark.xfail(
-    strict=True, reason="NumPy forgets the flag, so copies of a spline can be changed by accident"
-)
 @pytest.mark.parametrize("how", ["pickle", "deepcopy"])
 def test_the_arrays_of_a_copy_cannot_be_changed(how):
     made = COPIES[how](ss.CubicSpline(None, THREE, S2))
@@ -1171,12 +1158,7 @@ def test_one_curve_is_no_sequence():
     [
         (2, 3),
         (3,),
-        pytest.param(
-            (1, 3),
-            marks=pytest.mark.xfail(
-                strict=True, reason="a vector that broadcast keeps its batch axis of length 1"
-            ),
-        ),
+        (1, 3),
     ],
     ids=str,
 )
@@ -1194,7 +1176,6 @@ def test_a_slice_may_be_empty():
     assert len(none) == 0 and none(0.5).shape == (0, 3) and "0 curves" in repr(none)
 
 
-@pytest.mark.xfail(strict=True, reason="reductions over no curves raise")
 @pytest.mark.parametrize("use", [lambda s: str(s.report), lambda s: s.length()], ids=["report", "length"])
 def test_an_empty_slice_can_be_used(use):
     use(ss.CubicSpline(None, [THREE, THREE], S2)[2:])
@@ -1302,7 +1283,6 @@ far = np.stack([np.cosh(10 + 0 * a), np.sinh(10) * np.cos(a), np.sinh(10) * np.s
 
 
 # In processes of their own: an integral that does not end takes all memory.
-@pytest.mark.xfail(strict=True, reason="bisection chases rounding errors until memory runs out")
 @pytest.mark.parametrize(
     "code",
     [
@@ -1374,7 +1354,6 @@ def test_files_keep_everything(name):
         assert isinstance(ours, str) or (ours[0] == theirs[0] and same(tuple(ours[1]), tuple(theirs[1])))
 
 
-@pytest.mark.xfail(strict=True, reason="only the unit is stored, not how many of it make a tick")
 def test_files_keep_dates_that_count_in_tens():
     spline = ss.CubicSpline(np.array([0, 1, 3], "M8[10s]"), THREE, S2)
     assert np.array_equal(round_trip(spline).t, spline.t)
@@ -1460,13 +1439,7 @@ except ImportError as error:
     [
         ([1], 0),
         ([2], 2),
-        pytest.param(
-            [2, 3] * 8,
-            5,
-            marks=pytest.mark.xfail(
-                strict=True, reason="every change of the number starts threads that never end"
-            ),
-        ),
+        ([2, 3] * 8, 5),
     ],
     ids=str,
 )

@@ -67,9 +67,6 @@ def test_points_are_real_numbers(points):
     fit_error(r"points must be an array of real numbers, not of|no points given", points=points)
 
 
-@pytest.mark.xfail(
-    strict=True, raises=ValueError, reason="NumPy's own error comes out, not a ValidationError"
-)
 @pytest.mark.parametrize("argument", ["points", "t", "x", "end vector"])
 def test_ragged_lists(argument):
     ragged = [[1, 0, 0], [0, 1]]
@@ -128,13 +125,11 @@ def test_the_bad_point_of_a_batch_is_named():
         ss.fit_many([(None, P), (None, changed(1, [0, 2, 0])[:2])], S2)
 
 
-@pytest.mark.xfail(strict=True, reason="which factor is not said")
 def test_the_bad_factor_of_a_product_is_named():
     flat = np.zeros((3, 1))
     fit_error(r"points\[1\]\[2\]|factor 1|Sphere\(2\)", None, (flat, changed(2, [0, 0, 2])), "r:1 x sphere:2")
 
 
-@pytest.mark.xfail(strict=True, reason="the factors before the bad one are fitted first")
 def test_a_product_is_checked_before_any_work():
     fit_error("off the space", None, (np.zeros((3, 1)), changed(2, [0, 0, 2])), "r:1 x sphere:2")
 
@@ -178,7 +173,6 @@ def test_antipodal_points_in_operations(operation):
     assert S2.distance(P[0], -P[0]) == pytest.approx(np.pi)
 
 
-@pytest.mark.xfail(strict=True, reason="reported as a cut locus at the angle NaN")
 def test_the_logarithm_of_nan_is_no_cut_locus():
     try:
         result = S2.log(P[0], [NAN, 0, 0])
@@ -235,7 +229,6 @@ def named(message, arrays):
     return value
 
 
-@pytest.mark.xfail(strict=True, raises=IndexError, reason="places are counted as if the array were flat")
 @pytest.mark.parametrize("argument", ["t", "x"])
 def test_indices_are_those_of_the_array_that_was_given(argument):
     t = np.broadcast_to([0.0, 1, 2], (2, 2, 3)).copy()
@@ -249,16 +242,12 @@ def test_indices_are_those_of_the_array_that_was_given(argument):
     assert np.isnan(named(str(caught.value), {"t": t} if argument == "t" else {"x": x}))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="plain numbers are not counted from the first time, yet the message says so"
-)
 def test_times_in_messages_are_those_that_were_given():
     with pytest.raises(ss.ValidationError, match=r"t\[2\] = 6 repeats") as caught:
         ss.CubicSpline([5, 6, 6], P, S2)
     assert "counted from" not in str(caught.value)
 
 
-@pytest.mark.xfail(strict=True, reason="numbers are written out with hundreds of zeros")
 def test_messages_are_short():
     with pytest.raises(ss.ValidationError) as caught:
         ss.CubicSpline(None, P, S2)(-1e-300)
@@ -374,8 +363,8 @@ def test_curves_that_are_not_closed():
         ({"max_iter": 0}, r"max_iter must be at least 1"),
         ({"extrapolate": "foo"}, r"extrapolate must be None, True, 'geodesic' or 'periodic', not 'foo'"),
         ({"extrapolate": False}, r"extrapolate must be .*, not False"),
-        ({"on_failure": "foo"}, r"on_failure must be one of 'raise', 'warn', 'ignore', not 'foo'"),
-        ({"on_failure": None}, r"on_failure must be one of .*, not None"),
+        ({"on_failure": "foo"}, r"on_failure must be 'raise', 'warn' or 'ignore', not 'foo'"),
+        ({"on_failure": None}, r"on_failure must be .*, not None"),
     ],
     ids=str,
 )
@@ -398,7 +387,6 @@ def test_options_of_a_wrong_type(options):
         ss.CubicSpline(None, P, S2, **options)
 
 
-@pytest.mark.xfail(strict=True, reason="an OverflowError, or an error that does not name the option")
 @pytest.mark.parametrize(
     "options",
     [
@@ -454,7 +442,6 @@ def test_bad_dimensions(kind, n):
         kind(n)
 
 
-@pytest.mark.xfail(strict=True, raises=OverflowError, reason="the conversion to a machine word comes out")
 @pytest.mark.parametrize("make", [lambda: ss.Sphere(10**30), lambda: ss.space("sphere:" + "9" * 30)])
 def test_huge_dimensions(make):
     with pytest.raises(ss.ValidationError):
@@ -496,12 +483,10 @@ def test_a_product_has_factors():
         space.exp((P, FLAT), (P,))
 
 
-@pytest.mark.xfail(strict=True, reason="with t=None every factor counts its own points")
 def test_factors_of_different_lengths():
     fit_error("points", None, (P, np.zeros((4, 1))), PRODUCT)
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="reports are joined before the axes are compared")
 def test_factors_of_different_batch_axes():
     fit_error("batch axes differ", None, (TWO, np.zeros((3, 3, 1))), PRODUCT)
 
@@ -512,17 +497,17 @@ def test_factors_of_different_batch_axes():
 @pytest.mark.parametrize(
     "x, match",
     [
-        (NAN, r"x\[0\] is NaN; times must be finite"),
+        (NAN, r"x is NaN; times must be finite"),
         ([0.5, NAN], r"x\[1\] is NaN; times must be finite"),
         ([0.5, 1, INF], r"x\[2\] is inf; times must be finite"),
-        (2.5, r"x\[0\] = 2\.5 is outside the knots \[0, 2\].*extrapolate=True, 'geodesic' or 'periodic'"),
+        (2.5, r"x = 2\.5 is outside the knots \[0, 2\].*extrapolate=True, 'geodesic' or 'periodic'"),
         ([0, 2, -0.25], r"x\[2\] = -0\.25 is outside the knots"),
-        (np.nextafter(2, 3), r"x\[0\] = 2\.0000000000000004 is outside the knots"),
-        (1j, r"x must be numbers or datetime64, not complex128"),
-        ("a", r"x must be numbers or datetime64, not <U1"),
-        (None, r"x must be numbers or datetime64, not object"),
-        (np.timedelta64(1, "s"), r"x must be numbers or datetime64, not timedelta64"),
-        (np.datetime64("2024-01-01"), r"x is datetime64, but the knots are numbers"),
+        (np.nextafter(2, 3), r"x = 2\.0000000000000004 is outside the knots"),
+        (1j, r"x must be numbers, not complex128"),
+        ("a", r"x must be numbers, not <U1"),
+        (None, r"x must be numbers, not object"),
+        (np.timedelta64(1, "s"), r"x must be numbers, not timedelta64"),
+        (np.datetime64("2024-01-01"), r"the knots are numbers, so x must be numbers, not datetime64"),
     ],
     ids=str,
 )
@@ -543,9 +528,9 @@ def test_no_policy_makes_sense_of_nan(policy, x):
 
 def test_the_curve_of_a_bad_time_is_named():
     spline = ss.CubicSpline([[0, 1, 2], [0, 1, 3]], TWO, S2)
-    with pytest.raises(ss.ValidationError, match=r"x\[0\] of curve 0 = 2\.5 is outside the knots \[0, 2\]"):
+    with pytest.raises(ss.ValidationError, match=r"x = 2\.5 is outside the knots \[0, 2\] of curve 0"):
         spline(2.5)
-    with pytest.raises(ss.ValidationError, match=r"x\[1\] of curve 1 is NaN"):
+    with pytest.raises(ss.ValidationError, match=r"x\[1,1\] is NaN"):
         spline([[1, 1], [1, NAN]], per_curve=True)
     with pytest.raises(ss.ValidationError, match=r"must begin with the batch axes \(2,\); got \(3,\)"):
         spline(np.ones(3), per_curve=True)
@@ -559,7 +544,7 @@ def test_dates_and_numbers_do_not_mix():
         spline(0.5)
     with pytest.raises(ss.ValidationError, match=r"x\[1\] is NaT"):
         spline(np.array(["2024-01-01", "NaT"], "M8[D]"))
-    with pytest.raises(ss.ValidationError, match=r"x\[0\] = .* is outside the knots"):
+    with pytest.raises(ss.ValidationError, match=r"x = .* is outside the knots"):
         spline(np.datetime64("2023-12-31"))
 
 
@@ -583,9 +568,6 @@ def test_evaluate_compares_shapes():
         ss.evaluate(0.5, None, P[:1], P[:1], S2)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="evaluate checks neither times nor points nor velocities; bad times panic"
-)
 @pytest.mark.parametrize(
     "t, p, u",
     [
@@ -620,7 +602,6 @@ for t, nu, extrapolate in itertools.product(knots, range(3), (None, True, "geode
 """
 
 
-@pytest.mark.xfail(strict=True, reason="f64::clamp panics where the last knot is before the first, or NaN")
 @pytest.mark.parametrize("how", ["evaluate", "check=False"])
 def test_bad_knots_never_panic(how):
     run_python(BAD_KNOTS, how, RUST_BACKTRACE="0")
@@ -649,7 +630,6 @@ def test_bad_operands(call, match):
         call()
 
 
-@pytest.mark.xfail(strict=True, reason="NumPy's own errors come out, or none")
 @pytest.mark.parametrize(
     "call",
     [
@@ -721,9 +701,7 @@ def test_files_with_many_bad_bytes():
     [
         zipfile.ZIP_DEFLATED,
         zipfile.ZIP_BZIP2,
-        pytest.param(
-            zipfile.ZIP_LZMA, marks=pytest.mark.xfail(strict=True, reason="LZMAError comes out of load")
-        ),
+        zipfile.ZIP_LZMA,
     ],
 )
 def test_compressed_files(method):
@@ -787,12 +765,7 @@ def test_messages_name_the_file(tmp_path):
     [
         npy(np.eye(3)),
         archive(readme__txt="hello"),
-        pytest.param(
-            stored()[:500],
-            marks=pytest.mark.xfail(
-                strict=True, reason="np.load leaves a damaged archive open that it opened"
-            ),
-        ),
+        stored()[:500],
     ],
     ids=["array", "archive", "truncated"],
 )
@@ -886,7 +859,6 @@ def test_files_with_a_wrong_array(changes):
         load(with_arrays(**changes))
 
 
-@pytest.mark.xfail(strict=True, reason="not checked when read; one knot panics when evaluated")
 @pytest.mark.parametrize(
     "changes",
     [

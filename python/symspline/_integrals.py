@@ -29,19 +29,20 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
         return total
     whole = _rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)
-    before, stalled = np.inf, 0
+    before, stalled = np.full(batch, np.inf), np.zeros(batch, dtype=int)
     while True:
         middle = (a + b) / 2
         halves = _rule(a, middle, f), _rule(middle, b, f)
         better = halves[0] + halves[1]
         error = np.abs(better - whole)
-        # Curves of a batch are refined together, interval by interval.
-        rough = (error > _TOL * scale[..., None]).reshape(-1, a.shape[-1]).any(axis=0)
-        left = error[..., rough].sum()
-        stalled += not left <= before / 2
-        if not rough.any() or stalled > _PATIENCE:
-            return (total + better.sum(axis=-1))[()]
+        left = error.sum(axis=-1)
+        stalled = stalled + ~(left <= before / 2)
         before = left
+        # Curves of a batch are refined together, interval by interval.
+        open_still = (stalled <= _PATIENCE)[..., None] & (error > _TOL * scale[..., None])
+        rough = open_still.reshape(-1, a.shape[-1]).any(axis=0)
+        if not rough.any():
+            return (total + better.sum(axis=-1))[()]
         total = total + better[..., ~rough].sum(axis=-1)
         ends = ((a, middle), (middle, b))
         a, b = (np.concatenate([x[..., rough], y[..., rough]], axis=-1) for x, y in ends)
