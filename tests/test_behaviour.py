@@ -80,7 +80,6 @@ def test_nothing_of_the_host_is_changed():
     run_python(STATE)
 
 
-@pytest.mark.xfail(strict=True, reason="save sets the umask of the whole process to zero for a moment")
 def test_saving_leaves_the_umask_alone(tmp_path, monkeypatch):
     masks = []
     monkeypatch.setattr(os, "umask", lambda mask: masks.append(mask) or 0o22)
@@ -217,9 +216,6 @@ def test_progress_of_a_short_fit():
     assert calls[-1] == (5, 5)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="points are counted again when pieces are fitted again with more overlap"
-)
 def test_progress_never_passes_its_total(threads):
     ss.set_num_threads(1)
     rng, n = np.random.default_rng(0), 150_000
@@ -234,7 +230,6 @@ def test_progress_never_passes_its_total(threads):
     assert (finished <= total).all() and (np.diff(finished) >= 0).all()
 
 
-@pytest.mark.xfail(strict=True, reason="progress starts anew in every factor")
 def test_progress_of_a_product():
     calls = []
     ss.CubicSpline(None, (np.eye(3), np.eye(3)), "sphere:2 x r:3", progress=lambda *call: calls.append(call))
@@ -291,7 +286,7 @@ assert len(calls) > 2 and all(calls)
 @pytest.mark.parametrize(
     "n",
     [
-        pytest.param(1, marks=pytest.mark.xfail(strict=True, reason="'RefCell already borrowed': a panic")),
+        1,
         2,
     ],
 )
@@ -512,21 +507,25 @@ def mirrored(d):
     return np.array([[np.sqrt(1 + x * x), -x, 0], [np.sqrt(1 + x * x), x, 0]])
 
 
-lossy = pytest.mark.xfail(strict=True, reason="rounding grows much faster than |p|²")
+# Velocities are ambient arrays, whose rounding de Casteljau's algorithm multiplies by the legs' cosh.
+lossy = pytest.mark.xfail(strict=True, reason="rounding grows faster than |p|² for steps this long")
 
 
-@pytest.mark.parametrize("how", ["geodesic", "spline"])
-@pytest.mark.parametrize("d", [2, 5, *(pytest.param(d, marks=lossy) for d in (10, 15, 20))])
-def test_the_hyperboloid_costs_no_more_than_the_square_of_its_points(d, how):
+@pytest.mark.parametrize(
+    ("how", "d"),
+    [
+        *(("geodesic", d) for d in (2, 5, 15, 20)),
+        *(("spline", d) for d in (2, 5)),
+        *(pytest.param("spline", d, marks=lossy) for d in (15, 20)),
+    ],
+)
+def test_the_hyperboloid_costs_no_more_than_the_square_of_its_points(how, d):
     space, p = ss.Hyperbolic(2), mirrored(d)
     middle = space.geodesic(*p, 0.5) if how == "geodesic" else ss.CubicSpline(None, p, space)(0.5)
     # In all but rounding this is (p + q)/|p + q|.
     assert np.abs(middle - [1, 0, 0]).max() < 100 * EPS * p[0, 0] ** 2
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the rounding floor has no upper limit: a relative defect of ¼ is converged"
-)
 def test_what_is_mostly_rounding_has_not_converged():
     report = ss.CubicSpline(None, mirrored(30), "h:2", on_failure="ignore").report
     assert not report.converged or report.residual < 1e-3
@@ -620,15 +619,7 @@ def test_strange_but_lawful_input():
         assert "\n" not in str(spline.report)
 
 
-far_out = pytest.mark.xfail(
-    strict=True, reason="squares under- or overflow: zero velocities count as converged"
-)
-
-
-@pytest.mark.parametrize(
-    "size",
-    [pytest.param(1e-200, marks=far_out), 1e-150, 1e-30, 1e30, 1e150, pytest.param(1e200, marks=far_out)],
-)
+@pytest.mark.parametrize("size", [1e-200, 1e-150, 1e-30, 1e30, 1e150, 1e200])
 def test_huge_and_tiny_flat_data(size):
     t, p = np.arange(5.0), size * points_on(ss.Euclidean(2), 5)
     spline, flat = ss.CubicSpline(t, p, "r:2"), FlatSpline(t, p, bc_type="natural")

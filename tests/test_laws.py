@@ -67,9 +67,9 @@ def test_geodesic_divides_the_distance(case, rng):
         q = space.exp(p, length * unit_tangent(space, p, rng))
         t = np.array([-0.3, 0.0, 0.25, 0.5, 1.0])
         x = space.geodesic(p, q, t)
-        assert np.abs(x[1] - p).max() <= EPS * condition(space, [p])
         # Near the antipode the direction of the geodesic is known to ε/(π − 2.9).
         allowed = 50 * EPS * condition(space, x)
+        assert np.abs(x[1] - p).max() <= allowed
         assert np.abs(space.distance(p, x) - np.abs(t) * length).max() <= allowed
         assert np.abs(x[4] - q).max() <= allowed
 
@@ -288,14 +288,16 @@ def test_a_batch_is_its_curves_bit_for_bit(case, rng):
     space = case.space
     p = np.stack([walk(space, step, 11, rng) for step in np.linspace(1e-3, 1.5, 11)])
     t = knots("random", 11, rng)
-    x = rng.uniform(t[0], t[-1], 37)
+    # In any order, in one segment (from curve to curve too), and dense over all.
+    times = rng.uniform(t[0], t[-1], 37), np.linspace(t[2], t[3], 40)[1:-1], np.linspace(t[0], t[-1], 331)
     for ends in ("natural", "not-a-knot"):
         batch = ss.CubicSpline(t, p, space, bc_type=ends)
         for i, points in enumerate(p):
             one = ss.CubicSpline(t, points, space, bc_type=ends)
             assert batch[i] == one
-            for nu in range(3):
-                assert np.array_equal(batch(x, nu)[i], one(x, nu))
+            for x in times:
+                for nu in range(3):
+                    assert np.array_equal(batch(x, nu)[i], one(x, nu))
 
 
 @pytest.mark.parametrize("ends", ENDS)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
+import secrets
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,60 @@ from .spaces import Space
 from .spaces import space as space_named
 from .spline import CubicSpline, _policy
 
+_T = TypeVar("_T")
+
 _FORMAT = "symspline-curve"
+_MANY = "symspline-curves"
+_LISTS = ("bc_type", "extrapolate", "report")
 _VERSION = 1
 
 
 def save(spline: CubicSpline, file: Any) -> None:
     """See `CubicSpline.save`."""
+    _write(file, _arrays_of_curve(spline))
+
+
+def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
+    """Write curves of one space, of any lengths, to one NPZ file, which `load_many` reads back.
+
+    Knots, points and velocities of all curves follow each other in one array each; ``knots`` holds how
+    many of them every curve has, ``names`` and the conditions and reports are lists in JSON.
+
+    Args:
+        curves: names and curves, none of them a batch; the knots of all are numbers, or all dates of one unit.
+        file: where to write, a name or an open file.
+
+    >>> import io, symspline as ss
+    >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+    >>> long, short = ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")
+    >>> file = io.BytesIO()
+    >>> ss.save_many({"long": long, "short": short}, file)
+    >>> _ = file.seek(0)
+    >>> ss.load_many(file) == {"long": long, "short": short}
+    True
+    """
+    if any(spline._batch for spline in curves.values()):
+        raise ValidationError("save_many takes single curves; a batch has a method save of its own")
+    if len({(spline.space, spline._t.dtype) for spline in curves.values()}) != 1:
+        raise ValidationError("save_many needs curves, all of one space and with knots of one type")
+    each = [_arrays_of_curve(spline) for spline in curves.values()]
+    arrays: dict[str, Any] = {
+        "format": _MANY,
+        "names": json.dumps(list(curves)),
+        "knots": [len(a["t"]) for a in each],
+    }
+    for key in each[0]:
+        values = [a[key] for a in each]
+        if key in _LISTS:
+            arrays[key] = json.dumps([json.loads(value) for value in values])
+        elif isinstance(values[0], np.ndarray):
+            arrays[key] = np.concatenate(values)
+        else:
+            arrays.setdefault(key, values[0])
+    _write(file, arrays)
+
+
+def _arrays_of_curve(spline: CubicSpline) -> dict[str, Any]:
     parts = spline._parts if isinstance(spline, ProductSpline) else (spline,)
     unit = _unit(spline._t.dtype) if spline._clock.dates else ""
     arrays: dict[str, Any] = {
@@ -43,6 +92,10 @@ def save(spline: CubicSpline, file: Any) -> None:
         suffix = f"_{i}" if len(parts) > 1 else ""
         arrays["points" + suffix] = part.points
         arrays["velocities" + suffix] = part.velocities
+    return arrays
+
+
+def _write(file: Any, arrays: dict[str, Any]) -> None:
     if hasattr(file, "write"):
         np.savez(file, **arrays)
         return
@@ -57,18 +110,14 @@ class replacing:
         self.path = path
 
     def __enter__(self) -> Path:
-        handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
-        os.close(handle)
-        self.temporary = Path(name)
+        self.temporary = self.path.with_name(f".{self.path.name}.{secrets.token_hex(8)}")
+        # Created here, with the rights of any new file, so that a later open finds it.
+        os.close(os.open(self.temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         return self.temporary
 
     def __exit__(self, kind: Any, *_: object) -> None:
         try:
             if kind is None:
-                # mkstemp's files are private; a result gets the rights of any new file.
-                mask = os.umask(0)
-                os.umask(mask)
-                self.temporary.chmod(0o666 & ~mask)
                 self.temporary.replace(self.path)
         finally:
             with suppress(FileNotFoundError):
@@ -90,14 +139,31 @@ def load(file: Any) -> CubicSpline:
     >>> ss.load(file) == spline
     True
     """
+    return _opened(file, _read)
+
+
+def load_many(file: Any) -> dict[str, CubicSpline]:
+    """Read the curves that `save_many`, or ``symspline fit --curve`` on the command line, wrote.
+
+    Returns:
+        Names and curves, in the order in which they were written.
+
+    Raises:
+        ValidationError: the file is damaged, or does not hold symspline curves.
+        OSError: the file cannot be read.
+    """
+    return _opened(file, _read_many)
+
+
+def _opened(file: Any, read: Callable[[dict[str, NDArray[Any]]], _T]) -> _T:
     name = getattr(file, "name", file if isinstance(file, (str, os.PathLike)) else "the file")
     if not hasattr(file, "read") and not isinstance(file, (str, os.PathLike)):
         raise TypeError(f"a path or an open file is needed, not {file!r}")
     try:
         if hasattr(file, "read"):
-            return _read(_arrays_of(file))
+            return read(_arrays_of(file))
         with open(file, "rb") as opened:
-            return _read(_arrays_of(opened))
+            return read(_arrays_of(opened))
     except (OSError, MemoryError):
         raise
     except ValidationError as error:
@@ -121,7 +187,25 @@ def _arrays_of(file: Any) -> dict[str, NDArray[Any]]:
         return {key: archive[key] for key in archive.files}
 
 
+def _read_many(arrays: dict[str, NDArray[Any]]) -> dict[str, CubicSpline]:
+    if str(arrays["format"]) == _FORMAT:
+        raise ValidationError("this file holds no collection of curves; read it with symspline.load")
+    if str(arrays["format"]) != _MANY:
+        raise ValidationError(f"format {str(arrays['format'])!r}, expected {_MANY!r}")
+    names, ends = json.loads(str(arrays["names"])), np.cumsum(arrays["knots"])
+    lists = {key: json.loads(str(arrays[key])) for key in _LISTS}
+    curves = {}
+    for i, (name, end) in enumerate(zip(names, ends, strict=True)):
+        own = slice(end - arrays["knots"][i], end)
+        one = {key: array[own] if array.ndim else array for key, array in arrays.items()}
+        one |= {key: np.array(json.dumps(values[i])) for key, values in lists.items()}
+        curves[str(name)] = _read(one | {"format": np.array(_FORMAT)})
+    return curves
+
+
 def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
+    if str(arrays["format"]) == _MANY:
+        raise ValidationError("this file holds several curves; read them with symspline.load_many")
     if str(arrays["format"]) != _FORMAT:
         raise ValidationError(f"format {str(arrays['format'])!r}, expected {_FORMAT!r}")
     version = int(arrays["version"])

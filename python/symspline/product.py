@@ -142,7 +142,9 @@ class ProductSpline(CubicSpline):
         ends = _split_ends(bc_type, space)
         _validate(t, points, space, ends, options)
         parts, errors = [], []
-        for factor, p, bc in zip(space.factors, points, ends, strict=True):
+        progress = options.pop("progress", None)
+        for i, (factor, p, bc) in enumerate(zip(space.factors, points, ends, strict=True)):
+            options["progress"] = _share(progress, i, len(space.factors))
             part, error = _try(t, p, factor, bc, options)
             parts.append(part)
             errors += [error] if error else []
@@ -244,6 +246,13 @@ def _validate(t: Any, points: Any, space: Product, ends: list[Any], options: dic
     if len(set(shapes)) > 1:
         described = ", ".join(f"{nodes} points, batch axes {batch}" for batch, nodes in shapes)
         raise ValidationError(f"points: the factors differ in length, or batch axes differ: {described}")
+
+
+def _share(progress: Any, i: int, factors: int) -> Any:
+    """Progress of the i-th factor as progress of all."""
+    if progress is None:
+        return None
+    return lambda finished, total: progress(i * total + finished, factors * total)
 
 
 def _try(t: Any, points: Any, factor: Space, bc: Any, options: dict[str, Any]) -> tuple[CubicSpline, Any]:

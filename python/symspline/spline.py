@@ -22,6 +22,9 @@ from .report import ConvergenceWarning, Report, shaped
 from .spaces import POINT_TOL, POINT_TOL_FLOAT32, Space
 from .spaces import space as space_named
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _PACKAGE = os.path.dirname(__file__)
 
 Array = NDArray[Any]
@@ -209,10 +212,9 @@ class CubicSpline:
             raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}")
         return self._at(x, _QUANTITIES[nu], extrapolate, per_curve)
 
-    def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Array:
+    def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
         """|γ'| at times x, shape batch axes + x.shape."""
-        result: Array = self._at(x, "speed", extrapolate, per_curve)
-        return result
+        return self._at(x, "speed", extrapolate, per_curve)[()]
 
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
@@ -333,6 +335,9 @@ class CubicSpline:
             self._extrapolate,
             self._report._map(lambda column: column[index]),
         )
+
+    def __bool__(self) -> bool:
+        return True
 
     def __iter__(self) -> Iterator[CubicSpline]:
         return (self[i] for i in range(len(self)))

@@ -87,9 +87,7 @@ pub fn apply<M: Space>(
             match operation {
                 Operation::Exp => space.ray(a, b, Lane::ONE, &mut result),
                 Operation::Log => result.copy_from_slice(&log),
-                Operation::Geodesic => {
-                    space.ray(a, &log, Lane::new(at.map(|i| t[i])), &mut result);
-                }
+                Operation::Geodesic => space.geodesic(a, b, Lane::new(at.map(|i| t[i])), &mut result),
                 Operation::Distance => result[0] = space.distance(a, b, &log, angle),
                 Operation::Transvection => space.transvect(a, b, c, &mut result),
                 Operation::Transport => space.carry(a, &log, c, &mut result),

@@ -174,47 +174,120 @@ struct Job<'a, M> {
     first: usize,
 }
 
-/// Where one sample falls.
-#[derive(Clone, Copy, Default)]
-struct Place {
+/// Where eight samples fall. It goes along the samples of a block in their order.
+struct Places<'a, M> {
+    job: &'a Job<'a, M>,
+    /// The next sample: the i-th time of a curve.
     curve: usize,
+    i: usize,
+    /// Samples that are left in the block.
+    left: usize,
     segment: usize,
-    h: f64,
-    /// Time in units of the segment.
-    tau: f64,
-    /// Time beyond the last (positive) or before the first knot.
-    beyond: f64,
+    /// Where the data of each lane's segment begin.
+    at: [usize; LANES],
+    /// Times, first knots and lengths of the segments.
+    x: Lane,
+    knot: Lane,
+    h: Lane,
+    /// Times beyond the last (positive) or before the first knot.
+    beyond: [f64; LANES],
+    /// First and last knot of the segment, if all lanes are in the same one.
+    shared: Option<[Lane; 2]>,
+}
+
+impl<'a, M: Space> Places<'a, M> {
+    fn new(job: &'a Job<'a, M>, samples: usize) -> Self {
+        let count = job.times.count;
+        Places {
+            job,
+            curve: job.first / count,
+            i: job.first % count,
+            left: samples,
+            segment: 0,
+            at: [usize::MAX; LANES],
+            x: Lane::ZERO,
+            knot: Lane::ZERO,
+            h: Lane::ONE,
+            beyond: [0.0; LANES],
+            shared: None,
+        }
+    }
+
+    /// Goes to the next eight samples; lanes that are left over repeat the last one. Returns whether
+    /// they fall in other segments than those before.
+    #[inline(always)]
+    fn advance(&mut self) -> bool {
+        let Times { x, count } = *self.job.times;
+        if let Some([from, to]) = self.shared
+            && self.left >= LANES
+            && self.i + LANES <= count
+        {
+            // Dense samples in order stay in a segment for a while.
+            let row = if x.len() == count { self.i } else { self.curve * count + self.i };
+            let next = Lane::new(std::array::from_fn(|l| x[row..][..LANES][l]));
+            if (next.simd_ge(from) & next.simd_lt(to)).all() {
+                self.x = next;
+                self.step(LANES);
+                return false;
+            }
+        }
+        self.search()
+    }
+
+    #[inline(always)]
+    fn step(&mut self, samples: usize) {
+        self.left -= samples;
+        self.i += samples;
+        if self.i == self.job.times.count {
+            (self.curve, self.i) = (self.curve + 1, 0);
+            self.shared = None;
+        }
+    }
+
+    fn search(&mut self) -> bool {
+        let Job { curves, locator, outside, .. } = self.job;
+        let Times { x, count } = *self.job.times;
+        let len = self.job.space.point_len();
+        let (mut at, mut xs, mut knots, mut ends) = (self.at, [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let mut x = if x.len() == count { x[self.i] } else { x[self.curve * count + self.i] };
+            let t = curves.knots(self.curve);
+            let (start, end) = (t[0], t[t.len() - 1]);
+            self.beyond[l] = 0.0;
+            if x < start || x > end {
+                match outside {
+                    Outside::Continue => {}
+                    Outside::Geodesic => {
+                        self.beyond[l] = if x < start { x - start } else { x - end };
+                        x = x.max(start).min(end);
+                    }
+                    Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
+                }
+            }
+            let k = match locator {
+                Some(locator) => locator.find(x, self.segment),
+                None => Locator::new(t, false).find(x, self.segment),
+            };
+            self.segment = k;
+            at[l] = (self.curve * curves.nodes + k) * len;
+            (xs[l], knots[l], ends[l]) = (x, t[k], t[k + 1]);
+            if self.left > 1 {
+                self.step(1);
+            }
+        }
+        let changed = at != self.at;
+        self.at = at;
+        self.x = Lane::new(xs);
+        self.knot = Lane::new(knots);
+        self.h = Lane::new(ends) - self.knot;
+        // The next sample may be of another curve already.
+        let alike = at == [at[0]; LANES] && self.beyond == [0.0; LANES] && self.i >= LANES;
+        self.shared = alike.then(|| [self.knot, Lane::new(ends)]);
+        changed
+    }
 }
 
 impl<M: Space> Job<'_, M> {
-    /// Where a sample falls: the i-th time of a curve.
-    #[inline(always)]
-    fn place(&self, curve: usize, i: usize, hint: usize) -> Place {
-        let Times { x, count } = *self.times;
-        let mut x = if x.len() == count { x[i] } else { x[curve * count + i] };
-        let t = self.curves.knots(curve);
-        let (start, end) = (t[0], t[t.len() - 1]);
-        let mut beyond = 0.0;
-        if x < start || x > end {
-            match self.outside {
-                Outside::Continue => {}
-                Outside::Geodesic => {
-                    beyond = if x < start { x - start } else { x - end };
-                    x = x.max(start).min(end);
-                }
-                Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
-            }
-        }
-        let k = match self.locator {
-            Some(locator) => locator.find(x, hint),
-            None => Locator::new(t, false).find(x, hint),
-        };
-        let h = t[k + 1] - t[k];
-        // Exactly 1 at the last knot.
-        let tau = if x == t[k + 1] { 1.0 } else { (x - t[k]) / h };
-        Place { curve, segment: k, h, tau, beyond }
-    }
-
     /// Evaluates a block of samples, eight at a time, whatever segments they fall in.
     fn run<S: Derivatives>(&self, out: &mut [f64], size: usize) {
         with_size!(self.space.point_len(), len => self.run_sized::<S>(out, size, len));
@@ -226,30 +299,11 @@ impl<M: Space> Job<'_, M> {
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
         let mut vectors = vec![Lane::ZERO; 3 * len];
-        let mut left = out.len() / size;
-        let (mut curve, mut i) = (self.first / self.times.count, self.first % self.times.count);
-        let mut places = [Place::default(); LANES];
-        let mut loaded = [usize::MAX; LANES];
-        let (mut h, mut rate) = (Lane::ONE, Lane::ONE);
+        let mut places = Places::new(self, out.len() / size);
+        let mut rate = Lane::ONE;
         for out in out.chunks_mut(LANES * size) {
-            let mut hint = places[LANES - 1].segment;
-            for place in &mut places {
-                *place = self.place(curve, i, hint);
-                hint = place.segment;
-                // Lanes that are left over repeat the last sample.
-                if left > 1 {
-                    left -= 1;
-                    i += 1;
-                    if i == self.times.count {
-                        (curve, i) = (curve + 1, 0);
-                    }
-                }
-            }
-            let at = places.map(|p| (p.curve * curves.nodes + p.segment) * len);
-            // Dense samples often fall in the segments of the samples before.
-            if at != loaded {
-                loaded = at;
-                h = Lane::new(places.map(|p| p.h));
+            if places.advance() {
+                let Places { at, h, .. } = places;
                 rate = Lane::ONE / h;
                 let third = h * lane(1.0 / 3.0);
                 let Segment { ends: [p0, p1], legs: [a, b], .. } = &mut segment;
@@ -261,10 +315,11 @@ impl<M: Space> Job<'_, M> {
                 a.iter_mut().chain(b).for_each(|u| *u *= third);
                 segment.prepare(space, len);
             }
-            let tau = Lane::new(places.map(|p| p.tau));
+            // Exactly 1 at the last knot.
+            let tau = (places.x - places.knot) / places.h;
             segment.at(space, len, S::time(tau, rate), &mut gamma);
-            if self.outside == Outside::Geodesic && places.iter().any(|p| p.beyond != 0.0) {
-                self.go_straight(&places, h * lane(1.0 / 3.0), &segment, &mut gamma);
+            if self.outside == Outside::Geodesic && places.beyond != [0.0; LANES] {
+                self.go_straight(&places, &segment, &mut gamma);
             }
             let (p, derivatives) = vectors.split_at_mut(len);
             let (d, dd) = derivatives.split_at_mut(len);
@@ -290,15 +345,9 @@ impl<M: Space> Job<'_, M> {
 
     /// Replaces the lanes outside the knots by the geodesic that leaves the end.
     #[cold]
-    fn go_straight<S: Derivatives>(
-        &self,
-        places: &[Place; LANES],
-        third: Lane,
-        segment: &Segment<S>,
-        gamma: &mut [S],
-    ) {
+    fn go_straight<S: Derivatives>(&self, places: &Places<M>, segment: &Segment<S>, gamma: &mut [S]) {
         let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
-        let beyond = Lane::new(places.map(|p| p.beyond));
+        let (beyond, third) = (Lane::new(places.beyond), places.h * lane(1.0 / 3.0));
         let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
         let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
             x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()

@@ -98,6 +98,8 @@ pub struct Chain {
     pub r: Vec<Lane>,
     /// Prescribed end vectors, in the frames of the ends.
     pub end_values: [Vec<Lane>; 2],
+    /// What chords and velocities are multiplied by, see [`Space::SCALES`].
+    scale: Lane,
     /// The longest chord of each lane.
     pub max_step: Lane,
     /// By how much rounding errors may grow in each lane, see [`Space::condition`].
@@ -136,6 +138,7 @@ impl Chain {
         // Angles carry a few rounding errors; what is within them of the cut locus is on it.
         let limit = lane(space.cut_angle() * (1.0 - 4.0 * f64::EPSILON));
 
+        self.scale = if M::SCALES { scale_of(space, runs, n) } else { Lane::ONE };
         self.walker.start(space, runs);
         self.start.0.clone_from(&self.walker.frame);
         self.start.1.clone_from(&self.walker.p);
@@ -144,6 +147,9 @@ impl Chain {
             self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i)));
             let d = &mut self.chord[i * m..(i + 1) * m];
             let angle = self.walker.advance(space, runs, d);
+            if M::SCALES {
+                d.iter_mut().for_each(|x| *x *= self.scale);
+            }
             space.prepare(d, &mut self.prepared[i * keep..(i + 1) * keep]);
             self.max_step = max_or_nan(self.max_step, space.norm2(d));
             self.condition = max_or_nan(self.condition, space.condition(d));
@@ -156,7 +162,7 @@ impl Chain {
                 }
             }
         }
-        self.max_step = self.max_step.sqrt();
+        self.max_step = self.max_step.sqrt() / self.scale;
         self.read_end(space, 1, ends[1]);
     }
 
@@ -168,6 +174,7 @@ impl Chain {
                 gather(rows, &mut self.ambient);
                 let Walker { frame, p, .. } = &self.walker;
                 space.coordinates(frame, p, &self.ambient, &mut self.end_values[end]);
+                self.end_values[end].iter_mut().for_each(|x| *x *= self.scale);
             }
             None => self.end_values[end].fill(Lane::ZERO),
         }
@@ -195,6 +202,9 @@ impl Chain {
         for i in 0..=self.n {
             let Walker { frame, p, .. } = &self.walker;
             space.tangent(frame, p, &self.u[i * m..(i + 1) * m], &mut self.ambient);
+            if M::SCALES {
+                self.ambient.iter_mut().for_each(|x| *x /= self.scale);
+            }
             visit(i, &self.ambient);
             if i < self.n {
                 // The chords are known; the residual is no longer needed and takes them.
@@ -202,4 +212,19 @@ impl Chain {
             }
         }
     }
+}
+
+/// The power of two that brings the longest chord of each lane to a size near one; 1 for chords that
+/// vanish.
+fn scale_of<M: Space>(space: &M, runs: &[Run; LANES], n: usize) -> Lane {
+    let len = space.point_len();
+    Lane::new(runs.map(|run| {
+        let difference = |i: usize| {
+            let (p, q) = (run.point(i, len), run.point(i + 1, len));
+            p.iter().zip(q).fold(0.0_f64, |m, (p, q)| m.max((q - p).abs()))
+        };
+        let longest = (0..n).map(difference).fold(0.0, f64::max);
+        let exponent = longest.log2().round().clamp(-1000.0, 1000.0);
+        if longest > 0.0 && longest.is_finite() { (-exponent).exp2() } else { 1.0 }
+    }))
 }

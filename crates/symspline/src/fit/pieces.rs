@@ -96,7 +96,10 @@ fn fit_cut<M: Space>(
     let work: usize = groups.iter().map(|g| g[0].nodes * space.dim()).sum();
     parallel::for_each(groups, work > PARALLEL, monitor, |group| {
         fit_lanes(space, problem, options, monitor, group);
-        monitor.advance(group.iter().map(|p| p.core.len()).sum());
+        // Curves that are done again with more overlap were counted before.
+        if overlap == OVERLAP || overlap == usize::MAX {
+            monitor.advance(group.iter().map(|p| p.core.len()).sum());
+        }
     });
     merge(problem, options, len, &pieces, reports)
 }
@@ -163,77 +166,86 @@ fn fit_lanes<M: Space>(
     monitor: &Monitor,
     group: &mut [Piece],
 ) {
-    THREAD.with_borrow_mut(|Thread { chain, work }| {
-        let nodes = group[0].nodes;
-        // Lanes that are left over repeat the first piece.
-        let piece = |l: usize| &group[if l < group.len() { l } else { 0 }];
-        let runs: [Run; LANES] = std::array::from_fn(|l| problem.run(piece(l), space.point_len()));
-        let is_end = |l: usize| {
-            let (p, last) = (piece(l), problem.segments(piece(l).curve));
-            [p.first == 0, p.first + nodes == last + 1]
-        };
-        let whole = |l: usize| is_end(l) == [true, true];
-        let (ends, values) =
-            match problem.ends {
-                Ends::Periodic if whole(0) => (ChainEnds::Periodic, [None, None]),
-                // Pieces of a closed curve, all of whose ends are artificial.
-                Ends::Periodic => (ChainEnds::Open([[EndKind::Acceleration; LANES]; 2]), [None, None]),
-                Ends::Open(ends) => {
-                    let mut kinds = [[EndKind::Acceleration; LANES]; 2];
-                    let mut values = [None, None];
-                    for (e, end) in ends.iter().enumerate() {
-                        kinds[e] = std::array::from_fn(|l| {
-                            if is_end(l)[e] { end.kind() } else { EndKind::Acceleration }
-                        });
-                        values[e] = end.values().map(|v| (v, space.point_len()));
-                    }
-                    (ChainEnds::Open(kinds), values)
-                }
-            };
-        let zeros = vec![0.0; space.point_len()];
-        let rows: [Option<[&[f64]; LANES]>; 2] = std::array::from_fn(|e| {
-            values[e].map(|(v, len)| {
-                std::array::from_fn(|l| {
-                    let c = piece(l).curve;
-                    if is_end(l)[e] { &v[c * len..(c + 1) * len] } else { &zeros[..] }
-                })
-            })
-        });
-        chain.unroll(space, &runs, nodes - 1, rows);
-        let ends = few_points(space, chain, ends);
-        let cut = chain.cut;
-        let idle = mask_from(|l| cut[l].is_some());
-        let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
-        let options = Options { tol: pieces_tol, ..*options };
-        let outcome = solve(space, chain, &ends, &options, idle, work, monitor);
-        let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
-        let legs = long_legs(space, chain, outcome.leg);
-        let steps = chain.max_step.to_array();
-        for (l, p) in group.iter_mut().enumerate() {
-            let status = if let Some((index, angle)) = cut[l] {
-                Status::CutLocus { index: p.first + index, angle }
-            } else if monitor.cancelled() {
-                Status::Stopped
-            } else if !outcome.converged[l] {
-                Status::Unconverged
-            } else if let Some((index, angle)) = legs[l] {
-                Status::LongLeg { index: p.first + index, angle }
-            } else {
-                Status::Converged
-            };
-            p.report = Report {
-                status,
-                iterations: outcome.iterations[l],
-                residual: residual[l],
-                max_step: steps[l],
-                rate: rate[l],
-            };
+    // Taken out and put back, because Python may call in again while we ask it whether to go on.
+    let mut memory = THREAD.take();
+    fit_in(space, problem, options, monitor, group, &mut memory);
+    THREAD.set(memory);
+}
+
+fn fit_in<M: Space>(
+    space: &M,
+    problem: &Problem,
+    options: &Options,
+    monitor: &Monitor,
+    group: &mut [Piece],
+    Thread { chain, work }: &mut Thread,
+) {
+    let nodes = group[0].nodes;
+    // Lanes that are left over repeat the first piece.
+    let piece = |l: usize| &group[if l < group.len() { l } else { 0 }];
+    let runs: [Run; LANES] = std::array::from_fn(|l| problem.run(piece(l), space.point_len()));
+    let is_end = |l: usize| {
+        let (p, last) = (piece(l), problem.segments(piece(l).curve));
+        [p.first == 0, p.first + nodes == last + 1]
+    };
+    let whole = |l: usize| is_end(l) == [true, true];
+    let (ends, values) = match problem.ends {
+        Ends::Periodic if whole(0) => (ChainEnds::Periodic, [None, None]),
+        // Pieces of a closed curve, all of whose ends are artificial.
+        Ends::Periodic => (ChainEnds::Open([[EndKind::Acceleration; LANES]; 2]), [None, None]),
+        Ends::Open(ends) => {
+            let mut kinds = [[EndKind::Acceleration; LANES]; 2];
+            let mut values = [None, None];
+            for (e, end) in ends.iter().enumerate() {
+                kinds[e] =
+                    std::array::from_fn(|l| if is_end(l)[e] { end.kind() } else { EndKind::Acceleration });
+                values[e] = end.values().map(|v| (v, space.point_len()));
+            }
+            (ChainEnds::Open(kinds), values)
         }
-        let runs: [Run; LANES] = std::array::from_fn(|l| {
-            problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len())
-        });
-        write_velocities(space, chain, &runs, group);
+    };
+    let zeros = vec![0.0; space.point_len()];
+    let rows: [Option<[&[f64]; LANES]>; 2] = std::array::from_fn(|e| {
+        values[e].map(|(v, len)| {
+            std::array::from_fn(|l| {
+                let c = piece(l).curve;
+                if is_end(l)[e] { &v[c * len..(c + 1) * len] } else { &zeros[..] }
+            })
+        })
     });
+    chain.unroll(space, &runs, nodes - 1, rows);
+    let ends = few_points(space, chain, ends);
+    let cut = chain.cut;
+    let idle = mask_from(|l| cut[l].is_some());
+    let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
+    let options = Options { tol: pieces_tol, ..*options };
+    let outcome = solve(space, chain, &ends, &options, idle, work, monitor);
+    let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
+    let legs = long_legs(space, chain, outcome.leg);
+    let steps = chain.max_step.to_array();
+    for (l, p) in group.iter_mut().enumerate() {
+        let status = if let Some((index, angle)) = cut[l] {
+            Status::CutLocus { index: p.first + index, angle }
+        } else if monitor.cancelled() {
+            Status::Stopped
+        } else if !outcome.converged[l] {
+            Status::Unconverged
+        } else if let Some((index, angle)) = legs[l] {
+            Status::LongLeg { index: p.first + index, angle }
+        } else {
+            Status::Converged
+        };
+        p.report = Report {
+            status,
+            iterations: outcome.iterations[l],
+            residual: residual[l],
+            max_step: steps[l],
+            rate: rate[l],
+        };
+    }
+    let runs: [Run; LANES] =
+        std::array::from_fn(|l| problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len()));
+    write_velocities(space, chain, &runs, group);
 }
 
 /// Not-a-knot ends of two and of three points need a rule of their own; it is SciPy's.

@@ -12,6 +12,8 @@ use crate::space::Space;
 /// Defects of this many ε times the condition of the chords are rounding: an iteration that stops
 /// improving below has converged.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
+/// But a residual above this is never called rounding.
+const ROUNDING_MOST: f64 = 1e-9;
 /// Residuals are brought to this part of the tolerance: the jump of the acceleration at a knot is
 /// about twelve times the residual.
 const AIM: f64 = 1.0 / 40.0;
@@ -70,7 +72,7 @@ pub fn solve<M: Space>(
         vector.resize(chain.u.len(), Lane::ZERO);
     }
     let (tol, aim) = (lane(options.tol), lane(options.tol * AIM));
-    let floor = (chain.condition * lane(ROUNDING)).max(tol);
+    let floor = (chain.condition * lane(ROUNDING)).min(lane(ROUNDING_MOST)).max(tol);
     let infinity = lane(f64::INFINITY);
     let limit = space.cut_angle() * LEG_LIMIT;
 

@@ -22,6 +22,8 @@ impl Euclidean {
 }
 
 impl Space for Euclidean {
+    const SCALES: bool = true;
+
     fn point_len(&self) -> usize {
         self.n
     }
@@ -88,7 +90,11 @@ impl Space for Euclidean {
     fn lift(&self, _p: &[Lane], _frame: &mut [Lane]) {}
     #[inline(always)]
     fn step(&self, _frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
-        self.log(p, q, chord)
+        for i in 0..self.n {
+            chord[i] = q[i] - p[i];
+        }
+        // There is no cut locus.
+        Lane::ZERO
     }
     fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
     #[inline(always)]

@@ -32,6 +32,10 @@ pub(crate) const ROUNDING_SIZE: Lane = Lane::splat(1e-7);
 /// complex number is two), coordinates at the origin are [`dim`](Space::dim) numbers, orthonormal
 /// for [`norm2`](Space::norm2).
 pub trait Space: Copy + Send + Sync + 'static {
+    /// Whether multiplying all points by a number multiplies the curve by it. Then data of any size
+    /// are brought to size one first, so that squares neither overflow nor vanish.
+    const SCALES: bool = false;
+
     /// Numbers in the array of a point.
     fn point_len(&self) -> usize;
     /// Dimension of the space.
