@@ -9,7 +9,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 .PHONY: demo test bench check-tools clean
 
 demo: .venv/built
-	$(BIN)/python -m symspline.demo --out demo-output
+	$(BIN)/symspline demo --out demo-output
 
 test: .venv/built
 	cargo fmt --all --check

@@ -10,6 +10,7 @@ import symspline as ss
 from symspline import _tracks as tracks
 from symspline import demo, hurdat
 from symspline._pieces import Pieces, pairs
+from symspline.cli import main
 from symspline.lonlat import from_lonlat, to_lonlat
 
 HOUR = np.timedelta64(1, "h")
@@ -123,7 +124,7 @@ def test_great_circles_and_linear_lonlat_jump(storms, splines):
 
 
 def test_demo_writes_its_files(tmp_path, capsys):
-    demo.run(tmp_path / "new" / "folder")
+    assert main(["demo", "--out", str(tmp_path / "new" / "folder")]) == 0
     folder = tmp_path / "new" / "folder"
     text = capsys.readouterr().out
     assert text.isascii()

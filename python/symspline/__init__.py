@@ -17,7 +17,7 @@ from . import _cpu
 _cpu.check(_Path(__file__).parent)
 
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads, set_num_threads  # noqa: E402
-from .files import load  # noqa: E402
+from .files import load, load_many, save_many  # noqa: E402
 from .product import Product  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .spaces import Euclidean, Hyperbolic, Space, Sphere, space  # noqa: E402
@@ -40,7 +40,9 @@ __all__ = [
     "fit",
     "fit_many",
     "load",
+    "load_many",
     "num_threads",
+    "save_many",
     "set_num_threads",
     "space",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -15,56 +14,25 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from ._tracks import GLOBE, KMH, Comparison, Times, comparison, every, slerp_pieces
+from ._tracks import GLOBE, KMH, Comparison, Times, comparison, every, samples, slerp_pieces
 from .hurdat import Storm
 from .lonlat import from_lonlat, to_lonlat
+from .plotting.globe import View, degrees, draw_frame, draw_globe
+from .plotting.style import DPI, EDGE, GRID, HALO, INK, SPLINE, heading, window
 from .spline import CubicSpline
 
 Array = NDArray[np.float64]
 
-LAND, COAST, GRID, INK = "#e4dfd2", "#a8a18f", "#b9c8d1", "#22303a"
-SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
+LAND = "#e4dfd2"
 SPEED = LinearSegmentedColormap.from_list(
     "speed", ["#7fb2d6", "#3b6fb6", "#5b3a9a", "#a3297f", "#dd4a3f", "#f7a51c"]
 )
-SPLINE, SLERP, LONLAT = "#0b559f", "#d95f0e", "#3a9a68"
-HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
-DPI = 150
+SLERP, LONLAT = "#d95f0e", "#3a9a68"
 
 
-# ---- the globe ----
-
-
-@dataclass(frozen=True)
-class View:
-    """A globe seen from far above a place: unit vectors to the east, to the north and up."""
-
-    east: Array
-    north: Array
-    up: Array
-
-    @classmethod
-    def above(cls, lon: float, lat: float) -> View:
-        """The view with a place in the middle."""
-        return cls(from_lonlat(lon + 90, 0), from_lonlat(lon, lat + 90), from_lonlat(lon, lat))
-
-    def flat(self, points: Array) -> Array:
-        """The orthographic projection, shape (..., 2)."""
-        return np.stack([points @ self.east, points @ self.north], axis=-1)
-
-    def visible(self, points: Array) -> Array:
-        """The projection of what is on the near side; NaN, which breaks a line, on the far side."""
-        return np.where((points @ self.up > 0)[..., None], self.flat(points), np.nan)
-
-    def outline(self, ring: Array) -> Array:
-        """The projection of a ring of points, its far part pressed onto the horizon."""
-        flat = self.flat(ring)
-        horizon = flat / np.linalg.norm(flat, axis=-1, keepdims=True)
-        return np.where((ring @ self.up > 0)[..., None], flat, horizon)
+# ---- the land ----
 
 
 def coastlines() -> list[Array]:
@@ -75,40 +43,11 @@ def coastlines() -> list[Array]:
     return [from_lonlat(*np.array([row.split(",") for row in line], dtype=float).T) for line in lines]
 
 
-def _draw_globe(axes: Axes, view: View, spacing: int) -> None:
-    """A shaded globe with a graticule."""
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_xlim(-1.06, 1.06)
-    axes.set_ylim(-1.06, 1.06)
-    x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
-    light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
-    shade = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
-    shade.set_clip_path(Circle((0, 0), 1, transform=axes.transData))
-    axes.add_patch(Circle((0, 0), 1, fill=False, edgecolor=COAST, linewidth=1, zorder=3))
-    steps = np.linspace(-180, 180, 721)
-    lines = [from_lonlat(steps, lat) for lat in range(spacing - 90, 90, spacing)]
-    lines += [from_lonlat(lon, steps / 2) for lon in range(-180, 180, spacing)]
-    for line in lines:
-        axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, zorder=2)
-
-
 def _draw_land(axes: Axes, view: View) -> None:
     for ring in coastlines():
         if (ring @ view.up > 0).any():
             axes.fill(*view.outline(ring).T, facecolor=LAND, linewidth=0, zorder=1)
-            axes.plot(*view.visible(ring).T, color=COAST, linewidth=0.7, zorder=1)
-
-
-def _title(figure: Figure, title: str, subtitle: str, height: float) -> None:
-    """Title and subtitle in the upper left corner."""
-    figure.text(0.03, height, title, color=INK, fontsize=18, weight="bold")
-    figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=12)
-
-
-def _degrees(value: int, positive: str, negative: str) -> str:
-    """``-30`` is 30°W or 30°S."""
-    return f"{abs(value)}°" + (positive if value > 0 else negative if value < 0 else "")
+            axes.plot(*view.visible(ring).T, color=EDGE, linewidth=0.7, zorder=1)
 
 
 # ---- the tracks ----
@@ -137,7 +76,7 @@ def draw_tracks(storms: Sequence[Storm], splines: Sequence[CubicSpline], path: P
     """All tracks on a globe, coloured by speed."""
     figure = Figure(figsize=(13, 10.4), dpi=DPI)
     axes = figure.add_axes((0.01, 0.085, 0.98, 0.845))
-    _draw_globe(axes, _OVERVIEW, 15)
+    draw_globe(axes, _OVERVIEW, 15)
     axes.set_ylim(-0.54, 1.02)
     _draw_land(axes, _OVERVIEW)
     _label_graticule(axes)
@@ -152,7 +91,7 @@ def draw_tracks(storms: Sequence[Storm], splines: Sequence[CubicSpline], path: P
     bar.set_label("speed of the storm, km/h", color=INK, fontsize=11)
     bar.outline.set_visible(False)
     title = f"{len(storms)} Atlantic storms as C² curves on the sphere"
-    _title(figure, title, "best tracks of 2021 and 2022, NOAA HURDAT2; white dots: fixes", 0.955)
+    heading(figure, title, "best tracks of 2021 and 2022, NOAA HURDAT2; white dots: fixes", 0.955)
     figure.savefig(path)
 
 
@@ -194,15 +133,15 @@ def _draw_name(axes: Axes, storm: Storm, spline: CubicSpline) -> None:
 
 def _label_graticule(axes: Axes) -> None:
     """Parallels at the horizon, meridians on the equator."""
-    look: dict[str, Any] = {"color": COAST, "fontsize": 8.5, "va": "center", "zorder": 3}
+    look: dict[str, Any] = {"color": EDGE, "fontsize": 8.5, "va": "center", "zorder": 3}
     for lat in (0, 15, 30, 45, 60):
         limb = np.degrees(np.arccos(-np.tan(np.radians(lat)) * np.tan(np.radians(_LAT))))
         for side, ha in ((-1, "right"), (1, "left")):
             x, y = 1.012 * _OVERVIEW.flat(from_lonlat(_LON + side * limb, lat))
-            axes.text(x, y, _degrees(lat, "N", "S"), ha=ha, **look)
+            axes.text(x, y, degrees(lat, "N", "S"), ha=ha, **look)
     for lon in range(-120, 0, 15):
         x, y = _OVERVIEW.flat(from_lonlat(lon, 0))
-        axes.text(x + 0.006, y - 0.014, _degrees(lon, "E", "W"), ha="left", **look)
+        axes.text(x + 0.006, y - 0.014, degrees(lon, "E", "W"), ha="left", **look)
 
 
 # ---- three points ----
@@ -213,7 +152,7 @@ def draw_three_points(spline: CubicSpline, path: Path) -> None:
     figure = Figure(figsize=(8, 8.9), dpi=DPI)
     axes = figure.add_axes((0.02, 0.01, 0.96, 0.86))
     view = View.above(52, 24)
-    _draw_globe(axes, view, 15)
+    draw_globe(axes, view, 15)
     t = np.linspace(0, 2, 401)
     arcs = GLOBE.geodesic(spline.points[:-1, None], spline.points[1:, None], np.linspace(0, 1, 101))
     for arc in arcs:
@@ -233,7 +172,7 @@ def draw_three_points(spline: CubicSpline, path: Path) -> None:
             path_effects=HALO,
             zorder=8,
         )
-    _title(figure, "Three points on the sphere", "times 0, 1, 2, natural ends; white dots: every 0.1", 0.955)
+    heading(figure, "Three points on the sphere", "times 0, 1, 2, natural ends; white dots: every 0.1", 0.955)
     handles = [Line2D([], [], color=SPLINE, linewidth=3.4), Line2D([], [], color=SLERP, linewidth=2, ls="--")]
     labels = ["C² spline", "great-circle arcs"]
     figure.legend(
@@ -263,7 +202,7 @@ def draw_comparison(storm: Storm, spline: CubicSpline, path: Path) -> None:
     subtitle = (
         "speed, course and turn rate are continuous along the spline; the turn rate has corners at the fixes"
     )
-    _title(figure, f"What C² buys: {storm.label}", subtitle, 0.945)
+    heading(figure, f"What C² buys: {storm.label}", subtitle, 0.945)
     figure.savefig(path)
 
 
@@ -306,10 +245,10 @@ def _draw_storm(axes: Axes, spline: CubicSpline) -> None:
     lon, lat = (float(value) for value in to_lonlat(spline.points.mean(axis=0)))
     view = View.above(lon, lat)
     line = view.flat(spline(every(np.timedelta64(10, "m"), spline.t)))
-    _draw_frame(axes, view, lon, lat, line)
+    draw_frame(axes, view, *window(line, 1.22))
     dots, arcs = view.flat(spline.points), slerp_pieces(spline)
     axes.plot(*line.T, color=SPLINE, linewidth=2.8, zorder=4)
-    for arc in arcs.at(arcs.samples(13)):
+    for arc in arcs.at(samples(arcs, 13)):
         axes.plot(*view.flat(arc).T, color=SLERP, linewidth=1.2, zorder=5)
     axes.plot(*dots.T, "o", color=INK, markersize=4, zorder=6)
     left = view.flat(spline.velocities) @ np.array([[0, 1], [-1, 0]])
@@ -326,27 +265,3 @@ def _draw_storm(axes: Axes, spline: CubicSpline) -> None:
             path_effects=HALO,
             zorder=7,
         )
-
-
-def _draw_frame(axes: Axes, view: View, lon: float, lat: float, line: Array) -> None:
-    """A square frame around a line, with a graticule that is labelled at the left and at the bottom."""
-    low, high = line.min(axis=0), line.max(axis=0)
-    half = 0.61 * (high - low).max()
-    (west, south), (east, north) = (low + high) / 2 - half, (low + high) / 2 + half
-    reach = np.linspace(-25, 25, 101)
-    meridians = {x: view.flat(from_lonlat(x, lat + reach)) for x in _fives(lon)}
-    parallels = {y: view.flat(from_lonlat(lon + reach, y)) for y in _fives(lat)}
-    for curve in (*meridians.values(), *parallels.values()):
-        axes.plot(*curve.T, color=GRID, linewidth=0.7, zorder=2)
-    at_bottom = [np.interp(south, curve[:, 1], curve[:, 0]) for curve in meridians.values()]
-    at_left = [np.interp(west, curve[:, 0], curve[:, 1]) for curve in parallels.values()]
-    axes.set_xticks(at_bottom, [_degrees(x, "E", "W") for x in meridians])
-    axes.set_yticks(at_left, [_degrees(y, "N", "S") for y in parallels])
-    axes.set(aspect="equal", xlim=(west, east), ylim=(south, north), facecolor="#eff4f7")
-    axes.tick_params(length=0, labelcolor=INK)
-
-
-def _fives(middle: float) -> range:
-    """Multiples of five degrees around a place."""
-    start = 5 * round(middle / 5)
-    return range(start - 20, start + 21, 5)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._pieces import Pieces, pairs, spline_pieces
 from .hurdat import Storm
-from .lonlat import from_lonlat, to_lonlat
+from .lonlat import compass, from_lonlat, to_lonlat
 from .spaces import Sphere
-from .spline import CubicSpline, evaluate, fit_many
+from .spline import CubicSpline, fit_many
 
 Array = NDArray[np.float64]
 Times = NDArray[np.datetime64]
@@ -42,63 +42,26 @@ def every(step: np.timedelta64, times: Times) -> Times:
 # ---- one segment at a time ----
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Segments as curves of their own, each with two knots: they know nothing of their neighbours.
-
-    Attributes:
-        t: shape (S, 2).
-        points, velocities: shape (S, 2, 3).
-    """
-
-    t: Times
-    points: Array
-    velocities: Array
-
-    def at(self, x: Times, nu: int = 0) -> Array:
-        """Every segment at its own times, the rows of x: shape (S, m, 3)."""
-        values: Array = evaluate(x, self.t, self.points, self.velocities, GLOBE, nu, per_curve=True)
-        return values
-
-    def samples(self, number: int) -> Times:
-        """Times of every segment from its left to its right end, shape (S, number)."""
-        shares = np.linspace(0, 1, number)
-        seconds = (self.t[:, 1:] - self.t[:, :1]) / np.timedelta64(1, "s") * shares
-        times: Times = self.t[:, :1] + np.rint(seconds).astype("timedelta64[s]")
-        return times
-
-
-def spline_pieces(spline: CubicSpline) -> Pieces:
-    """The segments of a spline."""
-    return Pieces(_pairs(spline.t), _pairs(spline.points), _pairs(spline.velocities))
+def samples(pieces: Pieces, number: int) -> Times:
+    """Times of every segment from its left to its right end, shape (segments, number)."""
+    shares = np.linspace(0, 1, number)
+    seconds = (pieces.t[:, 1:] - pieces.t[:, :1]) / np.timedelta64(1, "s") * shares
+    times: Times = pieces.t[:, :1] + np.rint(seconds).astype("timedelta64[s]")
+    return times
 
 
 def slerp_pieces(spline: CubicSpline) -> Pieces:
     """The great-circle arcs between the points of a spline, each at constant speed."""
-    t, points = _pairs(spline.t), _pairs(spline.points)
+    t, points = pairs(spline.t), pairs(spline.points)
     seconds = (t[:, 1] - t[:, 0]) / np.timedelta64(1, "s")
     ends = [GLOBE.log(points[:, 0], points[:, 1]), -GLOBE.log(points[:, 1], points[:, 0])]
-    return Pieces(t, points, np.stack(ends, axis=1) / seconds[:, None, None])
+    return Pieces(GLOBE, t, points, np.stack(ends, axis=1) / seconds[:, None, None])
 
 
-def _pairs(values: NDArray[Any]) -> NDArray[Any]:
-    """Neighbours, shape (N, 2, ...)."""
-    return np.stack([values[:-1], values[1:]], axis=1)
-
-
-def knot_jumps(spline: CubicSpline) -> tuple[float, float, float]:
-    """Largest jumps of γ, γ' and ∇γ' at the inner knots, relative to the largest |γ|, |γ'|, |∇γ'| there.
-
-    The value from the left is that of the left segment alone, the value from the right that of the right.
-    """
-    pieces = spline_pieces(spline)
-    position, velocity, acceleration = (_largest_jump(pieces.at(pieces.t, nu)) for nu in (0, 1, 2))
-    return position, velocity, acceleration
-
-
-def _largest_jump(ends: Array) -> float:
-    jumps = np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=-1)
-    return float(jumps.max() / np.linalg.norm(ends, axis=-1).max())
+def relative_jumps(pieces: Pieces) -> tuple[float, float, float]:
+    """Largest jumps of γ, γ' and ∇γ' at the inner knots, relative to the largest |γ|, |γ'|, |∇γ'| there."""
+    position, velocity, acceleration = (pieces.jumps(nu) for nu in (0, 1, 2))
+    return position.relative, velocity.relative, acceleration.relative
 
 
 # ---- motion ----
@@ -121,7 +84,7 @@ class Motion:
 
 def motion(point: Array, velocity: Array, acceleration: Array) -> Motion:
     """Motion from position, velocity and covariant acceleration, in radians and seconds."""
-    east, north = _compass(point)
+    east, north = compass(point)
     speed = np.linalg.norm(velocity, axis=-1)
     course = np.arctan2((velocity * east).sum(-1), (velocity * north).sum(-1))
     to_the_right = (np.cross(point, acceleration) * velocity).sum(-1) / speed**2
@@ -140,14 +103,14 @@ def lonlat_motion(storm: Storm, x: Times) -> Motion:
         storm: the storm; none of its segments crosses the date line.
         x: times, shape (segments, m): a row for every segment.
     """
-    lon, lat = (np.radians(_pairs(values)) for values in (storm.lon, storm.lat))
-    ends = _pairs(storm.times)
+    lon, lat = (np.radians(pairs(values)) for values in (storm.lon, storm.lat))
+    ends = pairs(storm.times)
     share = (x - ends[:, :1]) / (ends[:, 1:] - ends[:, :1])
     seconds = (ends[:, 1:] - ends[:, :1]) / np.timedelta64(1, "s")
     along, up = (np.diff(values, axis=1) / seconds for values in (lon, lat))
     place = [values[:, :1] + share * np.diff(values, axis=1) for values in (lon, lat)]
     point = from_lonlat(*np.degrees(place))
-    east, north = _compass(point)
+    east, north = compass(point)
     sine, cosine = np.sin(place[1]), np.cos(place[1])
     velocity = (along * cosine)[..., None] * east + np.broadcast_to(up[..., None], east.shape) * north
     acceleration = (-2 * along * up * sine)[..., None] * east + (along**2 * sine * cosine)[..., None] * north
@@ -176,7 +139,7 @@ class Comparison:
 
 def comparison(storm: Storm, spline: CubicSpline) -> Comparison:
     """The C² spline, great-circle arcs, and longitude and latitude interpolated linearly."""
-    x = spline_pieces(spline).samples(73)
+    x = samples(spline_pieces(spline), 73)
     smooth = piecewise_motion(spline_pieces(spline), x)
     course = np.unwrap(smooth.course.ravel(), period=360).reshape(x.shape)
     motions = {
@@ -190,14 +153,6 @@ def comparison(storm: Storm, spline: CubicSpline) -> Comparison:
 def _next_to(course: Array, motion: Motion) -> Motion:
     """The motion with its course changed by full turns to come closest to a given one."""
     return replace(motion, course=motion.course + 360 * np.rint((course - motion.course) / 360))
-
-
-def _compass(point: Array) -> tuple[Array, Array]:
-    """Unit vectors to the east and to the north."""
-    horizontal = np.hypot(point[..., 0], point[..., 1])
-    zero = np.zeros_like(horizontal)
-    east = np.stack([-point[..., 1], point[..., 0], zero], axis=-1) / horizontal[..., None]
-    return east, np.cross(point, east)
 
 
 # ---- a storm in numbers ----
@@ -237,7 +192,7 @@ def summary(storm: Storm, spline: CubicSpline) -> Summary:
         len(storm),
         int(spline.report.iterations),
         float(spline.report.residual),
-        knot_jumps(spline),
+        relative_jumps(spline_pieces(spline)),
         float(steps.max()),
         float((steps / (np.diff(spline.t) / np.timedelta64(1, "h"))).max()),
         float(speed.max()),

@@ -1,12 +1,11 @@
 """Storm tracks on a globe: what symspline does, on real data.
 
-``python -m symspline.demo [--out FOLDER]`` turns the 37 Atlantic storms of NOAA's HURDAT2 sample into C²
+``symspline demo [--out FOLDER]`` turns the 37 Atlantic storms of NOAA's HURDAT2 sample into C²
 curves on S², prints a table, and writes hourly positions, one of the splines and three pictures.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import time
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from textwrap import fill
 import numpy as np
 
 from ._tracks import GLOBE, Positions, Summary, comparison, fit_tracks, hourly, summary
+from .files import replacing
 from .hurdat import Storm, read_sample
 from .spline import CubicSpline
 
@@ -28,10 +28,9 @@ _PORTRAIT = "Gaston 2022"
 """The storm that is saved and drawn on its own: it makes a long loop and never stands still."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demo; returns the exit code."""
+def run(folder: Path) -> None:
+    """Run the demo; its files go to ``folder``, which exists."""
     start = time.perf_counter()
-    folder = _folder(arguments)
     fixes = read_sample()
     storms = [storm.spaced(_GAP) for storm in fixes]
     before = time.perf_counter()
@@ -51,22 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     written += _write_pictures(folder, storms, splines, portrait)
     print("Written:", *written, sep="\n  ")
     print(f"Run time: {time.perf_counter() - start:.1f} s")
-    return 0
-
-
-def _folder(arguments: Sequence[str] | None) -> Path:
-    parser = argparse.ArgumentParser(
-        "python -m symspline.demo", description="Storm tracks as C2 curves on S2."
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("demo-output"), metavar="FOLDER", help="default: %(default)s"
-    )
-    folder: Path = parser.parse_args(arguments).out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        parser.error(f"cannot make the folder {folder}: {error.strerror}")
-    return folder
 
 
 def _summaries(storms: Sequence[Storm], splines: Sequence[CubicSpline]) -> list[Summary]:
@@ -146,14 +129,15 @@ def _write_data(
         folder / f"{_PORTRAIT.lower().replace(' ', '-')}.npz",
     )
     _write_csv(table, positions)
-    np.savez(arrays, **vars(positions))
+    with replacing(arrays) as file:
+        np.savez(file, **vars(positions))
     splines[portrait].save(curve)
     return [table, arrays, curve]
 
 
 def _write_csv(path: Path, positions: Positions) -> None:
     columns = vars(positions)
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         for storm, when, lon, lat, speed in zip(*columns.values(), strict=True):
@@ -170,12 +154,11 @@ def _write_pictures(
     from ._maps import draw_comparison, draw_three_points, draw_tracks
 
     tracks, points, c2 = (folder / name for name in ("tracks.png", "three-points.png", "c2.png"))
-    draw_tracks(storms, splines, tracks)
-    # The example of Appendix D of the paper, with the natural ends that are the paper's default.
-    draw_three_points(CubicSpline(None, np.eye(3), GLOBE), points)
-    draw_comparison(storms[portrait], splines[portrait], c2)
+    with replacing(tracks) as file:
+        draw_tracks(storms, splines, file)
+    with replacing(points) as file:
+        # The example of Appendix D of the paper, with the natural ends that are the paper's default.
+        draw_three_points(CubicSpline(None, np.eye(3), GLOBE), file)
+    with replacing(c2) as file:
+        draw_comparison(storms[portrait], splines[portrait], file)
     return [tracks, points, c2]
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -104,13 +104,14 @@ def _write(file: Any, arrays: dict[str, Any]) -> None:
 
 
 class replacing:
-    """A temporary file beside ``path`` that takes its place if all goes well, and is gone if not."""
+    """A temporary file beside ``path``, with the same ending, that takes its place if all goes well, and is
+    gone if not."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def __enter__(self) -> Path:
-        self.temporary = self.path.with_name(f".{self.path.name}.{secrets.token_hex(8)}")
+        self.temporary = self.path.with_name(f".{self.path.stem}.{secrets.token_hex(8)}{self.path.suffix}")
         # Created here, with the rights of any new file, so that a later open finds it.
         os.close(os.open(self.temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         return self.temporary

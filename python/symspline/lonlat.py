@@ -34,3 +34,19 @@ def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
     """
     x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
     return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
+
+
+def compass(points: ArrayLike) -> tuple[Array, Array]:
+    """Unit vectors to the east and to the north at unit vectors of shape (..., 3); at a pole, those of
+    0° E.
+
+    >>> east, north = compass([1, 0, 0])
+    >>> east + 0.0, north + 0.0
+    (array([0., 1., 0.]), array([0., 0., 1.]))
+    """
+    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    horizontal = np.hypot(x, y)
+    pole = horizontal == 0
+    cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
+    zero = np.zeros_like(x)
+    return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)

@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         code: int = options.run(options)
-        sys.stdout.flush()
+        print(end="", flush=True)
         return code
     except BrokenPipeError:
         _drop_output()
@@ -50,8 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         if error.filename is None:
             _drop_output()
-        return _say(f"{error.filename or 'output'}: {error.strerror or error}", BAD)
-    except (Problem, ValidationError, CutLocusError) as error:
+        return _say(f"cannot write {error.filename or 'the output'}: {error.strerror or error}", BAD)
+    except Problem as error:
+        return _say(error, error.code)
+    except (ValidationError, CutLocusError) as error:
         return _say(error, BAD)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
@@ -12,6 +13,14 @@ from ..files import replacing
 
 class Problem(Exception):
     """Bad input or usage; the message is for the user."""
+
+    code = 2
+
+
+class Failure(Problem):
+    """Nothing is wrong with the input, but with what was found."""
+
+    code = 1
 
 
 def did_you_mean(name: str, names: Sequence[str]) -> str:
@@ -38,13 +47,19 @@ def reading(path: Path) -> Iterator[None]:
         raise Problem(f"cannot read {path}: {error.strerror or error}") from None
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[Path]:
-    """A temporary file that becomes ``path`` if all goes well."""
+def check_target(path: Path) -> None:
+    """Raise `Problem` if a file cannot be written: better before the work than after it."""
     if path.is_dir():
         raise Problem(f"cannot write {path}: it is a folder")
     if not path.parent.is_dir():
         raise Problem(f"cannot write {path}: there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise Problem(f"cannot write {path}: no permission to write into {path.parent}")
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """A temporary file that becomes ``path`` if all goes well."""
     try:
         with replacing(path) as temporary:
             yield temporary

@@ -1,4 +1,4 @@
-"""NPZ: every array is a column; the entries of an array with more axes are columns of their own."""
+"""NPZ: arrays with one entry a row; the entries of an array with more axes are columns of their own."""
 
 from __future__ import annotations
 
@@ -13,57 +13,57 @@ from .tables import Array, ArrayTable
 
 
 class NpzTable(ArrayTable):
-    """Arrays of an NPZ file. Entries of an array ``points`` are ``points_0``, ``points_1``, … row by row;
-    of complex numbers ``points_0_re``, ``points_0_im``, …"""
+    """The arrays of an NPZ file. The entries of an array ``a`` are the columns ``a_0``, ``a_1``, … row by
+    row; those of complex numbers ``a_0_re``, ``a_0_im``, …"""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._groups: dict[str, list[str]] = {}
-        self._columns: dict[str, Array] = {}
-        for key, array in _arrays(path).items():
-            if array.ndim and array.dtype.kind in "biufcMU":
-                columns = _split(key, array)
-                self._groups[key] = list(columns)
-                self._columns.update(columns)
+        self._groups = {
+            key: _split(key, array)
+            for key, array in _arrays(path).items()
+            if array.ndim and array.dtype.kind in "biufcMU"
+        }
+        self._columns = {name: column for group in self._groups.values() for name, column in group.items()}
         self.names = list(self._columns)
         self.numeric = [name for name, column in self._columns.items() if column.dtype.kind in "biuf"]
-
-    def expand(self, name: str) -> list[str]:
-        return self._groups.get(name) or super().expand(name)
 
     def require(self, name: str) -> str:
         if name not in self.names:
             raise Problem(f"{self.path} has no array {name!r}; {did_you_mean(name, list(self._groups))}")
         return name
 
+    def expand(self, name: str) -> list[str]:
+        return list(self._groups[name]) if name in self._groups else super().expand(name)
+
     def points(self, others: Sequence[str | None]) -> list[str]:
-        return self._groups.get("points") or super().points(others)
+        return self.expand("points") if "points" in self._groups else super().points(others)
 
     def _column(self, name: str) -> Array:
         return self._columns[name]
 
 
 def _arrays(path: Path) -> dict[str, Array]:
-    with reading(path):
-        if not zipfile.is_zipfile(path):
-            path.open("rb").close()
+    with reading(path), open(path, "rb") as file:
+        if not zipfile.is_zipfile(file):
             raise Problem(f"{path} is not an NPZ file")
+        file.seek(0)
         try:
-            with np.load(path, allow_pickle=False) as archive:
+            with np.load(file, allow_pickle=False) as archive:
                 arrays = {key: archive[key] for key in archive.files}
         except (zipfile.BadZipFile, ValueError, EOFError) as error:
-            raise Problem(f"{path} is damaged, or holds objects instead of numbers: {error}") from None
+            raise Problem(f"{path} is damaged, or holds other things than numbers: {error}") from None
     if "format" in arrays:
-        raise Problem(f"{path} is a fitted curve, not a table")
+        raise Problem(f"{path} is a curve that was fitted already, not a table")
     return arrays
 
 
 def _split(key: str, array: Array) -> dict[str, Array]:
     """The columns of an array."""
-    rows = array.reshape(len(array), -1)
-    names = [key] if array.ndim == 1 else [f"{key}_{i}" for i in range(rows.shape[1])]
+    entries = array.reshape(len(array), -1).T
+    names = [key] if array.ndim == 1 else [f"{key}_{i}" for i in range(len(entries))]
     if array.dtype.kind != "c":
-        return dict(zip(names, rows.T, strict=True))
-    parts = [(f"{name}{end}", part) for name, column in zip(names, rows.T, strict=True)
-             for end, part in (("_re", column.real), ("_im", column.imag))]
-    return dict(parts)
+        return dict(zip(names, entries, strict=True))
+    columns = {}
+    for name, entry in zip(names, entries, strict=True):
+        columns[name + "_re"], columns[name + "_im"] = entry.real, entry.imag
+    return columns

@@ -18,44 +18,41 @@ class ParquetTable(ArrayTable):
     def __init__(self, path: Path) -> None:
         self.path = path
         pa, parquet = _pyarrow()
-        with reading(path):
+        with reading(path), open(path, "rb") as file:
             try:
-                self._table = parquet.read_table(path)
-            except pa.ArrowInvalid as error:
-                raise Problem(f"{path} is damaged or not a Parquet file: {error}") from None
+                self._table = parquet.read_table(file)
+            except pa.ArrowInvalid:
+                raise Problem(f"{path} is damaged or not a Parquet file") from None
         self.names = self._table.column_names
-        types = pa.types
-        self.numeric = [
-            field.name
-            for field in self._table.schema
-            if types.is_integer(field.type) or types.is_floating(field.type) or types.is_decimal(field.type)
-        ]
+        tests = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
+        self.numeric = [f.name for f in self._table.schema if any(test(f.type) for test in tests)]
 
     def _column(self, name: str) -> Array:
         pa, _ = _pyarrow()
         column = self._table.column(name)
+        if column.null_count:
+            empty = int(column.is_null().to_numpy().argmax())
+            raise Problem(f"{self.path}, row {empty} (counted from 0): column {name!r} is empty")
         if pa.types.is_decimal(column.type):
             column = column.cast(pa.float64())
         values: Array = column.to_numpy()
         return values
 
     def _is_utc(self, name: str) -> bool:
-        return self._table.schema.field(name).type.tz is not None
+        return getattr(self._table.schema.field(name).type, "tz", None) is not None
 
 
 def write_parquet(file: BinaryIO, columns: Mapping[str, Array], utc: bool) -> None:
     """Write columns; dates become timestamps."""
     pa, parquet = _pyarrow()
-    arrays = {name: _array(pa, values, utc) for name, values in columns.items()}
-    parquet.write_table(pa.table(arrays), file)
+    parquet.write_table(pa.table({name: _array(pa, values, utc) for name, values in columns.items()}), file)
 
 
 def _array(pa: Any, values: Array, utc: bool) -> Any:
     if values.dtype.kind != "M":
         return pa.array(values)
     unit = np.datetime_data(values.dtype)[0]
-    if unit not in ("s", "ms", "us", "ns"):
-        unit = "s" if unit in ("D", "h", "m") else "ns"
+    unit = unit if unit in ("ms", "us", "ns") else "s"
     return pa.array(values.astype(f"datetime64[{unit}]"), pa.timestamp(unit, "UTC" if utc else None))
 
 

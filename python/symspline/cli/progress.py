@@ -22,7 +22,7 @@ class Progress:
 
     def __enter__(self) -> Self:
         self._next = time.monotonic() + _WAIT
-        self._shows = sys.stderr.isatty()
+        self._shows = sys.stderr is not None and sys.stderr.isatty()
         return self
 
     def __call__(self, done: int, total: int) -> None:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .dates import parse_times
 from .errors import Problem, did_you_mean, writing
 from .progress import Progress
+from .times import Fail, parse_times
 
 Array = NDArray[Any]
 Doubles = NDArray[np.float64]
@@ -28,16 +28,16 @@ class Rows:
 
     Attributes:
         numbers: shape (rows, columns).
-        times: numbers or ``datetime64``, None if no time column was asked for.
-        utc: whether the times had a Z or an offset, and were converted.
+        times: numbers or ``datetime64``; empty if no column of times was asked for.
+        utc: whether the times had a Z or an offset; they are UTC then.
         labels: names of the curves, None if no such column was asked for.
-        place: where a row is, such as "line 7".
+        place: where a row is, such as ``"line 7"``.
     """
 
     numbers: Doubles
-    times: Array | None
+    times: Array
     utc: bool
-    labels: NDArray[np.str_] | None
+    labels: list[str] | None
     place: Place
 
 
@@ -54,14 +54,6 @@ class Table(ABC):
     names: list[str]
     numeric: list[str]
 
-    def expand(self, name: str) -> list[str]:
-        """The columns that a name stands for: itself, or the two parts of complex numbers."""
-        parts = [name + "_re", name + "_im"]
-        if name not in self.names and set(parts) <= set(self.names):
-            return parts
-        self.require(name)
-        return [name]
-
     def require(self, name: str) -> str:
         """The name, if there is such a column."""
         if name not in self.names:
@@ -69,16 +61,35 @@ class Table(ABC):
         return name
 
     def find(self, *names: str) -> str | None:
-        """The first column with one of these names, whatever the case."""
+        """The first column with one of these names in lower case, whatever its case."""
         return next((own for name in names for own in self.names if own.lower() == name), None)
 
+    def expand(self, name: str) -> list[str]:
+        """The columns that a name stands for: itself, or the two parts of complex numbers."""
+        parts = [name + "_re", name + "_im"]
+        if name not in self.names and set(parts) <= set(self.names):
+            return parts
+        return [self.require(name)]
+
     def points(self, others: Sequence[str | None]) -> list[str]:
-        """The columns of the points if nobody says which: all numbers that are nothing else."""
+        """The columns of the points if nobody says which: all with numbers but the others."""
         return [name for name in self.numeric if name not in others]
 
     @abstractmethod
     def read(self, numbers: Sequence[str], time: str | None, label: str | None, progress: Progress) -> Rows:
         """The rows, with some columns as numbers, one as times and one as labels."""
+
+    def _fail(self, name: str, place: Place) -> Fail:
+        """Problems of a column."""
+        return lambda row, found: Problem(f"{self.path}, {place(row)}: column {name!r} {found}")
+
+    def _finite(self, values: Doubles, name: str, place: Place) -> Doubles:
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise self._fail(name, place)(
+                int(bad[0]), f"holds {values[bad[0]]}, which is not a finite number"
+            )
+        return values
 
 
 class ArrayTable(Table):
@@ -92,65 +103,62 @@ class ArrayTable(Table):
         return False
 
     def read(self, numbers: Sequence[str], time: str | None, label: str | None, progress: Progress) -> Rows:
-        def place(row: int) -> str:
-            return f"row {row} (counted from 0)"
-
         columns = []
         for done, name in enumerate(numbers):
             progress(done, len(numbers))
-            columns.append(self._numbers(name, place))
-        times, utc = self._times(time, place) if time is not None else (None, False)
-        labels = self._column(label).astype(np.str_) if label is not None else None
-        lengths = {len(c) for c in (*columns, times, labels) if c is not None}
+            columns.append(self._numbers(name))
+        times, utc = self._times(time) if time is not None else (np.empty(0), False)
+        labels = self._column(label).astype(np.str_).tolist() if label is not None else None
+        given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
+        lengths = sorted(set(map(len, given)))
         if len(lengths) > 1:
-            raise Problem(f"{self.path}: the columns differ in length: {listed_lengths(lengths)}")
-        table = np.stack(columns, axis=1) if columns else np.empty((max(lengths, default=0), 0))
-        return Rows(table, times, utc, labels, place)
+            raise Problem(f"{self.path}: arrays differ in length: {' and '.join(map(str, lengths))}")
+        if lengths == [0]:
+            raise Problem(f"{self.path} has no rows")
+        return Rows(_table(columns), times, utc, labels, _row)
 
-    def _numbers(self, name: str, place: Place) -> Doubles:
+    def _numbers(self, name: str) -> Doubles:
         array = self._column(name)
         if array.dtype.kind not in "biuf":
             raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
-        values = array.astype(np.float64)
-        check_finite(values, self.path, name, place)
-        return values
+        return self._finite(array.astype(np.float64), name, _row)
 
-    def _times(self, name: str, place: Place) -> tuple[Array, bool]:
+    def _times(self, name: str) -> tuple[Array, bool]:
         array = self._column(name)
         if array.dtype.kind in "OUT":
-            return parse_times(array.astype(np.str_).tolist(), self.path, name, place)
-        if array.dtype.kind == "M":
-            missing = np.flatnonzero(np.isnat(array))
-            if missing.size:
-                raise Problem(f"{self.path}, {place(missing[0])}: column {name!r} holds no time")
-            return array, self._is_utc(name)
-        return (array, False) if array.dtype.kind in "iu" else (self._numbers(name, place), False)
+            return parse_times(array.astype(np.str_).tolist(), self._fail(name, _row))
+        if array.dtype.kind in "iu":
+            return array, False
+        if array.dtype.kind != "M":
+            return self._numbers(name), False
+        if np.isnat(array).any():
+            raise self._fail(name, _row)(int(np.isnat(array).argmax()), "holds no time")
+        return array, self._is_utc(name)
 
 
-def listed_lengths(lengths: set[int]) -> str:
-    """Lengths in words."""
-    return " and ".join(map(str, sorted(lengths)))
+def _row(row: int) -> str:
+    return f"row {row} (counted from 0)"
 
 
-def check_finite(values: Doubles, path: Path, name: str, place: Place) -> None:
-    """Raise `Problem` at the first value that is NaN or infinite."""
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        found = "no number" if np.isnan(values[bad[0]]) else "an infinite number"
-        raise Problem(f"{path}, {place(bad[0])}: column {name!r} holds {found}")
+def _table(columns: Sequence[Doubles]) -> Doubles:
+    """Columns side by side."""
+    return np.stack(columns, axis=1) if columns else np.empty((0, 0))
+
+
+# ---- files ----
 
 
 def ending(path: Path, allowed: Sequence[str], what: str) -> str:
     """The ending of a file name, which says what is in the file."""
     suffix = path.suffix.lower()
     if suffix not in allowed:
-        raise Problem(f"{path}: {what} must end in {' or '.join(allowed)}")
+        raise Problem(f"{path}: the name of {what} must end in {' or '.join(allowed)}")
     return suffix
 
 
 def open_table(path: Path) -> Table:
     """The table in a CSV, NPZ or Parquet file."""
-    suffix = ending(path, ENDINGS, "the name of a table")
+    suffix = ending(path, ENDINGS, "a table")
     if suffix == ".csv":
         from .csv_files import CsvTable
 
@@ -166,14 +174,14 @@ def open_table(path: Path) -> Table:
 
 def write_table(path: Path, columns: Mapping[str, Array], utc: bool) -> None:
     """Write columns of equal length to a CSV, NPZ or Parquet file, by its ending."""
-    suffix = ending(path, ENDINGS, "the name of a table")
+    suffix = ending(path, ENDINGS, "a table")
     with writing(path) as temporary, open(temporary, "wb") as file:
         if suffix == ".csv":
             from .csv_files import write_csv
 
             write_csv(file, columns, utc)
         elif suffix == ".npz":
-            np.savez(file, **dict(columns))
+            np.savez(file, **columns)  # type: ignore[arg-type]
         else:
             from .parquet_files import write_parquet
 

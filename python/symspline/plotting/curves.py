@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.dates import date2num
 from numpy.typing import NDArray
 
 from .._core import ValidationError
 from ..spline import CubicSpline
-from .style import INK, colors
+from .style import DATES, INK, colors
 
 Doubles = NDArray[np.float64]
 
+_SECOND = np.timedelta64(1, "s")
 MOST = 50
 """The largest number of curves of a batch that are drawn."""
 
@@ -31,12 +31,16 @@ class Curve:
         x: times, as the core counts them; among them all knots.
         color: of its line.
         alone: whether it is the only curve of the figure.
+        start: the first date of all, if times are dates.
+        dates: whether time axes show dates: matplotlib's are good to a microsecond.
     """
 
     spline: CubicSpline
     x: Doubles
     color: Any
     alone: bool
+    start: Any
+    dates: bool
 
     @cached_property
     def points(self) -> Any:
@@ -46,20 +50,24 @@ class Curve:
     @cached_property
     def speed(self) -> Doubles:
         """|γ'| at the times x."""
-        return self._at("speed")
+        speed: Doubles = self._at("speed")
+        return speed
 
     @cached_property
     def bend(self) -> Doubles:
         """|∇γ'| at the times x."""
-        return self._at("bend")
+        bend: Doubles = self._at("bend")
+        return bend
 
     @cached_property
     def times(self) -> Doubles:
         """The times x where matplotlib puts them on an axis."""
-        first = self.spline.t[0]
+        first, since = self.spline.t[0], self.x - self.x[0]
         if self.dates:
-            return np.asarray(date2num(first + np.rint(1e6 * self.x).astype("timedelta64[us]")))
-        return float(first) + (self.x - self.x[0])
+            return np.asarray(DATES.date2num(first + np.rint(1e6 * since).astype("timedelta64[us]")))
+        if self.start is not None:
+            first = (first - self.start) / _SECOND
+        return np.asarray(float(first) + since)
 
     @property
     def knots(self) -> slice:
@@ -67,9 +75,11 @@ class Curve:
         return slice(None, None, (len(self.x) - 1) // (len(self.spline.t) - 1))
 
     @property
-    def dates(self) -> bool:
-        """Whether times are dates."""
-        return bool(self.spline.t.dtype.kind == "M")
+    def time_name(self) -> str:
+        """What is written below a time axis."""
+        if self.dates:
+            return ""
+        return "t" if self.start is None else f"seconds since {self.start}"
 
     def part(self, number: int) -> Curve:
         """The curve in one factor of a product."""
@@ -85,14 +95,13 @@ class Curve:
         look = {"color": self.color, "linewidth": 2.4 if self.alone else 1.4, "zorder": 4} | look
         axes.plot(*places.T, **look)
 
-    def draw_dots(self, axes: Axes, places: Doubles) -> None:
+    def draw_dots(self, axes: Axes, places: Doubles, **look: Any) -> None:
         """The given points, shape (N+1, 2) or (N+1, 3); the first is white."""
         size = float(np.clip(30 / np.sqrt(len(places)), 2, 6.5)) * (1 if self.alone else 0.6)
         color = INK if self.alone else self.color
-        axes.plot(*places.T, "o", color=color, markersize=size, zorder=6)
-        axes.plot(
-            *places[:1].T, "o", color="white", markersize=size, markeredgecolor=color, markeredgewidth=1.2, zorder=7
-        )
+        look = {"color": color, "markersize": size, "markeredgecolor": color, "zorder": 6} | look
+        axes.plot(*places.T, "o", **look)
+        axes.plot(*places[:1].T, "o", **look | {"color": "white", "markeredgewidth": 1.2})
 
 
 def curves_of(spline: CubicSpline) -> tuple[list[Curve], str]:
@@ -105,29 +114,34 @@ def curves_of(spline: CubicSpline) -> tuple[list[Curve], str]:
     everything = int(np.prod(batch))
     good = np.flatnonzero(_finite(spline))
     if not good.size:
-        raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
+        raise ValidationError(
+            "there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)"
+        )
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), MOST)).astype(int))]
-    words = f"{len(chosen)} of {everything} curves, " if len(chosen) < everything else f"{everything} curves, "
-    if len(good) < everything:
-        words += f"{everything - len(good)} failed, "
+    number = f"{len(chosen)} of {everything}" if len(chosen) < everything else f"{everything}"
     picked = [_pick(spline, np.unravel_index(number, batch)) for number in chosen]
     alone = len(picked) == 1
+    start = spline.t.min() if spline.t.dtype.kind == "M" else None
+    dates = start is not None and bool((spline.t.max() - start) / _SECOND > 1e-3)
     curves = [
-        Curve(curve, _samples(curve._times), color, alone)
+        Curve(curve, _samples(curve._times), color, alone, start, dates)
         for curve, color in zip(picked, colors(len(picked)), strict=True)
     ]
-    return curves, words if batch else ""
+    return curves, f"{number} curves, " if batch else ""
 
 
 def _finite(spline: CubicSpline) -> NDArray[np.bool_]:
     """Which curves are finite, one after the other."""
     batch, times = spline._batch, spline._times
     start = np.broadcast_to(times, (*batch, times.shape[-1]))[..., :1]
-    finite: NDArray[np.bool_] = np.isfinite(spline._evaluate(np.ascontiguousarray(start), "speed", None, True))
+    finite: NDArray[np.bool_] = np.isfinite(
+        spline._evaluate(np.ascontiguousarray(start), "speed", None, True)
+    )
     return finite.ravel()
 
 
 def _pick(spline: CubicSpline, index: Sequence[Any]) -> CubicSpline:
+    """One curve of a batch."""
     for i in index:
         spline = spline[i]
     return spline

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
+from matplotlib.figure import SubFigure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
@@ -21,19 +22,19 @@ _ORIGIN = np.array([1.0, 0.0, 0.0])
 _STEPS = np.array([1, 2, 5]) * 10.0 ** np.arange(-9, 3)[:, None]
 
 
-def draw_disk(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """The disk, with two families of geodesics at right angles to the axes.
 
     A curve that is far from the middle is moved there, and a small one is enlarged.
     """
     everything = np.concatenate([curve.points for curve in curves])
     centre, reach = _centre(everything)
-    half = 1.04 if reach > 0.5 or reach < 1e-7 else 1.4 * np.tanh(reach / 2)
+    half = 1.04 if reach > 1.2 or reach < 1e-7 else 1.4 * np.tanh(reach / 2)
     axes = panel.add_axes(inside(panel, 0.25, 0.45, 0.25, 0.1))
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
     spacing = 0.5 if half > 1 else _nice(0.6 * reach)
-    _draw_grid(axes, spacing, half)
+    _draw_grid(axes, spacing)
     for curve in curves:
         curve.draw_line(axes, flat(curve.points, centre))
         curve.draw_dots(axes, flat(curve.spline.points, centre))
@@ -46,27 +47,37 @@ def draw_disk(panel: FigureBase, curves: Sequence[Curve]) -> None:
 def flat(points: Array, centre: Array) -> Array:
     """Where points are in the disk whose middle is ``centre``, shape (..., 2)."""
     moved = _PLANE.transvection(centre, _PLANE.log(centre, _ORIGIN), points)
-    return moved[..., 1:] / (1 + moved[..., :1])
+    places: Array = moved[..., 1:] / (1 + moved[..., :1])
+    return places
 
 
 def _centre(points: Array) -> tuple[Array, float]:
-    """The middle of the disk, and the distance to the farthest point."""
+    """The middle of the disk, and the distance to the farthest point from there.
+
+    It is that of the smallest circle around the points, unless they lie around (1, 0, 0) anyway.
+    """
+    points = points[:: 1 + len(points) // 2000]
     middle = _PLANE.project(points.mean(axis=0))
+    for i in range(2, 200):
+        # Bădoiu and Clarkson (2003): ever shorter steps to the farthest point.
+        middle = _PLANE.geodesic(middle, points[_PLANE.distance(middle, points).argmax()], 1 / i)
     around, beside = (_PLANE.distance(place, points).max() for place in (_ORIGIN, middle))
-    return (middle, float(beside)) if beside < 0.6 * around else (_ORIGIN, float(around))
+    return (middle, float(beside)) if beside < 0.8 * around else (_ORIGIN, float(around))
 
 
 def _nice(value: float) -> float:
+    """The spacing that comes closest."""
     return float(_STEPS.ravel()[np.abs(np.log(_STEPS.ravel() / value)).argmin()])
 
 
-def _draw_grid(axes: Axes, spacing: float, half: float) -> None:
-    rim = Circle((0, 0), 1, facecolor=PAPER, edgecolor=EDGE, linewidth=1, zorder=0)
-    axes.add_patch(rim)
-    look = {"fill": False, "edgecolor": GRID, "linewidth": 0.6, "zorder": 1, "clip_path": rim}
-    axes.plot([-1, 1, np.nan, 0, 0], [0, 0, np.nan, -1, 1], color=GRID, linewidth=0.9, zorder=1)
-    for number in range(1, 11):
-        distance = number * spacing
-        middle, radius = 1 / np.tanh(distance), 1 / np.sinh(distance)
-        for x, y in ((middle, 0), (-middle, 0), (0, middle), (0, -middle)):
-            axes.add_patch(Circle((x, y), radius, **look))
+def _draw_grid(axes: Axes, spacing: float) -> None:
+    """The disk, and geodesics at right angles to either axis, ten on each side of the other."""
+    axes.add_patch(Circle((0, 0), 1, facecolor=PAPER, edgecolor=EDGE, linewidth=1, zorder=0))
+    along = 14 * np.linspace(-1, 1, 301) ** 3
+    for number in range(-10, 11):
+        aside = np.cosh(along) * np.sinh(number * spacing)
+        line = np.column_stack([np.cosh(along) * np.cosh(number * spacing), aside, np.sinh(along)])
+        upright = flat(line, _ORIGIN)
+        look: dict[str, Any] = {"color": GRID, "linewidth": 0.6 if number else 0.9, "zorder": 1}
+        axes.plot(*upright.T, **look)
+        axes.plot(*upright[:, ::-1].T, **look)

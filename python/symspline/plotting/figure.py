@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure, SubFigure
 
 from ..spline import CubicSpline
 from .curves import Curve, curves_of
 from .pictures import Picture, picture_of
-from .style import DPI, INK, heading, size
+from .style import DPI, INK, heading
 from .timeline import timelines
 
-_HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 3.6
-_FACTORS, _IN_ROW = 6, 3
+_HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 4.0
+_FACTORS = 6
 
 
 class CurveFigure(Figure):
@@ -39,7 +40,8 @@ def plot(spline: CubicSpline, file: Any = None) -> Figure:
         widths, heights = [picture.width, _RATES_WIDTH], [_HEAD, picture.height]
     figure = CurveFigure(figsize=(sum(widths), sum(heights)), dpi=DPI, facecolor="white")
     grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
-    heading(figure, f"C² spline on {spline.space!r}", words + _description(spline), 1 - 0.5 / sum(heights))
+    title = shorten(f"C² spline on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
+    heading(figure, title, words + _description(spline), 1 - 0.5 / sum(heights))
     picture.draw(figure.add_subfigure(grid[1, 0]), curves)
     _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
     if file is not None:
@@ -51,42 +53,44 @@ def _description(spline: CubicSpline) -> str:
     """Points, end conditions and whether the solver got there."""
     ends = f"{spline.bc_type} ends" if isinstance(spline.bc_type, str) else "own end conditions"
     words = f"{spline.t.shape[-1]} points{' each' if spline._batch else ''}, {ends}"
-    unconverged = int(np.size(spline.report.converged) - np.sum(spline.report.converged))
-    return words + (", not converged" if unconverged and not spline._batch else "")
+    factors = len(getattr(spline.space, "factors", ()))
+    if factors > _FACTORS:
+        words += f", {_FACTORS} of {factors} factors"
+    if np.all(spline.report.converged):
+        return words
+    number = f"{np.size(spline.report.converged) - np.sum(spline.report.converged)} " if spline._batch else ""
+    return f"{words}, {number}not converged"
 
 
-def _draw_rates(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """|γ'| and |∇γ'| of every curve."""
-    per = (" per s", " per s²") if curves[0].dates else ("", "")
-    speed, bend = timelines(panel, curves, [f"speed |γ′|{per[0]}", f"acceleration |∇γ′|{per[1]}"])
+    per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
+    speed, bend = timelines(panel, curves, [f"speed\n|γ′|{per[0]}", f"acceleration\n|∇γ′|{per[1]}"])
     for curve in curves:
         line = {"color": curve.color, "linewidth": 1.8 if curve.alone else 1.1}
         speed.plot(curve.times, curve.speed, **line)
         bend.plot(curve.times, curve.bend, **line)
-    top = max(curve.speed.max() for curve in curves)
-    duration = max(curve.x[-1] - curve.x[0] for curve in curves)
-    # Not below what is rounding: a curve of constant speed is shown as such.
-    _from_zero(speed, top or 1.0)
-    _from_zero(bend, max(*(curve.bend.max() for curve in curves), 1e-6 * (top or 1.0) / duration))
-
-
-def _from_zero(axes: Any, top: float) -> None:
-    axes.set_ylim(0, 1.08 * top)
+    top = max(curve.speed.max() for curve in curves) or 1.0
+    unit = top / max(curve.x[-1] - curve.x[0] for curve in curves)
+    highest = max(curve.bend.max() for curve in curves)
+    speed.set_ylim(0, 1.08 * top)
+    # The rounding of a geodesic is not blown up.
+    bend.set_ylim(0, 1.08 * (highest if highest > 1e-9 * unit else unit))
 
 
 def _of_factors(curves: Sequence[Curve]) -> Picture:
     """The pictures of a product's factors, side by side."""
     factors = curves[0].spline.space.factors  # type: ignore[attr-defined]
     shown = factors[:_FACTORS]
-    columns = min(len(shown), _IN_ROW)
-    rows = -(-len(shown) // columns)
+    rows = 1 if len(shown) <= 3 else 2
+    columns = -(-len(shown) // rows)
 
-    def draw(panel: FigureBase, curves: Sequence[Curve]) -> None:
-        cells = np.ravel(panel.subfigures(2 * rows, columns, height_ratios=[0.3, 4.8] * rows))
+    def draw(panel: SubFigure, curves: Sequence[Curve]) -> None:
+        cells = np.asarray(panel.subfigures(2 * rows, columns, height_ratios=[0.3, 4.3] * rows))
         for i, factor in enumerate(shown):
             row, column = divmod(i, columns)
-            caption, cell = cells[2 * row * columns + column], cells[(2 * row + 1) * columns + column]
+            caption, cell = cells[2 * row : 2 * row + 2, column]
             caption.text(0.5, 0.3, repr(factor), ha="center", color=INK, fontsize=12)
             picture_of(factor).draw(cell, [curve.part(i) for curve in curves])
 
-    return Picture(draw, 5.2 * columns, 5.1 * rows)
+    return Picture(draw, 4.8 * columns, 4.6 * rows)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from matplotlib.figure import FigureBase
-from matplotlib.ticker import MaxNLocator
 import numpy as np
+from matplotlib.figure import SubFigure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from .curves import Curve
 from .style import EDGE, GRID, INK, inside, plain, window
 from .timeline import timelines
 
 
-def draw_graph(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """R¹: the graph."""
     (axes,) = timelines(panel, curves, ["x"])
     for curve in curves:
@@ -22,7 +23,7 @@ def draw_graph(panel: FigureBase, curves: Sequence[Curve]) -> None:
         curve.draw_dots(axes, np.column_stack([curve.times, curve.points])[curve.knots])
 
 
-def draw_plane(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """R²: the curve, with equal scales."""
     axes = panel.add_axes(inside(panel, 0.8, 0.55, 0.25, 0.2))
     plain(axes)
@@ -33,10 +34,11 @@ def draw_plane(panel: FigureBase, curves: Sequence[Curve]) -> None:
     axes.set_aspect("equal", adjustable="datalim")
 
 
-def draw_room(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_room(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """R³: the curve in a box with equal scales, and its shadow on the floor."""
-    axes: Any = panel.add_axes(inside(panel, 0.1, 0.15, 0.35, 0.0), projection="3d")
-    middle, half = window(np.concatenate([curve.points for curve in curves]), 1.1)
+    axes: Any = panel.add_axes(inside(panel, 0.0, 0.1, 0.3, 0.0), projection="3d")
+    everything = np.concatenate([curve.points for curve in curves])
+    middle, half = window(everything, 1.1)
     half = half or 1.0
     axes.set(**{f"{a}lim": (m - half, m + half) for a, m in zip("xyz", middle, strict=True)})
     for curve in curves:
@@ -46,13 +48,22 @@ def draw_room(panel: FigureBase, curves: Sequence[Curve]) -> None:
         curve.draw_line(axes, curve.points)
         curve.draw_dots(axes, curve.spline.points)
     _light(axes)
+    spread = {azimuth: np.std(_sideways(everything, azimuth)) for azimuth in (-60, -30, 30, 60)}
+    axes.view_init(elev=24, azim=max(spread, key=spread.__getitem__))
+
+
+def _sideways(points: NDArray[np.float64], azimuth: float) -> NDArray[np.float64]:
+    """How far to the right points are, seen from an azimuth."""
+    angle = np.radians(azimuth)
+    right: NDArray[np.float64] = points[:, 1] * np.cos(angle) - points[:, 0] * np.sin(angle)
+    return right
 
 
 def _light(axes: Any) -> None:
     """White walls with faint lines."""
     axes.set_facecolor("none")
-    axes.tick_params(labelcolor=INK, labelsize=8, pad=0)
-    axes.view_init(elev=24, azim=-58)
+    axes.tick_params(color=EDGE, labelcolor=INK, labelsize=8, pad=0)
+    axes.set_box_aspect((1, 1, 1), zoom=0.9)
     for axis, label in ((axes.xaxis, "x₁"), (axes.yaxis, "x₂"), (axes.zaxis, "x₃")):
         axis.set_pane_color("white")
         axis.pane.set_edgecolor(GRID)

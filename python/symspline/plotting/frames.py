@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
+from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .curves import Curve
 from .style import AXES, INK, size
-from .timeline import timelines
+from .timeline import LEFT, RIGHT, timelines
 
 Array = NDArray[np.float64]
 
-_ROWS = 5
-_BOLD = 24
 _VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Right, up and towards the viewer, for whom the first axis points forwards and the third up."""
 
 
-def draw_quaternions(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_quaternions(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """S³: unit quaternions, scalar first, as rotations."""
     draw_frames(panel, curves, rotations)
 
@@ -38,38 +37,45 @@ def rotations(quaternions: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def draw_frames(panel: FigureBase, curves: Sequence[Curve], matrices: Callable[[Array], Array]) -> None:
+def draw_frames(panel: SubFigure, curves: Sequence[Curve], matrices: Callable[[Array], Array]) -> None:
     """The columns of rotation matrices as arrows along a time axis; the given ones bold.
 
     Args:
         matrices: makes of points the rotation matrices, shape (..., 3, 3).
     """
-    shown = [curves[i] for i in np.unique(np.linspace(0, len(curves) - 1, min(len(curves), _ROWS)).astype(int))]
-    (axes,) = timelines(panel, shown, [""], top=0.45)
-    axes.set(ylim=(-0.5, len(shown) - 0.5), yticks=[])
+    width, height = size(panel)
+    rows = np.unique(np.linspace(0, len(curves) - 1, min(len(curves), int(height // 0.8))).astype(int))
+    (axes,) = timelines(panel, curves, [""], top=0.4)
+    axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
     axes.spines["left"].set_visible(False)
-    width, height = (side * length for side, length in zip(axes.get_position().size, size(panel), strict=True))
-    length = min(0.6, 0.55 * height / len(shown))
-    for row, curve in enumerate(reversed(shown)):
-        bold, between = _places(curve, width / (0.45 * length))
-        frames = _VIEW @ matrices(curve.points)
-        _draw_arrows(axes, curve.times[between], row, length * frames[between], bold=False)
-        _draw_arrows(axes, curve.times[bold], row, length * frames[bold], bold=True)
-    handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
-    title = "axes of the frame; given ones bold" + (f"; {len(shown)} curves" if len(shown) < len(curves) else "")
-    place = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": 3, "borderaxespad": 0}
-    axes.legend(handles, ["first", "second", "third"], frameon=False, labelcolor=INK, fontsize=9, **place)
-    axes.text(0, 1.02, title, transform=axes.transAxes, color=INK, fontsize=9)
+    length = min(0.7, 0.4 * height / len(rows))
+    number = int((width - LEFT - RIGHT) / (0.5 * length))
+    for row, i in enumerate(rows):
+        bold, between = _places(curves[i], number)
+        frames = length * _VIEW @ matrices(curves[i].points)
+        _draw_arrows(axes, curves[i].times[between], -row, frames[between], bold=False)
+        _draw_arrows(axes, curves[i].times[bold], -row, frames[bold], bold=True)
+    _explain(axes, "bold: given" if len(rows) == len(curves) else f"bold: given; {len(rows)} of the curves")
 
 
-def _places(curve: Curve, number: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _places(curve: Curve, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Among the samples of a curve, knots for bold frames, and places in between for faint ones."""
     knots = np.arange(len(curve.x))[curve.knots]
-    bold = knots[:: 1 + (len(knots) - 2) // _BOLD]
-    even = np.linspace(curve.x[0], curve.x[-1], int(number))
+    bold = knots[np.unique(np.linspace(0, len(knots) - 1, min(len(knots), number)).astype(int))]
+    even = np.linspace(curve.x[0], curve.x[-1], number)
     gap = np.abs(even[:, None] - curve.x[bold]).min(axis=1)
     between = np.searchsorted(curve.x, even[gap > 0.6 * (even[1] - even[0])])
     return bold, between
+
+
+def _explain(axes: Axes, note: str) -> None:
+    """Which colour is which axis."""
+    handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
+    labels = ["first axis", "second", "third", note]
+    handles.append(Line2D([], [], linestyle="none"))
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4, "borderaxespad": 0.2}
+    look: dict[str, Any] = {"labelcolor": INK, "fontsize": 9, "handlelength": 1.2, "columnspacing": 1.2}
+    axes.legend(handles, labels, frameon=False, **place, **look)
 
 
 def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) -> None:

@@ -53,14 +53,24 @@ class View:
 
 
 def middle_of(points: Array) -> tuple[float, float]:
-    """Longitude and latitude of the place above which points, shape (m, 3), are seen well."""
-    mean = points.mean(axis=0)
-    if np.linalg.norm(mean) < 0.2:
-        # All around: oblique to the plane that comes closest to the points.
+    """Longitude and latitude of the place above which points, shape (m, 3), are seen well.
+
+    The middle of the smallest circle around them, their mean if they do not fit into one half of the globe, or,
+    where they are all around, a place from which the plane closest to them is seen obliquely.
+    """
+    points = points[:: 1 + len(points) // 2000]
+    middle = points.mean(axis=0)
+    for i in range(2, 200):
+        # Bădoiu and Clarkson (2003): ever shorter steps to the farthest point.
+        middle = middle + (points[np.square(points - middle).sum(axis=1).argmax()] - middle) / i
+    if np.linalg.norm(middle) < 0.25:
+        middle = points.mean(axis=0)
+    if np.linalg.norm(middle) < 0.25:
         normal = np.linalg.svd(points, full_matrices=False)[2][2]
-        start = points[0] - (points[0] @ normal) * normal
-        mean = start / np.linalg.norm(start) + (0.6 if normal[2] >= 0 else -0.6) * normal
-    lon, lat = to_lonlat(mean)
+        middle = middle + 0.2 * points[0]
+        middle -= (middle @ normal) * normal
+        middle = middle / np.linalg.norm(middle) + (0.6 if normal[2] >= 0 else -0.6) * normal
+    lon, lat = to_lonlat(middle)
     return float(lon), float(lat)
 
 
@@ -90,20 +100,21 @@ def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:
     """
     (west, south), (east, north) = middle - half, middle + half
     lon, lat = (float(value) for value in to_lonlat(view.up))
-    reach = np.degrees(np.arcsin(min(1.0, float(np.linalg.norm(middle)) + 1.45 * half)))
-    around = 180.0 if abs(lat) + reach > 80 else reach / np.cos(np.radians(abs(lat) + reach))
-    spacing = _nice(np.degrees(2 * half) / 5)
-    parallels = _multiples(spacing, max(lat - reach, -90), min(lat + reach, 90))
-    meridians = _multiples(_nice(spacing / np.cos(np.radians(min(abs(lat), 85)))), lon - around, lon + around)
+    reach = np.arcsin(min(1.0, float(np.linalg.norm(middle)) + 1.45 * half))
+    aside = np.sin(reach) / np.cos(np.radians(lat))
+    around = np.degrees(np.arcsin(aside)) if aside < 1 else 180.0
+    reach = np.degrees(reach)
+    parallels = _multiples(_nice(np.degrees(2 * half) / 5), max(lat - reach, -90), min(lat + reach, 90))
+    meridians = _multiples(_nice(around / 3.5) if around < 180 else 30, lon - around, lon + around)
     steps = np.linspace(-1, 1, 721)
     bottom = [view.visible(from_lonlat(x, np.clip(lat + reach * steps, -90, 90))) for x in meridians]
     left = [view.visible(from_lonlat(lon + around * steps, y)) for y in parallels]
     for line in (*bottom, *left):
         axes.plot(*line.T, color=GRID, linewidth=0.7, zorder=2)
-    axes.set_xticks(*_labels([_crossings(line, south) for line in bottom], meridians, "E", "W", west, east))
-    axes.set_yticks(
-        *_labels([_crossings(line[:, ::-1], west) for line in left], parallels, "N", "S", south, north)
-    )
+    crossed = [_crossings(line, south) for line in bottom]
+    axes.set_xticks(*_labels(crossed, meridians, "E", "W", west, east))
+    crossed = [_crossings(line[:, ::-1], west) for line in left]
+    axes.set_yticks(*_labels(crossed, parallels, "N", "S", south, north))
     axes.set(aspect="equal", xlim=(west, east), ylim=(south, north), facecolor=PAPER)
     axes.tick_params(length=0, labelcolor=INK)
 
@@ -124,24 +135,22 @@ def _crossings(line: Array, level: float) -> Array:
     above = line[:, 1] > level
     (i,) = np.nonzero((above[1:] != above[:-1]) & np.isfinite(line[1:, 1] - line[:-1, 1]))
     share = (level - line[i, 1]) / (line[i + 1, 1] - line[i, 1])
-    return line[i, 0] + share * (line[i + 1, 0] - line[i, 0])
+    crossed: Array = line[i, 0] + share * (line[i + 1, 0] - line[i, 0])
+    return crossed
 
 
 def _labels(
     crossings: Iterable[Array], values: Iterable[float], positive: str, negative: str, low: float, high: float
 ) -> tuple[list[float], list[str]]:
-    """Ticks and their labels, those left out that would come too close to another."""
-    found = sorted(
-        (float(place), value)
-        for places, value in zip(crossings, values, strict=True)
-        for place in places
-        if low <= place <= high
-    )
-    kept: list[tuple[float, float]] = []
-    for place, value in found:
-        if not kept or place - kept[-1][0] > 0.08 * (high - low):
-            kept.append((place, value))
-    return [place for place, _ in kept], [degrees(value, positive, negative) for _, value in kept]
+    """Ticks and their labels, without those that would come too close to another."""
+    pairs = zip(crossings, values, strict=True)
+    found = sorted((float(x), degrees(value, positive, negative)) for places, value in pairs for x in places)
+    kept: list[tuple[float, str]] = []
+    for x, label in found:
+        room = (0.02 + (0.018 * len(label) if positive == "E" else 0.03)) * (high - low)
+        if low <= x <= high and (not kept or x - kept[-1][0] > room):
+            kept.append((x, label))
+    return [x for x, _ in kept], [label for _, label in kept]
 
 
 def degrees(value: float, positive: str, negative: str) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from matplotlib.figure import FigureBase
+from matplotlib.figure import SubFigure
 
 from ..spaces import Space
 from .components import draw_components
@@ -28,7 +28,7 @@ class Picture(NamedTuple):
             wider than high there is no room for speed and acceleration: they go below.
     """
 
-    draw: Callable[[FigureBase, Sequence[Curve]], None]
+    draw: Callable[[SubFigure, Sequence[Curve]], None]
     width: float = 5.2
     height: float = 5.2
 
@@ -39,7 +39,7 @@ _PICTURES = {
     "euclidean:3": Picture(draw_room),
     "sphere:1": Picture(draw_angle, 10.5, 3.2),
     "sphere:2": Picture(draw_sphere, 11.4, 4.6),
-    "sphere:3": Picture(draw_quaternions, 10.5, 2.9),
+    "sphere:3": Picture(draw_quaternions, 10.5, 2.7),
     "hyperbolic:2": Picture(draw_disk),
 }
 _OTHERS = Picture(draw_components, 10.5, 3.8)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import FigureBase
+from matplotlib.axes import Axes
+from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
 from ..lonlat import to_lonlat
@@ -21,7 +23,7 @@ _POLE = 60
 """Neighbouring samples whose longitudes differ by more have the pole between them."""
 
 
-def draw_angle(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_angle(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """S¹: the angle against time, without jumps."""
     (axes,) = timelines(panel, curves, ["angle, degrees"])
     for curve in curves:
@@ -31,41 +33,47 @@ def draw_angle(panel: FigureBase, curves: Sequence[Curve]) -> None:
         curve.draw_dots(axes, graph[curve.knots])
 
 
-def draw_sphere(panel: FigureBase, curves: Sequence[Curve]) -> None:
+def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """S²: a globe and, if there is room, a map of all longitudes and latitudes."""
+    draw_ball(panel, curves, lambda points: points)
     width, height = size(panel)
-    room = min(width, height)
-    draw_ball(panel, curves, room)
     if width > 2 * height:
-        _draw_map(panel, curves, room)
+        _draw_map(panel, curves, height)
 
 
-def draw_ball(panel: FigureBase, curves: Sequence[Curve], room: float) -> None:
-    """Curves on a globe in the left of a panel, dashed on its far side; where they are small, a part of it.
+def draw_ball(panel: SubFigure, curves: Sequence[Curve], vectors: Callable[[Any], Array]) -> None:
+    """Curves on a globe in the left of a panel, dashed on its far side.
 
     Args:
-        room: width of what may be used of the panel, in inches.
+        vectors: makes of points unit vectors, shape (..., 3).
     """
-    everything = np.concatenate([curve.points for curve in curves])
-    view = View.above(*middle_of(everything))
-    far = np.arctan2(np.linalg.norm(view.flat(everything), axis=-1), everything @ view.up).max()
+    lines = [vectors(curve.points) for curve in curves]
+    axes, view = _globe(panel, np.concatenate(lines))
+    for curve, line in zip(curves, lines, strict=True):
+        given = vectors(curve.spline.points)
+        curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
+        curve.draw_line(axes, view.visible(line))
+        curve.draw_dots(axes, view.hidden(given), alpha=0.35)
+        curve.draw_dots(axes, view.visible(given))
+
+
+def _globe(panel: SubFigure, points: Array) -> tuple[Axes, View]:
+    """A globe turned towards points or, where they are close together, a part of it."""
+    view = View.above(*middle_of(points))
+    far = np.arctan2(np.linalg.norm(view.flat(points), axis=-1), points @ view.up).max()
     width, height = size(panel)
+    room = min(width, height)
     if 1e-7 < far < _SMALL:
-        side = min(room - 0.9, height - 0.7)
-        axes = panel.add_axes((0.8 / width, 0.5 / height, side / width, side / height))
-        draw_frame(axes, view, *window(view.flat(everything), 1.22))
-        axes.tick_params(labelsize=9)
+        axes = panel.add_axes(inside(panel, 0.95, 0.5, width - room + 0.2, height - room + 0.65))
+        draw_frame(axes, view, *window(view.flat(points), 1.22))
+        axes.tick_params(labelsize=8)
     else:
-        side = min(room, height) - 0.2
-        axes = panel.add_axes((0.5 * (room - side) / width, 0.5 - 0.5 * side / height, side / width, side / height))
+        axes = panel.add_axes(inside(panel, 0.1, 0.1, width - room + 0.1, 0.1))
         draw_globe(axes, view, 15)
-    for curve in curves:
-        curve.draw_line(axes, view.hidden(curve.points), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
-        curve.draw_line(axes, view.visible(curve.points))
-        curve.draw_dots(axes, view.visible(curve.spline.points))
+    return axes, view
 
 
-def _draw_map(panel: FigureBase, curves: Sequence[Curve], left: float) -> None:
+def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float) -> None:
     axes = panel.add_axes(inside(panel, left + 0.65, 0.5, 0.3, 0.2))
     plain(axes)
     axes.set(aspect="equal", xlim=(-180, 180), ylim=(-90, 90), facecolor=PAPER, label="map")
@@ -77,7 +85,7 @@ def _draw_map(panel: FigureBase, curves: Sequence[Curve], left: float) -> None:
     for curve in curves:
         places = lonlat_of(curve.points)
         curve.draw_line(axes, broken(places))
-        curve.draw_dots(axes, places[curve.knots])
+        curve.draw_dots(axes, places[curve.knots], clip_on=False, markersize=4.5)
 
 
 def lonlat_of(points: Array) -> Array:

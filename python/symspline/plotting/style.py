@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import colormaps, dates
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -19,6 +19,8 @@ AXES = ["#d55e00", "#009e73", "#0072b2"]
 """Red, green and blue for the axes of a frame, in shades that colour-blind readers tell apart."""
 HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
 DPI = 150
+DATES: Any = dates
+"""The module of matplotlib, which has no types."""
 
 
 def colors(number: int) -> list[Any]:
@@ -32,13 +34,13 @@ def heading(figure: Figure, title: str, subtitle: str, height: float) -> None:
     figure.text(0.03, height - 0.3 / figure.get_figheight(), subtitle, color=INK, fontsize=12)
 
 
-def size(panel: FigureBase) -> tuple[float, float]:
+def size(panel: SubFigure) -> tuple[float, float]:
     """Width and height in inches."""
-    return panel.bbox.width / panel.get_figure(root=True).dpi, panel.bbox.height / panel.get_figure(root=True).dpi
+    return panel.bbox.width / panel.dpi, panel.bbox.height / panel.dpi
 
 
 def inside(
-    panel: FigureBase, left: float, bottom: float, right: float, top: float
+    panel: SubFigure, left: float, bottom: float, right: float, top: float
 ) -> tuple[float, float, float, float]:
     """The rectangle, for ``add_axes``, with these margins in inches."""
     width, height = size(panel)

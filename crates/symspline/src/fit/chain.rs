@@ -9,6 +9,7 @@
 
 use crate::scalar::{LANES, Lane, gather, lane, max_or_nan};
 use crate::space::Space;
+use crate::with_size;
 
 /// After this many steps the rounding errors of a frame are removed, which costs the cube of the
 /// dimension: one step costs its square.
@@ -66,11 +67,10 @@ impl Walker {
 
     /// One node on; returns the deciding angle of the chord.
     #[inline(always)]
-    fn advance<M: Space>(&mut self, space: &M, runs: &[Run; LANES], chord: &mut [Lane]) -> Lane {
+    fn advance<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize, chord: &mut [Lane]) -> Lane {
         self.node += 1;
-        let len = self.p.len();
-        gather(runs.map(|r| r.point(self.node, len)), &mut self.q);
-        let angle = space.step(&mut self.frame, &self.p, &self.q, chord);
+        gather(runs.map(|r| r.point(self.node, len)), &mut self.q[..len]);
+        let angle = space.step(&mut self.frame, &self.p[..len], &self.q[..len], chord);
         std::mem::swap(&mut self.p, &mut self.q);
         if self.node.is_multiple_of(tidy_every(chord.len())) {
             space.tidy(&mut self.frame, &self.p);
@@ -143,10 +143,19 @@ impl Chain {
         self.start.0.clone_from(&self.walker.frame);
         self.start.1.clone_from(&self.walker.p);
         self.read_end(space, 0, ends[0]);
-        for i in 0..n {
+        with_size!(len, len => self.walk(space, runs, len, limit));
+        self.max_step = self.max_step.sqrt() / self.scale;
+        self.read_end(space, 1, ends[1]);
+    }
+
+    /// Goes along the polygon and keeps its chords.
+    #[inline(always)]
+    fn walk<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize, limit: Lane) {
+        let (m, keep) = (self.m, space.chord_len());
+        for i in 0..self.n {
             self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i)));
             let d = &mut self.chord[i * m..(i + 1) * m];
-            let angle = self.walker.advance(space, runs, d);
+            let angle = self.walker.advance(space, runs, len, d);
             if M::SCALES {
                 d.iter_mut().for_each(|x| *x *= self.scale);
             }
@@ -162,8 +171,6 @@ impl Chain {
                 }
             }
         }
-        self.max_step = self.max_step.sqrt() / self.scale;
-        self.read_end(space, 1, ends[1]);
     }
 
     /// The prescribed vector at an end, in the frame there; the walker must stand at that end.
@@ -191,24 +198,31 @@ impl Chain {
     }
 
     /// Hands out the velocities as ambient tangent vectors, node by node.
-    pub fn roll_up<M: Space>(
+    pub fn roll_up<M: Space>(&mut self, space: &M, runs: &[Run; LANES], visit: impl FnMut(usize, &[Lane])) {
+        with_size!(space.point_len(), len => self.walk_again(space, runs, len, visit));
+    }
+
+    #[inline(always)]
+    fn walk_again<M: Space>(
         &mut self,
         space: &M,
         runs: &[Run; LANES],
+        len: usize,
         mut visit: impl FnMut(usize, &[Lane]),
     ) {
         let m = self.m;
         self.walker.start(space, runs);
         for i in 0..=self.n {
             let Walker { frame, p, .. } = &self.walker;
-            space.tangent(frame, p, &self.u[i * m..(i + 1) * m], &mut self.ambient);
+            let ambient = &mut self.ambient[..len];
+            space.tangent(frame, &p[..len], &self.u[i * m..(i + 1) * m], ambient);
             if M::SCALES {
-                self.ambient.iter_mut().for_each(|x| *x /= self.scale);
+                ambient.iter_mut().for_each(|x| *x /= self.scale);
             }
-            visit(i, &self.ambient);
+            visit(i, ambient);
             if i < self.n {
                 // The chords are known; the residual is no longer needed and takes them.
-                self.walker.advance(space, runs, &mut self.r[..m]);
+                self.walker.advance(space, runs, len, &mut self.r[..m]);
             }
         }
     }

@@ -11,7 +11,7 @@ use super::solve::{Workspace, solve};
 use super::{End, Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{LANES, Lane, lane, mask_from};
+use crate::scalar::{LANES, Lane, lane, mask_from, scatter};
 use crate::space::Space;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -305,18 +305,16 @@ fn long_legs<M: Space>(space: &M, chain: &Chain, leg: Lane) -> [Option<(usize, f
 
 fn write_velocities<M: Space>(space: &M, chain: &mut Chain, runs: &[Run; LANES], group: &mut [Piece]) {
     let len = space.point_len();
+    let mut rows = vec![0.0; LANES * len];
     chain.roll_up(space, runs, |i, u| {
-        for (l, p) in group.iter_mut().enumerate() {
-            let out = if p.core.contains(&i) {
+        scatter(u, &mut rows);
+        for (p, row) in group.iter_mut().zip(rows.chunks_exact(len)) {
+            if p.core.contains(&i) {
                 let at = (i - p.core.start) * len;
-                &mut p.velocities[at..at + len]
+                p.velocities[at..at + len].copy_from_slice(row);
             } else if i == p.core.end {
-                p.next_velocity.resize(len, 0.0);
-                &mut p.next_velocity[..]
-            } else {
-                continue;
-            };
-            out.iter_mut().zip(u).for_each(|(out, u)| *out = u.as_array()[l]);
+                p.next_velocity.extend_from_slice(row);
+            }
         }
     });
 }

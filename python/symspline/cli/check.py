@@ -1,0 +1,116 @@
+"""``symspline check``: whether curves are what they should be."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._pieces import is_closed, spline_pieces
+from ..product import ProductSpline
+from ..spaces import Hyperbolic, Space
+from ..spline import CubicSpline
+from .curves import read_curves
+from .errors import Failure, listed
+
+SUMMARY = "measure how well curves interpolate and how smooth they are"
+DESCRIPTION = """\
+Measure how well curves interpolate, and how smooth they are. Every segment is evaluated on its own, so that
+the values from both sides of a knot know nothing of each other. The table has
+
+  distance      the largest distance of the curve from its points
+  position      the largest jump of the curve at a knot, relative to the largest length of its array
+  velocity      the largest jump of the velocity, relative to the largest velocity
+  acceleration  the largest jump of the covariant acceleration, relative to the largest one
+
+A jump of the k-th derivative may be 1e-12 of the largest value, and 100 eps / h^k for rounding, where h is the
+shorter of the two segments; far out in hyperbolic space, |p|^2 as much. With a larger one the check fails, and
+the exit code is 1."""
+EPILOG = """\
+example:
+  symspline check storms.npz"""
+
+MEASURES = ("distance", "position", "velocity", "acceleration")
+_RELATIVE = 1e-12
+_ROUNDING = 100 * float(np.finfo(np.float64).eps)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``symspline check``."""
+    parser.add_argument("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, print and judge."""
+    curves = read_curves(options.curves)
+    width = max(len("curve"), *map(len, curves.splines)) if curves.named else 0
+    print(_line(width, "curve", "points", *MEASURES))
+    failed = []
+    for name, spline in curves.splines.items():
+        found = measure(spline)
+        print(_line(width, name, len(spline.t), *(f"{value:.1e}" for value in found.values)))
+        if not found.excess <= 1:
+            failed.append(name)
+    if failed:
+        which = (
+            f"{len(failed)} of {len(curves.splines)} curves: {listed(failed)}"
+            if curves.named
+            else "the curve"
+        )
+        raise Failure(f"{options.curves}: more than rounding allows in {which}")
+    print("All is within what rounding allows.")
+    return 0
+
+
+def _line(width: int, name: str, *cells: object) -> str:
+    first = f"{name:{width}}  " if width else ""
+    return first + f"{cells[0]:>8}" + "".join(f"{cell:>14}" for cell in cells[1:])
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was measured on a curve.
+
+    Attributes:
+        values: the numbers of the table.
+        excess: the largest of them divided by what is allowed.
+    """
+
+    values: tuple[float, ...]
+    excess: float
+
+
+def measure(spline: CubicSpline) -> Found:
+    """Distance from the points, and jumps at the knots; of a curve in a product, in its worst factor."""
+    parts = spline._parts if isinstance(spline, ProductSpline) else (spline,)
+    found = [_measure(part) for part in parts]
+    values = np.max([part.values for part in found], axis=0)
+    return Found(tuple(values.tolist()), float(np.max([part.excess for part in found])))
+
+
+def _measure(spline: CubicSpline) -> Found:
+    if not np.isfinite(spline.velocities).all():
+        return Found((np.nan,) * len(MEASURES), np.inf)
+    pieces = spline_pieces(spline)
+    closed = is_closed(spline)
+    steps = np.diff(spline._times)
+    shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
+    rounding = _ROUNDING * _condition(spline.space, spline.points)
+    distance = float(spline.space.distance(pieces.at(pieces.t), pieces.points).max())
+    values, excess = [distance], [distance / (_RELATIVE + rounding)]
+    for nu in range(3):
+        jumps = pieces.jumps(nu, closed)
+        allowed = _RELATIVE * jumps.largest + rounding / shorter**nu
+        values.append(jumps.relative)
+        excess.append(float((jumps.size / allowed).max(initial=0.0)))
+    return Found(tuple(values), max(excess))
+
+
+def _condition(space: Space, points: NDArray[np.float64]) -> float:
+    """By how much rounding counts near these points."""
+    if isinstance(space, Hyperbolic):
+        return float(np.square(points).sum(axis=-1).max())
+    return max(1.0, float(np.abs(points).max()))

@@ -1,0 +1,124 @@
+"""Files of curves, with the names that columns had in the table they were fitted to."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from ..files import load, load_many, save, save_many
+from ..spaces import Space
+from ..spline import CubicSpline
+from .errors import Problem, reading, writing
+from .points import LONLAT, labels, require_globe
+
+ENDING = (".npz",)
+_COLUMNS = "columns"
+"""The entry of the file with the columns, which the library does not look at."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of columns.
+
+    Attributes:
+        points: of the numbers of a point.
+        time, curve: of times and of names of curves.
+        lonlat: whether points are longitude and latitude in degrees.
+        utc: whether times are written with a Z.
+    """
+
+    points: list[str]
+    time: str = "time"
+    curve: str = "curve"
+    lonlat: bool = False
+    utc: bool = False
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Curves of one space.
+
+    Attributes:
+        splines: by name.
+        named: whether the names mean something: not for a single curve.
+        columns: how they are called in tables.
+    """
+
+    splines: dict[str, CubicSpline]
+    named: bool
+    columns: Columns
+
+    @property
+    def space(self) -> Space:
+        """The space."""
+        return next(iter(self.splines.values())).space
+
+    def called(self, name: str) -> str:
+        """How a message calls a curve."""
+        return f"curve {name!r}" if self.named else "the curve"
+
+
+def write_curves(path: Path, curves: Curves) -> None:
+    """Write curves to a file that `symspline.load` or `symspline.load_many` reads, too."""
+    with writing(path) as temporary:
+        with open(temporary, "wb") as file:
+            if curves.named:
+                save_many(curves.splines, file)
+            else:
+                save(next(iter(curves.splines.values())), file)
+        columns = np.array(json.dumps(asdict(curves.columns)))
+        with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
+            np.lib.format.write_array(entry, columns)
+
+
+def read_curves(path: Path, lonlat: bool = False) -> Curves:
+    """The curves in a file of ``symspline fit``, `CubicSpline.save` or `symspline.save_many`.
+
+    Args:
+        path: the file.
+        lonlat: whether to write longitudes and latitudes, also if the file does not say so.
+    """
+    with reading(path), open(path, "rb") as file:
+        if not zipfile.is_zipfile(file):
+            raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes")
+        file.seek(0)
+        entries = zipfile.ZipFile(file).namelist()
+        file.seek(0)
+        if "names.npy" in entries:
+            splines, named = load_many(file), True
+        else:
+            splines = dict(_singles(load(file)))
+            named = len(splines) > 1
+        space = next(iter(splines.values())).space
+        if lonlat:
+            require_globe(space)
+        file.seek(0)
+        columns = _columns(path, file) if f"{_COLUMNS}.npy" in entries else None
+    if columns is None:
+        columns = Columns(labels(space))
+    if lonlat and not columns.lonlat:
+        columns = replace(columns, points=LONLAT, lonlat=True)
+    return Curves(splines, named, columns)
+
+
+def _columns(path: Path, file: BinaryIO) -> Columns:
+    with np.load(file, allow_pickle=False) as archive:
+        try:
+            return Columns(**json.loads(str(archive[_COLUMNS])))
+        except (ValueError, TypeError) as error:
+            raise Problem(f"{path} is damaged: {error}") from None
+
+
+def _singles(spline: CubicSpline, name: str = "") -> Iterator[tuple[str, CubicSpline]]:
+    """The curves of a batch, named by their numbers."""
+    if not spline._batch:
+        yield name, spline
+        return
+    for i, part in enumerate(spline):
+        yield from _singles(part, f"{name},{i}" if name else str(i))

@@ -1,0 +1,107 @@
+"""The rows of a table as curves to fit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from ..spaces import Space
+from .errors import Problem
+from .points import from_degrees, onto, unflatten
+from .tables import Rows
+
+Groups = Mapping[str, NDArray[np.int64]]
+
+# What helps in Python only.
+_ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter")
+
+
+class Data:
+    """Rows, curve by curve.
+
+    Attributes:
+        groups: names of the curves, in the order in which they begin, and the rows of each.
+    """
+
+    def __init__(self, path: Path, rows: Rows) -> None:
+        self._path = path
+        self._rows = rows
+        self.groups = group(rows)
+        for name, own in self.groups.items():
+            self._check_curve(name, own)
+
+    def curves(self, space: Space, lonlat: bool) -> list[tuple[Any, Any]]:
+        """Times and points of every curve."""
+        times = self._rows.times
+        points = self._places() if lonlat else self._points(space)
+        return [(times[own] if times.size else None, _picked(points, own)) for own in self.groups.values()]
+
+    def located(self, message: str) -> str:
+        """A message of the library, with lines of the file and names of curves instead of numbers."""
+        found = re.search(r"\bcurve (\d+)", message)
+        name = list(self.groups)[int(found[1]) if found else 0]
+        own = self.groups[name]
+        message = re.sub(
+            r"points\[(\d+)\]", lambda m: f"the point in {self._rows.place(own[int(m[1])])}", message
+        )
+        called = f"curve {name!r}" if self._rows.labels is not None else "the curve"
+        message = message.replace(found[0], called) if found else message
+        of_file = f"{self._path}: " if found else ""
+        return of_file + _ADVICE.sub("", message)
+
+    def _points(self, space: Space) -> Any:
+        try:
+            return onto(space, unflatten(space, self._rows.numbers))
+        except ValidationError as error:
+            text = re.sub(
+                r"^point (\d+)", lambda m: f"the point in {self._rows.place(int(m[1]))}", str(error)
+            )
+            raise Problem(f"{self._path}: {_ADVICE.sub('', text)}") from None
+
+    def _places(self) -> NDArray[np.float64]:
+        degrees = self._rows.numbers
+        off = np.flatnonzero(np.abs(degrees[:, 1]) > 90)
+        if off.size:
+            where = self._rows.place(off[0])
+            raise Problem(
+                f"{self._path}, {where}: latitude {degrees[off[0], 1]:g} is not between -90 and 90 degrees; "
+                "say with --columns LON,LAT which column is which"
+            )
+        return from_degrees(degrees)
+
+    def _check_curve(self, name: str, own: NDArray[np.int64]) -> None:
+        """Raise `Problem` unless there are two points, and their times increase."""
+        of = f" of curve {name!r}" if self._rows.labels is not None else ""
+        if len(own) < 2:
+            where = f", {self._rows.place(own[0])}" if len(own) else ""
+            raise Problem(f"{self._path}{where}: this is the only point{of}; a curve needs two")
+        if not self._rows.times.size:
+            return
+        times = self._rows.times[own]
+        bad = np.flatnonzero(~(times[1:] > times[:-1]))
+        if bad.size:
+            before, here = (self._rows.place(own[i]) for i in (bad[0], bad[0] + 1))
+            raise Problem(
+                f"{self._path}, {here}: time {times[bad[0] + 1]}{of} does not come after {times[bad[0]]} in {before}; "
+                "times must increase"
+            )
+
+
+def group(rows: Rows) -> Groups:
+    """The rows of every curve, which is the one curve "" if rows have no labels."""
+    if rows.labels is None:
+        return {"": np.arange(len(rows.numbers))}
+    codes: dict[str, int] = {}
+    of_row = np.array([codes.setdefault(label, len(codes)) for label in rows.labels], dtype=np.int64)
+    order = np.argsort(of_row, kind="stable")
+    return dict(zip(codes, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True))
+
+
+def _picked(points: Any, own: NDArray[np.int64]) -> Any:
+    return tuple(part[own] for part in points) if isinstance(points, tuple) else points[own]

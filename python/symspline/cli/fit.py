@@ -1,0 +1,147 @@
+"""``symspline fit``: a table of points becomes a file of curves."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from .._core import ConvergenceError, CutLocusError, ValidationError
+from ..spaces import Space
+from ..spaces import space as space_named
+from ..spline import CubicSpline, fit_many
+from .curves import ENDING, Curves, write_curves
+from .data import Data
+from .errors import Problem, check_target
+from .points import GLOBE, require_globe
+from .progress import Progress
+from .roles import named_columns, point_columns, time_column
+from .tables import ending, open_table
+
+SUMMARY = "fit C2 splines to the points in a table"
+DESCRIPTION = """\
+Fit C2 splines to the points in a table: CSV, NPZ or Parquet, by the ending of its name.
+
+Every row is a point at a time. Columns of a CSV file are named in its first line; blank lines are skipped.
+Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or 2021-08-29T16:55:00.5+02:00, all
+written in the same way; those with Z or an offset become UTC, and rates are per second. The numbers of a
+point stand in columns in the order of its array: a matrix row by row, complex numbers as A_re, A_im. Points
+that are off the space by no more than 1e-4, as rounding in a file makes them, are moved onto it. In an NPZ
+file columns are arrays with one entry a row; an array `points` may hold all numbers of the points."""
+EPILOG = """\
+examples:
+  symspline fit track.csv --lonlat -o track.npz
+  symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
+  symspline fit attitude.parquet --space sphere:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
+
+symspline.load reads the curve in Python; with --curve, symspline.load_many reads all of them."""
+
+_EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``symspline fit``."""
+    add = parser.add_argument
+    add("input", type=Path, metavar="IN", help="table to read: .csv, .npz or .parquet")
+    add("--space", metavar="S", help="such as sphere:2, hyperbolic:3 or 'sphere:3 x euclidean:3'")
+    add("--time", metavar="COL", help="column of times (default: t or time; if there is none, 0, 1, 2, ...)")
+    add("--columns", metavar="A,B,...", help="columns of a point (default: all others that hold numbers)")
+    add("--curve", metavar="COL", help="column of names: rows with one name are one curve, in their order")
+    add(
+        "--lonlat",
+        action="store_true",
+        help="points are longitude and latitude in degrees, in columns lon and lat, or longitude and "
+        "latitude, or the two --columns; the space is sphere:2",
+    )
+    add(
+        "--bc-type",
+        default="natural",
+        metavar="END",
+        help="natural (default), not-a-knot, clamped, periodic; "
+        "or two of the first three with a comma, for start and end",
+    )
+    add("--method", default="auto", metavar="M", help="auto (default), quasi-newton or fixed-point")
+    add(
+        "--tol",
+        type=float,
+        default=1e-12,
+        help="relative C2 defect that counts as converged (default: 1e-12)",
+    )
+    add(
+        "--extrapolate",
+        choices=_EXTRAPOLATE,
+        help="the curve outside its times: the last segment continued, a geodesic at constant speed, "
+        "or the same again (default: there is none)",
+    )
+    add("-o", dest="output", type=Path, metavar="OUT", required=True, help="file of curves to write: .npz")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, fit and write."""
+    ending(options.output, ENDING, "a file of curves")
+    check_target(options.output)
+    space = _space(options.space, options.lonlat)
+    table = open_table(options.input)
+    curve = table.require(options.curve) if options.curve is not None else None
+    time = time_column(table, options.time, [curve])
+    points = point_columns(table, options.columns, [time, curve], space, options.lonlat)
+    with Progress("reading") as progress:
+        rows = table.read(points, time, curve, progress)
+    splines = _fit(Data(table.path, rows), space, options)
+    columns = replace(named_columns(points, time, curve, options.lonlat), utc=rows.utc)
+    write_curves(options.output, Curves(splines, curve is not None, columns))
+    print(f"{options.output}: {_summary(list(splines.values()))}")
+    return 0
+
+
+def _space(name: str | None, lonlat: bool) -> Space:
+    if name is None and not lonlat:
+        raise Problem("say which space the points are on with --space, such as --space sphere:2")
+    space = GLOBE if name is None else space_named(name)
+    if lonlat:
+        require_globe(space)
+    return space
+
+
+def _fit(data: Data, space: Space, options: argparse.Namespace) -> dict[str, CubicSpline]:
+    """All curves in one call."""
+    bc_type = _bc_type(options.bc_type)
+    try:
+        with Progress("fitting") as progress:
+            fitted = fit_many(
+                data.curves(space, options.lonlat),
+                space,
+                bc_type=bc_type,
+                method=options.method,
+                tol=options.tol,
+                extrapolate=_EXTRAPOLATE.get(options.extrapolate),
+                progress=progress,
+            )
+    except (ValidationError, CutLocusError, ConvergenceError) as error:
+        raise type(error)(data.located(str(error))) from None
+    return dict(zip(data.groups, fitted, strict=True))
+
+
+def _bc_type(text: str) -> str | tuple[str, ...]:
+    words = tuple(word.strip() for word in text.split(","))
+    if words == ("periodic",) or (
+        len(words) in (1, 2) and set(words) <= {"natural", "not-a-knot", "clamped"}
+    ):
+        return words[0] if len(words) == 1 else words
+    raise Problem(
+        f"--bc-type {text}: give natural, not-a-knot, clamped or periodic, or two of the first three with a comma"
+    )
+
+
+def _summary(splines: Sequence[CubicSpline]) -> str:
+    points = sum(len(spline.t) for spline in splines)
+    reports = [spline.report for spline in splines]
+    iterations, residual = max(r.iterations for r in reports), max(r.residual for r in reports)
+    curves = f"{len(splines)} curve{'s' if len(splines) > 1 else ''}"
+    most = "at most " if len(splines) > 1 else ""
+    return (
+        f"{curves} through {points} points of {splines[0].space}, converged: {reports[0].method}, "
+        f"{most}{iterations} iterations, residual {most}{residual:.1e}"
+    )

@@ -1,0 +1,197 @@
+"""``symspline sample``: a file of curves becomes a table."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._pieces import is_closed
+from ..spline import CubicSpline
+from .curves import Curves, read_curves
+from .data import Groups, group
+from .errors import Problem, check_target, did_you_mean
+from .points import flatten, motion_degrees, motion_labels, to_degrees
+from .progress import Progress
+from .roles import time_column
+from .tables import ENDINGS, Rows, Table, ending, open_table, write_table
+from .times import Times, every, spread
+
+SUMMARY = "make a table of points along curves"
+DESCRIPTION = """\
+Make a table of points along curves: CSV, NPZ or Parquet, by the ending of its name. Columns are the time, the
+name of the curve if there are several, and the numbers of the point, named as in the table that was
+fitted, or x0, x1, ... in the order of its array; with --nu 1 the velocity, x0_d1, ..., and with --nu 2
+the covariant acceleration, x0_d2, ..., per unit of time, which is a second for dates. For longitude and
+latitude these are east_d1, north_d1, ..., in degrees of arc."""
+EPILOG = """\
+examples:
+  symspline sample track.npz --every 10min -o track.csv
+  symspline sample attitude.npz -n 1000 --nu 0,1,2 -o attitude.parquet
+  symspline sample storms.npz --at satellites.csv --nu 0,1 -o storms.csv
+
+--at reads the column of times of the table that was fitted, or t or time; if the file also has the column of
+the curves' names, every row is for its curve, else for all."""
+
+# Samples at a time.
+_CHUNK = 100_000
+_MOST = 10**9
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``symspline sample``."""
+    add = parser.add_argument
+    add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument(
+        "--every",
+        metavar="DT",
+        help="from the start in steps: a number in the unit of the times, seconds for dates; or for dates "
+        "a duration in ns, us, ms, s, min, h or d",
+    )
+    which.add_argument("-n", dest="number", type=int, metavar="N", help="so many, from the start to the end")
+    which.add_argument(
+        "--at", type=Path, metavar="FILE", help="at the times in a table: .csv, .npz or .parquet"
+    )
+    add(
+        "--nu",
+        default="0",
+        metavar="0,1,2",
+        help="points (0, the default), velocities (1), accelerations (2)",
+    )
+    add("--lonlat", action="store_true", help="write longitude and latitude, also of curves fitted otherwise")
+    add("-o", dest="output", type=Path, metavar="OUT", required=True, help="table to write")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Evaluate, and write the table."""
+    ending(options.output, ENDINGS, "a table")
+    check_target(options.output)
+    orders = _orders(options.nu)
+    curves = read_curves(options.curves, options.lonlat)
+    if options.at is not None:
+        times, rows = _given(options.at, curves)
+    else:
+        times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
+        rows = None
+    names = _names(curves, orders)
+    with Progress("sampling") as progress:
+        values = _values(curves, times, orders, progress)
+    columns: list[NDArray[Any]] = [np.concatenate(list(times.values())), *values.T]
+    if curves.named:
+        columns.insert(1, np.repeat(list(times), [len(x) for x in times.values()]))
+    if rows is not None:
+        columns = [column[np.argsort(rows)] for column in columns]
+    write_table(options.output, dict(zip(names, columns, strict=True)), curves.columns.utc)
+    print(f"{options.output}: {len(values)} rows")
+    return 0
+
+
+# ---- times ----
+
+
+def _along(knots: Times, options: argparse.Namespace) -> Times:
+    if options.every is not None:
+        return every(options.every, knots)
+    if not 1 <= options.number <= _MOST:
+        raise Problem(f"-n {options.number}: the number of samples must be between 1 and 10^9")
+    return spread(options.number, knots)
+
+
+def _given(path: Path, curves: Curves) -> tuple[dict[str, Times], NDArray[np.int64] | None]:
+    """Times of every curve in a file, and their rows if every row is for one curve."""
+    table = open_table(path)
+    time = _time_column(table, curves.columns.time)
+    curve = curves.columns.curve if curves.named and curves.columns.curve in table.names else None
+    with Progress("reading") as progress:
+        rows = table.read([], time, curve, progress)
+    if rows.labels is None:
+        groups: Groups = {name: np.arange(len(rows.times)) for name in curves.splines}
+    else:
+        groups = group(rows)
+    for name, own in groups.items():
+        if name not in curves.splines:
+            near = did_you_mean(name, list(curves.splines))
+            raise Problem(f"{path}, {rows.place(own[0])}: there is no curve {name!r}; {near}")
+        _check_times(path, rows, own, curves, name)
+    times = {name: rows.times[own] for name, own in groups.items()}
+    return times, None if rows.labels is None else np.concatenate(list(groups.values()))
+
+
+def _time_column(table: Table, usual: str) -> str:
+    if usual in table.names or len(table.names) == 1:
+        return usual if usual in table.names else table.names[0]
+    found = time_column(table, None, [])
+    if found is None:
+        raise Problem(f"{table.path} has no column {usual!r} of times; {did_you_mean(usual, table.names)}")
+    return found
+
+
+def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves, name: str) -> None:
+    """Raise `Problem` unless the curve has points at these times."""
+    spline = curves.splines[name]
+    times, knots = rows.times[own], spline.t
+    if (times.dtype.kind == "M") != (knots.dtype.kind == "M"):
+        kinds = "dates", "numbers"
+        wanted, found = kinds if knots.dtype.kind == "M" else kinds[::-1]
+        raise Problem(f"{path}: the times of {curves.called(name)} are {wanted}, but these are {found}")
+    if spline.extrapolate is not None or is_closed(spline):
+        return
+    outside = np.flatnonzero((times < knots[0]) | (times > knots[-1]))
+    if outside.size:
+        raise Problem(
+            f"{path}, {rows.place(own[outside[0]])}: time {times[outside[0]]} is outside {curves.called(name)}, "
+            f"which runs from {knots[0]} to {knots[-1]}; fit with --extrapolate to say what is meant there"
+        )
+
+
+# ---- columns ----
+
+
+def _orders(text: str) -> list[int]:
+    orders = [part.strip() for part in text.split(",")]
+    if not set(orders) <= {"0", "1", "2"} or len(set(orders)) < len(orders):
+        raise Problem(f"--nu {text}: give one or more of 0, 1 and 2, separated by commas")
+    return list(map(int, orders))
+
+
+def _names(curves: Curves, orders: list[int]) -> list[str]:
+    columns = curves.columns
+    names = [columns.time, *([columns.curve] if curves.named else [])]
+    for nu in orders:
+        if nu and columns.lonlat:
+            names += motion_labels(nu)
+        else:
+            names += [f"{name}_d{nu}" if nu else name for name in columns.points]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise Problem(f"two columns would have the name {twice!r}; fit with other names")
+    return names
+
+
+def _values(
+    curves: Curves, times: Mapping[str, Times], orders: list[int], progress: Progress
+) -> NDArray[np.float64]:
+    """The numbers of all samples, one curve after the other."""
+    total = sum(map(len, times.values()))
+    blocks: list[NDArray[np.float64]] = []
+    done = 0
+    for name, all_times in times.items():
+        for start in range(0, len(all_times), _CHUNK):
+            x = all_times[start : start + _CHUNK]
+            parts = [_quantity(curves.splines[name], x, nu, curves.columns.lonlat) for nu in orders]
+            blocks.append(np.concatenate(parts, axis=1))
+            done += len(x)
+            progress(done, total)
+    return np.concatenate(blocks)
+
+
+def _quantity(spline: CubicSpline, x: Times, nu: int, lonlat: bool) -> NDArray[np.float64]:
+    values = spline(x, nu)
+    if not lonlat:
+        return flatten(spline.space, values)
+    return motion_degrees(spline(x), values) if nu else to_degrees(values)

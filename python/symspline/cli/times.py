@@ -1,0 +1,209 @@
+"""Times in texts: numbers, ISO dates and durations; and times along a curve."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import Problem
+
+Times = NDArray[Any]
+Fail = Callable[[int, str], Problem]
+"""Makes the problem of a row of a column from what was found there."""
+
+# A date, with 0 for every digit.
+_SHAPE = re.compile(
+    r"0000-00-00"
+    r"(?:(?P<mark>[T ])00:00(?P<seconds>:00(?:\.0{1,9})?)? ?(?P<zone>Z|[+-]00(?::?00)?)?)?"
+)
+_ZEROS = str.maketrans("123456789", "000000000")
+# Whole numbers up to here are exact as doubles.
+_EXACT = 2**53
+
+_NANOSECONDS = {
+    "ns": 1,
+    "us": 10**3,
+    "ms": 10**6,
+    "s": 10**9,
+    "min": 60 * 10**9,
+    "h": 3600 * 10**9,
+    "d": 86400 * 10**9,
+}
+_DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
+_MOST = 10**9
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+# ---- columns ----
+
+
+def parse_times(cells: list[str], fail: Fail) -> tuple[Times, bool]:
+    """The times in a column: numbers if the first is one, else ISO dates.
+
+    Returns:
+        The times, and whether they had a Z or an offset and are now UTC.
+    """
+    cells = [cell.strip() for cell in cells]
+    if "" in cells:
+        raise fail(cells.index(""), "is empty")
+    if cells and not is_number(cells[0]):
+        return _dates(cells, fail)
+    return _numbers(cells, fail), False
+
+
+def _numbers(cells: list[str], fail: Fail) -> Times:
+    try:
+        values = np.fromiter(map(float, cells), np.float64, len(cells))
+    except ValueError:
+        i = next(i for i, cell in enumerate(cells) if not is_number(cell))
+        raise fail(
+            i, f"holds {cells[i]!r}, but {cells[0]!r} before; all must be numbers, or all dates"
+        ) from None
+    if not np.isfinite(values).all():
+        i = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise fail(i, f"holds {cells[i]!r}, which is no time")
+    if np.abs(values).max(initial=0) > _EXACT:
+        with suppress(ValueError, OverflowError):
+            return np.array([int(cell) for cell in cells], dtype=np.int64)
+    return values
+
+
+def _dates(cells: list[str], fail: Fail) -> tuple[Times, bool]:
+    shapes = [cell.translate(_ZEROS) for cell in cells]
+    zones = {shape: _zone(shape, shapes, cells, fail) for shape in dict.fromkeys(shapes)}
+    lengths = [len(cell) - zones[shape] for cell, shape in zip(cells, shapes, strict=True)]
+    bodies = [cell[:length].rstrip() for cell, length in zip(cells, lengths, strict=True)]
+    try:
+        times = np.array(bodies, dtype="datetime64")
+    except ValueError:
+        i = next(i for i, body in enumerate(bodies) if not _is_date(body))
+        raise fail(i, f"holds {cells[i]!r}, which is no date of the calendar") from None
+    if not zones[shapes[0]]:
+        return times, False
+    offsets = [cell[length:] for cell, length in zip(cells, lengths, strict=True)]
+    minutes = {offset: _minutes(offset) for offset in set(offsets)}
+    return times - np.array([minutes[offset] for offset in offsets], dtype="timedelta64[m]"), True
+
+
+def _zone(shape: str, shapes: list[str], cells: list[str], fail: Fail) -> int:
+    """The length of the Z or the offset at the end of dates of a shape, which must suit the first date."""
+    match, first = _SHAPE.fullmatch(shape), _SHAPE.fullmatch(shapes[0])
+    i = shapes.index(shape)
+    if first is None or (match is None and not is_number(cells[i])):
+        raise fail(i, f"holds {cells[i]!r}, not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z")
+    if match is None or _style(match) != _style(first):
+        raise fail(i, f"holds {cells[i]!r}, but {cells[0]!r} before; write all times in the same way")
+    return len(match["zone"] or "")
+
+
+def _style(match: re.Match[str]) -> tuple[Any, ...]:
+    """What the dates of a column have in common; fractions and offsets may differ."""
+    return match["mark"], match["seconds"] is None, match["zone"] is None
+
+
+def _minutes(offset: str) -> int:
+    """``"+02:30"`` is 150."""
+    if offset == "Z":
+        return 0
+    digits = offset[1:].replace(":", "").ljust(4, "0")
+    minutes = 60 * int(digits[:2]) + int(digits[2:])
+    return -minutes if offset[0] == "-" else minutes
+
+
+def _is_date(text: str) -> bool:
+    try:
+        np.datetime64(text)
+    except ValueError:
+        return False
+    return True
+
+
+# ---- times along a curve ----
+
+
+def every(step: str, knots: Times) -> Times:
+    """Times from the first to at most the last knot, one a step."""
+    number, unit = _duration(step)
+    if knots.dtype.kind == "M":
+        delta = _timedelta(number * _NANOSECONDS[unit or "s"], step)
+        start, stop = knots[0] + 0 * delta, knots[-1] + 0 * delta
+        dates: Times = start + delta * np.arange(_count((stop - start) // delta, step))
+        return dates
+    if unit:
+        raise Problem(f"--every {step}: the times of this curve are numbers; give a step without a unit")
+    if knots.dtype.kind == "i":
+        if number != int(number):
+            raise Problem(
+                f"--every {step}: the times of this curve are large whole numbers; give a whole step"
+            )
+        whole: Times = knots[0] + int(number) * np.arange(_count((knots[-1] - knots[0]) // int(number), step))
+        return whole
+    # A step that divides the curve up to rounding reaches its end.
+    count = _count((knots[-1] - knots[0]) / float(number) * (1 + 1e-12), step)
+    times: Times = np.minimum(knots[0] + float(number) * np.arange(count), knots[-1])
+    return times
+
+
+def spread(count: int, knots: Times) -> Times:
+    """So many times from the first to the last knot at equal distances; dates to a microsecond."""
+    if knots.dtype.kind == "f":
+        return np.linspace(knots[0], knots[-1], count)
+    dates = knots.dtype.kind == "M"
+    start, stop = (knot + np.timedelta64(0, "us") if dates else knot for knot in (knots[0], knots[-1]))
+    span = stop - start
+    steps = np.rint(np.linspace(0, span.astype(np.int64), count)).astype(np.int64).astype(span.dtype)
+    times = np.minimum(start + steps, stop)
+    return _coarsest(times) if dates else times
+
+
+def _coarsest(dates: Times) -> Times:
+    """The same dates in seconds if they are whole seconds, else in the next finer unit that will do."""
+    for unit in ("s", "ms", "us"):
+        coarse = dates.astype(f"datetime64[{unit}]")
+        if (coarse == dates).all():
+            return coarse
+    return dates
+
+
+def _timedelta(nanoseconds: Decimal, step: str) -> Any:
+    if nanoseconds < 1 or nanoseconds != int(nanoseconds):
+        raise Problem(f"--every {step}: a step is a whole number of nanoseconds")
+    unit = next(unit for unit in ("s", "ms", "us", "ns") if int(nanoseconds) % _NANOSECONDS[unit] == 0)
+    try:
+        return np.array(int(nanoseconds) // _NANOSECONDS[unit], dtype=f"timedelta64[{unit}]")[()]
+    except OverflowError:
+        raise Problem(f"--every {step}: that is too long") from None
+
+
+def _count(steps: float, option: str) -> int:
+    if steps >= _MOST:
+        raise Problem(f"--every {option}: that makes {float(steps):.1e} samples of one curve")
+    return int(steps) + 1
+
+
+def _duration(text: str) -> tuple[Decimal, str]:
+    """``"10min"`` is 10 and ``"min"``."""
+    match = _DURATION.fullmatch(text.strip())
+    if match is None or match[2].lower() not in ("", *_NANOSECONDS):
+        raise Problem(
+            f"--every {text}: a step is a number such as 0.5, or a duration such as 10min; "
+            f"units are {', '.join(_NANOSECONDS)}"
+        )
+    number = Decimal(match[1])
+    if number == 0:
+        raise Problem(f"--every {text}: a step must be larger than zero")
+    return number, match[2].lower()
