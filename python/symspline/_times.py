@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,11 @@ class Clock:
 
     origin: Any = None
     dates: bool = False
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether times are taken as they are."""
+        return self.origin is None
 
     def knots(self, knots: NDArray[Any]) -> Doubles:
         """Knots as the core counts them."""

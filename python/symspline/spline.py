@@ -208,9 +208,11 @@ class CubicSpline:
         Raises:
             ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None.
         """
-        if not isinstance(nu, (int, np.integer)) or nu not in _QUANTITIES:
-            raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}")
-        return self._at(x, _QUANTITIES[nu], extrapolate, per_curve)
+        try:
+            quantity = _QUANTITIES[nu]
+        except (KeyError, TypeError):
+            raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}") from None
+        return self._at(x, quantity, extrapolate, per_curve)
 
     def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
         """|γ'| at times x, shape batch axes + x.shape."""
@@ -226,7 +228,11 @@ class CubicSpline:
 
     def _at(self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Any:
         """A quantity at times as the user gives them."""
-        times, per_curve = self._clock.at(x, self._batch, per_curve)
+        if self._clock.plain and type(x) is float:
+            # A single time is worth a short way.
+            times = np.array(x)
+        else:
+            times, per_curve = self._clock.at(x, self._batch, per_curve)
         try:
             return self._evaluate(times, quantity, extrapolate, per_curve)
         except ValidationError as error:
@@ -236,7 +242,7 @@ class CubicSpline:
         self, x: NDArray[np.float64], quantity: str, extrapolate: bool | str | None, per_curve: bool
     ) -> Array:
         policy = self._extrapolate if extrapolate is None else _policy(extrapolate)
-        if policy is None and isinstance(self._bc_type, str) and self._bc_type == "periodic":
+        if policy is None and type(self._bc_type) is str and self._bc_type == "periodic":
             policy = "periodic"
         if per_curve and x.shape[: len(self._batch)] != self._batch:
             raise ValidationError(

@@ -1,0 +1,879 @@
+"""The command line: every verb, every format, and what it says when something is wrong."""
+
+import csv
+import errno
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import walk
+
+import symspline as ss
+from symspline import files
+from symspline.cli import curves as cli_curves
+from symspline.cli import fit as cli_fit
+from symspline.cli import main, points, times
+from symspline.cli.errors import Problem
+from symspline.cli.progress import Progress
+from symspline.lonlat import from_lonlat, to_lonlat
+
+README = Path(__file__).parents[1] / "README.md"
+FIXES = [("00:00", 178.5, 28.0), ("06:00", -179.0, 29.1), ("12:00", -177.0, 30.0), ("18:00", -176.2, 31.5)]
+TRACK = "time,lon,lat\n" + "".join(f"2021-08-29T{clock}Z,{lon},{lat}\n" for clock, lon, lat in FIXES)
+AXES = "t,x,y,z\n0,1,0,0\n1,0,1,0\n3,0,0,1\n"
+PAIR = "id,t,x,y,z\na,0,1,0,0\nb,1,0,1,0\na,2,0,0,1\nb,2,0,0,1\na,3,0,1,0\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Every test has the current folder to itself."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(capsys):
+    """Runs a command line that works, and returns what it prints."""
+
+    def run(line):
+        code = main(shlex.split(line))
+        out, err = capsys.readouterr()
+        assert (code, err) == (0, ""), err
+        return out
+
+    return run
+
+
+@pytest.fixture
+def fails(capsys):
+    """Runs a command line that fails, and returns the one line that it says."""
+
+    def fails(line, code=2):
+        before = sorted(os.listdir())
+        assert main(shlex.split(line)) == code
+        err = capsys.readouterr().err
+        assert err.startswith("symspline: ") and err.count("\n") == 1 and err.endswith("\n"), err
+        assert sorted(os.listdir()) == before
+        return err[len("symspline: ") : -1]
+
+    return fails
+
+
+def write(name, text):
+    Path(name).write_text(text, encoding="utf-8", newline="")
+
+
+def table(name):
+    """The columns of a CSV file, as texts."""
+    with open(name, newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    return dict(zip(rows[0], map(list, zip(*rows[1:], strict=True)), strict=True))
+
+
+def numbers(columns, *names):
+    return np.stack([np.array(columns[name], float) for name in names], axis=1)
+
+
+# ---- the way through ----
+
+
+def test_the_example_of_the_readme(run):
+    section = README.read_text(encoding="utf-8").split("## Command line")[1].split("\n## ")[0]
+    write("ida.csv", re.search(r"```csv\n(.*?)```", section, re.S)[1])
+    lines = re.search(r"```sh\n(.*?)```", section, re.S)[1].splitlines()
+    assert [line.split()[1] for line in lines] == ["fit", "check", "sample", "plot"]
+    for line in lines:
+        run(line.removeprefix("symspline ").partition("#")[0])
+    columns = table("smooth.csv")
+    assert list(columns) == ["time", "lon", "lat"]
+    assert len(columns["time"]) == 36 * 6 + 1
+    assert columns["time"][1] == "2021-08-28T00:10:00Z"
+    assert Path("ida.png").read_bytes().startswith(b"\x89PNG")
+    assert len(ss.load("ida.npz").t) == 7
+
+
+def test_a_fit_is_that_of_the_library(run):
+    write("axes.csv", AXES)
+    out = run("fit axes.csv --space sphere:2 --bc-type not-a-knot,clamped --extrapolate geodesic -o axes.npz")
+    assert out.startswith("axes.npz: 1 curve through 3 points of sphere:2, converged: quasi-newton, ")
+    spline = ss.CubicSpline(
+        [0, 1, 3], np.eye(3), "sphere:2", bc_type=("not-a-knot", "clamped"), extrapolate="geodesic"
+    )
+    loaded = ss.load("axes.npz")
+    assert loaded == spline and loaded.extrapolate == "geodesic"
+    run("sample axes.npz -n 7 --nu 0,1,2 -o out.csv")
+    columns = table("out.csv")
+    assert list(columns) == ["t", *(f"{x}{end}" for end in ("", "_d1", "_d2") for x in "xyz")]
+    x = np.linspace(0, 3, 7)
+    np.testing.assert_array_equal(np.array(columns["t"], float), x)
+    for nu, end in enumerate(("", "_d1", "_d2")):
+        np.testing.assert_array_equal(numbers(columns, *(f"{x}{end}" for x in "xyz")), spline(x, nu))
+
+
+def test_options_of_the_solver(run, fails):
+    write("axes.csv", AXES)
+    assert "fixed-point" in run("fit axes.csv --space s:2 --method fixed-point --tol 1e-6 -o axes.npz")
+    assert 1e-12 < ss.load("axes.npz").report.residual < 1e-6
+    assert fails("fit axes.csv --space s:2 --method foo -o b.npz").startswith("method must be")
+    assert "tol" in fails("fit axes.csv --space s:2 --tol -1 -o b.npz")
+    assert "--tol" in fails("fit axes.csv --space s:2 --tol x -o b.npz")
+    assert fails("fit axes.csv --space s:2 --bc-type foo -o b.npz").startswith("--bc-type foo: give natural")
+    assert fails("fit axes.csv --space s:2 --bc-type periodic,natural -o b.npz").startswith("--bc-type")
+    assert fails("fit axes.csv --space s:2 --bc-type periodic -o b.npz").startswith(
+        "axes.csv: bc_type='periodic'"
+    )
+
+
+def test_rows_without_times_are_at_whole_numbers(run):
+    write("a.csv", "x,y\n1,2\n3,4\n5,7\n")
+    run("fit a.csv --space r:2 -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline(None, [[1, 2], [3, 4], [5, 7]], "r:2")
+    run("sample a.npz --every 1 -o b.csv")
+    assert list(table("b.csv")) == ["time", "x", "y"]
+
+
+def test_products(run):
+    write("a.csv", "t,a,b,c,d,x\n0,1,0,0,0,1\n1,0,1,0,0,2\n2,0,0,1,0,4\n")
+    run("fit a.csv --space 'sphere:3 x r:1' -o a.npz")
+    spline = ss.CubicSpline(None, (np.eye(4)[:3], [[1], [2], [4]]), "sphere:3 x r:1")
+    assert ss.load("a.npz") == spline
+    run("check a.npz")
+    run("sample a.npz --every 0.5 --nu 1 -o b.csv")
+    found = numbers(table("b.csv"), *(f"{name}_d1" for name in "abcdx"))
+    np.testing.assert_array_equal(found, np.concatenate(spline(np.arange(5) / 2, 1), axis=1))
+
+
+def test_help_has_examples(capsys):
+    for verb in ("", "fit", "sample", "plot", "check", "demo"):
+        with pytest.raises(SystemExit) as end:
+            main([*verb.split(), "--help"])
+        assert end.value.code == 0
+        assert f"  symspline {verb}" in capsys.readouterr().out.split("\nexample")[1]
+
+
+def test_as_a_module():
+    write("axes.csv", AXES)
+    line = [sys.executable, "-m", "symspline", "fit", "axes.csv", "--space", "s:2", "-o", "axes.npz"]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=20)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert Path("axes.npz").exists()
+    done = subprocess.run([*line, "--time", "tt"], capture_output=True, text=True, timeout=20)
+    assert done.returncode == 2
+    assert done.stderr == "symspline: axes.csv has no column 'tt'; did you mean 't'?\n"
+
+
+# ---- formats ----
+
+
+def test_formats_read_the_same(run):
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    write("a.csv", TRACK)
+    clock = np.array([f"2021-08-29T{row[0]}" for row in FIXES], "datetime64[s]")
+    lon, lat = np.array([row[1:] for row in FIXES]).T
+    np.savez("a.npz", time=clock, lon=lon, lat=lat)
+    parquet.write_table(
+        pa.table({"time": pa.array(clock, pa.timestamp("s", "UTC")), "lon": lon, "lat": lat}), "a.parquet"
+    )
+    parquet.write_table(
+        pa.table({"time": [f"{c} +00:00" for c in clock], "lon": lon, "lat": lat}), "b.parquet"
+    )
+    splines = []
+    for name in ("a.csv", "a.npz", "a.parquet", "b.parquet"):
+        run(f"fit {name} --lonlat -o curve.npz")
+        splines.append(ss.load("curve.npz"))
+    for spline in splines:
+        np.testing.assert_array_equal(spline.t, clock)
+        np.testing.assert_array_equal(spline.velocities, splines[0].velocities)
+
+
+def test_formats_write_the_same(run):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o curve.npz")
+    for ending in ("csv", "npz", "parquet", "CSV"):
+        run(f"sample curve.npz --every 1.5h --nu 0,1 -o out.{ending}")
+    texts = table("out.csv")
+    assert Path("out.CSV").read_bytes() == Path("out.csv").read_bytes()
+    arrays, columns = np.load("out.npz"), parquet.read_table("out.parquet")
+    assert list(texts) == list(arrays) == columns.column_names
+    assert columns.schema.field("time").type.tz == "UTC"
+    assert [text.removesuffix("Z") for text in texts["time"]] == arrays["time"].astype(str).tolist()
+    np.testing.assert_array_equal(arrays["time"], columns["time"].to_numpy())
+    for name in list(texts)[1:]:
+        np.testing.assert_array_equal(np.array(texts[name], float), arrays[name])
+        np.testing.assert_array_equal(arrays[name], columns[name].to_numpy())
+
+
+def test_t_and_points_of_an_npz_file(run, fails):
+    np.savez("a.npz", t=[0, 1, 3], points=np.eye(3), velocities=np.ones((3, 3)), note="hello")
+    run("fit a.npz --space s:2 -o curve.npz")
+    assert ss.load("curve.npz") == ss.CubicSpline([0, 1, 3], np.eye(3), "s:2")
+    np.savez("b.npz", when=[0, 1, 3], u=np.eye(3)[:, :2], w=np.eye(3)[:, 2])
+    run("fit b.npz --space s:2 --time when --columns u,w -o curve2.npz")
+    assert ss.load("curve.npz") == ss.load("curve2.npz")
+    np.savez("c.npz", t=[0, 1], points=np.eye(3))
+    assert fails("fit c.npz --space s:2 -o d.npz") == "c.npz: arrays differ in length: 2 and 3"
+    np.savez("c.npz", t=[0, 1, np.inf], points=np.eye(3))
+    assert "c.npz, row 2 (counted from 0): column 't' holds inf" in fails("fit c.npz --space s:2 -o d.npz")
+    np.savez("c.npz", t=np.array(["2020-01-01", "NaT"], "datetime64[D]"), points=np.eye(2))
+    assert "column 't' holds no time" in fails("fit c.npz --space s:1 -o d.npz")
+    assert "did you mean 'points'?" in fails("fit c.npz --space s:1 --columns point -o d.npz")
+    np.savez("c.npz", t=[], points=np.empty((0, 2)))
+    assert fails("fit c.npz --space s:1 -o d.npz") == "c.npz has no rows"
+    np.savez("c.npz", t=[0, 1], points=np.array([["a"], ["b"]]))
+    assert "not numbers" in fails("fit c.npz --space r:1 -o d.npz")
+    np.savez("c.npz", t=np.array([{}, {}]))
+    assert "c.npz is damaged" in fails("fit c.npz --space r:1 -o d.npz")
+    assert "was fitted already" in fails("fit curve.npz --space s:2 -o d.npz")
+    write("e.npz", "no zip")
+    assert fails("fit e.npz --space s:2 -o d.npz") == "e.npz is not an NPZ file"
+
+
+def test_parquet_of_all_kinds(run, fails):
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    from decimal import Decimal
+
+    columns = {
+        "id": pa.array(["a", "a", "b", "b"]).dictionary_encode(),
+        "time": pa.array(np.array(["2020-01-01", "2020-01-02"] * 2, "datetime64[D]")),
+        "x": pa.array([1, 2, 3, 4]),
+        "y": pa.array([Decimal("1.5")] * 4),
+        "z": pa.array([1.0, None, 2.0, 3.0]),
+    }
+    parquet.write_table(pa.table(columns), "a.parquet")
+    run("fit a.parquet --space r:2 --curve id --columns x,y -o a.npz")
+    made = ss.load_many("a.npz")
+    assert list(made) == ["a", "b"]
+    np.testing.assert_array_equal(made["b"].points, [[3, 1.5], [4, 1.5]])
+    assert str(made["a"].t[1]) == "2020-01-02"
+    problem = fails("fit a.parquet --space r:3 --curve id -o b.npz")
+    assert problem == "a.parquet, row 1 (counted from 0): column 'z' is empty"
+    Path("b.parquet").write_bytes(Path("a.parquet").read_bytes()[:300])
+    assert fails("fit b.parquet --space r:3 -o b.npz") == "b.parquet is damaged or not a Parquet file"
+
+
+def test_parquet_without_pyarrow(run, fails, monkeypatch):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o axes.npz")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "pip install 'symspline[parquet]'" in fails("sample axes.npz -n 3 -o out.parquet")
+    assert "pip install 'symspline[parquet]'" in fails("fit out.parquet --space s:2 -o a.npz")
+
+
+def test_what_programs_write_as_csv(run):
+    """A byte order mark, Windows line ends, blanks behind commas, quotes, blank lines, no last line end."""
+    text = '\ufeff"t", "x"\r\n0,1.5\r\n\r\n 1 , "2.5"\r\n\r\n3,1e-3'
+    write("a.csv", text)
+    run("fit a.csv --space r:1 -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 3], [[1.5], [2.5], [1e-3]], "r:1")
+
+
+def test_long_files_are_read_in_pieces(run, fails):
+    n = 4500
+    angle = np.arange(n) / 10
+    rows = [f"{i},{np.cos(a)!r},{np.sin(a)!r},note\n" for i, a in enumerate(angle.tolist())]
+    rows.insert(3000, "\n" * 5000)
+    write("a.csv", "t,x,y,remark\n" + "".join(rows))
+    run("fit a.csv --space s:1 -o a.npz")
+    np.testing.assert_allclose(
+        ss.load("a.npz").points, np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-15
+    )
+    rows[4000] = "17,1,one,\n"
+    write("a.csv", "t,x,y,remark\n" + "".join(rows))
+    assert (
+        fails("fit a.csv --space s:1 -o b.npz")
+        == "a.csv, line 9001: column 'y' holds 'one', which is not a number"
+    )
+    run("sample a.npz --every 0.5 -o b.csv")
+    assert len(table("b.csv")["t"]) == 2 * n - 1
+
+
+def test_complex_numbers_and_matrices():
+    class Complex(ss.Space):
+        _dtype = np.complex128
+        point_shape = (2, 2)
+
+        def __init__(self):
+            pass
+
+        __str__ = object.__repr__
+
+    space = Complex()
+    assert points.labels(space)[:3] == ["x0_re", "x0_im", "x1_re"] and len(points.labels(space)) == 8
+    values = np.arange(8).reshape(2, 2, 2) + 1j
+    columns = points.flatten(space, values)
+    assert columns[0].tolist() == [0, 1, 1, 1, 2, 1, 3, 1]
+    np.testing.assert_array_equal(points.unflatten(space, columns), values)
+
+
+def test_columns_of_complex_numbers(run, fails):
+    write("a.csv", "z_re,w,z_im\n1,2,3\n4,5,7\n")
+    run("fit a.csv --space r:2 --columns z -o a.npz")
+    assert ss.load("a.npz").points.tolist() == [[1, 3], [4, 7]]
+    np.savez("b.npz", points=np.array([[1 + 3j], [4 + 7j]]))
+    run("fit b.npz --space r:2 -o b2.npz")
+    assert ss.load("a.npz") == ss.load("b2.npz")
+
+
+# ---- times ----
+
+
+def dated(cells):
+    write("a.csv", "time,x\n" + "".join(f"{cell},{i}\n" for i, cell in enumerate(cells)))
+
+
+@pytest.mark.parametrize(
+    "cells, t",
+    [
+        (["2020-01-01", "2020-02-29"], ["2020-01-01", "2020-02-29"]),
+        (["2020-01-01 12:00", "2020-02-29 06:30"], ["2020-01-01T12:00", "2020-02-29T06:30"]),
+        (
+            ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"],
+            ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"],
+        ),
+        (["2020-01-01T12:00Z", "2020-01-01T12:30+00:00"], ["2020-01-01T12:00", "2020-01-01T12:30"]),
+        (["2019-12-31T23:00-0300", "2020-01-01T05:00+02:30"], ["2020-01-01T02:00", "2020-01-01T02:30"]),
+        (
+            ["2020-01-01 00:00:00.5 +01", "2020-01-01 00:00:01 Z"],
+            ["2019-12-31T23:00:00.5", "2020-01-01T00:00:01"],
+        ),
+    ],
+)
+def test_dates(run, cells, t):
+    dated(cells)
+    run("fit a.csv --space r:1 -o a.npz")
+    np.testing.assert_array_equal(ss.load("a.npz").t, np.array(t, "datetime64[ms]"))
+
+
+@pytest.mark.parametrize(
+    "cells, found",
+    [
+        (
+            ["2020-01-01", "2020-01-02T00:00"],
+            "line 3: column 'time' holds '2020-01-02T00:00', but '2020-01-01' before",
+        ),
+        (["2020-01-01T00:00", "2020-01-02 00:00"], "write all times in the same way"),
+        (["2020-01-01T00:00Z", "2020-01-02T00:00"], "write all times in the same way"),
+        (["2020-01-01", "2020-01-02", "7"], "line 4: column 'time' holds '7', but '2020-01-01' before"),
+        (["7", "2020-01-02"], "line 3: column 'time' holds '2020-01-02', but '7' before"),
+        (["2020-01-01", "soon"], "line 3: column 'time' holds 'soon', not a time: write 0.5, 2021-08-29 or"),
+        (["29.8.2021", "30.8.2021"], "line 2: column 'time' holds '29.8.2021', not a time"),
+        (["2020-01-01", "2020-02-30"], "line 3: column 'time' holds '2020-02-30', which is no date"),
+        (["2020-01-01", ""], "line 3: column 'time' is empty"),
+        (["1", "nan"], "line 3: column 'time' holds 'nan', which is no time"),
+        (["2020-01-02", "2020-01-01"], "line 3: time 2020-01-01 does not come after 2020-01-02 in line 2"),
+        (["1", "1"], "line 3: time 1.0 does not come after 1.0 in line 2; times must increase"),
+    ],
+)
+def test_times_that_are_not(fails, cells, found):
+    dated(cells)
+    assert f"a.csv, {found}" in fails("fit a.csv --space r:1 -o a.npz") or found in fails(
+        "fit a.csv --space r:1 -o a.npz"
+    )
+
+
+def test_large_whole_times_are_exact(run):
+    start = 1_630_000_000_000_000_001
+    dated([start, start + 1, start + 3])
+    run("fit a.csv --space r:1 -o a.npz")
+    assert ss.load("a.npz").t.tolist() == [start, start + 1, start + 3]
+    run("sample a.npz --every 1 -o b.csv")
+    assert table("b.csv")["time"] == [str(start + i) for i in range(4)]
+    run("sample a.npz -n 2 -o b.csv")
+    assert table("b.csv")["time"] == [str(start), str(start + 3)]
+
+
+def test_times_along_a_curve():
+    day = np.array(["2020-01-01", "2020-01-02"], "datetime64[D]")
+    assert len(times.every("10min", day)) == 145
+    assert times.every("6H", day)[-1] == day[-1]
+    assert times.every("7h", day).tolist() == times.every("25200", day).tolist()
+    assert len(times.every("7h", day)) == 4
+    half = times.every("0.5s", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
+    assert half.astype(str).tolist()[1] == "2020-01-01T00:00:00.500"
+    assert times.every("2d", day).tolist() == [day[0].astype("datetime64[s]").item()]
+    np.testing.assert_array_equal(
+        times.every("0.1", np.array([0.0, 1.0])), np.minimum(np.arange(11) * 0.1, 1)
+    )
+    assert times.every("0.3", np.array([0.0, 1.0]))[-1] == 3 * 0.3
+    assert times.spread(3, day).astype(str).tolist()[1] == "2020-01-01T12:00:00"
+    thirds = times.spread(4, np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
+    assert thirds.astype(str).tolist()[1] == "2020-01-01T00:00:00.333333"
+    for fine in ("ns", "ps"):
+        knots = np.array([0, 10**18 + 1], f"datetime64[{fine}]")
+        spread = times.spread(1000, knots)
+        assert (
+            spread[0] == knots[0] and spread[-1] == knots[-1] and (np.diff(spread) > np.timedelta64(0)).all()
+        )
+
+
+@pytest.mark.parametrize(
+    "step, found",
+    [
+        ("0", "larger than zero"),
+        ("-1", "a step is a number"),
+        ("ten", "a step is a number"),
+        ("1y", "units are ns, us, ms, s, min, h, d"),
+        ("0.5ns", "whole number of nanoseconds"),
+        ("1e-12d", "whole number of nanoseconds"),
+        ("1e30d", "too long"),
+        ("1ns", "samples of one curve"),
+    ],
+)
+def test_steps_that_are_none(step, found):
+    with pytest.raises(Problem, match=found):
+        times.every(step, np.array(["2020-01-01", "2020-01-02"], "datetime64[D]"))
+
+
+def test_steps_of_numbers(fails, run):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o a.npz")
+    assert "give a step without a unit" in fails("sample a.npz --every 10min -o b.csv")
+    assert "samples of one curve" in fails("sample a.npz --every 1e-300 -o b.csv")
+    assert "-n 0: the number of samples" in fails("sample a.npz -n 0 -o b.csv")
+    assert "large whole numbers" in str(
+        pytest.raises(Problem, times.every, "0.5", np.array([2**60, 2**60 + 5])).value
+    )
+
+
+# ---- longitude and latitude ----
+
+
+def test_a_track_across_the_date_line(run):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o a.npz")
+    spline = ss.load("a.npz")
+    lon, lat = np.array([row[1:] for row in FIXES]).T
+    np.testing.assert_allclose(spline.points, from_lonlat(lon, lat), atol=1e-15)
+    run("sample a.npz --every 10min --nu 0,1,2 -o b.csv")
+    columns = table("b.csv")
+    assert list(columns) == ["time", "lon", "lat", "east_d1", "north_d1", "east_d2", "north_d2"]
+    track = numbers(columns, "lon", "lat")
+    assert (np.abs(track[:, 0]) > 175).all() and (np.abs(track[:, 0]) <= 180).all()
+    assert np.count_nonzero(np.abs(np.diff(track[:, 0])) > 300) == 1
+    # Differences along the curve, in degrees of arc and seconds.
+    rate = numbers(columns, "east_d1", "north_d1")
+    middle = np.radians(track[1:-1, 1])
+    turn = (track[2:] - track[:-2] + 180) % 360 - 180
+    seen = turn / 1200 * np.stack([np.cos(middle), np.ones_like(middle)], axis=1)
+    np.testing.assert_allclose(rate[1:-1], seen, rtol=2e-4, atol=1e-9)
+    acceleration = numbers(columns, "east_d2", "north_d2")
+    assert np.abs(acceleration[[0, -1]]).max() < 1e-12 * np.abs(acceleration).max()  # natural ends
+
+
+def test_a_track_over_the_pole(run):
+    write("a.csv", "t,Longitude,LATITUDE\n0,10,88\n1,10,90\n2,190,88\n")
+    run("fit a.csv --lonlat -o a.npz")
+    run("sample a.npz --every 0.5 --nu 0,1 -o b.csv")
+    columns = table("b.csv")
+    assert list(columns)[:3] == ["t", "Longitude", "LATITUDE"]
+    np.testing.assert_allclose(numbers(columns, "LATITUDE")[:, 0], [88, 89, 90, 89, 88], atol=1e-9)
+    np.testing.assert_allclose(np.hypot(*numbers(columns, "east_d1", "north_d1").T), 2, atol=1e-9)
+
+
+def test_lonlat_by_column_names(run, fails):
+    write("a.csv", "t,b,l\n0,50,7\n1,51,8\n")
+    run("fit a.csv --lonlat --columns l,b -o a.npz")
+    np.testing.assert_allclose(to_lonlat(ss.load("a.npz").points), [[7, 8], [50, 51]], atol=1e-13)
+    assert "--lonlat needs columns lon and lat" in fails("fit a.csv --lonlat -o b.npz")
+    assert "longitude and latitude are 2 numbers" in fails("fit a.csv --lonlat --columns l -o b.npz")
+    assert "is for sphere:2, not for sphere:3" in fails("fit a.csv --lonlat --space s:3 -o b.npz")
+    write("a.csv", "t,lat,lon\n0,50,7\n1,51,98\n")
+    problem = fails("fit a.csv --lonlat --columns lat,lon -o b.npz")
+    assert problem.startswith("a.csv, line 3: latitude 98 is not between -90 and 90 degrees")
+
+
+def test_lonlat_of_a_curve_that_was_made_in_python(run, fails):
+    ss.CubicSpline(None, np.eye(3), "s:2").save("a.npz")
+    run("sample a.npz -n 3 -o b.csv")
+    assert list(table("b.csv")) == ["time", "x0", "x1", "x2"]
+    run("sample a.npz -n 3 --lonlat -o b.csv")
+    np.testing.assert_allclose(numbers(table("b.csv"), "lon", "lat")[:2], [[0, 0], [90, 0]], atol=1e-13)
+    ss.CubicSpline(None, [[0], [1]], "r:1").save("c.npz")
+    assert fails("sample c.npz -n 3 --lonlat -o b.csv") == "--lonlat is for sphere:2, not for euclidean:1"
+
+
+# ---- several curves ----
+
+
+def test_curves_in_one_file(run):
+    write("pair.csv", PAIR)
+    out = run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    assert out.startswith("pair.npz: 2 curves through 5 points of sphere:2, converged: ")
+    e = np.eye(3)
+    fitted = ss.fit_many([([0, 2, 3], e[[0, 2, 1]]), ([1, 2], e[1:])], "s:2")
+    assert ss.load_many("pair.npz") == dict(zip("ab", fitted, strict=True))
+    run("sample pair.npz --every 0.5 -o out.csv")
+    columns = table("out.csv")
+    assert list(columns) == ["t", "id", "x", "y", "z"]
+    assert columns["id"] == ["a"] * 7 + ["b"] * 3
+    np.testing.assert_array_equal(numbers(columns, *"xyz")[7:], fitted[1]([1, 1.5, 2]))
+    lines = run("check pair.npz").splitlines()
+    assert [line.split()[0] for line in lines] == ["curve", "a", "b", "All"]
+    run("plot pair.npz --curve b -o b.svg")
+    assert "<svg" in Path("b.svg").read_text(encoding="utf-8")
+
+
+def test_one_curve_with_a_name_is_a_collection_too(run):
+    write("pair.csv", "\n".join(line for line in PAIR.splitlines() if not line.startswith("b")))
+    run("fit pair.csv --space s:2 --curve id -o one.npz")
+    assert list(ss.load_many("one.npz")) == ["a"]
+    run("sample one.npz -n 2 -o out.csv")
+    assert table("out.csv")["id"] == ["a", "a"]
+    run("plot one.npz -o one.png")
+
+
+def test_a_batch_made_in_python(run):
+    p = np.stack([np.eye(3), np.eye(3)[::-1]])
+    ss.CubicSpline(None, p, "s:2").save("batch.npz")
+    run("sample batch.npz -n 3 -o out.csv")
+    columns = table("out.csv")
+    assert columns["curve"] == ["0"] * 3 + ["1"] * 3
+    np.testing.assert_allclose(numbers(columns, "x0", "x1", "x2"), p.reshape(6, 3), atol=1e-15)
+    ss.CubicSpline(None, np.stack([p, p]), "s:2").save("batch.npz")
+    run("sample batch.npz -n 1 -o out.csv")
+    assert table("out.csv")["curve"] == ["0,0", "0,1", "1,0", "1,1"]
+
+
+def test_problems_of_one_curve_name_it(run, fails):
+    write("pair.csv", PAIR)
+    run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    assert fails("plot pair.npz -o a.png") == "pair.npz has 2 curves; say which with --curve: a, b"
+    assert fails("plot pair.npz --curve c -o a.png") == "pair.npz has no curve 'c'; there are a, b"
+    write("bad.csv", PAIR + "c,3,1,0,0\n")
+    problem = "bad.csv, line 7: this is the only point of curve 'c'; a curve needs two"
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == problem
+    write("bad.csv", PAIR + "b,1.5,1,0,0\n")
+    problem = "bad.csv, line 7: time 1.5 of curve 'b' does not come after 2.0 in line 5; times must increase"
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == problem
+    write("bad.csv", PAIR + "b,4,0,0,-1\n")
+    problem = fails("fit bad.csv --space s:2 --curve id -o bad.npz")
+    assert problem.startswith(
+        "bad.csv: the point in line 5 and the point in line 7 of curve 'b' lie at or past"
+    )
+    write("bad.csv", PAIR + ",5,0,0,1\n")
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == "bad.csv, line 7: column 'id' is empty"
+
+
+def test_samples_at_given_times(run, fails):
+    write("pair.csv", PAIR)
+    run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    a, b = ss.load_many("pair.npz").values()
+    write("at.csv", "id,t\nb,1.5\na,0.5\nb,1.25\n")
+    run("sample pair.npz --at at.csv -o out.csv")
+    columns = table("out.csv")
+    assert (columns["id"], columns["t"]) == (["b", "a", "b"], ["1.5", "0.5", "1.25"])
+    np.testing.assert_array_equal(numbers(columns, *"xyz"), [b(1.5), a(0.5), b(1.25)])
+    np.savez("at.npz", T=[1.5, 1.25])
+    run("sample pair.npz --at at.npz -o out.csv")
+    assert table("out.csv")["id"] == ["a", "a", "b", "b"]
+    write("at.csv", "when\n1\n")
+    run("sample pair.npz --at at.csv -o out.csv")
+    write("at.csv", "t,id\n1.5,q\n")
+    assert (
+        fails("sample pair.npz --at at.csv -o x.csv")
+        == "at.csv, line 2: there is no curve 'q'; there are a, b"
+    )
+    write("at.csv", "t\n1.5\n2.5\n")
+    problem = (
+        "at.csv, line 3: time 2.5 is outside curve 'b', which runs from 1.0 to 2.0; fit with --extrapolate"
+    )
+    assert fails("sample pair.npz --at at.csv -o x.csv").startswith(problem)
+    write("at.csv", "when,id\n1.5,a\n")
+    assert "at.csv has no column 't' of times; there are when, id" in fails(
+        "sample pair.npz --at at.csv -o x.csv"
+    )
+    write("at.csv", "t\n2020-01-01\n")
+    assert "are numbers, but these are dates" in fails("sample pair.npz --at at.csv -o x.csv")
+
+
+def test_samples_outside(run):
+    write("axes.csv", AXES)
+    write("at.csv", "t\n-1\n4\n")
+    run("fit axes.csv --space s:2 --extrapolate continue -o axes.npz")
+    run("sample axes.npz --at at.csv -o out.csv")
+    spline = ss.CubicSpline([0, 1, 3], np.eye(3), "s:2", extrapolate=True)
+    np.testing.assert_array_equal(numbers(table("out.csv"), *"xyz"), spline([-1, 4]))
+    write("ring.csv", AXES + "4,1,0,0\n")
+    run("fit ring.csv --space s:2 --bc-type periodic -o ring.npz")
+    run("sample ring.npz --at at.csv -o out.csv")
+    run("check ring.npz")
+
+
+def test_collections_in_python(folder):
+    one, other = ss.fit_many([(None, np.eye(3)), ([1, 2], np.eye(3)[:2])], "s:2", bc_type="not-a-knot")
+    ss.save_many({"": one, "b\0é": other}, folder / "c.npz")
+    loaded = ss.load_many(folder / "c.npz")
+    assert loaded == {"": one, "b\0é": other}
+    assert loaded[""].report == one.report and loaded[""].bc_type == "not-a-knot"
+    product = ss.space("s:2 x r:1")
+    v = (np.array([0.0, 1, 0]), np.array([2.0]))
+    both = ss.CubicSpline(None, (np.eye(3), np.eye(3)[:, :1]), product, bc_type=((1, v), "natural"))
+    ss.save_many({"p": both, "q": both}, folder / "p.npz")
+    assert ss.load_many(folder / "p.npz")["q"] == both
+    with pytest.raises(ss.ValidationError, match="of one space"):
+        ss.save_many({"p": both, "q": one}, folder / "d.npz")
+    with pytest.raises(ss.ValidationError, match="of one space"):
+        ss.save_many({}, folder / "d.npz")
+    with pytest.raises(ss.ValidationError, match="single curves"):
+        ss.save_many({"a": ss.CubicSpline(None, [np.eye(3)] * 2, "s:2")}, folder / "d.npz")
+    with pytest.raises(ss.ValidationError, match=r"read them with symspline\.load_many"):
+        ss.load(folder / "c.npz")
+    one.save(folder / "one.npz")
+    with pytest.raises(ss.ValidationError, match=r"read it with symspline\.load"):
+        ss.load_many(folder / "one.npz")
+    arrays = dict(np.load(folder / "c.npz"))
+    for key, value in {"knots": [3, 3], "names": '["a"]', "format": "other", "report": "[]"}.items():
+        np.savez(folder / "bad.npz", **arrays | {key: value})
+        with pytest.raises(ss.ValidationError, match=r"bad\.npz"):
+            ss.load_many(folder / "bad.npz")
+
+
+# ---- check ----
+
+
+def test_check_of_good_curves_on_all_spaces(run):
+    rng = np.random.default_rng(3)
+    for name, step in [("r:2", 1.0), ("s:1", 0.7), ("s:3", 0.7), ("h:2", 0.5), ("h:5", 0.5)]:
+        space = ss.space(name)
+        t = np.cumsum(rng.uniform(0.5, 1.5, 30))
+        ss.CubicSpline(t, walk(space, step, 30, rng), space, bc_type="not-a-knot").save("a.npz")
+        assert "All is within what rounding allows." in run("check a.npz")
+
+
+def test_check_far_out_in_hyperbolic_space(run):
+    """Ambient numbers are large there; lengths of the space are not."""
+    rng = np.random.default_rng(4)
+    space = ss.Hyperbolic(2)
+    for far in (2, 4, 6):
+        moved = space.transvection([1, 0, 0], [0, far, 0], walk(space, 0.3, 20, rng))
+        ss.CubicSpline(None, space.project(moved), space).save("a.npz")
+        run("check a.npz")
+
+
+def test_check_finds_what_is_wrong(run, fails, capsys):
+    good = ss.CubicSpline(None, walk(ss.Sphere(2), 0.5, 8, np.random.default_rng(1)), "s:2")
+    good.save("a.npz")
+    arrays = dict(np.load("a.npz"))
+    arrays["velocities"][3] *= 1 + 1e-6
+    np.savez("bent.npz", **arrays)
+    assert main(["check", "bent.npz"]) == 1
+    out, err = capsys.readouterr()
+    assert err == "symspline: bent.npz: more than rounding allows in the curve\n"
+    position, velocity, acceleration = map(float, out.splitlines()[1].split()[2:])
+    assert max(position, velocity) < 1e-14 and 1e-7 < acceleration < 1e-4
+    bent, lost = ss.load("bent.npz"), np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0.0]])
+    lost = ss.CubicSpline(None, lost, "s:2", on_failure="ignore")
+    ss.save_many({"good": good, "bent": bent, "lost": lost}, "many.npz")
+    problem = fails("check many.npz", code=1)
+    assert problem == "many.npz: more than rounding allows in 2 of 3 curves: bent, lost"
+
+
+def test_check_sees_the_seam(fails):
+    ring = walk(ss.Sphere(2), 0.5, 6, np.random.default_rng(2))
+    ss.CubicSpline(None, [*ring, ring[0]], "s:2", bc_type="periodic").save("ring.npz")
+    arrays = dict(np.load("ring.npz"))
+    arrays["velocities"][0] *= 1.01
+    np.savez("ring.npz", **arrays)
+    fails("check ring.npz", code=1)
+    arrays["bc_type"] = json.dumps("natural")
+    arrays["velocities"][0] /= 1.01
+    np.savez("ring.npz", **arrays)
+    assert main(["check", "ring.npz"]) == 0
+
+
+# ---- what can be wrong ----
+
+
+@pytest.mark.parametrize(
+    "text, options, problem",
+    [
+        (AXES, "--space s:2 --time tt", "a.csv has no column 'tt'; did you mean 't'?"),
+        (AXES, "--space s:2 --columns X,Y,Q", "a.csv has no column 'X'; did you mean 'x'?"),
+        (AXES, "--space s:2 --curve storm", "a.csv has no column 'storm'; there are t, x, y, z"),
+        (
+            AXES,
+            "--space r:2",
+            "a.csv: a point of euclidean:2 has 2 numbers, but there are 3 columns for it: x, y, z",
+        ),
+        (AXES, "--space r:2 --columns x,x", "column 'x' of a.csv cannot have two meanings"),
+        (AXES, "--space r:2 --columns t,x --time t", "column 't' of a.csv cannot have two meanings"),
+        (AXES, "", "say which space the points are on with --space, such as --space sphere:2"),
+        (AXES, "--space foo:2", "unknown space 'foo:2'; known are"),
+        (AXES + "4,1,0,n/a\n", "--space s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
+        (AXES + "\n\n4,1,0,\n", "--space s:2", "a.csv, line 7: column 'z' is empty"),
+        (
+            AXES + "4,1,0,inf\n",
+            "--space s:2",
+            "a.csv, line 5: column 'z' holds inf, which is not a finite number",
+        ),
+        (AXES + "4,1,0\n", "--space s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
+        (AXES + '4,1,0,"0\n', "--space s:2", "a.csv, line 5: unexpected end of data"),
+        (AXES + "4,1.001,0,0\n", "--space s:2", "a.csv: the point in line 5 is off the space by 1.000e-3"),
+        (
+            AXES + "4,0,0,-1\n",
+            "--space s:2",
+            "a.csv: the point in line 4 and the point in line 5 of the curve lie at or",
+        ),
+        ("", "--space s:2", "a.csv is empty"),
+        ("\n\n", "--space s:2", "a.csv is empty"),
+        ("t,x\n", "--space r:1", "a.csv has no rows below the names of its columns"),
+        ("t,x\n1,2\n", "--space r:1", "a.csv, line 2: this is the only point; a curve needs two"),
+        ("1,2\n3,4\n", "--space r:2", "a.csv: the first line must name the columns, but holds numbers"),
+        ("t;x\n1;2\n", "--space r:1", "a.csv: cells must be separated by commas; the first line is 't;x'"),
+        ("t,x,x\n1,2,3\n", "--space r:1", "a.csv: the first line names two columns 'x'"),
+        (
+            "t,x,y\n1,a,3\n2,4,5\n",
+            "--space r:2",
+            "has 2 numbers, but there are 1 columns for it: y; say which with ",
+        ),
+    ],
+)
+def test_bad_tables(fails, text, options, problem):
+    write("a.csv", text)
+    assert problem in fails(f"fit a.csv {options} -o a.npz")
+
+
+def test_a_column_that_begins_with_a_text_is_named(fails):
+    write("a.csv", "t,x,y\n1,a,3\n2,4,5\n")
+    assert fails("fit a.csv --space r:2 -o a.npz").endswith("(x: no number in the first row)")
+
+
+def test_points_are_moved_onto_the_space_by_rounding_only(run, fails):
+    write("a.csv", "t,x,y\n0,1.00001,0\n1,0.70711,0.70711\n")
+    run("fit a.csv --space s:1 -o a.npz")
+    np.testing.assert_allclose(np.linalg.norm(ss.load("a.npz").points, axis=1), 1, atol=1e-15)
+    write("a.csv", "t,x,y\n0,1.001,0\n1,0.70711,0.70711\n")
+    problem = fails("fit a.csv --space s:1 -o b.npz")
+    assert problem.startswith("a.csv: the point in line 2 is off the space by 1.000e-3")
+    assert "1e-4" in problem and "space.project" not in problem
+
+
+def test_bad_usage(run, fails):
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    assert fails("").endswith("(see symspline --help)")
+    assert "invalid choice: 'ft'" in fails("ft")
+    assert (
+        fails("fit a.csv --space s:2")
+        == "the following arguments are required: -o (see symspline fit --help)"
+    )
+    assert "unrecognized arguments: --tiem" in fails("fit a.csv --space s:2 --tiem t -o b.npz")
+    assert "--every -n --at is required" in fails("sample a.npz -o b.csv")
+    assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
+    assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
+    assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
+    ending = "b.txt: the name of a table must end in .csv or .npz or .parquet"
+    assert fails("sample a.npz -n 3 -o b.txt") == ending
+    assert fails("plot a.npz -o b.txt").startswith("b.txt: the name of a picture must end in .")
+    assert "must end in .csv" in fails("fit a.txt --space s:2 -o b.npz")
+
+
+def test_files_that_cannot_be_read(fails):
+    assert fails("fit no.csv --space s:2 -o a.npz") == "cannot read no.csv: No such file or directory"
+    assert fails("fit no.npz --space s:2 -o a.npz") == "cannot read no.npz: No such file or directory"
+    assert fails("check no.npz") == "cannot read no.npz: No such file or directory"
+    os.mkdir("folder.csv")
+    assert fails("fit folder.csv --space s:2 -o a.npz") == "cannot read folder.csv: Is a directory"
+    Path("latin.csv").write_bytes("t,x\n0,1\n1,2°\n".encode("latin-1"))
+    assert fails("fit latin.csv --space r:1 -o a.npz") == "latin.csv is not text in UTF-8"
+    write("a.npz", "no zip")
+    assert fails("check a.npz") == "a.npz is not a file of curves, such as `symspline fit` makes"
+    np.savez("a.npz", x=1)
+    assert "a.npz" in fails("check a.npz")
+    ss.CubicSpline(None, [[0], [1]], "r:1").save("a.npz")
+    np.savez("a.npz", **dict(np.load("a.npz")), columns="{}")
+    assert fails("check a.npz").startswith("a.npz is damaged")
+    Path("a.npz").write_bytes(Path("a.npz").read_bytes()[:-300])
+    assert "a.npz" in fails("check a.npz")
+
+
+def test_pictures_without_matplotlib(run, fails, monkeypatch):
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "pip install 'symspline[plot]'" in fails("plot a.npz -o a.png")
+
+
+def test_a_fit_that_does_not_converge(fails):
+    p = walk(ss.Sphere(3), 2.5, 30, np.random.default_rng(5))
+    np.savez("far.npz", points=p)
+    write("old.npz", "as it was")
+    problem = fails("fit far.npz --space s:3 --method fixed-point -o old.npz", code=1)
+    assert problem.startswith("far.npz: no convergence of the curve: residual")
+    assert Path("old.npz").read_text() == "as it was"
+
+
+# ---- output ----
+
+
+def test_output_that_cannot_be_written(run, fails, monkeypatch):
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    assert fails("fit a.csv --space s:2 -o no/b.npz") == "cannot write no/b.npz: there is no folder no"
+    os.mkdir("b.npz")
+    assert fails("fit a.csv --space s:2 -o b.npz") == "cannot write b.npz: it is a folder"
+    assert fails("plot a.npz -o no/b.png").startswith("cannot write no/b.png")
+    assert fails("sample a.npz -n 3 -o no/b.csv").startswith("cannot write no/b.csv")
+    assert fails("demo --out a.csv") == "cannot make the folder a.csv: File exists"
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert fails("fit a.csv --space s:2 -o c.npz") == "cannot write c.npz: no permission to write into ."
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(run, fails, folder):
+    write("a.csv", AXES)
+    folder.chmod(0o500)
+    try:
+        assert "no permission" in fails("fit a.csv --space s:2 -o a.npz")
+    finally:
+        folder.chmod(0o700)
+
+
+@pytest.mark.parametrize("ending", ["csv", "npz", "parquet", "png"])
+def test_a_full_disk(run, fails, monkeypatch, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    write(f"out.{ending}", "as it was")
+
+    class Full:
+        """A file whose disk is full."""
+
+        def __init__(self, file):
+            self._file = file
+
+        def __getattr__(self, name):
+            return getattr(self._file, name)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            self._file.close()
+
+        def write(self, data):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    def full(name, mode="r", *arguments, **options):
+        file = open(name, mode, *arguments, **options)
+        return Full(file) if "w" in mode else file
+
+    monkeypatch.setattr("symspline.cli.tables.open", full, raising=False)
+    monkeypatch.setattr("symspline.cli.curves.open", full, raising=False)
+    monkeypatch.setattr("matplotlib.cbook.open", full, raising=False)
+    monkeypatch.setattr("PIL.Image.builtins.open", full)
+    line = "plot a.npz" if ending == "png" else "sample a.npz -n 3"
+    assert fails(f"{line} -o out.{ending}") == f"cannot write out.{ending}: No space left on device"
+    assert fails("fit a.csv --space s:2 -o a.npz") == "cannot write a.npz: No space left on device"
+    assert Path(f"out.{ending}").read_text() == "as it was"
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 3], np.eye(3), "s:2")
