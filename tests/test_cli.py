@@ -1,15 +1,16 @@
 """The command line: every verb, every format, and what it says when something is wrong."""
 
 import csv
-import errno
 import json
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,8 @@ import pytest
 from cases import walk
 
 import symspline as ss
-from symspline import files
-from symspline.cli import curves as cli_curves
-from symspline.cli import fit as cli_fit
 from symspline.cli import main, points, times
 from symspline.cli.errors import Problem
-from symspline.cli.progress import Progress
 from symspline.lonlat import from_lonlat, to_lonlat
 
 README = Path(__file__).parents[1] / "README.md"
@@ -274,12 +271,16 @@ def test_what_programs_write_as_csv(run):
     write("a.csv", text)
     run("fit a.csv --space r:1 -o a.npz")
     assert ss.load("a.npz") == ss.CubicSpline([0, 1, 3], [[1.5], [2.5], [1e-3]], "r:1")
+    # Columns without a name: an index, and commas at the end of lines.
+    write("b.csv", ",t,x,,\n0,0,1.5,,\n1,1,2.5,,\n2,3,1e-3,,\n")
+    run("fit b.csv --space r:1 -o b.npz")
+    assert ss.load("b.npz") == ss.load("a.npz")
 
 
 def test_long_files_are_read_in_pieces(run, fails):
     n = 4500
     angle = np.arange(n) / 10
-    rows = [f"{i},{np.cos(a)!r},{np.sin(a)!r},note\n" for i, a in enumerate(angle.tolist())]
+    rows = [f"{i},{np.cos(a):.17g},{np.sin(a):.17g},note\n" for i, a in enumerate(angle)]
     rows.insert(3000, "\n" * 5000)
     write("a.csv", "t,x,y,remark\n" + "".join(rows))
     run("fit a.csv --space s:1 -o a.npz")
@@ -375,9 +376,8 @@ def test_dates(run, cells, t):
 )
 def test_times_that_are_not(fails, cells, found):
     dated(cells)
-    assert f"a.csv, {found}" in fails("fit a.csv --space r:1 -o a.npz") or found in fails(
-        "fit a.csv --space r:1 -o a.npz"
-    )
+    problem = fails("fit a.csv --space r:1 -o a.npz")
+    assert problem.startswith("a.csv, line ") and found in problem
 
 
 def test_large_whole_times_are_exact(run):
@@ -439,9 +439,8 @@ def test_steps_of_numbers(fails, run):
     assert "give a step without a unit" in fails("sample a.npz --every 10min -o b.csv")
     assert "samples of one curve" in fails("sample a.npz --every 1e-300 -o b.csv")
     assert "-n 0: the number of samples" in fails("sample a.npz -n 0 -o b.csv")
-    assert "large whole numbers" in str(
-        pytest.raises(Problem, times.every, "0.5", np.array([2**60, 2**60 + 5])).value
-    )
+    with pytest.raises(Problem, match="large whole numbers"):
+        times.every("0.5", np.array([2**60, 2**60 + 5]))
 
 
 # ---- longitude and latitude ----
@@ -464,7 +463,7 @@ def test_a_track_across_the_date_line(run):
     middle = np.radians(track[1:-1, 1])
     turn = (track[2:] - track[:-2] + 180) % 360 - 180
     seen = turn / 1200 * np.stack([np.cos(middle), np.ones_like(middle)], axis=1)
-    np.testing.assert_allclose(rate[1:-1], seen, rtol=2e-4, atol=1e-9)
+    np.testing.assert_allclose(rate[1:-1], seen, rtol=1e-3)
     acceleration = numbers(columns, "east_d2", "north_d2")
     assert np.abs(acceleration[[0, -1]]).max() < 1e-12 * np.abs(acceleration).max()  # natural ends
 
@@ -803,12 +802,16 @@ def test_pictures_without_matplotlib(run, fails, monkeypatch):
     assert "pip install 'symspline[plot]'" in fails("plot a.npz -o a.png")
 
 
-def test_a_fit_that_does_not_converge(fails):
-    p = walk(ss.Sphere(3), 2.5, 30, np.random.default_rng(5))
-    np.savez("far.npz", points=p)
+def test_a_fit_that_does_not_converge(fails, monkeypatch):
+    monkeypatch.setattr("symspline.cli.fit.fit_many", partial(ss.fit_many, max_iter=2))
+    write("pair.csv", PAIR)
     write("old.npz", "as it was")
-    problem = fails("fit far.npz --space s:3 --method fixed-point -o old.npz", code=1)
-    assert problem.startswith("far.npz: no convergence of the curve: residual")
+    problem = fails("fit pair.csv --space s:2 --columns x,y,z --curve id -o old.npz", code=1)
+    assert problem.startswith("pair.csv: no convergence of curve 'a': residual")
+    assert "max_iter" not in problem
+    write("axes.csv", AXES)
+    problem = fails("fit axes.csv --space s:2 -o old.npz", code=1)
+    assert problem.startswith("axes.csv: no convergence of the curve: residual")
     assert Path("old.npz").read_text() == "as it was"
 
 
@@ -838,42 +841,114 @@ def test_a_folder_without_permission(run, fails, folder):
         folder.chmod(0o700)
 
 
-@pytest.mark.parametrize("ending", ["csv", "npz", "parquet", "png"])
-def test_a_full_disk(run, fails, monkeypatch, ending):
+ENDINGS = pytest.mark.parametrize("ending", ["csv", "npz", "parquet", "png", "fit"])
+
+
+def written_into(ending, folder):
+    """A line that writes more than 16 kB into a folder, and the name of the file."""
     if ending == "parquet":
         pytest.importorskip("pyarrow")
+    if ending == "fit":
+        return f"fit long.csv --space r:1 -o {folder}/out.npz", f"{folder}/out.npz"
+    verb = "plot a.npz" if ending == "png" else "sample a.npz -n 3000"
+    return f"{verb} -o {folder}/out.{ending}", f"{folder}/out.{ending}"
+
+
+@pytest.fixture
+def curves(run):
+    """Files to begin with: ``a.npz``, and ``long.csv``."""
     write("a.csv", AXES)
     run("fit a.csv --space s:2 -o a.npz")
-    write(f"out.{ending}", "as it was")
+    write("long.csv", "x\n" + "".join(f"{i}\n" for i in range(3000)))
 
-    class Full:
-        """A file whose disk is full."""
 
-        def __init__(self, file):
-            self._file = file
+@ENDINGS
+def test_a_full_disk(curves, fails, folder, ending):
+    os.mkdir("disk")
+    mount = ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", "disk"]
+    if not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("only root can mount a small disk")
+    try:
+        line, out = written_into(ending, "disk")
+        write(out, "as it was")
+        assert fails(line) == f"cannot write {out}: No space left on device"
+        assert [(path.name, path.read_text()) for path in Path("disk").iterdir()] == [(out[5:], "as it was")]
+    finally:
+        subprocess.run(["umount", "disk"], check=True)
 
-        def __getattr__(self, name):
-            return getattr(self._file, name)
 
-        def __enter__(self):
-            return self
+@ENDINGS
+def test_writing_that_fails_midway(curves, fails, ending):
+    resource = pytest.importorskip("resource")
+    line, out = written_into(ending, ".")
+    write(out, "as it was")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, hard))
+    try:
+        assert fails(line) == f"cannot write {Path(out)}: File too large"
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert Path(out).read_text() == "as it was"
 
-        def __exit__(self, *_):
-            self._file.close()
 
-        def write(self, data):
-            raise OSError(errno.ENOSPC, "No space left on device")
+@pytest.mark.parametrize("where", ["fitting", "saving"])
+def test_interrupted(fails, monkeypatch, where):
+    def interrupt(file, *_, **__):
+        if where == "saving":
+            file.write(b"half of it")
+        raise KeyboardInterrupt
 
-    def full(name, mode="r", *arguments, **options):
-        file = open(name, mode, *arguments, **options)
-        return Full(file) if "w" in mode else file
+    write("a.csv", AXES)
+    write("a.npz", "as it was")
+    target = {"fitting": "symspline.cli.fit.fit_many", "saving": "numpy.savez"}[where]
+    monkeypatch.setattr(target, interrupt)
+    assert fails("fit a.csv --space s:2 -o a.npz", code=130) == "interrupted"
+    assert Path("a.npz").read_text() == "as it was"
 
-    monkeypatch.setattr("symspline.cli.tables.open", full, raising=False)
-    monkeypatch.setattr("symspline.cli.curves.open", full, raising=False)
-    monkeypatch.setattr("matplotlib.cbook.open", full, raising=False)
-    monkeypatch.setattr("PIL.Image.builtins.open", full)
-    line = "plot a.npz" if ending == "png" else "sample a.npz -n 3"
-    assert fails(f"{line} -o out.{ending}") == f"cannot write out.{ending}: No space left on device"
-    assert fails("fit a.csv --space s:2 -o a.npz") == "cannot write a.npz: No space left on device"
-    assert Path(f"out.{ending}").read_text() == "as it was"
-    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 3], np.eye(3), "s:2")
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_interrupted_by_a_signal(curves, folder):
+    os.mkdir("out")
+    line = [sys.executable, "-m", "symspline", "sample", "a.npz", "-n", "1000000", "-o", "out/out.csv"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 20
+        while not any(path.stat().st_size for path in Path("out").iterdir()) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert (process.returncode, out, err) == (130, "", "symspline: interrupted\n")
+    assert not os.listdir("out")
+
+
+def test_nobody_reads_on(curves):
+    line = [sys.executable, "-m", "symspline", "check", "a.npz"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 141
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_output_into_a_full_disk(curves):
+    with open("/dev/full", "w") as full:
+        line = [sys.executable, "-m", "symspline", "check", "a.npz"]
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=20)
+    problem = "symspline: cannot write the output: No space left on device\n"
+    assert (done.returncode, done.stderr) == (2, problem)
+
+
+def test_not_enough_memory(curves, fails, monkeypatch):
+    def too_much(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("symspline.cli.sample.spread", too_much)
+    assert fails("sample a.npz -n 3 -o b.csv") == "there is not enough memory for this"
+
+
+def test_progress_on_a_terminal(curves, capsys, monkeypatch):
+    monkeypatch.setattr("symspline.cli.progress._WAIT", 0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
+    shown = capsys.readouterr().err
+    assert "\rsampling: 100 %" in shown and "\rwriting: 40 %" in shown
+    assert shown.endswith(" \r") and "\n" not in shown

@@ -194,6 +194,8 @@ def _read_many(arrays: dict[str, NDArray[Any]]) -> dict[str, CubicSpline]:
     if str(arrays["format"]) != _MANY:
         raise ValidationError(f"format {str(arrays['format'])!r}, expected {_MANY!r}")
     names, ends = json.loads(str(arrays["names"])), np.cumsum(arrays["knots"])
+    if ends[-1:].tolist() != [len(arrays["t"])]:
+        raise ValidationError(f"the curves have {arrays['knots'].sum()} knots, but t has {len(arrays['t'])}")
     lists = {key: json.loads(str(arrays[key])) for key in _LISTS}
     curves = {}
     for i, (name, end) in enumerate(zip(names, ends, strict=True)):

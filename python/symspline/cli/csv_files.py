@@ -23,7 +23,7 @@ _CHUNK = 2000
 
 
 class CsvTable(Table):
-    """A CSV file. Blank lines are skipped; a column is numeric if its first cell is a number."""
+    """A CSV file. Blank lines are skipped; a column is numeric if it has a name and its first cell is a number."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -36,12 +36,13 @@ class CsvTable(Table):
             raise Problem(f"{path}: cells must be separated by commas; the first line is {self.names[0]!r}")
         if all(map(is_number, self.names)):
             raise Problem(f"{path}: the first line must name the columns, but holds numbers")
-        twice = next((name for name in self.names if self.names.count(name) > 1), None)
+        twice = next((name for name in self.names if name and self.names.count(name) > 1), None)
         if twice is not None:
             raise Problem(f"{path}: the first line names two columns {twice!r}")
         if len(first) < 2:
             raise Problem(f"{path} has no rows below the names of its columns")
-        self.numeric = [name for name, cell in zip(self.names, first[1], strict=False) if is_number(cell)]
+        cells = zip(self.names, first[1], strict=False)
+        self.numeric = [name for name, cell in cells if name and is_number(cell)]
 
     def read(self, numbers: Sequence[str], time: str | None, label: str | None, progress: Progress) -> Rows:
         where = {name: i for i, name in enumerate(self.names)}

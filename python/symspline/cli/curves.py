@@ -12,7 +12,6 @@ from typing import BinaryIO
 import numpy as np
 
 from ..files import load, load_many, save, save_many
-from ..spaces import Space
 from ..spline import CubicSpline
 from .errors import Problem, reading, writing
 from .points import LONLAT, labels, require_globe
@@ -53,11 +52,6 @@ class Curves:
     splines: dict[str, CubicSpline]
     named: bool
     columns: Columns
-
-    @property
-    def space(self) -> Space:
-        """The space."""
-        return next(iter(self.splines.values())).space
 
     def called(self, name: str) -> str:
         """How a message calls a curve."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -59,7 +60,7 @@ def _arrays(path: Path) -> dict[str, Array]:
 
 def _split(key: str, array: Array) -> dict[str, Array]:
     """The columns of an array."""
-    entries = array.reshape(len(array), -1).T
+    entries = array.reshape(len(array), math.prod(array.shape[1:])).T
     names = [key] if array.ndim == 1 else [f"{key}_{i}" for i in range(len(entries))]
     if array.dtype.kind != "c":
         return dict(zip(names, entries, strict=True))

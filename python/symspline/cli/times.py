@@ -166,7 +166,7 @@ def spread(count: int, knots: Times) -> Times:
     start, stop = (knot + np.timedelta64(0, "us") if dates else knot for knot in (knots[0], knots[-1]))
     span = stop - start
     steps = np.rint(np.linspace(0, span.astype(np.int64), count)).astype(np.int64).astype(span.dtype)
-    times = np.minimum(start + steps, stop)
+    times = np.append(start + steps[:-1], stop) if count > 1 else np.array([start])
     return _coarsest(times) if dates else times
 
 
