@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from .errors import Problem, reading
+from .errors import Problem, first_twice, reading
 from .progress import Progress
 from .tables import Array, Doubles, Rows, Table
 from .times import is_number, parse_times
@@ -36,7 +36,7 @@ class CsvTable(Table):
             raise Problem(f"{path}: cells must be separated by commas; the first line is {self.names[0]!r}")
         if all(map(is_number, self.names)):
             raise Problem(f"{path}: the first line must name the columns, but holds numbers")
-        twice = next((name for name in self.names if name and self.names.count(name) > 1), None)
+        twice = first_twice([name for name in self.names if name])
         if twice is not None:
             raise Problem(f"{path}: the first line names two columns {twice!r}")
         if len(first) < 2:

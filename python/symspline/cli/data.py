@@ -47,13 +47,13 @@ class Data:
         found = re.search(r"\bcurve (\d+)", message)
         name = list(self.groups)[int(found[1]) if found else 0]
         own = self.groups[name]
-        message = re.sub(
+        text = re.sub(
             r"points\[(\d+)\]", lambda m: f"the point in {self._rows.place(own[int(m[1])])}", message
         )
         called = f"curve {name!r}" if self._rows.labels is not None else "the curve"
-        message = message.replace(found[0], called) if found else message
-        of_file = f"{self._path}: " if found else ""
-        return of_file + _ADVICE.sub("", message)
+        text = text.replace(found[0], called) if found else text
+        of_file = f"{self._path}: " if text != message else ""
+        return of_file + _ADVICE.sub("", text)
 
     def _points(self, space: Space) -> Any:
         try:

@@ -32,6 +32,16 @@ def did_you_mean(name: str, names: Sequence[str]) -> str:
     return f"there are {listed(names)}"
 
 
+def first_twice(names: Sequence[str]) -> str | None:
+    """The first name that comes a second time."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None
+
+
 def listed(names: Sequence[str]) -> str:
     """The names, or the first of very many."""
     shown = ", ".join(names[:12])

@@ -17,7 +17,7 @@ from .data import Data
 from .errors import Problem, check_target
 from .points import GLOBE, require_globe
 from .progress import Progress
-from .roles import named_columns, point_columns, time_column
+from .roles import named_columns, point_columns, split_names, time_column
 from .tables import ending, open_table
 
 SUMMARY = "fit C2 splines to the points in a table"
@@ -85,8 +85,9 @@ def run(options: argparse.Namespace) -> int:
     space = _space(options.space, options.lonlat)
     table = open_table(options.input)
     curve = table.require(options.curve) if options.curve is not None else None
-    time = time_column(table, options.time, [curve])
-    points = point_columns(table, options.columns, [time, curve], space, options.lonlat)
+    given = split_names(options.columns)
+    time = time_column(table, options.time, [curve, *given])
+    points = point_columns(table, given, [time, curve], space, options.lonlat)
     with Progress("reading") as progress:
         rows = table.read(points, time, curve, progress)
     splines = _fit(Data(table.path, rows), space, options)

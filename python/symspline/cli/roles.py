@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 
 from ..spaces import Space
 from .curves import Columns
-from .errors import Problem, listed
+from .errors import Problem, first_twice, listed
 from .points import LONLAT, labels
 from .tables import Table
 
 
-def time_column(table: Table, given: str | None, others: list[str | None]) -> str | None:
+def split_names(text: str | None) -> list[str]:
+    """Names with commas between them; one that has a comma itself is quoted."""
+    (names,) = csv.reader([text or ""], skipinitialspace=True)
+    return [name.strip() for name in names]
+
+
+def time_column(table: Table, given: str | None, others: Sequence[str | None]) -> str | None:
     """The column of times: the one that was named, or one called t or time."""
     if given is not None:
         return table.require(given)
@@ -20,17 +27,16 @@ def time_column(table: Table, given: str | None, others: list[str | None]) -> st
 
 
 def point_columns(
-    table: Table, given: str | None, others: list[str | None], space: Space, lonlat: bool
+    table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool
 ) -> list[str]:
     """The columns of a point: those that were named, or all that are left."""
-    if given is not None:
-        (names,) = csv.reader([given], skipinitialspace=True)
-        columns = [column for name in names for column in table.expand(name.strip())]
+    if given:
+        columns = [column for name in given for column in table.expand(name)]
     elif lonlat:
         columns = _lonlat(table)
     else:
         columns = table.points(others)
-    _check(table, columns, others, space, lonlat, given is not None)
+    _check(table, columns, others, space, lonlat, bool(given))
     return columns
 
 
@@ -55,18 +61,19 @@ def _check(
     table: Table, columns: list[str], others: list[str | None], space: Space, lonlat: bool, given: bool
 ) -> None:
     wanted = LONLAT if lonlat else labels(space)
-    twice = next((name for name in columns if columns.count(name) > 1 or name in others), None)
+    twice = first_twice([*filter(None, others), *columns])
     if twice is not None:
         raise Problem(f"column {twice!r} of {table.path} cannot have two meanings")
     if len(columns) != len(wanted):
         advice = "" if given else "; say which with --columns"
-        no_number = [name for name in table.names if name not in (*table.numeric, *others)]
-        if no_number and not given:
-            advice += f" ({listed(no_number)}: no number in the first row)"
+        known = {"", *table.numeric, *filter(None, others)}
+        other = [name for name in table.names if name not in known]
+        if other and not given:
+            advice += f" (no numbers in the first row of {listed(other)})"
         place = "longitude and latitude are 2 numbers"
         point = place if lonlat else f"a point of {space} has {len(wanted)} numbers"
-        found = f"{len(columns)} columns for it: {listed(columns)}" if columns else "no columns for it"
-        raise Problem(f"{table.path}: {point}, but there are {found}{advice}")
+        found = f"{len(columns)} columns: {listed(columns)}" if columns else "no columns"
+        raise Problem(f"{table.path}: {point}, and there are {found}{advice}")
     for name, meant in zip(columns, wanted, strict=True):
         mark = meant[-3:]
         if mark in ("_re", "_im") and name[-3:] in ("_re", "_im") and not name.endswith(mark):

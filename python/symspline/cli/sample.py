@@ -14,7 +14,7 @@ from .._pieces import is_closed
 from ..spline import CubicSpline
 from .curves import Curves, read_curves
 from .data import Groups, group
-from .errors import Problem, check_target, did_you_mean
+from .errors import Problem, check_target, did_you_mean, first_twice
 from .points import flatten, motion_degrees, motion_labels, to_degrees
 from .progress import Progress
 from .roles import time_column
@@ -167,7 +167,7 @@ def _names(curves: Curves, orders: list[int]) -> list[str]:
             names += motion_labels(nu)
         else:
             names += [f"{name}_d{nu}" if nu else name for name in columns.points]
-    twice = next((name for name in names if names.count(name) > 1), None)
+    twice = first_twice(names)
     if twice is not None:
         raise Problem(f"two columns would have the name {twice!r}; fit with other names")
     return names
