@@ -125,9 +125,31 @@ pub fn apply<M: Space>(
 }
 
 /// Projects points in place. The first that is farther off than `tol`, or not finite, is an error:
-/// its row, how far it is off, and why it is no point. Nothing is lost: rows from there on are
-/// untouched.
+/// its row, how far it is off, and why it is no point.
 pub fn project_points<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Result<(), (usize, f64, String)> {
+    let len = space.point_len();
+    let first = std::sync::Mutex::new(None);
+    let parallel = points.len() > PARALLEL;
+    let blocks: Vec<(usize, &mut [f64])> = points.chunks_mut(BLOCK * len).enumerate().collect();
+    let quiet = |_| true;
+    parallel::for_each(blocks, parallel, &Monitor::new(&quiet), |(block, rows)| {
+        if let Err((row, off)) = project_block(space, rows, tol)
+            && let Ok(mut first) = first.lock()
+        {
+            let row = block * BLOCK + row;
+            if first.is_none_or(|(earlier, _)| row < earlier) {
+                *first = Some((row, off));
+            }
+        }
+    });
+    match first.into_inner() {
+        Ok(Some((row, off))) => Err((row, off, space.complaint(&points[row * len..(row + 1) * len]))),
+        _ => Ok(()),
+    }
+}
+
+/// Projects some points; stops at the first that is too far off.
+fn project_block<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Result<(), (usize, f64)> {
     let len = space.point_len();
     let mut x = vec![Lane::ZERO; len];
     for (group, rows) in points.chunks_mut(LANES * len).enumerate() {
@@ -138,7 +160,7 @@ pub fn project_points<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Resu
         if !off.simd_le(lane(tol)).all() {
             let off = off.to_array();
             if let Some(l) = (0..=last).find(|&l| !(off[l] <= tol)) {
-                return Err((group * LANES + l, off[l], space.complaint(&rows[l * len..(l + 1) * len])));
+                return Err((group * LANES + l, off[l]));
             }
         }
         scatter(&x, rows);

@@ -36,6 +36,8 @@ struct Piece<'a> {
     report: Report,
     /// The velocity just behind the core, which belongs to the next piece: they must agree.
     next_velocity: Vec<f64>,
+    /// The largest number in the velocities of the core.
+    largest: f64,
 }
 
 /// Fits all curves of a problem; velocities get the layout of the points. Curves at fault are NaN.
@@ -143,6 +145,7 @@ fn cut<'a>(
             velocities: mine,
             report: Report::default(),
             next_velocity: Vec::new(),
+            largest: 0.0,
         });
         from = to;
     }
@@ -312,6 +315,7 @@ fn write_velocities<M: Space>(space: &M, chain: &mut Chain, runs: &[Run; LANES],
             if p.core.contains(&i) {
                 let at = (i - p.core.start) * len;
                 p.velocities[at..at + len].copy_from_slice(row);
+                p.largest = row.iter().fold(p.largest, |x, u| x.max(u.abs()));
             } else if i == p.core.end {
                 p.next_velocity.extend_from_slice(row);
             }
@@ -342,7 +346,7 @@ fn merge(
             if report.status == Status::Converged {
                 report.status = r.status;
             }
-            largest = p.velocities.iter().fold(largest, |x, u| x.max(u.abs()));
+            largest = largest.max(p.largest);
             if let Some(next) = next {
                 for (a, b) in p.next_velocity.iter().zip(&next.velocities[..len]) {
                     mismatch = mismatch.max((a - b).abs());
