@@ -20,7 +20,3 @@ def test_an_old_processor_gets_a_clear_message(folder):
 def test_a_module_built_for_any_processor_is_let_in(folder):
     (folder / "_core.abi3.so").write_bytes(b"... symspline built for any processor ...")
     _cpu.check(folder)
-
-
-def test_this_processor_runs_what_was_built_on_it():
-    assert _cpu._has_v3()
