@@ -531,6 +531,14 @@ def test_what_is_mostly_rounding_has_not_converged():
     assert not report.converged or report.residual < 1e-3
 
 
+def test_legs_that_doubles_cannot_hold_are_an_error():
+    # Given velocities are a solution at once, but ε cosh²(30) is far above 1.
+    p, v = [[1.0, 0, 0], [np.cosh(1), np.sinh(1), 0]], np.array([0, 0, 90.0])
+    with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[0\] has length 30\.0, .*times"):
+        ss.CubicSpline(None, p, "h:2", bc_type=((1, v), (1, v)))
+    assert np.isfinite(ss.CubicSpline(None, p, "h:2", bc_type=((1, v / 10), (1, v / 10)))(0.5)).all()
+
+
 # ---- tracks on a globe ----
 
 

@@ -149,6 +149,13 @@ fn faults(
                     index + 1
                 ),
             ),
+            Status::LongLeg { index, angle } if limit.is_infinite() => (
+                "unconverged",
+                format!(
+                    "the control leg at points[{index}]{of} has length {angle:.1}, which rounding errors outgrow; \
+                     give times that suit the distances: the segments beside it differ too much in length"
+                ),
+            ),
             Status::LongLeg { index, angle } => (
                 "cut-locus",
                 format!(

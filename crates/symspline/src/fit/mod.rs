@@ -93,7 +93,7 @@ pub enum Status {
         /// Deciding angle between them.
         angle: f64,
     },
-    /// The solution leaves the cut locus in a control leg at a point.
+    /// A control leg at a point reaches the cut locus, or is too long for doubles.
     LongLeg {
         /// Index of the point.
         index: usize,

@@ -283,10 +283,10 @@ fn few_points<M: Space>(space: &M, chain: &mut Chain, ends: ChainEnds) -> ChainE
     ChainEnds::Open(kinds)
 }
 
-/// The first leg of each lane that reaches the cut locus, by deciding angle.
+/// The first leg of each lane that is too long, by deciding angle.
 fn long_legs<M: Space>(space: &M, chain: &Chain, leg: Lane) -> [Option<(usize, f64)>; LANES] {
     let mut found = [None; LANES];
-    if leg.simd_lt(lane(space.injectivity_radius())).all() {
+    if leg.simd_lt(lane(space.injectivity_radius().min(space.longest_leg()))).all() {
         return found;
     }
     let m = chain.m;
@@ -298,7 +298,7 @@ fn long_legs<M: Space>(space: &M, chain: &Chain, leg: Lane) -> [Option<(usize, f
         }
         let angle = space.angle(&v).to_array();
         for l in 0..LANES {
-            if angle[l] >= space.cut_angle() {
+            if angle[l] >= space.longest_leg() {
                 found[l].get_or_insert((i, angle[l]));
             }
         }

@@ -33,6 +33,11 @@ impl Space for Hyperbolic {
         f64::INFINITY
     }
 
+    fn longest_leg(&self) -> f64 {
+        // ε cosh²(18) ≈ 1: of points this far apart rounding leaves nothing.
+        18.0
+    }
+
     fn project(&self, x: &mut [Lane]) -> Lane {
         // The point with the same space-like coordinates.
         let height = (Lane::ONE + dot(&x[1..], &x[1..])).sqrt();

@@ -48,6 +48,10 @@ pub trait Space: Copy + Send + Sync + 'static {
     }
     /// The deciding angle at which the cut locus is met; infinite where there is none.
     fn cut_angle(&self) -> f64;
+    /// The deciding angle that a control leg must not reach.
+    fn longest_leg(&self) -> f64 {
+        self.cut_angle()
+    }
     /// K of (22).
     fn curvature(&self) -> f64;
     /// Shape of the array of a point.
