@@ -17,11 +17,13 @@ class Case:
         name: the space's name.
         far: the longest step between neighbours that the solver laws use.
         smooth: whether to run the laws on smooth curves (needs dimension 2 or more).
+        few: whether to run the long laws on few of their cases: for further sizes of a family.
     """
 
     name: str
     far: float = 2.5
     smooth: bool = True
+    few: bool = False
 
     @property
     def space(self):
@@ -38,29 +40,105 @@ CASES = [
     Case("hyperbolic:1", far=1.5, smooth=False),
     Case("hyperbolic:2", far=1.5),
     Case("hyperbolic:5", far=1.5),
+    Case("rp:1", far=1.2, smooth=False, few=True),
+    Case("rp:2", far=1.2),
+    Case("rp:7", far=1.2, few=True),
+    Case("cp:1", far=1.0, few=True),
+    Case("cp:2", far=1.0),
+    Case("cp:7", far=1.0, few=True),
+    Case("gr:1,3", far=1.2, few=True),
+    Case("gr:2,3", far=1.2, few=True),
+    Case("gr:2,5", far=1.2),
+    Case("gr:3,8", far=1.2, few=True),
+    Case("gr:7,8", far=1.2, few=True),
+    Case("cgr:1,2", far=1.0, few=True),
+    Case("cgr:2,4", far=1.0),
+    Case("cgr:3,8", far=1.0, few=True),
+    Case("so:2", smooth=False, few=True),
+    Case("so:3"),
+    Case("so:5", few=True),
+    Case("so:8", few=True),
+    Case("o:2", smooth=False, few=True),
+    Case("o:3", few=True),
+    Case("u:1", smooth=False, few=True),
+    Case("u:2"),
+    Case("u:5", few=True),
+    Case("u:8", few=True),
+    Case("su:2"),
+    Case("su:3", few=True),
+    Case("su:8", few=True),
+    Case("spd:1", far=1.5, smooth=False, few=True),
+    Case("spd:2", far=1.5),
+    Case("spd:3", far=1.5),
+    Case("spd:8", far=1.5, few=True),
+    Case("hpd:1", far=1.5, smooth=False, few=True),
+    Case("hpd:2", far=1.5),
+    Case("hpd:5", far=1.5, few=True),
+    Case("se:2", far=1.5),
+    Case("se:3", far=1.5),
 ]
+
+POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite)
+QUOTIENTS = (ss.RealProjective, ss.ComplexProjective, ss.Grassmannian, ss.ComplexGrassmannian)
 
 
 def condition(space, points):
-    """By how much rounding of points near these counts: |p|² on the hyperboloid (in flat space |p|)."""
+    """By how much rounding of points near these counts: |p|² on the hyperboloid, |p| cond(p) for positive
+    definite matrices, |p| otherwise."""
     if isinstance(space, ss.Hyperbolic):
         return float(np.max(np.sum(np.square(points), axis=-1)))
-    return max(1.0, float(np.max(np.abs(points))))
+    if len(space.point_shape) == 2:
+        largest = max(1.0, float(np.max(np.linalg.norm(points, axis=(-2, -1)))))
+    else:
+        largest = max(1.0, float(np.max(np.abs(points))))
+    if isinstance(space, POSITIVE):
+        return largest * float(np.max(np.linalg.cond(np.asarray(points))))
+    return largest
+
+
+def apart(space, p, q):
+    """How far points are from each other: distance where one point has many arrays, and the largest
+    difference of arrays elsewhere."""
+    if isinstance(space, QUOTIENTS):
+        return float(np.max(space.distance(p, q)))
+    return float(np.abs(np.asarray(p) - q).max())
+
+
+def compact(space):
+    return np.isfinite(space.injectivity_radius) and not isinstance(space, ss.SpecialEuclidean)
 
 
 def base_point(space, rng):
     """A random point that is not far from the middle of a non-compact space."""
     p = space.random_point(rng)
-    if np.isfinite(space.injectivity_radius):
+    if compact(space):
         return p
     centre = np.zeros(space.point_shape)
     if isinstance(space, ss.Hyperbolic):
         centre[0] = 1.0
+    if len(space.point_shape) == 2:
+        centre = np.eye(space.point_shape[0])
     return space.exp(centre, 0.3 * space.log(centre, p))
 
 
 def unit_tangent(space, p, rng):
     v = space.random_tangent(rng, p)
+    return v / space.norm(p, v)
+
+
+def steep_tangent(space, p, rng):
+    """A unit tangent vector whose deciding angle is as large as its length allows: the geodesic in its
+    direction is the first to meet the cut locus."""
+    v = unit_tangent(space, p, rng)
+    if isinstance(space, (ss.Grassmannian, ss.ComplexGrassmannian)):
+        u, _, w = np.linalg.svd(v, full_matrices=False)
+        return space.project_tangent(p, np.outer(u[:, 0], w[0]))
+    groups = (ss.SpecialOrthogonal, ss.Orthogonal, ss.Unitary, ss.SpecialUnitary)
+    if isinstance(space, groups):
+        z = np.linalg.eigh(-1j * (p.conj().T @ v))[1]
+        first, last = (np.outer(z[:, i], z[:, i].conj()) for i in (-1, 0))
+        v = p @ (1j * first if isinstance(space, ss.Unitary) else 1j * (first - last))
+        v = space.project_tangent(p, v if np.iscomplexobj(p) else v.real)
     return v / space.norm(p, v)
 
 
@@ -74,9 +152,9 @@ def walk(space, step, n, rng, turn=0.5):
     direction = unit_tangent(space, p[0], rng)
     for _ in range(n - 1):
         q = space.project(space.exp(p[-1], step * direction))
-        direction = space.transport(p[-1], q, direction)
+        direction = space.project_tangent(q, space.transport(p[-1], q, direction))
         direction = direction + turn * unit_tangent(space, q, rng)
-        if not np.isfinite(space.injectivity_radius) and space.distance(p[0], q) > 2.0:
+        if not compact(space) and space.distance(p[0], q) > 2.0:
             direction = space.log(q, p[0]) + 0.5 * direction
         size = space.norm(q, direction)
         direction = direction / size if size > 0.1 else unit_tangent(space, q, rng)
@@ -101,19 +179,34 @@ def one_sided(spline, nu):
 
 
 def jumps(spline):
-    """Largest jump of γ, γ', ∇γ' at a knot, as multiples of what the C² law allows."""
+    """Largest jump of γ, γ', ∇γ' at a knot, as multiples of what the C² law allows.
+
+    Vectors at one point that has many arrays are compared at the same one.
+    """
     space, p = spline.space, spline.points
     h = np.diff(np.asarray(spline.t, float))
     found = []
+    starts, ends = one_sided(spline, 0)
+    closed = isinstance(spline.bc_type, str) and spline.bc_type == "periodic"
     for nu in range(3):
         start, end = one_sided(spline, nu)
-        left, right, shorter = end[:-1], start[1:], np.minimum(h[:-1], h[1:])
-        if isinstance(spline.bc_type, str) and spline.bc_type == "periodic":
-            left, right = np.concatenate([left, end[-1:]]), np.concatenate([right, start[:1]])
+        shorter = np.minimum(h[:-1], h[1:])
+        pairs = [(a[:-1], b[1:]) for a, b in ((ends, starts), (end, start))]
+        if closed:
+            pairs = [
+                (np.concatenate([left, a[-1:]]), np.concatenate([right, b[:1]]))
+                for (left, right), (a, b) in zip(pairs, ((ends, starts), (end, start)), strict=True)
+            ]
             shorter = np.append(shorter, min(h[0], h[-1]))
+        (from_, to), (left, right) = pairs
         largest = max(np.abs(start).max(), np.abs(end).max())
         # 50 ε for the rounding of either side.
         allowed = 1e-12 * largest + 2 * 50 * EPS * condition(space, p) / shorter**nu
-        difference = np.abs(left - right).reshape(len(left), -1).max(axis=1, initial=0.0)
+        if nu == 0:
+            difference = np.array([apart(space, a, b) for a, b in zip(left, right, strict=True)])
+        else:
+            if isinstance(space, QUOTIENTS) and len(left):
+                left = space.transport(from_, to, left)
+            difference = np.abs(left - right).reshape(len(left), -1).max(axis=1, initial=0.0)
         found.append(float((difference / allowed).max(initial=0.0)))
     return found

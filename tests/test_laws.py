@@ -1,15 +1,32 @@
 """Laws that every space and every spline obeys, over all spaces and over decades of magnitude."""
 
+import itertools
+
 import numpy as np
 import pytest
-from cases import CASES, EPS, base_point, closed_walk, condition, jumps, unit_tangent, walk
+from cases import (
+    CASES,
+    EPS,
+    POSITIVE,
+    QUOTIENTS,
+    apart,
+    base_point,
+    closed_walk,
+    condition,
+    jumps,
+    steep_tangent,
+    unit_tangent,
+    walk,
+)
 from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
 from symspline._core import Handle
 
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-every_smooth = pytest.mark.parametrize("case", [c for c in CASES if c.smooth], ids=lambda case: case.name)
+every_smooth = pytest.mark.parametrize(
+    "case", [c for c in CASES if c.smooth and not c.few], ids=lambda case: case.name
+)
 ENDS = ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"]
 # Lengths over decades, close together around the switches between series (angles of a step whose
 # square is 0.1 or 2.5, or whose 1 − cos is 0.0075 or 0.09).
@@ -45,15 +62,15 @@ def lengths(space):
 @every
 def test_exp_and_log_are_inverse(case, rng):
     space = case.space
-    for length in lengths(space):
+    for length, direction in itertools.product(lengths(space), (unit_tangent, steep_tangent)):
         p = base_point(space, rng)
-        v = length * unit_tangent(space, p, rng)
+        v = length * direction(space, p, rng)
         q = space.exp(p, v)
         space.check_point(q)
         # Rounding of points, and the condition 1/(limit − angle) of the logarithm.
         allowed = 20 * EPS * condition(space, [p, q])
         near_cut = length / min(1.0, (space.injectivity_radius - length))
-        assert np.abs(space.exp(p, space.log(p, q)) - q).max() <= allowed, length
+        assert apart(space, space.exp(p, space.log(p, q)), q) <= allowed, length
         if length > 1e-7:
             assert np.abs(space.log(p, q) - v).max() <= allowed * max(1.0, near_cut), length
         assert abs(space.distance(p, q) - length) <= allowed * max(1.0, length), length
@@ -62,16 +79,16 @@ def test_exp_and_log_are_inverse(case, rng):
 @every
 def test_geodesic_divides_the_distance(case, rng):
     space = case.space
-    for length in (1e-8, 1e-3, 0.5, 2.9):
+    for length in (1e-8, 1e-3, 0.5, 0.9 * min(3.2, space.injectivity_radius)):
         p = base_point(space, rng)
         q = space.exp(p, length * unit_tangent(space, p, rng))
         t = np.array([-0.3, 0.0, 0.25, 0.5, 1.0])
         x = space.geodesic(p, q, t)
         # Near the antipode the direction of the geodesic is known to ε/(π − 2.9).
         allowed = 50 * EPS * condition(space, x)
-        assert np.abs(x[1] - p).max() <= allowed
+        assert apart(space, x[1], p) <= allowed
         assert np.abs(space.distance(p, x) - np.abs(t) * length).max() <= allowed
-        assert np.abs(x[4] - q).max() <= allowed
+        assert apart(space, x[4], q) <= allowed
 
 
 def symmetry(space, p, x):
@@ -81,7 +98,7 @@ def symmetry(space, p, x):
 @every
 def test_transvection_is_the_product_of_two_symmetries(case, rng):
     space = case.space
-    for length in [x for x in lengths(space) if x < 2.5]:
+    for length in [x for x in lengths(space) if x < min(2.5, 0.9 * space.injectivity_radius)]:
         p = base_point(space, rng)
         v = length * unit_tangent(space, p, rng)
         x = space.exp(p, 0.4 * unit_tangent(space, p, rng))
@@ -89,8 +106,8 @@ def test_transvection_is_the_product_of_two_symmetries(case, rng):
         moved = space.transvection(p, v, x)
         twice = symmetry(space, middle, symmetry(space, p, x))
         allowed = 100 * EPS * condition(space, [p, x, moved])
-        assert np.abs(moved - twice).max() <= allowed, length
-        assert np.abs(space.transvection(p, v, p) - space.exp(p, v)).max() <= allowed, length
+        assert apart(space, moved, twice) <= allowed, length
+        assert apart(space, space.transvection(p, v, p), space.exp(p, v)) <= allowed, length
 
 
 @every
@@ -105,9 +122,10 @@ def test_transvection_carries_exp_and_keeps_length(case, rng):
         # Parallel transport needs log(p, q), whose direction is known to ε/length for short steps,
         # but then it matters by length only.
         allowed = 100 * EPS * condition(space, [p, q]) / min(1.0, (space.injectivity_radius - length))
-        assert abs(space.norm(q, carried) - 0.7) <= allowed, length
+        if not isinstance(space, ss.SpecialEuclidean):
+            assert abs(space.norm(q, carried) - 0.7) <= allowed, length
         moved = space.transvection(p, v, space.exp(p, w))
-        assert np.abs(moved - space.exp(q, carried)).max() <= 4 * allowed, length
+        assert apart(space, moved, space.exp(q, carried)) <= 4 * allowed, length
         assert np.abs(space.transport(p, q, v) + space.log(q, p)).max() <= allowed, length
 
 
@@ -119,6 +137,9 @@ def test_inner_product_is_that_of_distance(case, rng):
     space.check_tangent(p, u)
     e = 1e-4
     square = space.distance(space.exp(p, e * u), space.exp(p, e * v)) ** 2 / e**2
+    if isinstance(space, ss.SpecialEuclidean):
+        # There is no invariant metric: distances are those from the first point.
+        square = space.distance(p, space.exp(p, e * (u - v))) ** 2 / e**2
     # Curvature enters at e² relative; distances carry ε/e.
     assert square == pytest.approx(space.norm(p, u - v) ** 2, rel=1e-6, abs=1e-6)
     expanded = space.inner(p, u, u) - 2 * space.inner(p, u, v) + space.inner(p, v, v)
@@ -126,6 +147,11 @@ def test_inner_product_is_that_of_distance(case, rng):
 
 
 # ---- the spline ----
+
+
+def sharpness(space):
+    """K where it is above 1: steps on such a space are as long as K times that on a sphere."""
+    return max(1.0, np.nan_to_num(space.curvature))
 
 
 def end_conditions(kind, space, p):
@@ -149,11 +175,13 @@ def knots(kind, n, rng):
 @pytest.mark.parametrize("method", ["fixed-point", "quasi-newton"])
 def test_the_curve_is_c2(case, method, ends, spacing, rng):
     space = case.space
-    for step in (1e-8, 1e-5, 1e-2, 0.3, 0.8, 1.5, 2.0, 2.5):
-        if step > case.far or (ends == "periodic" and step > 2.0):
+    steps = (1e-8, 0.3, case.far) if case.few else (1e-8, 1e-5, 1e-2, 0.3, 0.8, 1.2, 1.5, 2.0, 2.5)
+    for step in steps:
+        if step > case.far or (ends == "periodic" and step > 2.0 / sharpness(space)):
             # There and back with steps near π has no solution with all legs inside the cut locus.
             continue
-        if ends in ("not-a-knot", "mixed") and isinstance(space, ss.Hyperbolic) and step > 1.2:
+        growing = (ss.Hyperbolic, *POSITIVE)
+        if ends in ("not-a-knot", "mixed") and isinstance(space, growing) and step > 1.2:
             # The cubic in normal coordinates extrapolates through exponentially growing space: points
             # far apart need more iterations than the default, or do not converge.
             continue
@@ -167,14 +195,14 @@ def test_the_curve_is_c2(case, method, ends, spacing, rng):
         assert space.distance(spline(t), p).max() <= 10 * EPS * condition(space, p)
         # The acceleration holds S(v)⁻¹, which for the longest legs is 4.
         largest = max(jumps(spline))
-        assert largest <= (1.0 if step <= 2.0 else 4.0), (step, largest)
+        assert largest <= (1.0 if step < 2.0 else 4.0), (step, largest)
 
 
 @every
 @pytest.mark.parametrize("ends", ["natural", "not-a-knot", "periodic", "velocity"])
 def test_solvers_agree(case, ends, rng):
     space = case.space
-    for step in (1e-3, 0.3, 1.2):
+    for step in (1e-3, 0.3, 1.2 / sharpness(space)):
         p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
         t = knots("random", len(p), rng)
         bc = end_conditions(ends, space, p)
@@ -202,7 +230,7 @@ def test_the_spline_commutes_with_isometries(case, rng):
         here = ss.CubicSpline(t, p, space, bc_type=ends)
         there = ss.CubicSpline(t, move(p), space, bc_type=ends)
         allowed = 200 * EPS * condition(space, [*p, *move(p)])
-        assert np.abs(there(x) - move(here(x))).max() <= allowed
+        assert apart(space, there(x), move(here(x))) <= allowed
 
 
 @every
@@ -215,9 +243,12 @@ def test_reversing_time_reverses_the_curve(case, rng):
         forth = ss.CubicSpline(t, p, space, bc_type=ends)
         back = ss.CubicSpline(-t[::-1], p[::-1], space, bc_type=ends)
         allowed = 200 * EPS * condition(space, p)
-        assert np.abs(forth(x) - back(-x)).max() <= allowed
-        assert np.abs(forth(x, 1) + back(-x, 1)).max() <= 10 * allowed
-        assert np.abs(forth(x, 2) - back(-x, 2)).max() <= 100 * allowed
+        assert apart(space, forth(x), back(-x)) <= allowed
+        for nu, sign, factor in ((1, -1, 10), (2, 1, 100)):
+            there = back(-x, nu)
+            if isinstance(space, QUOTIENTS):
+                there = space.transport(back(-x), forth(x), there)
+            assert np.abs(forth(x, nu) - sign * there).max() <= factor * allowed
 
 
 @every
@@ -252,7 +283,7 @@ def smooth_curve(space, t, closed):
         waves = 0.6 * np.cos(w) + 0.2 * np.sin(2 * w), 0.5 * np.sin(w), 0.2 * np.cos(2 * w)
     else:
         waves = 0.9 * t + 0.3 * np.sin(3 * t), 0.5 * np.cos(2 * t), 0.4 * np.sin(4 * t)
-    v = sum(wave[:, None] * axis for wave, axis in zip(waves, axes, strict=True))
+    v = sum(np.multiply.outer(wave, axis) for wave, axis in zip(waves, axes, strict=True))
     return space.exp(o, v)
 
 
@@ -276,7 +307,8 @@ def test_a_smooth_curve_is_recovered(case, ends, order):
             around = [smooth_curve(space, end + e, False) for end in (0.0, 1.0)]
             # Fourth-order differences: 1e-12, far below the curve's own error.
             bc = [
-                (1, space.project_tangent(p[i], difference @ a)) for i, a in zip((0, -1), around, strict=True)
+                (1, space.project_tangent(p[i], np.tensordot(difference, a, 1)))
+                for i, a in zip((0, -1), around, strict=True)
             ]
         spline = ss.CubicSpline(t, p, space, bc_type=bc)
         errors.append(space.distance(spline(x), smooth_curve(space, x, ends == "periodic")).max())

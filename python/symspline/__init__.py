@@ -16,26 +16,56 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
+from . import convert  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads, set_num_threads  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .product import Product  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
-from .spaces import Euclidean, Hyperbolic, Space, Sphere, space  # noqa: E402
+from .spaces import (  # noqa: E402
+    ComplexGrassmannian,
+    ComplexProjective,
+    Euclidean,
+    Grassmannian,
+    HermitianPositiveDefinite,
+    Hyperbolic,
+    Orthogonal,
+    RealProjective,
+    Space,
+    SpecialEuclidean,
+    SpecialOrthogonal,
+    SpecialUnitary,
+    Sphere,
+    SymmetricPositiveDefinite,
+    Unitary,
+    space,
+)
 from .spline import CubicSpline, evaluate, fit, fit_many  # noqa: E402
 
 __version__ = "0.1.0"
 __all__ = [
+    "ComplexGrassmannian",
+    "ComplexProjective",
     "ConvergenceError",
     "ConvergenceWarning",
     "CubicSpline",
     "CutLocusError",
     "Euclidean",
+    "Grassmannian",
+    "HermitianPositiveDefinite",
     "Hyperbolic",
+    "Orthogonal",
     "Product",
+    "RealProjective",
     "Report",
     "Space",
+    "SpecialEuclidean",
+    "SpecialOrthogonal",
+    "SpecialUnitary",
     "Sphere",
+    "SymmetricPositiveDefinite",
+    "Unitary",
     "ValidationError",
+    "convert",
     "evaluate",
     "fit",
     "fit_many",

@@ -36,7 +36,7 @@ def ends_of(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[End] | N
 
 
 def _end(end: Any, name: str, space: Space, batch: tuple[int, ...]) -> End:
-    shape = batch + space.point_shape
+    shape = batch + space._doubles_shape
     if isinstance(end, str):
         if end not in _WORDS:
             raise ValidationError(f"{_HELP}; the {name} is {end!r}")
@@ -65,7 +65,8 @@ def _copy(vector: Any) -> Any:
     """A read-only copy; for a product a tuple of them."""
     if isinstance(vector, tuple):
         return tuple(_copy(part) for part in vector)
-    array = np.array(vector, dtype=np.float64)
+    array = np.array(vector)
+    array = array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
     array.flags.writeable = False
     return array
 

@@ -66,6 +66,7 @@ def fit_many(
         offsets.tolist(),
         progress,
     )
+    all_points, all_velocities = space._numbers(all_points), space._numbers(all_velocities)
     ends_kept = kept(bc_type)
     reports = shaped(spline._solver(method), columns, (len(curves),), space.curvature)
     fitted = [

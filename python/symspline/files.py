@@ -230,7 +230,8 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
     for i, factor in enumerate(factors):
         suffix = f"_{i}" if len(factors) > 1 else ""
         points, velocities = (
-            factor._doubles(arrays[key + suffix], key + suffix) for key in ("points", "velocities")
+            factor._numbers(factor._doubles(arrays[key + suffix], key + suffix))
+            for key in ("points", "velocities")
         )
         nodes = points.shape[: points.ndim - len(factor.point_shape)]
         if points.shape != velocities.shape or not nodes or times.shape not in ((nodes[-1],), nodes):
@@ -283,8 +284,10 @@ def _report(plain: dict[str, Any], batch: tuple[int, ...]) -> Report:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON can hold it: arrays become lists."""
+    """As JSON can hold it: arrays become lists, complex ones two."""
     if isinstance(value, np.ndarray):
+        if value.dtype.kind == "c":
+            return {"re": value.real.tolist(), "im": value.imag.tolist()}
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
@@ -303,8 +306,10 @@ def _rich(value: Any) -> Any:
 
 
 def _vectors(value: Any) -> Any:
-    """An array; for a product whose factors differ in shape, a tuple of arrays."""
+    """An array; for a product whose factors differ in shape or are complex, a tuple of arrays."""
+    if isinstance(value, dict):
+        return _vectors(value["re"]) + 1j * _vectors(value["im"])
     try:
         return np.asarray(value, dtype=np.float64)
-    except ValueError:
-        return tuple(np.asarray(part, dtype=np.float64) for part in value)
+    except (ValueError, TypeError):
+        return tuple(_vectors(part) for part in value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,7 +27,7 @@ class Space:
     _name: ClassVar[str]
     _handle: Handle
     _parameters: tuple[int, ...]
-    _dtype: ClassVar[type[np.generic]] = np.float64
+    _complex: bool
 
     def __init__(self, *parameters: int) -> None:
         for value in parameters:
@@ -38,6 +39,7 @@ class Space:
         except OverflowError:
             raise ValidationError(f"{self!r} is too large") from None
         self._point_shape = tuple(self._handle.point_shape())
+        self._complex = self._handle.is_complex()
 
     # ---- what it is ----
 
@@ -146,10 +148,12 @@ class Space:
             ValidationError: no point is close to x (a zero vector, or not finite).
         """
         result = self._apply("project", x=x)
-        good = np.isfinite(result) & np.isfinite(np.asarray(x, dtype=np.float64))
+        good = np.isfinite(result) & np.isfinite(np.asarray(x, dtype=self.dtype))
         if not good.all():
             bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
-            raise ValidationError(f"x{bad or ''} cannot be projected: it is zero or not finite")
+            raise ValidationError(
+                f"x{bad or ''} cannot be projected: no point of the space is close to it, or it is not finite"
+            )
         return result
 
     def project_tangent(self, p: ArrayLike, v: ArrayLike) -> Array:
@@ -159,18 +163,18 @@ class Space:
     def check_point(self, p: ArrayLike) -> None:
         """Raise ValidationError unless p (or every one of an array of points) is a point."""
         array = self._doubles(p, "p")
-        lead = array.shape[: array.ndim - len(self.point_shape)]
-        self._handle.check_points(self._rows(array, array.shape), lead, POINT_TOL)
+        lead = self._lead(array)
+        self._handle.check_points(self._rows(array, lead), lead, POINT_TOL)
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
         """Raise ValidationError unless v is a tangent vector at the point p."""
         self.check_point(p)
         points, vectors = self._doubles(p, "p"), self._doubles(v, "v")
         try:
-            shape = np.broadcast_shapes(points.shape, vectors.shape)
+            lead = np.broadcast_shapes(self._lead(points), self._lead(vectors))
         except ValueError:
             raise ValidationError(f"p {points.shape} and v {vectors.shape} do not broadcast") from None
-        defects = self._handle.tangent_defects(self._rows(points, shape), self._rows(vectors, shape))
+        defects = self._handle.tangent_defects(self._rows(points, lead), self._rows(vectors, lead))
         bad = np.flatnonzero(~(defects <= POINT_TOL))
         if bad.size:
             raise ValidationError(
@@ -183,51 +187,74 @@ class Space:
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
         """Random points, shape ``shape + point_shape``: uniform on a compact space."""
         shape = (shape,) if isinstance(shape, int) else tuple(shape)
-        return self._apply("scatter", x=rng.standard_normal(shape + self.point_shape))
+        noise = rng.standard_normal(shape + self._doubles_shape)
+        return self._apply("scatter", x=self._numbers(noise))
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
         """Standard normal tangent vectors at the points p."""
-        noise = rng.standard_normal(np.shape(p))
-        return self._apply("random_tangent", p=p, noise=noise)
+        lead = self._lead(self._doubles(p, "p"))
+        noise = rng.standard_normal(lead + self._doubles_shape)
+        return self._apply("random_tangent", p=p, noise=self._numbers(noise))
 
     # ---- arrays ----
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of the numbers of a point: float64, or complex128."""
+        return np.dtype(np.complex128 if self._complex else np.float64)
+
+    def _numbers(self, doubles: NDArray[np.float64]) -> Array:
+        """The compiled core's doubles as the numbers of points: pairs are complex numbers."""
+        return doubles.view(np.complex128) if self._complex else doubles
 
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
 
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
-        """The value as an array of doubles whose last axes are those of a point."""
+        """The value as contiguous doubles whose last axes are those of a point; of complex numbers the
+        last axis holds real and imaginary parts side by side."""
         array = as_array(value, name)
-        if array.dtype.kind not in "biuf":
-            raise ValidationError(f"{name} must be an array of real numbers, not of {array.dtype}")
+        if array.dtype.kind == "c" and not self._complex:
+            raise ValidationError(
+                f"{name} holds complex numbers, but points of {self!r} are real"
+                + (f"; did you mean {_COMPLEX[self._name]}?" if self._name in _COMPLEX else "")
+            )
+        if array.dtype.kind not in "biufc":
+            raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
         shape = self.point_shape
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
             raise ValidationError(
                 f"{name} has shape {array.shape}, but {self!r} needs shape (..., {', '.join(map(str, shape))})"
             )
-        return np.asarray(array, dtype=np.float64, order="C")
+        array = np.asarray(array, dtype=self.dtype, order="C")
+        return array.view(np.float64)
 
-    def _rows(self, array: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
-        rows = np.broadcast_to(array, shape).reshape(-1, int(np.prod(self.point_shape)))
-        return np.ascontiguousarray(rows)
+    def _rows(self, array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
+        shape = self._doubles_shape
+        return np.ascontiguousarray(np.broadcast_to(array, lead + shape).reshape(-1, math.prod(shape)))
+
+    @property
+    def _doubles_shape(self) -> tuple[int, ...]:
+        *first, last = self.point_shape
+        return (*first, 2 * last if self._complex else last)
+
+    def _lead(self, array: NDArray[np.float64]) -> tuple[int, ...]:
+        """The axes before those of a point."""
+        return array.shape[: array.ndim - len(self.point_shape)]
 
     def _apply(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
         arrays = {name: self._doubles(value, name) for name, value in inputs.items()}
-        axes = len(self.point_shape)
         try:
-            lead = np.broadcast_shapes(
-                *(a.shape[: a.ndim - axes] for a in arrays.values()), () if t is None else t.shape
-            )
+            lead = np.broadcast_shapes(*map(self._lead, arrays.values()), () if t is None else t.shape)
         except ValueError:
             shapes = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
             raise ValidationError(f"the leading axes do not broadcast: {shapes}") from None
-        shape = lead + self.point_shape
-        rows = [self._rows(a, shape) for a in arrays.values()]
+        rows = [self._rows(a, lead) for a in arrays.values()]
         times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
         result = self._handle.apply(operation, rows, times)
         if operation in ("distance", "inner"):
             return result.reshape(lead)[()]
-        return result.reshape(shape)
+        return self._numbers(result.reshape(lead + self._doubles_shape))
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, "_name"):
@@ -280,6 +307,186 @@ class Hyperbolic(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+
+class RealProjective(Space):
+    """Real projective space RPⁿ, lines through the origin of Rⁿ⁺¹: points are unit vectors of n + 1
+    numbers, of which x and −x are the same point. Distance is the angle between lines, at most π/2.
+
+    >>> import symspline as ss
+    >>> ss.RealProjective(2).distance([1, 0, 0], [-1, 0, 0]).round(8)
+    np.float64(0.0)
+    """
+
+    _name = "rp"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class ComplexProjective(Space):
+    """Complex projective space CPⁿ, pure quantum states of n + 1 levels: points are complex unit vectors
+    of n + 1 numbers up to a phase, with the Fubini–Study metric: distance is arccos |⟨p, q⟩|.
+
+    CP¹ is the Bloch sphere, of radius ½.
+
+    >>> import symspline as ss
+    >>> ss.ComplexProjective(1).distance([1, 0], [0.6, 0.8j]).round(8)
+    np.float64(0.92729522)
+    """
+
+    _name = "cp"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Grassmannian(Space):
+    """The Grassmannian Gr(k, n), k-dimensional subspaces of Rⁿ: points are n × k matrices with
+    orthonormal columns, any basis of the subspace. Distance is √(Σ θᵢ²) of the principal angles.
+
+    >>> import symspline as ss
+    >>> ss.Grassmannian(2, 5).dim
+    6
+    """
+
+    _name = "gr"
+
+    def __init__(self, k: int, n: int) -> None:
+        super().__init__(k, n)
+
+
+class ComplexGrassmannian(Space):
+    """The complex Grassmannian, k-dimensional subspaces of Cⁿ: points are complex n × k matrices with
+    orthonormal columns, any basis of the subspace.
+
+    >>> import symspline as ss
+    >>> ss.ComplexGrassmannian(2, 5).dim
+    12
+    """
+
+    _name = "cgr"
+
+    def __init__(self, k: int, n: int) -> None:
+        super().__init__(k, n)
+
+
+class SpecialOrthogonal(Space):
+    """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
+    In SO(3) distance is the angle of the rotation from one to the other.
+
+    >>> import numpy as np, symspline as ss
+    >>> quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    >>> ss.SpecialOrthogonal(3).distance(np.eye(3), quarter).round(8)
+    np.float64(1.57079633)
+    """
+
+    _name = "so"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Orthogonal(Space):
+    """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
+    of the two parts.
+
+    >>> import symspline as ss
+    >>> ss.Orthogonal(2).dim
+    1
+    """
+
+    _name = "o"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Unitary(Space):
+    """Unitary n × n matrices, with ⟨u, v⟩ = Re tr u*v.
+
+    >>> import symspline as ss
+    >>> ss.Unitary(1).distance([[1]], [[1j]]).round(8)
+    np.float64(1.57079633)
+    """
+
+    _name = "u"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class SpecialUnitary(Space):
+    """Unitary n × n matrices of determinant 1, with ⟨u, v⟩ = Re tr u*v.
+
+    >>> import symspline as ss
+    >>> ss.SpecialUnitary(2).dim
+    3
+    """
+
+    _name = "su"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class SymmetricPositiveDefinite(Space):
+    """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
+    covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
+
+    >>> import numpy as np, symspline as ss
+    >>> ss.SymmetricPositiveDefinite(2).geodesic(np.eye(2), 4 * np.eye(2), 0.5).round(12)
+    array([[2., 0.],
+           [0., 2.]])
+    """
+
+    _name = "spd"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class HermitianPositiveDefinite(Space):
+    """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
+
+    >>> import symspline as ss
+    >>> ss.HermitianPositiveDefinite(2).dim
+    4
+    """
+
+    _name = "hpd"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class SpecialEuclidean(Space):
+    """Rigid motions of n = 2 or 3 dimensions, poses: homogeneous (n+1) × (n+1) matrices [[R, t], [0, 1]].
+
+    Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of
+    (ω, v) = g⁻¹u, the rates in the body, and serve for reporting only. For positions that move
+    independently of the rotation use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
+
+    >>> import symspline as ss
+    >>> ss.SpecialEuclidean(3).point_shape
+    (4, 4)
+    """
+
+    _name = "se"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+# What a complex array may have been meant for.
+_COMPLEX = {
+    "rp": "ComplexProjective",
+    "gr": "ComplexGrassmannian",
+    "o": "Unitary",
+    "so": "SpecialUnitary",
+    "spd": "HermitianPositiveDefinite",
+    "sphere": "ComplexProjective",
+}
 
 
 def space(name: str | Space) -> Space:

@@ -31,6 +31,7 @@ Array = NDArray[Any]
 Progress = Callable[[int, int], object]
 
 _OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
+_NORMS = ("speed", "bend")
 _QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
 _FAULTS: dict[str, type[Exception]] = {"cut-locus": CutLocusError, "unconverged": ConvergenceError}
 
@@ -159,6 +160,8 @@ class CubicSpline:
             )
         except ValidationError as error:
             raise self._clock.explain(error) from None
+        self._points = space._numbers(self._points)
+        self._velocities = space._numbers(self._velocities)
         self._points.flags.writeable = self._velocities.flags.writeable = False
         if not dry:
             self._report = shaped(_solver(method), columns, batch, space.curvature)
@@ -248,16 +251,17 @@ class CubicSpline:
             raise ValidationError(
                 f"with per_curve=True the shape of x must begin with the batch axes {self._batch}; got {x.shape}"
             )
-        return _core.evaluate(
+        values = _core.evaluate(
             self._space._handle,
             self._times,
-            self._points,
-            self._velocities,
+            self._points.view(np.float64),
+            self._velocities.view(np.float64),
             x,
             quantity,
             _OUTSIDE[policy],
             per_curve,
         )
+        return values if quantity in _NORMS else self._space._numbers(values)
 
     # ---- what it is made of ----
 
@@ -461,7 +465,7 @@ def evaluate(
         pieces = zip(points, u, space.factors, strict=True)
         options = {"extrapolate": extrapolate, "per_curve": per_curve}
         return tuple(evaluate(x, t, p, v, factor, nu, **options) for p, v, factor in pieces)  # type: ignore[arg-type]
-    velocities = space._doubles(u, "u")
+    velocities = space._numbers(space._doubles(u, "u"))
     if velocities.shape != np.shape(points):
         raise ValidationError(f"u has shape {velocities.shape}, but points {np.shape(points)}")
     if not np.isfinite(velocities).all():

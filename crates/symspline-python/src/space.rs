@@ -42,6 +42,10 @@ impl Handle {
     fn point_shape(&self) -> Vec<usize> {
         with_space!(&self.space, s => s.point_shape())
     }
+    /// Whether numbers are complex: pairs of doubles in all arrays of this module.
+    fn is_complex(&self) -> bool {
+        with_space!(&self.space, s => s.is_complex())
+    }
     fn dim(&self) -> usize {
         with_space!(&self.space, s => s.dim())
     }

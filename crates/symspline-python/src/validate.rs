@@ -5,7 +5,7 @@ use crate::space::off_space;
 use pyo3::prelude::*;
 use symspline::fit::{End, Ends, Problem};
 use symspline::monitor::Monitor;
-use symspline::rows::{Operation, apply, project_points, tangent_defects};
+use symspline::rows::{Operation, apply, leg_angle, project_points, tangent_defects};
 use symspline::space::Space;
 
 /// Where a curve stands in a batch, for messages; nothing for a single curve.
@@ -52,7 +52,29 @@ pub fn points<M: Space>(
         let curve = offsets.partition_point(|&o| o <= row) - 1;
         let which = format!("points[{}]{}", row - offsets[curve], of_curve(curve, batch));
         off_space(&which, off, tol, &why)
-    })
+    })?;
+    if !space.is_connected() {
+        one_component(space, points, offsets, batch)?;
+    }
+    Ok(())
+}
+
+/// Neighbours must lie in the same part of a space that has two.
+fn one_component<M: Space>(space: &M, points: &[f64], offsets: &[usize], batch: &[usize]) -> PyResult<()> {
+    let len = space.point_len();
+    for (curve, ends) in offsets.windows(2).enumerate() {
+        let part = |i: usize| space.component(&points[i * len..(i + 1) * len]);
+        if let Some(i) = (ends[0] + 1..ends[1]).find(|&i| part(i) != part(i - 1)) {
+            let i = i - ends[0];
+            return Err(invalid(format!(
+                "points[{}] and points[{i}]{} have opposite determinants: no curve joins a rotation and a \
+                 reflection",
+                i - 1,
+                of_curve(curve, batch)
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// End vectors must be tangent and velocities not too fast; closed curves must be closed.
@@ -108,19 +130,19 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, batch: &[usize], tol: f64) -
                 defects[c]
             )));
         }
-        if order == "velocity" && space.injectivity_radius().is_finite() {
-            let mut square = vec![0.0; curves];
-            let _ = apply(space, Operation::Inner, &[p, v, v], &[], &monitor, &mut square);
-            for (c, square) in square.iter().enumerate() {
-                let h = end_segment(problem, c, e);
-                let largest = 3.0 * space.injectivity_radius() / h;
-                if square.sqrt() >= largest {
+        if order == "velocity" && space.cut_angle().is_finite() {
+            // The control leg h u/3, by its deciding angle.
+            for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
+                v.iter_mut().for_each(|x| *x /= 3.0);
+                let angle = leg_angle(space, &p[c * len..(c + 1) * len], v);
+                if angle >= space.longest_leg() {
+                    let factor = space.longest_leg() / angle;
                     return Err(invalid(format!(
-                        "the {name} velocity{} has speed {:.6}, too fast for its segment of length {}: its \
-                         control leg would pass the cut locus; the speed must stay below {largest:.6}",
+                        "the {name} velocity{} is too fast for its segment of length {}: its control leg has \
+                         angle {angle:.6}, past the cut locus at {:.6}; multiply it by less than {factor:.6}",
                         of_curve(c, batch),
-                        square.sqrt(),
-                        number(h)
+                        number(end_segment(problem, c, e)),
+                        space.longest_leg(),
                     )));
                 }
             }

@@ -8,6 +8,7 @@
 
 pub mod curve;
 pub mod fit;
+pub mod matrix;
 pub mod monitor;
 pub mod parallel;
 pub mod rows;

@@ -90,7 +90,7 @@ pub fn apply<M: Space>(
                 Operation::Geodesic => space.geodesic(a, b, Lane::new(at.map(|i| t[i])), &mut result),
                 Operation::Distance => result[0] = space.distance(a, b, &log, angle),
                 Operation::Transvection => space.transvect(a, b, c, &mut result),
-                Operation::Transport => space.carry(a, &log, c, &mut result),
+                Operation::Transport => space.carry(a, b, &log, c, &mut result),
                 Operation::Inner => result[0] = space.inner(a, b, c),
                 Operation::Project => {
                     space.project(a);
@@ -183,4 +183,15 @@ pub fn tangent_defects<M: Space>(space: &M, points: &[f64], vectors: &[f64]) -> 
     }
     defects.truncate(rows);
     defects
+}
+
+/// The deciding angle of a tangent vector at a point.
+pub fn leg_angle<M: Space>(space: &M, point: &[f64], vector: &[f64]) -> f64 {
+    let p: Vec<Lane> = point.iter().map(|&x| lane(x)).collect();
+    let v: Vec<Lane> = vector.iter().map(|&x| lane(x)).collect();
+    let mut frame = vec![Lane::ZERO; space.frame_len()];
+    let mut x = vec![Lane::ZERO; space.dim()];
+    space.lift(&p, &mut frame);
+    space.coordinates(&frame, &p, &v, &mut x);
+    space.angle(&x).to_array()[0]
 }

@@ -41,14 +41,14 @@ const fn alternating<const N: usize>(shift: usize) -> [f64; N] {
 }
 
 /// (1 − cos√x)/x = Σ (−x)ʲ/(2j+2)!
-const VERSINE: [f64; 12] = alternating(2);
+pub(crate) const VERSINE: [f64; 12] = alternating(2);
 /// (1 − sin√x/√x)/x = Σ (−x)ʲ/(2j+3)!
-const SINC_DEFECT: [f64; 12] = alternating(3);
+pub(crate) const SINC_DEFECT: [f64; 12] = alternating(3);
 /// θ/sin θ = Σ yʲ Πᵢ i/(2i+1) with y = 1 − cos θ, the series of asin(z)/(z√(1−z²)) at z² = y/2.
-const ARC: [f64; 24] = {
-    let mut c = [1.0; 24];
+pub(crate) const ARC: [f64; 46] = {
+    let mut c = [1.0; 46];
     let mut j = 1;
-    while j < 24 {
+    while j < 46 {
         c[j] = c[j - 1] * j as f64 / (2 * j + 1) as f64;
         j += 1;
     }
@@ -182,8 +182,33 @@ pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
     y.compose(f)
 }
 
+/// (θ/sin θ − 1)/y as a function of y = 1 − cos θ ≤ 1.
+#[inline(always)]
+pub fn arc_defect<S: Scalar>(y: S) -> S {
+    let yv = y.value();
+    let limits = [0.0075, 0.09, 0.3];
+    let terms = [7, 14, 22];
+    let series = |tier: usize| polynomial::<S>(&ARC[1..1 + terms[tier] + S::ORDER], yv);
+    let within = limits.map(|limit| yv.abs().simd_le(lane(limit)));
+    let top = (0..3).find(|&i| within[i].all()).unwrap_or(3);
+    let mut e = if top < 3 {
+        series(top)
+    } else {
+        let [f, f1, f2] = arc_full_range(yv, lane(2.0) - yv);
+        let e = (f - Lane::ONE) / yv;
+        let e1 = (f1 - e) / yv;
+        [e, e1, (f2 - lane(2.0) * e1) / yv]
+    };
+    for i in (0..top).rev() {
+        if within[i].any() {
+            e = select::<S>(within[i], series(i), e);
+        }
+    }
+    y.compose(e)
+}
+
 #[inline(never)]
-fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
+pub(crate) fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
     let cos = y.simd_lt(Lane::ONE).select(Lane::ONE - y, rest - Lane::ONE);
     let sin2 = y * rest;
     let sin = sin2.abs().sqrt();

@@ -111,59 +111,6 @@ pub fn evaluate<M: Space>(
     });
 }
 
-/// A scalar that carries derivatives in t.
-trait Derivatives: Scalar {
-    /// Time in units of a segment, and by how much it grows a unit of time.
-    fn time(t: Lane, rate: Lane) -> Self;
-    fn first(self) -> Lane;
-    fn second(self) -> Lane;
-}
-
-impl Derivatives for Lane {
-    #[inline(always)]
-    fn time(t: Lane, _rate: Lane) -> Self {
-        t
-    }
-    #[inline(always)]
-    fn first(self) -> Lane {
-        Lane::ZERO
-    }
-    #[inline(always)]
-    fn second(self) -> Lane {
-        Lane::ZERO
-    }
-}
-
-impl Derivatives for Dual {
-    #[inline(always)]
-    fn time(t: Lane, rate: Lane) -> Self {
-        Dual { v: t, d: rate }
-    }
-    #[inline(always)]
-    fn first(self) -> Lane {
-        self.d
-    }
-    #[inline(always)]
-    fn second(self) -> Lane {
-        Lane::ZERO
-    }
-}
-
-impl Derivatives for Jet {
-    #[inline(always)]
-    fn time(t: Lane, rate: Lane) -> Self {
-        Jet { v: t, d: rate, dd: Lane::ZERO }
-    }
-    #[inline(always)]
-    fn first(self) -> Lane {
-        self.d
-    }
-    #[inline(always)]
-    fn second(self) -> Lane {
-        self.dd
-    }
-}
-
 struct Job<'a, M> {
     space: &'a M,
     curves: &'a Curves<'a>,
@@ -289,12 +236,12 @@ impl<'a, M: Space> Places<'a, M> {
 
 impl<M: Space> Job<'_, M> {
     /// Evaluates a block of samples, eight at a time, whatever segments they fall in.
-    fn run<S: Derivatives>(&self, out: &mut [f64], size: usize) {
-        with_size!(self.space.point_len(), len => self.run_sized::<S>(out, size, len));
+    fn run<S: Scalar>(&self, out: &mut [f64], size: usize) {
+        with_size!(M::VECTORS, self.space.point_len(), len => self.run_sized::<S>(out, size, len));
     }
 
     #[inline(always)]
-    fn run_sized<S: Derivatives>(&self, out: &mut [f64], size: usize, len: usize) {
+    fn run_sized<S: Scalar>(&self, out: &mut [f64], size: usize, len: usize) {
         let (space, curves) = (self.space, self.curves);
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
@@ -317,7 +264,7 @@ impl<M: Space> Job<'_, M> {
             }
             // Exactly 1 at the last knot.
             let tau = (places.x - places.knot) / places.h;
-            segment.at(space, len, S::time(tau, rate), &mut gamma);
+            segment.at(space, len, S::from_parts([tau, rate, Lane::ZERO]), &mut gamma);
             if self.outside == Outside::Geodesic && places.beyond != [0.0; LANES] {
                 self.go_straight(&places, &segment, &mut gamma);
             }
@@ -325,7 +272,7 @@ impl<M: Space> Job<'_, M> {
             let (d, dd) = derivatives.split_at_mut(len);
             let (d, dd) = (&mut d[..len], &mut dd[..len]);
             for (i, g) in gamma[..len].iter().enumerate() {
-                (p[i], d[i], dd[i]) = (g.value(), g.first(), g.second());
+                [p[i], d[i], dd[i]] = g.parts();
             }
             let norm = |v: &[Lane]| max_or_nan(space.inner(p, v, v), Lane::ZERO).sqrt();
             match self.quantity {
@@ -345,7 +292,7 @@ impl<M: Space> Job<'_, M> {
 
     /// Replaces the lanes outside the knots by the geodesic that leaves the end.
     #[cold]
-    fn go_straight<S: Derivatives>(&self, places: &Places<M>, segment: &Segment<S>, gamma: &mut [S]) {
+    fn go_straight<S: Scalar>(&self, places: &Places<M>, segment: &Segment<S>, gamma: &mut [S]) {
         let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
         let (beyond, third) = (Lane::new(places.beyond), places.h * lane(1.0 / 3.0));
         let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
@@ -354,7 +301,12 @@ impl<M: Space> Job<'_, M> {
         };
         let velocity: Vec<Lane> = pick(a, b).iter().map(|leg| *leg / third).collect();
         let mut straight = gamma.to_vec();
-        self.space.ray(&pick(p0, p1), &velocity, S::time(beyond, Lane::ONE), &mut straight);
+        self.space.ray(
+            &pick(p0, p1),
+            &velocity,
+            S::from_parts([beyond, Lane::ONE, Lane::ZERO]),
+            &mut straight,
+        );
         for (g, s) in gamma.iter_mut().zip(&straight) {
             *g = S::select(before | behind, *s, *g);
         }

@@ -143,7 +143,7 @@ impl Chain {
         self.start.0.clone_from(&self.walker.frame);
         self.start.1.clone_from(&self.walker.p);
         self.read_end(space, 0, ends[0]);
-        with_size!(len, len => self.walk(space, runs, len, limit));
+        with_size!(M::VECTORS, len, len => self.walk(space, runs, len, limit));
         self.max_step = self.max_step.sqrt() / self.scale;
         self.read_end(space, 1, ends[1]);
     }
@@ -194,12 +194,16 @@ impl Chain {
         let last = (&self.walker.frame, &self.walker.p);
         let (from, to) = if to_last { (first, last) } else { (last, first) };
         space.tangent(from.0, from.1, x, &mut self.ambient);
-        space.coordinates(to.0, to.1, &self.ambient, x);
+        // One point, but maybe another array.
+        let mut there = vec![Lane::ZERO; self.ambient.len()];
+        let zero = vec![Lane::ZERO; self.ambient.len()];
+        space.carry(from.1, to.1, &zero, &self.ambient, &mut there);
+        space.coordinates(to.0, to.1, &there, x);
     }
 
     /// Hands out the velocities as ambient tangent vectors, node by node.
     pub fn roll_up<M: Space>(&mut self, space: &M, runs: &[Run; LANES], visit: impl FnMut(usize, &[Lane])) {
-        with_size!(space.point_len(), len => self.walk_again(space, runs, len, visit));
+        with_size!(M::VECTORS, space.point_len(), len => self.walk_again(space, runs, len, visit));
     }
 
     #[inline(always)]

@@ -75,7 +75,7 @@ const THIRD: Lane = lane(1.0 / 3.0);
 /// Fills `chain.r` with right side minus left side of the C² condition at every node.
 pub fn residual<M: Space>(space: &M, chain: &mut Chain, ends: &ChainEnds, work: &mut NodeVectors) -> Defect {
     work.resize(chain.m);
-    with_size!(chain.m, m => inside(space, chain, ends, work, m))
+    with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, work, m))
 }
 
 #[inline(always)]

@@ -144,7 +144,7 @@ pub fn solve<M: Space>(
             // After going back, what is left of the step is as long as what was taken back.
             *s = worse.select(-*n, *n);
         }
-        if legs.simd_gt(lane(0.5 * limit)).any() {
+        if legs.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))).any() {
             shorten(space, chain, limit, done);
         }
     }
@@ -167,7 +167,12 @@ fn shorten<M: Space>(space: &M, chain: &mut Chain, limit: f64, done: Lane) {
     for i in 0..=chain.n {
         let h = chain.h[i.max(1) - 1].max(chain.h[i.min(chain.n - 1)]);
         let u = &mut chain.u[i * m..(i + 1) * m];
-        let leg = space.norm2(u).sqrt() * h * lane(1.0 / 3.0);
+        let third = h * lane(1.0 / 3.0);
+        let length = space.norm2(u).sqrt() * third;
+        if !(length.simd_gt(lane(limit.min(space.injectivity_radius()))) & !done).any() {
+            continue;
+        }
+        let leg = space.angle(&u.iter().map(|u| *u * third).collect::<Vec<_>>());
         let long = leg.simd_gt(lane(limit)) & !done;
         if long.any() {
             u.iter_mut().for_each(|x| *x = long.select(*x * lane(limit) / leg, *x));

@@ -68,7 +68,7 @@ impl Tridiagonal {
 
     /// Solves on the rows `first..=last` in place, for vectors of m numbers.
     fn solve_open(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
-        with_size!(m, m => self.solve_rows(first, last, m, x));
+        with_size!(true, m, m => self.solve_rows(first, last, m, x));
     }
 
     #[inline(always)]

@@ -26,6 +26,16 @@ impl Scalar for Dual {
     }
 
     #[inline(always)]
+    fn parts(self) -> [Lane; 3] {
+        [self.v, self.d, Lane::ZERO]
+    }
+
+    #[inline(always)]
+    fn from_parts([v, d, _]: [Lane; 3]) -> Self {
+        Dual { v, d }
+    }
+
+    #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
         Dual { v: self.v.mul_add(b.v, c.v), d: self.v.mul_add(b.d, self.d.mul_add(b.v, c.d)) }
     }

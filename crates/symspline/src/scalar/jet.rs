@@ -28,6 +28,16 @@ impl Scalar for Jet {
     }
 
     #[inline(always)]
+    fn parts(self) -> [Lane; 3] {
+        [self.v, self.d, self.dd]
+    }
+
+    #[inline(always)]
+    fn from_parts([v, d, dd]: [Lane; 3]) -> Self {
+        Jet { v, d, dd }
+    }
+
+    #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
         let cross = self.d * b.d;
         Jet {

@@ -41,6 +41,12 @@ pub trait Scalar:
     /// The number without its derivatives.
     fn value(self) -> Lane;
 
+    /// Value, first and second derivative; those that are not carried are zero.
+    fn parts(self) -> [Lane; 3];
+
+    /// From value and derivatives; those that are not carried are dropped.
+    fn from_parts(parts: [Lane; 3]) -> Self;
+
     /// `self · b + c`, rounded once where the processor can.
     fn fma(self, b: Self, c: Self) -> Self;
 
@@ -68,6 +74,16 @@ impl Scalar for Lane {
     #[inline(always)]
     fn value(self) -> Lane {
         self
+    }
+
+    #[inline(always)]
+    fn parts(self) -> [Lane; 3] {
+        [self, Lane::ZERO, Lane::ZERO]
+    }
+
+    #[inline(always)]
+    fn from_parts([v, ..]: [Lane; 3]) -> Self {
+        v
     }
 
     #[inline(always)]
@@ -129,25 +145,31 @@ pub fn mask_from(f: impl Fn(usize) -> bool) -> Lane {
     Lane::new(array).simd_gt(Lane::ZERO)
 }
 
-/// Calls a function of a size with the common small sizes as constants: inlined into it, loops over
-/// coordinates unroll and small vectors stay in registers.
+/// Runs an expression with a size of a space as a constant where it is a common small one: inlined into
+/// it, loops over coordinates unroll and small vectors stay in registers. That pays for spaces of
+/// vectors ([`Space::VECTORS`](crate::space::Space::VECTORS)), and would only multiply the code of others.
 #[macro_export]
 macro_rules! with_size {
-    ($size:expr, $m:ident => $body:expr) => {
-        match $size {
-            2 => {
-                let $m = 2;
-                $body
+    ($pays:expr, $size:expr, $m:ident => $body:expr) => {{
+        let $m = $size;
+        if $pays {
+            match $m {
+                2 => {
+                    let $m = 2;
+                    $body
+                }
+                3 => {
+                    let $m = 3;
+                    $body
+                }
+                4 => {
+                    let $m = 4;
+                    $body
+                }
+                _ => $body,
             }
-            3 => {
-                let $m = 3;
-                $body
-            }
-            4 => {
-                let $m = 4;
-                $body
-            }
-            $m => $body,
+        } else {
+            $body
         }
-    };
+    }};
 }

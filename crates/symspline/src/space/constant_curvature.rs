@@ -281,6 +281,7 @@ pub fn stretch<const K: i32, S: Scalar>(v: &[S], x: &mut [S]) {
 /// The methods of [`Space`](super::Space) that sphere and hyperboloid share, for a constant `K`.
 macro_rules! curved_methods {
     () => {
+        const VECTORS: bool = true;
         fn point_len(&self) -> usize {
             self.n + 1
         }

@@ -23,6 +23,7 @@ impl Euclidean {
 
 impl Space for Euclidean {
     const SCALES: bool = true;
+    const VECTORS: bool = true;
 
     fn point_len(&self) -> usize {
         self.n
@@ -64,7 +65,7 @@ impl Space for Euclidean {
             out[i] = x[i] + v[i];
         }
     }
-    fn carry(&self, _p: &[Lane], _v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+    fn carry(&self, _p: &[Lane], _q: &[Lane], _v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         out.copy_from_slice(x);
     }
     #[inline(always)]

@@ -11,14 +11,24 @@
 //!
 //! Adding a space is one page and one line in [`spaces!`].
 
+mod algebra;
 mod constant_curvature;
 mod euclidean;
+mod grassmannian;
 mod hyperbolic;
+mod positive_definite;
+mod rigid;
+mod special_euclidean;
 mod sphere;
+mod unitary;
 
 pub use euclidean::Euclidean;
+pub use grassmannian::{ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective};
 pub use hyperbolic::Hyperbolic;
+pub use positive_definite::{HermitianPositiveDefinite, SymmetricPositiveDefinite};
+pub use special_euclidean::SpecialEuclidean;
 pub use sphere::Sphere;
+pub use unitary::{Orthogonal, SpecialOrthogonal, SpecialUnitary, Unitary, UnitaryGroup};
 
 use crate::scalar::{Lane, Scalar, dot, max_or_nan};
 
@@ -35,6 +45,8 @@ pub trait Space: Copy + Send + Sync + 'static {
     /// Whether multiplying all points by a number multiplies the curve by it. Then data of any size
     /// are brought to size one first, so that squares neither overflow nor vanish.
     const SCALES: bool = false;
+    /// Whether points are vectors of a few numbers, for which code of known sizes pays.
+    const VECTORS: bool = false;
 
     /// Numbers in the array of a point.
     fn point_len(&self) -> usize;
@@ -58,6 +70,18 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn point_shape(&self) -> Vec<usize> {
         vec![self.point_len()]
     }
+    /// Whether the numbers of a point are complex, real and imaginary part side by side.
+    fn is_complex(&self) -> bool {
+        false
+    }
+    /// Whether any two points are joined by a curve.
+    fn is_connected(&self) -> bool {
+        true
+    }
+    /// Tells the two parts of a space apart that no curve joins.
+    fn component(&self, _p: &[f64]) -> bool {
+        true
+    }
     /// Distance below which the logarithm is defined whatever the direction.
     fn injectivity_radius(&self) -> f64 {
         self.cut_angle()
@@ -77,8 +101,9 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]);
     /// The transvection `E_p(v)` of (10) applied to a point x.
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
-    /// `E_p(v)` applied to a tangent vector x at p: parallel transport to `exp_p(v)`.
-    fn carry(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+    /// Parallel transport of a tangent vector x from p to q = `exp_p(v)`: `E_p(v)` applied to it, at the
+    /// representative q.
+    fn carry(&self, p: &[Lane], _q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         self.transvect(p, v, x, out);
     }
     /// Turns the derivative of the ambient array at γ into the velocity γ', in place.
@@ -187,4 +212,15 @@ spaces! {
     Euclidean(n) = "euclidean" | "r";
     Sphere(n) = "sphere" | "s";
     Hyperbolic(n) = "hyperbolic" | "h";
+    RealProjective(n) = "rp" | "real-projective";
+    ComplexProjective(n) = "cp" | "complex-projective";
+    Grassmannian(k, n) = "gr" | "grassmannian";
+    ComplexGrassmannian(k, n) = "cgr" | "complex-grassmannian";
+    SpecialOrthogonal(n) = "so" | "special-orthogonal";
+    Orthogonal(n) = "o" | "orthogonal";
+    Unitary(n) = "u" | "unitary";
+    SpecialUnitary(n) = "su" | "special-unitary";
+    SymmetricPositiveDefinite(n) = "spd" | "symmetric-positive-definite";
+    HermitianPositiveDefinite(n) = "hpd" | "hermitian-positive-definite";
+    SpecialEuclidean(n) = "se" | "special-euclidean";
 }

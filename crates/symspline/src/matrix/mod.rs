@@ -1,0 +1,379 @@
+//! Small dense matrices over lanes, jets and duals, real and complex.
+//!
+//! An entry is `[S; D]`: a real number for D = 1, real and imaginary part for D = 2. Every formula is
+//! written once for both.
+
+mod dense;
+mod eigen;
+mod function;
+mod series;
+
+pub use dense::{cholesky, determinant, orthonormalise, reorthonormalise, solve_lower};
+pub use eigen::{diagonalise, orthogonalise, sort_columns};
+pub use function::{Unary, function_of};
+pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, trig};
+
+use crate::scalar::{Lane, Scalar, lane};
+use smallvec::{SmallVec, smallvec};
+use std::ops::{Add, Index, IndexMut, Neg, Sub};
+
+/// A real number (D = 1), or real and imaginary part of a complex one (D = 2).
+pub type Entry<S, const D: usize> = [S; D];
+
+/// `a b + c`, or `a b* + c` with `CONJUGATE`.
+#[inline(always)]
+fn mul_add<S: Scalar, const D: usize, const CONJUGATE: bool>(
+    a: Entry<S, D>,
+    b: Entry<S, D>,
+    c: Entry<S, D>,
+) -> Entry<S, D> {
+    let mut out = c;
+    if D == 1 {
+        out[0] = a[0].fma(b[0], c[0]);
+    } else {
+        let (ai, bi) = (a[D - 1], if CONJUGATE { -b[D - 1] } else { b[D - 1] });
+        out[0] = a[0].fma(b[0], (-ai).fma(bi, c[0]));
+        out[D - 1] = a[0].fma(bi, ai.fma(b[0], c[D - 1]));
+    }
+    out
+}
+
+/// `a b + c`.
+pub fn multiply_add<const D: usize>(
+    a: Entry<Lane, D>,
+    b: Entry<Lane, D>,
+    c: Entry<Lane, D>,
+) -> Entry<Lane, D> {
+    mul_add::<Lane, D, false>(a, b, c)
+}
+
+/// `Re a*b + c`.
+#[inline(always)]
+fn inner_add<S: Scalar, const D: usize>(a: Entry<S, D>, b: Entry<S, D>, c: S) -> S {
+    let c = a[0].fma(b[0], c);
+    if D == 1 { c } else { a[D - 1].fma(b[D - 1], c) }
+}
+
+#[inline(always)]
+fn conjugate<S: Scalar, const D: usize>(mut a: Entry<S, D>) -> Entry<S, D> {
+    if D > 1 {
+        a[D - 1] = -a[D - 1];
+    }
+    a
+}
+
+/// A matrix, row by row. Up to sixteen entries live on the stack.
+#[derive(Clone)]
+pub struct Matrix<S, const D: usize> {
+    rows: usize,
+    cols: usize,
+    data: SmallVec<[Entry<S, D>; 16]>,
+}
+
+impl<S: Scalar, const D: usize> Matrix<S, D> {
+    /// All zeros.
+    pub fn zeros(rows: usize, cols: usize) -> Self {
+        Matrix { rows, cols, data: smallvec![[S::constant(Lane::ZERO); D]; rows * cols] }
+    }
+
+    /// The identity.
+    pub fn identity(n: usize) -> Self {
+        Self::zeros(n, n).plus_identity(Lane::ONE)
+    }
+
+    /// From numbers row by row, imaginary parts behind real ones.
+    pub fn read(rows: usize, cols: usize, numbers: &[S]) -> Self {
+        let mut m = Self::zeros(rows, cols);
+        m.data.copy_from_slice(&numbers.as_chunks::<D>().0[..rows * cols]);
+        m
+    }
+
+    /// Constants.
+    pub fn constant(rows: usize, cols: usize, numbers: &[Lane]) -> Self {
+        Self::from_fn(rows, cols, |i, j| {
+            let at = (i * cols + j) * D;
+            std::array::from_fn(|c| S::constant(numbers[at + c]))
+        })
+    }
+
+    /// From a function of row and column.
+    pub fn from_fn(rows: usize, cols: usize, mut f: impl FnMut(usize, usize) -> Entry<S, D>) -> Self {
+        let mut m = Self::zeros(rows, cols);
+        for i in 0..rows {
+            for j in 0..cols {
+                m[(i, j)] = f(i, j);
+            }
+        }
+        m
+    }
+
+    /// A real diagonal matrix.
+    pub fn diagonal(entries: &[S]) -> Self {
+        let mut m = Self::zeros(entries.len(), entries.len());
+        for (i, &x) in entries.iter().enumerate() {
+            m[(i, i)][0] = x;
+        }
+        m
+    }
+
+    /// Writes the numbers as [`read`](Self::read) takes them.
+    pub fn write(&self, out: &mut [S]) {
+        for (out, x) in out.as_chunks_mut::<D>().0.iter_mut().zip(&self.data) {
+            *out = *x;
+        }
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    #[inline(always)]
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// All entries, row by row.
+    #[inline(always)]
+    pub fn entries(&self) -> &[Entry<S, D>] {
+        &self.data
+    }
+
+    /// `A B`.
+    pub fn times(&self, b: &Self) -> Self {
+        let mut out = Self::zeros(self.rows, b.cols);
+        for i in 0..self.rows {
+            let row = &mut out.data[i * b.cols..][..b.cols];
+            for k in 0..self.cols {
+                let a = self.data[i * self.cols + k];
+                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols..][..b.cols]) {
+                    *c = mul_add::<S, D, false>(a, *b, *c);
+                }
+            }
+        }
+        out
+    }
+
+    /// `A* B`.
+    pub fn adjoint_times(&self, b: &Self) -> Self {
+        let mut out = Self::zeros(self.cols, b.cols);
+        for k in 0..self.rows {
+            for i in 0..self.cols {
+                let a = conjugate(self.data[k * self.cols + i]);
+                let row = &mut out.data[i * b.cols..][..b.cols];
+                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols..][..b.cols]) {
+                    *c = mul_add::<S, D, false>(a, *b, *c);
+                }
+            }
+        }
+        out
+    }
+
+    /// `A B*`.
+    pub fn times_adjoint(&self, b: &Self) -> Self {
+        Self::from_fn(self.rows, b.rows, |i, j| {
+            let mut sum = [S::constant(Lane::ZERO); D];
+            let (x, y) = (&self.data[i * self.cols..][..self.cols], &b.data[j * b.cols..][..b.cols]);
+            for (x, y) in x.iter().zip(y) {
+                sum = mul_add::<S, D, true>(*x, *y, sum);
+            }
+            sum
+        })
+    }
+
+    /// `A*`.
+    pub fn adjoint(&self) -> Self {
+        Self::from_fn(self.cols, self.rows, |i, j| conjugate(self[(j, i)]))
+    }
+
+    /// `(A + A*)/2`, exactly Hermitian.
+    pub fn hermitian_part(&self) -> Self {
+        self.with_adjoint(Lane::ONE)
+    }
+
+    /// `(A − A*)/2`, exactly skew-Hermitian.
+    pub fn skew_part(&self) -> Self {
+        self.with_adjoint(lane(-1.0))
+    }
+
+    fn with_adjoint(&self, sign: Lane) -> Self {
+        let half = lane(0.5);
+        Self::from_fn(self.rows, self.cols, |i, j| {
+            let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
+            std::array::from_fn(|c| (a[c] + b[c] * sign) * half)
+        })
+    }
+
+    /// `A + x`, x times the identity.
+    pub fn plus_identity(mut self, x: Lane) -> Self {
+        for i in 0..self.rows.min(self.cols) {
+            self[(i, i)][0] = self[(i, i)][0] + x;
+        }
+        self
+    }
+
+    /// `x A`.
+    pub fn scaled(mut self, x: Lane) -> Self {
+        self.data.iter_mut().flatten().for_each(|a| *a = *a * x);
+        self
+    }
+
+    /// `x A` with a scalar that may carry derivatives.
+    pub fn times_scalar(mut self, x: S) -> Self {
+        self.data.iter_mut().flatten().for_each(|a| *a = *a * x);
+        self
+    }
+
+    /// `(1 + A)(1 + B) − 1`: products of what is near the identity keep their small digits.
+    pub fn compose(&self, b: &Self) -> Self {
+        &(&self.times(b) + self) + b
+    }
+
+    /// `Re tr A*B`.
+    pub fn inner(&self, b: &Self) -> S {
+        let mut sum = S::constant(Lane::ZERO);
+        for (a, b) in self.data.iter().zip(&b.data) {
+            sum = inner_add(*a, *b, sum);
+        }
+        sum
+    }
+
+    /// Frobenius norm of the values, a bound of all eigenvalues.
+    pub fn size(&self) -> Lane {
+        let mut sum = Lane::ZERO;
+        for a in self.data.iter().flatten() {
+            sum = a.value().mul_add(a.value(), sum);
+        }
+        sum.sqrt()
+    }
+
+    /// Real part of the trace.
+    pub fn trace(&self) -> S {
+        let mut sum = self[(0, 0)][0];
+        for i in 1..self.rows {
+            sum = sum + self[(i, i)][0];
+        }
+        sum
+    }
+
+    /// The rows `from..to`.
+    pub fn some_rows(&self, from: usize, to: usize) -> Self {
+        Matrix {
+            rows: to - from,
+            cols: self.cols,
+            data: SmallVec::from_slice(&self.data[from * self.cols..to * self.cols]),
+        }
+    }
+
+    /// The columns `from..to`.
+    pub fn some_cols(&self, from: usize, to: usize) -> Self {
+        Self::from_fn(self.rows, to - from, |i, j| self[(i, from + j)])
+    }
+
+    /// The values without derivatives.
+    pub fn value(&self) -> Matrix<Lane, D> {
+        self.map(|x| x.value())
+    }
+
+    /// A function of every entry.
+    pub fn map_entries(mut self, f: impl Fn(Entry<S, D>) -> Entry<S, D>) -> Self {
+        self.data.iter_mut().for_each(|x| *x = f(*x));
+        self
+    }
+
+    /// A function of every number.
+    pub fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matrix<T, D> {
+        Matrix {
+            rows: self.rows,
+            cols: self.cols,
+            data: self.data.iter().map(|a| std::array::from_fn(|c| f(a[c]))).collect(),
+        }
+    }
+}
+
+/// What can be picked lane by lane.
+pub trait Select {
+    /// `a` on the lanes of a mask, `b` on the others.
+    fn select(mask: Lane, a: Self, b: Self) -> Self;
+}
+
+impl<S: Scalar, const D: usize> Select for Matrix<S, D> {
+    fn select(mask: Lane, a: Self, mut b: Self) -> Self {
+        for (b, a) in b.data.iter_mut().flatten().zip(a.data.iter().flatten()) {
+            *b = S::select(mask, *a, *b);
+        }
+        b
+    }
+}
+
+impl<T: Select, const F: usize> Select for [T; F] {
+    fn select(mask: Lane, a: Self, b: Self) -> Self {
+        let mut pairs = a.into_iter().zip(b);
+        std::array::from_fn(|_| {
+            let (a, b) = pairs.next().expect("arrays are of one length");
+            T::select(mask, a, b)
+        })
+    }
+}
+
+/// Picks by size: lanes up to `limits[i]` get `f(i)`, larger ones `f(limits.len())`.
+///
+/// What a lane gets depends on its own size only, never on its neighbours'.
+pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -> R) -> R {
+    let within = |i: usize| size.simd_le(lane(limits[i]));
+    let top = (0..limits.len()).find(|&i| within(i).all()).unwrap_or(limits.len());
+    let mut result = f(top);
+    for i in (0..top).rev() {
+        if within(i).any() {
+            result = R::select(within(i), f(i), result);
+        }
+    }
+    result
+}
+
+impl<S, const D: usize> Index<(usize, usize)> for Matrix<S, D> {
+    type Output = Entry<S, D>;
+    #[inline(always)]
+    fn index(&self, (i, j): (usize, usize)) -> &Entry<S, D> {
+        &self.data[i * self.cols + j]
+    }
+}
+
+impl<S, const D: usize> IndexMut<(usize, usize)> for Matrix<S, D> {
+    #[inline(always)]
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut Entry<S, D> {
+        &mut self.data[i * self.cols + j]
+    }
+}
+
+impl<S: Scalar, const D: usize> Add for &Matrix<S, D> {
+    type Output = Matrix<S, D>;
+    fn add(self, b: Self) -> Matrix<S, D> {
+        let mut out = self.clone();
+        for (x, y) in out.data.iter_mut().flatten().zip(b.data.iter().flatten()) {
+            *x = *x + *y;
+        }
+        out
+    }
+}
+
+impl<S: Scalar, const D: usize> Sub for &Matrix<S, D> {
+    type Output = Matrix<S, D>;
+    fn sub(self, b: Self) -> Matrix<S, D> {
+        let mut out = self.clone();
+        for (x, y) in out.data.iter_mut().flatten().zip(b.data.iter().flatten()) {
+            *x = *x - *y;
+        }
+        out
+    }
+}
+
+impl<S: Scalar, const D: usize> Neg for Matrix<S, D> {
+    type Output = Self;
+    fn neg(mut self) -> Self {
+        self.data.iter_mut().flatten().for_each(|x| *x = -*x);
+        self
+    }
+}

@@ -1,0 +1,299 @@
+//! Positive definite matrices with the affine-invariant metric tr p⁻¹u p⁻¹v: GL(n) acts by
+//! g·p = g p g*, geodesics are p^½ exp(t p^−½ v p^−½) p^½.
+//!
+//! Points are whitened by a factor L with p = L L*, never by a square root, which loses digits where p
+//! is ill-conditioned: errors are ε times the condition of p.
+
+use super::algebra::Algebra;
+use super::{ROUNDING_SIZE, Space};
+use crate::matrix::{
+    Matrix, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus, orthogonalise, solve_lower,
+};
+use crate::scalar::{Lane, Scalar, lane};
+
+/// Hermitian positive definite n × n matrices, real for D = 1, complex for D = 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PositiveDefinite<const D: usize> {
+    n: usize,
+}
+
+/// Real positive definite matrices.
+pub type SymmetricPositiveDefinite = PositiveDefinite<1>;
+/// Complex positive definite matrices.
+pub type HermitianPositiveDefinite = PositiveDefinite<2>;
+
+/// Size of L⁻¹(q − p)L⁻* up to which the logarithm works on the difference; beyond, on factors.
+const NEAR: f64 = 0.35;
+
+impl<const D: usize> PositiveDefinite<D> {
+    /// The n × n matrices.
+    pub fn new(n: usize) -> Result<Self, String> {
+        let name = if D == 1 { "SymmetricPositiveDefinite" } else { "HermitianPositiveDefinite" };
+        if n == 0 { Err(format!("{name}(n) needs n >= 1")) } else { Ok(PositiveDefinite { n }) }
+    }
+
+    /// n
+    pub fn parameters(&self) -> [usize; 1] {
+        [self.n]
+    }
+
+    fn algebra(&self) -> Algebra<D> {
+        Algebra { n: self.n, skew: false, traceless: false }
+    }
+
+    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+        Matrix::read(self.n, self.n, x)
+    }
+}
+
+/// `L⁻¹ x L⁻*` for a Hermitian x.
+fn whiten<const D: usize>(l: &Matrix<Lane, D>, x: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+    solve_lower(l, &solve_lower(l, x).adjoint()).hermitian_part()
+}
+
+/// `g x g*` for a Hermitian x.
+fn congruent<S: Scalar, const D: usize>(g: &Matrix<S, D>, x: &Matrix<S, D>) -> Matrix<S, D> {
+    g.times(x).times_adjoint(g).hermitian_part()
+}
+
+/// `log(L⁻¹ q L⁻*)` for the factor L of p.
+fn log_whitened<const D: usize>(
+    l: &Matrix<Lane, D>,
+    p: &Matrix<Lane, D>,
+    q: &Matrix<Lane, D>,
+) -> Matrix<Lane, D> {
+    let b = whiten(l, &(q - p));
+    by_size(b.size(), &[NEAR], |tier| if tier == 0 { log_one_plus(&b) } else { log_of_factors(l, q) })
+}
+
+/// The same by the singular values of `L⁻¹ L_q = U σ V*`: log is U 2 ln σ U*.
+#[inline(never)]
+fn log_of_factors<const D: usize>(l: &Matrix<Lane, D>, q: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+    let n = q.rows();
+    let mut u = solve_lower(l, &cholesky(q));
+    orthogonalise(&mut u, None);
+    let square: Vec<Lane> =
+        (0..n).map(|j| (0..n).flat_map(|i| u[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum))).collect();
+    // u has columns of length σ.
+    let scaled = Matrix::from_fn(n, n, |i, j| u[(i, j)].map(|x| x * (square[j].ln() / square[j])));
+    scaled.times_adjoint(&u).hermitian_part()
+}
+
+impl<const D: usize> Space for PositiveDefinite<D> {
+    fn point_len(&self) -> usize {
+        self.n * self.n * D
+    }
+    fn point_shape(&self) -> Vec<usize> {
+        vec![self.n, self.n]
+    }
+    fn is_complex(&self) -> bool {
+        D == 2
+    }
+    fn dim(&self) -> usize {
+        self.algebra().dim()
+    }
+    fn frame_len(&self) -> usize {
+        2 * self.point_len()
+    }
+    fn chord_len(&self) -> usize {
+        self.point_len()
+    }
+    fn cut_angle(&self) -> f64 {
+        f64::INFINITY
+    }
+    fn longest_leg(&self) -> f64 {
+        // ε e^{2·17} is 1: what comes back from there is noise.
+        17.0
+    }
+    fn curvature(&self) -> f64 {
+        // One dimension is flat.
+        if self.n == 1 { 0.0 } else { std::f64::consts::FRAC_1_SQRT_2 }
+    }
+
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        let p = self.read(p);
+        let l = cholesky(&p);
+        let w = whiten(&l, &self.read(v));
+        let e = exp_minus_one(&w.clone().scaled(t.value()));
+        let x = &congruent(&l, &e) + &p;
+        let zero = Matrix::zeros(self.n, self.n);
+        let d = if S::ORDER > 0 { &w.times(&e) + &w } else { zero.clone() };
+        let dd = if S::ORDER > 1 { congruent(&l, &w.times(&d)) } else { zero.clone() };
+        let d = if S::ORDER > 0 { congruent(&l, &d) } else { zero };
+        for (i, out) in out.iter_mut().enumerate() {
+            let part = |m: &Matrix<Lane, D>| m.entries()[i / D][i % D];
+            *out = t.compose([part(&x), part(&d), part(&dd)]);
+        }
+    }
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        let (p, q) = (self.read(p), self.read(q));
+        let l = cholesky(&p);
+        let w = log_whitened(&l, &p, &q);
+        congruent(&l, &w).write(out);
+        w.size()
+    }
+    fn distance(&self, _p: &[Lane], _q: &[Lane], _log: &[Lane], angle: Lane) -> Lane {
+        angle
+    }
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        let (p, q) = (self.read(p), self.read(q));
+        // Whitened by the value of p, p is 1 + δ where δ has derivatives only, so that its square root
+        // is 1 + δ/2 − δ²/8 exactly.
+        let l = cholesky(&p.value());
+        let n = self.n;
+        let inverse = solve_lower(&l, &Matrix::identity(n));
+        let lift = |m: &Matrix<Lane, D>| m.map(S::constant);
+        let (l, inverse) = (lift(&l), lift(&inverse));
+        let b = congruent(&inverse, &(&q - &p));
+        let (root, b) = if S::ORDER == 0 {
+            (Matrix::identity(n), b)
+        } else {
+            let delta = congruent(&inverse, &p).map(|x| {
+                let [_, d, dd] = x.parts();
+                S::from_parts([Lane::ZERO, d, dd])
+            });
+            let square = delta.times(&delta);
+            let half = delta.clone().scaled(lane(0.5));
+            let root = (&half - &square.clone().scaled(lane(0.125))).plus_identity(Lane::ONE);
+            let inverse = (&square.scaled(lane(0.375)) - &half).plus_identity(Lane::ONE);
+            (root, congruent(&inverse, &b))
+        };
+        let e = exp_minus_one(&log_one_plus(&b).times_scalar(t));
+        let g = l.times(&root);
+        (&congruent(&g, &e) + &p).write(out);
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        // g = exp(½ v p⁻¹) = L exp(½ L⁻¹vL⁻*) L⁻¹
+        let l = cholesky(&self.read(p));
+        let half = whiten(&l, &self.read(v)).scaled(lane(0.5));
+        let g = l.times(&exp_minus_one(&half).plus_identity(Lane::ONE));
+        congruent(&g, &whiten(&l, &self.read(x))).write(out);
+    }
+    fn velocity(&self, _gamma: &[Lane], d: &mut [Lane]) {
+        self.read(d).hermitian_part().write(d);
+    }
+    fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
+        // γ'' − γ'γ⁻¹γ'
+        let x = solve_lower(&cholesky(&self.read(gamma)), &self.read(d));
+        (&self.read(dd).hermitian_part() - &x.adjoint_times(&x)).hermitian_part().write(dd);
+    }
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        let l = cholesky(&self.read(p));
+        whiten(&l, &self.read(u)).inner(&whiten(&l, &self.read(v)))
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        let before = self.read(x);
+        let p = before.hermitian_part();
+        let size = p.size();
+        let off = (&p - &before).size() / size.simd_gt(Lane::ZERO).select(size, Lane::ONE);
+        let pivots = cholesky(&p);
+        let last = pivots[(self.n - 1, self.n - 1)][0];
+        let good = last.is_finite() & size.is_finite();
+        p.map(|x| good.select(x, lane(f64::NAN))).write(x);
+        good.select(off, lane(f64::INFINITY))
+    }
+    fn project_tangent(&self, _p: &[Lane], v: &mut [Lane]) -> Lane {
+        let before = self.read(v);
+        let size = before.size();
+        let after = before.hermitian_part();
+        after.write(v);
+        (&after - &before).size() / (size + ROUNDING_SIZE)
+    }
+    fn scatter(&self, noise: &mut [Lane]) {
+        let h = self.read(noise).hermitian_part();
+        exp_minus_one(&h).plus_identity(Lane::ONE).write(noise);
+    }
+    fn complaint(&self, x: &[f64]) -> String {
+        let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
+        let before = self.read(&lanes);
+        let p = before.hermitian_part();
+        let off = ((&p - &before).size() / p.size()).to_array()[0];
+        let what = if D == 1 { "symmetric" } else { "Hermitian" };
+        if !before.size().to_array()[0].is_finite() {
+            return "it is not finite".into();
+        }
+        if !(off <= 1e-4) {
+            return format!("it is not {what}: the skew part is {off:.3e} of it");
+        }
+        let mut values = [p];
+        diagonalise(&mut values);
+        let least = (0..self.n).map(|i| values[0][(i, i)][0].to_array()[0]).fold(f64::INFINITY, f64::min);
+        if least > 0.0 {
+            format!("it is not {what}: the skew part is {off:.3e} of it")
+        } else {
+            format!("it is not positive definite: its smallest eigenvalue is {least:.6e}")
+        }
+    }
+
+    // A frame at p is a g with p = g g*, and its inverse: coordinates of v are those of g⁻¹ v g⁻*.
+    fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
+        let l = cholesky(&self.read(p));
+        let (g, inverse) = frame.split_at_mut(self.point_len());
+        l.write(g);
+        solve_lower(&l, &Matrix::identity(self.n)).write(inverse);
+    }
+    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        let (frame_g, frame_inverse) = frame.split_at_mut(self.point_len());
+        let (g, inverse) = (self.read(frame_g), self.read(frame_inverse));
+        let (p, q) = (self.read(p), self.read(q));
+        let b = congruent(&inverse, &(&q - &p));
+        let delta = by_size(b.size(), &[NEAR], |tier| {
+            if tier == 0 {
+                return log_one_plus(&b);
+            }
+            // g = L·(L⁻¹g), and L⁻¹g is unitary.
+            let l = cholesky(&p);
+            let turn = solve_lower(&l, &g);
+            congruent(&turn.adjoint(), &log_of_factors(&l, &q))
+        });
+        self.algebra().coordinates(&delta, chord);
+        let half = delta.clone().scaled(lane(0.5));
+        let g = &g.times(&exp_minus_one(&half)) + &g;
+        let inverse = &exp_minus_one(&-half).times(&inverse) + &inverse;
+        // Both are brought back to q: one step of Newton's method for g⁻¹, and for g g* = q.
+        let defect = g.times(&inverse).plus_identity(lane(-1.0));
+        let inverse = &inverse - &inverse.times(&defect);
+        let off = congruent(&inverse, &q).plus_identity(lane(-1.0)).scaled(lane(0.5));
+        (&g + &g.times(&off)).write(frame_g);
+        (&inverse - &off.times(&inverse)).write(frame_inverse);
+        delta.size()
+    }
+    fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
+    fn coordinates(&self, frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        let inverse = self.read(&frame[self.point_len()..]);
+        self.algebra().coordinates(&congruent(&inverse, &self.read(v)), x);
+    }
+    fn tangent(&self, frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        let g = self.read(&frame[..self.point_len()]);
+        congruent(&g, &self.algebra().matrix(x)).write(v);
+    }
+
+    fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
+        exp_minus_one(&self.algebra().half(chord)).write(prepared);
+    }
+    /// With m = e^{−a/2}e^{d/2}e^{−b/2}: w⁺ = log(m m*) and w⁻ = −log(m* m).
+    fn legs<S: Scalar>(
+        &self,
+        _d: &[Lane],
+        prepared: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    ) {
+        let algebra = self.algebra();
+        let ea = exp_minus_one(&-algebra.half(a));
+        let eb = exp_minus_one(&-algebra.half(b));
+        let ed = Matrix::<S, D>::constant(self.n, self.n, prepared);
+        let m = ea.compose(&ed).compose(&eb);
+        let sum = &m + &m.adjoint();
+        algebra.coordinates(&log_one_plus(&(&m.times_adjoint(&m) + &sum).hermitian_part()), w_plus);
+        algebra.coordinates(&-log_one_plus(&(&m.adjoint_times(&m) + &sum).hermitian_part()), w_minus);
+    }
+    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
+        self.algebra().stretch(v, x);
+    }
+    fn condition(&self, chord: &[Lane]) -> Lane {
+        self.norm2(chord).sqrt().exp()
+    }
+}
