@@ -6,7 +6,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test bench check-tools clean
+.PHONY: demo test test-oracles bench check-tools clean
 
 demo: .venv/built
 	$(BIN)/symspline demo --out demo-output
@@ -19,6 +19,17 @@ test: .venv/built
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest --doctest-modules python tests
+
+# Compares with geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
+# compiled module of .venv, which every Python from 3.11 on can load. Needs .5 GB; not part of `test`.
+test-oracles: .venv-oracles/built
+	.venv-oracles/bin/python -m pytest tests/oracles -o pythonpath='python tests' \
+		-W 'ignore:BackendImporter:ImportWarning'
+
+.venv-oracles/built: tests/oracles/requirements.txt | .venv/built
+	test -x .venv-oracles/bin/python || $(BIN)/python -m venv .venv-oracles
+	.venv-oracles/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	touch $@
 
 # Some minutes; the machine should have nothing else to do.
 bench: .venv/built
@@ -36,4 +47,4 @@ check-tools:
 		{ echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian: python3-venv)"; exit 1; }
 
 clean:
-	rm -rf .venv target demo-output
+	rm -rf .venv .venv-oracles target demo-output

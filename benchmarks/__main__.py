@@ -5,56 +5,67 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import symspline as ss
 
-from . import cost, data, limits, machine, side_by_side
+from . import cost, data, every_space, limits, machine, side_by_side
 from .data import FULL, QUICK, Sizes
 from .tables import table
 from .timing import Effort
 
 HERE = Path(__file__).parent
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+PACKAGES = ("symspline", "numpy", "scipy", "splines")
 
 
 def main() -> None:
     """Run the benchmarks."""
     parser = argparse.ArgumentParser("python -m benchmarks", description="Benchmarks of symspline.")
     parser.add_argument("--quick", action="store_true", help="a smoke test: tiny sizes, nothing is kept")
-    quick = parser.parse_args().quick
+    parser.add_argument("--spaces", action="store_true", help="only the tables of every space")
+    parser.add_argument(
+        "--large", action="store_true", help=f"with a curve in {every_space.LARGE.space} among the spaces"
+    )
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(shutil.copytree(HERE, Path(scratch) / "benchmarks")) if quick else HERE
-        if quick:
+        folder = Path(shutil.copytree(HERE, Path(scratch) / "benchmarks")) if given.quick else HERE
+        if given.quick:
             print("A smoke test: it shows that the benchmarks run; its numbers mean nothing.\n", flush=True)
-        _run(folder, *((QUICK, Effort(2, 0, 0.1)) if quick else (FULL, Effort(7, 0.02, 10))))
+        threads = ss.num_threads()
+        sizes, effort = (QUICK, Effort(2, 0, 0.1)) if given.quick else (FULL, Effort(7, 0.02, 10))
+        if not given.spaces:
+            _write(folder, "measured", _pieces(folder, sizes, threads, effort))
+        plan = every_space.QUICK if given.quick else every_space.FULL
+        _write(folder, "spaces", _spaces(plan.with_large() if given.large else plan, threads))
 
 
-def _run(folder: Path, sizes: Sizes, effort: Effort) -> None:
-    file, threads = folder / "README.md", ss.num_threads()
-    before, after = _around(file.read_text(encoding="utf-8"))
-    pieces = []
-    for piece in _pieces(folder, sizes, threads, effort):
+def _write(folder: Path, part: str, pieces: Iterable[str]) -> None:
+    """Print pieces as they come, and put them into a part of the README."""
+    file = folder / "README.md"
+    begin, end = (f"<!-- {part}: {side} -->" for side in ("begin", "end"))
+    before, after = _around(file.read_text(encoding="utf-8"), begin, end)
+    kept = []
+    for piece in pieces:
         print(piece, end="\n\n", flush=True)
-        pieces.append(piece)
-    measured = "\n\n".join((BEGIN, *pieces, END))
+        kept.append(piece)
+    measured = "\n\n".join((begin, *kept, end))
     file.write_text(f"{before}{measured}{after}", encoding="utf-8")
 
 
-def _around(readme: str) -> tuple[str, str]:
+def _around(readme: str, begin: str, end: str) -> tuple[str, str]:
     """The text before and after what is measured."""
-    before, begin, rest = readme.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise SystemExit(f"benchmarks/README.md lacks the lines {BEGIN} and {END}")
+    before, found, rest = readme.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise SystemExit(f"benchmarks/README.md lacks the lines {begin} and {end}")
     return before, after
 
 
 def _pieces(folder: Path, sizes: Sizes, threads: int, effort: Effort) -> Iterator[str]:
     """The measured part of the README, paragraph by paragraph."""
     yield "## Where and with what"
-    yield table(("", ""), machine.description(threads).items())
+    yield table(("", ""), machine.description(threads, PACKAGES).items())
     walk = data.rotations(max(sizes.knots))
     yield "## Beside other libraries"
     built = side_by_side.construction(walk, sizes, threads, effort)
@@ -69,6 +80,11 @@ def _pieces(folder: Path, sizes: Sizes, threads: int, effort: Effort) -> Iterato
     yield limits.cores_text(walk, sizes, effort)
     yield "## How far from the limit"
     yield limits.limits_text(walk, sizes, effort)
+
+
+def _spaces(plan: every_space.Plan, threads: int) -> Iterator[str]:
+    yield "## Every space"
+    yield from every_space.pieces(plan, threads)
 
 
 if __name__ == "__main__":

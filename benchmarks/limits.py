@@ -13,7 +13,7 @@ from . import data
 from .data import SPHERE, Array, Sizes
 from .side_by_side import QUANTITIES
 from .tables import count, table, verdict, versus
-from .timing import Effort, Timing, Work, measure, ready, seconds
+from .timing import Effort, Result, Timing, Work, measure, ready, shared
 
 ANGLES, TURNS = 3, 6
 """Of de Casteljau's six geodesics the first three join control points: their angles belong to the
@@ -53,11 +53,6 @@ def _goal(value: object) -> str:
     return f"\n\nGoal for a value: at most 25 ns, {found}."
 
 
-class _PerSample(Timing):
-    def __str__(self) -> str:
-        return f"{seconds(self.median)} ({seconds(self.low)} – {seconds(self.high)})"
-
-
 def _long_works(walk: Array, sizes: Sizes) -> dict[str, Work]:
     (n, (curves, keys), samples) = sizes.long_curve, sizes.batch, sizes.most_samples
     long, own = data.knots(n), data.knots(keys)
@@ -74,7 +69,7 @@ def _long_works(walk: Array, sizes: Sizes) -> dict[str, Work]:
     }
 
 
-def _per_sample(curve: ss.CubicSpline, n: int, samples: int, effort: Effort) -> dict[str, object]:
+def _per_sample(curve: ss.CubicSpline, n: int, samples: int, effort: Effort) -> dict[str, Result]:
     x = data.times(n, samples)
     reused = np.empty((samples, 4))
     works: dict[str, Work] = {
@@ -84,13 +79,7 @@ def _per_sample(curve: ss.CubicSpline, n: int, samples: int, effort: Effort) -> 
         f"{TURNS} sines, {TURNS} cosines, {ANGLES} arctan2 (NumPy)": _trigonometry(samples),
     }
     results = measure({name: ready(work) for name, work in works.items()}, effort)
-    return {name: _shared(result, samples) for name, result in results.items()}
-
-
-def _shared(result: object, samples: int) -> object:
-    if not isinstance(result, Timing):
-        return result
-    return _PerSample(result.median / samples, result.low / samples, result.high / samples, result.runs)
+    return {name: shared(result, samples) for name, result in results.items()}
 
 
 def _trigonometry(samples: int) -> Work:

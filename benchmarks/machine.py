@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 
-def description(threads: int) -> dict[str, str]:
+def description(threads: int, packages: Iterable[str]) -> dict[str, str]:
     """Processor, system, versions, date."""
-    packages = {name: _version(name) for name in ("symspline", "numpy", "scipy", "splines")}
     return {
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "processor": f"{_processor()}, {os.cpu_count()} cores, {threads} used by symspline unless it says one",
         "system": f"{platform.system()} {platform.machine()}",
         "load before": _load(),
         "Python": platform.python_version(),
-        **packages,
+        **{name: _version(name) for name in packages},
     }
 
 

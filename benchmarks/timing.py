@@ -42,10 +42,12 @@ class Timing:
 
     def __str__(self) -> str:
         unit, name = _unit(self.median)
-        if self.runs == 1:
-            return f"{_digits(self.median / unit)} {name} (once)"
+        return self.within(unit, f" {name}")
+
+    def within(self, unit: float, name: str = "") -> str:
+        """As a number of units of so many seconds."""
         spread = f"{_digits(self.low / unit)}–{_digits(self.high / unit)}"
-        return f"{_digits(self.median / unit)} {name} ({spread})"
+        return f"{_digits(self.median / unit)}{name} ({'once' if self.runs == 1 else spread})"
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,18 @@ def ratio(slow: Result, fast: Result) -> float | None:
     if isinstance(slow, Failure) or isinstance(fast, Failure):
         return None
     return slow.median / fast.median
+
+
+def shared(result: Result, n: int) -> Result:
+    """The time for one of n things that are done in a call."""
+    if isinstance(result, Failure):
+        return result
+    return Timing(result.median / n, result.low / n, result.high / n, result.runs)
+
+
+def in_unit(result: Result, unit: float) -> str:
+    """A result as a number of units of so many seconds."""
+    return result.within(unit) if isinstance(result, Timing) else str(result)
 
 
 def seconds(time: float) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import cost, data, libraries, tables, timing
+from benchmarks import cost, data, every_space, geodesics, geometries, libraries, tables, timing
+from benchmarks.walks import LONGEST, walks
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -32,9 +33,9 @@ def test_smoke_test_runs_and_keeps_nothing():
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("A smoke test")
     assert "goal for" not in done.stdout.lower() and "missed" not in done.stdout
-    assert done.stdout.count("\n## ") == 5
+    assert done.stdout.count("\n## ") == 6
     failed = [line for line in done.stdout.splitlines() if "fails" in line]
-    assert all("acceleration" in line or line.startswith("| splines |") for line in failed), failed
+    assert all("Unsupported n: 2" in line for line in failed), failed
     assert kept == {file: file.read_bytes() for file in (ROOT / "benchmarks").glob("*.*")}
 
 
@@ -75,6 +76,68 @@ def test_libraries_compute_the_same(name, bounds):
         assert len(other.at(theirs)(x, nu)) == len(own.at(curve)(x, nu)) == 100
 
 
+SPACES = [
+    *("spd:1", "spd:3", "hpd:2", "so:3", "u:1", "u:4", "su:3", "se:3"),
+    *("rp:2", "cp:3", "gr:1,3", "gr:2,5", "gr:3,4", "gr:2,40", "cgr:2,4"),
+]
+
+
+@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize("knots", [2, 3, 12])
+def test_fit_in_numpy_is_the_same(name, knots):
+    space = ss.space(name)
+    points = walks(space, 4, knots)
+    expected = ss.CubicSpline(None, points, space).velocities
+    assert space.norm(points, expected).min() > 0.05
+    np.testing.assert_allclose(geometries.velocities(points, space), expected, atol=1e-12)
+
+
+def test_fit_in_numpy_that_differs_stops_the_benchmark(monkeypatch):
+    space = ss.SpecialOrthogonal(3)
+    points = walks(space, 2, 5)
+    every_space.check(points, space)
+    monkeypatch.setattr(geometries, "velocities", lambda points, space: 0.5 * points)
+    with pytest.raises(SystemExit, match=r"fit in SpecialOrthogonal\(3\) differs"):
+        every_space.check(points, space)
+
+
+def test_fit_in_numpy_knows_its_spaces():
+    with pytest.raises(ValueError, match=r"SpecialOrthogonal\(4\)"):
+        geometries.velocities(walks(ss.SpecialOrthogonal(4), 1, 3), ss.SpecialOrthogonal(4))
+
+
+@pytest.mark.parametrize("name", ["spd:3", "u:4", "cp:3", "se:2", "gr:2,5", "gr:2,40", "hyperbolic:2"])
+def test_steps_of_the_walks_are_as_said(name):
+    space = ss.space(name)
+    points = walks(space, 3, 8)
+    space.check_point(points)
+    np.testing.assert_array_equal(points, walks(space, 3, 8))
+    if name != "se:2":
+        steps = space.distance(points[:, :-1], points[:, 1:])
+        assert LONGEST / 3 < steps.min() < 0.17 and 0.23 < steps.max() < LONGEST
+
+
+@pytest.mark.parametrize("name", ["spd:3", "hpd:2", "so:3", "u:4", "gr:2,5", "cp:3"])
+@pytest.mark.parametrize("operation", geodesics.OPERATIONS)
+def test_geodesics_of_others_are_the_same(name, operation):
+    space = ss.space(name)
+    p, q = np.moveaxis(walks(space, 5, 2), 1, 0)
+    offered = [peer for peer in geodesics.PEERS if geodesics.offers(peer, space, operation)]
+    for peer in offered:
+        pytest.importorskip(peer)
+        assert len(geodesics.checked(peer, space, operation, p, q)()) == 5
+    assert offered or operation == "geodesic" or name == "hpd:2"
+
+
+def test_geodesics_that_differ_stop_the_benchmark(monkeypatch):
+    space = ss.SymmetricPositiveDefinite(2)
+    p, q = np.moveaxis(walks(space, 2, 2), 1, 0)
+    wrong = geodesics.Call(lambda: p, lambda points: points)
+    monkeypatch.setattr(geodesics, "_pyriemann", lambda *_: wrong)
+    with pytest.raises(SystemExit, match="pyriemann: geodesic"):
+        geodesics.text({"spd:2": (p, q)}, TINY)
+
+
 def test_failure_is_recorded(monkeypatch):
     def fail():
         raise ValueError("no | such\nthing")
@@ -100,6 +163,13 @@ def test_slow_work_runs_once_and_fast_work_often():
     assert len(calls) == 1 and "once" in str(slow["a"])
     timing.measure({"a": timing.ready(lambda: calls.append(0))}, timing.Effort(1, 1e-3, 1))
     assert len(calls) > 100
+
+
+def test_time_is_shared():
+    each = timing.shared(timing.Timing(2.5, 2.0, 3.0, 7), 1000)
+    assert timing.in_unit(each, 1e-6) == "2500 (2000–3000)"
+    failed = timing.failure(ValueError("no"))
+    assert timing.in_unit(timing.shared(failed, 10), 1e-6) == str(failed)
 
 
 def test_slope():

@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import walk
+from curves import each, parts, points_on, same_curve
 
 import symspline as ss
-from symspline.cli import main, points, times
+from symspline.cli import main, times
 from symspline.cli.errors import Problem
 from symspline.lonlat import from_lonlat, to_lonlat
 
@@ -300,31 +301,153 @@ def test_long_files_are_read_in_pieces(run, fails):
     assert len(table("b.csv")["t"]) == 2 * n - 1
 
 
-def test_complex_numbers_and_matrices():
-    class Complex(ss.Space):
-        _dtype = np.complex128
-        point_shape = (2, 2)
+# ---- every space ----
 
-        def __init__(self):
-            pass
-
-        __str__ = object.__repr__
-
-    space = Complex()
-    assert points.labels(space)[:3] == ["x0_re", "x0_im", "x1_re"] and len(points.labels(space)) == 8
-    values = np.arange(8).reshape(2, 2, 2) + 1j
-    columns = points.flatten(space, values)
-    assert columns[0].tolist() == [0, 1, 1, 1, 2, 1, 3, 1]
-    np.testing.assert_array_equal(points.unflatten(space, columns), values)
+SPACES = (
+    *("r:2", "s:2", "h:2", "rp:2", "cp:1", "gr:2,4", "cgr:1,2", "so:3", "o:3", "u:2", "su:2"),
+    *("spd:2", "hpd:2", "se:2", "se:3", "so:3 x r:3", "r:2 x su:2 x cp:1 x spd:2"),
+)
+TABLES = pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
+TIMES = np.array([0, 0.7, 2, 2.5, 4, 5])
 
 
-def test_columns_of_complex_numbers(run, fails):
-    write("a.csv", "z_re,w,z_im\n1,2,3\n4,5,7\n")
-    run("fit a.csv --space r:2 --columns z -o a.npz")
-    assert ss.load("a.npz").points.tolist() == [[1, 3], [4, 7]]
-    np.savez("b.npz", points=np.array([[1 + 3j], [4 + 7j]]))
-    run("fit b.npz --space r:2 -o b2.npz")
-    assert ss.load("a.npz") == ss.load("b2.npz")
+def numbered(values, mark=""):
+    """Columns of points or vectors: a0, a1, … in the first factor of a product, b0, b1, … in the second."""
+    columns = {}
+    for letter, part in zip("abcd", parts(values), strict=False):
+        for i, column in enumerate(part.reshape(len(part), -1).T):
+            both = {"_re": column.real, "_im": column.imag} if np.iscomplexobj(column) else {"": column}
+            columns |= {f"{letter}{i}{mark}{end}": numbers for end, numbers in both.items()}
+    return columns
+
+
+def write_table(name, columns):
+    if name.endswith("csv"):
+        rows = [
+            ",".join(map(str, row)) for row in zip(*map(np.ndarray.tolist, columns.values()), strict=True)
+        ]
+        write(name, "\n".join([",".join(columns), *rows]))
+    elif name.endswith("npz"):
+        np.savez(name, **columns)
+    else:
+        pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+        parquet.write_table(pa.table(columns), name)
+
+
+def read_table(name):
+    if name.endswith("csv"):
+        return {key: np.array(cells, float) for key, cells in table(name).items()}
+    if name.endswith("npz"):
+        return dict(np.load(name))
+    columns = pytest.importorskip("pyarrow.parquet").read_table(name)
+    return {key: columns[key].to_numpy() for key in columns.column_names}
+
+
+def assert_same_columns(found, expected):
+    assert list(found) == list(expected)
+    for key, numbers in expected.items():
+        np.testing.assert_array_equal(found[key], numbers)
+
+
+def test_the_spaces_are_all_that_there_are():
+    words = {part.split(":")[0] for name in SPACES for part in name.split(" x ")}
+    assert all(words.intersection(row) for row in ss._core.Handle.names())
+
+
+@TABLES
+@pytest.mark.parametrize("name", SPACES)
+def test_tables_of_every_space(run, name, ending):
+    space, p = ss.space(name), points_on(ss.space(name), step=0.4)
+    write_table(f"a.{ending}", {"t": TIMES, **numbered(p)})
+    run(f"fit a.{ending} --space '{name}' --bc-type not-a-knot -o fitted.npz")
+    spline = ss.CubicSpline(TIMES, p, space, bc_type="not-a-knot")
+    loaded = ss.load("fitted.npz")
+    assert same_curve(loaded, spline)
+    run("check fitted.npz")
+    run(f"sample fitted.npz -n 11 --nu 0,1,2 -o b.{ending}")
+    x = np.linspace(0, 5, 11)
+    smooth = {"t": x, **numbered(spline(x)), **numbered(spline(x, 1), "_d1"), **numbered(spline(x, 2), "_d2")}
+    assert_same_columns(read_table(f"b.{ending}"), smooth)
+    # What was written can be read again.
+    names = ",".join(key.removesuffix("_re") for key in numbered(p) if not key.endswith("_im"))
+    run(f"fit b.{ending} --space '{name}' --columns {names} -o again.npz")
+    assert same_curve(ss.load("again.npz"), ss.CubicSpline(x, spline(x), space))
+    run("check again.npz")
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_many_curves_of_every_space(run, name):
+    space, p = ss.space(name), points_on(ss.space(name), step=0.4)
+    columns = {"t": np.array([*"001122"], float), **numbered(p)}
+    write_table("a.npz", {"id": np.array([*"ababab"]), **columns})
+    run(f"fit a.npz --space '{name}' --curve id -o b.npz")
+    first, second = each(lambda part: part[::2], p), each(lambda part: part[1::2], p)
+    fitted = ss.fit_many([([0, 1, 2], first), ([0, 1, 2], second)], space)
+    assert ss.load_many("b.npz") == dict(zip("ab", fitted, strict=True))
+    run("sample b.npz --every 1 --nu 1 -o c.npz")
+    rates = [numbered(spline([0, 1, 2], 1), "_d1") for spline in fitted]
+    found = read_table("c.npz")
+    assert found.pop("id").tolist() == [*"aaabbb"] and found.pop("t").tolist() == [0, 1, 2] * 2
+    assert_same_columns(found, {key: np.concatenate([rate[key] for rate in rates]) for key in rates[0]})
+    run("plot b.npz --curve b -o b.png")
+
+
+@pytest.mark.parametrize(
+    "name, names",
+    [
+        ("s:2", ["x0", "x1", "x2"]),
+        ("cp:1", ["x0_re", "x0_im", "x1_re", "x1_im"]),
+        ("gr:1,2", ["m11", "m21"]),
+        ("u:1", ["m11_re", "m11_im"]),
+        ("r:1 x so:2 x s:1", ["x0", "m11", "m12", "m21", "m22", "x1", "x2"]),
+        ("spd:1 x u:1 x r:1", ["m1_11", "m2_11_re", "m2_11_im", "x0"]),
+    ],
+)
+def test_names_of_curves_that_were_made_in_python(run, name, names):
+    ss.CubicSpline(None, points_on(ss.space(name), step=0.4), name).save("a.npz")
+    run("sample a.npz -n 2 -o b.csv")
+    assert list(table("b.csv")) == ["time", *names]
+    run("sample a.npz -n 2 --nu 2 -o b.csv")
+    assert list(table("b.csv")) == ["time", *(re.sub("(_re|_im|)$", r"_d2\1", key, count=1) for key in names)]
+
+
+def test_names_in_large_matrices(run):
+    ss.CubicSpline(None, points_on(ss.space("so:11"), n=3, step=0.4), "so:11").save("a.npz")
+    run("sample a.npz -n 2 -o b.csv")
+    names = list(table("b.csv"))
+    assert (names[1], names[2], names[11], names[121]) == ("m1_1", "m1_2", "m1_11", "m11_11")
+
+
+def test_arrays_of_matrices_and_of_complex_numbers(run):
+    p = points_on(ss.space("so:3 x cp:1"), step=0.4)
+    spline = ss.CubicSpline(TIMES, p, "so:3 x cp:1")
+    np.savez("a.npz", psi=p[1], when=TIMES, R=p[0])
+    run("fit a.npz --space 'so:3 x cp:1' --time when --columns R,psi -o b.npz")
+    assert same_curve(ss.load("b.npz"), spline)
+    np.savez("a.npz", points=p[0], t=TIMES, R=p[0])
+    run("fit a.npz --space so:3 -o b.npz")
+    assert same_curve(ss.load("b.npz"), ss.CubicSpline(TIMES, p[0], "so:3"))
+
+
+def test_columns_of_complex_numbers(run):
+    """Halves may stand anywhere; a column of its own is a complex number that is real."""
+    up, down = np.array([1, 0.8, 0.6]), np.array([0, 0.6j, 0.64 + 0.48j])
+    spline = ss.CubicSpline(None, np.stack([up, down], axis=1), "cp:1")
+    columns = {"down_im": down.imag, "note": 0 * up, "up": up, "down_re": down.real}
+    write_table("a.csv", columns)
+    for names in ("up,down", "up,down_re,down_im", "up,down_im,down_re", "down_im,up,down_re"):
+        run(f"fit a.csv --space cp:1 --columns {names} -o a.npz")
+        loaded = ss.load("a.npz")
+        swapped = np.flip(spline.points, axis=1)
+        np.testing.assert_array_equal(loaded.points, swapped if names[:7] == "down_im" else spline.points)
+    run("fit a.csv --space cp:1 --columns up,down -o a.npz")
+    run("sample a.npz --every 1 -o b.csv")
+    assert list(table("b.csv")) == ["time", "up_re", "up_im", "down_re", "down_im"]
+    written = numbers(table("b.csv"), "up_re", "up_im", "down_re", "down_im").view(complex)
+    np.testing.assert_array_equal(written, spline([0, 1, 2]))
+    # In a real space they are two numbers, if both are named.
+    run("fit a.csv --space r:2 --columns down_re,down_im -o a.npz")
+    np.testing.assert_array_equal(ss.load("a.npz").points, np.stack([down.real, down.imag], 1))
 
 
 # ---- times ----
@@ -642,13 +765,59 @@ def test_collections_in_python(folder):
 # ---- check ----
 
 
-def test_check_of_good_curves_on_all_spaces(run):
-    rng = np.random.default_rng(3)
-    for name, step in [("r:2", 1.0), ("s:1", 0.7), ("s:3", 0.7), ("h:2", 0.5), ("h:5", 0.5)]:
-        space = ss.space(name)
-        t = np.cumsum(rng.uniform(0.5, 1.5, 30))
-        ss.CubicSpline(t, walk(space, step, 30, rng), space, bc_type="not-a-knot").save("a.npz")
-        assert "All is within what rounding allows." in run("check a.npz")
+@pytest.mark.parametrize("name", [*SPACES, "s:1", "h:5"])
+def test_check_on_every_space(run, fails, name):
+    space = ss.space(name)
+    t = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 30))
+    ss.CubicSpline(t, points_on(space, 30, step=0.5), space, bc_type="not-a-knot").save("a.npz")
+    assert "All is within what rounding allows." in run("check a.npz")
+    arrays = dict(np.load("a.npz"))
+    last = max(key for key in arrays if key.startswith("velocities"))
+    arrays[last][17] *= 1 + 1e-6
+    np.savez("bent.npz", **arrays)
+    assert "more than rounding allows" in fails("check bent.npz", code=1)
+
+
+@pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,4", "cgr:2,4"])
+def test_check_where_a_point_has_many_arrays(run, name):
+    space, rng = ss.space(name), np.random.default_rng(6)
+    p = points_on(space, 20, step=0.5)
+    if len(space.point_shape) == 1:
+        p = (
+            p * np.exp(1j * rng.uniform(0, 6, (20, 1)))
+            if name[0] == "c"
+            else p * rng.choice([-1, 1], (20, 1))
+        )
+    else:
+        p = p @ ss.space("u:2" if name[0] == "c" else "o:2").random_point(rng, 20)
+    ss.CubicSpline(None, p, space).save("a.npz")
+    run("check a.npz")
+
+
+@pytest.mark.parametrize("name", ["spd:2", "hpd:3"])
+@pytest.mark.parametrize("unit", [1e-9, 1, 1e9])
+def test_check_of_positive_definite_matrices_of_any_size(run, fails, name, unit):
+    """Neither long and thin nor tiny ones count as worse than others."""
+    space = ss.space(name)
+    stretch = unit * np.geomspace(1, 1e3, space.point_shape[0])
+    p = points_on(space, 20, step=0.5)
+    spline = ss.CubicSpline(None, stretch[:, None] * p * stretch / unit, space)
+    spline.save("a.npz")
+    position = run("check a.npz").splitlines()[1].split()[2]
+    assert float(position) < 1e-8
+    arrays = dict(np.load("a.npz"))
+    arrays["velocities"][7] *= 1 + 1e-4
+    np.savez("bent.npz", **arrays)
+    fails("check bent.npz", code=1)
+
+
+@pytest.mark.parametrize("far", [1e-6, 1e3, 1e6])
+@pytest.mark.parametrize("name", ["se:2", "se:3"])
+def test_check_of_poses_far_away(run, name, far):
+    p = points_on(ss.space(name), 20, step=0.5)
+    p[:, :-1, -1] += far
+    ss.CubicSpline(None, p, name).save("a.npz")
+    run("check a.npz")
 
 
 def test_check_far_out_in_hyperbolic_space(run):
@@ -742,6 +911,124 @@ def test_check_sees_the_seam(fails):
 def test_bad_tables(fails, text, options, problem):
     write("a.csv", text)
     assert problem in fails(f"fit a.csv {options} -o a.npz")
+
+
+HALVES = "t,a_re,a_im,b_re,b_im\n0,1,0,0,0\n1,0.6,0,0,0.8\n"
+
+
+@pytest.mark.parametrize(
+    "text, options, problem",
+    [
+        (
+            HALVES,
+            "--space sphere:1",
+            "a.csv: a_re and a_im are a complex number where a real one belongs: a point of sphere:1 has 2 numbers; "
+            "did you mean --space cp:1?",
+        ),
+        (
+            HALVES,
+            "--space r:2 --columns a",
+            "a point of euclidean:2 has 2 numbers; name its columns one by one with",
+        ),
+        (
+            HALVES,
+            "--space 'r:1 x cp:1' --columns a,b_re,b_im,t --time t",
+            "column 't' of a.csv cannot have two meanings",
+        ),
+        (
+            "t,x," + HALVES[2:].replace("\n0,", "\n0,0,").replace("\n1,", "\n1,0,"),
+            "--space 'cp:1 x r:1'",
+            "a.csv: b_re and b_im are a complex number where a real one belongs: a point of cp:1 x euclidean:1 has 3 "
+            "numbers (cp:1: 2 complex numbers, A_re and A_im each; euclidean:1: 1 number); name its columns",
+        ),
+        (
+            HALVES,
+            "--space su:2",
+            "a.csv: a point of su:2 has 4 complex numbers, A_re and A_im each, a 2 x 2 matrix row by row, and there "
+            "are 2 numbers: a, b; say which with --columns",
+        ),
+        (
+            HALVES,
+            "--space se:2 --columns a_re,b_re",
+            "a.csv: a point of se:2 has 9 numbers, a 3 x 3 matrix row by row, and there are 2 columns: a_re, b_re",
+        ),
+        (
+            HALVES,
+            "--space cp:1 --columns a,b_re",
+            "a.csv: column 'b_re' is half of a complex number, and there is no 'b_im' in --columns",
+        ),
+        (HALVES, "--space cp:1 --columns a,a_re", "column 'a_re' of a.csv cannot have two meanings"),
+        (
+            HALVES,
+            "--space cp:1 --columns a,c",
+            "a.csv has no column 'c'; there are t, a_re, a_im, b_re, b_im",
+        ),
+        (
+            HALVES.replace("b_im", "c"),
+            "--space cp:1 --columns a,b",
+            "a.csv has a column 'b_re', but no 'b_im'; a complex number needs both",
+        ),
+        (
+            HALVES.replace("b_re", "c"),
+            "--space cp:2",
+            "a.csv: column 'b_im' is half of a complex number, and there is no 'b_re' in the table",
+        ),
+        (
+            HALVES.replace("0,1,0,0,0", "0,1,0,0,"),
+            "--space cp:1",
+            "a.csv: column 'b_re' is half of a complex number, and there is no 'b_im' with numbers",
+        ),
+        (
+            HALVES.replace("0,1,0,0,0", "0,1,0,0,"),
+            "--space cp:1 --columns a,b",
+            "a.csv, line 2: column 'b_im' is empty",
+        ),
+        (HALVES + "2,1,0,0,\n", "--space cp:1", "a.csv, line 4: column 'b_im' is empty"),
+        (HALVES + "2,1,0,0,0.1\n", "--space cp:1", "a.csv: the point in line 4 is off the space by 5.000e-3"),
+        (HALVES, "--space gr:4,2", "gr:4,2 asks for subspaces larger than the space; did you mean gr:2,4?"),
+        (HALVES, "--space se:4", "se:n needs n = 2 or 3, not 4"),
+    ],
+)
+def test_bad_columns_of_complex_numbers_and_matrices(fails, text, options, problem):
+    write("a.csv", text)
+    assert problem in fails(f"fit a.csv {options} -o a.npz")
+
+
+@pytest.mark.parametrize(
+    "name, change, problem",
+    [
+        ("so:3", lambda p: 1.01 * p, "the point in line 5 is off the space by 1.741e-2: its columns are not"),
+        ("so:3", lambda p: -p, "the point in line 5 is off the space: its determinant is -1"),
+        ("o:3", lambda p: -p, "the point in line 4 and the point in line 5 of curve 'a' have opposite"),
+        ("r:1 x o:3", lambda p: -p, "the point in line 4 and the point in line 5 of curve 'a' have opposite"),
+        ("su:2", lambda p: 1j * p, "its determinant is not 1 but has the phase 3.141593 (u:2 takes it)"),
+        ("spd:2", lambda p: -p, "the point in line 5 is off the space: it is not positive definite"),
+        ("hpd:2", lambda p: p + 1j * p[0, 0] * np.eye(2), "line 5 is off the space by"),
+        ("se:2", lambda p: p.T, "the point in line 5 is off the space by"),
+        ("gr:1,2", lambda p: 2 * p, "the point in line 5 is off the space by"),
+        ("r:2 x gr:2,4", lambda p: 2 * p, "the part in gr:2,4 of the point in line 5 is off the space by"),
+        (
+            "so:3",
+            lambda p: p @ np.diag([1, -1, -1]),
+            "line 4 and the point in line 5 of curve 'a' lie at or past",
+        ),
+        ("r:1 x u:1", lambda p: -p, "line 4 and the point in line 5 of curve 'a' lie at or past"),
+    ],
+)
+def test_bad_points_in_matrix_spaces(fails, name, change, problem):
+    """The fourth of equal points is another one."""
+    space = ss.space(name)
+    points = points_on(space, 2, step=0.4)
+    rows = each(lambda part: np.concatenate([part[[0, 0, 0]], part[:1]]), points)
+    parts(rows)[-1][3] = change(parts(rows)[-1][3])
+    columns = {"t": np.arange(4), "id": np.array([*"aaaa"]), **numbered(rows)}
+    write_table("a.csv", columns)
+    found = fails(f"fit a.csv --space '{name}' --curve id -o b.npz")
+    assert found.startswith("a.csv: ") and problem in found
+    write_table("a.npz", columns)
+    for line, row in (("line 4", "row 2 (counted from 0)"), ("line 5", "row 3 (counted from 0)")):
+        problem = problem.replace(line, row)
+    assert problem in fails(f"fit a.npz --space '{name}' --curve id -o b.npz")
 
 
 def test_points_are_moved_onto_the_space_by_rounding_only(run, fails):

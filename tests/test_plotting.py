@@ -7,12 +7,26 @@ from io import BytesIO
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 
 import symspline as ss
 from symspline.lonlat import from_lonlat
-from symspline.plotting import components, disk, flat, frames, globe, sphere
+from symspline.plotting import (
+    angle,
+    bloch,
+    components,
+    disk,
+    dome,
+    ellipses,
+    flat,
+    frames,
+    globe,
+    poses,
+    sphere,
+    subspaces,
+)
 from symspline.plotting.pictures import picture_of
 
 KINDS = {
@@ -20,12 +34,40 @@ KINDS = {
     "euclidean:2": flat.draw_plane,
     "euclidean:3": flat.draw_room,
     "euclidean:5": components.draw_components,
-    "sphere:1": sphere.draw_angle,
+    "sphere:1": angle.draw_circle,
     "sphere:2": sphere.draw_sphere,
     "sphere:3": frames.draw_quaternions,
     "sphere:15": components.draw_components,
     "hyperbolic:1": components.draw_components,
     "hyperbolic:2": disk.draw_disk,
+    "rp:1": angle.draw_slope,
+    "rp:2": dome.draw_lines,
+    "rp:4": subspaces.draw_principal_angles,
+    "cp:1": bloch.draw_bloch,
+    "cp:2": subspaces.draw_principal_angles,
+    "gr:1,2": angle.draw_slope,
+    "gr:1,3": dome.draw_lines,
+    "gr:2,3": dome.draw_normals,
+    "gr:2,5": subspaces.draw_principal_angles,
+    "gr:4,5": subspaces.draw_principal_angles,
+    "cgr:1,2": bloch.draw_bloch,
+    "cgr:2,3": subspaces.draw_principal_angles,
+    "so:2": angle.draw_turn,
+    "so:3": frames.draw_rotations,
+    "so:4": components.draw_components,
+    "o:2": angle.draw_turn,
+    "o:3": frames.draw_rotations,
+    "u:1": angle.draw_phase,
+    "u:3": components.draw_components,
+    "su:2": frames.draw_spins,
+    "su:3": components.draw_components,
+    "spd:1": components.draw_components,
+    "spd:2": ellipses.draw_ellipses,
+    "spd:3": ellipses.draw_ellipsoids,
+    "spd:4": components.draw_components,
+    "hpd:2": components.draw_components,
+    "se:2": poses.draw_flat_poses,
+    "se:3": poses.draw_poses,
 }
 
 
@@ -57,6 +99,12 @@ def axes_named(figure, label):
 
 def lines_of(axes):
     return [line.get_xydata() for line in axes.lines]
+
+
+def dots_of(axes):
+    """Where the dots of the only curve are, near and far side together: all, and the first."""
+    dots = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    return [np.where(np.isnan(far), near, far) for far, near in zip(dots[:2], dots[2:], strict=True)]
 
 
 def texts_of(figure):
@@ -176,8 +224,9 @@ def test_large_whole_numbers_as_times():
 
 
 @pytest.mark.parametrize("shape", [(5,), (3, 5)], ids=["one curve", "batch"])
-def test_product_has_a_picture_a_factor(shape):
-    space = ss.space("sphere:2 x sphere:3 x h:2 x r:4")
+@pytest.mark.parametrize("name", ["sphere:2 x sphere:3 x h:2 x r:4", "cp:1 x gr:2,3 x spd:3 x u:3"])
+def test_product_has_a_picture_a_factor(name, shape):
+    space = ss.space(name)
     rng = np.random.default_rng(2)
     spline = ss.CubicSpline(None, tuple(points_on(s, rng, shape) for s in space.factors), space)
     figure = rendered(spline.plot())
@@ -261,12 +310,29 @@ def test_degrees():
     assert [globe.degrees(value, "E", "W") for value in values] == words
 
 
-def test_angle_does_not_jump():
-    angle = 1.3 * np.arange(12)
-    spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
+TURN = 1.3 * np.arange(12)
+DIRECTION = np.stack([np.cos(TURN), np.sin(TURN)], axis=-1)
+TURNED = np.stack([DIRECTION, DIRECTION[:, ::-1] * [-1, 1]], axis=-1)
+SIGNS = np.random.default_rng(9).choice([-1, 1], (12, 1))
+
+
+@pytest.mark.parametrize(
+    "name, points",
+    [
+        ("sphere:1", DIRECTION),
+        ("so:2", TURNED),
+        ("o:2", TURNED * [1, -1]),
+        ("u:1", np.exp(1j * TURN)[:, None, None]),
+        ("rp:1", DIRECTION * SIGNS),
+        ("gr:1,2", (DIRECTION * SIGNS)[:, :, None]),
+    ],
+)
+def test_angle_does_not_jump(name, points):
+    spline = ss.CubicSpline(None, points, name)
     line = lines_of(axes_named(spline.plot(), "angle, degrees"))[0]
-    np.testing.assert_allclose(line[-1, 1], np.degrees(angle[-1]))
+    np.testing.assert_allclose(line[-1, 1] - line[0, 1], np.degrees(TURN[-1]))
     assert np.abs(np.diff(line[:, 1])).max() < 5
+    assert (line[0, 1] - np.degrees(TURN[0])) % 180 == pytest.approx(0, abs=1e-9)
 
 
 def test_quaternions_as_rotations():
@@ -280,16 +346,34 @@ def test_quaternions_as_rotations():
     )
     np.testing.assert_allclose(np.linalg.det(matrices), 1)
     np.testing.assert_allclose(frames.rotations(-q), matrices)
-    np.testing.assert_allclose(frames._VIEW @ frames._VIEW.T, np.eye(3), atol=1e-3)
+    np.testing.assert_allclose(frames.VIEW @ frames.VIEW.T, np.eye(3), atol=1e-3)
 
 
-def test_given_frames_are_bold():
-    spline = spline_on("sphere:3", (4,), [0, 1, 2.5, 4])
+def test_spins_as_rotations():
+    """U (v·σ) U* = (Rv)·σ."""
+    pauli = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
+    u = ss.SpecialUnitary(2).random_point(np.random.default_rng(10), 20)
+    turned = u[:, None] @ pauli @ u[:, None].conj().swapaxes(-1, -2)
+    matrices = frames.rotations(frames.quaternions(u))
+    np.testing.assert_allclose(np.einsum("mij,ikl->mjkl", matrices, pauli), turned, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "name, rotations",
+    [
+        ("sphere:3", frames.rotations),
+        ("so:3", np.array),
+        ("o:3", np.array),
+        ("su:2", lambda u: frames.rotations(frames.quaternions(u))),
+    ],
+)
+def test_given_frames_are_bold(name, rotations):
+    spline = spline_on(name, (4,), [0, 1, 2.5, 4])
     faint, bold = (q for q in spline.plot().axes[0].collections if hasattr(q, "U"))
     np.testing.assert_allclose(np.unique(bold.X), spline.t)
     assert bold.width > faint.width and len(faint.X) > len(bold.X)
     right_up = np.sort(np.hypot(bold.U, bold.V).reshape(4, 3))
-    lengths = np.linalg.norm((frames._VIEW @ frames.rotations(spline.points))[:, :2], axis=1)
+    lengths = np.linalg.norm((frames.VIEW @ rotations(spline.points))[:, :2], axis=1)
     np.testing.assert_allclose(right_up, 0.7 * np.sort(lengths), atol=1e-12)
 
 
@@ -312,6 +396,190 @@ def test_disk_moves_to_a_curve_that_is_far_away():
     assert np.abs(lines_of(figure.axes[0])[-3]).max() < 0.7  # the curve; after it come its dots
 
 
+BLOCH = {
+    (1, 0): (0, 0, 1),
+    (0, 1j): (0, 0, -1),
+    (0.5**0.5, 0.5**0.5): (1, 0, 0),
+    (0.5**0.5, 0.5**0.5 * 1j): (0, 1, 0),
+    (0.6, 0.8j): (0, 0.96, -0.28),
+}
+
+
+def test_bloch_vectors():
+    states = np.array(list(BLOCH))
+    vectors = bloch.bloch_vectors(states)
+    np.testing.assert_allclose(vectors, list(BLOCH.values()), atol=1e-15)
+    np.testing.assert_allclose(bloch.bloch_vectors(states[:, :, None] * np.exp(2j)), vectors, atol=1e-15)
+    p, q = ss.ComplexProjective(1).random_point(np.random.default_rng(11), (2, 20))
+    angle = np.arccos(np.sum(bloch.bloch_vectors(p) * bloch.bloch_vectors(q), axis=1))
+    np.testing.assert_allclose(angle, 2 * ss.ComplexProjective(1).distance(p, q))
+
+
+@pytest.mark.parametrize("size, zoomed", [(0.3, False), (0.03, True)])
+def test_states_are_drawn_on_the_bloch_sphere(size, zoomed):
+    """The dots are a right-angled projection of the Bloch vectors, as the labels are, with |0⟩ up."""
+    space, rng = ss.ComplexProjective(1), np.random.default_rng(12)
+    middle = space.random_point(rng)
+    points = space.exp(middle, size * space.random_tangent(rng, np.stack([middle] * 8)))
+    figure = rendered(ss.CubicSpline(None, points, "cp:1").plot())
+    axes, vectors = figure.axes[0], bloch.bloch_vectors(points)
+    places, first = dots_of(axes)
+    view = np.linalg.lstsq(vectors, places)[0]
+    np.testing.assert_allclose(vectors @ view, places, atol=1e-9)
+    np.testing.assert_allclose(view.T @ view, np.eye(2), atol=1e-9)
+    np.testing.assert_array_equal(first, places[:1])
+    labels = {text.get_text(): text.get_position() for text in axes.texts}
+    assert not labels if zoomed else labels.keys() == {"|0⟩", "|1⟩", "x", "y"}
+    for label, direction in {"|0⟩": 2, "x": 0, "y": 1}.items() if labels else ():
+        np.testing.assert_allclose(labels[label], 1.17 * view[direction], atol=1e-9)
+    assert not labels or labels["|0⟩"][1] > 1 > -1 > labels["|1⟩"][1]
+
+
+# Through the rim three times, and along it.
+HALF_SPHERE = ss.Sphere(2).project(
+    np.array([[1.0, 0, 1], [1, 0.5, 0.2], [0.5, 1, -0.3], [-0.5, 1, -0.2], [-1, 0, 0.3], [-1, -1, -0.4]])
+)
+RIM = ss.Sphere(2).project(np.array([[1.0, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0]]))
+
+
+def planes(normals, rng):
+    """Any orthonormal bases of the planes with these normals."""
+    bases = np.linalg.svd(normals[:, None])[2][:, 1:].swapaxes(1, 2)
+    return bases @ ss.Orthogonal(2).random_point(rng, len(normals))
+
+
+@pytest.mark.parametrize("name", ["rp:2", "gr:1,3", "gr:2,3"])
+@pytest.mark.parametrize("points, crossings", [(HALF_SPHERE, 3), (HALF_SPHERE[::-1], 3), (RIM, 0)])
+def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
+    rng = np.random.default_rng(13)
+    signs = rng.choice([-1, 1], (len(points), 1))
+    made = {
+        "rp:2": points * signs,
+        "gr:1,3": (points * signs)[:, :, None],
+        "gr:2,3": planes(points, rng),
+    }
+    spline = ss.CubicSpline(None, made[name], name)
+    axes = rendered(spline.plot()).axes[0]
+    (far, near), (dots, _) = [line for line in lines_of(axes) if len(line) > 1000], dots_of(axes)
+    line = np.where(np.isnan(near), far, near)
+    broken = np.isnan(line[:, 0])
+    assert broken.sum() == crossings
+    assert np.nanmax(np.linalg.norm(np.diff(line, axis=0), axis=1)) < 0.05
+    # At a break the line goes on at the opposite point.
+    (gaps,) = np.nonzero(broken)
+    np.testing.assert_allclose(line[gaps - 1], -line[gaps + 1], atol=1e-12)
+    for dot in dots:
+        assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
+
+
+def test_half_sphere_is_the_upper_one():
+    line = dome.broken(dome.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001))))
+    np.testing.assert_allclose(np.linalg.norm(line[~np.isnan(line[:, 0])], axis=1), 1)
+    assert np.nanmin(line) >= -1 and np.nanmin(line[:, 2]) >= 0
+
+
+def test_small_curve_on_the_half_sphere_is_enlarged():
+    """Also across the rim, where nothing is broken."""
+    points = ss.Sphere(2).project(np.array([[1, 0, 0.02], [1, 0.03, -0.01], [1, 0.04, -0.05]]))
+    axes = rendered(ss.CubicSpline(None, [[1], [-1], [1]] * points, "rp:2").plot()).axes[0]
+    assert np.ptp(axes.get_xlim()) < 0.2
+    (line,) = [line for line in lines_of(axes) if len(line) > 1000 and np.isfinite(line).all()]
+    assert np.linalg.norm(np.diff(line, axis=0), axis=1).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["rp:4", "cp:2", "gr:2,5", "gr:4,5", "cgr:2,3", "cgr:2,5"])
+def test_principal_angles(name):
+    """Distance is √(Σ θᵢ²), and the bases do not matter."""
+    space, rng = ss.space(name), np.random.default_rng(14)
+    spline = spline_on(name)
+    axes = axes_named(rendered(spline.plot()), "principal angles to")
+    lines = [line for line in lines_of(axes) if len(line) > 1000]
+    n, k = np.reshape(spline.points[0], (space.point_shape[0], -1)).shape
+    assert len(lines) == min(k, n - k)
+    distance = space.distance(spline.points[0], spline(lines[0][:, 0]))
+    norm = np.linalg.norm([np.radians(line[:, 1]) for line in lines], axis=0)
+    np.testing.assert_allclose(norm, distance, atol=1e-12)
+    p = space.random_point(rng, 5)
+    turn = ss.Orthogonal(k) if k > 1 and not np.iscomplexobj(p) else ss.Unitary(k)
+    turned = p.reshape(5, n, k) @ turn.random_point(rng, 5)
+    np.testing.assert_allclose(subspaces.principal_angles(turned), subspaces.principal_angles(p), atol=1e-12)
+
+
+def test_outlines_of_positive_definite_matrices():
+    matrices = ss.SymmetricPositiveDefinite(2).random_point(np.random.default_rng(15), 20)
+    rings = ellipses.outlines(matrices)
+    np.testing.assert_allclose(np.einsum("mai,mij,maj->ma", rings, np.linalg.inv(matrices), rings), 1)
+    radii = np.linalg.norm(rings, axis=-1)
+    roots = np.sqrt(np.linalg.eigvalsh(matrices))
+    np.testing.assert_allclose(np.stack([radii.min(axis=1), radii.max(axis=1)], axis=1), roots, rtol=1e-2)
+
+
+def test_sections_lie_in_the_outline_of_an_ellipsoid():
+    """The shadow of xᵀA⁻¹x ≤ 1 is the ellipse of a block of A."""
+    matrices = ss.SymmetricPositiveDefinite(3).random_point(np.random.default_rng(16), 20)
+    halves = ellipses.sections(matrices)
+    inside = np.einsum("mnai,mij,mnaj->mna", halves, np.linalg.inv(matrices[:, :2, :2]), halves)
+    assert np.nanmax(inside) <= 1 + 1e-12 and np.nanmax(inside) > 0.99
+    # Two of the halves go through the near end of a half axis, none through the far end.
+    values, vectors = np.linalg.eigh(matrices)
+    ends = np.sqrt(values)[:, None] * vectors * np.where(vectors[:, 2:] > 0, 1, -1)
+    for sign, number in ((1, 2), (-1, 0)):
+        gaps = halves[:, :, :, None] - sign * ends.swapaxes(1, 2)[:, None, None, :, :2]
+        met = (np.linalg.norm(gaps, axis=-1) < 1e-12).any(axis=2)
+        assert (met.sum(axis=1) == number).all()
+
+
+@pytest.mark.parametrize("name", ["spd:2", "spd:3"])
+def test_ellipses_are_drawn_to_scale(name):
+    spline = spline_on(name, (4,), [0, 1, 2.5, 4])
+    figure = rendered(spline.plot())
+    axes = figure.axes[0]
+    faint, bold = (found for found in axes.collections if isinstance(found, PolyCollection))
+    np.testing.assert_allclose(bold.get_offsets(), np.stack([spline.t, [0] * 4], axis=1))
+    assert len(faint.get_offsets()) > 4 and bold.get_linewidth()[0] > faint.get_linewidth()[0]
+    assert bold.get_facecolor()[0, 3] > 0 == faint.get_facecolor()[0, 3]
+    view = np.eye(2) if name == "spd:2" else frames.VIEW[:2]
+    roots = np.sqrt(np.linalg.eigvalsh(view @ spline.points @ view.T))
+    # The bar says how long a number is.
+    (bar,) = [line for line in axes.lines if line.get_marker() == "|"]
+    (number,) = [float(text.get_text()) for text in axes.texts if text.get_text().replace(".", "").isdigit()]
+    unit = np.ptp(axes.transAxes.transform(bar.get_xydata())[:, 0]) / number
+    scale = bold.get_transform().get_matrix()[:2, :2]
+    radii = np.linalg.norm([path.vertices @ scale for path in bold.get_paths()], axis=-1)
+    found = np.stack([radii.min(axis=1), radii.max(axis=1)], axis=1)
+    np.testing.assert_allclose(found, unit * roots, rtol=1e-2)
+
+
+def test_bodies_of_the_plane_point_along_their_first_axis():
+    spline = spline_on("se:2", (5,))
+    figure = rendered(spline.plot())
+    between, given, first = figure.axes[0].collections
+    paths = [path.vertices for path in (*first.get_paths(), *given.get_paths())]
+    assert len(between.get_paths()) > 5 and len(paths) == 5
+    for path, pose in zip(paths, spline.points, strict=True):
+        tip = (path[0] - pose[:2, 2]) / np.linalg.norm(path[0] - pose[:2, 2])
+        np.testing.assert_allclose(tip, pose[:2, 0])
+        left = path[1] - path[3]
+        assert left @ pose[:2, 1] == pytest.approx(np.linalg.norm(left))
+
+
+def test_frames_stand_on_the_path():
+    spline = spline_on("se:3", (5,))
+    axes = rendered(spline.plot()).axes[0]
+    sticks = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_linewidth() == 2.0]
+    length = np.linalg.norm(sticks[0][1] - sticks[0][0])
+    for i, (stick, color) in enumerate(zip(sticks, frames.AXES, strict=True)):
+        ends = stick.reshape(5, 3, 3)
+        np.testing.assert_allclose(ends[:, 0], spline.points[:, :3, 3])
+        np.testing.assert_allclose(ends[:, 1] - ends[:, 0], length * spline.points[:, :3, i])
+        assert color in [line.get_color() for line in axes.lines if line.get_linewidth() == 2.0]
+
+
+def test_lengths_of_rigid_motions_are_those_in_the_body():
+    labels = {axes.get_ylabel() for axes in spline_on("se:3").plot().axes}
+    assert {"speed\n|(ω, v)|", "acceleration\n|(ω′, v′)|"} <= labels
+
+
 def test_names_of_components():
     assert components.component_names((3,), False) == ["x₁", "x₂", "x₃"]
     assert components.component_names((2, 2), False) == ["x₁₁", "x₁₂", "x₂₁", "x₂₂"]
@@ -322,8 +590,42 @@ def test_names_of_components():
     figure = spline_on("sphere:15").plot()
     (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
     assert sorted(text.get_text() for text in legend.texts) == sorted(
-        components.component_names((12,), False)
+        [*components.component_names((12,), False), "4 others"]
     )
+
+
+def test_imaginary_parts_are_dashed():
+    spline = spline_on("u:2")
+    axes = axes_named(spline.plot(), "components")
+    lines = [line for line in axes.lines if len(line.get_xdata()) > 1000]
+    assert [line.get_linestyle() for line in lines] == ["-", "--"] * 4
+    assert [line.get_color() for line in lines[::2]] == [line.get_color() for line in lines[1::2]]
+    entries = spline(lines[0].get_xdata()).reshape(-1, 4)
+    for i in range(4):
+        drawn = lines[2 * i].get_ydata() + 1j * lines[2 * i + 1].get_ydata()
+        np.testing.assert_allclose(drawn, entries[:, i], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("spd:1", "x₁₁"),
+        ("spd:4", "x₁₁ x₁₂ x₁₃ x₁₄ x₂₂ x₂₃ x₂₄ x₃₃ x₃₄ x₄₄"),
+        ("hpd:1", "Re_x₁₁"),
+        ("hpd:2", "Re_x₁₁ Re_x₁₂ Im_x₁₂ Re_x₂₂"),
+    ],
+)
+def test_components_that_follow_from_others_are_left_out(name, words):
+    figure = spline_on(name).plot()
+    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+    assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
+
+
+def test_legend_of_a_large_matrix_is_short():
+    figure = rendered(spline_on("u:5", (2, 4)).plot())
+    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+    words = [text.get_text() for text in legend.texts]
+    assert len(words) == 13 and "38 others" in words
 
 
 # ---- files, and the rest of the program ----

@@ -19,6 +19,7 @@ _cpu.check(_Path(__file__).parent)
 from . import convert  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads, set_num_threads  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
+from .free import BezierCurve, BSpline  # noqa: E402
 from .product import Product  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .spaces import (  # noqa: E402
@@ -43,6 +44,8 @@ from .spline import CubicSpline, evaluate, fit, fit_many  # noqa: E402
 
 __version__ = "0.1.0"
 __all__ = [
+    "BSpline",
+    "BezierCurve",
     "ComplexGrassmannian",
     "ComplexProjective",
     "ConvergenceError",

@@ -57,5 +57,13 @@ def evaluate(
     per_curve: bool,
     progress: _Progress | None = None,
 ) -> _Doubles: ...
+def evaluate_bspline(
+    handle: Handle,
+    knots: _Doubles,
+    control: _Doubles,
+    degree: int,
+    x: _Doubles,
+    quantity: str,
+) -> _Doubles: ...
 def set_num_threads(n: int) -> None: ...
 def num_threads() -> int: ...

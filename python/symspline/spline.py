@@ -17,6 +17,7 @@ from ._arrays import as_array, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._ends import ends_of, kept, picked
 from ._integrals import integrate
+from ._span import Span, is_large, lifted, span_of
 from ._times import Clock, clock_of
 from .report import ConvergenceWarning, Report, shaped
 from .spaces import POINT_TOL, POINT_TOL_FLOAT32, Space
@@ -89,6 +90,7 @@ class CubicSpline:
     _extrapolate: Any
     _report: Report
     _faults: list[tuple[int, str, str]]
+    _small: tuple[Span, Array, Array] | None = None
 
     def __new__(cls, t: Any = None, points: Any = None, space: Any = None, **options: Any) -> Self:
         if cls is CubicSpline and space is not None and not isinstance(space, Space):
@@ -143,28 +145,67 @@ class CubicSpline:
         self._bc_type = kept(bc_type)
         if max_iter is not None:
             max_iter = whole_number(max_iter, "max_iter", 1)
+        options = (method, tol, max_iter)
         try:
-            self._points, self._velocities, columns, self._faults = _core.fit(
+            large = is_large(space)
+            points, velocities, columns, self._faults = _core.fit(
                 space._handle,
                 self._times,
                 doubles,
                 ends,
-                method,
-                tol,
-                max_iter,
+                *options,
                 check,
                 point_tol,
                 None,
                 progress,
-                dry,
+                dry or large,
             )
         except ValidationError as error:
             raise self._clock.explain(error) from None
-        self._points = space._numbers(self._points)
-        self._velocities = space._numbers(self._velocities)
+        self._points, self._velocities = space._numbers(points), space._numbers(velocities)
+        if large and not dry:
+            columns = self._fit_in_span(ends, options, progress)
         self._points.flags.writeable = self._velocities.flags.writeable = False
         if not dry:
             self._report = shaped(_solver(method), columns, batch, space.curvature)
+
+    def _fit_in_span(self, ends: Any, options: Any, progress: Progress | None) -> Any:
+        """Fit in the span of points and end vectors; the points have been validated."""
+        space = self._space
+        vectors = [
+            space._numbers(value)[..., None, :]
+            if len(space.point_shape) == 1
+            else space._numbers(value)[..., None, :, :]
+            for _, value in ends or []
+            if value is not None
+        ]
+        span = span_of(space, self._points, *vectors)
+        small_ends = ends
+        if ends is not None:
+            rows = iter(vectors)
+            small_ends = [
+                (
+                    kind,
+                    None
+                    if value is None
+                    else _doubles_of(span.down(next(rows))).reshape(*self._batch, *span.space._doubles_shape),
+                )
+                for kind, value in ends
+            ]
+        _, velocities, columns, self._faults = _core.fit(
+            span.space._handle,
+            self._times,
+            _doubles_of(span.down(self._points)),
+            small_ends,
+            *options,
+            False,
+            0.0,
+            None,
+            progress,
+            False,
+        )
+        self._velocities = span.up(span.space._numbers(velocities))
+        return columns
 
     @classmethod
     def _made(
@@ -251,17 +292,31 @@ class CubicSpline:
             raise ValidationError(
                 f"with per_curve=True the shape of x must begin with the batch axes {self._batch}; got {x.shape}"
             )
+        space, points, velocities, span = self._space, self._points, self._velocities, None
+        if is_large(space):
+            span, points, velocities = self._in_span()
+            space = span.space
         values = _core.evaluate(
-            self._space._handle,
+            space._handle,
             self._times,
-            self._points.view(np.float64),
-            self._velocities.view(np.float64),
+            points.view(np.float64),
+            velocities.view(np.float64),
             x,
             quantity,
             _OUTSIDE[policy],
             per_curve,
         )
-        return values if quantity in _NORMS else self._space._numbers(values)
+        if quantity in _NORMS:
+            return values
+        return space._numbers(values) if span is None else lifted(span, space._numbers(values), self._batch)
+
+    def _in_span(self) -> tuple[Span, Array, Array]:
+        """The span, and points and velocities in it; kept from the first use on."""
+        if self._small is None:
+            at_ends = np.take(self._velocities, [0, -1], axis=len(self._batch))
+            span = span_of(self._space, self._points, at_ends)
+            self._small = span, span.down(self._points), span.down(self._velocities)
+        return self._small
 
     # ---- what it is made of ----
 
@@ -396,10 +451,21 @@ class CubicSpline:
     def plot(self, file: Any = None) -> Figure:
         """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.
 
-        The picture depends on the space: a globe and a map on S², rotated frames on S³ (unit quaternions,
-        scalar first), the Poincaré disk for H², the curve or its graph in R¹, R² and R³, and otherwise the
-        components against time. Of a batch at most 50 curves are drawn. Neither pyplot nor any setting of
-        matplotlib is touched.
+        The picture depends on the space:
+
+        - S²: a globe and a map; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
+        - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis.
+        - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the angle against time, without jumps.
+        - SE(3): frames on the path of the positions; SE(2): arrow heads on it.
+        - CP¹ and the complex Gr(1, 2): the Bloch sphere.
+        - RP², Gr(1, 3) and Gr(2, 3): a half sphere, with the normals of planes; a curve that leaves it
+          through the rim comes back on the opposite side.
+        - Other projective spaces and Grassmannians: the principal angles to the first point.
+        - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
+        - Otherwise the components against time, imaginary parts dashed.
+
+        For a product the pictures of its factors. Of a batch at most 50 curves are drawn. Neither pyplot nor
+        any setting of matplotlib is touched.
 
         Args:
             file: where to save the figure, if anywhere: a name such as ``"curve.pdf"``, or an open file.
@@ -516,6 +582,10 @@ def _points(points: Any, space: Space) -> tuple[NDArray[np.float64], float]:
     if doubles.shape[axes - 1] < 2:
         raise ValidationError("a curve needs at least two points; got one")
     return doubles, POINT_TOL_FLOAT32 if array.dtype in (np.float32, np.float16) else POINT_TOL
+
+
+def _doubles_of(numbers: Array) -> NDArray[np.float64]:
+    return np.ascontiguousarray(numbers).view(np.float64)
 
 
 def _knots(

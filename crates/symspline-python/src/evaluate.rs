@@ -6,7 +6,9 @@ use crate::validate::of_curve;
 use crate::watch::watched;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::curve::{Curves, Outside, Quantity, Times, evaluate as run};
+use symspline::curve::{
+    BSpline, Curves, Outside, Quantity, Times, evaluate as run, evaluate_bspline as run_bspline,
+};
 use symspline::with_space;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -26,14 +28,7 @@ pub fn evaluate<'py>(
     per_curve: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let quantity = match quantity {
-        "point" => Quantity::Point,
-        "velocity" => Quantity::Velocity,
-        "acceleration" => Quantity::Acceleration,
-        "speed" => Quantity::Speed,
-        "bend" => Quantity::Bend,
-        _ => return Err(invalid(format!("unknown quantity {quantity:?}"))),
-    };
+    let quantity = quantity_named(quantity)?;
     let (policy, strict) = match outside {
         "raise" => (Outside::Continue, true),
         "continue" => (Outside::Continue, false),
@@ -60,6 +55,46 @@ pub fn evaluate<'py>(
     let result = write.as_slice_mut()?;
     watched(py, progress, result.len(), |monitor| {
         with_space!(&handle.space, s => run(s, &curves, &times, quantity, policy, monitor, result));
+    })?;
+    drop(write);
+    Ok(out)
+}
+
+fn quantity_named(name: &str) -> PyResult<Quantity> {
+    Ok(match name {
+        "point" => Quantity::Point,
+        "velocity" => Quantity::Velocity,
+        "acceleration" => Quantity::Acceleration,
+        "speed" => Quantity::Speed,
+        "bend" => Quantity::Bend,
+        _ => return Err(invalid(format!("unknown quantity {name:?}"))),
+    })
+}
+
+/// Evaluates B-spline curves at times inside their domain: the result is batch axes + x.shape + axes of a
+/// point (or none).
+#[pyfunction]
+pub fn evaluate_bspline<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    knots: Array<'py>,
+    control: Array<'py>,
+    degree: usize,
+    x: Array<'py>,
+    quantity: &str,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let quantity = quantity_named(quantity)?;
+    let axes = control.ndim() - handle.point_axes();
+    let mut shape = [&control.shape()[..axes - 1], x.shape()].concat();
+    if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
+        shape.extend_from_slice(&control.shape()[axes..]);
+    }
+    let curve = BSpline { knots: knots.as_slice()?, control: control.as_slice()?, degree };
+    let out = PyArrayDyn::zeros(py, shape, false);
+    let mut write = out.readwrite();
+    let (x, result) = (x.as_slice()?, write.as_slice_mut()?);
+    watched(py, None, result.len(), |monitor| {
+        with_space!(&handle.space, s => run_bspline(s, &curve, x, quantity, monitor, result));
     })?;
     drop(write);
     Ok(out)

@@ -70,7 +70,7 @@ pub fn apply<M: Space>(
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
         let mut x: [Vec<Lane>; 3] = std::array::from_fn(|_| vec![Lane::ZERO; len]);
         let (mut result, mut log) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
-        let mut frame = vec![Lane::ZERO; space.frame_len()];
+        let mut frame = Vec::new();
         let rows = out.len() / size;
         for (group, out) in out.chunks_mut(LANES * size).enumerate() {
             let at: [usize; LANES] =
@@ -101,6 +101,7 @@ pub fn apply<M: Space>(
                     result.copy_from_slice(a);
                 }
                 Operation::RandomTangent => {
+                    frame.resize(space.frame_len(), Lane::ZERO);
                     space.lift(a, &mut frame);
                     space.tangent(&frame, a, &b[..space.dim()], &mut result);
                 }
@@ -189,9 +190,5 @@ pub fn tangent_defects<M: Space>(space: &M, points: &[f64], vectors: &[f64]) -> 
 pub fn leg_angle<M: Space>(space: &M, point: &[f64], vector: &[f64]) -> f64 {
     let p: Vec<Lane> = point.iter().map(|&x| lane(x)).collect();
     let v: Vec<Lane> = vector.iter().map(|&x| lane(x)).collect();
-    let mut frame = vec![Lane::ZERO; space.frame_len()];
-    let mut x = vec![Lane::ZERO; space.dim()];
-    space.lift(&p, &mut frame);
-    space.coordinates(&frame, &p, &v, &mut x);
-    space.angle(&x).to_array()[0]
+    space.angle_at(&p, &v).to_array()[0]
 }

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from . import check, demo, fit, plot, sample
-from .errors import Problem
+from .errors import Problem, with_names
 
 FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Problem as error:
         return _say(error, error.code)
     except (ValidationError, CutLocusError) as error:
-        return _say(error, BAD)
+        return _say(with_names(str(error)), BAD)
 
 
 def _say(message: object, code: int) -> int:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._pieces import is_closed, spline_pieces
 from ..product import ProductSpline
-from ..spaces import Hyperbolic, Space
+from ..spaces import HermitianPositiveDefinite, Hyperbolic, Space, SymmetricPositiveDefinite
 from ..spline import CubicSpline
 from .curves import read_curves
 from .errors import Failure, listed
@@ -22,13 +23,16 @@ Measure how well curves interpolate, and how smooth they are. Every segment is e
 the values from both sides of a knot know nothing of each other. The table has
 
   distance      the largest distance of the curve from its points
-  position      the largest jump of the curve at a knot, relative to the largest length of its array
+  position      the largest jump of the curve at a knot, relative to the largest length of its array; of
+                positive definite matrices the jump itself, as distances are relative there
   velocity      the largest jump of the velocity, relative to the largest velocity
   acceleration  the largest jump of the covariant acceleration, relative to the largest one
 
-A jump of the k-th derivative may be 1e-12 of the largest value, and 100 eps / h^k for rounding, where h is the
-shorter of the two segments; far out in hyperbolic space, |p|^2 as much. With a larger one the check fails, and
-the exit code is 1."""
+Lengths are those of the space, so that it does not matter which array of a line or subspace stands for it; of
+poses those of the rates in the body, the angle and the way together. A jump of the k-th derivative may be
+1e-12 of the largest value, and 100 eps / h^k for rounding, where h is the shorter of the two segments; |p| as
+much where points p have large numbers, in hyperbolic space |p|^2 as much, for positive definite matrices
+cond(p). With a larger one the check fails, and the exit code is 1."""
 EPILOG = """\
 example:
   symspline check storms.npz"""
@@ -36,6 +40,8 @@ example:
 MEASURES = ("distance", "position", "velocity", "acceleration")
 _RELATIVE = 1e-12
 _ROUNDING = 100 * float(np.finfo(np.float64).eps)
+# Lengths of their metric are relative to the matrices as they are: 1 m² or 10⁶ mm² is the same.
+_POSITIVE = (SymmetricPositiveDefinite, HermitianPositiveDefinite)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,14 +109,18 @@ def _measure(spline: CubicSpline) -> Found:
     values, excess = [distance], [distance / (_RELATIVE + rounding)]
     for nu in range(3):
         jumps = pieces.jumps(nu, closed)
+        if nu == 0 and isinstance(spline.space, _POSITIVE):
+            jumps = replace(jumps, largest=1.0)
         allowed = _RELATIVE * jumps.largest + rounding / shorter**nu
         values.append(jumps.relative)
         excess.append(float((jumps.size / allowed).max(initial=0.0)))
     return Found(tuple(values), max(excess))
 
 
-def _condition(space: Space, points: NDArray[np.float64]) -> float:
+def _condition(space: Space, points: NDArray[Any]) -> float:
     """By how much rounding counts near these points."""
     if isinstance(space, Hyperbolic):
         return float(np.square(points).sum(axis=-1).max())
+    if isinstance(space, _POSITIVE):
+        return float(np.linalg.cond(points).max())
     return max(1.0, float(np.abs(points).max()))

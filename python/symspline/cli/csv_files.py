@@ -14,8 +14,9 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from .errors import Problem, first_twice, reading
+from .layout import Doubles
 from .progress import Progress
-from .tables import Array, Doubles, Rows, Table
+from .tables import Array, Rows, Table
 from .times import is_number, parse_times
 
 # Few enough rows to stay in the processor's cache: three times faster than many.

@@ -14,7 +14,8 @@ import numpy as np
 from ..files import load, load_many, save, save_many
 from ..spline import CubicSpline
 from .errors import Problem, reading, writing
-from .points import LONLAT, labels, require_globe
+from .layout import labels
+from .points import LONLAT, require_globe
 
 ENDING = (".npz",)
 _COLUMNS = "columns"
@@ -26,7 +27,7 @@ class Columns:
     """Names of columns.
 
     Attributes:
-        points: of the numbers of a point.
+        points: of the numbers of a point; those of complex ones without their endings.
         time, curve: of times and of names of curves.
         lonlat: whether points are longitude and latitude in degrees.
         utc: whether times are written with a Z.

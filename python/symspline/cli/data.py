@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
+from ..product import Product
 from ..spaces import Space
-from .errors import Problem
-from .points import from_degrees, onto, unflatten
+from .errors import Problem, with_names
+from .layout import matrix, unflatten
+from .points import from_degrees, onto
 from .tables import Rows
 
 Groups = Mapping[str, NDArray[np.int64]]
 
 # What helps in Python only.
-_ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter")
+_ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter| \(np\.[^()]*\)")
 
 
 class Data:
@@ -56,13 +58,21 @@ class Data:
         return of_file + _ADVICE.sub("", text)
 
     def _points(self, space: Space) -> Any:
+        parts = unflatten(space, self._rows.numbers)
+        if not isinstance(space, Product):
+            return self._onto(space, parts[0])
+        pairs = zip(space.factors, parts, strict=True)
+        return tuple(self._onto(factor, part, f"the part in {factor} of ") for factor, part in pairs)
+
+    def _onto(self, space: Space, points: NDArray[Any], of: str = "") -> NDArray[Any]:
         try:
-            return onto(space, unflatten(space, self._rows.numbers))
+            return onto(space, points)
         except ValidationError as error:
             text = re.sub(
-                r"^point (\d+)", lambda m: f"the point in {self._rows.place(int(m[1]))}", str(error)
+                r"^point (\d+)", lambda m: f"{of}the point in {self._rows.place(int(m[1]))}", str(error)
             )
-            raise Problem(f"{self._path}: {_ADVICE.sub('', text)}") from None
+            order = f"; the columns of the table are a {matrix(space)}" if matrix(space) else ""
+            raise Problem(f"{self._path}: {with_names(_ADVICE.sub('', text))}{order}") from None
 
     def _places(self) -> NDArray[np.float64]:
         degrees = self._rows.numbers

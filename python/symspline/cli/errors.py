@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
 from ..files import replacing
+from ..spaces import _CLASSES
+
+_NAMES = {cls.__name__: name for name, cls in _CLASSES.items()}
+_SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\(([\w, ]+)\)")
 
 
 class Problem(Exception):
@@ -21,6 +26,11 @@ class Failure(Problem):
     """Nothing is wrong with the input, but with what was found."""
 
     code = 1
+
+
+def with_names(message: str) -> str:
+    """A message of the library with spaces as --space takes them: so:3, not SpecialOrthogonal(3)."""
+    return _SPACE.sub(lambda m: f"{_NAMES[m[1]]}:{m[2].replace(' ', '')}", message)
 
 
 def did_you_mean(name: str, names: Sequence[str]) -> str:

@@ -14,10 +14,11 @@ from ..spaces import space as space_named
 from ..spline import CubicSpline, fit_many
 from .curves import ENDING, Curves, write_curves
 from .data import Data
+from .entries import completed
 from .errors import Problem, check_target
 from .points import GLOBE, require_globe
 from .progress import Progress
-from .roles import named_columns, point_columns, split_names, time_column
+from .roles import named_columns, point_entries, split_names, time_column
 from .tables import ending, open_table
 
 SUMMARY = "fit C2 splines to the points in a table"
@@ -26,15 +27,19 @@ Fit C2 splines to the points in a table: CSV, NPZ or Parquet, by the ending of i
 
 Every row is a point at a time. Columns of a CSV file are named in its first line; blank lines are skipped.
 Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or 2021-08-29T16:55:00.5+02:00, all
-written in the same way; those with Z or an offset become UTC, and rates are per second. The numbers of a
-point stand in columns in the order of its array: a matrix row by row, complex numbers as A_re, A_im. Points
-that are off the space by no more than 1e-4, as rounding in a file makes them, are moved onto it. In an NPZ
-file columns are arrays with one entry a row; an array `points` may hold all numbers of the points."""
+written in the same way; those with Z or an offset become UTC, and rates are per second.
+
+The numbers of a point stand in columns in the order of its array, and --columns names them in that order: a
+matrix row by row, in a product one factor after the other. A complex number A has the columns A_re and A_im,
+which --columns calls A, or one column A if it is real. Points that are off the space by no more than 1e-4, as
+rounding in a file makes them, are moved onto it. In an NPZ file columns are arrays with one entry a row, which
+may be complex, or vectors or matrices; an array `points` may hold all numbers of the points."""
 EPILOG = """\
 examples:
   symspline fit track.csv --lonlat -o track.npz
   symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
   symspline fit attitude.parquet --space sphere:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
+  symspline fit states.csv --space cp:1 --columns up,down -o states.npz
 
 symspline.load reads the curve in Python; with --curve, symspline.load_many reads all of them."""
 
@@ -45,9 +50,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``symspline fit``."""
     add = parser.add_argument
     add("input", type=Path, metavar="IN", help="table to read: .csv, .npz or .parquet")
-    add("--space", metavar="S", help="such as sphere:2, hyperbolic:3 or 'sphere:3 x euclidean:3'")
+    add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
     add("--time", metavar="COL", help="column of times (default: t or time; if there is none, 0, 1, 2, ...)")
-    add("--columns", metavar="A,B,...", help="columns of a point (default: all others that hold numbers)")
+    add(
+        "--columns",
+        metavar="A,B,...",
+        help="columns of a point, in the order of its numbers (default: all others that hold numbers)",
+    )
     add("--curve", metavar="COL", help="column of names: rows with one name are one curve, in their order")
     add(
         "--lonlat",
@@ -87,11 +96,13 @@ def run(options: argparse.Namespace) -> int:
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
     time = time_column(table, options.time, [curve, *given])
-    points = point_columns(table, given, [time, curve], space, options.lonlat)
+    entries = point_entries(table, given, [time, curve], space, options.lonlat)
     with Progress("reading") as progress:
-        rows = table.read(points, time, curve, progress)
+        rows = table.read([name for entry in entries for name in entry.columns], time, curve, progress)
+    if not options.lonlat:
+        rows = replace(rows, numbers=completed(rows.numbers, entries, space))
     splines = _fit(Data(table.path, rows), space, options)
-    columns = replace(named_columns(points, time, curve, options.lonlat), utc=rows.utc)
+    columns = replace(named_columns(entries, time, curve, options.lonlat), utc=rows.utc)
     write_curves(options.output, Curves(splines, curve is not None, columns))
     print(f"{options.output}: {_summary(list(splines.values()))}")
     return 0

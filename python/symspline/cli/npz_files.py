@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import Problem, did_you_mean, reading
+from .layout import IM, RE
 from .tables import Array, ArrayTable
 
 
@@ -66,5 +67,5 @@ def _split(key: str, array: Array) -> dict[str, Array]:
         return dict(zip(names, entries, strict=True))
     columns = {}
     for name, entry in zip(names, entries, strict=True):
-        columns[name + "_re"], columns[name + "_im"] = entry.real, entry.imag
+        columns[name + RE], columns[name + IM] = entry.real, entry.imag
     return columns

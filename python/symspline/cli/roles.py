@@ -5,10 +5,14 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 
+from .. import spaces
+from ..product import Product
 from ..spaces import Space
 from .curves import Columns
+from .entries import Entry, paired
 from .errors import Problem, first_twice, listed
-from .points import LONLAT, labels
+from .layout import complex_numbers, described
+from .points import LONLAT
 from .tables import Table
 
 
@@ -26,24 +30,35 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
     return None if found in others else found
 
 
-def point_columns(
+def point_entries(
     table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool
-) -> list[str]:
-    """The columns of a point: those that were named, or all that are left."""
+) -> list[Entry]:
+    """The numbers of a point: in columns that were named, or in all that are left."""
     if given:
-        columns = [column for name in given for column in table.expand(name)]
+        groups = [table.expand(name) for name in given]
     elif lonlat:
-        columns = _lonlat(table)
+        groups = [_lonlat(table)]
     else:
-        columns = table.points(others)
-    _check(table, columns, others, space, lonlat, bool(given))
-    return columns
+        groups = [table.points(others)]
+    columns = [column for group in groups for column in group]
+    if any(complex_numbers(space)):
+        groups = [columns]
+    # Else A_re and A_im are two real numbers if both were named.
+    entries = [entry for group in groups for entry in paired(group)]
+    for names in (columns, [entry.name for entry in entries]):
+        twice = first_twice([*filter(None, others), *names])
+        if twice is not None:
+            raise Problem(f"column {twice!r} of {table.path} cannot have two meanings")
+    if not lonlat:
+        _check_halves(table, entries, space, bool(given))
+    _check_count(table, entries, others, space, lonlat, bool(given))
+    return entries
 
 
-def named_columns(points: list[str], time: str | None, curve: str | None, lonlat: bool) -> Columns:
+def named_columns(entries: list[Entry], time: str | None, curve: str | None, lonlat: bool) -> Columns:
     """What a file of curves keeps of them."""
-    standard = Columns(points)
-    return Columns(points, time or standard.time, curve or standard.curve, lonlat)
+    standard = Columns([entry.name for entry in entries])
+    return Columns(standard.points, time or standard.time, curve or standard.curve, lonlat)
 
 
 def _lonlat(table: Table) -> list[str]:
@@ -57,26 +72,49 @@ def _lonlat(table: Table) -> list[str]:
     return columns
 
 
-def _check(
-    table: Table, columns: list[str], others: list[str | None], space: Space, lonlat: bool, given: bool
-) -> None:
-    wanted = LONLAT if lonlat else labels(space)
-    twice = first_twice([*filter(None, others), *columns])
-    if twice is not None:
-        raise Problem(f"column {twice!r} of {table.path} cannot have two meanings")
-    if len(columns) != len(wanted):
-        advice = "" if given else "; say which with --columns"
-        known = {"", *table.numeric, *filter(None, others)}
-        other = [name for name in table.names if name not in known]
-        if other and not given:
-            advice += f" (no numbers in the first row of {listed(other)})"
-        place = "longitude and latitude are 2 numbers"
-        point = place if lonlat else f"a point of {space} has {len(wanted)} numbers"
-        found = f"{len(columns)} columns: {listed(columns)}" if columns else "no columns"
-        raise Problem(f"{table.path}: {point}, and there are {found}{advice}")
-    for name, meant in zip(columns, wanted, strict=True):
-        mark = meant[-3:]
-        if mark in ("_re", "_im") and name[-3:] in ("_re", "_im") and not name.endswith(mark):
+def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool) -> None:
+    """Raise `Problem` unless real numbers have one column, and complex ones both or one without an ending."""
+    kinds = complex_numbers(space)
+    as_many = len(entries) == len(kinds)
+    if not as_many:
+        # Which number a column is for is not known, but all may be of one kind.
+        kinds = kinds[:1] * len(entries) if len(set(kinds)) == 1 else []
+    for entry, is_complex in zip(entries, kinds, strict=False):
+        if len(entry.columns) > 1 and not is_complex:
             raise Problem(
-                f"{table.path}: columns of complex numbers come as A_re,A_im,B_re,B_im; got {listed(columns)}"
+                f"{table.path}: {' and '.join(entry.columns)} are a complex number where a real one belongs: "
+                f"a point of {space} has {described(space)}; {_advice(space, as_many)}"
             )
+        half = entry.other_half
+        if half is not None and is_complex:
+            where = "in --columns" if given else "with numbers" if half in table.names else "in the table"
+            raise Problem(
+                f"{table.path}: column {entry.columns[0]!r} is half of a complex number, "
+                f"and there is no {half!r} {where}"
+            )
+
+
+def _advice(space: Space, as_many: bool) -> str:
+    """What to do about complex numbers where real ones belong."""
+    if not as_many or isinstance(space, Product) or space._name not in spaces._COMPLEX:
+        return "name its columns one by one with --columns"
+    meant: type[Space] = getattr(spaces, spaces._COMPLEX[space._name])
+    return f"did you mean --space {meant._name}:{','.join(map(str, space._parameters))}?"
+
+
+def _check_count(
+    table: Table, entries: list[Entry], others: list[str | None], space: Space, lonlat: bool, given: bool
+) -> None:
+    wanted = len(LONLAT) if lonlat else len(complex_numbers(space))
+    if len(entries) == wanted:
+        return
+    advice = "" if given else "; say which with --columns"
+    known = {"", *table.numeric, *filter(None, others)}
+    other = [name for name in table.names if name not in known]
+    if other and not given:
+        advice += f" (no numbers in the first row of {listed(other)})"
+    point = "longitude and latitude are 2 numbers" if lonlat else f"a point of {space} has {described(space)}"
+    kind = "numbers" if any(len(entry.columns) > 1 for entry in entries) else "columns"
+    names = listed([entry.name for entry in entries])
+    found = f"{len(entries)} {kind}: {names}" if entries else "no columns"
+    raise Problem(f"{table.path}: {point}, and there are {found}{advice}")

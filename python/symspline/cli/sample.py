@@ -15,7 +15,8 @@ from ..spline import CubicSpline
 from .curves import Curves, read_curves
 from .data import Groups, group
 from .errors import Problem, check_target, did_you_mean, first_twice
-from .points import flatten, motion_degrees, motion_labels, to_degrees
+from .layout import column_names, flatten
+from .points import motion_degrees, motion_labels, to_degrees
 from .progress import Progress
 from .roles import time_column
 from .tables import ENDINGS, Rows, Table, ending, open_table, write_table
@@ -25,9 +26,11 @@ SUMMARY = "make a table of points along curves"
 DESCRIPTION = """\
 Make a table of points along curves: CSV, NPZ or Parquet, by the ending of its name. Columns are the time, the
 name of the curve if there are several, and the numbers of the point, named as in the table that was
-fitted, or x0, x1, ... in the order of its array; with --nu 1 the velocity, x0_d1, ..., and with --nu 2
-the covariant acceleration, x0_d2, ..., per unit of time, which is a second for dates. For longitude and
-latitude these are east_d1, north_d1, ..., in degrees of arc."""
+fitted, or x0, x1, ... in the order of its array, and m11, m12, ... for a matrix, row by row; of a complex
+number x0_re and x0_im. With --nu 1 there is the velocity, x0_d1, ... or x0_d1_re, ..., and with --nu 2 the
+covariant acceleration, x0_d2, ..., per unit of time, which is a second for dates. For longitude and latitude
+these are east_d1, north_d1, ..., in degrees of arc. A line or a subspace has many arrays: which one stands for
+it may change from one segment of a curve to the next, and vectors go with the one in their row."""
 EPILOG = """\
 examples:
   symspline sample track.npz --every 10min -o track.csv
@@ -160,13 +163,13 @@ def _orders(text: str) -> list[int]:
 
 
 def _names(curves: Curves, orders: list[int]) -> list[str]:
-    columns = curves.columns
+    columns, space = curves.columns, next(iter(curves.splines.values())).space
     names = [columns.time, *([columns.curve] if curves.named else [])]
     for nu in orders:
-        if nu and columns.lonlat:
-            names += motion_labels(nu)
+        if columns.lonlat:
+            names += motion_labels(nu) if nu else columns.points
         else:
-            names += [f"{name}_d{nu}" if nu else name for name in columns.points]
+            names += column_names(space, columns.points, nu)
     twice = first_twice(names)
     if twice is not None:
         raise Problem(f"two columns would have the name {twice!r}; fit with other names")

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import Problem, did_you_mean, writing
+from .layout import IM, RE, Doubles
 from .progress import Progress
 from .times import Fail, parse_times
 
 Array = NDArray[Any]
-Doubles = NDArray[np.float64]
 Place = Callable[[int], str]
 
 ENDINGS = (".csv", ".npz", ".parquet")
@@ -66,10 +66,16 @@ class Table(ABC):
 
     def expand(self, name: str) -> list[str]:
         """The columns that a name stands for: itself, or the two parts of complex numbers."""
-        parts = [name + "_re", name + "_im"]
-        if name not in self.names and set(parts) <= set(self.names):
-            return parts
-        return [self.require(name)]
+        parts = [name + RE, name + IM]
+        found = [part for part in parts if part in self.names]
+        if name in self.names or not found:
+            return [self.require(name)]
+        if len(found) == 1:
+            (missing,) = set(parts) - set(found)
+            raise Problem(
+                f"{self.path} has a column {found[0]!r}, but no {missing!r}; a complex number needs both"
+            )
+        return parts
 
     def points(self, others: Sequence[str | None]) -> list[str]:
         """The columns of the points if nobody says which: all with numbers but the others."""

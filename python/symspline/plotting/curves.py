@@ -74,6 +74,15 @@ class Curve:
         """Where the knots are among the times x."""
         return slice(None, None, (len(self.x) - 1) // (len(self.spline.t) - 1))
 
+    def picked(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Which of the times x to draw something large at: at most ``number`` knots, and times in between."""
+        knots = np.arange(len(self.x))[self.knots]
+        bold = knots[np.unique(np.linspace(0, len(knots) - 1, min(len(knots), number)).astype(int))]
+        even = np.linspace(self.x[0], self.x[-1], number)
+        gap = np.abs(even[:, None] - self.x[bold]).min(axis=1)
+        between = np.searchsorted(self.x, even[gap > 0.6 * (even[1] - even[0])])
+        return bold, between
+
     @property
     def time_name(self) -> str:
         """What is written below a time axis."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
+from ..spaces import SpecialEuclidean
 from ..spline import CubicSpline
 from .curves import Curve, curves_of
 from .pictures import Picture, picture_of
@@ -65,7 +66,10 @@ def _description(spline: CubicSpline) -> str:
 def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """|γ'| and |∇γ'| of every curve."""
     per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
-    speed, bend = timelines(panel, curves, [f"speed\n|γ′|{per[0]}", f"acceleration\n|∇γ′|{per[1]}"])
+    # Rigid motions have no invariant lengths, see `SpecialEuclidean`.
+    rigid = isinstance(curves[0].spline.space, SpecialEuclidean)
+    first, second = ("|(ω, v)|", "|(ω′, v′)|") if rigid else ("|γ′|", "|∇γ′|")
+    speed, bend = timelines(panel, curves, [f"speed\n{first}{per[0]}", f"acceleration\n{second}{per[1]}"])
     for curve in curves:
         line = {"color": curve.color, "linewidth": 1.8 if curve.alone else 1.1}
         speed.plot(curve.times, curve.speed, **line)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -25,31 +26,51 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """R²: the curve, with equal scales."""
-    axes = panel.add_axes(inside(panel, 0.8, 0.55, 0.25, 0.2))
-    plain(axes)
-    axes.set(xlabel="x₁", ylabel="x₂")
+    axes = plane(panel)
     for curve in curves:
         curve.draw_line(axes, curve.points)
         curve.draw_dots(axes, curve.spline.points)
-    axes.set_aspect("equal", adjustable="datalim")
 
 
 def draw_room(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """R³: the curve in a box with equal scales, and its shadow on the floor."""
-    axes: Any = panel.add_axes(inside(panel, 0.0, 0.1, 0.3, 0.0), projection="3d")
-    everything = np.concatenate([curve.points for curve in curves])
-    middle, half = window(everything, 1.1)
-    half = half or 1.0
-    axes.set(**{f"{a}lim": (m - half, m + half) for a, m in zip("xyz", middle, strict=True)})
+    axes = room(panel, [curve.points for curve in curves])
     for curve in curves:
-        shadow = curve.points.copy()
-        shadow[:, 2] = middle[2] - half
-        curve.draw_line(axes, shadow, color=GRID, linewidth=1.2, zorder=2)
         curve.draw_line(axes, curve.points)
         curve.draw_dots(axes, curve.spline.points)
+
+
+def plane(panel: SubFigure) -> Axes:
+    """Axes with equal scales."""
+    axes = panel.add_axes(inside(panel, 0.8, 0.55, 0.25, 0.2))
+    plain(axes)
+    axes.set(xlabel="x₁", ylabel="x₂")
+    axes.set_aspect("equal", adjustable="datalim")
+    return axes
+
+
+def room(
+    panel: SubFigure, lines: Sequence[NDArray[np.float64]], margin: float = 1.1, below: float = 0.1
+) -> Any:
+    """A box with equal scales around lines of shape (m, 3), with their shadows on the floor.
+
+    Args:
+        margin: width of the box as a multiple of that of the lines.
+        below: inches that are left free.
+    """
+    axes: Any = panel.add_axes(inside(panel, 0.0, below, 0.3, 0.0), projection="3d")
+    everything = np.concatenate(lines)
+    middle, half = window(everything, margin)
+    half = half or 1.0
+    axes.set(**{f"{a}lim": (m - half, m + half) for a, m in zip("xyz", middle, strict=True)})
+    for line in lines:
+        shadow = line.copy()
+        shadow[:, 2] = middle[2] - half
+        axes.plot(*shadow.T, color=GRID, linewidth=1.2, zorder=2)
     _light(axes)
     spread = {azimuth: np.std(_sideways(everything, azimuth)) for azimuth in (-60, -30, 30, 60)}
     axes.view_init(elev=24, azim=max(spread, key=spread.__getitem__))
+    return axes
 
 
 def _sideways(points: NDArray[np.float64], azimuth: float) -> NDArray[np.float64]:

@@ -13,17 +13,33 @@ from numpy.typing import NDArray
 
 from .curves import Curve
 from .style import AXES, INK, size
-from .timeline import LEFT, RIGHT, timelines
+from .timeline import LEFT, RIGHT, row_axes
 
 Array = NDArray[np.float64]
 
-_VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
+VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Right, up and towards the viewer, for whom the first axis points forwards and the third up."""
 
 
 def draw_quaternions(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """S³: unit quaternions, scalar first, as rotations."""
     draw_frames(panel, curves, rotations)
+
+
+def draw_rotations(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """SO(3) and O(3): orthogonal matrices as they are."""
+    draw_frames(panel, curves, lambda matrices: matrices)
+
+
+def draw_spins(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """SU(2): the rotations of space that belong to the matrices."""
+    draw_frames(panel, curves, lambda matrices: rotations(quaternions(matrices)))
+
+
+def quaternions(matrices: NDArray[Any]) -> Array:
+    """The unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
+    a, b = matrices[..., 0, 0], matrices[..., 1, 0]
+    return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
 
 
 def rotations(quaternions: Array) -> Array:
@@ -44,36 +60,28 @@ def draw_frames(panel: SubFigure, curves: Sequence[Curve], matrices: Callable[[A
         matrices: makes of points the rotation matrices, shape (..., 3, 3).
     """
     width, height = size(panel)
-    rows = np.unique(np.linspace(0, len(curves) - 1, min(len(curves), int(height // 0.8))).astype(int))
-    (axes,) = timelines(panel, curves, [""], top=0.4)
-    axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
-    axes.spines["left"].set_visible(False)
+    axes, rows = row_axes(panel, curves)
     length = min(0.7, 0.4 * height / len(rows))
     number = int((width - LEFT - RIGHT) / (0.5 * length))
     for row, i in enumerate(rows):
-        bold, between = _places(curves[i], number)
-        frames = length * _VIEW @ matrices(curves[i].points)
+        bold, between = curves[i].picked(number)
+        frames = length * VIEW @ matrices(curves[i].points)
         _draw_arrows(axes, curves[i].times[between], -row, frames[between], bold=False)
         _draw_arrows(axes, curves[i].times[bold], -row, frames[bold], bold=True)
-    _explain(axes, "bold: given" if len(rows) == len(curves) else f"bold: given; {len(rows)} of the curves")
+    explain(axes, "bold: given" if len(rows) == len(curves) else f"bold: given; {len(rows)} of the curves")
 
 
-def _places(curve: Curve, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Among the samples of a curve, knots for bold frames, and places in between for faint ones."""
-    knots = np.arange(len(curve.x))[curve.knots]
-    bold = knots[np.unique(np.linspace(0, len(knots) - 1, min(len(knots), number)).astype(int))]
-    even = np.linspace(curve.x[0], curve.x[-1], number)
-    gap = np.abs(even[:, None] - curve.x[bold]).min(axis=1)
-    between = np.searchsorted(curve.x, even[gap > 0.6 * (even[1] - even[0])])
-    return bold, between
-
-
-def _explain(axes: Axes, note: str) -> None:
-    """Which colour is which axis."""
+def explain(axes: Axes, note: str, height: float = 1.0) -> None:
+    """Which colour is which axis, in a line at a height of the axes."""
     handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
     labels = ["first axis", "second", "third", note]
     handles.append(Line2D([], [], linestyle="none"))
-    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4, "borderaxespad": 0.2}
+    place: dict[str, Any] = {
+        "loc": "lower left",
+        "bbox_to_anchor": (0, height),
+        "ncols": 4,
+        "borderaxespad": 0.2,
+    }
     look: dict[str, Any] = {"labelcolor": INK, "fontsize": 9, "handlelength": 1.2, "columnspacing": 1.2}
     axes.legend(handles, labels, frameon=False, **place, **look)
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Patch
 from numpy.typing import NDArray
 
 from ..lonlat import from_lonlat, to_lonlat
-from .style import EDGE, GRID, INK, PAPER
+from .style import EDGE, GRID, HALO, INK, PAPER
 
 Array = NDArray[np.float64]
 
@@ -74,22 +74,50 @@ def middle_of(points: Array) -> tuple[float, float]:
     return float(lon), float(lat)
 
 
+def shade(axes: Axes, outline: Patch) -> None:
+    """Fill an outline as if it were a part of a ball of radius 1 around the middle."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
+    light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
+    image = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
+    outline.set_transform(axes.transData)
+    image.set_clip_path(outline)
+
+
 def draw_globe(axes: Axes, view: View, spacing: int) -> None:
     """A shaded globe with a graticule."""
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_xlim(-1.06, 1.06)
     axes.set_ylim(-1.06, 1.06)
-    x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
-    light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
-    shade = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
-    shade.set_clip_path(Circle((0, 0), 1, transform=axes.transData))
+    shade(axes, Circle((0, 0), 1))
     axes.add_patch(Circle((0, 0), 1, fill=False, edgecolor=EDGE, linewidth=1, zorder=3))
     steps = np.linspace(-180, 180, 721)
     lines = [from_lonlat(steps, lat) for lat in range(spacing - 90, 90, spacing)]
     lines += [from_lonlat(lon, steps / 2) for lon in range(-180, 180, spacing)]
     for line in lines:
         axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, zorder=2)
+
+
+def label_directions(axes: Axes, view: View, directions: Mapping[str, tuple[float, float, float]]) -> None:
+    """Labelled half axes from the middle of a ball, those on the far side faint."""
+    for label, direction in directions.items():
+        end = np.array(direction)
+        alpha = 0.9 if end @ view.up > -1e-9 else 0.5
+        stick = view.flat(np.stack([0 * end, end]))
+        axes.plot(*stick.T, color=INK, linewidth=0.8, alpha=0.6 * alpha, zorder=3)
+        x, y = view.flat(1.17 * end)
+        axes.text(
+            x,
+            y,
+            label,
+            color=INK,
+            fontsize=11,
+            alpha=alpha,
+            ha="center",
+            va="center",
+            path_effects=HALO,
+            zorder=7,
+        )
 
 
 def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:

@@ -1,9 +1,8 @@
-"""Curves on the circle S¹ and on the sphere S²."""
+"""Curves on the sphere S²."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +13,6 @@ from ..lonlat import to_lonlat
 from .curves import Curve
 from .globe import View, degrees, draw_frame, draw_globe, middle_of
 from .style import GRID, PAPER, inside, plain, size, window
-from .timeline import timelines
 
 Array = NDArray[np.float64]
 
@@ -23,53 +21,50 @@ _POLE = 60
 """Neighbouring samples whose longitudes differ by more have the pole between them."""
 
 
-def draw_angle(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """S¹: the angle against time, without jumps."""
-    (axes,) = timelines(panel, curves, ["angle, degrees"])
-    for curve in curves:
-        angle = np.degrees(np.unwrap(np.arctan2(curve.points[:, 1], curve.points[:, 0])))
-        graph = np.column_stack([curve.times, angle])
-        curve.draw_line(axes, graph)
-        curve.draw_dots(axes, graph[curve.knots])
-
-
 def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """S²: a globe and, if there is room, a map of all longitudes and latitudes."""
-    draw_ball(panel, curves, lambda points: points)
+    points = np.concatenate([curve.points for curve in curves])
+    axes, view = part_of_globe(panel, points) or _globe(panel, points)
+    for curve in curves:
+        draw_on_globe(axes, view, curve, curve.points, curve.spline.points)
     width, height = size(panel)
     if width > 2 * height:
         _draw_map(panel, curves, height)
 
 
-def draw_ball(panel: SubFigure, curves: Sequence[Curve], vectors: Callable[[Any], Array]) -> None:
-    """Curves on a globe in the left of a panel, dashed on its far side.
+def draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Array) -> None:
+    """A curve on a globe, dashed on the far side.
 
     Args:
-        vectors: makes of points unit vectors, shape (..., 3).
+        line: unit vectors along the curve, shape (m, 3).
+        given: those of the given points.
     """
-    lines = [vectors(curve.points) for curve in curves]
-    axes, view = _globe(panel, np.concatenate(lines))
-    for curve, line in zip(curves, lines, strict=True):
-        given = vectors(curve.spline.points)
-        curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
-        curve.draw_line(axes, view.visible(line))
-        curve.draw_dots(axes, view.hidden(given), alpha=0.35)
-        curve.draw_dots(axes, view.visible(given))
+    curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
+    curve.draw_line(axes, view.visible(line))
+    curve.draw_dots(axes, view.hidden(given), alpha=0.35)
+    curve.draw_dots(axes, view.visible(given))
+
+
+def part_of_globe(panel: SubFigure, points: Array) -> tuple[Axes, View] | None:
+    """The part of a globe, in the left of a panel, where points are; None if they are not close together."""
+    view = View.above(*middle_of(points))
+    far = np.arctan2(np.linalg.norm(view.flat(points), axis=-1), points @ view.up).max()
+    if not 1e-7 < far < _SMALL:
+        return None
+    width, height = size(panel)
+    room = min(width, height)
+    axes = panel.add_axes(inside(panel, 0.95, 0.5, width - room + 0.2, height - room + 0.65))
+    draw_frame(axes, view, *window(view.flat(points), 1.22))
+    axes.tick_params(labelsize=8)
+    return axes, view
 
 
 def _globe(panel: SubFigure, points: Array) -> tuple[Axes, View]:
-    """A globe turned towards points or, where they are close together, a part of it."""
+    """A whole globe in the left of a panel, turned towards points."""
     view = View.above(*middle_of(points))
-    far = np.arctan2(np.linalg.norm(view.flat(points), axis=-1), points @ view.up).max()
     width, height = size(panel)
-    room = min(width, height)
-    if 1e-7 < far < _SMALL:
-        axes = panel.add_axes(inside(panel, 0.95, 0.5, width - room + 0.2, height - room + 0.65))
-        draw_frame(axes, view, *window(view.flat(points), 1.22))
-        axes.tick_params(labelsize=8)
-    else:
-        axes = panel.add_axes(inside(panel, 0.1, 0.1, width - room + 0.1, 0.1))
-        draw_globe(axes, view, 15)
+    axes = panel.add_axes(inside(panel, 0.1, 0.1, width - min(width, height) + 0.1, 0.1))
+    draw_globe(axes, view, 15)
     return axes, view
 
 

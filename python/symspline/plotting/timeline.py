@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
+from numpy.typing import NDArray
 
 from .curves import Curve
 from .style import DATES, EDGE, inside, plain, size
@@ -34,6 +35,19 @@ def timelines(
         _mark_knots(axes, curves)
         made.append(axes)
     return made
+
+
+def row_axes(panel: SubFigure, curves: Sequence[Curve], top: float = 0.4) -> tuple[Axes, NDArray[np.intp]]:
+    """Axes for pictures along the time axis, and the numbers of the curves that get a row: as many as fit.
+
+    Row i is at height −i.
+    """
+    number = min(len(curves), int(size(panel)[1] // 0.8))
+    rows = np.unique(np.linspace(0, len(curves) - 1, number).astype(int))
+    (axes,) = timelines(panel, curves, [""], top=top)
+    axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
+    axes.spines["left"].set_visible(False)
+    return axes, rows
 
 
 def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) -> None:

@@ -7,6 +7,7 @@ use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
 use crate::space::Space;
 use crate::with_size;
+use std::ops::DerefMut;
 
 /// Spline curves with equally many knots: the triple (t, p, u).
 pub struct Curves<'a> {
@@ -237,36 +238,56 @@ impl<'a, M: Space> Places<'a, M> {
 impl<M: Space> Job<'_, M> {
     /// Evaluates a block of samples, eight at a time, whatever segments they fall in.
     fn run<S: Scalar>(&self, out: &mut [f64], size: usize) {
-        with_size!(M::VECTORS, self.space.point_len(), len => self.run_sized::<S>(out, size, len));
+        match self.space.chart() {
+            None => with_size!(M::VECTORS, self.space.point_len(), len => {
+                self.run_sized::<S, M>(self.space, None, out, size, len)
+            }),
+            Some(chart) => {
+                self.run_sized::<S, M::Chart>(&chart, Some(self.space), out, size, chart.point_len())
+            }
+        }
     }
 
+    /// The same in a chart with points of `len` numbers: `curved` is the space if it is not the chart
+    /// itself.
     #[inline(always)]
-    fn run_sized<S: Scalar>(&self, out: &mut [f64], size: usize, len: usize) {
-        let (space, curves) = (self.space, self.curves);
+    fn run_sized<S: Scalar, C: Space>(
+        &self,
+        chart: &C,
+        curved: Option<&M>,
+        out: &mut [f64],
+        size: usize,
+        len: usize,
+    ) {
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
         let mut vectors = vec![Lane::ZERO; 3 * len];
+        let ambient = self.space.point_len();
+        let mut buffer = vec![Lane::ZERO; if curved.is_some() { 4 * ambient } else { 0 }];
         let mut places = Places::new(self, out.len() / size);
         let mut rate = Lane::ONE;
         for out in out.chunks_mut(LANES * size) {
             if places.advance() {
-                let Places { at, h, .. } = places;
-                rate = Lane::ONE / h;
-                let third = h * lane(1.0 / 3.0);
-                let Segment { ends: [p0, p1], legs: [a, b], .. } = &mut segment;
-                let (p, u) = (curves.points, curves.velocities);
-                gather(at.map(|i| &p[i..][..len]), &mut p0[..len]);
-                gather(at.map(|i| &p[i + len..][..len]), &mut p1[..len]);
-                gather(at.map(|i| &u[i..][..len]), &mut a[..len]);
-                gather(at.map(|i| &u[i + len..][..len]), &mut b[..len]);
-                a.iter_mut().chain(b).for_each(|u| *u *= third);
-                segment.prepare(space, len);
+                rate = Lane::ONE / places.h;
+                match curved {
+                    None => self.read(&places, len, &mut segment.ends, &mut segment.legs),
+                    Some(space) => {
+                        let (p, v) = buffer.split_at_mut(2 * ambient);
+                        let [p0, p1] = two(p, ambient);
+                        let [v0, v1] = two(v, ambient);
+                        self.read(&places, ambient, &mut [&mut *p0, &mut *p1], &mut [&mut *v0, &mut *v1]);
+                        let [y, z] = &mut segment.ends;
+                        let [a, b] = &mut segment.legs;
+                        space.enter([p0, p1], [v0, v1], [y, z], [a, b]);
+                    }
+                }
+                segment.prepare(chart, len);
             }
             // Exactly 1 at the last knot.
             let tau = (places.x - places.knot) / places.h;
-            segment.at(space, len, S::from_parts([tau, rate, Lane::ZERO]), &mut gamma);
+            segment.at(chart, len, S::from_parts([tau, rate, Lane::ZERO]), &mut gamma);
             if self.outside == Outside::Geodesic && places.beyond != [0.0; LANES] {
-                self.go_straight(&places, &segment, &mut gamma);
+                go_straight(chart, &places, &segment, &mut gamma);
             }
             let (p, derivatives) = vectors.split_at_mut(len);
             let (d, dd) = derivatives.split_at_mut(len);
@@ -274,41 +295,79 @@ impl<M: Space> Job<'_, M> {
             for (i, g) in gamma[..len].iter().enumerate() {
                 [p[i], d[i], dd[i]] = g.parts();
             }
-            let norm = |v: &[Lane]| max_or_nan(space.inner(p, v, v), Lane::ZERO).sqrt();
             match self.quantity {
-                Quantity::Velocity | Quantity::Speed => space.velocity(p, d),
-                Quantity::Acceleration | Quantity::Bend => space.acceleration(p, d, dd),
+                Quantity::Velocity | Quantity::Speed => chart.velocity(p, d),
+                Quantity::Acceleration | Quantity::Bend => chart.acceleration(p, d, dd),
                 Quantity::Point => {}
             }
-            match self.quantity {
-                Quantity::Point => scatter(p, out),
-                Quantity::Velocity => scatter(d, out),
-                Quantity::Acceleration => scatter(dd, out),
-                Quantity::Speed => scatter(&[norm(d)], out),
-                Quantity::Bend => scatter(&[norm(dd)], out),
+            let vector = match self.quantity {
+                Quantity::Point => None,
+                Quantity::Velocity | Quantity::Speed => Some(&*d),
+                Quantity::Acceleration | Quantity::Bend => Some(&*dd),
+            };
+            let norm = |p: &[Lane], v: &[Lane]| max_or_nan(self.space.inner(p, v, v), Lane::ZERO).sqrt();
+            let lengths = matches!(self.quantity, Quantity::Speed | Quantity::Bend);
+            match (curved, vector) {
+                (None, Some(v)) if lengths => scatter(&[norm(p, v)], out),
+                (None, vector) => scatter(vector.unwrap_or(p), out),
+                (Some(space), vector) => {
+                    let [point, result] = two(&mut buffer, ambient);
+                    space.leave(p, vector, result);
+                    if lengths {
+                        space.leave(p, None, point);
+                        scatter(&[norm(point, result)], out);
+                    } else {
+                        scatter(result, out);
+                    }
+                }
             }
         }
     }
 
-    /// Replaces the lanes outside the knots by the geodesic that leaves the end.
-    #[cold]
-    fn go_straight<S: Scalar>(&self, places: &Places<M>, segment: &Segment<S>, gamma: &mut [S]) {
-        let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
-        let (beyond, third) = (Lane::new(places.beyond), places.h * lane(1.0 / 3.0));
-        let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
-        let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
-            x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
-        };
-        let velocity: Vec<Lane> = pick(a, b).iter().map(|leg| *leg / third).collect();
-        let mut straight = gamma.to_vec();
-        self.space.ray(
-            &pick(p0, p1),
-            &velocity,
-            S::from_parts([beyond, Lane::ONE, Lane::ZERO]),
-            &mut straight,
-        );
-        for (g, s) in gamma.iter_mut().zip(&straight) {
-            *g = S::select(before | behind, *s, *g);
+    /// Gathers the ends of eight segments, and the legs there: h/3 times the velocities.
+    #[inline(always)]
+    fn read(
+        &self,
+        places: &Places<M>,
+        len: usize,
+        ends: &mut [impl DerefMut<Target = [Lane]>; 2],
+        legs: &mut [impl DerefMut<Target = [Lane]>; 2],
+    ) {
+        let Places { at, h, .. } = places;
+        let third = *h * lane(1.0 / 3.0);
+        let (p, u) = (self.curves.points, self.curves.velocities);
+        for e in 0..2 {
+            gather(at.map(|i| &p[i + e * len..][..len]), &mut ends[e][..len]);
+            gather(at.map(|i| &u[i + e * len..][..len]), &mut legs[e][..len]);
+            legs[e].iter_mut().for_each(|u| *u *= third);
         }
+    }
+}
+
+/// The first two rows of a buffer.
+fn two(buffer: &mut [Lane], len: usize) -> [&mut [Lane]; 2] {
+    let (a, b) = buffer.split_at_mut(len);
+    [a, &mut b[..len]]
+}
+
+/// Replaces the lanes outside the knots by the geodesic that leaves the end.
+#[cold]
+fn go_straight<M: Space, C: Space, S: Scalar>(
+    chart: &C,
+    places: &Places<M>,
+    segment: &Segment<S>,
+    gamma: &mut [S],
+) {
+    let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
+    let (beyond, third) = (Lane::new(places.beyond), places.h * lane(1.0 / 3.0));
+    let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
+    let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
+        x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
+    };
+    let velocity: Vec<Lane> = pick(a, b).iter().map(|leg| *leg / third).collect();
+    let mut straight = gamma.to_vec();
+    chart.ray(&pick(p0, p1), &velocity, S::from_parts([beyond, Lane::ONE, Lane::ZERO]), &mut straight);
+    for (g, s) in gamma.iter_mut().zip(&straight) {
+        *g = S::select(before | behind, *s, *g);
     }
 }

@@ -220,7 +220,9 @@ fn end<M: Space>(
 
     // Acceleration A: w − v = (h²/6) S(v) A.
     a.copy_from_slice(value);
-    stretch_by(space, h0 * THIRD, u, a);
+    if value.iter().any(|x| x.simd_ne(Lane::ZERO).any()) {
+        stretch_by(space, h0 * THIRD, u, a);
+    }
     for c in 0..m {
         a[c] = sign * (r[c] - a[c] * lane(1.0 / 6.0));
     }

@@ -1,10 +1,10 @@
 //! What a point may need once: orthonormal columns, determinants, triangular factors.
 
-use super::{Entry, Matrix, inner_add, mul_add};
+use super::{Entry, Matrix, Storage, inner_add, mul_add};
 use crate::scalar::{LANES, Lane, lane};
 
 /// Makes the columns orthonormal by Gram and Schmidt, twice, so that they are so to rounding.
-pub fn orthonormalise<const D: usize>(a: &mut Matrix<Lane, D>) {
+pub fn orthonormalise<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
     let (rows, cols) = (a.rows(), a.cols());
     for j in 0..cols {
         for _ in 0..2 {
@@ -32,13 +32,13 @@ pub fn orthonormalise<const D: usize>(a: &mut Matrix<Lane, D>) {
 
 /// One step of Newton's method (Schulz 1933) for the unitary factor of a nearly unitary matrix, or
 /// one with nearly orthonormal columns: an error e becomes about e².
-pub fn reorthonormalise<const D: usize>(a: &mut Matrix<Lane, D>) {
+pub fn reorthonormalise<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
     let defect = a.adjoint_times(a).plus_identity(lane(-1.0)).scaled(lane(-0.5));
     *a = &a.times(&defect) + a;
 }
 
 /// The determinant.
-pub fn determinant<const D: usize>(a: &Matrix<Lane, D>) -> Entry<Lane, D> {
+pub fn determinant<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>) -> Entry<Lane, D> {
     let n = a.rows();
     let mut out = [[0.0; D]; LANES];
     for (l, out) in out.iter_mut().enumerate() {
@@ -92,7 +92,7 @@ fn determinant_of<const D: usize>(mut a: Vec<[f64; D]>, n: usize) -> [f64; D] {
 }
 
 /// The lower triangular L with `A = L L*`; NaN on lanes where A is not positive definite.
-pub fn cholesky<const D: usize>(a: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+pub fn cholesky<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
     let n = a.rows();
     let mut l = Matrix::zeros(n, n);
     for j in 0..n {
@@ -117,7 +117,10 @@ pub fn cholesky<const D: usize>(a: &Matrix<Lane, D>) -> Matrix<Lane, D> {
 }
 
 /// `L⁻¹ B` for a lower triangular L with real diagonal.
-pub fn solve_lower<const D: usize>(l: &Matrix<Lane, D>, b: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+pub fn solve_lower<const D: usize, A: Storage>(
+    l: &Matrix<Lane, D, A>,
+    b: &Matrix<Lane, D, A>,
+) -> Matrix<Lane, D, A> {
     let mut x = b.clone();
     for i in 0..l.rows() {
         let inverse = Lane::ONE / l[(i, i)][0];

@@ -2,7 +2,7 @@
 //!
 //! Every lane rotates until it is done and then stays as it is, whatever its neighbours need.
 
-use super::{Entry, Matrix, conjugate, inner_add, mul_add};
+use super::{Entry, Matrix, Storage, conjugate, inner_add, mul_add};
 use crate::scalar::{Lane, lane, max_or_nan};
 
 /// Jacobi's method needs five to eight sweeps; what is not done after so many is not finite.
@@ -27,14 +27,14 @@ fn rotation<const D: usize>(alpha: Lane, beta: Entry<Lane, D>) -> (Lane, Entry<L
 
 /// Columns p and q of a matrix become `c a_p + s a_q` and `c a_q − s̄ a_p`.
 #[inline]
-fn rotate_columns<const D: usize>(
-    a: &mut Matrix<Lane, D>,
+fn rotate_columns<const D: usize, A: Storage>(
+    a: &mut Matrix<Lane, D, A>,
     (p, q): (usize, usize),
     c: Lane,
     s: Entry<Lane, D>,
 ) {
     let minus = conjugate(s).map(|x| -x);
-    for i in 0..a.rows {
+    for i in 0..a.rows() {
         let (x, y) = (a[(i, p)], a[(i, q)]);
         a[(i, p)] = mul_add::<Lane, D, false>(y, s, x.map(|x| x * c));
         a[(i, q)] = mul_add::<Lane, D, false>(x, minus, y.map(|y| y * c));
@@ -43,9 +43,14 @@ fn rotate_columns<const D: usize>(
 
 /// Rows p and q become `c a_p + s̄ a_q` and `c a_q − s a_p`.
 #[inline]
-fn rotate_rows<const D: usize>(a: &mut Matrix<Lane, D>, (p, q): (usize, usize), c: Lane, s: Entry<Lane, D>) {
+fn rotate_rows<const D: usize, A: Storage>(
+    a: &mut Matrix<Lane, D, A>,
+    (p, q): (usize, usize),
+    c: Lane,
+    s: Entry<Lane, D>,
+) {
     let (conjugated, minus) = (conjugate(s), s.map(|x| -x));
-    for i in 0..a.cols {
+    for i in 0..a.cols() {
         let (x, y) = (a[(p, i)], a[(q, i)]);
         a[(p, i)] = mul_add::<Lane, D, false>(y, conjugated, x.map(|x| x * c));
         a[(q, i)] = mul_add::<Lane, D, false>(x, minus, y.map(|y| y * c));
@@ -57,7 +62,9 @@ fn rotate_rows<const D: usize>(a: &mut Matrix<Lane, D>, (p, q): (usize, usize), 
 /// With two matrices, real and imaginary part of a normal one, every rotation is that of the
 /// combination which is farthest from diagonal (Bunse-Gerstner, Byers & Mehrmann 1993): eigenvalues
 /// that coincide in one are told apart by the other.
-pub fn diagonalise<const D: usize, const M: usize>(a: &mut [Matrix<Lane, D>; M]) -> Matrix<Lane, D> {
+pub fn diagonalise<const D: usize, const M: usize, A: Storage>(
+    a: &mut [Matrix<Lane, D, A>; M],
+) -> Matrix<Lane, D, A> {
     let n = a[0].rows();
     let mut v = Matrix::identity(n);
     let size = a.iter().fold(Lane::ZERO, |m, a| max_or_nan(m, a.size()));
@@ -98,13 +105,13 @@ pub fn diagonalise<const D: usize, const M: usize>(a: &mut [Matrix<Lane, D>; M])
 
 /// Half the difference of the diagonal, and the off-diagonal entry, of the matrix to diagonalise in
 /// the plane (p, q).
-fn combination<const D: usize, const M: usize>(
-    a: &[Matrix<Lane, D>; M],
+fn combination<const D: usize, const M: usize, A: Storage>(
+    a: &[Matrix<Lane, D, A>; M],
     p: usize,
     q: usize,
 ) -> (Lane, Entry<Lane, D>) {
     let half = lane(0.5);
-    let plane = |a: &Matrix<Lane, D>| (half * (a[(p, p)][0] - a[(q, q)][0]), a[(p, q)]);
+    let plane = |a: &Matrix<Lane, D, A>| (half * (a[(p, p)][0] - a[(q, q)][0]), a[(p, q)]);
     let (a1, b1) = plane(&a[0]);
     if M == 1 {
         return (a1, b1);
@@ -129,14 +136,17 @@ fn combination<const D: usize, const M: usize>(
 /// values are found to full relative accuracy where columns are badly scaled.
 ///
 /// `v`, if given, is multiplied by V.
-pub fn orthogonalise<const D: usize>(a: &mut Matrix<Lane, D>, mut v: Option<&mut Matrix<Lane, D>>) {
+pub fn orthogonalise<const D: usize, A: Storage>(
+    a: &mut Matrix<Lane, D, A>,
+    mut v: Option<&mut Matrix<Lane, D, A>>,
+) {
     let n = a.cols();
     for _ in 0..MAX_SWEEPS {
         let mut moved = false;
         for p in 0..n {
             for q in p + 1..n {
                 let (mut pp, mut qq, mut pq) = (Lane::ZERO, Lane::ZERO, [Lane::ZERO; D]);
-                for i in 0..a.rows {
+                for i in 0..a.rows() {
                     let (x, y) = (a[(i, p)], a[(i, q)]);
                     pp = inner_add(x, x, pp);
                     qq = inner_add(y, y, qq);
@@ -163,7 +173,7 @@ pub fn orthogonalise<const D: usize>(a: &mut Matrix<Lane, D>, mut v: Option<&mut
 }
 
 /// Sorts the columns of several matrices alike by falling keys, lane by lane.
-pub fn sort_columns<const D: usize>(keys: &mut [Lane], matrices: &mut [&mut Matrix<Lane, D>]) {
+pub fn sort_columns<const D: usize, A: Storage>(keys: &mut [Lane], matrices: &mut [&mut Matrix<Lane, D, A>]) {
     let n = keys.len();
     for pass in 0..n {
         for j in 0..n - 1 - pass {
@@ -174,7 +184,7 @@ pub fn sort_columns<const D: usize>(keys: &mut [Lane], matrices: &mut [&mut Matr
             let (a, b) = (keys[j], keys[j + 1]);
             (keys[j], keys[j + 1]) = (swap.select(b, a), swap.select(a, b));
             for m in matrices.iter_mut() {
-                for i in 0..m.rows {
+                for i in 0..m.rows() {
                     for c in 0..D {
                         let (a, b) = (m[(i, j)][c], m[(i, j + 1)][c]);
                         (m[(i, j)][c], m[(i, j + 1)][c]) = (swap.select(b, a), swap.select(a, b));

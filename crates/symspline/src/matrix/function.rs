@@ -6,7 +6,7 @@
 //! triangle (Hermite & Genocchi), which is how they are computed where their arguments are close.
 
 use super::eigen::diagonalise;
-use super::{Entry, Matrix, mul_add};
+use super::{Entry, Matrix, Storage, mul_add};
 use crate::scalar::{Lane, Scalar, lane};
 
 /// A function of a real variable for [`function_of`].
@@ -73,7 +73,10 @@ impl<F: Fn(Lane) -> [Lane; 3], R: Fn(Lane) -> Lane> Unary<F, R> {
 
 /// `f(H)` of a Hermitian matrix.
 #[inline(never)]
-pub fn function_of<S: Scalar, const D: usize, F, R>(h: &Matrix<S, D>, f: &Unary<F, R>) -> Matrix<S, D>
+pub fn function_of<S: Scalar, const D: usize, F, R, A: Storage>(
+    h: &Matrix<S, D, A>,
+    f: &Unary<F, R>,
+) -> Matrix<S, D, A>
 where
     F: Fn(Lane) -> [Lane; 3],
     R: Fn(Lane) -> Lane,
@@ -82,7 +85,7 @@ where
     let mut values = [h.value()];
     let v = diagonalise(&mut values);
     let eigenvalues: Vec<Lane> = (0..n).map(|i| values[0][(i, i)][0]).collect();
-    let back = |m: &Matrix<Lane, D>| v.times(m).times_adjoint(&v);
+    let back = |m: &Matrix<Lane, D, A>| v.times(m).times_adjoint(&v);
     let diagonal: Vec<Lane> = eigenvalues.iter().map(|&x| (f.f)(x)[0]).collect();
     let mut parts = vec![back(&Matrix::diagonal(&diagonal))];
     if S::ORDER > 0 {
@@ -94,12 +97,13 @@ where
                 quotients[(j, i)] = quotients[(i, j)];
             }
         }
-        let scaled =
-            |m: &Matrix<Lane, D>| Matrix::from_fn(n, n, |i, j| m[(i, j)].map(|x| x * quotients[(i, j)][0]));
+        let scaled = |m: &Matrix<Lane, D, A>| {
+            Matrix::from_fn(n, n, |i, j| m[(i, j)].map(|x| x * quotients[(i, j)][0]))
+        };
         let d = part(1);
         parts.push(back(&scaled(&d)));
         if S::ORDER > 1 {
-            let mut dd: Matrix<Lane, D> = scaled(&part(2));
+            let mut dd: Matrix<Lane, D, A> = scaled(&part(2));
             for i in 0..n {
                 for j in 0..n {
                     for k in 0..n {
@@ -116,7 +120,7 @@ where
 }
 
 /// A matrix from its value and derivatives.
-pub(super) fn join<S: Scalar, const D: usize>(parts: &[Matrix<Lane, D>]) -> Matrix<S, D> {
+pub(super) fn join<S: Scalar, const D: usize, A: Storage>(parts: &[Matrix<Lane, D, A>]) -> Matrix<S, D, A> {
     let (rows, cols) = (parts[0].rows(), parts[0].cols());
     Matrix::from_fn(rows, cols, |i, j| {
         std::array::from_fn(|c| {

@@ -11,11 +11,11 @@ mod series;
 pub use dense::{cholesky, determinant, orthonormalise, reorthonormalise, solve_lower};
 pub use eigen::{diagonalise, orthogonalise, sort_columns};
 pub use function::{Unary, function_of};
-pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, trig};
+pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};
 
 use crate::scalar::{Lane, Scalar, lane};
 use smallvec::{SmallVec, smallvec};
-use std::ops::{Add, Index, IndexMut, Neg, Sub};
+use std::ops::{Add, Deref, DerefMut, Index, IndexMut, Neg, Sub};
 
 /// A real number (D = 1), or real and imaginary part of a complex one (D = 2).
 pub type Entry<S, const D: usize> = [S; D];
@@ -62,18 +62,109 @@ fn conjugate<S: Scalar, const D: usize>(mut a: Entry<S, D>) -> Entry<S, D> {
     a
 }
 
-/// A matrix, row by row. Up to sixteen entries live on the stack.
-#[derive(Clone)]
-pub struct Matrix<S, const D: usize> {
-    rows: usize,
-    cols: usize,
-    data: SmallVec<[Entry<S, D>; 16]>,
+/// Where the entries of a matrix are, and how many.
+pub trait Storage: Copy + Send + Sync + 'static {
+    /// Rows and columns.
+    type Shape: Copy;
+    /// A container of entries.
+    type Of<T: Copy>: Clone + Deref<Target = [T]> + DerefMut;
+    /// A shape that is asked for.
+    fn shape(rows: usize, cols: usize) -> Self::Shape;
+    /// The numbers of rows and columns.
+    fn size(shape: Self::Shape) -> (usize, usize);
+    /// Equal entries.
+    fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
+}
+
+/// Any size. Up to sixteen entries live on the stack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dynamic;
+
+impl Storage for Dynamic {
+    type Shape = (usize, usize);
+    type Of<T: Copy> = SmallVec<[T; 16]>;
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        (rows, cols)
+    }
+    #[inline(always)]
+    fn size(shape: Self::Shape) -> (usize, usize) {
+        shape
+    }
+    fn filled<T: Copy>((rows, cols): Self::Shape, x: T) -> Self::Of<T> {
+        smallvec![x; rows * cols]
+    }
+}
+
+/// N × N matrices of NN = N² entries, a size known to the compiler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Known<const N: usize, const NN: usize>;
+
+/// An array that dereferences to a slice.
+#[derive(Clone, Copy)]
+pub struct Entries<T, const NN: usize>([T; NN]);
+
+impl<T, const NN: usize> Deref for Entries<T, NN> {
+    type Target = [T];
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T, const NN: usize> DerefMut for Entries<T, NN> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+}
+
+impl<const N: usize, const NN: usize> Storage for Known<N, NN> {
+    type Shape = ();
+    type Of<T: Copy> = Entries<T, NN>;
+    #[inline(always)]
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        debug_assert!(rows == N && cols == N && N * N == NN);
+    }
+    #[inline(always)]
+    fn size(_: Self::Shape) -> (usize, usize) {
+        (N, N)
+    }
+    #[inline(always)]
+    fn filled<T: Copy>(_: Self::Shape, x: T) -> Self::Of<T> {
+        Entries([x; NN])
+    }
+}
+
+/// A matrix, row by row.
+pub struct Matrix<S: Scalar, const D: usize, A: Storage = Dynamic> {
+    shape: A::Shape,
+    data: A::Of<Entry<S, D>>,
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Clone for Matrix<S, D, A> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        Matrix { shape: self.shape, data: self.data.clone() }
+    }
 }
 
 impl<S: Scalar, const D: usize> Matrix<S, D> {
+    /// The rows `from..to`.
+    pub fn some_rows(&self, from: usize, to: usize) -> Self {
+        Self::from_fn(to - from, self.cols(), |i, j| self[(from + i, j)])
+    }
+
+    /// The columns `from..to`.
+    pub fn some_cols(&self, from: usize, to: usize) -> Self {
+        Self::from_fn(self.rows(), to - from, |i, j| self[(i, from + j)])
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     /// All zeros.
     pub fn zeros(rows: usize, cols: usize) -> Self {
-        Matrix { rows, cols, data: smallvec![[S::constant(Lane::ZERO); D]; rows * cols] }
+        let shape = A::shape(rows, cols);
+        Matrix { shape, data: A::filled(shape, [S::constant(Lane::ZERO); D]) }
     }
 
     /// The identity.
@@ -118,7 +209,7 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     /// Writes the numbers as [`read`](Self::read) takes them.
     pub fn write(&self, out: &mut [S]) {
-        for (out, x) in out.as_chunks_mut::<D>().0.iter_mut().zip(&self.data) {
+        for (out, x) in out.as_chunks_mut::<D>().0.iter_mut().zip(self.data.iter()) {
             *out = *x;
         }
     }
@@ -126,13 +217,13 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
     /// Number of rows.
     #[inline(always)]
     pub fn rows(&self) -> usize {
-        self.rows
+        A::size(self.shape).0
     }
 
     /// Number of columns.
     #[inline(always)]
     pub fn cols(&self) -> usize {
-        self.cols
+        A::size(self.shape).1
     }
 
     /// All entries, row by row.
@@ -143,12 +234,12 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     /// `A B`.
     pub fn times(&self, b: &Self) -> Self {
-        let mut out = Self::zeros(self.rows, b.cols);
-        for i in 0..self.rows {
-            let row = &mut out.data[i * b.cols..][..b.cols];
-            for k in 0..self.cols {
-                let a = self.data[i * self.cols + k];
-                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols..][..b.cols]) {
+        let mut out = Self::zeros(self.rows(), b.cols());
+        for i in 0..self.rows() {
+            let row = &mut out.data[i * b.cols()..][..b.cols()];
+            for k in 0..self.cols() {
+                let a = self.data[i * self.cols() + k];
+                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols()..][..b.cols()]) {
                     *c = mul_add::<S, D, false>(a, *b, *c);
                 }
             }
@@ -158,12 +249,12 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     /// `A* B`.
     pub fn adjoint_times(&self, b: &Self) -> Self {
-        let mut out = Self::zeros(self.cols, b.cols);
-        for k in 0..self.rows {
-            for i in 0..self.cols {
-                let a = conjugate(self.data[k * self.cols + i]);
-                let row = &mut out.data[i * b.cols..][..b.cols];
-                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols..][..b.cols]) {
+        let mut out = Self::zeros(self.cols(), b.cols());
+        for k in 0..self.rows() {
+            for i in 0..self.cols() {
+                let a = conjugate(self.data[k * self.cols() + i]);
+                let row = &mut out.data[i * b.cols()..][..b.cols()];
+                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols()..][..b.cols()]) {
                     *c = mul_add::<S, D, false>(a, *b, *c);
                 }
             }
@@ -173,9 +264,9 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     /// `A B*`.
     pub fn times_adjoint(&self, b: &Self) -> Self {
-        Self::from_fn(self.rows, b.rows, |i, j| {
+        Self::from_fn(self.rows(), b.rows(), |i, j| {
             let mut sum = [S::constant(Lane::ZERO); D];
-            let (x, y) = (&self.data[i * self.cols..][..self.cols], &b.data[j * b.cols..][..b.cols]);
+            let (x, y) = (&self.data[i * self.cols()..][..self.cols()], &b.data[j * b.cols()..][..b.cols()]);
             for (x, y) in x.iter().zip(y) {
                 sum = mul_add::<S, D, true>(*x, *y, sum);
             }
@@ -185,7 +276,7 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     /// `A*`.
     pub fn adjoint(&self) -> Self {
-        Self::from_fn(self.cols, self.rows, |i, j| conjugate(self[(j, i)]))
+        Self::from_fn(self.cols(), self.rows(), |i, j| conjugate(self[(j, i)]))
     }
 
     /// `(A + A*)/2`, exactly Hermitian.
@@ -200,7 +291,7 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     fn with_adjoint(&self, sign: Lane) -> Self {
         let half = lane(0.5);
-        Self::from_fn(self.rows, self.cols, |i, j| {
+        Self::from_fn(self.rows(), self.cols(), |i, j| {
             let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
             std::array::from_fn(|c| (a[c] + b[c] * sign) * half)
         })
@@ -208,7 +299,7 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
 
     /// `A + x`, x times the identity.
     pub fn plus_identity(mut self, x: Lane) -> Self {
-        for i in 0..self.rows.min(self.cols) {
+        for i in 0..self.rows().min(self.cols()) {
             self[(i, i)][0] = self[(i, i)][0] + x;
         }
         self
@@ -234,7 +325,7 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
     /// `Re tr A*B`.
     pub fn inner(&self, b: &Self) -> S {
         let mut sum = S::constant(Lane::ZERO);
-        for (a, b) in self.data.iter().zip(&b.data) {
+        for (a, b) in self.data.iter().zip(b.data.iter()) {
             sum = inner_add(*a, *b, sum);
         }
         sum
@@ -252,28 +343,14 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
     /// Real part of the trace.
     pub fn trace(&self) -> S {
         let mut sum = self[(0, 0)][0];
-        for i in 1..self.rows {
+        for i in 1..self.rows() {
             sum = sum + self[(i, i)][0];
         }
         sum
     }
 
-    /// The rows `from..to`.
-    pub fn some_rows(&self, from: usize, to: usize) -> Self {
-        Matrix {
-            rows: to - from,
-            cols: self.cols,
-            data: SmallVec::from_slice(&self.data[from * self.cols..to * self.cols]),
-        }
-    }
-
-    /// The columns `from..to`.
-    pub fn some_cols(&self, from: usize, to: usize) -> Self {
-        Self::from_fn(self.rows, to - from, |i, j| self[(i, from + j)])
-    }
-
     /// The values without derivatives.
-    pub fn value(&self) -> Matrix<Lane, D> {
+    pub fn value(&self) -> Matrix<Lane, D, A> {
         self.map(|x| x.value())
     }
 
@@ -284,12 +361,12 @@ impl<S: Scalar, const D: usize> Matrix<S, D> {
     }
 
     /// A function of every number.
-    pub fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matrix<T, D> {
-        Matrix {
-            rows: self.rows,
-            cols: self.cols,
-            data: self.data.iter().map(|a| std::array::from_fn(|c| f(a[c]))).collect(),
+    pub fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matrix<T, D, A> {
+        let mut out = Matrix::<T, D, A>::zeros(self.rows(), self.cols());
+        for (out, a) in out.data.iter_mut().zip(self.data.iter()) {
+            *out = std::array::from_fn(|c| f(a[c]));
         }
+        out
     }
 }
 
@@ -299,7 +376,7 @@ pub trait Select {
     fn select(mask: Lane, a: Self, b: Self) -> Self;
 }
 
-impl<S: Scalar, const D: usize> Select for Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> Select for Matrix<S, D, A> {
     fn select(mask: Lane, a: Self, mut b: Self) -> Self {
         for (b, a) in b.data.iter_mut().flatten().zip(a.data.iter().flatten()) {
             *b = S::select(mask, *a, *b);
@@ -333,24 +410,25 @@ pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -
     result
 }
 
-impl<S, const D: usize> Index<(usize, usize)> for Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> Index<(usize, usize)> for Matrix<S, D, A> {
     type Output = Entry<S, D>;
     #[inline(always)]
     fn index(&self, (i, j): (usize, usize)) -> &Entry<S, D> {
-        &self.data[i * self.cols + j]
+        &self.data[i * self.cols() + j]
     }
 }
 
-impl<S, const D: usize> IndexMut<(usize, usize)> for Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> IndexMut<(usize, usize)> for Matrix<S, D, A> {
     #[inline(always)]
     fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut Entry<S, D> {
-        &mut self.data[i * self.cols + j]
+        let cols = self.cols();
+        &mut self.data[i * cols + j]
     }
 }
 
-impl<S: Scalar, const D: usize> Add for &Matrix<S, D> {
-    type Output = Matrix<S, D>;
-    fn add(self, b: Self) -> Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> Add for &Matrix<S, D, A> {
+    type Output = Matrix<S, D, A>;
+    fn add(self, b: Self) -> Matrix<S, D, A> {
         let mut out = self.clone();
         for (x, y) in out.data.iter_mut().flatten().zip(b.data.iter().flatten()) {
             *x = *x + *y;
@@ -359,9 +437,9 @@ impl<S: Scalar, const D: usize> Add for &Matrix<S, D> {
     }
 }
 
-impl<S: Scalar, const D: usize> Sub for &Matrix<S, D> {
-    type Output = Matrix<S, D>;
-    fn sub(self, b: Self) -> Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> Sub for &Matrix<S, D, A> {
+    type Output = Matrix<S, D, A>;
+    fn sub(self, b: Self) -> Matrix<S, D, A> {
         let mut out = self.clone();
         for (x, y) in out.data.iter_mut().flatten().zip(b.data.iter().flatten()) {
             *x = *x - *y;
@@ -370,7 +448,7 @@ impl<S: Scalar, const D: usize> Sub for &Matrix<S, D> {
     }
 }
 
-impl<S: Scalar, const D: usize> Neg for Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> Neg for Matrix<S, D, A> {
     type Output = Self;
     fn neg(mut self) -> Self {
         self.data.iter_mut().flatten().for_each(|x| *x = -*x);

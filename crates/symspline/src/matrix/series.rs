@@ -6,12 +6,15 @@
 //! coincide. Beyond the radius of a series its argument is halved, or eigenvectors are used.
 
 use super::function::{Unary, function_of};
-use super::{Matrix, Select, by_size, inner_add, mul_add};
+use super::{Matrix, Select, Storage, by_size, inner_add, mul_add};
 use crate::scalar::{LANES, Lane, Scalar, lane};
 use crate::special::{ARC, SINC_DEFECT, VERSINE, arc_full_range};
 
 /// Σ cⱼ Hʲ for several lists of coefficients of one length.
-fn series<S: Scalar, const D: usize, const F: usize>(h: &Matrix<S, D>, c: [&[f64]; F]) -> [Matrix<S, D>; F] {
+fn series<S: Scalar, const D: usize, const F: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    c: [&[f64]; F],
+) -> [Matrix<S, D, A>; F] {
     match h.rows() {
         1 => {
             let x = h[(0, 0)][0];
@@ -32,7 +35,10 @@ fn horner<S: Scalar>(c: &[f64], mut step: impl FnMut(S, f64) -> S) -> S {
 }
 
 /// With H² = e₁H − e₂.
-fn two<S: Scalar, const D: usize, const F: usize>(h: &Matrix<S, D>, c: [&[f64]; F]) -> [Matrix<S, D>; F] {
+fn two<S: Scalar, const D: usize, const F: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    c: [&[f64]; F],
+) -> [Matrix<S, D, A>; F] {
     let (a, d) = (h[(0, 0)][0], h[(1, 1)][0]);
     let off = h[(0, 1)];
     let zero = S::constant(Lane::ZERO);
@@ -51,12 +57,23 @@ fn two<S: Scalar, const D: usize, const F: usize>(h: &Matrix<S, D>, c: [&[f64]; 
 }
 
 /// With H³ = e₁H² − e₂H + e₃.
-fn three<S: Scalar, const D: usize, const F: usize>(h: &Matrix<S, D>, c: [&[f64]; F]) -> [Matrix<S, D>; F] {
-    let zero = S::constant(Lane::ZERO);
+fn three<S: Scalar, const D: usize, const F: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    c: [&[f64]; F],
+) -> [Matrix<S, D, A>; F] {
     let square = hermitian_square(h);
+    let e = invariants(h, &square);
+    c.map(|c| combine(h, &square, reduce(e, c)))
+}
+
+/// e₁, −e₂ and e₃ of a 3 × 3 matrix.
+fn invariants<S: Scalar, const D: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    square: &Matrix<S, D, A>,
+) -> [S; 3] {
+    let zero = S::constant(Lane::ZERO);
     let e1 = h.trace();
-    let half = lane(0.5);
-    let e2 = (e1 * e1 - square.trace()) * half;
+    let minus_e2 = (square.trace() - e1 * e1) * lane(0.5);
     // e₃ = det H by the first row.
     let minor = |j: usize, k: usize| {
         let product = mul_add::<S, D, false>(h[(1, j)], h[(2, k)], [zero; D]);
@@ -67,26 +84,34 @@ fn three<S: Scalar, const D: usize, const F: usize>(h: &Matrix<S, D>, c: [&[f64]
     det = mul_add::<S, D, false>(h[(0, 0)], minor(1, 2), det);
     det = mul_add::<S, D, false>(h[(0, 1)], minor(2, 0), det);
     det = mul_add::<S, D, false>(h[(0, 2)], minor(0, 1), det);
-    let e3 = det[0];
-    let minus_e2 = -e2;
-    c.map(|c| {
-        let (mut x0, mut x1, mut x2) = (zero, zero, zero);
-        for &c in c.iter().rev() {
-            (x0, x1, x2) = (x2 * e3 + lane(c), x2.fma(minus_e2, x0), x2.fma(e1, x1));
-        }
-        let mut out = Matrix::zeros(3, 3);
-        for ((out, h), s) in out.data.iter_mut().zip(&h.data).zip(&square.data) {
-            *out = std::array::from_fn(|c| x2.fma(s[c], x1 * h[c]));
-        }
-        for i in 0..3 {
-            out[(i, i)][0] = out[(i, i)][0] + x0;
-        }
-        out
-    })
+    [e1, minus_e2, det[0]]
+}
+
+/// The coefficients of 1, H and H² that a series comes down to.
+fn reduce<S: Scalar>([e1, minus_e2, e3]: [S; 3], c: &[f64]) -> [S; 3] {
+    let zero = S::constant(Lane::ZERO);
+    c.iter()
+        .rev()
+        .fold([zero; 3], |[x0, x1, x2], &c| [x2 * e3 + lane(c), x2.fma(minus_e2, x0), x2.fma(e1, x1)])
+}
+
+fn combine<S: Scalar, const D: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    square: &Matrix<S, D, A>,
+    [x0, x1, x2]: [S; 3],
+) -> Matrix<S, D, A> {
+    let mut out = Matrix::<S, D, A>::zeros(3, 3);
+    for ((out, h), s) in out.data.iter_mut().zip(h.data.iter()).zip(square.data.iter()) {
+        *out = std::array::from_fn(|c| x2.fma(s[c], x1 * h[c]));
+    }
+    for i in 0..3 {
+        out[(i, i)][0] = out[(i, i)][0] + x0;
+    }
+    out
 }
 
 /// H², whose lower half is not computed twice.
-fn hermitian_square<S: Scalar, const D: usize>(h: &Matrix<S, D>) -> Matrix<S, D> {
+fn hermitian_square<S: Scalar, const D: usize, A: Storage>(h: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     let n = h.rows();
     let mut out = Matrix::zeros(n, n);
     for i in 0..n {
@@ -102,10 +127,10 @@ fn hermitian_square<S: Scalar, const D: usize>(h: &Matrix<S, D>) -> Matrix<S, D>
     out
 }
 
-fn paterson_stockmeyer<S: Scalar, const D: usize, const F: usize>(
-    h: &Matrix<S, D>,
+fn paterson_stockmeyer<S: Scalar, const D: usize, const F: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
     c: [&[f64]; F],
-) -> [Matrix<S, D>; F] {
+) -> [Matrix<S, D, A>; F] {
     let n = h.rows();
     let block = ((c[0].len() as f64 * F as f64).sqrt().round() as usize).clamp(1, c[0].len());
     let mut powers = vec![h.clone()];
@@ -166,8 +191,8 @@ fn repeat<R: Select + Clone>(mut x: R, times: Lane, step: impl Fn(&R) -> R) -> R
 const TRIG: [f64; 2] = [0.1, 2.5];
 
 /// `s(G) = sin√G/√G` and `k(G) = (cos√G − 1)/G` of a Hermitian G ≥ 0. The cosine is `1 + G k(G)`.
-pub fn trig<S: Scalar, const D: usize>(g: &Matrix<S, D>) -> [Matrix<S, D>; 2] {
-    let inside = |g: &Matrix<S, D>, n: usize| {
+pub fn trig<S: Scalar, const D: usize, A: Storage>(g: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {
+    let inside = |g: &Matrix<S, D, A>, n: usize| {
         let [v, d] = series(g, [terms::<S>(&VERSINE, n), terms::<S>(&SINC_DEFECT, n)]);
         [(-g.times(&d)).plus_identity(Lane::ONE), -v]
     };
@@ -201,9 +226,9 @@ const EXP: [f64; 24] = {
 };
 
 /// `exp(A) − 1` of a Hermitian matrix.
-pub fn exp_minus_one<S: Scalar, const D: usize>(a: &Matrix<S, D>) -> Matrix<S, D> {
+pub fn exp_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     const LIMITS: [f64; 3] = [0.1, 0.4, 1.5];
-    let inside = |a: &Matrix<S, D>, n: usize| {
+    let inside = |a: &Matrix<S, D, A>, n: usize| {
         let [phi] = series(a, [terms::<S>(&EXP, n)]);
         a.times(&phi)
     };
@@ -221,7 +246,7 @@ pub fn exp_minus_one<S: Scalar, const D: usize>(a: &Matrix<S, D>) -> Matrix<S, D
 }
 
 /// `exp(Ω) − 1` of a skew-Hermitian matrix: `Ω s(G) + G k(G)` with G = Ω*Ω.
-pub fn exp_skew_minus_one<S: Scalar, const D: usize>(omega: &Matrix<S, D>) -> Matrix<S, D> {
+pub fn exp_skew_minus_one<S: Scalar, const D: usize, A: Storage>(omega: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     let g = omega.adjoint_times(omega);
     let [s, k] = trig(&g);
     &omega.times(&s) + &g.times(&k)
@@ -238,36 +263,51 @@ const LOG: [f64; 40] = {
     c
 };
 
+/// Largest arguments of so many terms of the series of [`log_one_plus`].
+const LOG_LIMITS: [f64; 3] = [0.05, 0.15, 0.35];
+const LOG_TERMS: [usize; 3] = [12, 19, 36];
+
 /// `log(1 + B)` of a Hermitian B with 1 + B positive definite.
-pub fn log_one_plus<S: Scalar, const D: usize>(b: &Matrix<S, D>) -> Matrix<S, D> {
-    const LIMITS: [f64; 3] = [0.05, 0.15, 0.35];
-    by_size(b.size(), &LIMITS, |tier| {
-        let n = match tier {
-            0 => 12,
-            1 => 19,
-            2 => 36,
-            _ => {
-                return function_of(
-                    b,
-                    &Unary {
-                        f: |x: Lane| {
-                            let y = x + Lane::ONE;
-                            let inverse = Lane::ONE / y;
-                            [y.ln(), inverse, -(inverse * inverse)]
-                        },
-                        // The function is singular at x = −1.
-                        room: |x: Lane| (x + Lane::ONE).abs(),
-                    },
-                );
-            }
-        };
-        let [phi] = series(b, [terms::<S>(&LOG, n)]);
+pub fn log_one_plus<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    by_size(b.size(), &LOG_LIMITS, |tier| {
+        if tier == LOG_LIMITS.len() {
+            return log_full_range(b);
+        }
+        let [phi] = series(b, [terms::<S>(&LOG, LOG_TERMS[tier])]);
         b.times(&phi)
     })
 }
 
+/// The same of two matrices with the same eigenvalues.
+pub fn log_one_plus_alike<S: Scalar, const D: usize, A: Storage>(
+    b: [&Matrix<S, D, A>; 2],
+) -> [Matrix<S, D, A>; 2] {
+    if b[0].rows() != 3 {
+        return b.map(log_one_plus);
+    }
+    by_size(b[0].size(), &LOG_LIMITS, |tier| {
+        if tier == LOG_LIMITS.len() {
+            return b.map(log_full_range);
+        }
+        // log(1 + B) = x₀B + x₁B² + x₂B³, whose coefficients are symmetric functions of eigenvalues.
+        let squares = b.map(hermitian_square);
+        let x = reduce(invariants(b[0], &squares[0]), terms::<S>(&LOG, LOG_TERMS[tier]));
+        [0, 1].map(|i| b[i].times(&combine(b[i], &squares[i], x)))
+    })
+}
+
+fn log_full_range<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    let log = |x: Lane| {
+        let y = x + Lane::ONE;
+        let inverse = Lane::ONE / y;
+        [y.ln(), inverse, -(inverse * inverse)]
+    };
+    // The function is singular at x = −1.
+    function_of(b, &Unary { f: log, room: |x: Lane| (x + Lane::ONE).abs() })
+}
+
 /// `θ/sin θ` as a function of the Hermitian `Y = 1 − cos θ`; `rest` is `2 − Y`, known to more digits.
-pub fn arc<S: Scalar, const D: usize>(y: &Matrix<S, D>) -> Matrix<S, D> {
+pub fn arc<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     const LIMITS: [f64; 4] = [0.0075, 0.09, 0.3, 0.8];
     by_size(y.size(), &LIMITS, |tier| {
         let n = match tier {

@@ -1,20 +1,22 @@
 //! Tangent vectors at the origin as matrices, and their coordinates.
 
-use crate::matrix::{Matrix, by_size};
+use crate::matrix::{Matrix, Storage, by_size};
 use crate::scalar::{Lane, Scalar, lane};
+use std::marker::PhantomData;
 
 /// A space of n × n matrices: Hermitian or skew-Hermitian, real (D = 1) or complex (D = 2), with or
 /// without the multiples of the identity.
 ///
 /// Coordinates are orthonormal for `Re tr x*y`, for skew-symmetric real matrices for half of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Algebra<const D: usize> {
+#[derive(Clone, Copy)]
+pub struct Algebra<const D: usize, A> {
     pub n: usize,
     pub skew: bool,
     pub traceless: bool,
+    pub storage: PhantomData<A>,
 }
 
-impl<const D: usize> Algebra<D> {
+impl<const D: usize, A: Storage> Algebra<D, A> {
     /// Number of coordinates.
     pub fn dim(&self) -> usize {
         let n = self.n;
@@ -32,7 +34,7 @@ impl<const D: usize> Algebra<D> {
     }
 
     /// Coordinates of a matrix.
-    pub fn coordinates<S: Scalar>(&self, m: &Matrix<S, D>, x: &mut [S]) {
+    pub fn coordinates<S: Scalar>(&self, m: &Matrix<S, D, A>, x: &mut [S]) {
         let n = self.n;
         let mut at = 0;
         if !(self.skew && D == 1) {
@@ -63,7 +65,7 @@ impl<const D: usize> Algebra<D> {
     }
 
     /// The matrix with given coordinates.
-    pub fn matrix<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+    pub fn matrix<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         let n = self.n;
         let mut m = Matrix::zeros(n, n);
         let mut at = 0;
@@ -102,25 +104,25 @@ impl<const D: usize> Algebra<D> {
     }
 
     /// Half the matrix with given coordinates: what acts in the transvection.
-    pub fn half<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+    pub fn half<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         self.matrix(x).scaled(lane(0.5))
     }
 
     /// `S(v) x = Σ ad²ʲ x/(2j+1)!` of Lemma A.2, with the bracket of ½v and matrices.
     pub fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
         let (half, start) = (self.half(v), self.matrix(x));
-        let bracket = |a: &Matrix<S, D>, x: &Matrix<S, D>| &a.times(x) - &x.times(a);
+        let bracket = |a: &Matrix<S, D, A>, x: &Matrix<S, D, A>| &a.times(x) - &x.times(a);
         let sum = stretch_series(half.size() * lane(2.0), &start, |x| bracket(&half, &bracket(&half, x)));
         self.coordinates(&sum, x);
     }
 }
 
 /// `Σ (ad²)ʲ x/(2j+1)!` where `size` bounds the norm of ad.
-pub fn stretch_series<S: Scalar, const D: usize>(
+pub fn stretch_series<S: Scalar, const D: usize, A: Storage>(
     size: Lane,
-    x: &Matrix<S, D>,
-    twice: impl Fn(&Matrix<S, D>) -> Matrix<S, D>,
-) -> Matrix<S, D> {
+    x: &Matrix<S, D, A>,
+    twice: impl Fn(&Matrix<S, D, A>) -> Matrix<S, D, A>,
+) -> Matrix<S, D, A> {
     // The first term that is left out is below 1e-16.
     const TIERS: [f64; 5] = [0.1, 0.5, 1.5, 3.5, 8.0];
     const TERMS: [usize; 6] = [4, 7, 10, 15, 23, 40];

@@ -282,6 +282,7 @@ pub fn stretch<const K: i32, S: Scalar>(v: &[S], x: &mut [S]) {
 macro_rules! curved_methods {
     () => {
         const VECTORS: bool = true;
+        type Chart = Self;
         fn point_len(&self) -> usize {
             self.n + 1
         }
@@ -323,6 +324,9 @@ macro_rules! curved_methods {
         #[inline(always)]
         fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
             cc::tangential::<K>(gamma, dd);
+        }
+        fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
+            max_or_nan(self.inner(p, v, v), Lane::ZERO).sqrt()
         }
         fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
             cc::product::<K, Lane>(u, v)

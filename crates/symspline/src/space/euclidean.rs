@@ -22,6 +22,8 @@ impl Euclidean {
 }
 
 impl Space for Euclidean {
+    type Chart = Self;
+
     const SCALES: bool = true;
     const VECTORS: bool = true;
 

@@ -75,7 +75,7 @@ const SERIES: f64 = 0.8;
 const SMALL: usize = 16;
 
 /// s and k of [`trig`], and c − 1, for a tangent vector.
-struct Rotation<S, const D: usize> {
+struct Rotation<S: Scalar, const D: usize> {
     s: Matrix<S, D>,
     k: Matrix<S, D>,
     versed: Matrix<S, D>,
@@ -199,11 +199,14 @@ impl<const D: usize, const LINES: bool> Subspaces<D, LINES> {
 
     fn write_frame(&self, x: &Matrix<Lane, D>, rest: &Matrix<Lane, D>, frame: &mut [Lane]) {
         let k = self.k;
-        Matrix::from_fn(self.n, self.n, |i, j| if j < k { x[(i, j)] } else { rest[(i, j - k)] }).write(frame);
+        Matrix::<Lane, D>::from_fn(self.n, self.n, |i, j| if j < k { x[(i, j)] } else { rest[(i, j - k)] })
+            .write(frame);
     }
 }
 
 impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
+    type Chart = Self;
+
     fn point_len(&self) -> usize {
         self.n * self.k * D
     }
@@ -445,12 +448,17 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
         stretch_series(size, &start, twice).write(x);
     }
     fn angle(&self, v: &[Lane]) -> Lane {
-        let b = self.coordinate_matrix(v);
-        let mut g = [b.adjoint_times(&b)];
-        diagonalise(&mut g);
-        let largest = (0..self.k).fold(Lane::ZERO, |m, i| max_or_nan(m, g[0][(i, i)][0]));
-        largest.sqrt()
+        largest_singular_value(&self.coordinate_matrix(v))
     }
+    fn angle_at(&self, _p: &[Lane], v: &[Lane]) -> Lane {
+        largest_singular_value(&self.read(v))
+    }
+}
+
+fn largest_singular_value<const D: usize>(b: &Matrix<Lane, D>) -> Lane {
+    let mut g = [b.adjoint_times(b)];
+    diagonalise(&mut g);
+    (0..b.cols()).fold(Lane::ZERO, |m, i| max_or_nan(m, g[0][(i, i)][0])).sqrt()
 }
 
 /// A unitary matrix whose first columns span those of Y: the product of Householder's reflections.

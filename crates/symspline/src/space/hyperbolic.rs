@@ -4,7 +4,7 @@
 //! apart neighbouring floating-point points are.
 
 use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
-use crate::scalar::{Lane, Scalar, dot, lane};
+use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
 const K: i32 = -1;
 

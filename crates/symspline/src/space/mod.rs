@@ -18,6 +18,7 @@ mod grassmannian;
 mod hyperbolic;
 mod positive_definite;
 mod rigid;
+mod rotations;
 mod special_euclidean;
 mod sphere;
 mod unitary;
@@ -25,7 +26,11 @@ mod unitary;
 pub use euclidean::Euclidean;
 pub use grassmannian::{ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective};
 pub use hyperbolic::Hyperbolic;
-pub use positive_definite::{HermitianPositiveDefinite, SymmetricPositiveDefinite};
+pub use positive_definite::{
+    HermitianPositiveDefinite, SymmetricPositiveDefinite, SymmetricPositiveDefinite2,
+    SymmetricPositiveDefinite3,
+};
+pub use rotations::Rotations;
 pub use special_euclidean::SpecialEuclidean;
 pub use sphere::Sphere;
 pub use unitary::{Orthogonal, SpecialOrthogonal, SpecialUnitary, Unitary, UnitaryGroup};
@@ -47,6 +52,18 @@ pub trait Space: Copy + Send + Sync + 'static {
     const SCALES: bool = false;
     /// Whether points are vectors of a few numbers, for which code of known sizes pays.
     const VECTORS: bool = false;
+
+    /// A space that covers this one locally, in which curves are evaluated: usually the space itself.
+    type Chart: Space;
+    /// The chart; `None` where it is the space itself.
+    fn chart(&self) -> Option<Self::Chart> {
+        None
+    }
+    /// Brings a segment of a curve into the chart: its end points and tangent vectors there.
+    fn enter(&self, _p: [&[Lane]; 2], _v: [&[Lane]; 2], _y: [&mut [Lane]; 2], _w: [&mut [Lane]; 2]) {}
+    /// Brings a point of the chart and, if given, a tangent vector there back: writes the point, or the
+    /// vector.
+    fn leave(&self, _y: &[Lane], _w: Option<&[Lane]>, _out: &mut [Lane]) {}
 
     /// Numbers in the array of a point.
     fn point_len(&self) -> usize;
@@ -164,22 +181,38 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn angle(&self, v: &[Lane]) -> Lane {
         self.norm2(v).sqrt()
     }
+    /// The deciding angle of `exp_p(v)`.
+    fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
+        let (mut frame, mut x) = (vec![Lane::ZERO; self.frame_len()], vec![Lane::ZERO; self.dim()]);
+        self.lift(p, &mut frame);
+        self.coordinates(&frame, p, v, &mut x);
+        self.angle(&x)
+    }
     /// By how much rounding errors may grow in [`legs`](Space::legs) over a chord.
     fn condition(&self, _chord: &[Lane]) -> Lane {
         Lane::ONE
     }
 }
 
-/// The list of spaces: makes the enum that dispatches once a call, and the names.
+/// The list of spaces: makes the enum that dispatches once a call, and the names. Behind `specialised`
+/// stand pages of their own for one size of a space.
 macro_rules! spaces {
-    ($($space:ident($($parameter:ident),+) = $($name:literal)|+;)+) => {
+    ($($space:ident($($parameter:ident),+) = $($name:literal)|+;)+
+     => specialised: $($special:ident = $general:ident($($value:literal),+);)+) => {
         /// Any of the spaces.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum AnySpace { $(#[allow(missing_docs)] $space($space)),+ }
+        pub enum AnySpace {
+            $(#[allow(missing_docs)] $space($space),)+
+            $(#[allow(missing_docs)] $special($special)),+
+        }
 
         impl AnySpace {
             /// The space with a name (short or long) and parameters, e.g. `"sphere"`, `[2]`.
             pub fn new(name: &str, parameters: &[usize]) -> Result<Self, String> {
+                Self::general(name, parameters).and_then(Self::specialised)
+            }
+
+            fn general(name: &str, parameters: &[usize]) -> Result<Self, String> {
                 match (name, parameters) {
                     $(($($name)|+, &[$($parameter),+]) => $space::new($($parameter),+).map(Self::$space),)+
                     $(($($name)|+, _) => Err(format!(
@@ -189,12 +222,22 @@ macro_rules! spaces {
                 }
             }
 
+            fn specialised(self) -> Result<Self, String> {
+                match self {
+                    $(Self::$general(space) if space.parameters() == [$($value),+] => $special::new($($value),+).map(Self::$special),)+
+                    _ => Ok(self),
+                }
+            }
+
             /// All names, one row a space, the first of a row being the canonical one.
             pub const NAMES: [&[&str]; [$(stringify!($space)),+].len()] = [$(&[$($name),+]),+];
 
             /// The canonical name and the parameters.
             pub fn name(&self) -> (&'static str, Vec<usize>) {
-                match self { $(Self::$space(space) => ([$($name),+][0], space.parameters().to_vec())),+ }
+                match self {
+                    $(Self::$space(space) => ([$($name),+][0], space.parameters().to_vec()),)+
+                    $(Self::$special(_) => $general::new($($value),+).map(|s| Self::$general(s).name()).unwrap_or_default(),)+
+                }
             }
         }
 
@@ -202,7 +245,10 @@ macro_rules! spaces {
         #[macro_export]
         macro_rules! with_space {
             ($any:expr, $bound:ident => $body:expr) => {
-                match $any { $($crate::space::AnySpace::$space($bound) => $body),+ }
+                match $any {
+                    $($crate::space::AnySpace::$space($bound) => $body,)+
+                    $($crate::space::AnySpace::$special($bound) => $body),+
+                }
             };
         }
     };
@@ -223,4 +269,9 @@ spaces! {
     SymmetricPositiveDefinite(n) = "spd" | "symmetric-positive-definite";
     HermitianPositiveDefinite(n) = "hpd" | "hermitian-positive-definite";
     SpecialEuclidean(n) = "se" | "special-euclidean";
+
+    => specialised:
+    Rotations = SpecialOrthogonal(3);
+    SymmetricPositiveDefinite2 = SymmetricPositiveDefinite(2);
+    SymmetricPositiveDefinite3 = SymmetricPositiveDefinite(3);
 }

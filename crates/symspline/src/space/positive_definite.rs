@@ -7,29 +7,40 @@
 use super::algebra::Algebra;
 use super::{ROUNDING_SIZE, Space};
 use crate::matrix::{
-    Matrix, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus, orthogonalise, solve_lower,
+    Dynamic, Known, Matrix, Storage, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus,
+    log_one_plus_alike, orthogonalise, solve_lower,
 };
 use crate::scalar::{Lane, Scalar, lane};
+use std::marker::PhantomData;
 
 /// Hermitian positive definite n × n matrices, real for D = 1, complex for D = 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PositiveDefinite<const D: usize> {
+pub struct PositiveDefinite<const D: usize, A = Dynamic> {
     n: usize,
+    storage: PhantomData<A>,
 }
 
 /// Real positive definite matrices.
 pub type SymmetricPositiveDefinite = PositiveDefinite<1>;
+/// The same of sizes two and three, known to the compiler.
+pub type SymmetricPositiveDefinite2 = PositiveDefinite<1, Known<2, 4>>;
+/// See [`SymmetricPositiveDefinite2`].
+pub type SymmetricPositiveDefinite3 = PositiveDefinite<1, Known<3, 9>>;
 /// Complex positive definite matrices.
 pub type HermitianPositiveDefinite = PositiveDefinite<2>;
 
 /// Size of L⁻¹(q − p)L⁻* up to which the logarithm works on the difference; beyond, on factors.
 const NEAR: f64 = 0.35;
 
-impl<const D: usize> PositiveDefinite<D> {
+impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
     /// The n × n matrices.
     pub fn new(n: usize) -> Result<Self, String> {
         let name = if D == 1 { "SymmetricPositiveDefinite" } else { "HermitianPositiveDefinite" };
-        if n == 0 { Err(format!("{name}(n) needs n >= 1")) } else { Ok(PositiveDefinite { n }) }
+        if n == 0 {
+            Err(format!("{name}(n) needs n >= 1"))
+        } else {
+            Ok(PositiveDefinite { n, storage: PhantomData })
+        }
     }
 
     /// n
@@ -37,38 +48,44 @@ impl<const D: usize> PositiveDefinite<D> {
         [self.n]
     }
 
-    fn algebra(&self) -> Algebra<D> {
-        Algebra { n: self.n, skew: false, traceless: false }
+    fn algebra(&self) -> Algebra<D, A> {
+        Algebra { n: self.n, skew: false, traceless: false, storage: PhantomData }
     }
 
-    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         Matrix::read(self.n, self.n, x)
     }
 }
 
 /// `L⁻¹ x L⁻*` for a Hermitian x.
-fn whiten<const D: usize>(l: &Matrix<Lane, D>, x: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+fn whiten<const D: usize, A: Storage>(l: &Matrix<Lane, D, A>, x: &Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
     solve_lower(l, &solve_lower(l, x).adjoint()).hermitian_part()
 }
 
 /// `g x g*` for a Hermitian x.
-fn congruent<S: Scalar, const D: usize>(g: &Matrix<S, D>, x: &Matrix<S, D>) -> Matrix<S, D> {
+fn congruent<S: Scalar, const D: usize, A: Storage>(
+    g: &Matrix<S, D, A>,
+    x: &Matrix<S, D, A>,
+) -> Matrix<S, D, A> {
     g.times(x).times_adjoint(g).hermitian_part()
 }
 
 /// `log(L⁻¹ q L⁻*)` for the factor L of p.
-fn log_whitened<const D: usize>(
-    l: &Matrix<Lane, D>,
-    p: &Matrix<Lane, D>,
-    q: &Matrix<Lane, D>,
-) -> Matrix<Lane, D> {
+fn log_whitened<const D: usize, A: Storage>(
+    l: &Matrix<Lane, D, A>,
+    p: &Matrix<Lane, D, A>,
+    q: &Matrix<Lane, D, A>,
+) -> Matrix<Lane, D, A> {
     let b = whiten(l, &(q - p));
     by_size(b.size(), &[NEAR], |tier| if tier == 0 { log_one_plus(&b) } else { log_of_factors(l, q) })
 }
 
 /// The same by the singular values of `L⁻¹ L_q = U σ V*`: log is U 2 ln σ U*.
 #[inline(never)]
-fn log_of_factors<const D: usize>(l: &Matrix<Lane, D>, q: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+fn log_of_factors<const D: usize, A: Storage>(
+    l: &Matrix<Lane, D, A>,
+    q: &Matrix<Lane, D, A>,
+) -> Matrix<Lane, D, A> {
     let n = q.rows();
     let mut u = solve_lower(l, &cholesky(q));
     orthogonalise(&mut u, None);
@@ -79,7 +96,9 @@ fn log_of_factors<const D: usize>(l: &Matrix<Lane, D>, q: &Matrix<Lane, D>) -> M
     scaled.times_adjoint(&u).hermitian_part()
 }
 
-impl<const D: usize> Space for PositiveDefinite<D> {
+impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
+    type Chart = Self;
+
     fn point_len(&self) -> usize {
         self.n * self.n * D
     }
@@ -121,7 +140,7 @@ impl<const D: usize> Space for PositiveDefinite<D> {
         let dd = if S::ORDER > 1 { congruent(&l, &w.times(&d)) } else { zero.clone() };
         let d = if S::ORDER > 0 { congruent(&l, &d) } else { zero };
         for (i, out) in out.iter_mut().enumerate() {
-            let part = |m: &Matrix<Lane, D>| m.entries()[i / D][i % D];
+            let part = |m: &Matrix<Lane, D, A>| m.entries()[i / D][i % D];
             *out = t.compose([part(&x), part(&d), part(&dd)]);
         }
     }
@@ -142,7 +161,7 @@ impl<const D: usize> Space for PositiveDefinite<D> {
         let l = cholesky(&p.value());
         let n = self.n;
         let inverse = solve_lower(&l, &Matrix::identity(n));
-        let lift = |m: &Matrix<Lane, D>| m.map(S::constant);
+        let lift = |m: &Matrix<Lane, D, A>| m.map(S::constant);
         let (l, inverse) = (lift(&l), lift(&inverse));
         let b = congruent(&inverse, &(&q - &p));
         let (root, b) = if S::ORDER == 0 {
@@ -284,11 +303,14 @@ impl<const D: usize> Space for PositiveDefinite<D> {
         let algebra = self.algebra();
         let ea = exp_minus_one(&-algebra.half(a));
         let eb = exp_minus_one(&-algebra.half(b));
-        let ed = Matrix::<S, D>::constant(self.n, self.n, prepared);
+        let ed = Matrix::<S, D, A>::constant(self.n, self.n, prepared);
         let m = ea.compose(&ed).compose(&eb);
         let sum = &m + &m.adjoint();
-        algebra.coordinates(&log_one_plus(&(&m.times_adjoint(&m) + &sum).hermitian_part()), w_plus);
-        algebra.coordinates(&-log_one_plus(&(&m.adjoint_times(&m) + &sum).hermitian_part()), w_minus);
+        let plus = (&m.times_adjoint(&m) + &sum).hermitian_part();
+        let minus = (&m.adjoint_times(&m) + &sum).hermitian_part();
+        let [plus, minus] = log_one_plus_alike([&plus, &minus]);
+        algebra.coordinates(&plus, w_plus);
+        algebra.coordinates(&-minus, w_minus);
     }
     fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
         self.algebra().stretch(v, x);

@@ -144,6 +144,8 @@ fn times<S: Scalar>([omega, v]: Twist<S>, x: S) -> Twist<S> {
 }
 
 impl Space for SpecialEuclidean {
+    type Chart = Self;
+
     fn point_len(&self) -> usize {
         (self.n + 1) * (self.n + 1)
     }

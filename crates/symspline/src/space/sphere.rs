@@ -1,7 +1,7 @@
 //! The sphere Sⁿ = {x ∈ Rⁿ⁺¹ : |x| = 1}, G = O(n+1), κ = 1.
 
 use super::{ROUNDING_SIZE, Space, constant_curvature as cc};
-use crate::scalar::{Lane, Scalar, dot, lane};
+use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
 const K: i32 = 1;
 

@@ -8,11 +8,12 @@ use super::algebra::Algebra;
 use super::{ROUNDING_SIZE, Space};
 use crate::matrix::multiply_add;
 use crate::matrix::{
-    Matrix, Unary, arc, by_size, determinant, diagonalise, exp_skew_minus_one, function_of, orthonormalise,
-    reorthonormalise, sort_columns,
+    Dynamic, Matrix, Unary, arc, by_size, determinant, diagonalise, exp_skew_minus_one, function_of,
+    orthonormalise, reorthonormalise, sort_columns,
 };
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 use std::f64::consts::{PI, SQRT_2};
+use std::marker::PhantomData;
 
 /// Matrices with p*p = 1: real for D = 1, complex for D = 2, of determinant one if `SPECIAL`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,8 +54,8 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
 
     const SU: bool = D == 2 && SPECIAL;
 
-    fn algebra(&self) -> Algebra<D> {
-        Algebra { n: self.n, skew: true, traceless: Self::SU }
+    fn algebra(&self) -> Algebra<D, Dynamic> {
+        Algebra { n: self.n, skew: true, traceless: Self::SU, storage: PhantomData }
     }
 
     fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
@@ -209,6 +210,8 @@ fn traceless<const D: usize>(mut m: Matrix<Lane, D>) -> Matrix<Lane, D> {
 }
 
 impl<const D: usize, const SPECIAL: bool> Space for UnitaryGroup<D, SPECIAL> {
+    type Chart = Self;
+
     fn point_len(&self) -> usize {
         self.n * self.n * D
     }

@@ -1,0 +1,166 @@
+"""Subspaces as projectors, and pure quantum states as density matrices: matrices that do not depend on the
+basis or the phase."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._core import ValidationError
+from ._reading import (
+    Array,
+    adjoint,
+    largest,
+    length,
+    numbers,
+    off_one,
+    refuse,
+    square_matrices,
+    unit_vectors,
+)
+
+
+def basis_to_projector(basis: ArrayLike) -> Array:
+    """The orthogonal projectors Y Y* on subspaces, the same for every basis Y of a subspace.
+
+    Source: Bendokat, Zimmermann & Absil, A Grassmann manifold handbook (2020), §2.
+
+    Args:
+        basis: points of a Grassmannian, matrices with orthonormal columns, shape (..., n, k), real or
+            complex.
+
+    Returns:
+        Hermitian matrices, shape (..., n, n).
+
+    Raises:
+        ValidationError: columns are not orthonormal.
+
+    >>> basis_to_projector([[0.6], [0.8]]).round(8)
+    array([[0.36, 0.48],
+           [0.48, 0.64]])
+    """
+    y, tol = numbers(basis, "basis", 2)
+    if not 1 <= y.shape[-1] <= y.shape[-2]:
+        raise ValidationError(f"basis must be of shape (..., n, k) with 1 <= k <= n, not {y.shape}")
+    off = off_one(y)
+    refuse(
+        ~(off <= tol),
+        "basis",
+        lambda i: (
+            f"does not have orthonormal columns: |Y*Y - 1| is {off[i]:.3e}; orthonormalise it, for example by "
+            "numpy.linalg.qr(basis).Q"
+        ),
+    )
+    q = np.linalg.qr(y).Q
+    return _hermitian_part(q @ adjoint(q))
+
+
+def projector_to_basis(projector: ArrayLike) -> Array:
+    """Orthonormal bases of the subspaces that orthogonal projectors project on, points of a Grassmannian.
+
+    Args:
+        projector: Hermitian matrices P = P² of one rank k, shape (..., n, n), real or complex.
+
+    Returns:
+        Matrices with orthonormal columns, shape (..., n, k).
+
+    Raises:
+        ValidationError: a matrix is not a projector, or of another rank than the first.
+
+    >>> abs(projector_to_basis([[0.36, 0.48], [0.48, 0.64]])).round(8)
+    array([[0.6],
+           [0.8]])
+    """
+    p, tol = square_matrices(projector, "projector")
+    _check_projectors(p, tol, "projector", "a projector", "basis_to_projector makes projectors of bases")
+    ranks = np.rint(np.trace(p, axis1=-2, axis2=-1).real).astype(int)
+    rank = int(ranks.max(initial=0))
+    refuse(
+        np.asarray(ranks != rank),
+        "projector",
+        lambda i: (
+            f"has rank {ranks[i]}, others have rank {rank}; convert subspaces of one dimension at a time"
+        ),
+    )
+    if rank == 0:
+        raise ValidationError("projector is zero or empty: there is no subspace to project on")
+    basis: Array = np.linalg.eigh(p).eigenvectors[..., p.shape[-1] - rank :]
+    return basis
+
+
+def state_to_density(state: ArrayLike) -> Array:
+    """The density matrices ψψ* of pure states, the same whatever the phase of ψ.
+
+    Args:
+        state: unit vectors, points of `ComplexProjective` (or `RealProjective`), shape (..., n).
+
+    Returns:
+        Hermitian matrices of trace 1, shape (..., n, n).
+
+    Raises:
+        ValidationError: a vector is not of length 1.
+
+    >>> state_to_density([0.6, 0.8j]).round(8)
+    array([[0.36+0.j  , 0.  -0.48j],
+           [0.  +0.48j, 0.64+0.j  ]])
+    """
+    psi, tol = numbers(state, "state", 1)
+    psi = unit_vectors(psi, tol, "state", "a state")
+    density: Array = psi[..., :, None] * psi[..., None, :].conj()
+    return density
+
+
+def density_to_state(density: ArrayLike) -> Array:
+    """The state vectors of density matrices of pure states, points of `ComplexProjective`.
+
+    Of all phases it is the one in which the largest component is positive. Source: Nielsen & Chuang,
+    Quantum Computation and Quantum Information, §2.4.
+
+    Args:
+        density: Hermitian matrices ρ = ρ² of trace 1, shape (..., n, n).
+
+    Returns:
+        Unit vectors, shape (..., n).
+
+    Raises:
+        ValidationError: a matrix is not a density matrix, or that of a mixed state.
+
+    >>> density_to_state([[0.64, -0.48j], [0.48j, 0.36]]).round(8)
+    array([0.8+0.j , 0. +0.6j])
+    """
+    rho, tol = square_matrices(density, "density")
+    traces = np.trace(rho, axis1=-2, axis2=-1)
+    refuse(
+        ~(np.abs(traces - 1) <= tol),
+        "density",
+        lambda i: f"is not a density matrix: its trace is {traces[i]}, not 1; divide it by its trace",
+    )
+    _check_projectors(
+        rho, tol, "density", "a pure state", "only pure states, of purity tr P² = 1, have a state vector"
+    )
+    rho = _hermitian_part(rho)
+    best = np.argmax(np.diagonal(rho, axis1=-2, axis2=-1).real, axis=-1)
+    psi = np.take_along_axis(rho, best[..., None, None], axis=-1)[..., 0]
+    state: Array = psi / length(np.abs(psi))[..., None]
+    return state
+
+
+def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -> None:
+    # Input that is far off may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        skew, square = largest(p - adjoint(p)), p @ p
+        off = largest(square - p)
+    refuse(~(skew <= tol), name, lambda i: f"is not Hermitian: |P - P*| is {skew[i]:.3e}; {advice}")
+
+    refuse(
+        ~(off <= tol),
+        name,
+        lambda i: (
+            f"is not {what}: |P² - P| is {off[i]:.3e}, tr P² is {np.trace(square[i]).real:.6g}; {advice}"
+        ),
+    )
+
+
+def _hermitian_part(x: Array) -> Array:
+    part: Array = (x + adjoint(x)) / 2
+    return part

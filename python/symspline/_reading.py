@@ -1,0 +1,104 @@
+"""Reading the arrays that are to be converted: numbers, shapes, and what to say of the first bad one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._arrays import as_array
+from ._core import ValidationError
+from .spaces import POINT_TOL, POINT_TOL_FLOAT32
+
+Array = NDArray[Any]
+
+_SINGLE = (np.float32, np.float16, np.complex64)
+
+
+def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
+    """An array of doubles or complex numbers, and how far off its points may be.
+
+    >>> numbers([1, 2], "x", 1)
+    (array([1., 2.]), 1e-08)
+    """
+    array = as_array(value, name)
+    if array.dtype.kind not in "biufc":
+        raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
+    if array.ndim < axes:
+        raise ValidationError(f"{name} has shape {array.shape}, but needs {axes} or more axes")
+    tol = POINT_TOL_FLOAT32 if array.dtype in _SINGLE else POINT_TOL
+    array = array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}; leave out what is missing or not finite")
+    return array, tol
+
+
+def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:
+    """The same for real numbers, with given last axes; None is any length but 0."""
+    array, tol = numbers(value, name, len(shape))
+    last = array.shape[array.ndim - len(shape) :]
+    fits = all(n == m or (m is None and n > 0) for n, m in zip(last, shape, strict=True))
+    if array.dtype.kind == "c" or not fits:
+        wanted = ", ".join("n" if m is None else str(m) for m in shape)
+        kind = "complex" if array.dtype.kind == "c" else "real"
+        raise ValidationError(
+            f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}"
+        )
+    return array, tol
+
+
+def square_matrices(value: ArrayLike, name: str) -> tuple[Array, float]:
+    """The same for square matrices, real or complex."""
+    array, tol = numbers(value, name, 2)
+    if array.shape[-1] != array.shape[-2] or array.shape[-1] == 0:
+        raise ValidationError(f"{name} must be square matrices, of shape (..., n, n), not {array.shape}")
+    return array, tol
+
+
+def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
+    """Unit vectors, made exact.
+
+    Raises:
+        ValidationError: a vector is not of length 1.
+    """
+    lengths = length(np.abs(x))
+    refuse(
+        ~(np.abs(lengths - 1) <= tol),
+        name,
+        lambda i: f"is not {what}: its length is {lengths[i]}, not 1; divide it by its length",
+    )
+    return x / lengths[..., None]
+
+
+def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
+    """Raise ValidationError for the first bad entry, in the words of ``say(index)``."""
+    found = np.argwhere(bad)
+    if len(found):
+        index = tuple(found[0].tolist())
+        raise ValidationError(f"{name}{list(index) or ''} {say(index)}")
+
+
+def length(x: Array) -> Array:
+    """|x| of real vectors without overflow; shape of the leading axes."""
+    result: Array = np.hypot.reduce(x, axis=-1)
+    return result
+
+
+def adjoint(x: Array) -> Array:
+    """Conjugate transposes."""
+    result: Array = np.swapaxes(x, -1, -2).conj()
+    return result
+
+
+def off_one(x: Array) -> Array:
+    """How far columns are from orthonormal: the largest entry of |X*X − 1| of every matrix."""
+    # Of input that is far off.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return largest(adjoint(x) @ x - np.eye(x.shape[-1]))
+
+
+def largest(x: Array) -> Array:
+    """Largest entry of every matrix, by magnitude."""
+    result: Array = np.abs(x).max(axis=(-2, -1))
+    return result

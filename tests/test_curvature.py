@@ -1,0 +1,221 @@
+"""K of (22) and the injectivity radius of every space, found by search.
+
+K² is the largest |[[a, b], c]| = |R(a, b)c| of unit tangent vectors. For a small sum of tensors it is a
+largest singular value, of one vector at a time.
+"""
+
+import numpy as np
+import pytest
+from cases import CASES, EPS, base_point, compact, unit_tangent
+
+import symspline as ss
+
+NAMES = [
+    *("euclidean:3", "sphere:1", "sphere:2", "sphere:4", "hyperbolic:1", "hyperbolic:2", "hyperbolic:4"),
+    *("rp:1", "rp:2", "rp:4", "cp:1", "cp:2", "cp:4"),
+    *("gr:1,2", "gr:1,4", "gr:3,4", "gr:2,4", "gr:2,5", "gr:3,5", "cgr:1,2", "cgr:1,4", "cgr:2,3", "cgr:2,4"),
+    *("so:2", "so:3", "so:4", "so:5", "o:2", "o:3", "o:4", "u:1", "u:2", "u:3", "su:2", "su:3"),
+    *("spd:1", "spd:2", "spd:3", "spd:4", "hpd:1", "hpd:2", "hpd:3"),
+]
+every = pytest.mark.parametrize("name", NAMES)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(22)
+
+
+def bracket(a, b):
+    return a @ b - b @ a
+
+
+def vectors_of(sign):
+    """R(a, b)c = ±(⟨b, c⟩a − ⟨a, c⟩b)."""
+
+    def triple(space, p, a, b, c):
+        return sign * (space.inner(p, a, c) * b - space.inner(p, b, c) * a)
+
+    return triple
+
+
+def of_subspaces(space, p, a, b, c):
+    """[[a, b], c] of the off-diagonal blocks."""
+    if len(space.point_shape) == 1:
+        return of_subspaces(ss.ComplexGrassmannian(1, len(p)), p, a[:, None], b[:, None], c[:, None])[:, 0]
+    turn = a.conj().T @ b - b.conj().T @ a
+    return c @ turn - (a @ b.conj().T - b @ a.conj().T) @ c
+
+
+def of_matrices(space, p, a, b, c):
+    """¼ p [[p⁻¹a, p⁻¹b], p⁻¹c]: what acts in a transvection is half of p⁻¹a."""
+    a, b, c = np.linalg.solve(p, [a, b, c])
+    return p @ bracket(bracket(a, b), c) / 4
+
+
+TRIPLES = {
+    ss.Euclidean: vectors_of(0),
+    ss.Sphere: vectors_of(1),
+    ss.Hyperbolic: vectors_of(-1),
+    **dict.fromkeys((ss.RealProjective, ss.ComplexProjective), of_subspaces),
+    **dict.fromkeys((ss.Grassmannian, ss.ComplexGrassmannian), of_subspaces),
+    **dict.fromkeys((ss.SpecialOrthogonal, ss.Orthogonal, ss.Unitary, ss.SpecialUnitary), of_matrices),
+    **dict.fromkeys((ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite), of_matrices),
+}
+
+
+def triple(space, p, a, b, c):
+    return TRIPLES[type(space)](space, p, a, b, c)
+
+
+def around_a_parallelogram(space, p, a, b, c, size):
+    """c after parallel transport around a small parallelogram, first along a."""
+    q, sides = p, [size * a, size * b]
+    for step in (0, 1, 0, 1):
+        r = space.exp(q, sides[step])
+        *sides, c = (space.transport(q, r, v) for v in (*sides, c))
+        # The way back.
+        sides[step] = -sides[step]
+        q = r
+    return space.transport(q, p, c)
+
+
+@every
+def test_the_triple_product_is_curvature(name, rng):
+    """Holonomy of a small parallelogram, from `transport` alone: R(a, b)c is its limit."""
+    space = ss.space(name)
+    p = base_point(space, rng)
+    a, b, c = (unit_tangent(space, p, rng) for _ in range(3))
+
+    def holonomy(h):
+        # The mean over both directions has an error of h², which extrapolation makes h⁴.
+        there, back = (around_a_parallelogram(space, p, s * a, s * b, c, h) for s in (1, -1))
+        return ((there - c) + (back - c)) / (2 * h**2)
+
+    limit = (4 * holonomy(0.01) - holonomy(0.02)) / 3
+    assert space.norm(p, limit - triple(space, p, a, b, c)) <= 1e-5
+
+
+def orthonormal_basis(space, p, rng):
+    basis = []
+    while len(basis) < space.dim:
+        v = space.random_tangent(rng, p)
+        for _ in range(2):
+            for e in basis:
+                v = v - space.inner(p, e, v) * e
+        basis.append(v / space.norm(p, v))
+    return np.array(basis)
+
+
+def curvature_tensor(space, p, rng):
+    """⟨R(eᵢ, eⱼ)eₖ, eₗ⟩ of an orthonormal basis."""
+    basis = orthonormal_basis(space, p, rng)
+    return np.array(
+        [
+            [
+                [[space.inner(p, d, x) for d in basis] for c in basis for x in [triple(space, p, a, b, c)]]
+                for b in basis
+            ]
+            for a in basis
+        ]
+    )
+
+
+def climb(tensor, rng, steps=300):
+    """|R(a, b)c| of unit vectors, made larger in one of them at a time, until it rests."""
+    a, b, c = (x / np.linalg.norm(x) for x in rng.standard_normal((3, len(tensor))))
+    first = best = np.linalg.norm(np.einsum("ijkl,i,j,k->l", tensor, a, b, c))
+    for _ in range(steps):
+        a = np.linalg.svd(np.einsum("ijkl,j,k->il", tensor, b, c)).U[:, 0]
+        b = np.linalg.svd(np.einsum("ijkl,i,k->jl", tensor, a, c)).U[:, 0]
+        c, sizes, _ = np.linalg.svd(np.einsum("ijkl,i,j->kl", tensor, a, b))
+        c = c[:, 0]
+        if sizes[0] <= best * (1 + 1e-12):
+            break
+        best = sizes[0]
+    return first, max(best, sizes[0])
+
+
+@every
+def test_curvature_is_the_largest_triple_product(name, rng):
+    space = ss.space(name)
+    p = space.random_point(rng) if compact(space) else base_point(space, rng)
+    tensor = curvature_tensor(space, p, rng)
+    unit = rng.standard_normal((3, 2000, space.dim))
+    unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
+    some = np.linalg.norm(np.einsum("ijkl,ni,nj,nk->nl", tensor, *unit, optimize=True), axis=-1)
+    square = space.curvature**2
+    rounding = 1000 * EPS
+    assert some.max() <= square * (1 + 1e-12) + rounding
+    found = np.array([climb(tensor, rng) for _ in range(20)])
+    assert found.max() <= square * (1 + 1e-10) + rounding
+    # Some climbs end on lower tops.
+    assert found[:, 1].max() == pytest.approx(square, rel=1e-6, abs=rounding)
+
+
+def test_curvature_of_products_and_poses():
+    assert ss.Product(ss.Sphere(2), ss.ComplexProjective(2), ss.Euclidean(1)).curvature == 2.0
+    # The group of poses has no invariant metric, hence no K.
+    assert np.isnan(ss.SpecialEuclidean(3).curvature)
+
+
+# ---- injectivity radius ----
+
+
+def unit(n, i, j, value=1.0):
+    e = np.zeros((n, n), dtype=type(value))
+    e[i, j] = value
+    return e
+
+
+def shortest_loop(space):
+    """A point, and the direction of a shortest closed geodesic there."""
+    match space:
+        case ss.Sphere() | ss.RealProjective() | ss.ComplexProjective():
+            p, v = np.eye(*(2, space.point_shape[0]))
+        case ss.Grassmannian() | ss.ComplexGrassmannian():
+            n, k = space.point_shape
+            p, v = np.eye(n, k), np.eye(n)[:, [k]] * np.eye(k)[0]
+        case ss.SpecialOrthogonal() | ss.Orthogonal():
+            n = space.point_shape[0]
+            p, v = np.eye(n), unit(n, 1, 0) - unit(n, 0, 1)
+        case ss.Unitary():
+            n = space.point_shape[0]
+            p, v = np.eye(n), unit(n, 0, 0, 1j)
+        case ss.SpecialUnitary():
+            n = space.point_shape[0]
+            p, v = np.eye(n), unit(n, 0, 0, 1j) - unit(n, 1, 1, 1j)
+    return p, v / space.norm(p, v)
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if compact(c.space)], ids=lambda case: case.name)
+def test_injectivity_radius(case, rng):
+    space = case.space
+    radius = space.injectivity_radius
+    p, v = shortest_loop(space)
+    # It is closed after twice the radius, and up to there the way back is longer.
+    assert space.distance(space.exp(p, 2 * radius * v), p) <= 20 * EPS
+    # The angle that decides is π at the most, which rounding of π moves by ε.
+    for d in (1e-1, 1e-3, 1e-6, 1e-9):
+        assert abs(space.distance(p, space.exp(p, (radius - d) * v)) - (radius - d)) <= 20 * EPS
+        assert abs(space.distance(p, space.exp(p, (radius + d) * v)) - (radius - d)) <= 20 * EPS
+    # In no direction does a geodesic stop being shortest before.
+    directions = [v, *(unit_tangent(space, p, rng) for _ in range(200))]
+    for d in (1e-1, 1e-3, 1e-6, 1e-9):
+        velocities = (radius - d) * np.array(directions)
+        back = space.log(p, space.exp(p, velocities))
+        # The logarithm's condition is 1/d.
+        assert np.abs(back - velocities).max() <= 50 * EPS / d
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if not compact(c.space)], ids=lambda case: case.name)
+def test_no_injectivity_radius(case, rng):
+    space = case.space
+    if isinstance(space, ss.SpecialEuclidean):
+        # Half a turn; translations have no cut locus.
+        assert space.injectivity_radius == np.pi
+        return
+    assert space.injectivity_radius == np.inf
+    # Distances that e^d times rounding still leaves digits of.
+    p = base_point(space, rng)
+    v = 8.0 * unit_tangent(space, p, rng)
+    assert space.distance(p, space.exp(p, v)) == pytest.approx(8.0, rel=1e-8)

@@ -1,0 +1,197 @@
+"""The geometry against other programs: pymanopt, and formulas with 40 digits.
+
+pymanopt has no parallel transport (its ``transport`` projects, or does nothing), so that only exp, log,
+distance and inner product are compared with it. Transvections carry parallel transport, and are compared
+with products of symmetries.
+"""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from cases import EPS, QUOTIENTS, base_point, unit_tangent
+from exact import DIGITS, Poses, PositiveDefinite, Sphere, Subspaces, Unitary, doubles, exact, transvection
+from pymanopt import manifolds
+
+import symspline as ss
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(40)
+
+
+@pytest.fixture(autouse=True)
+def digits():
+    with mp.workdps(DIGITS):
+        yield
+
+
+def plain(space, x):
+    """Subspaces as projectors."""
+    return x @ np.swapaxes(x, -1, -2).conj() if isinstance(space, QUOTIENTS) else x
+
+
+# ---- pymanopt ----
+
+ROOT = np.sqrt(2)
+# Its lengths in groups are those of Re tr u*v, and its tangent vectors there are p⁻¹v.
+PYMANOPT = [
+    ("sphere:3", manifolds.Sphere(4), 1.0),
+    ("gr:2,5", manifolds.Grassmann(5, 2), 1.0),
+    ("gr:3,4", manifolds.Grassmann(4, 3), 1.0),
+    ("cgr:2,4", manifolds.ComplexGrassmann(4, 2), 1.0),
+    ("cgr:1,3", manifolds.ComplexGrassmann(3, 1), 1.0),
+    ("so:3", manifolds.SpecialOrthogonalGroup(3), ROOT),
+    ("so:5", manifolds.SpecialOrthogonalGroup(5), ROOT),
+    ("u:2", manifolds.UnitaryGroup(2), 1.0),
+    ("u:4", manifolds.UnitaryGroup(4), 1.0),
+    ("spd:2", manifolds.SymmetricPositiveDefinite(2), 1.0),
+    ("spd:5", manifolds.SymmetricPositiveDefinite(5), 1.0),
+    ("hpd:3", manifolds.HermitianPositiveDefinite(3), 1.0),
+]
+
+
+@pytest.mark.parametrize(("name", "theirs", "scale"), PYMANOPT, ids=[row[0] for row in PYMANOPT])
+@pytest.mark.parametrize("length", [1e-3, 0.1, 0.7, 1.4])
+def test_geometry_is_that_of_pymanopt(name, theirs, scale, length, rng):
+    space = ss.space(name)
+    group = isinstance(space, ss.SpecialOrthogonal | ss.Unitary)
+
+    def there(p, v):
+        return p.conj().T @ v if group else v
+
+    for _ in range(4):
+        p = base_point(space, rng)
+        v, w = length * unit_tangent(space, p, rng), unit_tangent(space, p, rng)
+        q = space.exp(p, v)
+        size = max(np.linalg.cond(p), np.linalg.cond(q)) if name[1:3] == "pd" else 1.0
+        allowed = 200 * EPS * size
+        # Arc cosines, of which theirs are made, lose half the digits for small angles.
+        lost = 1e-7 if isinstance(space, (*QUOTIENTS, ss.Sphere)) else allowed
+        assert np.abs(plain(space, theirs.exp(p, there(p, v))) - plain(space, q)).max() <= allowed
+        log_lost = 1e-9 if isinstance(space, ss.Sphere) else allowed
+        assert np.abs(theirs.log(p, q) - there(p, v)).max() <= log_lost
+        assert abs(theirs.dist(p, q) - scale * length) <= lost
+        # One of their metrics has a complex type.
+        product = np.real(theirs.inner_product(p, there(p, v), there(p, w)))
+        assert product == pytest.approx(scale**2 * space.inner(p, v, w), abs=allowed)
+
+
+def test_hyperbolic_space_is_that_of_pymanopt(rng):
+    """Through the Poincaré ball."""
+    space, theirs = ss.Hyperbolic(3), manifolds.PoincareBall(3)
+    for length in (1e-3, 0.5, 2.0):
+        p = base_point(space, rng)
+        v = length * unit_tangent(space, p, rng)
+        q = space.exp(p, v)
+        a, b = ss.convert.hyperboloid_to_ball([p, q])
+        assert theirs.dist(a, b) == pytest.approx(length, rel=1e-9)
+        middle = theirs.exp(a, theirs.log(a, b) / 2)
+        there = ss.convert.hyperboloid_to_ball(space.geodesic(p, q, 0.5))
+        assert np.abs(middle - there).max() <= 1000 * EPS
+
+
+# ---- forty digits ----
+
+
+def compare(space, geometry, p, v, x, scale=1.0, size=1.0, log_size=1.0):
+    """Exp, transvection, log and distance, each from doubles as they are.
+
+    Args:
+        size: by how much rounding counts, in points.
+        log_size: the same for the direction of logarithms.
+    """
+    exact_p, exact_x = geometry.point(exact(p)), geometry.point(exact(x))
+    q = doubles(geometry.exp(exact_p, exact(v)), p)
+    allowed = 20 * EPS * size
+    assert np.abs(plain(space, space.exp(p, v)) - plain(space, q)).max() <= allowed * np.abs(q).max()
+    moved = doubles(transvection(geometry, exact_p, exact(v), exact_x), x)
+    difference = np.abs(plain(space, space.transvection(p, v, x)) - plain(space, moved)).max()
+    assert difference <= allowed * np.abs(moved).max()
+    exact_q = geometry.point(exact(q))
+    log = doubles(geometry.log(exact_p, exact_q), v)
+    allowed *= max(1.0, space.norm(p, v))
+    assert np.abs(space.log(p, q) - log).max() <= allowed * log_size * max(1.0, np.abs(p).max())
+    assert abs(space.distance(p, q) - float(geometry.distance(exact_p, exact_q)) * scale) <= allowed
+
+
+LENGTHS = [1e-12, 1e-8, 1e-4, 0.1, 0.6, 1.5]
+GAPS = [0.5, 1e-2, 1e-4, 1e-8, 1e-12, 1e-14]
+
+
+@pytest.mark.parametrize("length", [*LENGTHS, 3.0, *(np.pi - np.array(GAPS))])
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_sphere(n, length, rng):
+    space = ss.Sphere(n)
+    p, x = space.random_point(rng, 2)
+    # Towards the antipode the direction of the logarithm fades away.
+    compare(
+        space, Sphere(), p, length * unit_tangent(space, p, rng), x, log_size=1 / min(1.0, np.pi - length)
+    )
+
+
+@pytest.mark.parametrize("length", [*LENGTHS, 2.5])
+@pytest.mark.parametrize("name", ["u:2", "u:3", "su:3", "so:3", "so:4", "so:5", "o:4"])
+def test_groups(name, length, rng):
+    space = ss.space(name)
+    p, x = space.random_point(rng, 2)
+    if name == "o:4":
+        x = p @ ss.SpecialOrthogonal(4).random_point(rng)
+    v = length * unit_tangent(space, p, rng)
+    compare(space, Unitary(), p, v, x, 1 / ROOT if name[0] in "so" and name[:2] != "su" else 1.0)
+
+
+@pytest.mark.parametrize("gap", GAPS)
+def test_unitary_near_pi(gap, rng):
+    space = ss.Unitary(3)
+    p, x, turn = space.random_point(rng, 3)
+    v = p @ (turn * (1j * np.array([np.pi - gap, 0.7, -1.9]))) @ turn.conj().T
+    # Neither directions nor angles fade there: the eigenvalue near −1 is alone.
+    compare(space, Unitary(), p, space.project_tangent(p, v), x)
+
+
+@pytest.mark.parametrize("gap", GAPS)
+def test_rotations_near_pi(gap, rng):
+    space = ss.SpecialOrthogonal(3)
+    p, x = space.random_point(rng, 2)
+    v = (np.pi - gap) * unit_tangent(space, p, rng)
+    compare(space, Unitary(), p, v, x, 1 / ROOT)
+
+
+@pytest.mark.parametrize("length", LENGTHS)
+@pytest.mark.parametrize("name", ["gr:2,4", "gr:3,4", "gr:2,6", "cgr:2,4", "cgr:1,3"])
+def test_subspaces(name, length, rng):
+    space = ss.space(name)
+    p, x = space.random_point(rng, 2)
+    compare(space, Subspaces(), p, length * unit_tangent(space, p, rng), x, log_size=1 / (np.pi / 2 - length))
+
+
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("name", ["gr:2,4", "cgr:2,4"])
+def test_subspaces_near_a_right_angle(name, gap, rng):
+    space = ss.space(name)
+    p, x = space.random_point(rng, 2)
+    u, _, w = np.linalg.svd(space.random_tangent(rng, p), full_matrices=False)
+    v = space.project_tangent(p, (u * [np.pi / 2 - gap, 0.7]) @ w)
+    # Real principal vectors have no phase that could fade.
+    compare(space, Subspaces(), p, v, x, log_size=1 / gap if name[0] == "c" else 1.0)
+
+
+@pytest.mark.parametrize("condition", [1.0, 1e4, 1e8, 1e12])
+@pytest.mark.parametrize("length", [1e-8, 1e-4, 0.1, 1.0, 4.0])
+@pytest.mark.parametrize("name", ["spd:3", "hpd:3"])
+def test_positive_definite(name, length, condition, rng):
+    space = ss.space(name)
+    turns = ss.space("so:3" if name == "spd:3" else "u:3").random_point(rng, 2)
+    p, x = space.project((turns * condition ** -np.linspace(0, 1, 3)) @ np.swapaxes(turns, -1, -2).conj())
+    v = length * unit_tangent(space, p, rng)
+    size = max(np.linalg.cond(y) for y in (p, x, space.exp(p, v)))
+    compare(space, PositiveDefinite(), p, v, x, size=size)
+
+
+@pytest.mark.parametrize("length", [*LENGTHS, 3.0])
+@pytest.mark.parametrize("name", ["se:2", "se:3"])
+def test_poses(name, length, rng):
+    space = ss.space(name)
+    p, x = space.random_point(rng, 2)
+    compare(space, Poses(), p, length * unit_tangent(space, p, rng), x, size=np.abs([p, x]).max())
