@@ -68,7 +68,7 @@ def fit_many(
     )
     all_points, all_velocities = space._numbers(all_points), space._numbers(all_velocities)
     ends_kept = kept(bc_type)
-    reports = shaped(spline._solver(method), columns, (len(curves),), space.curvature)
+    reports = shaped(columns, (len(curves),), space.curvature, method)
     fitted = [
         CubicSpline._made(
             space,

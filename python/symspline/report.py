@@ -21,7 +21,8 @@ class Report:
     with the batch axes.
 
     Attributes:
-        method: the solver that was used.
+        method: the solver that was used: ``"auto"`` tries quasi-newton, then newton, then the homotopy; of
+            a batch the last that any curve needed.
         converged: whether the residual is below the tolerance, or at the rounding floor (256 ε times
             the condition of the data).
         iterations: how often the C² residual was evaluated.
@@ -29,7 +30,10 @@ class Report:
             largest of all knots.
         max_step: D of (21), the longest distance between neighbouring points.
         curvature: K of (22).
-        invariant_radius: the smallest V of (38), or None where Theorem 3.1 says nothing.
+        invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so
+            (Theorem 3.1). None where the theorem says nothing, which is normal for points far apart, for
+            unequal knots and other ends than natural ones and given velocities; NaN for such a curve of a
+            batch.
         rate: mean contraction of the residual per iteration.
     """
 
@@ -55,8 +59,14 @@ class Report:
             many = "at most " if converged.size > 1 else ""
         return (
             f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
-            f"longest step {np.max(self.max_step):.3g}, contraction {np.max(self.rate):.2g}"
+            f"longest step {np.max(self.max_step):.3g}, contraction {np.max(self.rate):.2g}{self._certificate()}"
         )
+
+    def _certificate(self) -> str:
+        radius = self.invariant_radius
+        if radius is None or np.isnan(radius).all():
+            return ""
+        return f", control legs stay below {np.nanmax(radius):.3g} (Theorem 3.1)"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Report):
@@ -67,7 +77,13 @@ class Report:
     def _map(self, function: Any) -> Report:
         """The report with a function applied to the fields that are per curve."""
         names = ["converged", "iterations", "residual", "max_step", "rate"]
-        return replace(self, **{name: function(getattr(self, name)) for name in names})
+        radius = self.invariant_radius
+        if radius is not None:
+            part = function(radius)
+            radius = None if np.ndim(part) == 0 and np.isnan(part) else part
+        return replace(
+            self, invariant_radius=radius, **{name: function(getattr(self, name)) for name in names}
+        )
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -76,10 +92,14 @@ def _same(a: Any, b: Any) -> bool:
     return np.array_equal(a, b, equal_nan=True)
 
 
-def shaped(
-    method: str, columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float
-) -> Report:
-    """A report from the compiled core's columns."""
+# As the compiled core numbers them, in the order in which they are tried.
+SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy")
+
+
+def shaped(columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float, method: str) -> Report:
+    """A report from the compiled core's columns; ``method`` is what was asked for."""
     values = [column.item() if batch == () else column.reshape(batch) for column in columns]
-    converged, iterations, residual, max_step, rate = values
-    return Report(method, converged, iterations, residual, max_step, curvature, None, rate)
+    converged, iterations, residual, max_step, rate, solver, radius = values
+    used = SOLVERS[int(np.max(solver))] if columns[0].size else ("quasi-newton" if method == "auto" else method)
+    known = None if np.isnan(radius).all() else radius
+    return Report(used, converged, iterations, residual, max_step, curvature, known, rate)

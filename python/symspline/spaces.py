@@ -214,13 +214,11 @@ class Space:
         """The value as contiguous doubles whose last axes are those of a point; of complex numbers the
         last axis holds real and imaginary parts side by side."""
         array = as_array(value, name)
-        if array.dtype.kind == "c" and not self._complex:
-            raise ValidationError(
-                f"{name} holds complex numbers, but points of {self!r} are real"
-                + (f"; did you mean {_COMPLEX[self._name]}?" if self._name in _COMPLEX else "")
-            )
-        if array.dtype.kind not in "biufc":
-            raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
+        if array.dtype.kind not in ("biufc" if self._complex else "biuf"):
+            numbers = "numbers" if self._complex else "real numbers"
+            complex_twin = _COMPLEX.get(self._name) if array.dtype.kind == "c" else None
+            hint = f"; did you mean {complex_twin}?" if complex_twin else ""
+            raise ValidationError(f"{name} must be an array of {numbers}, not of {array.dtype}{hint}")
         shape = self.point_shape
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
             raise ValidationError(

@@ -167,7 +167,7 @@ class CubicSpline:
             columns = self._fit_in_span(ends, options, progress)
         self._points.flags.writeable = self._velocities.flags.writeable = False
         if not dry:
-            self._report = shaped(_solver(method), columns, batch, space.curvature)
+            self._report = shaped(columns, batch, space.curvature, method)
 
     def _fit_in_span(self, ends: Any, options: Any, progress: Progress | None) -> Any:
         """Fit in the span of points and end vectors; the points have been validated."""
@@ -616,10 +616,6 @@ def _check_options(on_failure: Any, progress: Any) -> None:
         raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {on_failure!r}")
     if progress is not None and not callable(progress):
         raise ValidationError(f"progress must be a function of two numbers, not {progress!r}")
-
-
-def _solver(method: str) -> str:
-    return "quasi-newton" if method == "auto" else method
 
 
 def _fail(faults: list[tuple[int, str, str]], on_failure: str, spline: Any) -> None:

@@ -136,13 +136,19 @@ pub fn ends<M: Space>(space: &M, problem: &Problem, batch: &[usize], tol: f64) -
                 v.iter_mut().for_each(|x| *x /= 3.0);
                 let angle = leg_angle(space, &p[c * len..(c + 1) * len], v);
                 if angle >= space.longest_leg() {
-                    let factor = space.longest_leg() / angle;
+                    let mut square = [0.0];
+                    let (p, v) = (&p[c * len..(c + 1) * len], &*v);
+                    let _ = apply(space, Operation::Inner, &[p, v, v], &[], &monitor, &mut square);
+                    let h = end_segment(problem, c, e);
+                    let speed = 3.0 * square[0].sqrt() / h;
                     return Err(invalid(format!(
-                        "the {name} velocity{} is too fast for its segment of length {}: its control leg has \
-                         angle {angle:.6}, past the cut locus at {:.6}; multiply it by less than {factor:.6}",
+                        "the {name} velocity{} has speed {speed:.6}, too fast for its segment of length {}: its \
+                         control leg would pass the cut locus, angle {angle:.6} of {:.6}; in this direction the \
+                         speed must stay below {:.6}",
                         of_curve(c, batch),
-                        number(end_segment(problem, c, e)),
+                        number(h),
                         space.longest_leg(),
+                        speed * space.longest_leg() / angle,
                     )));
                 }
             }

@@ -7,7 +7,7 @@
 //! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
 //! long curve.
 
-use crate::scalar::{LANES, Lane, gather, lane, max_or_nan};
+use crate::scalar::{LANES, Lane, Scalar, gather, lane, max_or_nan};
 use crate::space::Space;
 use crate::with_size;
 
@@ -110,6 +110,8 @@ pub struct Chain {
     /// Frame and point at the first node.
     start: (Vec<Lane>, Vec<Lane>),
     ambient: Vec<Lane>,
+    /// A vector at either side of a seam, and zero.
+    seam: [Vec<Lane>; 3],
 }
 
 impl Chain {
@@ -189,16 +191,26 @@ impl Chain {
 
     /// Carries coordinates across the seam of a closed curve: from the frame at its first node to
     /// that at its last, or back.
-    pub fn across_seam<M: Space>(&mut self, space: &M, to_last: bool, x: &mut [Lane]) {
-        let first = (&self.start.0, &self.start.1);
-        let last = (&self.walker.frame, &self.walker.p);
+    pub fn across_seam<S: Scalar, M: Space>(&mut self, space: &M, to_last: bool, x: &mut [S]) {
+        let (first, last) = ((&self.start.0, &self.start.1), (&self.walker.frame, &self.walker.p));
         let (from, to) = if to_last { (first, last) } else { (last, first) };
-        space.tangent(from.0, from.1, x, &mut self.ambient);
-        // One point, but maybe another array.
-        let mut there = vec![Lane::ZERO; self.ambient.len()];
-        let zero = vec![Lane::ZERO; self.ambient.len()];
-        space.carry(from.1, to.1, &zero, &self.ambient, &mut there);
-        space.coordinates(to.0, to.1, &there, x);
+        let [here, there, none] = &mut self.seam;
+        for vector in [&mut *here, &mut *there, &mut *none] {
+            vector.resize(space.point_len(), Lane::ZERO);
+        }
+        let mut parts = [(); 3].map(|_| vec![Lane::ZERO; self.m]);
+        for (k, part) in parts.iter_mut().enumerate().take(S::ORDER + 1) {
+            for (p, x) in part.iter_mut().zip(&*x) {
+                *p = x.parts()[k];
+            }
+            space.tangent(from.0, from.1, part, here);
+            // One point, but maybe another array.
+            space.carry(from.1, to.1, none, here, there);
+            space.coordinates(to.0, to.1, there, part);
+        }
+        for (i, x) in x.iter_mut().enumerate() {
+            *x = S::from_parts([parts[0][i], parts[1][i], parts[2][i]]);
+        }
     }
 
     /// Hands out the velocities as ambient tangent vectors, node by node.

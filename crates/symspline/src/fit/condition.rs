@@ -12,7 +12,7 @@
 //! this is (13).
 
 use super::chain::Chain;
-use crate::scalar::{LANES, Lane, lane, max_or_nan};
+use crate::scalar::{LANES, Lane, Scalar, lane, max_or_nan};
 use crate::space::Space;
 use crate::with_size;
 
@@ -53,19 +53,24 @@ pub struct Defect {
 }
 
 /// Vectors of one node, kept between residuals.
-#[derive(Default)]
-pub struct NodeVectors {
-    a: Vec<Lane>,
-    b: Vec<Lane>,
-    left: Vec<Lane>,
-    right: Vec<Lane>,
-    next_left: Vec<Lane>,
+pub struct NodeVectors<S> {
+    a: Vec<S>,
+    b: Vec<S>,
+    left: Vec<S>,
+    right: Vec<S>,
+    next_left: Vec<S>,
 }
 
-impl NodeVectors {
+impl<S> Default for NodeVectors<S> {
+    fn default() -> Self {
+        NodeVectors { a: vec![], b: vec![], left: vec![], right: vec![], next_left: vec![] }
+    }
+}
+
+impl<S: Scalar> NodeVectors<S> {
     fn resize(&mut self, m: usize) {
         for vector in [&mut self.a, &mut self.b, &mut self.left, &mut self.right, &mut self.next_left] {
-            vector.resize(m, Lane::ZERO);
+            vector.resize(m, S::constant(Lane::ZERO));
         }
     }
 }
@@ -73,17 +78,39 @@ impl NodeVectors {
 const THIRD: Lane = lane(1.0 / 3.0);
 
 /// Fills `chain.r` with right side minus left side of the C² condition at every node.
-pub fn residual<M: Space>(space: &M, chain: &mut Chain, ends: &ChainEnds, work: &mut NodeVectors) -> Defect {
-    work.resize(chain.m);
-    with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, work, m))
-}
-
-#[inline(always)]
-fn inside<M: Space>(
+pub fn residual<M: Space>(
     space: &M,
     chain: &mut Chain,
     ends: &ChainEnds,
-    work: &mut NodeVectors,
+    work: &mut NodeVectors<Lane>,
+) -> Defect {
+    let (u, mut r) = (std::mem::take(&mut chain.u), std::mem::take(&mut chain.r));
+    let defect = residual_of(space, chain, ends, &u, &mut r, work);
+    (chain.u, chain.r) = (u, r);
+    defect
+}
+
+/// The same for velocities u that may carry derivatives.
+pub fn residual_of<S: Scalar, M: Space>(
+    space: &M,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    u: &[S],
+    r: &mut [S],
+    work: &mut NodeVectors<S>,
+) -> Defect {
+    work.resize(chain.m);
+    with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, m))
+}
+
+#[inline(always)]
+fn inside<S: Scalar, M: Space>(
+    space: &M,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
     m: usize,
 ) -> Defect {
     let (n, keep) = (chain.n, space.chord_len());
@@ -94,7 +121,7 @@ fn inside<M: Space>(
     let mut first_right = Lane::ZERO;
     for i in 0..=n {
         let (h_left, h_right) = (chain.h[i.max(1) - 1], chain.h[i.min(n - 1)]);
-        let u = &chain.u[i * m..][..if i < n { 2 * m } else { m }];
+        let u = &all_u[i * m..][..if i < n { 2 * m } else { m }];
         if i < n {
             let third = h_right * THIRD;
             for c in 0..m {
@@ -109,16 +136,16 @@ fn inside<M: Space>(
                 next_left[c] = (next_left[c] + b[c]) * scale;
             }
         }
-        let speed2 = space.norm2(&u[..m]);
+        let speed2 = length2(space, &u[..m]);
         result.speed = max_or_nan(result.speed, speed2);
         let h = h_left.max(h_right) * THIRD;
         result.leg = max_or_nan(result.leg, h * h * speed2);
 
-        let r = &mut chain.r[i * m..][..m];
+        let r = &mut all_r[i * m..][..m];
         if i > 0 && i < n {
             join(space, h_left, h_right, &u[..m], left, right, r);
             let weight = h_left * h_right / (h_left + h_right);
-            result.defect = max_or_nan(result.defect, space.norm2(r) * (weight * weight));
+            result.defect = max_or_nan(result.defect, length2(space, r) * (weight * weight));
         } else {
             // An end: keep the side that is there, the end condition comes below.
             r.copy_from_slice(if i == 0 { &*right } else { &*left });
@@ -129,10 +156,10 @@ fn inside<M: Space>(
         std::mem::swap(&mut left, &mut next_left);
     }
     let at_ends = match ends {
-        ChainEnds::Periodic => close(space, chain, work, first_right),
+        ChainEnds::Periodic => close(space, chain, all_u, all_r, work, first_right),
         ChainEnds::Open(kinds) => {
-            let first = end(space, chain, work, 0, &kinds[0]);
-            max_or_nan(first, end(space, chain, work, 1, &kinds[1]))
+            let first = end(space, chain, all_u, all_r, work, 0, &kinds[0]);
+            max_or_nan(first, end(space, chain, all_u, all_r, work, 1, &kinds[1]))
         }
     };
     result.defect = max_or_nan(result.defect, at_ends).sqrt();
@@ -140,16 +167,31 @@ fn inside<M: Space>(
     result
 }
 
+/// Squared length of the value of a coordinate vector.
+#[inline(always)]
+fn length2<S: Scalar, M: Space>(space: &M, x: &[S]) -> Lane {
+    const SMALL: usize = 16;
+    if x.len() <= SMALL {
+        let mut v = [Lane::ZERO; SMALL];
+        for c in 0..x.len() {
+            v[c] = x[c].value();
+        }
+        space.norm2(&v[..x.len()])
+    } else {
+        space.norm2(&x.iter().map(|x| x.value()).collect::<Vec<_>>())
+    }
+}
+
 /// The defect at a knot, `S(v⁻) right − S(v⁺) left`; `left` and `right` are overwritten.
 #[inline(always)]
-fn join<M: Space>(
+fn join<S: Scalar, M: Space>(
     space: &M,
     h_left: Lane,
     h_right: Lane,
-    u: &[Lane],
-    left: &mut [Lane],
-    right: &mut [Lane],
-    r: &mut [Lane],
+    u: &[S],
+    left: &mut [S],
+    right: &mut [S],
+    r: &mut [S],
 ) {
     let m = u.len();
     // Spacing that is equal up to the rounding of the knots needs no S: it would change the
@@ -164,46 +206,54 @@ fn join<M: Space>(
     stretch_by(space, h_left * THIRD, u, right);
     stretch_by(space, h_right * THIRD, u, left);
     for c in 0..m {
-        r[c] = equal.select(r[c], right[c] - left[c]);
+        r[c] = S::select(equal, r[c], right[c] - left[c]);
     }
 }
 
 /// `S(factor · u) x`.
 #[inline(always)]
-fn stretch_by<M: Space>(space: &M, factor: Lane, u: &[Lane], x: &mut [Lane]) {
+fn stretch_by<S: Scalar, M: Space>(space: &M, factor: Lane, u: &[S], x: &mut [S]) {
     const SMALL: usize = 16;
     if u.len() <= SMALL {
-        let mut v = [Lane::ZERO; SMALL];
+        let mut v = [S::constant(Lane::ZERO); SMALL];
         for c in 0..u.len() {
-            v[c] = factor * u[c];
+            v[c] = u[c] * factor;
         }
         space.stretch(&v[..u.len()], x);
     } else {
-        space.stretch(&u.iter().map(|&u| factor * u).collect::<Vec<_>>(), x);
+        space.stretch(&u.iter().map(|&u| u * factor).collect::<Vec<_>>(), x);
     }
 }
 
 /// The defect at the seam of a closed curve: the left side comes from the last node.
-fn close<M: Space>(space: &M, chain: &mut Chain, work: &mut NodeVectors, h_right: Lane) -> Lane {
-    let (n, m) = (chain.n, chain.m);
-    let NodeVectors { a: u, left, right, b: r, .. } = work;
-    left.copy_from_slice(&chain.r[n * m..]);
-    right.copy_from_slice(&chain.r[..m]);
-    u.copy_from_slice(&chain.u[..m]);
-    chain.across_seam(space, false, left);
-    let h_left = chain.h[n - 1];
-    join(space, h_left, h_right, u, left, right, r);
-    chain.r[..m].copy_from_slice(r);
-    chain.r[n * m..].fill(Lane::ZERO);
-    let weight = h_left * h_right / (h_left + h_right);
-    space.norm2(r) * (weight * weight)
-}
-
-/// The defect at an open end; `chain.r` holds the one side that is there.
-fn end<M: Space>(
+fn close<S: Scalar, M: Space>(
     space: &M,
     chain: &mut Chain,
-    work: &mut NodeVectors,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
+    h_right: Lane,
+) -> Lane {
+    let (n, m) = (chain.n, chain.m);
+    let NodeVectors { left, right, b: r, .. } = work;
+    left.copy_from_slice(&all_r[n * m..]);
+    right.copy_from_slice(&all_r[..m]);
+    chain.across_seam(space, false, left);
+    let h_left = chain.h[n - 1];
+    join(space, h_left, h_right, &all_u[..m], left, right, r);
+    all_r[..m].copy_from_slice(r);
+    all_r[n * m..].fill(S::constant(Lane::ZERO));
+    let weight = h_left * h_right / (h_left + h_right);
+    length2(space, r) * (weight * weight)
+}
+
+/// The defect at an open end; `all_r` holds the one side that is there.
+fn end<S: Scalar, M: Space>(
+    space: &M,
+    chain: &Chain,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
     which: usize,
     kinds: &[EndKind; LANES],
 ) -> Lane {
@@ -214,39 +264,41 @@ fn end<M: Space>(
         if which == 0 { (0, 1, 0, 1.min(n - 1)) } else { (n, n - 1, n - 1, n.max(2) - 2) };
     let (h0, h1) = (chain.h[i0], chain.h[i1]);
     let sign = if which == 0 { Lane::ONE } else { lane(-1.0) };
-    let u = &chain.u[node * m..(node + 1) * m];
+    let u = &all_u[node * m..(node + 1) * m];
     let value = &chain.end_values[which];
-    let r = &mut chain.r[node * m..(node + 1) * m];
+    let r = &mut all_r[node * m..(node + 1) * m];
 
     // Acceleration A: w − v = (h²/6) S(v) A.
-    a.copy_from_slice(value);
+    for c in 0..m {
+        a[c] = S::constant(value[c]);
+    }
     if value.iter().any(|x| x.simd_ne(Lane::ZERO).any()) {
         stretch_by(space, h0 * THIRD, u, a);
     }
     for c in 0..m {
-        a[c] = sign * (r[c] - a[c] * lane(1.0 / 6.0));
+        a[c] = (r[c] - a[c] * lane(1.0 / 6.0)) * sign;
     }
-    let mut size = space.norm2(a) * (h0 * h0);
+    let mut size = length2(space, a) * (h0 * h0);
     let velocity = of_kind(kinds, EndKind::Velocity);
     if velocity.any() {
         for c in 0..m {
-            b[c] = value[c] - u[c];
+            b[c] = -u[c] + value[c];
         }
-        size = velocity.select(space.norm2(b), size);
+        size = velocity.select(length2(space, b), size);
         for c in 0..m {
-            a[c] = velocity.select(b[c] * THIRD, a[c]);
+            a[c] = S::select(velocity, b[c] * THIRD, a[c]);
         }
     }
     let knot = of_kind(kinds, EndKind::NotAKnot);
     if knot.any() {
         let (d0, d1) = (&chain.chord[i0 * m..(i0 + 1) * m], &chain.chord[i1 * m..(i1 + 1) * m]);
-        not_a_knot(space, h0, h1, d0, d1, &chain.u[next * m..(next + 1) * m], b);
+        not_a_knot(space, h0, h1, d0, d1, &all_u[next * m..(next + 1) * m], b);
         for c in 0..m {
-            b[c] -= u[c];
+            b[c] = b[c] - u[c];
         }
-        size = knot.select(space.norm2(b), size);
+        size = knot.select(length2(space, b), size);
         for c in 0..m {
-            a[c] = knot.select(b[c] * THIRD, a[c]);
+            a[c] = S::select(knot, b[c] * THIRD, a[c]);
         }
     }
     r.copy_from_slice(a);
@@ -257,21 +309,22 @@ fn end<M: Space>(
 /// `x₂ = log_{p₁}(p₂)` that has `c'(t₁) = u₁`, it is `D exp_{p₁}(x₀)[c'(t₀)]`, in the frame at p₀ `S(x₀) c'(t₀)`.
 ///
 /// The formula is the same at the right end, where all vectors change sign.
-pub fn not_a_knot<M: Space>(
+pub fn not_a_knot<S: Scalar, M: Space>(
     space: &M,
     h0: Lane,
     h1: Lane,
     d0: &[Lane],
     d1: &[Lane],
-    u1: &[Lane],
-    out: &mut [Lane],
+    u1: &[S],
+    out: &mut [S],
 ) {
     // Divided differences of c at the two nodes beside t₁.
     let (i0, i1, i01) = (Lane::ONE / h0, Lane::ONE / h1, Lane::ONE / (h0 + h1));
     for c in 0..u1.len() {
-        let (alpha, beta) = (u1[c] - d0[c] * i0, d1[c] * i1 - u1[c]);
+        let (alpha, beta) = (u1[c] - d0[c] * i0, -u1[c] + d1[c] * i1);
         let third = (beta * i1 - alpha * i0) * i01;
-        out[c] = u1[c] - lane(2.0) * alpha + third * (h0 * h0);
+        out[c] = u1[c] - alpha * lane(2.0) + third * (h0 * h0);
     }
-    space.stretch(d0, out);
+    let d0: Vec<S> = d0.iter().map(|&d| S::constant(d)).collect();
+    space.stretch(&d0, out);
 }

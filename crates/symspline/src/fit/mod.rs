@@ -1,8 +1,12 @@
 //! From points to velocities: the spline through given points.
 
+mod auto;
+mod certificate;
 mod chain;
 mod condition;
 mod fixed_point;
+mod homotopy;
+mod newton;
 mod pieces;
 mod quasi_newton;
 mod solve;
@@ -56,6 +60,21 @@ pub enum Method {
     FixedPoint,
     /// Transported tridiagonal solves with Anderson mixing.
     QuasiNewton,
+    /// Newton's method with the block-tridiagonal Jacobian.
+    Newton,
+}
+
+/// The solver that a curve ended with, in the order in which they are tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Solver {
+    /// Algorithm 1 of the paper.
+    FixedPoint,
+    /// Transported tridiagonal solves.
+    QuasiNewton,
+    /// Newton's method.
+    Newton,
+    /// Newton's method along a homotopy from flat space.
+    Homotopy,
 }
 
 /// Solver options.
@@ -75,6 +94,7 @@ impl Options {
         self.max_iter.unwrap_or(match self.method {
             Method::FixedPoint => 2000,
             Method::Auto | Method::QuasiNewton => 300,
+            Method::Newton => 100,
         })
     }
 }
@@ -124,10 +144,22 @@ pub struct Report {
     pub max_step: f64,
     /// Mean contraction per iteration.
     pub rate: f64,
+    /// The solver that it ended with.
+    pub solver: Solver,
+    /// The smallest V of (38), NaN where Theorem 3.1 says nothing.
+    pub invariant_radius: f64,
 }
 
 impl Default for Report {
     fn default() -> Self {
-        Report { status: Status::Stopped, iterations: 0, residual: f64::NAN, max_step: 0.0, rate: 0.0 }
+        Report {
+            status: Status::Stopped,
+            iterations: 0,
+            residual: f64::NAN,
+            max_step: 0.0,
+            rate: 0.0,
+            solver: Solver::FixedPoint,
+            invariant_radius: f64::NAN,
+        }
     }
 }

@@ -5,9 +5,11 @@
 //! worst on any, so that a piece is exact to rounding a few dozen nodes from its ends. That neighbouring
 //! pieces agree is checked; where they do not, the overlap grows.
 
+use super::auto;
+use super::certificate::{equally_spaced, invariant_radius};
 use super::chain::{Chain, Run};
-use super::condition::{ChainEnds, EndKind};
-use super::solve::{Workspace, solve};
+use super::condition::{ChainEnds, EndKind, of_kind};
+use super::solve::Workspace;
 use super::{End, Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
 use crate::parallel;
@@ -38,6 +40,8 @@ struct Piece<'a> {
     next_velocity: Vec<f64>,
     /// The largest number in the velocities of the core.
     largest: f64,
+    /// The longer of the legs h|u|/3 at ends with a given velocity.
+    end_leg: f64,
 }
 
 /// Fits all curves of a problem; velocities get the layout of the points. Curves at fault are NaN.
@@ -103,7 +107,7 @@ fn fit_cut<M: Space>(
             monitor.advance(group.iter().map(|p| p.core.len()).sum());
         }
     });
-    merge(problem, options, len, &pieces, reports)
+    merge(space, problem, options, len, &pieces, reports)
 }
 
 /// Cuts a curve into pieces of one length, which may be the whole curve.
@@ -146,6 +150,7 @@ fn cut<'a>(
             report: Report::default(),
             next_velocity: Vec::new(),
             largest: 0.0,
+            end_leg: 0.0,
         });
         from = to;
     }
@@ -222,10 +227,11 @@ fn fit_in<M: Space>(
     let idle = mask_from(|l| cut[l].is_some());
     let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
     let options = Options { tol: pieces_tol, ..*options };
-    let outcome = solve(space, chain, &ends, &options, idle, work, monitor);
+    let outcome = auto::run(space, chain, &ends, &options, idle, work, monitor);
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
     let legs = long_legs(space, chain, outcome.leg);
     let steps = chain.max_step.to_array();
+    let given = given_legs(space, chain, &ends);
     for (l, p) in group.iter_mut().enumerate() {
         let status = if let Some((index, angle)) = cut[l] {
             Status::CutLocus { index: p.first + index, angle }
@@ -244,7 +250,10 @@ fn fit_in<M: Space>(
             residual: residual[l],
             max_step: steps[l],
             rate: rate[l],
+            solver: outcome.solver[l],
+            invariant_radius: f64::NAN,
         };
+        p.end_leg = given[l];
     }
     let runs: [Run; LANES] =
         std::array::from_fn(|l| problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len()));
@@ -324,7 +333,8 @@ fn write_velocities<M: Space>(space: &M, chain: &mut Chain, runs: &[Run; LANES],
 }
 
 /// Puts the reports of the pieces of each curve together; returns the curves whose pieces differ.
-fn merge(
+fn merge<M: Space>(
+    space: &M,
     problem: &Problem,
     options: &Options,
     len: usize,
@@ -343,6 +353,7 @@ fn merge(
             report.residual = report.residual.max(r.residual);
             report.max_step = report.max_step.max(r.max_step);
             report.rate = report.rate.max(r.rate);
+            report.solver = report.solver.max(r.solver);
             if report.status == Status::Converged {
                 report.status = r.status;
             }
@@ -361,6 +372,12 @@ fn merge(
         }
         if let Status::CutLocus { index, .. } | Status::LongLeg { index, .. } = &mut report.status {
             *index %= problem.segments(curve);
+        }
+        let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
+        if known && equally_spaced(problem.knots(curve)) {
+            let leg = same.iter().map(|p| p.end_leg).fold(0.0, f64::max);
+            let radius = invariant_radius(report.max_step, space.curvature(), leg);
+            report.invariant_radius = radius.unwrap_or(f64::NAN);
         }
         reports[curve] = report;
     }
@@ -384,7 +401,24 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// The longer of the legs h|u|/3 at ends with a given velocity, lane by lane.
+fn given_legs<M: Space>(space: &M, chain: &Chain, ends: &ChainEnds) -> [f64; LANES] {
+    let ChainEnds::Open(kinds) = ends else { return [0.0; LANES] };
+    let (n, m) = (chain.n, chain.m);
+    let mut longest = Lane::ZERO;
+    for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
+        let leg = space.norm2(&chain.u[node * m..(node + 1) * m]).sqrt() * chain.h[segment] * lane(1.0 / 3.0);
+        longest = of_kind(kinds, EndKind::Velocity).select(longest.max(leg), longest);
+    }
+    longest.to_array()
+}
+
 impl<'a> End<'a> {
+    /// Whether Theorem 3.1 is about such ends.
+    fn is_of_the_theorem(&self) -> bool {
+        matches!(self, End::Natural | End::Velocity(_))
+    }
+
     fn kind(&self) -> EndKind {
         match self {
             End::Natural | End::Acceleration(_) => EndKind::Acceleration,

@@ -2,9 +2,10 @@
 
 use super::chain::Chain;
 use super::condition::{ChainEnds, Defect, NodeVectors, residual};
+use super::newton::{self, Newton};
 use super::quasi_newton::Anderson;
 use super::tridiagonal::Tridiagonal;
-use super::{Method, Options, fixed_point, quasi_newton};
+use super::{Method, Options, Solver, fixed_point, quasi_newton};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, lane, mask_bits};
 use crate::space::Space;
@@ -41,14 +42,17 @@ pub struct Outcome {
     pub rate: Lane,
     /// The longest outer leg |h u/3|.
     pub leg: Lane,
+    /// Which solver got there.
+    pub solver: [Solver; LANES],
 }
 
 /// Memory of a solve, reused from fit to fit.
 #[derive(Default)]
 pub struct Workspace {
     t: Tridiagonal,
-    vectors: NodeVectors,
+    vectors: NodeVectors<Lane>,
     anderson: Anderson,
+    newton: Newton,
     step: Vec<Lane>,
     next_step: Vec<Lane>,
     best: Vec<Lane>,
@@ -64,7 +68,7 @@ pub fn solve<M: Space>(
     work: &mut Workspace,
     monitor: &Monitor,
 ) -> Outcome {
-    let Workspace { t, vectors, anderson, step, next_step, best } = work;
+    let Workspace { t, vectors, anderson, newton, step, next_step, best } = work;
     t.build(chain, ends);
     anderson.restart();
     best.clear();
@@ -123,6 +127,7 @@ pub fn solve<M: Space>(
             last = worse.select(last, defect);
             match options.method {
                 Method::FixedPoint => fixed_point::update(space, chain, ends, t, next_step),
+                Method::Newton => newton::update(space, chain, ends, newton, next_step),
                 Method::Auto | Method::QuasiNewton => {
                     quasi_newton::update(space, chain, ends, t, next_step);
                     if iteration > 1 {
@@ -157,7 +162,19 @@ pub fn solve<M: Space>(
         residuals = better.select(kept, residuals);
     }
     let rate = mean_rate(second, residuals, &iterations);
-    Outcome { iterations, residual: residuals, converged: mask_bits(converged), rate, leg: legs }
+    let solver = match options.method {
+        Method::FixedPoint => Solver::FixedPoint,
+        Method::Newton => Solver::Newton,
+        Method::Auto | Method::QuasiNewton => Solver::QuasiNewton,
+    };
+    Outcome {
+        iterations,
+        residual: residuals,
+        converged: mask_bits(converged),
+        rate,
+        leg: legs,
+        solver: [solver; LANES],
+    }
 }
 
 /// Scales velocities back whose outer legs would pass the cut locus: beyond it the C² condition

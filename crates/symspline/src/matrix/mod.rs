@@ -95,6 +95,28 @@ impl Storage for Dynamic {
     }
 }
 
+/// Any shape of at most CAPACITY entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Small<const CAPACITY: usize>;
+
+impl<const CAPACITY: usize> Storage for Small<CAPACITY> {
+    type Shape = (usize, usize);
+    type Of<T: Copy> = Entries<T, CAPACITY>;
+    #[inline(always)]
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        assert!(rows * cols <= CAPACITY, "a matrix of {rows} x {cols} is too large here");
+        (rows, cols)
+    }
+    #[inline(always)]
+    fn size(shape: Self::Shape) -> (usize, usize) {
+        shape
+    }
+    #[inline(always)]
+    fn filled<T: Copy>(_: Self::Shape, x: T) -> Self::Of<T> {
+        Entries([x; CAPACITY])
+    }
+}
+
 /// N × N matrices of NN = N² entries, a size known to the compiler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Known<const N: usize, const NN: usize>;
@@ -148,7 +170,12 @@ impl<S: Scalar, const D: usize, A: Storage> Clone for Matrix<S, D, A> {
     }
 }
 
-impl<S: Scalar, const D: usize> Matrix<S, D> {
+impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
+    /// The same matrix, stored in another way.
+    pub fn stored<B: Storage>(&self) -> Matrix<S, D, B> {
+        Matrix::from_fn(self.rows(), self.cols(), |i, j| self[(i, j)])
+    }
+
     /// The rows `from..to`.
     pub fn some_rows(&self, from: usize, to: usize) -> Self {
         Self::from_fn(to - from, self.cols(), |i, j| self[(from + i, j)])
@@ -175,7 +202,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     /// From numbers row by row, imaginary parts behind real ones.
     pub fn read(rows: usize, cols: usize, numbers: &[S]) -> Self {
         let mut m = Self::zeros(rows, cols);
-        m.data.copy_from_slice(&numbers.as_chunks::<D>().0[..rows * cols]);
+        m.data[..rows * cols].copy_from_slice(&numbers.as_chunks::<D>().0[..rows * cols]);
         m
     }
 
@@ -229,21 +256,40 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     /// All entries, row by row.
     #[inline(always)]
     pub fn entries(&self) -> &[Entry<S, D>] {
-        &self.data
+        &self.data[..self.rows() * self.cols()]
     }
 
     /// `A B`.
     pub fn times(&self, b: &Self) -> Self {
-        let mut out = Self::zeros(self.rows(), b.cols());
-        for i in 0..self.rows() {
-            let row = &mut out.data[i * b.cols()..][..b.cols()];
-            for k in 0..self.cols() {
-                let a = self.data[i * self.cols() + k];
-                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols()..][..b.cols()]) {
-                    *c = mul_add::<S, D, false>(a, *b, *c);
+        let (rows, inner, cols) = (self.rows(), self.cols(), b.cols());
+        let zero = [S::constant(Lane::ZERO); D];
+        let mut out = Self::zeros(rows, cols);
+        // Two by two entries at a time stay in registers.
+        let (even_rows, even_cols) = (rows & !1, cols & !1);
+        for i in (0..even_rows).step_by(2) {
+            for j in (0..even_cols).step_by(2) {
+                let mut sum = [zero; 4];
+                for k in 0..inner {
+                    let (x, y) = (self.data[i * inner + k], self.data[(i + 1) * inner + k]);
+                    let (u, v) = (b.data[k * cols + j], b.data[k * cols + j + 1]);
+                    sum[0] = mul_add::<S, D, false>(x, u, sum[0]);
+                    sum[1] = mul_add::<S, D, false>(x, v, sum[1]);
+                    sum[2] = mul_add::<S, D, false>(y, u, sum[2]);
+                    sum[3] = mul_add::<S, D, false>(y, v, sum[3]);
                 }
+                out.data[i * cols + j..][..2].copy_from_slice(&sum[..2]);
+                out.data[(i + 1) * cols + j..][..2].copy_from_slice(&sum[2..]);
             }
         }
+        let mut single = |i: usize, j: usize| {
+            let mut sum = zero;
+            for k in 0..inner {
+                sum = mul_add::<S, D, false>(self.data[i * inner + k], b.data[k * cols + j], sum);
+            }
+            out.data[i * cols + j] = sum;
+        };
+        (0..even_rows).for_each(|i| (even_cols..cols).for_each(|j| single(i, j)));
+        (even_rows..rows).for_each(|i| (0..cols).for_each(|j| single(i, j)));
         out
     }
 

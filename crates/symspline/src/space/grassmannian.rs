@@ -8,19 +8,21 @@
 use super::algebra::stretch_series;
 use super::{ROUNDING_SIZE, Space};
 use crate::matrix::{
-    Matrix, Unary, arc, by_size, diagonalise, function_of, orthogonalise, orthonormalise, reorthonormalise,
-    sort_columns, trig,
+    Dynamic, Matrix, Small, Storage, Unary, arc, by_size, diagonalise, function_of, orthogonalise,
+    orthonormalise, reorthonormalise, sort_columns, trig,
 };
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 use crate::special::theta_over_sin;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
+use std::marker::PhantomData;
 
 /// Subspaces of dimension k, real for D = 1, complex for D = 2. With `LINES`, k = 1 and points are
 /// vectors instead of n × 1 matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Subspaces<const D: usize, const LINES: bool> {
+pub struct Subspaces<const D: usize, const LINES: bool, A = Dynamic> {
     k: usize,
     n: usize,
+    storage: PhantomData<A>,
 }
 
 /// Subspaces of Rⁿ.
@@ -31,8 +33,14 @@ pub type ComplexGrassmannian = Subspaces<2, false>;
 pub type RealProjective = Subspaces<1, true>;
 /// Lines through the origin of Cⁿ⁺¹: pure quantum states.
 pub type ComplexProjective = Subspaces<2, true>;
+/// The same of few numbers, kept in registers or nearly.
+pub type SmallGrassmannian = Subspaces<1, false, Small<10>>;
+/// See [`SmallGrassmannian`].
+pub type SmallRealProjective = Subspaces<1, true, Small<4>>;
+/// See [`SmallGrassmannian`].
+pub type SmallComplexProjective = Subspaces<2, true, Small<4>>;
 
-impl<const D: usize> Subspaces<D, false> {
+impl<const D: usize, A> Subspaces<D, false, A> {
     /// k-dimensional subspaces of an n-dimensional space.
     pub fn new(k: usize, n: usize) -> Result<Self, String> {
         let name = if D == 1 { "Grassmannian" } else { "ComplexGrassmannian" };
@@ -44,7 +52,7 @@ impl<const D: usize> Subspaces<D, false> {
         if k == 0 || k == n {
             return Err(format!("{name}(k, n) needs 1 <= k < n; {name}({k}, {n}) is a single point"));
         }
-        Ok(Subspaces { k, n })
+        Ok(Subspaces { k, n, storage: PhantomData })
     }
 
     /// k and n
@@ -53,14 +61,14 @@ impl<const D: usize> Subspaces<D, false> {
     }
 }
 
-impl<const D: usize> Subspaces<D, true> {
+impl<const D: usize, A> Subspaces<D, true, A> {
     /// Projective space of dimension n.
     pub fn new(n: usize) -> Result<Self, String> {
         let name = if D == 1 { "RealProjective" } else { "ComplexProjective" };
         if n == 0 || n == usize::MAX {
             return Err(format!("{name}(n) needs n >= 1"));
         }
-        Ok(Subspaces { k: 1, n: n + 1 })
+        Ok(Subspaces { k: 1, n: n + 1, storage: PhantomData })
     }
 
     /// n
@@ -75,14 +83,14 @@ const SERIES: f64 = 0.8;
 const SMALL: usize = 16;
 
 /// s and k of [`trig`], and c − 1, for a tangent vector.
-struct Rotation<S: Scalar, const D: usize> {
-    s: Matrix<S, D>,
-    k: Matrix<S, D>,
-    versed: Matrix<S, D>,
+struct Rotation<S: Scalar, const D: usize, A: Storage> {
+    s: Matrix<S, D, A>,
+    k: Matrix<S, D, A>,
+    versed: Matrix<S, D, A>,
 }
 
-impl<S: Scalar, const D: usize> Rotation<S, D> {
-    fn of(g: &Matrix<S, D>) -> Self {
+impl<S: Scalar, const D: usize, A: Storage> Rotation<S, D, A> {
+    fn of(g: &Matrix<S, D, A>) -> Self {
         let [s, k] = trig(g);
         let versed = g.times(&k);
         Rotation { s, k, versed }
@@ -91,7 +99,7 @@ impl<S: Scalar, const D: usize> Rotation<S, D> {
     /// E(±Δ) of a point or vector, by what it is along X and along Δ.
     ///
     /// `E_X(Δ)Z = Z + X((c−1)X*Z − sΔ*Z) + Δ(sX*Z + kΔ*Z)`: the two factors behind X and Δ.
-    fn act(&self, along_x: &Matrix<S, D>, along_delta: &Matrix<S, D>) -> [Matrix<S, D>; 2] {
+    fn act(&self, along_x: &Matrix<S, D, A>, along_delta: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {
         [
             &self.versed.times(along_x) - &self.s.times(along_delta),
             &self.s.times(along_x) + &self.k.times(along_delta),
@@ -104,7 +112,10 @@ impl<S: Scalar, const D: usize> Rotation<S, D> {
 /// With M = X*Y and Z = (1 − XX*)Y it is `Z M* f`, f = θ/(sin θ cos θ) of the principal angles, which is
 /// a function of `1 − MM* = sin²θ` and blind to the representative Y. Returns the deciding angle, or a
 /// bound of it below the cut locus.
-fn log_from<S: Scalar, const D: usize>(top: &Matrix<S, D>, rest: &Matrix<S, D>) -> (Matrix<S, D>, Lane) {
+fn log_from<S: Scalar, const D: usize, A: Storage>(
+    top: &Matrix<S, D, A>,
+    rest: &Matrix<S, D, A>,
+) -> (Matrix<S, D, A>, Lane) {
     let square = top.times_adjoint(top).hermitian_part();
     // 2 sin²θ = 1 − cos 2θ
     let versine = (-square.clone()).plus_identity(Lane::ONE).scaled(lane(2.0));
@@ -142,12 +153,15 @@ fn log_from<S: Scalar, const D: usize>(top: &Matrix<S, D>, rest: &Matrix<S, D>) 
 /// The logarithm by principal vectors, Σ z_i (θ_i/sin θ_i) u_i* with M = U cos θ V* and Z V = (z_i): accurate
 /// to the cut locus, θ = π/2.
 #[inline(never)]
-fn principal<const D: usize>(top: &Matrix<Lane, D>, rest: &Matrix<Lane, D>) -> (Matrix<Lane, D>, Lane) {
+fn principal<const D: usize, A: Storage>(
+    top: &Matrix<Lane, D, A>,
+    rest: &Matrix<Lane, D, A>,
+) -> (Matrix<Lane, D, A>, Lane) {
     let k = top.rows();
     let mut v = top.adjoint();
     let mut u = Matrix::identity(k);
     orthogonalise(&mut v, Some(&mut u));
-    let length = |m: &Matrix<Lane, D>, j: usize| {
+    let length = |m: &Matrix<Lane, D, A>, j: usize| {
         (0..m.rows()).flat_map(|i| m[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum)).sqrt()
     };
     let mut cosines: Vec<Lane> = (0..k).map(|j| length(&v, j)).collect();
@@ -171,40 +185,43 @@ fn principal<const D: usize>(top: &Matrix<Lane, D>, rest: &Matrix<Lane, D>) -> (
 }
 
 /// What is orthogonal to the columns of Y.
-fn horizontal<S: Scalar, const D: usize>(y: &Matrix<S, D>, x: &Matrix<S, D>) -> Matrix<S, D> {
+fn horizontal<S: Scalar, const D: usize, A: Storage>(
+    y: &Matrix<S, D, A>,
+    x: &Matrix<S, D, A>,
+) -> Matrix<S, D, A> {
     // Twice, because the first time leaves rounding errors of what is removed.
     let once = x - &y.times(&y.adjoint_times(x));
     &once - &y.times(&y.adjoint_times(&once))
 }
 
-impl<const D: usize, const LINES: bool> Subspaces<D, LINES> {
-    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+impl<const D: usize, const LINES: bool, A: Storage> Subspaces<D, LINES, A> {
+    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         Matrix::read(self.n, self.k, x)
     }
 
-    fn coordinate_matrix<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+    fn coordinate_matrix<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         Matrix::read(self.n - self.k, self.k, x)
     }
 
     /// `log_X(Y)` in the ambient space.
-    fn log_between<S: Scalar>(&self, x: &Matrix<S, D>, y: &Matrix<S, D>) -> (Matrix<S, D>, Lane) {
+    fn log_between<S: Scalar>(&self, x: &Matrix<S, D, A>, y: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
         log_from(&x.adjoint_times(y), &horizontal(x, &(y - x)))
     }
 
     /// The columns of a frame: the subspace and its complement.
-    fn columns(&self, frame: &[Lane]) -> [Matrix<Lane, D>; 2] {
-        let q = Matrix::read(self.n, self.n, frame);
-        [q.some_cols(0, self.k), q.some_cols(self.k, self.n)]
+    fn columns(&self, frame: &[Lane]) -> (Matrix<Lane, D, A>, Matrix<Lane, D>) {
+        let q = Matrix::<Lane, D>::read(self.n, self.n, frame);
+        (q.some_cols(0, self.k).stored(), q.some_cols(self.k, self.n))
     }
 
-    fn write_frame(&self, x: &Matrix<Lane, D>, rest: &Matrix<Lane, D>, frame: &mut [Lane]) {
+    fn write_frame(&self, x: &Matrix<Lane, D, A>, rest: &Matrix<Lane, D>, frame: &mut [Lane]) {
         let k = self.k;
         Matrix::<Lane, D>::from_fn(self.n, self.n, |i, j| if j < k { x[(i, j)] } else { rest[(i, j - k)] })
             .write(frame);
     }
 }
 
-impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
+impl<const D: usize, const LINES: bool, A: Storage> Space for Subspaces<D, LINES, A> {
     type Chart = Self;
 
     fn point_len(&self) -> usize {
@@ -254,7 +271,7 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
             gamma.clone()
         };
         for (i, out) in out.iter_mut().enumerate() {
-            let part = |m: &Matrix<Lane, D>| m.entries()[i / D][i % D];
+            let part = |m: &Matrix<Lane, D, A>| m.entries()[i / D][i % D];
             *out = t.compose([part(&gamma), part(&d), part(&dd)]);
         }
     }
@@ -353,22 +370,24 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
     // A frame at p is a unitary matrix whose first k columns span p. They may be another
     // representative than p: W = X*p turns one into the other.
     fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
-        complete(&self.read(p)).write(frame);
+        complete(&Matrix::<Lane, D>::read(self.n, self.k, p)).write(frame);
     }
     fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
-        let [x, rest] = self.columns(frame);
+        let (x, rest) = self.columns(frame);
         let (p, q) = (self.read(p), self.read(q));
         // The complement is orthogonal to p, too: q − p is exact for near representatives.
-        let (b, angle) = log_from(&x.adjoint_times(&q), &rest.adjoint_times(&(&q - &p)));
+        let way = rest.adjoint_times(&(&q - &p).stored()).stored();
+        let (b, angle) = log_from(&x.adjoint_times(&q), &way);
         b.write(chord);
         let Rotation { s, k, versed } = Rotation::of(&b.adjoint_times(&b));
-        let x_next = &(&x + &x.times(&versed)) + &rest.times(&b.times(&s));
-        let turn = &rest.times(&b.times(&k)) - &x.times(&s);
-        let mut rest = &rest + &turn.times_adjoint(&b);
+        let x_next = &(&x + &x.times(&versed)) + &rest.times(&b.times(&s).stored()).stored();
+        let turn = &rest.times(&b.times(&k).stored()) - &x.times(&s).stored();
+        let mut rest = &rest + &turn.times_adjoint(&b.stored());
         // The first columns span q, and the others are orthogonal to it.
         let mut x = q.times(&q.adjoint_times(&x_next));
         reorthonormalise(&mut x);
-        rest = &rest - &x.times(&x.adjoint_times(&rest));
+        let along: Matrix<Lane, D> = x.stored();
+        rest = &rest - &along.times(&along.adjoint_times(&rest));
         if self.n <= SMALL {
             reorthonormalise(&mut rest);
         }
@@ -383,14 +402,14 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
         }
     }
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
-        let [subspace, rest] = self.columns(frame);
+        let (subspace, rest) = self.columns(frame);
         let w = subspace.adjoint_times(&self.read(p));
-        rest.adjoint_times(&self.read(v)).times_adjoint(&w).write(x);
+        rest.adjoint_times(&self.read(v).stored()).times_adjoint(&w.stored()).write(x);
     }
     fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
-        let [subspace, rest] = self.columns(frame);
+        let (subspace, rest) = self.columns(frame);
         let w = subspace.adjoint_times(&self.read(p));
-        rest.times(&self.coordinate_matrix(x).times(&w)).write(v);
+        rest.times(&self.coordinate_matrix(x).times(&w).stored()).write(v);
     }
 
     fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
@@ -411,7 +430,7 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
         w_minus: &mut [S],
     ) {
         let (n, k) = (self.n, self.k);
-        let chord = Matrix::<S, D>::constant(n - k, k, d);
+        let chord = Matrix::<S, D, A>::constant(n - k, k, d);
         let part = |i: usize| Matrix::constant(k, k, &prepared[i * k * k * D..][..k * k * D]);
         let over = Rotation { s: part(0), k: part(1), versed: part(2) };
         let [a, b] = [a, b].map(|x| {
@@ -419,19 +438,20 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
             let turn = Rotation::of(&x.adjoint_times(&x));
             (x, turn)
         });
-        let walk =
-            |first: &(Matrix<S, D>, Rotation<S, D>), last: &(Matrix<S, D>, Rotation<S, D>), sign: f64| {
-                let sign = lane(sign);
-                // E(−first)·o is (c, −first s), then the chord, then E(−last); all mirrored for the other way.
-                let mut top = first.1.versed.clone().plus_identity(Lane::ONE);
-                let mut rest = first.0.times(&first.1.s).scaled(-sign);
-                for (delta, turn, sign) in [(&chord, &over, sign), (&last.0, &last.1, -sign)] {
-                    let [to_top, to_delta] = turn.act(&top, &delta.adjoint_times(&rest).scaled(sign));
-                    top = &top + &to_top;
-                    rest = &rest + &delta.times(&to_delta).scaled(sign);
-                }
-                log_from(&top, &rest).0
-            };
+        let walk = |first: &(Matrix<S, D, A>, Rotation<S, D, A>),
+                    last: &(Matrix<S, D, A>, Rotation<S, D, A>),
+                    sign: f64| {
+            let sign = lane(sign);
+            // E(−first)·o is (c, −first s), then the chord, then E(−last); all mirrored for the other way.
+            let mut top = first.1.versed.clone().plus_identity(Lane::ONE);
+            let mut rest = first.0.times(&first.1.s).scaled(-sign);
+            for (delta, turn, sign) in [(&chord, &over, sign), (&last.0, &last.1, -sign)] {
+                let [to_top, to_delta] = turn.act(&top, &delta.adjoint_times(&rest).scaled(sign));
+                top = &top + &to_top;
+                rest = &rest + &delta.times(&to_delta).scaled(sign);
+            }
+            log_from(&top, &rest).0
+        };
         walk(&b, &a, 1.0).write(w_plus);
         walk(&a, &b, -1.0).write(w_minus);
     }
@@ -440,7 +460,7 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
         let g = b.adjoint_times(&b);
         let size = if self.k == 1 && D == 1 { b.size() } else { b.size() * lane(2.0) };
         // [v,[v,x]] = 2 v x* v − v v* x − x v* v
-        let twice = |x: &Matrix<S, D>| {
+        let twice = |x: &Matrix<S, D, A>| {
             let vx = b.adjoint_times(x);
             let inner = &vx.adjoint().scaled(lane(2.0)) - &vx;
             &b.times(&inner) - &x.times(&g)
@@ -455,17 +475,17 @@ impl<const D: usize, const LINES: bool> Space for Subspaces<D, LINES> {
     }
 }
 
-fn largest_singular_value<const D: usize>(b: &Matrix<Lane, D>) -> Lane {
+fn largest_singular_value<const D: usize, A: Storage>(b: &Matrix<Lane, D, A>) -> Lane {
     let mut g = [b.adjoint_times(b)];
     diagonalise(&mut g);
     (0..b.cols()).fold(Lane::ZERO, |m, i| max_or_nan(m, g[0][(i, i)][0])).sqrt()
 }
 
 /// A unitary matrix whose first columns span those of Y: the product of Householder's reflections.
-fn complete<const D: usize>(y: &Matrix<Lane, D>) -> Matrix<Lane, D> {
+fn complete<const D: usize, A: Storage>(y: &Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
     let (n, k) = (y.rows(), y.cols());
     let mut r = y.clone();
-    let mut q = Matrix::<Lane, D>::identity(n);
+    let mut q = Matrix::<Lane, D, A>::identity(n);
     for j in 0..k {
         let square = (j..n).flat_map(|i| r[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum));
         let head = r[(j, j)];
@@ -473,7 +493,7 @@ fn complete<const D: usize>(y: &Matrix<Lane, D>) -> Matrix<Lane, D> {
         // x − α e with α = −phase(x₀)|x|, so that nothing cancels.
         let none = size.simd_eq(Lane::ZERO);
         let factor = none.select(Lane::ZERO, square.sqrt() / size);
-        let mut v = Matrix::<Lane, D>::zeros(n, 1);
+        let mut v = Matrix::<Lane, D, A>::zeros(n, 1);
         for i in j..n {
             v[(i, 0)] = r[(i, j)];
         }

@@ -24,7 +24,10 @@ mod sphere;
 mod unitary;
 
 pub use euclidean::Euclidean;
-pub use grassmannian::{ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective};
+pub use grassmannian::{
+    ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective, SmallComplexProjective,
+    SmallGrassmannian, SmallRealProjective,
+};
 pub use hyperbolic::Hyperbolic;
 pub use positive_definite::{
     HermitianPositiveDefinite, SymmetricPositiveDefinite, SymmetricPositiveDefinite2,
@@ -33,7 +36,9 @@ pub use positive_definite::{
 pub use rotations::Rotations;
 pub use special_euclidean::SpecialEuclidean;
 pub use sphere::Sphere;
-pub use unitary::{Orthogonal, SpecialOrthogonal, SpecialUnitary, Unitary, UnitaryGroup};
+pub use unitary::{
+    Orthogonal, SpecialOrthogonal, SpecialUnitary, SpecialUnitary2, Unitary, Unitary2, Unitary4,
+};
 
 use crate::scalar::{Lane, Scalar, dot, max_or_nan};
 
@@ -195,10 +200,10 @@ pub trait Space: Copy + Send + Sync + 'static {
 }
 
 /// The list of spaces: makes the enum that dispatches once a call, and the names. Behind `specialised`
-/// stand pages of their own for one size of a space.
+/// stand pages of their own for some sizes of a space.
 macro_rules! spaces {
     ($($space:ident($($parameter:ident),+) = $($name:literal)|+;)+
-     => specialised: $($special:ident = $general:ident($($value:literal),+);)+) => {
+     => specialised: $($special:ident = $general:ident($($p:ident),+) if $condition:expr;)+) => {
         /// Any of the spaces.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum AnySpace {
@@ -222,9 +227,17 @@ macro_rules! spaces {
                 }
             }
 
+            fn name_of(type_name: &str) -> &'static str {
+                let types = [$(stringify!($space)),+];
+                types.iter().position(|t| *t == type_name).map_or("", |i| Self::NAMES[i][0])
+            }
+
             fn specialised(self) -> Result<Self, String> {
                 match self {
-                    $(Self::$general(space) if space.parameters() == [$($value),+] => $special::new($($value),+).map(Self::$special),)+
+                    $(Self::$general(space) if { let [$($p),+] = space.parameters(); $condition } => {
+                        let [$($p),+] = space.parameters();
+                        $special::new($($p),+).map(Self::$special)
+                    })+
                     _ => Ok(self),
                 }
             }
@@ -236,7 +249,7 @@ macro_rules! spaces {
             pub fn name(&self) -> (&'static str, Vec<usize>) {
                 match self {
                     $(Self::$space(space) => ([$($name),+][0], space.parameters().to_vec()),)+
-                    $(Self::$special(_) => $general::new($($value),+).map(|s| Self::$general(s).name()).unwrap_or_default(),)+
+                    $(Self::$special(space) => (Self::name_of(stringify!($general)), space.parameters().to_vec()),)+
                 }
             }
         }
@@ -271,7 +284,13 @@ spaces! {
     SpecialEuclidean(n) = "se" | "special-euclidean";
 
     => specialised:
-    Rotations = SpecialOrthogonal(3);
-    SymmetricPositiveDefinite2 = SymmetricPositiveDefinite(2);
-    SymmetricPositiveDefinite3 = SymmetricPositiveDefinite(3);
+    Rotations = SpecialOrthogonal(n) if n == 3;
+    SymmetricPositiveDefinite2 = SymmetricPositiveDefinite(n) if n == 2;
+    SymmetricPositiveDefinite3 = SymmetricPositiveDefinite(n) if n == 3;
+    Unitary2 = Unitary(n) if n == 2;
+    Unitary4 = Unitary(n) if n == 4;
+    SpecialUnitary2 = SpecialUnitary(n) if n == 2;
+    SmallRealProjective = RealProjective(n) if n <= 3;
+    SmallComplexProjective = ComplexProjective(n) if n <= 3;
+    SmallGrassmannian = Grassmannian(k, n) if k * n <= 10;
 }

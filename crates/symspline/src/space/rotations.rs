@@ -18,6 +18,11 @@ impl Rotations {
     pub fn new(n: usize) -> Result<Self, String> {
         SpecialOrthogonal::new(n).map(|general| Rotations { general })
     }
+
+    /// n
+    pub fn parameters(&self) -> [usize; 1] {
+        self.general.parameters()
+    }
 }
 
 const HALF: Lane = lane(0.5);

@@ -7,7 +7,7 @@
 
 use super::algebra::stretch_series;
 use super::rigid::{Motion, Twist, bracket, of_matrix, to_matrix};
-use super::{ROUNDING_SIZE, Space, UnitaryGroup};
+use super::{ROUNDING_SIZE, Space, SpecialOrthogonal};
 use crate::matrix::Matrix;
 use crate::scalar::{Lane, Scalar, dot, lane};
 use std::f64::consts::PI;
@@ -214,7 +214,7 @@ impl Space for SpecialEuclidean {
     fn project(&self, x: &mut [Lane]) -> Lane {
         let n = self.n;
         let mut r: Vec<Lane> = (0..n * n).map(|c| x[c / n * (n + 1) + c % n]).collect();
-        let mut off = UnitaryGroup::<1, true>::new(n).map_or(Lane::ZERO, |group| group.project(&mut r));
+        let mut off = SpecialOrthogonal::new(n).map_or(Lane::ZERO, |group| group.project(&mut r));
         for (c, r) in r.iter().enumerate() {
             x[c / n * (n + 1) + c % n] = *r;
         }
@@ -237,7 +237,7 @@ impl Space for SpecialEuclidean {
     fn scatter(&self, noise: &mut [Lane]) {
         let n = self.n;
         let mut r: Vec<Lane> = (0..n * n).map(|c| noise[c / n * (n + 1) + c % n]).collect();
-        if let Ok(group) = UnitaryGroup::<1, true>::new(n) {
+        if let Ok(group) = SpecialOrthogonal::new(n) {
             group.scatter(&mut r);
         }
         for (c, r) in r.iter().enumerate() {
@@ -255,7 +255,7 @@ impl Space for SpecialEuclidean {
             return format!("its last row is {last:?}, not (0, …, 0, 1)");
         }
         let r: Vec<f64> = (0..n * n).map(|c| x[c / n * (n + 1) + c % n]).collect();
-        let why = UnitaryGroup::<1, true>::new(n).map_or(String::new(), |group| group.complaint(&r));
+        let why = SpecialOrthogonal::new(n).map_or(String::new(), |group| group.complaint(&r));
         format!("in its rotation, {why}")
     }
 

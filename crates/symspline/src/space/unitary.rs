@@ -8,8 +8,8 @@ use super::algebra::Algebra;
 use super::{ROUNDING_SIZE, Space};
 use crate::matrix::multiply_add;
 use crate::matrix::{
-    Dynamic, Matrix, Unary, arc, by_size, determinant, diagonalise, exp_skew_minus_one, function_of,
-    orthonormalise, reorthonormalise, sort_columns,
+    Dynamic, Known, Matrix, Storage, Unary, arc, by_size, determinant, diagonalise, exp_skew_minus_one,
+    function_of, orthonormalise, reorthonormalise, sort_columns,
 };
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 use std::f64::consts::{PI, SQRT_2};
@@ -17,8 +17,9 @@ use std::marker::PhantomData;
 
 /// Matrices with p*p = 1: real for D = 1, complex for D = 2, of determinant one if `SPECIAL`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct UnitaryGroup<const D: usize, const SPECIAL: bool> {
+pub struct UnitaryGroup<const D: usize, const SPECIAL: bool, A = Dynamic> {
     n: usize,
+    storage: PhantomData<A>,
 }
 
 /// Rotations of n dimensions.
@@ -29,11 +30,17 @@ pub type Orthogonal = UnitaryGroup<1, false>;
 pub type Unitary = UnitaryGroup<2, false>;
 /// Unitary matrices of determinant one.
 pub type SpecialUnitary = UnitaryGroup<2, true>;
+/// Unitary matrices of sizes two and four, known to the compiler.
+pub type Unitary2 = UnitaryGroup<2, false, Known<2, 4>>;
+/// See [`Unitary2`].
+pub type Unitary4 = UnitaryGroup<2, false, Known<4, 16>>;
+/// See [`Unitary2`].
+pub type SpecialUnitary2 = UnitaryGroup<2, true, Known<2, 4>>;
 
 /// 1 − cos θ up to which the logarithm is a power series; θ is 1.37 there.
 const SERIES: f64 = 0.8;
 
-impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
+impl<const D: usize, const SPECIAL: bool, A: Storage> UnitaryGroup<D, SPECIAL, A> {
     /// The group of n × n matrices.
     pub fn new(n: usize) -> Result<Self, String> {
         // O(1) is two points.
@@ -44,7 +51,11 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
             (_, true) => "SpecialUnitary",
             (_, false) => "Unitary",
         };
-        if n < least { Err(format!("{name}(n) needs n >= {least}")) } else { Ok(UnitaryGroup { n }) }
+        if n < least {
+            Err(format!("{name}(n) needs n >= {least}"))
+        } else {
+            Ok(UnitaryGroup { n, storage: PhantomData })
+        }
     }
 
     /// n
@@ -54,22 +65,22 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
 
     const SU: bool = D == 2 && SPECIAL;
 
-    fn algebra(&self) -> Algebra<D, Dynamic> {
+    fn algebra(&self) -> Algebra<D, A> {
         Algebra { n: self.n, skew: true, traceless: Self::SU, storage: PhantomData }
     }
 
-    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         Matrix::read(self.n, self.n, x)
     }
 
     /// The skew-Hermitian Ω with v = pΩ.
-    fn generator(&self, p: &Matrix<Lane, D>, v: &[Lane]) -> Matrix<Lane, D> {
+    fn generator(&self, p: &Matrix<Lane, D, A>, v: &[Lane]) -> Matrix<Lane, D, A> {
         let omega = p.adjoint_times(&self.read(v)).skew_part();
         if Self::SU { traceless(omega) } else { omega }
     }
 
     /// The principal logarithm of 1 + E, and the deciding angle or a bound of it below the cut locus.
-    fn log_one_plus<S: Scalar>(&self, e: &Matrix<S, D>) -> (Matrix<S, D>, Lane) {
+    fn log_one_plus<S: Scalar>(&self, e: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
         let (sine, versine) = (e.skew_part(), -e.hermitian_part());
         // Where a sum of angles can be 2π the principal logarithm may have a trace.
         let n = self.n as f64;
@@ -94,7 +105,7 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
     ///
     /// Derivatives of T with Q = e^{iT} solve `Q' = e^{iT}'`, with the divided differences of `e^{iθ}`.
     #[inline(never)]
-    fn principal<S: Scalar>(&self, e: &Matrix<S, D>) -> (Matrix<S, D>, Lane) {
+    fn principal<S: Scalar>(&self, e: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
         let n = self.n;
         let part = |k: usize| complex(&e.map(|x| x.parts()[k]));
         let q = part(0).plus_identity(Lane::ONE);
@@ -110,8 +121,8 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
         };
         let mut t = vec![Matrix::diagonal(&theta)];
         if S::ORDER > 0 {
-            let basis = |m: Matrix<Lane, 2>| v.adjoint_times(&m).times(&v);
-            let over = |m: &Matrix<Lane, 2>| {
+            let basis = |m: Matrix<Lane, 2, A>| v.adjoint_times(&m).times(&v);
+            let over = |m: &Matrix<Lane, 2, A>| {
                 Matrix::from_fn(n, n, |i, j| divide(m[(i, j)], turning(&[theta[i], theta[j]])))
             };
             let d = over(&basis(part(1)));
@@ -137,7 +148,7 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
     }
 
     /// `log(p⁻¹q)` and its deciding angle.
-    fn log_between(&self, p: &Matrix<Lane, D>, q: &Matrix<Lane, D>) -> (Matrix<Lane, D>, Lane) {
+    fn log_between(&self, p: &Matrix<Lane, D, A>, q: &Matrix<Lane, D, A>) -> (Matrix<Lane, D, A>, Lane) {
         // p*q − 1 without cancellation for near points.
         self.log_one_plus(&p.adjoint_times(&(q - p)))
     }
@@ -147,7 +158,7 @@ impl<const D: usize, const SPECIAL: bool> UnitaryGroup<D, SPECIAL> {
     }
 }
 
-fn complex<const D: usize>(m: &Matrix<Lane, D>) -> Matrix<Lane, 2> {
+fn complex<const D: usize, A: Storage>(m: &Matrix<Lane, D, A>) -> Matrix<Lane, 2, A> {
     Matrix::from_fn(m.rows(), m.cols(), |i, j| {
         let x = m[(i, j)];
         [x[0], if D == 1 { Lane::ZERO } else { x[D - 1] }]
@@ -155,7 +166,7 @@ fn complex<const D: usize>(m: &Matrix<Lane, D>) -> Matrix<Lane, 2> {
 }
 
 /// −i M: Hermitian for a skew-Hermitian M.
-fn times_minus_i(m: Matrix<Lane, 2>) -> Matrix<Lane, 2> {
+fn times_minus_i<A: Storage>(m: Matrix<Lane, 2, A>) -> Matrix<Lane, 2, A> {
     m.map_entries(|[re, im]| [im, -re])
 }
 
@@ -202,14 +213,14 @@ fn spread_phases(theta: &mut [Lane]) -> Lane {
 }
 
 /// Without its part along the identity.
-fn traceless<const D: usize>(mut m: Matrix<Lane, D>) -> Matrix<Lane, D> {
+fn traceless<const D: usize, A: Storage>(mut m: Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
     let n = m.rows();
     let mean = (0..n).fold(Lane::ZERO, |sum, i| sum + m[(i, i)][D - 1]) / lane(n as f64);
     (0..n).for_each(|i| m[(i, i)][D - 1] -= mean);
     m
 }
 
-impl<const D: usize, const SPECIAL: bool> Space for UnitaryGroup<D, SPECIAL> {
+impl<const D: usize, const SPECIAL: bool, A: Storage> Space for UnitaryGroup<D, SPECIAL, A> {
     type Chart = Self;
 
     fn point_len(&self) -> usize {
@@ -252,7 +263,7 @@ impl<const D: usize, const SPECIAL: bool> Space for UnitaryGroup<D, SPECIAL> {
         let d = if S::ORDER > 0 { x.times(&omega) } else { x.clone() };
         let dd = if S::ORDER > 1 { d.times(&omega) } else { x.clone() };
         for (i, out) in out.iter_mut().enumerate() {
-            let part = |m: &Matrix<Lane, D>| m.entries()[i / D][i % D];
+            let part = |m: &Matrix<Lane, D, A>| m.entries()[i / D][i % D];
             *out = t.compose([part(&x), part(&d), part(&dd)]);
         }
     }
@@ -388,7 +399,7 @@ impl<const D: usize, const SPECIAL: bool> Space for UnitaryGroup<D, SPECIAL> {
     // A frame at p is g_R of a pair (g_L, g_R) with p = g_L g_R⁻¹: coordinates of pΩ are those of
     // g_R⁻¹ Ω g_R.
     fn lift(&self, _p: &[Lane], frame: &mut [Lane]) {
-        Matrix::<Lane, D>::identity(self.n).write(frame);
+        Matrix::<Lane, D, A>::identity(self.n).write(frame);
     }
     fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
         let (omega, angle) = self.log_between(&self.read(p), &self.read(q));
@@ -429,7 +440,7 @@ impl<const D: usize, const SPECIAL: bool> Space for UnitaryGroup<D, SPECIAL> {
         let algebra = self.algebra();
         let ea = exp_skew_minus_one(&-algebra.half(a));
         let eb = exp_skew_minus_one(&-algebra.half(b));
-        let ed = Matrix::<S, D>::constant(self.n, self.n, prepared);
+        let ed = Matrix::<S, D, A>::constant(self.n, self.n, prepared);
         let m = ea.compose(&ed).compose(&eb);
         let reverse = eb.compose(&ed).compose(&ea);
         let (plus, _) = self.log_one_plus(&m.compose(&reverse));
