@@ -18,7 +18,7 @@ test: .venv/built
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest --doctest-modules python tests
+	$(BIN)/python -m pytest --numprocesses auto --doctest-modules python tests
 
 # Compares with geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
 # compiled module of .venv, which every Python from 3.11 on can load. Needs .5 GB; not part of `test`.

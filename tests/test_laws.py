@@ -182,6 +182,9 @@ def test_the_curve_is_c2(case, method, ends, spacing, rng):
         if step > case.far or (ends == "periodic" and step > 2.0 / sharpness(space)):
             # There and back with steps near π has no solution with all legs inside the cut locus.
             continue
+        if method == "newton" and step > 1.0 / sharpness(space):
+            # From zero velocities Newton's method finds splines of near points only; `auto` starts it better.
+            continue
         growing = (ss.Hyperbolic, *POSITIVE)
         if ends in ("not-a-knot", "mixed") and isinstance(space, growing) and step > 1.2:
             # The cubic in normal coordinates extrapolates through exponentially growing space: points
@@ -197,7 +200,7 @@ def test_the_curve_is_c2(case, method, ends, spacing, rng):
         assert space.distance(spline(t), p).max() <= 10 * EPS * condition(space, p)
         # The acceleration holds S(v)⁻¹, which for the longest legs is 4.
         largest = max(jumps(spline))
-        assert largest <= (1.0 if step < 2.0 else 4.0), (step, largest)
+        assert largest <= (1.0 if step * sharpness(space) < 1.6 else 4.0), (step, largest)
 
 
 @every

@@ -26,8 +26,9 @@ class Report:
         converged: whether the residual is below the tolerance, or at the rounding floor (256 ε times
             the condition of the data).
         iterations: how often the C² residual was evaluated.
-        residual: the C² defect of a knot divided by 1/hᵢ₋₁ + 1/hᵢ, relative to the largest speed; the
-            largest of all knots.
+        residual: the C² defect of a knot divided by 1/hᵢ₋₁ + 1/hᵢ, relative to the largest speed |u| (or to
+            a thousandth of the largest distance over time between neighbours, if all speeds are smaller);
+            the largest of all knots.
         max_step: D of (21), the longest distance between neighbouring points.
         curvature: K of (22).
         invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so
@@ -96,10 +97,14 @@ def _same(a: Any, b: Any) -> bool:
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy")
 
 
-def shaped(columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float, method: str) -> Report:
+def shaped(
+    columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float, method: str
+) -> Report:
     """A report from the compiled core's columns; ``method`` is what was asked for."""
     values = [column.item() if batch == () else column.reshape(batch) for column in columns]
     converged, iterations, residual, max_step, rate, solver, radius = values
-    used = SOLVERS[int(np.max(solver))] if columns[0].size else ("quasi-newton" if method == "auto" else method)
+    used = (
+        SOLVERS[int(np.max(solver))] if columns[0].size else ("quasi-newton" if method == "auto" else method)
+    )
     known = None if np.isnan(radius).all() else radius
     return Report(used, converged, iterations, residual, max_step, curvature, known, rate)

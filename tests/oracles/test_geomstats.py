@@ -11,9 +11,9 @@ from geomstats.geometry.hpd_matrices import HPDMatrices
 from geomstats.geometry.hyperbolic import Hyperbolic
 from geomstats.geometry.hypersphere import Hypersphere
 from geomstats.geometry.invariant_metric import BiInvariantMetric
+from geomstats.geometry.spd_matrices import SPDMatrices
 from geomstats.geometry.special_euclidean import SpecialEuclidean
 from geomstats.geometry.special_orthogonal import SpecialOrthogonal
-from geomstats.geometry.spd_matrices import SPDMatrices
 
 import symspline as ss
 

@@ -140,6 +140,8 @@ fn faults(
     batch: &[usize],
 ) -> Vec<(usize, &'static str, String)> {
     let limit = with_space!(&handle.space, s => s.cut_angle());
+    // Unit quaternions are the usual reason for antipodes.
+    let sign = if handle.space.name().0 == "sphere" { ", or check their sign" } else { "" };
     let describe = |(c, r): (usize, &Report)| {
         let of = validate::of_curve(c, batch);
         let (kind, message) = match r.status {
@@ -148,7 +150,7 @@ fn faults(
                 "cut-locus",
                 format!(
                     "points[{index}] and points[{}]{of} lie at or past each other's cut locus: angle {angle}, \
-                     limit {limit}; put a point between them, or check their sign",
+                     limit {limit}; put a point between them{sign}",
                     index + 1
                 ),
             ),

@@ -111,8 +111,10 @@ impl Handle {
     /// Raises unless every row is a point within `tol`; `shape` is how the rows were laid out.
     fn check_points(&self, points: PyReadonlyArrayDyn<f64>, shape: Vec<usize>, tol: f64) -> PyResult<()> {
         let mut copy = points.as_slice()?.to_vec();
-        with_space!(&self.space, s => project_points(s, &mut copy, tol))
-            .map_err(|(row, off, why)| off_space(&format!("point {}", place(row, &shape)), off, tol, &why))
+        with_space!(&self.space, s => project_points(s, &mut copy, tol)).map_err(|(row, off, why)| {
+            let which = if shape.is_empty() { "it".into() } else { format!("point {}", place(row, &shape)) };
+            off_space(&which, off, tol, &why)
+        })
     }
 
     /// How far rows are from being tangent, relative to their size.

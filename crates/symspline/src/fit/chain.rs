@@ -102,6 +102,8 @@ pub struct Chain {
     scale: Lane,
     /// The longest chord of each lane.
     pub max_step: Lane,
+    /// The largest |dᵢ|/hᵢ of each lane.
+    pub pace: Lane,
     /// By how much rounding errors may grow in each lane, see [`Space::condition`].
     pub condition: Lane,
     /// Where neighbours lie at or past the cut locus: the first segment and its deciding angle.
@@ -137,6 +139,7 @@ impl Chain {
         }
         self.u.fill(Lane::ZERO);
         (self.max_step, self.condition, self.cut) = (Lane::ZERO, Lane::ONE, [None; LANES]);
+        self.pace = Lane::ZERO;
         // Angles carry a few rounding errors; what is within them of the cut locus is on it.
         let limit = lane(space.cut_angle() * (1.0 - 4.0 * f64::EPSILON));
 
@@ -147,6 +150,7 @@ impl Chain {
         self.read_end(space, 0, ends[0]);
         with_size!(M::VECTORS, len, len => self.walk(space, runs, len, limit));
         self.max_step = self.max_step.sqrt() / self.scale;
+        self.pace = self.pace.sqrt();
         self.read_end(space, 1, ends[1]);
     }
 
@@ -162,7 +166,9 @@ impl Chain {
                 d.iter_mut().for_each(|x| *x *= self.scale);
             }
             space.prepare(d, &mut self.prepared[i * keep..(i + 1) * keep]);
-            self.max_step = max_or_nan(self.max_step, space.norm2(d));
+            let length2 = space.norm2(d);
+            self.max_step = max_or_nan(self.max_step, length2);
+            self.pace = self.pace.max(length2 / (self.h[i] * self.h[i]));
             self.condition = max_or_nan(self.condition, space.condition(d));
             let inside = angle.simd_lt(limit);
             if !inside.all() {

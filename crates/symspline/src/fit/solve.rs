@@ -1,7 +1,7 @@
 //! The iteration that the solvers share: residual, convergence lane by lane, update.
 
 use super::chain::Chain;
-use super::condition::{ChainEnds, Defect, NodeVectors, residual};
+use super::condition::{ChainEnds, Defect, EndKind, NodeVectors, of_kind, residual};
 use super::newton::{self, Newton};
 use super::quasi_newton::Anderson;
 use super::tridiagonal::Tridiagonal;
@@ -13,6 +13,8 @@ use crate::space::Space;
 /// Defects of this many ε times the condition of the chords are rounding: an iteration that stops
 /// improving below has converged.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
+/// Velocities below this part of |d|/h count as rest: defects are measured against it then.
+const STANDSTILL: f64 = 1e-3;
 /// But a residual above this is never called rounding.
 const ROUNDING_MOST: f64 = 1e-9;
 /// Residuals are brought to this part of the tolerance: the jump of the acceleration at a knot is
@@ -22,6 +24,8 @@ const AIM: f64 = 1.0 / 40.0;
 const GROWTH_MIXED: f64 = 2.0;
 /// How often a step is halved before it is taken as it is.
 const MAX_TRIES: f64 = 6.0;
+/// The same for Newton's method, whose direction always leads downwards.
+const MAX_TRIES_NEWTON: f64 = 16.0;
 /// So many iterations without lowering the residual by 30 % are a standstill.
 const PATIENCE: f64 = 8.0;
 /// Outer legs are kept within this part of the distance to the cut locus while iterating.
@@ -79,6 +83,7 @@ pub fn solve<M: Space>(
     let floor = (chain.condition * lane(ROUNDING)).min(lane(ROUNDING_MOST)).max(tol);
     let infinity = lane(f64::INFINITY);
     let limit = space.cut_angle() * LEG_LIMIT;
+    let max_tries = lane(if options.method == Method::Newton { MAX_TRIES_NEWTON } else { MAX_TRIES });
 
     let mut done = idle;
     let mut converged = Lane::ZERO;
@@ -94,7 +99,9 @@ pub fn solve<M: Space>(
 
     for iteration in 1.. {
         let Defect { defect, speed, leg } = residual(space, chain, ends, vectors);
-        // A curve that stands still has neither speed nor defect.
+        // A curve that stands still has neither speed nor defect; one that goes there and back may stand
+        // still at every knot, where rounding is all that there is of its velocities.
+        let speed = speed.max(chain.pace * lane(STANDSTILL));
         let now = defect.simd_eq(Lane::ZERO).select(Lane::ZERO, defect / speed);
         residuals = done.select(residuals, now);
         legs = done.select(legs, leg);
@@ -120,8 +127,7 @@ pub fn solve<M: Space>(
 
         let mixing = anderson.active();
         let allowed = last * mixing.select(lane(GROWTH_MIXED), Lane::ONE);
-        let worse =
-            !defect.simd_le(allowed) & !done & tries.simd_lt(lane(MAX_TRIES)) & iteration_mask(iteration);
+        let worse = !defect.simd_le(allowed) & !done & tries.simd_lt(max_tries) & iteration_mask(iteration);
         if !worse.all() {
             contraction = worse.select(contraction, defect / last);
             last = worse.select(last, defect);
@@ -150,7 +156,7 @@ pub fn solve<M: Space>(
             *s = worse.select(-*n, *n);
         }
         if legs.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))).any() {
-            shorten(space, chain, limit, done);
+            shorten(space, chain, ends, limit, done);
         }
     }
     if !best.is_empty() {
@@ -179,9 +185,16 @@ pub fn solve<M: Space>(
 
 /// Scales velocities back whose outer legs would pass the cut locus: beyond it the C² condition
 /// has spurious solutions.
-fn shorten<M: Space>(space: &M, chain: &mut Chain, limit: f64, done: Lane) {
+fn shorten<M: Space>(space: &M, chain: &mut Chain, ends: &ChainEnds, limit: f64, done: Lane) {
     let m = chain.m;
     for i in 0..=chain.n {
+        // A velocity that is given stays.
+        let given = match ends {
+            ChainEnds::Open(kinds) if i == 0 => of_kind(&kinds[0], EndKind::Velocity),
+            ChainEnds::Open(kinds) if i == chain.n => of_kind(&kinds[1], EndKind::Velocity),
+            _ => Lane::ZERO,
+        };
+        let done = done | given;
         let h = chain.h[i.max(1) - 1].max(chain.h[i.min(chain.n - 1)]);
         let u = &mut chain.u[i * m..(i + 1) * m];
         let third = h * lane(1.0 / 3.0);

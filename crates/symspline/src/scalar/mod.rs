@@ -150,26 +150,21 @@ pub fn mask_from(f: impl Fn(usize) -> bool) -> Lane {
 /// vectors ([`Space::VECTORS`](crate::space::Space::VECTORS)), and would only multiply the code of others.
 #[macro_export]
 macro_rules! with_size {
-    ($pays:expr, $size:expr, $m:ident => $body:expr) => {{
-        let $m = $size;
-        if $pays {
-            match $m {
-                2 => {
-                    let $m = 2;
-                    $body
-                }
-                3 => {
-                    let $m = 3;
-                    $body
-                }
-                4 => {
-                    let $m = 4;
-                    $body
-                }
-                _ => $body,
+    ($pays:expr, $size:expr, $m:ident => $body:expr) => {
+        match $size {
+            2 if $pays => {
+                let $m = 2;
+                $body
             }
-        } else {
-            $body
+            3 if $pays => {
+                let $m = 3;
+                $body
+            }
+            4 if $pays => {
+                let $m = 4;
+                $body
+            }
+            $m => $body,
         }
-    }};
+    };
 }

@@ -9,7 +9,8 @@
 //!   transport is the identity;
 //! * at the origin o, on coordinates of 𝔪: there the C² condition is solved.
 //!
-//! Adding a space is one page and one line in [`spaces!`].
+//! Adding a space is one page and one line in `spaces!`, see docs/adding-a-space.md. The page's type needs
+//! `new`, which returns why its parameters are bad, `parameters`, and to derive Clone, Copy, Debug and Eq.
 
 mod algebra;
 mod constant_curvature;
@@ -44,13 +45,17 @@ use crate::scalar::{Lane, Scalar, dot, max_or_nan};
 
 /// Vectors of this size and smaller, at points of size one, may be rounding errors as to direction: a
 /// defect is measured against it where a vector is smaller still.
-pub(crate) const ROUNDING_SIZE: Lane = Lane::splat(1e-7);
+pub const ROUNDING_SIZE: Lane = Lane::splat(1e-7);
 
 /// A symmetric space: the paper's §2.1–2.4.
 ///
+/// The *deciding angle* of two points is what tells whether the geodesic between them is unique: it is
+/// below [`cut_angle`](Space::cut_angle) if so, and need be exact only near there; below it may be any
+/// upper bound. NaN in points must come back as NaN. What a lane gets must not depend on its neighbours.
+///
 /// Points and tangent vectors are ambient arrays of [`point_len`](Space::point_len) numbers (a
-/// complex number is two), coordinates at the origin are [`dim`](Space::dim) numbers, orthonormal
-/// for [`norm2`](Space::norm2).
+/// complex number is two), coordinates at the origin are [`dim`](Space::dim) numbers, for which
+/// [`norm2`](Space::norm2) is the squared length of the vector.
 pub trait Space: Copy + Send + Sync + 'static {
     /// Whether multiplying all points by a number multiplies the curve by it. Then data of any size
     /// are brought to size one first, so that squares neither overflow nor vanish.
@@ -60,7 +65,7 @@ pub trait Space: Copy + Send + Sync + 'static {
 
     /// A space that covers this one locally, in which curves are evaluated: usually the space itself.
     type Chart: Space;
-    /// The chart; `None` where it is the space itself.
+    /// The chart; `None` where it is the space itself. With a chart `enter` and `leave` are needed.
     fn chart(&self) -> Option<Self::Chart> {
         None
     }
@@ -104,7 +109,8 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn component(&self, _p: &[f64]) -> bool {
         true
     }
-    /// Distance below which the logarithm is defined whatever the direction.
+    /// Distance below which the logarithm is defined whatever the direction; other than the cut angle
+    /// where length and angle differ.
     fn injectivity_radius(&self) -> f64 {
         self.cut_angle()
     }
@@ -182,7 +188,7 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn norm2(&self, x: &[Lane]) -> Lane {
         dot(x, x)
     }
-    /// The deciding angle of `exp_o(v)`.
+    /// The deciding angle of `exp_o(v)`; grows in proportion to v.
     fn angle(&self, v: &[Lane]) -> Lane {
         self.norm2(v).sqrt()
     }

@@ -10,7 +10,7 @@ use crate::matrix::{
     Dynamic, Known, Matrix, Storage, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus,
     log_one_plus_alike, orthogonalise, solve_lower,
 };
-use crate::scalar::{Lane, Scalar, lane};
+use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 use std::marker::PhantomData;
 
 /// Hermitian positive definite n × n matrices, real for D = 1, complex for D = 2.
@@ -203,11 +203,12 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
     fn project(&self, x: &mut [Lane]) -> Lane {
         let before = self.read(x);
         let p = before.hermitian_part();
-        let size = p.size();
-        let off = (&p - &before).size() / size.simd_gt(Lane::ZERO).select(size, Lane::ONE);
-        let pivots = cholesky(&p);
-        let last = pivots[(self.n - 1, self.n - 1)][0];
-        let good = last.is_finite() & size.is_finite();
+        // Squares of very large or small entries would overflow or vanish.
+        let largest = x.iter().fold(Lane::ZERO, |m, x| max_or_nan(m, x.abs()));
+        let unit = Lane::ONE / largest.simd_gt(Lane::ZERO).select(largest, Lane::ONE);
+        let off = (&p - &before).scaled(unit).size() / p.clone().scaled(unit).size();
+        let last = cholesky(&p)[(self.n - 1, self.n - 1)][0];
+        let good = last.is_finite() & largest.is_finite();
         p.map(|x| good.select(x, lane(f64::NAN))).write(x);
         good.select(off, lane(f64::INFINITY))
     }
@@ -226,9 +227,10 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         let before = self.read(&lanes);
         let p = before.hermitian_part();
-        let off = ((&p - &before).size() / p.size()).to_array()[0];
+        let unit = lane(1.0 / x.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs())));
+        let off = ((&p - &before).scaled(unit).size() / p.clone().scaled(unit).size()).to_array()[0];
         let what = if D == 1 { "symmetric" } else { "Hermitian" };
-        if !before.size().to_array()[0].is_finite() {
+        if !x.iter().all(|x| x.is_finite()) {
             return "it is not finite".into();
         }
         if !(off <= 1e-4) {

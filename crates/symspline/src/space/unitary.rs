@@ -139,8 +139,11 @@ impl<const D: usize, const SPECIAL: bool, A: Storage> UnitaryGroup<D, SPECIAL, A
             }
         }
         // log Q = iT
-        let log: Vec<_> =
+        let mut log: Vec<_> =
             t.iter().map(|t| times_minus_i(-v.times(t).times_adjoint(&v)).skew_part()).collect();
+        if D == 1 {
+            log[0] = rotation_planes(&theta, &v);
+        }
         let entry = |i: usize, j: usize, c: usize| {
             S::from_parts(std::array::from_fn(|k| log.get(k).map_or(Lane::ZERO, |m| m[(i, j)][c])))
         };
@@ -163,6 +166,28 @@ fn complex<const D: usize, A: Storage>(m: &Matrix<Lane, D, A>) -> Matrix<Lane, 2
         let x = m[(i, j)];
         [x[0], if D == 1 { Lane::ZERO } else { x[D - 1] }]
     })
+}
+
+/// The real logarithm Σ θ (x yᵀ − y xᵀ) by eigenvectors x + iy of angles θ > 0.
+///
+/// Near π eigenvectors of ±θ mix by rounding, but not the plane of x and y.
+fn rotation_planes<A: Storage>(theta: &[Lane], v: &Matrix<Lane, 2, A>) -> Matrix<Lane, 2, A> {
+    let n = theta.len();
+    let mut log = Matrix::zeros(n, n);
+    for (k, &angle) in theta.iter().enumerate() {
+        let product =
+            |c: usize, d: usize| (0..n).fold(Lane::ZERO, |s, i| v[(i, k)][c].mul_add(v[(i, k)][d], s));
+        let area2 = product(0, 0) * product(1, 1) - product(0, 1) * product(0, 1);
+        let positive = angle.simd_gt(Lane::ZERO) & area2.simd_gt(Lane::ZERO);
+        let factor = positive.select(angle / area2.sqrt(), Lane::ZERO);
+        for i in 0..n {
+            for j in 0..n {
+                let (a, b): ([Lane; 2], [Lane; 2]) = (v[(i, k)], v[(j, k)]);
+                log[(i, j)][0] += factor * (a[0] * b[1] - a[1] * b[0]);
+            }
+        }
+    }
+    log
 }
 
 /// −i M: Hermitian for a skew-Hermitian M.

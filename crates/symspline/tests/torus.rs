@@ -1,0 +1,344 @@
+//! The flat torus, which the library does not have: the example of `docs/adding-a-space.md`, which quotes
+//! everything between the two markers below.
+
+// ---- the page begins ----
+use std::f64::consts::PI;
+use symspline::scalar::{Lane, Scalar, dot, lane, max_or_nan};
+use symspline::space::Space;
+use symspline::special::Trig;
+
+/// Tⁿ = S¹ × … × S¹: n unit vectors of R².
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Torus {
+    n: usize,
+}
+
+impl Torus {
+    /// The torus of n circles.
+    pub fn new(n: usize) -> Result<Self, String> {
+        if n == 0 { Err("Torus(n) needs n >= 1".into()) } else { Ok(Torus { n }) }
+    }
+
+    /// n
+    pub fn parameters(&self) -> [usize; 1] {
+        [self.n]
+    }
+}
+
+/// The j-th vector of R².
+#[inline(always)]
+fn pair<S: Scalar>(x: &[S], j: usize) -> [S; 2] {
+    [x[2 * j], x[2 * j + 1]]
+}
+
+/// p × q: the sine of the angle from p to q, and the coordinate of a tangent vector q at p.
+#[inline(always)]
+fn cross<S: Scalar>(p: [S; 2], q: [S; 2]) -> S {
+    p[0] * q[1] - p[1] * q[0]
+}
+
+/// The tangent vector at p with coordinate x.
+#[inline(always)]
+fn along(p: [Lane; 2], x: Lane) -> [Lane; 2] {
+    [-(x * p[1]), x * p[0]]
+}
+
+/// p turned by an angle.
+#[inline(always)]
+fn turned<S: Scalar>(p: [S; 2], angle: S) -> [S; 2] {
+    let Trig { c: cos, s, .. } = Trig::new(angle * angle);
+    let sin = s * angle;
+    [cos * p[0] - sin * p[1], cos * p[1] + sin * p[0]]
+}
+
+/// The angle from p to q, from −π to π.
+#[inline(always)]
+fn angle_between<S: Scalar>(p: [S; 2], q: [S; 2]) -> S {
+    // p × q = p × (q − p), which keeps its digits for near points.
+    let (sin, cos) = (cross(p, [q[0] - p[0], q[1] - p[1]]), dot(&p, &q));
+    // θ' = cos θ (sin θ)' − sin θ (cos θ)', and one derivative more likewise.
+    let [_, d, dd] = (sin * cos.value() - cos * sin.value()).parts();
+    S::from_parts([sin.value().atan2(cos.value()), d, dd])
+}
+
+/// The largest |xᵢ|, NaN if any is.
+fn largest(x: &[Lane]) -> Lane {
+    x.iter().fold(Lane::ZERO, |most, x| max_or_nan(most, x.abs()))
+}
+
+impl Space for Torus {
+    type Chart = Self;
+
+    fn point_len(&self) -> usize {
+        2 * self.n
+    }
+    fn point_shape(&self) -> Vec<usize> {
+        vec![self.n, 2]
+    }
+    fn dim(&self) -> usize {
+        self.n
+    }
+    fn frame_len(&self) -> usize {
+        0
+    }
+    fn cut_angle(&self) -> f64 {
+        PI
+    }
+    fn curvature(&self) -> f64 {
+        0.0
+    }
+
+    // ---- in the ambient array ----
+
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        for (j, out) in out.chunks_exact_mut(2).enumerate() {
+            let p = pair(p, j);
+            out.copy_from_slice(&turned(p.map(S::constant), t * cross(p, pair(v, j))));
+        }
+    }
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        let mut angle = Lane::ZERO;
+        for (j, out) in out.chunks_exact_mut(2).enumerate() {
+            let x = angle_between(pair(p, j), pair(q, j));
+            out.copy_from_slice(&along(pair(p, j), x));
+            angle = max_or_nan(angle, x.abs());
+        }
+        angle
+    }
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        for (j, out) in out.chunks_exact_mut(2).enumerate() {
+            out.copy_from_slice(&turned(pair(p, j), t * angle_between(pair(p, j), pair(q, j))));
+        }
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        for (j, out) in out.chunks_exact_mut(2).enumerate() {
+            out.copy_from_slice(&turned(pair(x, j), cross(pair(p, j), pair(v, j))));
+        }
+    }
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        for (j, d) in d.chunks_exact_mut(2).enumerate() {
+            let p = pair(gamma, j);
+            d.copy_from_slice(&along(p, cross(p, [d[0], d[1]])));
+        }
+    }
+    fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
+        self.velocity(gamma, dd);
+    }
+    fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        dot(u, v)
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        let mut off = Lane::ZERO;
+        for x in x.chunks_exact_mut(2) {
+            let norm = dot(x, x).sqrt();
+            let this = (norm - Lane::ONE).abs();
+            // What is a unit vector up to rounding stays as it is, bit for bit.
+            let scale = this.simd_le(lane(2.0 * f64::EPSILON)).select(Lane::ONE, Lane::ONE / norm);
+            x.iter_mut().for_each(|x| *x *= scale);
+            off = max_or_nan(off, this);
+        }
+        off
+    }
+    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
+        let size = dot(v, v).sqrt();
+        let off = (0..self.n).fold(Lane::ZERO, |off, j| max_or_nan(off, dot(&pair(p, j), &pair(v, j)).abs()));
+        self.velocity(p, v);
+        // The library's ROUNDING_SIZE: a smaller vector may consist of rounding errors.
+        off / (size + lane(1e-7))
+    }
+    fn scatter(&self, noise: &mut [Lane]) {
+        self.project(noise);
+    }
+    fn complaint(&self, x: &[f64]) -> String {
+        let norms: Vec<f64> = x.chunks_exact(2).map(|x| x[0].hypot(x[1])).collect();
+        format!("its rows have the norms {norms:?}, not 1")
+    }
+
+    // ---- moving frame ----
+
+    fn lift(&self, _p: &[Lane], _frame: &mut [Lane]) {}
+    fn step(&self, _frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        for (j, x) in chord.iter_mut().enumerate() {
+            *x = angle_between(pair(p, j), pair(q, j));
+        }
+        largest(chord)
+    }
+    fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
+    fn coordinates(&self, _frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        for (j, x) in x.iter_mut().enumerate() {
+            *x = cross(pair(p, j), pair(v, j));
+        }
+    }
+    fn tangent(&self, _frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        for (j, v) in v.chunks_exact_mut(2).enumerate() {
+            v.copy_from_slice(&along(pair(p, j), x[j]));
+        }
+    }
+
+    // ---- at the origin ----
+
+    fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+        for i in 0..self.n {
+            // Transvections add up, and the logarithm takes whole turns away.
+            let sum = -(a[i] + b[i]) + d[i];
+            let turns = (sum.value() / lane(2.0 * PI)).round();
+            w_plus[i] = sum - turns * lane(2.0 * PI);
+            w_minus[i] = -w_plus[i];
+        }
+    }
+    fn stretch<S: Scalar>(&self, _v: &[S], _x: &mut [S]) {}
+    fn angle(&self, v: &[Lane]) -> Lane {
+        largest(v)
+    }
+}
+// ---- the page ends ----
+
+use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
+use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
+use symspline::monitor::Monitor;
+use symspline::rows::{Fault, Operation, apply, project_points};
+use symspline::space::Euclidean;
+
+const ON: fn(usize) -> bool = |_| true;
+const QUANTITIES: [Quantity; 3] = [Quantity::Point, Quantity::Velocity, Quantity::Acceleration];
+const KNOTS: [f64; 9] = [0.0, 1.0, 1.7, 3.0, 3.4, 4.4, 5.4, 6.0, 7.1];
+/// Two angles a knot. They go round more than once, and neighbours are up to 2.6 apart.
+const ANGLES: [[f64; 2]; 9] = [
+    [3.0, -1.0],
+    [4.2, -3.1],
+    [5.5, -4.0],
+    [8.1, -4.4],
+    [8.8, -4.2],
+    [9.6, -3.0],
+    [8.9, -0.8],
+    [7.9, 0.3],
+    [6.3, 0.9],
+];
+
+/// The point of the torus with some angles.
+fn point(angles: &[f64]) -> Vec<f64> {
+    angles.iter().flat_map(|a| [a.cos(), a.sin()]).collect()
+}
+
+/// The tangent vector there with some coordinates.
+fn vector(angles: &[f64], x: &[f64]) -> Vec<f64> {
+    angles.iter().zip(x).flat_map(|(a, x)| [-x * a.sin(), x * a.cos()]).collect()
+}
+
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    assert!(a.iter().chain(b).all(|x| x.is_finite()));
+    a.iter().zip(b).fold(0.0, |most, (a, b)| (a - b).abs().max(most))
+}
+
+fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result<Vec<f64>, Fault> {
+    let mut out = vec![0.0; len];
+    apply(&Torus::new(2).unwrap(), operation, inputs, t, &Monitor::new(&ON), &mut out).map(|()| out)
+}
+
+/// The velocities of the spline through points.
+fn spline<M: Space>(space: &M, points: &[f64], ends: [End; 2]) -> Result<Vec<f64>, Status> {
+    let options = Options { method: Method::Auto, tol: 1e-13, max_iter: None };
+    let problem =
+        Problem { t: &KNOTS, shared: true, points, offsets: &[0, KNOTS.len()], ends: Ends::Open(ends) };
+    let mut velocities = vec![0.0; points.len()];
+    match fit(space, &problem, &options, &Monitor::new(&ON), &mut velocities)[0].status {
+        Status::Converged => Ok(velocities),
+        status => Err(status),
+    }
+}
+
+fn values<M: Space>(space: &M, curves: &Curves, times: &Times, quantity: Quantity) -> Vec<f64> {
+    let mut out = vec![0.0; curves.points.len() / curves.nodes * times.count];
+    evaluate(space, curves, times, quantity, Outside::Continue, &Monitor::new(&ON), &mut out);
+    out
+}
+
+#[test]
+fn parameters_are_checked() {
+    assert_eq!(Torus::new(2).unwrap().parameters(), [2]);
+    assert!(Torus::new(0).is_err());
+    let (_, off, why) = project_points(&Torus::new(2).unwrap(), &mut [1.0, 0.0, 0.0, 2.0], 1e-8).unwrap_err();
+    assert_eq!((off, why.as_str()), (1.0, "its rows have the norms [1.0, 2.0], not 1"));
+}
+
+#[test]
+fn exp_and_log_are_inverse_and_wrap() {
+    let (x, y) = ([3.0, 0.1], [-3.0, -2.4]);
+    let (p, q) = (point(&x), point(&y));
+    // The short way, across π in the first angle.
+    let v = vector(&x, &[2.0 * PI - 6.0, -2.5]);
+    assert!(difference(&run(Operation::Log, &[&p, &q], &[], 4).unwrap(), &v) < 1e-15);
+    assert!(difference(&run(Operation::Exp, &[&p, &v], &[], 4).unwrap(), &q) < 1e-15);
+    let middle = point(&[PI, -1.15]);
+    assert!(difference(&run(Operation::Geodesic, &[&p, &q], &[0.5], 4).unwrap(), &middle) < 1e-15);
+    let distance = run(Operation::Distance, &[&p, &q], &[], 1).unwrap();
+    assert!((distance[0] - (2.0 * PI - 6.0).hypot(2.5)).abs() < 1e-15);
+    // A short vector keeps its digits, at whatever angle.
+    let short = vector(&x, &[3e-9, -1e-12]);
+    let moved = run(Operation::Exp, &[&p, &short], &[], 4).unwrap();
+    assert!(difference(&run(Operation::Log, &[&p, &moved], &[], 4).unwrap(), &short) < 3e-16);
+}
+
+#[test]
+fn the_cut_locus_is_at_pi_in_any_coordinate() {
+    let (p, near, far) = (point(&[0.3, 1.0]), point(&[0.3, 1.0 - 3.1]), point(&[0.2, 1.0 + PI]));
+    assert!(run(Operation::Log, &[&p, &near], &[], 4).is_ok());
+    let (row, angle) = run(Operation::Log, &[&p, &far], &[], 4).unwrap_err();
+    assert_eq!(row, 0);
+    assert!((angle - PI).abs() < 1e-15);
+    let mut points = ANGLES.concat();
+    (points[6], points[7]) = (8.1, -4.0 + PI);
+    let fault = spline(&Torus::new(2).unwrap(), &point(&points), [End::Natural; 2]).unwrap_err();
+    assert!(matches!(fault, Status::CutLocus { index: 2, .. }), "{fault:?}");
+}
+
+#[test]
+fn the_spline_is_the_flat_one_of_the_angles() {
+    let (torus, flat) = (Torus::new(2).unwrap(), Euclidean::new(2).unwrap());
+    let angles = ANGLES.concat();
+    let points = point(&angles);
+    let x: Vec<f64> = (0..=200).map(|i| i as f64 * 7.1 / 200.0).collect();
+    let (nodes, times) = (KNOTS.len(), Times { x: &x, count: x.len() });
+    for end in [End::Natural, End::NotAKnot] {
+        let u = spline(&torus, &points, [end; 2]).unwrap();
+        let rates = spline(&flat, &angles, [end; 2]).unwrap();
+        assert!(difference(&u, &vector(&angles, &rates)) < 1e-13);
+        let curves = Curves { t: &KNOTS, nodes, points: &points, velocities: &u };
+        let lines = Curves { t: &KNOTS, nodes, points: &angles, velocities: &rates };
+        let theta = values(&flat, &lines, &times, Quantity::Point);
+        for (quantity, allowed) in QUANTITIES.into_iter().zip([1e-14, 1e-13, 1e-12]) {
+            let expected = match quantity {
+                Quantity::Point => point(&theta),
+                _ => vector(&theta, &values(&flat, &lines, &times, quantity)),
+            };
+            let off = difference(&values(&torus, &curves, &times, quantity), &expected);
+            assert!(off < allowed, "{quantity:?} is {off:e} off");
+        }
+    }
+}
+
+#[test]
+fn the_spline_is_c2_at_the_knots() {
+    let torus = Torus::new(2).unwrap();
+    let points = point(&ANGLES.concat());
+    // A start so fast the wrong way that the first middle leg takes the other way round.
+    let away = vector(&ANGLES[0], &[-8.5, 8.5]);
+    for ends in [[End::NotAKnot; 2], [End::Velocity(&away), End::Natural]] {
+        let u = spline(&torus, &points, ends).unwrap();
+        // Every segment as a curve of its own, at both its ends.
+        let twice = |x: &[f64], len: usize| -> Vec<f64> {
+            x.windows(2 * len).step_by(len).flatten().copied().collect()
+        };
+        let (t, p, v) = (twice(&KNOTS, 1), twice(&points, 4), twice(&u, 4));
+        let curves = Curves { t: &t, nodes: 2, points: &p, velocities: &v };
+        for (quantity, allowed) in QUANTITIES.into_iter().zip([1e-15, 1e-13, 1e-11]) {
+            let sides = values(&torus, &curves, &Times { x: &t, count: 2 }, quantity);
+            // The end of a segment, the start of the next, …
+            for (knot, sides) in sides[4..sides.len() - 4].chunks_exact(8).enumerate() {
+                let jump = difference(&sides[..4], &sides[4..]);
+                assert!(jump <= allowed, "{quantity:?} jumps by {jump:e} at knot {}", knot + 1);
+            }
+        }
+    }
+}
