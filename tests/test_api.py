@@ -416,10 +416,12 @@ def test_methods_agree(space):
         assert largest_difference(spline.velocities, reference.velocities) < 1e-12
 
 
-@pytest.mark.xfail(strict=True, reason="method='newton' does not exist yet")
 def test_newton_is_a_method():
-    spline = ss.CubicSpline(KNOTS, points_on(S2, 6), S2, method="newton")
-    assert spline.report.method == "newton"
+    p = points_on(S2, 6)
+    newton, auto = (ss.CubicSpline(KNOTS, p, S2, method=method) for method in ("newton", "auto"))
+    assert newton.report.method == "newton"
+    assert newton.report.iterations < auto.report.iterations
+    assert largest_difference(newton.velocities, auto.velocities) < 1e-12
 
 
 def test_tol_and_max_iter_bound_the_work():
@@ -812,7 +814,6 @@ def test_report_says_what_failed():
     assert "NOT converged" in str(spline[1].report)
 
 
-@pytest.mark.xfail(strict=True, reason="invariant_radius is always None")
 def test_invariant_radius_of_close_points():
     # (38) has a solution V exactly if KD ≤ 0.2610895, where KV = 0.4420886.
     spline = ss.CubicSpline(None, points_on(S2, 6, step=0.26), S2)

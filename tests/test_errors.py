@@ -617,7 +617,10 @@ def test_bad_knots_never_panic(how):
         (lambda: S2.exp(P, np.zeros((4, 3))), r"the leading axes do not broadcast: p \(3, 3\), v \(4, 3\)"),
         (lambda: S2.geodesic(P[0], P, [0, 1]), r"the leading axes do not broadcast"),
         (lambda: S2.distance(P, P + 0j), r"q must be an array of real numbers, not of complex128"),
-        (lambda: S2.project(np.zeros((2, 3))), r"x\[0\] cannot be projected: no point of the space is close to it, or it is not finite"),
+        (
+            lambda: S2.project(np.zeros((2, 3))),
+            r"x\[0\] cannot be projected: no point of the space is close to it, or it is not finite",
+        ),
         (lambda: S2.project([1, NAN, 0]), r"x cannot be projected"),
         (lambda: S2.check_point(2 * P), r"point 0 is off the space by 1\.000e0: its norm is 2"),
         (lambda: S2.check_tangent(P, P), r"vector 0 is not tangent .*a part of 1\.000e\+00"),

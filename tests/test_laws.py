@@ -207,7 +207,8 @@ def test_the_curve_is_c2(case, method, ends, spacing, rng):
 @pytest.mark.parametrize("ends", ["natural", "not-a-knot", "periodic", "velocity"])
 def test_solvers_agree(case, ends, rng):
     space = case.space
-    for step in (1e-3, 0.3, 1.2 / sharpness(space)):
+    # Far apart, several splines fit: the solvers may find different ones.
+    for step in (1e-3, 0.3, 1.0 / sharpness(space)):
         p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
         t = knots("random", len(p), rng)
         bc = end_conditions(ends, space, p)

@@ -17,7 +17,8 @@ from . import _cpu
 _cpu.check(_Path(__file__).parent)
 
 from . import convert  # noqa: E402
-from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads, set_num_threads  # noqa: E402
+from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
+from ._threads import set_num_threads  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
 from .product import Product  # noqa: E402
@@ -81,6 +82,9 @@ __all__ = [
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):
-    if not _threads.isdecimal():
-        raise ImportError(f"SYMSPLINE_NUM_THREADS must be a whole number, not {_threads!r}")
-    set_num_threads(int(_threads))
+    if not _threads.isdecimal() or len(_threads) > 9:
+        raise ImportError(f"SYMSPLINE_NUM_THREADS must be a whole number, not {_threads[:99]!r}")
+    try:
+        set_num_threads(int(_threads))
+    except ValidationError as _error:
+        raise ImportError(f"SYMSPLINE_NUM_THREADS: {_error}") from None

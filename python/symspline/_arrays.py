@@ -18,10 +18,24 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
         raise ValidationError(f"{name} is not an array of equally long rows: {error}") from None
 
 
+def shown(value: Any) -> str:
+    """A value in a message: on one line, and not too long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 150 else f"{text[:150]}…"
+
+
+def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
+    """The numbers in contiguous memory and of a type; those it cannot hold become infinite or zero."""
+    if array.dtype == dtype:
+        return np.asarray(array, order="C")
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        return np.asarray(array, dtype=dtype, order="C")
+
+
 def whole_number(value: Any, name: str, least: int) -> int:
     """A whole number that fits into a machine word."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise ValidationError(f"{name} must be a whole number, not {value!r}")
+        raise ValidationError(f"{name} must be a whole number, not {shown(value)}")
     if not least <= int(value) < 2**62:
         raise ValidationError(f"{name} must be at least {least} and not beyond 2**62, not {value}")
     return int(value)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._arrays import shown
 from ._core import ValidationError
 from .spaces import Space
 
@@ -31,7 +32,7 @@ def ends_of(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[End] | N
             return _NATURAL
         bc_type = (bc_type, bc_type)
     if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
-        raise ValidationError(f"{_HELP}; got {bc_type!r}")
+        raise ValidationError(f"{_HELP}; got {shown(bc_type)}")
     return [_end(end, name, space, batch) for end, name in zip(bc_type, ("start", "end"), strict=True)]
 
 
@@ -39,18 +40,18 @@ def _end(end: Any, name: str, space: Space, batch: tuple[int, ...]) -> End:
     shape = batch + space._doubles_shape
     if isinstance(end, str):
         if end not in _WORDS:
-            raise ValidationError(f"{_HELP}; the {name} is {end!r}")
+            raise ValidationError(f"{_HELP}; the {name} is {shown(end)}")
         return ("velocity", np.zeros(shape)) if end == "clamped" else (end, None)
     pair = isinstance(end, (tuple, list)) and len(end) == 2
     if not pair or not isinstance(end[0], (int, np.integer)) or end[0] not in _ORDERS:
-        raise ValidationError(f"{_HELP}; the {name} is {end!r}")
+        raise ValidationError(f"{_HELP}; the {name} is {shown(end)}")
     kind = _ORDERS[int(end[0])]
     value = space._doubles(end[1], f"the {name} {kind}")
     try:
         return kind, np.ascontiguousarray(np.broadcast_to(value, shape))
     except ValueError:
         raise ValidationError(
-            f"the {name} {kind} has shape {value.shape}, which does not broadcast to {shape}"
+            f"the {name} {kind} has shape {np.shape(end[1])}, which does not broadcast to {batch + space.point_shape}"
         ) from None
 
 

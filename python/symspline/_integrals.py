@@ -24,14 +24,20 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
     """
     times = np.broadcast_to(times, (*batch, times.shape[-1]))
     a, b = times[..., :-1], times[..., 1:]
+    if 0 in batch:
+        return np.zeros(batch)
+    # What is too large for doubles becomes infinite, and a curve that was not found is NaN.
+    with np.errstate(all="ignore"):
+        return _refined(a, b, f, batch)
+
+
+def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...]) -> Any:
     total = np.zeros(batch)
-    if total.size == 0:
-        return total
     whole = _rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)
     before, stalled = np.full(batch, np.inf), np.zeros(batch, dtype=int)
     while True:
-        middle = (a + b) / 2
+        middle = a / 2 + b / 2
         halves = _rule(a, middle, f), _rule(middle, b, f)
         better = halves[0] + halves[1]
         error = np.abs(better - whole)
@@ -51,7 +57,7 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
 
 def _rule(a: Doubles, b: Doubles, f: Callable[[Doubles], Any]) -> Doubles:
     half = (b - a) / 2
-    x = (a + b)[..., None] / 2 + half[..., None] * _NODES
+    x = (a / 2 + b / 2)[..., None] + half[..., None] * _NODES
     values = f(np.ascontiguousarray(x.reshape(*a.shape[:-1], -1))).reshape(x.shape)
     result: Doubles = (values @ _WEIGHTS) * half
     return result

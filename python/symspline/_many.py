@@ -10,6 +10,7 @@ from . import _core, spline
 from ._arrays import whole_number
 from ._core import ValidationError
 from ._ends import ends_of, kept, picked
+from ._span import fit_each_in_span, is_large
 from .report import shaped
 from .spaces import Space
 from .spline import CubicSpline
@@ -33,6 +34,9 @@ def fit_many(
     spline._check_options(on_failure, progress)
     if max_iter is not None:
         max_iter = whole_number(max_iter, "max_iter", 1)
+    for number, curve in enumerate(curves):
+        if not isinstance(curve, (tuple, list)) or len(curve) != 2:
+            raise ValidationError(f"curve {number} must be a pair (t, points)")
     if hasattr(space, "factors"):
         from .product import fit_many as product_many
 
@@ -53,11 +57,14 @@ def fit_many(
             raise ValidationError(f"curve {number}: {error}") from None
         point_tol = max(point_tol, tol_here)
     offsets = np.cumsum([0, *(len(p) for *_, p in prepared)])
+    all_times = np.concatenate([times for _, _, times, _ in prepared])
+    ends = ends_of(bc_type, space, (len(curves),))
+    large = is_large(space)
     all_points, all_velocities, columns, faults = _core.fit(
         space._handle,
-        np.concatenate([times for _, _, times, _ in prepared]),
+        all_times,
         np.concatenate([p for *_, p in prepared]),
-        ends_of(bc_type, space, (len(curves),)),
+        ends,
         method,
         tol,
         max_iter,
@@ -65,8 +72,13 @@ def fit_many(
         point_tol,
         offsets.tolist(),
         progress,
+        large,
     )
     all_points, all_velocities = space._numbers(all_points), space._numbers(all_velocities)
+    if large:
+        all_velocities, columns, faults = fit_each_in_span(
+            space, all_times, all_points, offsets, ends, (method, tol, max_iter), progress
+        )
     ends_kept = kept(bc_type)
     reports = shaped(columns, (len(curves),), space.curvature, method)
     fitted = [

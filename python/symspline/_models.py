@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._reading import Array, length, real_numbers, refuse
+from ._reading import Array, length, real_numbers, refuse, unmoved_by_underflow
 
 
+@unmoved_by_underflow
 def hyperboloid_to_ball(x: ArrayLike) -> Array:
     """The points of `Hyperbolic` in the Poincaré ball, by stereographic projection.
 
@@ -33,6 +34,7 @@ def hyperboloid_to_ball(x: ArrayLike) -> Array:
     return _inside(rest / (1 + time)[..., None], "x")
 
 
+@unmoved_by_underflow
 def ball_to_hyperboloid(y: ArrayLike) -> Array:
     """The points of `Hyperbolic` with given places in the Poincaré ball.
 
@@ -52,6 +54,7 @@ def ball_to_hyperboloid(y: ArrayLike) -> Array:
     return _with_time(2 * y / room)
 
 
+@unmoved_by_underflow
 def hyperboloid_to_half_space(x: ArrayLike) -> Array:
     """The points of `Hyperbolic` in the upper half-space, whose last coordinate is the height.
 
@@ -76,6 +79,7 @@ def hyperboloid_to_half_space(x: ArrayLike) -> Array:
     return np.concatenate([ground / steep, 1 / steep], axis=-1)
 
 
+@unmoved_by_underflow
 def half_space_to_hyperboloid(z: ArrayLike) -> Array:
     """The points of `Hyperbolic` with given places in the upper half-space.
 
@@ -104,6 +108,7 @@ def half_space_to_hyperboloid(z: ArrayLike) -> Array:
     return x
 
 
+@unmoved_by_underflow
 def ball_to_half_space(y: ArrayLike) -> Array:
     """From the Poincaré ball to the upper half-space, whose last coordinate is the height.
 
@@ -126,6 +131,7 @@ def ball_to_half_space(y: ArrayLike) -> Array:
     return z
 
 
+@unmoved_by_underflow
 def half_space_to_ball(z: ArrayLike) -> Array:
     """From the upper half-space to the Poincaré ball.
 

@@ -17,9 +17,11 @@ from ._reading import (
     refuse,
     square_matrices,
     unit_vectors,
+    unmoved_by_underflow,
 )
 
 
+@unmoved_by_underflow
 def basis_to_projector(basis: ArrayLike) -> Array:
     """The orthogonal projectors Y Y* on subspaces, the same for every basis Y of a subspace.
 
@@ -55,6 +57,7 @@ def basis_to_projector(basis: ArrayLike) -> Array:
     return _hermitian_part(q @ adjoint(q))
 
 
+@unmoved_by_underflow
 def projector_to_basis(projector: ArrayLike) -> Array:
     """Orthonormal bases of the subspaces that orthogonal projectors project on, points of a Grassmannian.
 
@@ -88,6 +91,7 @@ def projector_to_basis(projector: ArrayLike) -> Array:
     return basis
 
 
+@unmoved_by_underflow
 def state_to_density(state: ArrayLike) -> Array:
     """The density matrices ψψ* of pure states, the same whatever the phase of ψ.
 
@@ -110,6 +114,7 @@ def state_to_density(state: ArrayLike) -> Array:
     return density
 
 
+@unmoved_by_underflow
 def density_to_state(density: ArrayLike) -> Array:
     """The state vectors of density matrices of pure states, points of `ComplexProjective`.
 

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._core import ValidationError
-from ._reading import Array, length, off_one, real_numbers, refuse, unit_vectors
+from ._reading import Array, length, off_one, real_numbers, refuse, unit_vectors, unmoved_by_underflow
 
 
+@unmoved_by_underflow
 def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None) -> Array:
     """The unit quaternions of rotations, accurate for small angles and for angles near π.
 
@@ -48,6 +49,7 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
     return q if first else np.roll(q, -1, axis=-1)
 
 
+@unmoved_by_underflow
 def quaternion_to_matrix(quaternion: ArrayLike, *, scalar_first: bool | None = None) -> Array:
     """The rotation matrices of unit quaternions.
 

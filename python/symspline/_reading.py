@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array
+from ._arrays import as_array, cast
 from ._core import ValidationError
-from .spaces import POINT_TOL, POINT_TOL_FLOAT32
+from .spaces import point_tol
 
 Array = NDArray[Any]
 
-_SINGLE = (np.float32, np.float16, np.complex64)
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def unmoved_by_underflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """The function, for which numbers too small for doubles are zero, also where NumPy is to raise."""
+
+    @wraps(function)
+    def quiet(*arguments: _P.args, **options: _P.kwargs) -> _T:
+        with np.errstate(under="ignore"):
+            return function(*arguments, **options)
+
+    return quiet
 
 
 def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
@@ -28,8 +41,8 @@ def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
         raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
     if array.ndim < axes:
         raise ValidationError(f"{name} has shape {array.shape}, but needs {axes} or more axes")
-    tol = POINT_TOL_FLOAT32 if array.dtype in _SINGLE else POINT_TOL
-    array = array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+    tol = point_tol(array.dtype)
+    array = cast(array.copy(), np.complex128 if array.dtype.kind == "c" else np.float64)
     refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}; leave out what is missing or not finite")
     return array, tol
 

@@ -8,33 +8,25 @@ coordinates there; the curve is fitted and evaluated in them and lifted back.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .spaces import (
-    ComplexGrassmannian,
-    ComplexProjective,
-    Grassmannian,
-    Hyperbolic,
-    RealProjective,
-    Space,
-    Sphere,
-)
+from . import _core
+from .spaces import LARGE as _LARGE
+from .spaces import ComplexGrassmannian, Grassmannian, Hyperbolic, Space
 
 Array = NDArray[Any]
-
-# From this ambient dimension on curves are made in the span of their points.
-_LARGE = 256
+Progress = Callable[[int, int], object]
 
 
 def is_large(space: Space) -> bool:
     """Whether curves in a space are made in the span of their points."""
-    return isinstance(space, _LINEAR) and space.point_shape[0] >= _LARGE
-
-
-_LINEAR = (Sphere, Hyperbolic, RealProjective, ComplexProjective, Grassmannian, ComplexGrassmannian)
+    return space._linear and space.point_shape[0] >= _LARGE
 
 
 class Span(NamedTuple):
@@ -64,6 +56,70 @@ def span_of(space: Space, *arrays: Array) -> Span:
     return Span(space, _small(space, basis.shape[-1]), basis)
 
 
+def fit_in_span(
+    space: Space, times: Array, points: Array, ends: Any, options: Any, progress: Progress | None
+) -> tuple[Array, Any, list[Any]]:
+    """What the compiled core says of a fit: velocities, the columns of the report, and faults.
+
+    Points and end conditions have been validated; ``options`` are method, tol and max_iter.
+    """
+    # Vectors at the ends as rows of one knot.
+    axis = -1 - len(space.point_shape)
+    vectors = [
+        None if value is None else np.expand_dims(space._numbers(value), axis) for _, value in ends or []
+    ]
+    span = span_of(space, points, *(vector for vector in vectors if vector is not None))
+    small_ends = ends and [
+        (kind, None if vector is None else _doubles(span.down(vector).squeeze(axis)))
+        for (kind, _), vector in zip(ends, vectors, strict=True)
+    ]
+    method, tol, max_iter = options
+    _, velocities, columns, faults = _core.fit(
+        span.space._handle,
+        times,
+        _doubles(span.down(points)),
+        small_ends,
+        method,
+        tol,
+        max_iter,
+        False,
+        0.0,
+        progress=progress,
+    )
+    return span.up(span.space._numbers(velocities)), columns, faults
+
+
+def fit_each_in_span(
+    space: Space,
+    times: Array,
+    points: Array,
+    offsets: Array,
+    ends: Any,
+    options: Any,
+    progress: Progress | None,
+) -> tuple[Array, Any, list[Any]]:
+    """The same for curves that follow each other in one array, each in a span of its own."""
+    velocities, columns, faults = [], [], []
+    for i, (start, stop) in enumerate(pairwise(offsets)):
+        own_ends = ends and [(kind, None if value is None else value[i : i + 1]) for kind, value in ends]
+        share = progress and partial(_advance, progress, int(start), len(points))
+        found, column, fault = fit_in_span(
+            space, times[start:stop], points[None, start:stop], own_ends, options, share
+        )
+        velocities.append(found[0])
+        columns.append(column)
+        faults += [(i, kind, why.replace(" of curve 0", f" of curve {i}")) for _, kind, why in fault]
+    return np.concatenate(velocities), tuple(map(np.concatenate, zip(*columns, strict=True))), faults
+
+
+def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:
+    return progress(before + finished, total)
+
+
+def _doubles(numbers: Array) -> NDArray[np.float64]:
+    return np.ascontiguousarray(numbers).view(np.float64)
+
+
 def lifted(span: Span, values: Array, batch: tuple[int, ...]) -> Array:
     """Points or vectors of shape batch + times + (*point_shape) of the small space, back in the large."""
     axes = len(span.space.point_shape)
@@ -77,7 +133,7 @@ def _small(space: Space, m: int) -> Space:
         return type(space)(space.point_shape[1], m)
     if isinstance(space, Hyperbolic):
         return Hyperbolic(m)
-    small: Space = type(space)(m - 1)  # type: ignore[call-arg]
+    small: Space = type(space)(m - 1)
     return small
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array
+from ._arrays import as_array, cast
 from ._core import ValidationError
 
 Doubles = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Clock:
             return _seconds(array, origin, name)
         if origin is not None:
             array = _difference(array, origin) if array.dtype.kind in "iub" else array - np.float64(origin)
-        return np.asarray(array, dtype=np.float64, order="C")
+        return cast(array)
 
     def explain(self, error: ValidationError) -> ValidationError:
         """The error, saying from where its times are counted."""
@@ -89,7 +89,7 @@ def clock_of(knots: ArrayLike) -> tuple[Clock, NDArray[Any]]:
         return Clock(np.array(first)[()]), array.copy()
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"t must be numbers or datetime64, not {array.dtype}")
-    return Clock(), array.astype(np.float64)
+    return Clock(), cast(array.copy())
 
 
 def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._arrays import as_array, whole_number
-from ._core import CutLocusError, ValidationError
-from .spaces import POINT_TOL, POINT_TOL_FLOAT32, Space
+from ._arrays import as_array, cast, shown, whole_number
+from ._control import checked_knots, checked_points, control_array
+from ._core import ValidationError
+from ._span import Span, is_large, lifted, span_of
+from .spaces import Space
 from .spaces import space as space_named
 
 Array = NDArray[Any]
@@ -22,12 +24,14 @@ class BSpline:
     """A B-spline curve on a space: de Boor's algorithm with geodesics in place of straight lines.
 
     In flat space it is SciPy's ``BSpline``. On a curved space it keeps the ends and the smoothness at
-    simple knots up to C¹ (Popiel & Noakes 2007); at interior knots higher derivatives may jump.
+    simple knots up to C¹ (Popiel & Noakes 2007); at interior knots higher derivatives may jump. Where they
+    jump the curve has those from the right, at its end those from the left.
 
     Args:
         knots: shape (n + degree + 1,) for n control points, not falling; a knot may repeat up to
             ``degree + 1`` times, at which the curve is less smooth.
-        control_points: shape (..., n, *space.point_shape); leading axes are independent curves.
+        control_points: shape (..., n, *space.point_shape); leading axes are independent curves. Points
+            within 1e-8 of the space (1e-4 for single precision) are projected.
         degree: 1 or more.
         space: a space or its name.
 
@@ -42,64 +46,12 @@ class BSpline:
     """
 
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space | str) -> None:
-        self._space = space = space_named(space)
-        if hasattr(space, "factors"):
-            raise ValidationError("a curve in a product is one curve in every factor: make one for each")
+        self._space = space = _factor(space)
         self._degree = whole_number(degree, "degree", 1)
-        array = as_array(control_points, "control_points")
-        if array.ndim <= len(space.point_shape) or array.size == 0:
-            raise ValidationError(
-                f"control_points has shape {array.shape}; a curve needs shape (..., n, *point_shape)"
-            )
-        self._control_points = self._checked(array)
-        self._knots = self._checked_knots(knots)
+        doubles, tol = control_array(control_points, space, 2)
+        self._knots = checked_knots(knots, space._lead(doubles)[-1], self._degree)
+        self._control_points = checked_points(space, doubles, tol)
         self._control_points.flags.writeable = self._knots.flags.writeable = False
-
-    def _checked(self, array: Array) -> Array:
-        """The control points, on the space and within reach of each other."""
-        space = self._space
-        tol = POINT_TOL_FLOAT32 if array.dtype in (np.float32, np.float16) else POINT_TOL
-        doubles = space._doubles(array, "control_points")
-        lead = space._lead(doubles)
-        space._handle.check_points(space._rows(doubles, lead), lead, tol)
-        points = space.project(space._numbers(doubles))
-        index = (slice(None),) * (len(lead) - 1)
-        for i in range(lead[-1] - 1):
-            try:
-                space.log(points[(*index, i)], points[(*index, i + 1)])
-            except CutLocusError as error:
-                raise CutLocusError(f"control points {i} and {i + 1}: {error}") from None
-        return points
-
-    def _checked_knots(self, knots: ArrayLike) -> NDArray[np.float64]:
-        array = as_array(knots, "knots")
-        if array.ndim != 1 or array.dtype.kind not in "biuf":
-            raise ValidationError(
-                f"knots must be a row of real numbers, not {array.dtype} of shape {array.shape}"
-            )
-        count = self._control_points.shape[-1 - len(self._space.point_shape)]
-        needed = count + self._degree + 1
-        if count <= self._degree:
-            raise ValidationError(
-                f"degree {self._degree} needs at least {self._degree + 1} control points, got {count}"
-            )
-        if array.size != needed:
-            raise ValidationError(
-                f"{count} control points of degree {self._degree} need {needed} knots, got {array.size}"
-            )
-        result = array.astype(np.float64)
-        if not np.isfinite(result).all():
-            raise ValidationError(f"knots[{np.flatnonzero(~np.isfinite(result))[0]}] is not finite")
-        falls = np.flatnonzero(np.diff(result) < 0)
-        if falls.size:
-            raise ValidationError(
-                f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]"
-            )
-        if not result[self._degree] < result[count]:
-            raise ValidationError(
-                f"the curve lives between knots[{self._degree}] and knots[{count}], which are equal"
-            )
-        return result
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> Array:
         """The curve at times x.
@@ -114,30 +66,47 @@ class BSpline:
         Raises:
             ValidationError: a time is not finite or outside.
         """
-        if isinstance(nu, bool) or nu not in _QUANTITIES:
-            raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}")
-        return self._space._numbers(self._evaluate(x, _QUANTITIES[nu]))
+        try:
+            quantity = _QUANTITIES[nu]
+        except (KeyError, TypeError):
+            raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}") from None
+        return self._evaluate(x, quantity)
 
     def speed(self, x: ArrayLike) -> Array:
         """|γ'| at times x, shape batch axes + x.shape."""
         return self._evaluate(x, "speed")[()]
 
-    def _evaluate(self, x: ArrayLike, quantity: str) -> NDArray[np.float64]:
+    def _evaluate(self, x: ArrayLike, quantity: str) -> Array:
+        times = self._times(x)
+        space, control, span = self._space, self._control_points, None
+        if is_large(space):
+            span = self._span()
+            space, control = span.space, span.down(control)
+        values = _core.evaluate_bspline(
+            space._handle, self._knots, control.view(np.float64), self._degree, times, quantity
+        )
+        if quantity == "speed":
+            return values
+        batch = control.shape[: control.ndim - len(space.point_shape) - 1]
+        return space._numbers(values) if span is None else lifted(span, space._numbers(values), batch)
+
+    def _span(self) -> Span:
+        return span_of(self._space, self._control_points)
+
+    def _times(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Times of the curve as doubles."""
         times = as_array(x, "x")
         if times.dtype.kind not in "biuf":
             raise ValidationError(f"x must be real numbers, not {times.dtype}")
-        times = np.ascontiguousarray(times, dtype=np.float64).reshape(times.shape)
+        times = cast(times)
         start, end = self.domain
         outside = ~((times >= start) & (times <= end))
         if outside.any():
             index = np.argwhere(outside)[0].tolist()
-            raise ValidationError(
-                f"x{index or ''} = {times[tuple(index)]} is outside the curve's times [{start}, {end}]"
-            )
-        control = self._control_points.view(np.float64)
-        return _core.evaluate_bspline(
-            self._space._handle, self._knots, control, self._degree, times, quantity
-        )
+            time = times[tuple(index)]
+            where = f"outside the curve's times [{start}, {end}]" if np.isfinite(time) else "not finite"
+            raise ValidationError(f"x{index or ''} = {time} is {where}")
+        return times
 
     @property
     def domain(self) -> tuple[float, float]:
@@ -176,6 +145,11 @@ class BSpline:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        # Unpickled arrays can be written to.
+        self._control_points.flags.writeable = self._knots.flags.writeable = False
+
     def __repr__(self) -> str:
         count = self._control_points.shape[-1 - len(self._space.point_shape)]
         return f"<{type(self).__name__} on {self._space!r}: {count} control points, degree {self._degree}>"
@@ -197,11 +171,14 @@ class BezierCurve(BSpline):
     """
 
     def __init__(self, control_points: ArrayLike, space: Space | str) -> None:
-        space = space_named(space)
-        shape = np.shape(as_array(control_points, "control_points"))
-        count = shape[-1 - len(space.point_shape)] if len(shape) > len(space.point_shape) else 0
-        if count < 2:
-            raise ValidationError(
-                f"control_points has shape {shape}; a curve needs shape (..., n, *point_shape) with n >= 2"
-            )
+        space = _factor(space)
+        count = space._lead(control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
+
+
+def _factor(space: Space | str) -> Space:
+    """The space, which is no product."""
+    space = space_named(space)
+    if hasattr(space, "factors"):
+        raise ValidationError("a curve in a product is one curve in every factor: make one for each")
+    return space

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import spline as _spline
+from ._arrays import shown
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._ends import kept
-from .report import Report
+from .report import SOLVERS, Report
 from .spaces import Space
 from .spaces import space as space_named
 from .spline import CubicSpline
@@ -55,8 +57,8 @@ class Product(Space):
 
     @property
     def curvature(self) -> float:
-        """The largest K of the factors."""
-        return max(f.curvature for f in self.factors)
+        """The largest K of the factors; NaN if one of them has none."""
+        return float(np.max([f.curvature for f in self.factors]))
 
     def __str__(self) -> str:
         return " x ".join(map(str, self.factors))
@@ -87,7 +89,7 @@ class Product(Space):
         return self._each("geodesic", p, q, t=t)
 
     def distance(self, p: Any, q: Any) -> Any:
-        return np.sqrt(sum(np.square(d) for d in self._each("distance", p, q)))
+        return _together(self._each("distance", p, q))
 
     def transvection(self, p: Any, v: Any, x: Any) -> Any:
         return self._each("transvection", p, v, x)
@@ -99,7 +101,7 @@ class Product(Space):
         return sum(self._each("inner", p, u, v))
 
     def norm(self, p: Any, v: Any) -> Any:
-        return np.sqrt(sum(np.square(n) for n in self._each("norm", p, v)))
+        return _together(self._each("norm", p, v))
 
     def project(self, x: Any) -> Any:
         return self._each("project", x)
@@ -117,6 +119,7 @@ class Product(Space):
         return tuple(factor.random_point(rng, shape) for factor in self.factors)
 
     def random_tangent(self, rng: np.random.Generator, p: Any) -> Any:
+        check_tuple(p, self, "p")
         return tuple(factor.random_tangent(rng, q) for factor, q in zip(self.factors, p, strict=True))
 
 
@@ -138,7 +141,7 @@ class ProductSpline(CubicSpline):
     ) -> None:
         space = space_named(space)
         _spline._check_options(on_failure, options.get("progress"))
-        _check_tuple(points, space, "points")
+        check_tuple(points, space, "points")
         ends = _split_ends(bc_type, space)
         _validate(t, points, space, ends, options)
         parts, errors = [], []
@@ -168,7 +171,7 @@ class ProductSpline(CubicSpline):
     def _evaluate(self, *arguments: Any) -> Any:
         values = tuple(part._evaluate(*arguments) for part in self._parts)
         if arguments[1] in ("speed", "bend"):
-            return np.sqrt(sum(np.square(value) for value in values))
+            return _together(values)
         return values
 
     @property
@@ -211,7 +214,7 @@ def fit_many(
 ) -> list[CubicSpline]:
     """`symspline.fit_many` in a product: one parallel call a factor."""
     for number, curve in enumerate(curves):
-        _check_tuple(curve[1], space, f"curve {number}: points")
+        check_tuple(curve[1], space, f"curve {number}: points")
     columns, errors = [], []
     for i, (factor, bc) in enumerate(zip(space.factors, _split_ends(bc_type, space), strict=True)):
         part = [(t, points[i]) for t, points in curves]
@@ -267,7 +270,8 @@ def _kind(error: Exception) -> str:
     return "cut-locus" if isinstance(error, CutLocusError) else "unconverged"
 
 
-def _check_tuple(points: Any, space: Product, name: str) -> None:
+def check_tuple(points: Any, space: Any, name: str) -> None:
+    """Raise ValidationError unless there is one array a factor."""
     if not isinstance(points, (tuple, list)) or len(points) != len(space.factors):
         raise ValidationError(
             f"{name} must be a tuple of {len(space.factors)} arrays, one a factor of {space!r}"
@@ -279,16 +283,16 @@ def _split_ends(bc_type: Any, space: Product) -> list[Any]:
     if isinstance(bc_type, str):
         return [bc_type] * len(space.factors)
     if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
-        raise ValidationError(f"bc_type must be a word or a pair, not {bc_type!r}")
+        raise ValidationError(f"bc_type must be a word or a pair, not {shown(bc_type)}")
 
     def part(end: Any, i: int) -> Any:
         if isinstance(end, str):
             return end
         if not isinstance(end, (tuple, list)) or len(end) != 2:
             raise ValidationError(
-                f"an end condition is a word or a pair (order, tuple of vectors), not {end!r}"
+                f"an end condition is a word or a pair (order, tuple of vectors), not {shown(end)}"
             )
-        _check_tuple(end[1], space, "an end vector")
+        check_tuple(end[1], space, "an end vector")
         return (end[0], end[1][i])
 
     return [tuple(part(end, i) for end in bc_type) for i in range(len(space.factors))]
@@ -306,6 +310,12 @@ def _join_ends(ends: list[Any]) -> Any:
     return (both(0), both(1))
 
 
+def _together(lengths: Tuple) -> Any:
+    """What lengths in the factors are as one, by Pythagoras' theorem."""
+    with np.errstate(all="ignore"):
+        return reduce(np.hypot, lengths)
+
+
 def _worst(parts: tuple[CubicSpline, ...], space: Product) -> Report:
     reports = [part.report for part in parts]
 
@@ -316,6 +326,9 @@ def _worst(parts: tuple[CubicSpline, ...], space: Product) -> Report:
     converged: Any = np.all(np.stack([np.asarray(r.converged) for r in reports]), axis=0)
     return replace(
         reports[0],
+        method=max((r.method for r in reports), key=SOLVERS.index),
+        # The theorem is about each factor by itself.
+        invariant_radius=None,
         converged=bool(converged) if np.ndim(converged) == 0 else converged,
         iterations=largest([r.iterations for r in reports]),
         residual=largest([r.residual for r in reports]),
@@ -327,10 +340,10 @@ def _worst(parts: tuple[CubicSpline, ...], space: Product) -> Report:
 
 def _longest_step(parts: tuple[CubicSpline, ...]) -> Any:
     """D of (21): distances of the factors add as in Pythagoras' theorem, step by step."""
-    square: Any = 0.0
+    steps = []
     for part in parts:
         index = (slice(None),) * len(part._batch)
         p, q = part.points[(*index, slice(None, -1))], part.points[(*index, slice(1, None))]
-        square = square + part.space.distance(p, q) ** 2
-    longest = np.sqrt(np.max(square, axis=-1))
+        steps.append(part.space._apply("distance", p=p, q=q))
+    longest = np.max(_together(tuple(steps)), axis=-1)
     return float(longest) if np.ndim(longest) == 0 else longest

@@ -65,9 +65,9 @@ class Report:
 
     def _certificate(self) -> str:
         radius = self.invariant_radius
-        if radius is None or np.isnan(radius).all():
+        if radius is None or np.isnan(radius).any():
             return ""
-        return f", control legs stay below {np.nanmax(radius):.3g} (Theorem 3.1)"
+        return f", control legs stay below {np.max(radius):.3g} (Theorem 3.1)"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Report):

@@ -8,13 +8,22 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array
+from ._arrays import as_array, cast, shown, whole_number
 from ._core import Handle, ValidationError
 
 Array = NDArray[Any]
 
 POINT_TOL = 1e-8
 POINT_TOL_FLOAT32 = 1e-4
+# From this ambient dimension on nothing is made that needs a frame of all tangent vectors.
+LARGE = 256
+# So many numbers are 8 TB.
+_MOST = 2**40
+
+
+def point_tol(dtype: np.dtype[Any]) -> float:
+    """How far off a space points of a type may be."""
+    return POINT_TOL_FLOAT32 if dtype in (np.float32, np.float16, np.complex64) else POINT_TOL
 
 
 class Space:
@@ -25,6 +34,8 @@ class Space:
     """
 
     _name: ClassVar[str]
+    # Whether points are vectors or bases of subspaces, so that curves stay in the span of their points.
+    _linear: ClassVar[bool] = False
     _handle: Handle
     _parameters: tuple[int, ...]
     _complex: bool
@@ -32,13 +43,15 @@ class Space:
     def __init__(self, *parameters: int) -> None:
         for value in parameters:
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
-                raise ValidationError(f"{type(self).__name__} takes whole numbers, not {value!r}")
+                raise ValidationError(f"{type(self).__name__} takes whole numbers, not {shown(value)}")
         self._parameters = tuple(int(value) for value in parameters)
         try:
             self._handle = Handle(self._name, list(self._parameters))
         except OverflowError:
             raise ValidationError(f"{self!r} is too large") from None
         self._point_shape = tuple(self._handle.point_shape())
+        if max(self._parameters, default=0) >= _MOST or math.prod(self._point_shape) >= _MOST:
+            raise ValidationError(f"{self!r} is too large: no memory holds a point of it")
         self._complex = self._handle.is_complex()
 
     # ---- what it is ----
@@ -60,7 +73,8 @@ class Space:
 
     @property
     def curvature(self) -> float:
-        """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r."""
+        """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r; NaN for poses, which have no
+        invariant metric."""
         return self._handle.curvature()
 
     def __str__(self) -> str:
@@ -91,7 +105,7 @@ class Space:
         >>> ss.Sphere(2).exp([1, 0, 0], [0, ss.Sphere(2).injectivity_radius / 2, 0]).round(15)
         array([0., 1., 0.])
         """
-        return self._apply("exp", p=p, v=v)
+        return self._finite("exp", p=p, v=v)
 
     def log(self, p: ArrayLike, q: ArrayLike) -> Array:
         """The velocity at p of the geodesic that reaches q in unit time; inverse of `exp`.
@@ -99,7 +113,7 @@ class Space:
         Raises:
             CutLocusError: the two points lie at or past each other's cut locus.
         """
-        return self._apply("log", p=p, q=q)
+        return self._finite("log", p=p, q=q)
 
     def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> Array:
         """The geodesic from p (t = 0) to q (t = 1), the paper's [p, q]_t.
@@ -112,15 +126,15 @@ class Space:
         times = as_array(t, "t")
         if times.dtype.kind not in "biuf":
             raise ValidationError(f"t must be real numbers, not {times.dtype}")
-        return self._apply("geodesic", t=times.astype(np.float64), p=p, q=q)
+        return self._finite("geodesic", t=cast(times), p=p, q=q)
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
         """Length of the shortest geodesic between p and q; shape of the leading axes."""
-        return self._apply("distance", p=p, q=q)
+        return self._finite("distance", p=p, q=q)
 
     def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> Array:
         """The transvection E_p(v) of (10), applied to the point x: it moves p to exp_p(v)."""
-        return self._apply("transvection", p=p, v=v, x=x)
+        return self._finite("transvection", p=p, v=v, x=x)
 
     def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> Array:
         """Parallel transport of the tangent vector v from p to q along the geodesic between them.
@@ -128,15 +142,15 @@ class Space:
         Raises:
             CutLocusError: the two points lie at or past each other's cut locus.
         """
-        return self._apply("transport", p=p, q=q, v=v)
+        return self._finite("transport", p=p, q=q, v=v)
 
     def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
         """Inner product of two tangent vectors at p; shape of the leading axes."""
-        return self._apply("inner", p=p, u=u, v=v)
+        return self._finite("inner", p=p, u=u, v=v)
 
     def norm(self, p: ArrayLike, v: ArrayLike) -> Array:
         """Length of the tangent vector v at p; shape of the leading axes."""
-        result: Array = np.sqrt(np.maximum(self._apply("inner", p=p, v=v, again=v), 0.0))
+        result: Array = np.sqrt(np.maximum(self._finite("inner", p=p, v=v, again=v), 0.0))
         return result
 
     # ---- membership ----
@@ -148,23 +162,27 @@ class Space:
             ValidationError: no point is close to x (a zero vector, or not finite).
         """
         result = self._apply("project", x=x)
-        good = np.isfinite(result) & np.isfinite(np.asarray(x, dtype=self.dtype))
+        good = np.isfinite(result) & np.isfinite(cast(np.asarray(x), self.dtype))
         if not good.all():
             bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
             raise ValidationError(
                 f"x{bad or ''} cannot be projected: no point of the space is close to it, or it is not finite"
             )
+        try:
+            self.check_point(result)
+        except ValidationError as error:
+            raise ValidationError(f"x cannot be projected; of what comes nearest, {error}") from None
         return result
 
     def project_tangent(self, p: ArrayLike, v: ArrayLike) -> Array:
         """The tangential part of v at p."""
-        return self._apply("project_tangent", p=p, v=v)
+        return self._finite("project_tangent", p=p, v=v)
 
     def check_point(self, p: ArrayLike) -> None:
         """Raise ValidationError unless p (or every one of an array of points) is a point."""
         array = self._doubles(p, "p")
         lead = self._lead(array)
-        self._handle.check_points(self._rows(array, lead), lead, POINT_TOL)
+        self._handle.check_points(self._rows(array, lead), lead, point_tol(np.asarray(p).dtype))
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
         """Raise ValidationError unless v is a tangent vector at the point p."""
@@ -173,28 +191,43 @@ class Space:
         try:
             lead = np.broadcast_shapes(self._lead(points), self._lead(vectors))
         except ValueError:
-            raise ValidationError(f"p {points.shape} and v {vectors.shape} do not broadcast") from None
+            raise ValidationError(f"p {np.shape(p)} and v {np.shape(v)} do not broadcast") from None
         defects = self._handle.tangent_defects(self._rows(points, lead), self._rows(vectors, lead))
-        bad = np.flatnonzero(~(defects <= POINT_TOL))
+        tol = max(point_tol(np.asarray(p).dtype), point_tol(np.asarray(v).dtype))
+        bad = np.flatnonzero(~(defects <= tol))
         if bad.size:
+            index = ",".join(map(str, np.unravel_index(bad[0], lead)))
             raise ValidationError(
-                f"vector {bad[0]} is not tangent at its point: a part of {defects[bad[0]]:.3e} of it points "
-                f"off the space (allowed: {POINT_TOL:.0e}); use space.project_tangent(p, v)"
+                f"vector {index or 'v'} is not tangent at its point: a part of {defects[bad[0]]:.3e} of it points "
+                f"off the space (allowed: {tol:.0e}); use space.project_tangent(p, v)"
             )
 
     # ---- chance ----
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
         """Random points, shape ``shape + point_shape``: uniform on a compact space."""
-        shape = (shape,) if isinstance(shape, int) else tuple(shape)
-        noise = rng.standard_normal(shape + self._doubles_shape)
-        return self._apply("scatter", x=self._numbers(noise))
+        sizes = (shape,) if isinstance(shape, (int, np.integer)) else tuple(shape)
+        return self._apply("scatter", x=self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes)))
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
         """Standard normal tangent vectors at the points p."""
-        lead = self._lead(self._doubles(p, "p"))
-        noise = rng.standard_normal(lead + self._doubles_shape)
-        return self._apply("random_tangent", p=p, noise=self._numbers(noise))
+        noise = self._noise(rng, self._lead(self._doubles(p, "p")))
+        if self._linear and self.point_shape[0] >= LARGE:
+            return self._normal_tangent(p, noise)
+        return self._finite("random_tangent", p=p, noise=noise)
+
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+        """Standard normal tangent vectors, made of standard normal numbers without a frame at p."""
+        return self.project_tangent(p, noise)
+
+    def _noise(self, rng: np.random.Generator, lead: tuple[int, ...]) -> Array:
+        """Standard normal numbers in the shape of points."""
+        if not hasattr(rng, "standard_normal"):
+            raise TypeError(f"rng must be a numpy.random.Generator, not {shown(rng)}")
+        try:
+            return self._numbers(rng.standard_normal(lead + self._doubles_shape))
+        except ValueError as error:
+            raise ValidationError(f"cannot make points of shape {lead}: {error}") from None
 
     # ---- arrays ----
 
@@ -224,8 +257,7 @@ class Space:
             raise ValidationError(
                 f"{name} has shape {array.shape}, but {self!r} needs shape (..., {', '.join(map(str, shape))})"
             )
-        array = np.asarray(array, dtype=self.dtype, order="C")
-        return array.view(np.float64)
+        return cast(array, self.dtype).view(np.float64)
 
     def _rows(self, array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
         shape = self._doubles_shape
@@ -245,7 +277,7 @@ class Space:
         try:
             lead = np.broadcast_shapes(*map(self._lead, arrays.values()), () if t is None else t.shape)
         except ValueError:
-            shapes = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
+            shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in inputs.items())
             raise ValidationError(f"the leading axes do not broadcast: {shapes}") from None
         rows = [self._rows(a, lead) for a in arrays.values()]
         times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
@@ -253,6 +285,18 @@ class Space:
         if operation in ("distance", "inner"):
             return result.reshape(lead)[()]
         return self._numbers(result.reshape(lead + self._doubles_shape))
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+        """The same, but with an error where it is not finite."""
+        result = self._apply(operation, t, **inputs)
+        if not np.isfinite(result).all():
+            axes = () if operation in ("distance", "inner") else self._point_axes(result)
+            bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()
+            raise ValidationError(
+                f"{operation} of row {bad or 0} is not finite: its numbers are not finite, too large, or no point of "
+                "the space"
+            )
+        return result
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, "_name"):
@@ -287,6 +331,7 @@ class Sphere(Space):
     """
 
     _name = "sphere"
+    _linear = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -302,9 +347,16 @@ class Hyperbolic(Space):
     """
 
     _name = "hyperbolic"
+    _linear = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+        # Only at the middle is the metric that of the ambient numbers.
+        middle = np.eye(1, self.point_shape[0])[0]
+        noise[..., 0] = 0.0
+        return self.transport(middle, p, noise)
 
 
 class RealProjective(Space):
@@ -317,6 +369,7 @@ class RealProjective(Space):
     """
 
     _name = "rp"
+    _linear = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -334,6 +387,7 @@ class ComplexProjective(Space):
     """
 
     _name = "cp"
+    _linear = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -349,6 +403,7 @@ class Grassmannian(Space):
     """
 
     _name = "gr"
+    _linear = True
 
     def __init__(self, k: int, n: int) -> None:
         super().__init__(k, n)
@@ -364,6 +419,7 @@ class ComplexGrassmannian(Space):
     """
 
     _name = "cgr"
+    _linear = True
 
     def __init__(self, k: int, n: int) -> None:
         super().__init__(k, n)
@@ -476,6 +532,9 @@ class SpecialEuclidean(Space):
         super().__init__(n)
 
 
+# No number of a space is as long.
+_DIGITS = 40
+
 # What a complex array may have been meant for.
 _COMPLEX = {
     "rp": "ComplexProjective",
@@ -500,23 +559,24 @@ def space(name: str | Space) -> Space:
     if isinstance(name, Space):
         return name
     if not isinstance(name, str):
-        raise ValidationError(f"a space or its name is needed, not {name!r}")
+        raise ValidationError(f"a space or its name is needed, not {shown(name)}")
     factors = name.split(" x ")
     if len(factors) > 1:
         from .product import Product
 
         return Product(*map(space, factors))
-    word, _, parameters = name.strip().partition(":")
+    word, _, parameters = name.partition(":")
+    word = word.strip().lower()
     names = {alias: row[0] for row in Handle.names() for alias in row}
-    if word.lower() not in names:
+    if word not in names:
         known = ", ".join(" or ".join(row) for row in Handle.names())
-        raise ValidationError(f"unknown space {name!r}; known are {known}, e.g. 'sphere:2'")
+        raise ValidationError(f"unknown space {shown(name)}; known are {known}, e.g. 'sphere:2'")
     values = [part.strip() for part in parameters.split(",")]
-    if not all(value.isdecimal() for value in values):
-        raise ValidationError(f"{name!r}: behind the colon come whole numbers, e.g. 'sphere:2'")
-    cls: Any = _CLASSES[names[word.lower()]]
+    if not all(value.isdecimal() and len(value) <= _DIGITS for value in values):
+        raise ValidationError(f"{shown(name)}: behind the colon come whole numbers, e.g. 'sphere:2'")
+    cls: Any = _CLASSES[names[word]]
     try:
         made: Space = cls(*map(int, values))
     except TypeError:
-        raise ValidationError(f"{name!r}: {cls.__name__} does not take {len(values)} numbers") from None
+        raise ValidationError(f"{shown(name)}: {cls.__name__} does not take {len(values)} numbers") from None
     return made

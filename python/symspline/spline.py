@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._arrays import as_array, whole_number
+from ._arrays import as_array, shown, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._ends import ends_of, kept, picked
 from ._integrals import integrate
-from ._span import Span, is_large, lifted, span_of
+from ._span import Span, fit_in_span, is_large, lifted, span_of
 from ._times import Clock, clock_of
 from .report import ConvergenceWarning, Report, shaped
-from .spaces import POINT_TOL, POINT_TOL_FLOAT32, Space
+from .spaces import Space, point_tol
 from .spaces import space as space_named
 
 if TYPE_CHECKING:
@@ -47,8 +47,9 @@ class CubicSpline:
     Args:
         t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one
             row per curve. Numbers or ``datetime64``; for dates rates are per second.
-        points: shape (..., N+1, *space.point_shape), N >= 1; leading axes are independent curves. Points
-            within 1e-8 of the space (1e-4 for float32) are projected. For a `Product` a tuple of arrays.
+        points: shape (..., N+1, *space.point_shape), N >= 1, real, or complex on complex spaces; leading axes
+            are independent curves. Points within 1e-8 of the space (1e-4 for single precision) are projected.
+            For a `Product` a tuple of arrays.
         space: a space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
         bc_type: conditions at the ends: ``"natural"`` (zero covariant acceleration, the paper's default),
             ``"not-a-knot"`` (the better choice for a smooth curve: order 4 instead of 2 near the ends),
@@ -56,7 +57,9 @@ class CubicSpline:
             pair with one of ``"natural"``, ``"clamped"``, ``"not-a-knot"``, ``(1, velocity)``,
             ``(2, acceleration)`` for either end. The paper's clamped spline is ``((1, v0), (1, vN))``.
             Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
-        method: ``"auto"``, ``"quasi-newton"``, or ``"fixed-point"`` (the paper's Algorithm 1).
+        method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1), or ``"auto"``:
+            quasi-Newton, for curves that it leaves Newton's method, and then a homotopy from flat space.
+            `Report.method` says which was used.
         tol: largest relative C² defect that counts as converged, see `Report.residual`.
         max_iter: largest number of iterations; None for the method's own.
         extrapolate: what happens outside the knots: None raises (and wraps for periodic curves), True
@@ -164,48 +167,12 @@ class CubicSpline:
             raise self._clock.explain(error) from None
         self._points, self._velocities = space._numbers(points), space._numbers(velocities)
         if large and not dry:
-            columns = self._fit_in_span(ends, options, progress)
+            self._velocities, columns, self._faults = fit_in_span(
+                space, self._times, self._points, ends, options, progress
+            )
         self._points.flags.writeable = self._velocities.flags.writeable = False
         if not dry:
             self._report = shaped(columns, batch, space.curvature, method)
-
-    def _fit_in_span(self, ends: Any, options: Any, progress: Progress | None) -> Any:
-        """Fit in the span of points and end vectors; the points have been validated."""
-        space = self._space
-        vectors = [
-            space._numbers(value)[..., None, :]
-            if len(space.point_shape) == 1
-            else space._numbers(value)[..., None, :, :]
-            for _, value in ends or []
-            if value is not None
-        ]
-        span = span_of(space, self._points, *vectors)
-        small_ends = ends
-        if ends is not None:
-            rows = iter(vectors)
-            small_ends = [
-                (
-                    kind,
-                    None
-                    if value is None
-                    else _doubles_of(span.down(next(rows))).reshape(*self._batch, *span.space._doubles_shape),
-                )
-                for kind, value in ends
-            ]
-        _, velocities, columns, self._faults = _core.fit(
-            span.space._handle,
-            self._times,
-            _doubles_of(span.down(self._points)),
-            small_ends,
-            *options,
-            False,
-            0.0,
-            None,
-            progress,
-            False,
-        )
-        self._velocities = span.up(span.space._numbers(velocities))
-        return columns
 
     @classmethod
     def _made(
@@ -255,7 +222,7 @@ class CubicSpline:
         try:
             quantity = _QUANTITIES[nu]
         except (KeyError, TypeError):
-            raise ValidationError(f"nu must be 0, 1 or 2, not {nu!r}") from None
+            raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}") from None
         return self._at(x, quantity, extrapolate, per_curve)
 
     def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
@@ -313,10 +280,13 @@ class CubicSpline:
     def _in_span(self) -> tuple[Span, Array, Array]:
         """The span, and points and velocities in it; kept from the first use on."""
         if self._small is None:
+            # Velocities of a spline lie in the span of its points and end velocities.
             at_ends = np.take(self._velocities, [0, -1], axis=len(self._batch))
-            span = span_of(self._space, self._points, at_ends)
-            self._small = span, span.down(self._points), span.down(self._velocities)
+            self._small = self._down(span_of(self._space, self._points, at_ends))
         return self._small
+
+    def _down(self, span: Span) -> tuple[Span, Array, Array]:
+        return span, span.down(self._points), span.down(self._velocities)
 
     # ---- what it is made of ----
 
@@ -346,7 +316,10 @@ class CubicSpline:
         index = (slice(None),) * axis
         p, q = self._points[(*index, first)], self._points[(*index, last)]
         u, w = self._velocities[(*index, first)], self._velocities[(*index, last)]
-        inner = self._space.exp(p, third * u), self._space.exp(q, -third * w)
+        with np.errstate(all="ignore"):
+            legs = third * u, -third * w
+        # Of curves that were not found they are NaN.
+        inner = [self._space._apply("exp", p=at, v=leg) for at, leg in zip((p, q), legs, strict=True)]
         return np.stack([p, *inner, q], axis=axis + 1)
 
     @property
@@ -385,7 +358,7 @@ class CubicSpline:
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
         if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(f"a curve is picked by a whole number or a slice, not {index!r}")
+            raise TypeError(f"a curve is picked by a whole number or a slice, not {shown(index)}")
         own = self._times.ndim > 1
         return CubicSpline._made(
             self._space,
@@ -528,12 +501,16 @@ def evaluate(
     """
     space = space_named(space)
     if hasattr(space, "factors"):
+        from .product import check_tuple
+
+        check_tuple(points, space, "points")
+        check_tuple(u, space, "u")
         pieces = zip(points, u, space.factors, strict=True)
         options = {"extrapolate": extrapolate, "per_curve": per_curve}
         return tuple(evaluate(x, t, p, v, factor, nu, **options) for p, v, factor in pieces)  # type: ignore[arg-type]
-    velocities = space._numbers(space._doubles(u, "u"))
-    if velocities.shape != np.shape(points):
-        raise ValidationError(f"u has shape {velocities.shape}, but points {np.shape(points)}")
+    velocities, shape = space._numbers(space._doubles(u, "u")), as_array(points, "points").shape
+    if velocities.shape != shape:
+        raise ValidationError(f"u has shape {velocities.shape}, but points {shape}")
     if not np.isfinite(velocities).all():
         index = np.argwhere(~np.isfinite(velocities))[0].tolist()
         raise ValidationError(f"u{index} is not finite")
@@ -541,6 +518,9 @@ def evaluate(
     spline._space, spline._extrapolate = space, None
     spline._fill(t, points, "natural", "auto", 0.0, None, True, None, dry=True)
     spline._velocities = velocities
+    if is_large(space):
+        # Any velocities, unlike those of a spline.
+        spline._small = spline._down(span_of(space, spline._points, velocities))
     return spline(x, nu, extrapolate=extrapolate, per_curve=per_curve)
 
 
@@ -581,11 +561,7 @@ def _points(points: Any, space: Space) -> tuple[NDArray[np.float64], float]:
         )
     if doubles.shape[axes - 1] < 2:
         raise ValidationError("a curve needs at least two points; got one")
-    return doubles, POINT_TOL_FLOAT32 if array.dtype in (np.float32, np.float16) else POINT_TOL
-
-
-def _doubles_of(numbers: Array) -> NDArray[np.float64]:
-    return np.ascontiguousarray(numbers).view(np.float64)
+    return doubles, point_tol(array.dtype)
 
 
 def _knots(
@@ -606,16 +582,16 @@ def _policy(extrapolate: Any) -> Any:
     known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
     if extrapolate is not None and extrapolate is not True and not known:
         raise ValidationError(
-            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {extrapolate!r}"
+            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {shown(extrapolate)}"
         )
     return extrapolate
 
 
 def _check_options(on_failure: Any, progress: Any) -> None:
-    if on_failure not in ("raise", "warn", "ignore"):
-        raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {on_failure!r}")
+    if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
+        raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {shown(on_failure)}")
     if progress is not None and not callable(progress):
-        raise ValidationError(f"progress must be a function of two numbers, not {progress!r}")
+        raise ValidationError(f"progress must be a function of two numbers, not {shown(progress)}")
 
 
 def _fail(faults: list[tuple[int, str, str]], on_failure: str, spline: Any) -> None:

@@ -13,6 +13,13 @@ use crate::space::Space;
 const QUICK: usize = 120;
 const NEWTON: usize = 50;
 
+/// Where Newton's method starts.
+#[derive(Clone, Copy)]
+enum Start {
+    Here,
+    Zero,
+}
+
 /// Solves by the method asked for. `Auto` is quasi-Newton, then Newton from its iterate, then the
 /// homotopy from flat space, each on the lanes that the one before left.
 pub fn run<M: Space>(
@@ -31,24 +38,29 @@ pub fn run<M: Space>(
         let left = options.max_iter.map_or(most, |n| n.saturating_sub(used).min(most));
         Options { method, tol: options.tol, max_iter: Some(left.max(1)) }
     };
-    let quick = options.max_iter.unwrap_or(QUICK);
-    let mut outcome = solve(space, chain, ends, &within(Method::QuasiNewton, quick, 0), idle, work, monitor);
+    let mut outcome = solve(space, chain, ends, &within(Method::QuasiNewton, QUICK, 0), idle, work, monitor);
     let used = |o: &Outcome| o.iterations.iter().max().copied().unwrap_or(0);
     let open = |o: &Outcome| !(idle | mask_from(|l| o.converged[l]));
     let spent = |o: &Outcome| options.max_iter.is_some_and(|n| used(o) >= n);
     if open(&outcome).none() || spent(&outcome) || monitor.poll() {
         return outcome;
     }
-    let before = chain.u.clone();
-    let lanes = open(&outcome);
-    let tried =
-        solve(space, chain, ends, &within(Method::Newton, NEWTON, used(&outcome)), !lanes, work, monitor);
-    for l in 0..LANES {
-        outcome.iterations[l] += tried.iterations[l];
-    }
-    merge(chain, &before, &mut outcome, &tried, mask_bits(lanes), Solver::Newton);
-    if open(&outcome).none() || spent(&outcome) || monitor.poll() {
-        return outcome;
+    // From where that came to, and from zero: near the cut locus either may lead away.
+    for start in [Start::Here, Start::Zero] {
+        let before = chain.u.clone();
+        let lanes = open(&outcome);
+        if let Start::Zero = start {
+            chain.u.iter_mut().for_each(|u| *u = lanes.select(Lane::ZERO, *u));
+        }
+        let limits = within(Method::Newton, NEWTON, used(&outcome));
+        let tried = solve(space, chain, ends, &limits, !lanes, work, monitor);
+        for l in 0..LANES {
+            outcome.iterations[l] += tried.iterations[l];
+        }
+        merge(chain, &before, &mut outcome, &tried, mask_bits(lanes), Solver::Newton);
+        if open(&outcome).none() || spent(&outcome) || monitor.poll() {
+            return outcome;
+        }
     }
     let left = Options { max_iter: options.max_iter.map(|n| n.saturating_sub(used(&outcome))), ..*options };
     let done = !open(&outcome);

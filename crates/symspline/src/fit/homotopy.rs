@@ -48,9 +48,8 @@ pub fn follow<M: Space>(
         let goal = (at + ahead).min(Lane::ONE);
         scale(space, chain, &chords, &values, goal);
         predict(chain, &curves, places, goal);
-        let last = goal.simd_ge(Lane::ONE);
-        // Lanes at different λ are solved together; those in between need not be exact.
-        let tol = if (last | done).all() { options.tol } else { options.tol.max(LOOSE) };
+        // On the way curves need not be exact.
+        let tol = options.tol.max(LOOSE);
         let limits = Options { method: Method::Newton, tol, max_iter: Some(CORRECTIONS.min(budget)) };
         let found = solve(space, chain, ends, &limits, done, work, monitor);
         used += found.iterations.iter().max().copied().unwrap_or(0);
@@ -75,8 +74,15 @@ pub fn follow<M: Space>(
     for (u, c) in chain.u.iter_mut().zip(&curves[1]) {
         *u = arrived.select(*c, *u);
     }
-    let options = Options { method: Method::Newton, tol: options.tol, max_iter: Some(2 * CORRECTIONS) };
+    let budget = options.max_iter.map_or(2 * CORRECTIONS, |n| n.saturating_sub(used).min(2 * CORRECTIONS));
+    if arrived.none() || budget == 0 {
+        return;
+    }
+    let options = Options { method: Method::Newton, tol: options.tol, max_iter: Some(budget) };
     let last = solve(space, chain, ends, &options, !arrived, work, monitor);
+    for l in 0..LANES {
+        outcome.iterations[l] += last.iterations[l];
+    }
     merge(chain, &best, outcome, &last, mask_bits(arrived), super::Solver::Homotopy);
 }
 

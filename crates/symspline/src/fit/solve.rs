@@ -24,8 +24,6 @@ const AIM: f64 = 1.0 / 40.0;
 const GROWTH_MIXED: f64 = 2.0;
 /// How often a step is halved before it is taken as it is.
 const MAX_TRIES: f64 = 6.0;
-/// The same for Newton's method, whose direction always leads downwards.
-const MAX_TRIES_NEWTON: f64 = 16.0;
 /// So many iterations without lowering the residual by 30 % are a standstill.
 const PATIENCE: f64 = 8.0;
 /// Outer legs are kept within this part of the distance to the cut locus while iterating.
@@ -83,7 +81,6 @@ pub fn solve<M: Space>(
     let floor = (chain.condition * lane(ROUNDING)).min(lane(ROUNDING_MOST)).max(tol);
     let infinity = lane(f64::INFINITY);
     let limit = space.cut_angle() * LEG_LIMIT;
-    let max_tries = lane(if options.method == Method::Newton { MAX_TRIES_NEWTON } else { MAX_TRIES });
 
     let mut done = idle;
     let mut converged = Lane::ZERO;
@@ -127,7 +124,8 @@ pub fn solve<M: Space>(
 
         let mixing = anderson.active();
         let allowed = last * mixing.select(lane(GROWTH_MIXED), Lane::ONE);
-        let worse = !defect.simd_le(allowed) & !done & tries.simd_lt(max_tries) & iteration_mask(iteration);
+        let worse =
+            !defect.simd_le(allowed) & !done & tries.simd_lt(lane(MAX_TRIES)) & iteration_mask(iteration);
         if !worse.all() {
             contraction = worse.select(contraction, defect / last);
             last = worse.select(last, defect);
@@ -155,8 +153,9 @@ pub fn solve<M: Space>(
             // After going back, what is left of the step is as long as what was taken back.
             *s = worse.select(-*n, *n);
         }
-        if legs.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))).any() {
-            shorten(space, chain, ends, limit, done);
+        let long = legs.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))) & !done;
+        if long.any() {
+            shorten(space, chain, ends, limit, !long);
         }
     }
     if !best.is_empty() {

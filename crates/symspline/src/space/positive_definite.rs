@@ -233,7 +233,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         if !x.iter().all(|x| x.is_finite()) {
             return "it is not finite".into();
         }
-        if !(off <= 1e-4) {
+        if off > 1e-4 {
             return format!("it is not {what}: the skew part is {off:.3e} of it");
         }
         let mut values = [p];

@@ -303,6 +303,15 @@ impl<const D: usize, const SPECIAL: bool, A: Storage> Space for UnitaryGroup<D, 
         let (omega, _) = self.log_one_plus(&p.adjoint_times(&(&q - &p)));
         (&p.times(&exp_skew_minus_one(&omega.times_scalar(t))) + &p).write(out);
     }
+    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
+        let length = max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt();
+        if self.is_connected() {
+            return length;
+        }
+        // No curve joins a rotation and a reflection.
+        let [p, q] = [p, q].map(|x| determinant(&self.read(x))[0]);
+        (p * q).simd_lt(Lane::ZERO).select(lane(f64::INFINITY), length)
+    }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         let p = self.read(p);
         let half = exp_skew_minus_one(&self.generator(&p, v).scaled(lane(0.5))).plus_identity(Lane::ONE);
