@@ -122,11 +122,22 @@ def test_a_rotation_next_to_a_reflection():
 REFLECTION = np.diag([-1.0, 1, 1])
 
 
-def test_a_reflection_is_not_close_to_a_rotation():
-    try:
-        assert ss.Orthogonal(3).distance(np.eye(3), REFLECTION) > 1
-    except (ss.ValidationError, ss.CutLocusError):
-        return
+@pytest.mark.parametrize("operation", ["distance", "log", "geodesic", "transport"])
+def test_no_geodesic_joins_a_rotation_and_a_reflection(operation):
+    space = ss.Orthogonal(3)
+    extra = {"geodesic": (0.5,), "transport": (np.zeros((3, 3)),)}.get(operation, ())
+    call = getattr(space, operation)
+    with pytest.raises(ss.ValidationError, match=r"pair 0 has opposite determinants: no curve joins"):
+        call(np.eye(3), REFLECTION, *extra)
+    both = np.array([np.eye(3), REFLECTION])
+    with pytest.raises(ss.ValidationError, match=r"pair 1 has opposite determinants"):
+        call(np.eye(3), both, *extra)
+    with pytest.raises(ss.ValidationError, match=r"leading axes do not broadcast"):
+        call(both, np.array([np.eye(3)] * 3), *extra)
+    # Half a turn is another matter.
+    if operation != "distance":
+        with pytest.raises(ss.CutLocusError, match="pair 0"):
+            call(np.eye(3), np.diag([-1.0, -1, 1]), *extra)
 
 
 @pytest.mark.parametrize("name", POSITIVE)

@@ -80,7 +80,6 @@ def fit_many(
             space, all_times, all_points, offsets, ends, (method, tol, max_iter), progress
         )
     ends_kept = kept(bc_type)
-    reports = shaped(columns, (len(curves),), space.curvature, method)
     fitted = [
         CubicSpline._made(
             space,
@@ -91,7 +90,7 @@ def fit_many(
             all_velocities[offsets[i] : offsets[i + 1]],
             picked(ends_kept, i, 1, space),
             policy,
-            reports._map(lambda column, i=i: column[i].item()),
+            shaped(tuple(column[i : i + 1] for column in columns), (), space.curvature, method),
         )
         for i, (clock, t, times, _) in enumerate(prepared)
     ]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ._core import ValidationError
 from ._reading import Array, length, real_numbers, refuse, unmoved_by_underflow
 
 
@@ -160,6 +161,10 @@ def half_space_to_ball(z: ArrayLike) -> Array:
 def _hyperboloid(value: ArrayLike) -> tuple[Array, Array]:
     """The time-like coordinate, made exact, and the others."""
     x, tol = real_numbers(value, "x", (None,))
+    if x.shape[-1] < 2:
+        raise ValidationError(
+            f"x has shape {x.shape}, but points of the hyperboloid have two or more numbers"
+        )
     time = np.hypot(1.0, length(x[..., 1:]))
     refuse(
         ~(np.abs(x[..., 0] - time) <= tol * time),

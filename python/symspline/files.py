@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ._arrays import shown
 from ._core import ValidationError
 from ._ends import ends_of
 from ._times import clock_of
@@ -277,19 +278,20 @@ def _factor_ends(bc_type: Any, i: int) -> Any:
 
 
 def _report(plain: dict[str, Any], batch: tuple[int, ...]) -> Report:
-    kinds = {"converged": "b", "iterations": "i", "residual": "f", "max_step": "f", "rate": "f"}
+    numbers = dict.fromkeys(("residual", "max_step", "curvature", "invariant_radius", "rate"), "f")
+    kinds = {"converged": "b", "iterations": "i"} | numbers
 
     def column(key: str, value: Any) -> Any:
+        if key not in kinds or (key == "invariant_radius" and value is None):
+            return value
+        shape = () if key == "curvature" else batch
         array = np.asarray(value)
-        if key in kinds and (array.shape != batch or array.dtype.kind != kinds[key]):
-            raise ValidationError(f"the report's {key} is {value!r}")
-        if key == "invariant_radius" and value is not None and array.shape != batch:
-            raise ValidationError(f"the report's {key} is {value!r}")
-        many = key in kinds or (key == "invariant_radius" and value is not None)
-        return array if many and batch else value
+        if array.shape != shape or array.dtype.kind != kinds[key]:
+            raise ValidationError(f"the report's {key} is {shown(value)}")
+        return array if shape else value
 
     if not isinstance(plain["method"], str):
-        raise ValidationError(f"the report's method is {plain['method']!r}")
+        raise ValidationError(f"the report's method is {shown(plain['method'])}")
     return Report(**{key: column(key, value) for key, value in plain.items()})
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import as_array, cast, shown, whole_number
-from ._core import Handle, ValidationError
+from ._core import CutLocusError, Handle, ValidationError
 
 Array = NDArray[Any]
 
@@ -454,6 +455,27 @@ class Orthogonal(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+        try:
+            return super()._finite(operation, t, **inputs)
+        except (CutLocusError, ValidationError):
+            if "q" in inputs:
+                self._check_same_part(inputs["p"], inputs["q"])
+            raise
+
+    def _check_same_part(self, p: ArrayLike, q: ArrayLike) -> None:
+        pairs: Array = np.zeros((0, 0), int)
+        # Arrays of a wrong shape have an error of their own.
+        with np.errstate(all="ignore"), suppress(ValueError):
+            pairs = np.argwhere(
+                np.linalg.det(self._doubles(p, "p")) * np.linalg.det(self._doubles(q, "q")) < -0.5
+            )
+        if len(pairs):
+            pair = ",".join(map(str, pairs[0])) or "0"
+            raise ValidationError(
+                f"pair {pair} has opposite determinants: no curve joins a rotation and a reflection"
+            )
 
 
 class Unitary(Space):
