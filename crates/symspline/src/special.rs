@@ -40,10 +40,12 @@ const fn alternating<const N: usize>(shift: usize) -> [f64; N] {
     c
 }
 
+/// sin√x/√x = Σ (−x)ʲ/(2j+1)!
+pub(crate) const SINC: [f64; 12] = alternating(1);
 /// (1 − cos√x)/x = Σ (−x)ʲ/(2j+2)!
 pub(crate) const VERSINE: [f64; 12] = alternating(2);
 /// (1 − sin√x/√x)/x = Σ (−x)ʲ/(2j+3)!
-pub(crate) const SINC_DEFECT: [f64; 12] = alternating(3);
+const SINC_DEFECT: [f64; 12] = alternating(3);
 /// θ/sin θ = Σ yʲ Πᵢ i/(2i+1) with y = 1 − cos θ, the series of asin(z)/(z√(1−z²)) at z² = y/2.
 pub(crate) const ARC: [f64; 46] = {
     let mut c = [1.0; 46];

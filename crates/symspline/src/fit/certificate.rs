@@ -16,11 +16,14 @@ pub fn invariant_radius(step: f64, curvature: f64, v: f64) -> Option<f64> {
         // ½ (D + V) ≤ V
         return Some(step.max(v));
     }
-    let d = curvature * step;
-    let smallest = root(d, 0.0, 1.0)?;
+    let (d, v) = (curvature * step, curvature * v);
+    // It is at least that of flat space.
+    let smallest = root(d, d, 1.0)?;
+    if v <= smallest {
+        return Some(smallest / curvature);
+    }
     let largest = root(d, 0.5 * (std::f64::consts::PI - d) * (1.0 - 1e-9), -1.0)?;
-    let x = smallest.max(curvature * v);
-    (x <= largest).then_some(x / curvature)
+    (v <= largest).then_some(v / curvature)
 }
 
 /// A root x = KV of ½ u/sin u (d + x) − x with u = d + 2x, by Newton's method. The function is convex: from

@@ -1,7 +1,9 @@
 //! Jacobi's method: eigenvalues and singular values of small matrices, eight side by side.
 //!
-//! Every lane rotates until it is done and then stays as it is, whatever its neighbours need.
+//! Every lane rotates until it is done and then stays as it is, whatever its neighbours need. Larger
+//! matrices come nearly diagonal from a library, and are finished here.
 
+use super::large::{LARGE, eigenvectors, in_basis};
 use super::{Entry, Matrix, Storage, conjugate, inner_add, mul_add};
 use crate::scalar::{Lane, lane, max_or_nan};
 
@@ -11,6 +13,8 @@ const MAX_SWEEPS: usize = 30;
 const NEGLIGIBLE: f64 = 1e-17;
 /// Commuting matrices that were rounded do not commute: below this a pair is as diagonal as it gets.
 const NEGLIGIBLE_PAIR: f64 = 2.0 * f64::EPSILON;
+/// No sum of cosine and this part of the sine is the same for two angles but by chance.
+const GENERIC: f64 = 0.414_213_562_373_095;
 
 /// The rotation `[[c, −s̄], [s, c]]` whose first column is the eigenvector of `[[α, β], [β̄, −α]]` that
 /// lies nearer to the first axis.
@@ -67,8 +71,13 @@ pub fn diagonalise<const D: usize, const M: usize, A: Storage>(
 ) -> Matrix<Lane, D, A> {
     let n = a[0].rows();
     let mut v = Matrix::identity(n);
+    if n >= LARGE {
+        // Eigenvalues that coincide in both matrices, or by chance in this sum, are told apart below.
+        v = eigenvectors(&if M == 1 { a[0].clone() } else { &a[0] + &a[M - 1].scaled(lane(GENERIC)) });
+        a.iter_mut().for_each(|a| *a = in_basis(a, &v));
+    }
     let size = a.iter().fold(Lane::ZERO, |m, a| max_or_nan(m, a.size()));
-    let negligible = size * lane(if M == 1 { NEGLIGIBLE } else { NEGLIGIBLE_PAIR });
+    let negligible = size * lane(if M == 1 && n < LARGE { NEGLIGIBLE } else { NEGLIGIBLE_PAIR });
     let square = negligible * negligible;
     for _ in 0..MAX_SWEEPS {
         let mut moved = false;

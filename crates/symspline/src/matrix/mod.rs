@@ -6,6 +6,7 @@
 mod dense;
 mod eigen;
 mod function;
+mod large;
 mod series;
 
 pub use dense::{cholesky, determinant, orthonormalise, reorthonormalise, solve_lower};
@@ -14,6 +15,7 @@ pub use function::{Unary, function_of};
 pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};
 
 use crate::scalar::{Lane, Scalar, lane};
+use large::LARGE;
 use smallvec::{SmallVec, smallvec};
 use std::ops::{Add, Deref, DerefMut, Index, IndexMut, Neg, Sub};
 
@@ -74,6 +76,8 @@ pub trait Storage: Copy + Send + Sync + 'static {
     fn size(shape: Self::Shape) -> (usize, usize);
     /// Equal entries.
     fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
+    /// Entries from their places, row by row. Writes each once, where `filled` and a loop write twice.
+    fn collected<T: Copy>(shape: Self::Shape, spare: T, f: impl FnMut(usize) -> T) -> Self::Of<T>;
 }
 
 /// Any size. Up to sixteen entries live on the stack.
@@ -92,6 +96,10 @@ impl Storage for Dynamic {
     }
     fn filled<T: Copy>((rows, cols): Self::Shape, x: T) -> Self::Of<T> {
         smallvec![x; rows * cols]
+    }
+    #[inline(always)]
+    fn collected<T: Copy>((rows, cols): Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        (0..rows * cols).map(f).collect()
     }
 }
 
@@ -114,6 +122,14 @@ impl<const CAPACITY: usize> Storage for Small<CAPACITY> {
     #[inline(always)]
     fn filled<T: Copy>(_: Self::Shape, x: T) -> Self::Of<T> {
         Entries([x; CAPACITY])
+    }
+    #[inline(always)]
+    fn collected<T: Copy>((rows, cols): Self::Shape, spare: T, mut f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        let mut out = Entries([spare; CAPACITY]);
+        for (i, x) in out[..rows * cols].iter_mut().enumerate() {
+            *x = f(i);
+        }
+        out
     }
 }
 
@@ -154,6 +170,10 @@ impl<const N: usize, const NN: usize> Storage for Known<N, NN> {
     #[inline(always)]
     fn filled<T: Copy>(_: Self::Shape, x: T) -> Self::Of<T> {
         Entries([x; NN])
+    }
+    #[inline(always)]
+    fn collected<T: Copy>(_: Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        Entries(std::array::from_fn(f))
     }
 }
 
@@ -201,9 +221,8 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     /// From numbers row by row, imaginary parts behind real ones.
     pub fn read(rows: usize, cols: usize, numbers: &[S]) -> Self {
-        let mut m = Self::zeros(rows, cols);
-        m.data[..rows * cols].copy_from_slice(&numbers.as_chunks::<D>().0[..rows * cols]);
-        m
+        let entries = &numbers.as_chunks::<D>().0[..rows * cols];
+        Self::collected(A::shape(rows, cols), |i| entries[i])
     }
 
     /// Constants.
@@ -223,6 +242,26 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
             }
         }
         m
+    }
+
+    /// From a function of the place of an entry, counted row by row.
+    #[inline(always)]
+    fn collected(shape: A::Shape, f: impl FnMut(usize) -> Entry<S, D>) -> Self {
+        Matrix { shape, data: A::collected(shape, [S::constant(Lane::ZERO); D], f) }
+    }
+
+    /// A function of the numbers of one matrix.
+    #[inline(always)]
+    fn each(&self, f: impl Fn(S) -> S) -> Self {
+        let x = self.entries();
+        Self::collected(self.shape, |i| x[i].map(&f))
+    }
+
+    /// A function of the numbers of two matrices.
+    #[inline(always)]
+    fn zip(&self, b: &Self, f: impl Fn(S, S) -> S) -> Self {
+        let (x, y) = (self.entries(), b.entries());
+        Self::collected(self.shape, |i| std::array::from_fn(|c| f(x[i][c], y[i][c])))
     }
 
     /// A real diagonal matrix.
@@ -261,40 +300,33 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     /// `A B`.
     pub fn times(&self, b: &Self) -> Self {
-        let (rows, inner, cols) = (self.rows(), self.cols(), b.cols());
-        let zero = [S::constant(Lane::ZERO); D];
-        let mut out = Self::zeros(rows, cols);
-        // Two by two entries at a time stay in registers.
-        let (even_rows, even_cols) = (rows & !1, cols & !1);
-        for i in (0..even_rows).step_by(2) {
-            for j in (0..even_cols).step_by(2) {
-                let mut sum = [zero; 4];
-                for k in 0..inner {
-                    let (x, y) = (self.data[i * inner + k], self.data[(i + 1) * inner + k]);
-                    let (u, v) = (b.data[k * cols + j], b.data[k * cols + j + 1]);
-                    sum[0] = mul_add::<S, D, false>(x, u, sum[0]);
-                    sum[1] = mul_add::<S, D, false>(x, v, sum[1]);
-                    sum[2] = mul_add::<S, D, false>(y, u, sum[2]);
-                    sum[3] = mul_add::<S, D, false>(y, v, sum[3]);
+        if b.is_large() {
+            return large::times(self, b);
+        }
+        let mut out = Self::zeros(self.rows(), b.cols());
+        for i in 0..self.rows() {
+            for j in 0..b.cols() {
+                let mut sum = [S::constant(Lane::ZERO); D];
+                for k in 0..self.cols() {
+                    sum = mul_add::<S, D, false>(self[(i, k)], b[(k, j)], sum);
                 }
-                out.data[i * cols + j..][..2].copy_from_slice(&sum[..2]);
-                out.data[(i + 1) * cols + j..][..2].copy_from_slice(&sum[2..]);
+                out[(i, j)] = sum;
             }
         }
-        let mut single = |i: usize, j: usize| {
-            let mut sum = zero;
-            for k in 0..inner {
-                sum = mul_add::<S, D, false>(self.data[i * inner + k], b.data[k * cols + j], sum);
-            }
-            out.data[i * cols + j] = sum;
-        };
-        (0..even_rows).for_each(|i| (even_cols..cols).for_each(|j| single(i, j)));
-        (even_rows..rows).for_each(|i| (0..cols).for_each(|j| single(i, j)));
         out
+    }
+
+    /// Whether products with it pay for another order of work.
+    #[inline(always)]
+    fn is_large(&self) -> bool {
+        self.rows() * self.cols() >= LARGE * LARGE
     }
 
     /// `A* B`.
     pub fn adjoint_times(&self, b: &Self) -> Self {
+        if b.is_large() {
+            return large::times(&self.adjoint(), b);
+        }
         let mut out = Self::zeros(self.cols(), b.cols());
         for k in 0..self.rows() {
             for i in 0..self.cols() {
@@ -310,14 +342,10 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     /// `A B*`.
     pub fn times_adjoint(&self, b: &Self) -> Self {
-        Self::from_fn(self.rows(), b.rows(), |i, j| {
-            let mut sum = [S::constant(Lane::ZERO); D];
-            let (x, y) = (&self.data[i * self.cols()..][..self.cols()], &b.data[j * b.cols()..][..b.cols()]);
-            for (x, y) in x.iter().zip(y) {
-                sum = mul_add::<S, D, true>(*x, *y, sum);
-            }
-            sum
-        })
+        if b.is_large() {
+            return large::times(self, &b.adjoint());
+        }
+        Self::from_fn(self.rows(), b.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
     }
 
     /// `A*`.
@@ -352,26 +380,71 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `x A`.
-    pub fn scaled(mut self, x: Lane) -> Self {
-        self.data.iter_mut().flatten().for_each(|a| *a = *a * x);
-        self
+    pub fn scaled(&self, x: Lane) -> Self {
+        self.each(|a| a * x)
     }
 
     /// `x A` with a scalar that may carry derivatives.
-    pub fn times_scalar(mut self, x: S) -> Self {
-        self.data.iter_mut().flatten().for_each(|a| *a = *a * x);
-        self
+    pub fn times_scalar(&self, x: S) -> Self {
+        self.each(|a| a * x)
     }
 
     /// `(1 + A)(1 + B) − 1`: products of what is near the identity keep their small digits.
     pub fn compose(&self, b: &Self) -> Self {
-        &(&self.times(b) + self) + b
+        let product = self.times(b);
+        let (x, y, z) = (product.entries(), self.entries(), b.entries());
+        Self::collected(self.shape, |i| std::array::from_fn(|c| x[i][c] + y[i][c] + z[i][c]))
+    }
+
+    /// `(1 + A)(1 + A*) − 1`, exactly Hermitian.
+    pub fn gram(&self) -> Self {
+        if self.is_large() {
+            return (&self.times_adjoint(self) + &(self + &self.adjoint())).hermitian_part();
+        }
+        Self::hermitian(self.rows(), |i, j| {
+            let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
+            self.row_product(i, self, j, std::array::from_fn(|c| a[c] + b[c]))
+        })
+    }
+
+    /// `A B*` where that is Hermitian: one half of it is computed.
+    pub fn times_adjoint_hermitian(&self, b: &Self) -> Self {
+        if b.is_large() {
+            return self.times_adjoint(b).hermitian_part();
+        }
+        Self::hermitian(self.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
+    }
+
+    /// From the entries on and above the diagonal, exactly Hermitian.
+    fn hermitian(n: usize, f: impl Fn(usize, usize) -> Entry<S, D>) -> Self {
+        let mut out = Self::zeros(n, n);
+        for i in 0..n {
+            for j in i..n {
+                let x = f(i, j);
+                out[(i, j)] = x;
+                out[(j, i)] = conjugate(x);
+            }
+            if D > 1 {
+                out[(i, i)][D - 1] = S::constant(Lane::ZERO);
+            }
+        }
+        out
+    }
+
+    /// Row i of A times the adjoint of row j of B, added to `sum`.
+    #[inline(always)]
+    fn row_product(&self, i: usize, b: &Self, j: usize, mut sum: Entry<S, D>) -> Entry<S, D> {
+        let (x, y) = (&self.data[i * self.cols()..][..self.cols()], &b.data[j * b.cols()..][..b.cols()]);
+        for (x, y) in x.iter().zip(y) {
+            sum = mul_add::<S, D, true>(*x, *y, sum);
+        }
+        sum
     }
 
     /// `Re tr A*B`.
     pub fn inner(&self, b: &Self) -> S {
         let mut sum = S::constant(Lane::ZERO);
-        for (a, b) in self.data.iter().zip(b.data.iter()) {
+        for (a, b) in self.entries().iter().zip(b.entries()) {
             sum = inner_add(*a, *b, sum);
         }
         sum
@@ -380,7 +453,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     /// Frobenius norm of the values, a bound of all eigenvalues.
     pub fn size(&self) -> Lane {
         let mut sum = Lane::ZERO;
-        for a in self.data.iter().flatten() {
+        for a in self.entries().as_flattened() {
             sum = a.value().mul_add(a.value(), sum);
         }
         sum.sqrt()
@@ -401,18 +474,15 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// A function of every entry.
-    pub fn map_entries(mut self, f: impl Fn(Entry<S, D>) -> Entry<S, D>) -> Self {
-        self.data.iter_mut().for_each(|x| *x = f(*x));
-        self
+    pub fn map_entries(&self, f: impl Fn(Entry<S, D>) -> Entry<S, D>) -> Self {
+        let x = self.entries();
+        Self::collected(self.shape, |i| f(x[i]))
     }
 
     /// A function of every number.
     pub fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matrix<T, D, A> {
-        let mut out = Matrix::<T, D, A>::zeros(self.rows(), self.cols());
-        for (out, a) in out.data.iter_mut().zip(self.data.iter()) {
-            *out = std::array::from_fn(|c| f(a[c]));
-        }
-        out
+        let x = self.entries();
+        Matrix::<T, D, A>::collected(self.shape, |i| x[i].map(&f))
     }
 }
 
@@ -423,11 +493,8 @@ pub trait Select {
 }
 
 impl<S: Scalar, const D: usize, A: Storage> Select for Matrix<S, D, A> {
-    fn select(mask: Lane, a: Self, mut b: Self) -> Self {
-        for (b, a) in b.data.iter_mut().flatten().zip(a.data.iter().flatten()) {
-            *b = S::select(mask, *a, *b);
-        }
-        b
+    fn select(mask: Lane, a: Self, b: Self) -> Self {
+        a.zip(&b, |a, b| S::select(mask, a, b))
     }
 }
 
@@ -475,29 +542,20 @@ impl<S: Scalar, const D: usize, A: Storage> IndexMut<(usize, usize)> for Matrix<
 impl<S: Scalar, const D: usize, A: Storage> Add for &Matrix<S, D, A> {
     type Output = Matrix<S, D, A>;
     fn add(self, b: Self) -> Matrix<S, D, A> {
-        let mut out = self.clone();
-        for (x, y) in out.data.iter_mut().flatten().zip(b.data.iter().flatten()) {
-            *x = *x + *y;
-        }
-        out
+        self.zip(b, |x, y| x + y)
     }
 }
 
 impl<S: Scalar, const D: usize, A: Storage> Sub for &Matrix<S, D, A> {
     type Output = Matrix<S, D, A>;
     fn sub(self, b: Self) -> Matrix<S, D, A> {
-        let mut out = self.clone();
-        for (x, y) in out.data.iter_mut().flatten().zip(b.data.iter().flatten()) {
-            *x = *x - *y;
-        }
-        out
+        self.zip(b, |x, y| x - y)
     }
 }
 
 impl<S: Scalar, const D: usize, A: Storage> Neg for Matrix<S, D, A> {
     type Output = Self;
-    fn neg(mut self) -> Self {
-        self.data.iter_mut().flatten().for_each(|x| *x = -*x);
-        self
+    fn neg(self) -> Self {
+        self.each(|x| -x)
     }
 }

@@ -66,6 +66,11 @@ impl<const D: usize, A: Storage> Algebra<D, A> {
 
     /// The matrix with given coordinates.
     pub fn matrix<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
+        self.multiple(1.0, x)
+    }
+
+    /// `scale` times the matrix with given coordinates: ±½ of it acts in the transvections.
+    pub fn multiple<S: Scalar>(&self, scale: f64, x: &[S]) -> Matrix<S, D, A> {
         let n = self.n;
         let mut m = Matrix::zeros(n, n);
         let mut at = 0;
@@ -74,7 +79,7 @@ impl<const D: usize, A: Storage> Algebra<D, A> {
             if self.traceless {
                 // The j-th direction is (1, …, 1, −j, 0, …)/√(j(j+1)).
                 for j in 1..n {
-                    let value = x[at] * lane(1.0 / ((j * (j + 1)) as f64).sqrt());
+                    let value = x[at] * lane(scale / ((j * (j + 1)) as f64).sqrt());
                     for i in 0..j {
                         m[(i, i)][part] = m[(i, i)][part] + value;
                     }
@@ -83,12 +88,12 @@ impl<const D: usize, A: Storage> Algebra<D, A> {
                 }
             } else {
                 for j in 0..n {
-                    m[(j, j)][part] = x[j];
+                    m[(j, j)][part] = x[j] * lane(scale);
                 }
                 at = n;
             }
         }
-        let factor = lane(1.0 / self.off_diagonal());
+        let factor = lane(scale / self.off_diagonal());
         let sign = if self.skew { lane(-1.0) } else { Lane::ONE };
         for i in 0..n {
             for j in i + 1..n {
@@ -103,14 +108,9 @@ impl<const D: usize, A: Storage> Algebra<D, A> {
         m
     }
 
-    /// Half the matrix with given coordinates: what acts in the transvection.
-    pub fn half<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
-        self.matrix(x).scaled(lane(0.5))
-    }
-
     /// `S(v) x = Σ ad²ʲ x/(2j+1)!` of Lemma A.2, with the bracket of ½v and matrices.
     pub fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
-        let (half, start) = (self.half(v), self.matrix(x));
+        let (half, start) = (self.multiple(0.5, v), self.matrix(x));
         let bracket = |a: &Matrix<S, D, A>, x: &Matrix<S, D, A>| &a.times(x) - &x.times(a);
         let sum = stretch_series(half.size() * lane(2.0), &start, |x| bracket(&half, &bracket(&half, x)));
         self.coordinates(&sum, x);

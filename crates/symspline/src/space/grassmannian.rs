@@ -116,7 +116,7 @@ fn log_from<S: Scalar, const D: usize, A: Storage>(
     top: &Matrix<S, D, A>,
     rest: &Matrix<S, D, A>,
 ) -> (Matrix<S, D, A>, Lane) {
-    let square = top.times_adjoint(top).hermitian_part();
+    let square = top.times_adjoint_hermitian(top);
     // 2 sin²θ = 1 − cos 2θ
     let versine = (-square.clone()).plus_identity(Lane::ONE).scaled(lane(2.0));
     if top.rows() == 1 {
@@ -259,7 +259,7 @@ impl<const D: usize, const LINES: bool, A: Storage> Space for Subspaces<D, LINES
         let (x, delta) = (self.read(p), self.read(v));
         let g = delta.adjoint_times(&delta);
         let tv = t.value();
-        let Rotation { s, versed, .. } = Rotation::of(&g.clone().scaled(tv * tv));
+        let Rotation { s, versed, .. } = Rotation::of(&g.scaled(tv * tv));
         let c = versed.clone().plus_identity(Lane::ONE);
         let ts = s.scaled(tv);
         let gamma = &(&x + &x.times(&versed)) + &delta.times(&ts);
@@ -500,7 +500,7 @@ fn complete<const D: usize, A: Storage>(y: &Matrix<Lane, D, A>) -> Matrix<Lane, 
         v[(j, 0)] = head.map(|x| x.mul_add(factor, x));
         v[(j, 0)][0] += none.select(square.sqrt(), Lane::ZERO);
         let beta = lane(-2.0) / v.inner(&v);
-        let scaled = v.clone().scaled(beta);
+        let scaled = v.scaled(beta);
         r = &r + &scaled.times(&v.adjoint_times(&r));
         q = &q + &q.times(&scaled).times_adjoint(&v);
     }

@@ -67,7 +67,7 @@ fn congruent<S: Scalar, const D: usize, A: Storage>(
     g: &Matrix<S, D, A>,
     x: &Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
-    g.times(x).times_adjoint(g).hermitian_part()
+    g.times(x).times_adjoint_hermitian(g)
 }
 
 /// `log(L⁻¹ q L⁻*)` for the factor L of p.
@@ -93,7 +93,7 @@ fn log_of_factors<const D: usize, A: Storage>(
         (0..n).map(|j| (0..n).flat_map(|i| u[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum))).collect();
     // u has columns of length σ.
     let scaled = Matrix::from_fn(n, n, |i, j| u[(i, j)].map(|x| x * (square[j].ln() / square[j])));
-    scaled.times_adjoint(&u).hermitian_part()
+    scaled.times_adjoint_hermitian(&u)
 }
 
 impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
@@ -133,7 +133,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         let p = self.read(p);
         let l = cholesky(&p);
         let w = whiten(&l, &self.read(v));
-        let e = exp_minus_one(&w.clone().scaled(t.value()));
+        let e = exp_minus_one(&w.scaled(t.value()));
         let x = &congruent(&l, &e) + &p;
         let zero = Matrix::zeros(self.n, self.n);
         let d = if S::ORDER > 0 { &w.times(&e) + &w } else { zero.clone() };
@@ -172,8 +172,8 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
                 S::from_parts([Lane::ZERO, d, dd])
             });
             let square = delta.times(&delta);
-            let half = delta.clone().scaled(lane(0.5));
-            let root = (&half - &square.clone().scaled(lane(0.125))).plus_identity(Lane::ONE);
+            let half = delta.scaled(lane(0.5));
+            let root = (&half - &square.scaled(lane(0.125))).plus_identity(Lane::ONE);
             let inverse = (&square.scaled(lane(0.375)) - &half).plus_identity(Lane::ONE);
             (root, congruent(&inverse, &b))
         };
@@ -206,7 +206,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         // Squares of very large or small entries would overflow or vanish.
         let largest = x.iter().fold(Lane::ZERO, |m, x| max_or_nan(m, x.abs()));
         let unit = Lane::ONE / largest.simd_gt(Lane::ZERO).select(largest, Lane::ONE);
-        let off = (&p - &before).scaled(unit).size() / p.clone().scaled(unit).size();
+        let off = (&p - &before).scaled(unit).size() / p.scaled(unit).size();
         let last = cholesky(&p)[(self.n - 1, self.n - 1)][0];
         let good = last.is_finite() & largest.is_finite();
         p.map(|x| good.select(x, lane(f64::NAN))).write(x);
@@ -228,7 +228,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         let before = self.read(&lanes);
         let p = before.hermitian_part();
         let unit = lane(1.0 / x.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs())));
-        let off = ((&p - &before).scaled(unit).size() / p.clone().scaled(unit).size()).to_array()[0];
+        let off = ((&p - &before).scaled(unit).size() / p.scaled(unit).size()).to_array()[0];
         let what = if D == 1 { "symmetric" } else { "Hermitian" };
         if !x.iter().all(|x| x.is_finite()) {
             return "it is not finite".into();
@@ -268,7 +268,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
             congruent(&turn.adjoint(), &log_of_factors(&l, &q))
         });
         self.algebra().coordinates(&delta, chord);
-        let half = delta.clone().scaled(lane(0.5));
+        let half = delta.scaled(lane(0.5));
         let g = &g.times(&exp_minus_one(&half)) + &g;
         let inverse = &exp_minus_one(&-half).times(&inverse) + &inverse;
         // Both are brought back to q: one step of Newton's method for g⁻¹, and for g g* = q.
@@ -290,7 +290,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
     }
 
     fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
-        exp_minus_one(&self.algebra().half(chord)).write(prepared);
+        exp_minus_one(&self.algebra().multiple(0.5, chord)).write(prepared);
     }
     /// With m = e^{−a/2}e^{d/2}e^{−b/2}: w⁺ = log(m m*) and w⁻ = −log(m* m).
     fn legs<S: Scalar>(
@@ -303,14 +303,11 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         w_minus: &mut [S],
     ) {
         let algebra = self.algebra();
-        let ea = exp_minus_one(&-algebra.half(a));
-        let eb = exp_minus_one(&-algebra.half(b));
+        let ea = exp_minus_one(&algebra.multiple(-0.5, a));
+        let eb = exp_minus_one(&algebra.multiple(-0.5, b));
         let ed = Matrix::<S, D, A>::constant(self.n, self.n, prepared);
         let m = ea.compose(&ed).compose(&eb);
-        let sum = &m + &m.adjoint();
-        let plus = (&m.times_adjoint(&m) + &sum).hermitian_part();
-        let minus = (&m.adjoint_times(&m) + &sum).hermitian_part();
-        let [plus, minus] = log_one_plus_alike([&plus, &minus]);
+        let [plus, minus] = log_one_plus_alike([&m.gram(), &m.adjoint().gram()]);
         algebra.coordinates(&plus, w_plus);
         algebra.coordinates(&-minus, w_minus);
     }

@@ -284,7 +284,7 @@ impl<const D: usize, const SPECIAL: bool, A: Storage> Space for UnitaryGroup<D, 
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         let p = self.read(p);
         let omega = self.generator(&p, v);
-        let x = &p.times(&exp_skew_minus_one(&omega.clone().scaled(t.value()))) + &p;
+        let x = &p.times(&exp_skew_minus_one(&omega.scaled(t.value()))) + &p;
         let d = if S::ORDER > 0 { x.times(&omega) } else { x.clone() };
         let dd = if S::ORDER > 1 { d.times(&omega) } else { x.clone() };
         for (i, out) in out.iter_mut().enumerate() {
@@ -358,7 +358,7 @@ impl<const D: usize, const SPECIAL: bool, A: Storage> Space for UnitaryGroup<D, 
                 // A reflection is far from every rotation.
                 let reflection = det[0].simd_lt(Lane::ZERO);
                 off = reflection.select(lane(f64::INFINITY), off);
-                p = crate::matrix::Select::select(reflection, p.clone().scaled(lane(f64::NAN)), p);
+                p = crate::matrix::Select::select(reflection, p.scaled(lane(f64::NAN)), p);
             } else {
                 let phase = det[D - 1].atan2(det[0]);
                 off = max_or_nan(off, phase.abs());
@@ -458,7 +458,7 @@ impl<const D: usize, const SPECIAL: bool, A: Storage> Space for UnitaryGroup<D, 
     }
 
     fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
-        exp_skew_minus_one(&self.algebra().half(chord)).write(prepared);
+        exp_skew_minus_one(&self.algebra().multiple(0.5, chord)).write(prepared);
     }
     /// M = (m, m'⁻¹) with m = e^{−a/2}e^{d/2}e^{−b/2} and m' the same in reverse order: w⁺ = log(m m'), and
     /// w⁻ = log(m⁻¹m'⁻¹) is its image under conjugation by m.
@@ -472,8 +472,8 @@ impl<const D: usize, const SPECIAL: bool, A: Storage> Space for UnitaryGroup<D, 
         w_minus: &mut [S],
     ) {
         let algebra = self.algebra();
-        let ea = exp_skew_minus_one(&-algebra.half(a));
-        let eb = exp_skew_minus_one(&-algebra.half(b));
+        let ea = exp_skew_minus_one(&algebra.multiple(-0.5, a));
+        let eb = exp_skew_minus_one(&algebra.multiple(-0.5, b));
         let ed = Matrix::<S, D, A>::constant(self.n, self.n, prepared);
         let m = ea.compose(&ed).compose(&eb);
         let reverse = eb.compose(&ed).compose(&ea);
