@@ -6,7 +6,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-oracles bench check-tools clean
+.PHONY: demo test test-oracles test-torch fuzz bench check-tools clean
 
 demo: .venv/built
 	$(BIN)/symspline demo --out demo-output
@@ -30,6 +30,15 @@ test-oracles: .venv-oracles/built
 	test -x .venv-oracles/bin/python || $(BIN)/python -m venv .venv-oracles
 	.venv-oracles/bin/python -m pip install --quiet --disable-pip-version-check -r $<
 	touch $@
+
+# The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
+test-torch: .venv/built
+	$(INSTALL) 'torch>=2.4'
+	$(BIN)/python -m pytest tests/torch -o pythonpath='. tests'
+
+# About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time.
+fuzz: .venv/built
+	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
 
 # Some minutes; the machine should have nothing else to do.
 bench: .venv/built

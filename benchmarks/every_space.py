@@ -12,7 +12,7 @@ import numpy as np
 
 import symspline as ss
 
-from . import data, geodesics, geometries, machine
+from . import data, geodesics, geometries, gradients, machine
 from .data import Array
 from .side_by_side import QUANTITIES
 from .tables import count, table, versus
@@ -94,6 +94,7 @@ def pieces(plan: Plan, threads: int) -> Iterator[str]:
     with one_core():
         yield fits_text(points, plan.effort)
         yield samples_text(points, plan.samples, plan.effort)
+        yield gradients.text(plan.effort)
         yield geodesics.text({case.space: _pairs(p, plan.pairs) for case, p in points.items()}, plan.effort)
 
 

@@ -94,10 +94,12 @@ def test_reflections_among_rotations(name):
 @pytest.mark.parametrize("name", ["su:2", "su:3", "su:8"])
 @pytest.mark.parametrize("phase", [0.3, -1e-5])
 def test_the_phase_of_the_determinant(name, phase):
+    mantissa, exponent = f"{phase:.3e}".split("e")
     n = ss.space(name).point_shape[0]
     p = changed(name, 1, lambda x: x * np.exp(1j * phase / n))
     fails(
-        rf"points\[1\] is off .* determinant is not 1 but has the phase {phase:.6f} \(Unitary\({n}\) takes",
+        rf"points\[1\] is off .* determinant is not 1 but has the phase {mantissa}e{int(exponent)} "
+        rf"\(Unitary\({n}\) takes",
         p,
         name,
     )
@@ -604,3 +606,31 @@ def test_times_outside(x, match):
 def test_derivatives_that_there_are_not(nu):
     with pytest.raises(ss.ValidationError, match=r"nu must be 0, 1 or 2, not "):
         ss.BezierCurve(P, "sphere:2")(0.5, nu=nu)
+
+
+@pytest.mark.parametrize("name", ["spd:3", "hpd:3", "spd:8"])
+def test_a_matrix_that_is_singular_to_rounding_is_refused(name):
+    """Whatever the sign of the rounding errors, and whatever the units of its rows."""
+    n, rng = ss.space(name).point_shape[0], np.random.default_rng(3)
+    for _ in range(20):
+        a = rng.normal(size=(n, n - 1))
+        points = np.array([np.eye(n), a @ a.T], dtype=ss.space(name).dtype)
+        fails(
+            r"points\[1\] is off the space: it is not positive definite: its smallest eigenvalue",
+            points,
+            name,
+        )
+    units = 10.0 ** rng.uniform(-6, 6, n)
+    regular = np.eye(n) + 0.3
+    assert ss.CubicSpline(
+        None, np.array([np.eye(n), regular * units * units[:, None]]), name
+    ).report.converged
+
+
+def test_double_precision_is_not_excused_by_single_precision_beside_it():
+    good = np.array([[1, 0, 0], [0, 1, 0]])
+    off = good + 1e-6
+    curves = [(None, good.astype(np.float32)), (None, off)]
+    with pytest.raises(ss.ValidationError, match=r"curve 1: .*off the space by"):
+        ss.fit_many(curves, "sphere:2")
+    assert len(ss.fit_many([(None, off.astype(np.float32)), (None, good)], "sphere:2")) == 2

@@ -393,6 +393,8 @@ def in_child(queue):
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
+# JAX, which other tests import, warns of its own threads.
+@pytest.mark.filterwarnings("ignore:os.fork:RuntimeWarning")
 def test_a_forked_process_works(threads):
     ss.set_num_threads(2)
     context = multiprocessing.get_context("fork")

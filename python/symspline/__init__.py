@@ -18,6 +18,7 @@ _cpu.check(_Path(__file__).parent)
 
 from . import convert  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
+from ._derivatives import Gradient  # noqa: E402
 from ._threads import set_num_threads  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
@@ -54,6 +55,7 @@ __all__ = [
     "CubicSpline",
     "CutLocusError",
     "Euclidean",
+    "Gradient",
     "Grassmannian",
     "HermitianPositiveDefinite",
     "Hyperbolic",

@@ -44,8 +44,7 @@ def fit_many(
         return product_many(curves, space, bc_type, policy, on_failure, options)
     if not curves:
         return []
-    prepared = []
-    point_tol = 0.0
+    prepared, tols = [], []
     for number, curve in enumerate(curves):
         try:
             t, points = curve
@@ -55,7 +54,9 @@ def fit_many(
             prepared.append((*spline._knots(t, (), doubles.shape[0]), doubles))
         except (ValidationError, TypeError, ValueError) as error:
             raise ValidationError(f"curve {number}: {error}") from None
-        point_tol = max(point_tol, tol_here)
+        tols.append(tol_here)
+    if check:
+        _check_doubles(prepared, tols, space)
     offsets = np.cumsum([0, *(len(p) for *_, p in prepared)])
     all_times = np.concatenate([times for _, _, times, _ in prepared])
     ends = ends_of(bc_type, space, (len(curves),))
@@ -69,7 +70,7 @@ def fit_many(
         tol,
         max_iter,
         check,
-        point_tol,
+        max(tols),
         offsets.tolist(),
         progress,
         large,
@@ -97,3 +98,14 @@ def fit_many(
     if faults:
         spline._fail(faults, on_failure, fitted)
     return fitted
+
+
+def _check_doubles(prepared: list[Any], tols: list[float], space: Space) -> None:
+    """Points in double precision may not be as far off as those in single precision beside them."""
+    for number, ((*_, points), tol) in enumerate(zip(prepared, tols, strict=True)):
+        if tol < max(tols):
+            rows = points.reshape(len(points), -1)
+            try:
+                space._handle.check_points(rows, [len(points)], tol)
+            except ValidationError as error:
+                raise ValidationError(f"curve {number}: {error}") from None

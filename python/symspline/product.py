@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import spline as _spline
 from ._arrays import shown
 from ._core import ConvergenceError, CutLocusError, ValidationError
+from ._derivatives import Gradient
 from ._ends import kept
 from .report import SOLVERS, Report
 from .spaces import Space
@@ -173,6 +174,34 @@ class ProductSpline(CubicSpline):
         if arguments[1] in ("speed", "bend"):
             return _together(values)
         return values
+
+    def jvp(
+        self,
+        x: ArrayLike,
+        points: Any = None,
+        t: ArrayLike | None = None,
+        ends: tuple[Any, Any] | None = None,
+        nu: int = 0,
+    ) -> Tuple:
+        """How the curve moves when its data move, see `CubicSpline.jvp`; points and vectors are tuples."""
+        factors = len(self._parts)
+        if points is None:
+            points = (None,) * factors
+        check_tuple(points, self._space, "points")
+        for end in ends or ():
+            if end is not None:
+                check_tuple(end, self._space, "an end vector")
+        pairs = [tuple(end and end[i] for end in ends) if ends else None for i in range(factors)]
+        pieces = zip(self._parts, points, pairs, strict=True)
+        return tuple(part.jvp(x, p, t, pair, nu) for part, p, pair in pieces)
+
+    def vjp(self, x: ArrayLike, cotangent: Any, nu: int = 0) -> Gradient:
+        """The gradient with respect to the data, see `CubicSpline.vjp`; points and vectors are tuples."""
+        check_tuple(cotangent, self._space, "cotangent")
+        parts = [part.vjp(x, c, nu) for part, c in zip(self._parts, cotangent, strict=True)]
+        first, last = (None if parts[0].ends[e] is None else tuple(g.ends[e] for g in parts) for e in (0, 1))
+        t = np.sum([g.t for g in parts], axis=0)
+        return Gradient(tuple(g.points for g in parts), t, (first, last))
 
     @property
     def points(self) -> Tuple:

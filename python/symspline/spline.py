@@ -26,6 +26,8 @@ from .spaces import space as space_named
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ._derivatives import Gradient
+
 _PACKAGE = os.path.dirname(__file__)
 
 Array = NDArray[Any]
@@ -195,6 +197,17 @@ class CubicSpline:
         self._bc_type, self._extrapolate, self._report = bc_type, extrapolate, report
         return self
 
+    @classmethod
+    def _with_velocities(
+        cls, t: ArrayLike | None, points: Any, velocities: Array, space: Space, bc_type: Any, check: bool
+    ) -> CubicSpline:
+        """A spline whose velocities are known: validated, but not fitted."""
+        self = object.__new__(CubicSpline)
+        self._space, self._extrapolate = space, None
+        self._fill(t, points, bc_type, "auto", 0.0, None, check, None, dry=True)
+        self._velocities = velocities
+        return self
+
     # ---- the curve ----
 
     def __call__(
@@ -236,6 +249,73 @@ class CubicSpline:
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
         return integrate(self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch)
+
+    # ---- how it follows its data ----
+
+    def jvp(
+        self,
+        x: ArrayLike,
+        points: Any = None,
+        t: ArrayLike | None = None,
+        ends: tuple[Any, Any] | None = None,
+        nu: int = 0,
+    ) -> Any:
+        """How the curve at times x moves when its data move: the derivative in one direction.
+
+        The data move by small multiples of what is given here; what is not given stays. It is computed by
+        implicit differentiation of the C² condition, whose Jacobian Newton's method uses, too.
+
+        Args:
+            x: times between the first and the last knot, any shape.
+            points: tangent vectors at the points, of their shape. Of a closed curve the last point goes with the
+                first, and its row is not read.
+            t: changes of the knots, of their shape; in seconds for dates.
+            ends: changes of the vectors that were given at the two ends; None for no change. What is not changed
+                goes with its point in parallel.
+            nu: 0 for the point γ, 1 for the velocity γ'.
+
+        Returns:
+            Tangent vectors at the points of the curve, shape batch axes + x.shape + point_shape. With ``nu=1``
+            the covariant derivative of γ': how it changes seen from the moving point.
+
+        Raises:
+            ValidationError: the input is not what is described above, or the space has very many dimensions.
+
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+        >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
+        array([0.6875])
+        """
+        from ._derivatives import push
+
+        return push(self, x, points, t, ends, nu)
+
+    def vjp(self, x: ArrayLike, cotangent: Any, nu: int = 0) -> Gradient:
+        """The gradient of ``sum(cotangent * curve)`` with respect to the data: `jvp`, transposed.
+
+        Args:
+            x: times between the first and the last knot, any shape.
+            cotangent: any array of the shape of ``spline(x)``. Of complex numbers the sum is of the products of real
+                and of imaginary parts.
+            nu: 0 for the point γ, 1 for the velocity γ'.
+
+        Returns:
+            A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu))`` is
+            ``sum(g.points * points) + sum(g.t * t)`` and the same for the vectors at the ends: plain sums of products.
+            Vectors in it are tangent. Of a closed curve the last point has no gradient of its own.
+
+        Raises:
+            ValidationError: the input is not what is described above, or the space has very many dimensions.
+
+        >>> import symspline as ss
+        >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+        >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
+        [[0.40625], [0.6875], [-0.09375]]
+        """
+        from ._derivatives import pull
+
+        return pull(self, x, cotangent, nu)
 
     def _at(self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Any:
         """A quantity at times as the user gives them."""
@@ -514,10 +594,7 @@ def evaluate(
     if not np.isfinite(velocities).all():
         index = np.argwhere(~np.isfinite(velocities))[0].tolist()
         raise ValidationError(f"u{index} is not finite")
-    spline = object.__new__(CubicSpline)
-    spline._space, spline._extrapolate = space, None
-    spline._fill(t, points, "natural", "auto", 0.0, None, True, None, dry=True)
-    spline._velocities = velocities
+    spline = CubicSpline._with_velocities(t, points, velocities, space, "natural", check=True)
     if is_large(space):
         # Any velocities, unlike those of a spline.
         spline._small = spline._down(span_of(space, spline._points, velocities))

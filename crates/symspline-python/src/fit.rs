@@ -12,6 +12,8 @@ use symspline::space::Space;
 use symspline::with_space;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+/// A kind, and the vectors that it prescribes: one a curve.
+pub type EndOf<'py> = (String, Option<Array<'py>>);
 
 /// What a fit gives back: points on the space, velocities, the arrays of the report, and per failed
 /// curve (index, kind, message).
@@ -32,7 +34,7 @@ pub fn fit<'py>(
     handle: &Handle,
     t: Array<'py>,
     points: Array<'py>,
-    ends: Option<[(String, Option<Array<'py>>); 2]>,
+    ends: Option<[EndOf<'py>; 2]>,
     method: &str,
     tol: f64,
     max_iter: Option<usize>,
@@ -112,7 +114,7 @@ pub fn fit<'py>(
     Ok((out, velocities, arrays(py, &reports)?, faults))
 }
 
-fn end<'a>((kind, value): &'a (String, Option<Array>)) -> PyResult<End<'a>> {
+pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
     Ok(match (kind.as_str(), value) {
         ("natural", _) => End::Natural,
         ("not-a-knot", _) => End::NotAKnot,

@@ -1,5 +1,6 @@
 //! The compiled module `symspline._core`: arrays in, arrays out, validation; no mathematics.
 
+mod derivative;
 mod errors;
 mod evaluate;
 mod fit;
@@ -33,6 +34,8 @@ fn num_threads() -> usize {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<space::Handle>()?;
     m.add_function(wrap_pyfunction!(fit::fit, m)?)?;
+    m.add_function(wrap_pyfunction!(derivative::push, m)?)?;
+    m.add_function(wrap_pyfunction!(derivative::pull, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate_bspline, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;

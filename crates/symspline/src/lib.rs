@@ -7,6 +7,7 @@
 //! velocities, [`curve`] evaluates, [`space`] is the geometry.
 
 pub mod curve;
+pub mod derivative;
 pub mod fit;
 pub mod matrix;
 pub mod monitor;

@@ -144,7 +144,11 @@ pub fn project_points<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Resu
         }
     });
     match first.into_inner() {
-        Ok(Some((row, off))) => Err((row, off, space.complaint(&points[row * len..(row + 1) * len]))),
+        Ok(Some((row, off))) => {
+            let x = &points[row * len..(row + 1) * len];
+            let finite = x.iter().all(|x| x.is_finite());
+            Err((row, off, if finite { space.complaint(x) } else { "it is not finite".into() }))
+        }
         _ => Ok(()),
     }
 }

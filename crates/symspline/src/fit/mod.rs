@@ -1,6 +1,7 @@
 //! From points to velocities: the spline through given points.
 
 mod auto;
+mod blocks;
 mod certificate;
 mod chain;
 mod condition;
@@ -12,6 +13,7 @@ mod quasi_newton;
 mod solve;
 mod tridiagonal;
 
+pub use blocks::Blocks;
 pub use condition::EndKind;
 pub use pieces::fit;
 

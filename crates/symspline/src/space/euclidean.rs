@@ -86,7 +86,7 @@ impl Space for Euclidean {
     }
     fn scatter(&self, _noise: &mut [Lane]) {}
     fn complaint(&self, _x: &[f64]) -> String {
-        "it is not finite".into()
+        "any finite numbers are a point".into()
     }
 
     // Frames of flat space are all the same and hold nothing.

@@ -148,7 +148,7 @@ pub trait Space: Copy + Send + Sync + 'static {
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane;
     /// Turns independent standard normal numbers into a random point.
     fn scatter(&self, noise: &mut [Lane]);
-    /// Says in words and numbers why x is not a point.
+    /// Says in words and numbers why x, which is finite, is not a point.
     fn complaint(&self, x: &[f64]) -> String;
 
     // ---- moving frame ---------------------------------------------------------------------

@@ -62,6 +62,31 @@ fn whiten<const D: usize, A: Storage>(l: &Matrix<Lane, D, A>, x: &Matrix<Lane, D
     solve_lower(l, &solve_lower(l, x).adjoint()).hermitian_part()
 }
 
+/// The lanes on which p is positive definite to more than rounding, whatever the units of rows and columns:
+/// with ones on the diagonal, the smallest eigenvalue is above n rounding errors.
+fn positive_definite<const D: usize, A: Storage>(p: &Matrix<Lane, D, A>) -> Lane {
+    let (l, n) = (cholesky(p), p.rows());
+    // Pivots that are no small part of the diagonal tell without eigenvalues.
+    let pivots_above = |part: f64| {
+        (0..n).fold(Lane::ZERO.simd_eq(Lane::ZERO), |good, j| {
+            let root = l[(j, j)][0];
+            good & (root * root).simd_gt(lane(part) * p[(j, j)][0])
+        })
+    };
+    let sure = pivots_above(1e-6);
+    let doubtful = pivots_above(0.0) & !sure;
+    if doubtful.none() {
+        return sure;
+    }
+    let units: Vec<Lane> = (0..n).map(|i| Lane::ONE / p[(i, i)][0].sqrt()).collect();
+    let mut scaled: [Matrix<Lane, D, A>; 1] = [Matrix::from_fn(n, n, |i, j| {
+        p[(i, j)].map(|x| doubtful.select(x * units[i] * units[j], Lane::ZERO))
+    })];
+    diagonalise(&mut scaled);
+    let least = (0..n).map(|i| scaled[0][(i, i)][0]).fold(lane(f64::INFINITY), |m, x| m.min(x));
+    sure | (doubtful & least.simd_gt(lane(n as f64 * f64::EPSILON)))
+}
+
 /// `g x g*` for a Hermitian x.
 fn congruent<S: Scalar, const D: usize, A: Storage>(
     g: &Matrix<S, D, A>,
@@ -207,8 +232,7 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         let largest = x.iter().fold(Lane::ZERO, |m, x| max_or_nan(m, x.abs()));
         let unit = Lane::ONE / largest.simd_gt(Lane::ZERO).select(largest, Lane::ONE);
         let off = (&p - &before).scaled(unit).size() / p.scaled(unit).size();
-        let last = cholesky(&p)[(self.n - 1, self.n - 1)][0];
-        let good = last.is_finite() & largest.is_finite();
+        let good = positive_definite(&p) & largest.is_finite();
         p.map(|x| good.select(x, lane(f64::NAN))).write(x);
         good.select(off, lane(f64::INFINITY))
     }
@@ -230,19 +254,17 @@ impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
         let unit = lane(1.0 / x.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs())));
         let off = ((&p - &before).scaled(unit).size() / p.scaled(unit).size()).to_array()[0];
         let what = if D == 1 { "symmetric" } else { "Hermitian" };
-        if !x.iter().all(|x| x.is_finite()) {
-            return "it is not finite".into();
-        }
         if off > 1e-4 {
             return format!("it is not {what}: the skew part is {off:.3e} of it");
         }
-        let mut values = [p];
+        let mut values = [p.clone()];
         diagonalise(&mut values);
         let least = (0..self.n).map(|i| values[0][(i, i)][0].to_array()[0]).fold(f64::INFINITY, f64::min);
-        if least > 0.0 {
+        let rounding = if least > 0.0 { ", which is rounding beside the others" } else { "" };
+        if positive_definite(&p).all() {
             format!("it is not {what}: the skew part is {off:.3e} of it")
         } else {
-            format!("it is not positive definite: its smallest eigenvalue is {least:.6e}")
+            format!("it is not positive definite: its smallest eigenvalue is {least:.6e}{rounding}")
         }
     }
 

@@ -1,0 +1,148 @@
+//! Derivatives with respect to the data, called from Python.
+
+use crate::errors::invalid;
+use crate::fit::{EndOf, end};
+use crate::space::Handle;
+use crate::watch::watched;
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+use symspline::derivative::{Data, Derivative, Of};
+use symspline::fit::{End, Ends};
+use symspline::monitor::Monitor;
+use symspline::parallel;
+use symspline::space::Space;
+use symspline::with_space;
+
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+
+/// Curves with equally many knots and times, all arrays curve after curve.
+#[derive(FromPyObject)]
+pub struct Curves<'py> {
+    t: Array<'py>,
+    points: Array<'py>,
+    velocities: Array<'py>,
+    ends: Option<[EndOf<'py>; 2]>,
+    x: Array<'py>,
+    curves: usize,
+    nu: usize,
+}
+
+struct Slices<'a> {
+    t: &'a [f64],
+    points: &'a [f64],
+    velocities: &'a [f64],
+    ends: Ends<'a>,
+    x: &'a [f64],
+    curves: usize,
+    of: Of,
+}
+
+/// The part of an array that belongs to one of equally many curves.
+fn part<T>(array: &[T], curve: usize, curves: usize) -> &[T] {
+    let size = array.len() / curves;
+    &array[curve * size..(curve + 1) * size]
+}
+
+impl<'py> Curves<'py> {
+    fn slices(&self) -> PyResult<Slices<'_>> {
+        Ok(Slices {
+            t: self.t.as_slice()?,
+            points: self.points.as_slice()?,
+            velocities: self.velocities.as_slice()?,
+            ends: match &self.ends {
+                None => Ends::Periodic,
+                Some([a, b]) => Ends::Open([end(a)?, end(b)?]),
+            },
+            x: self.x.as_slice()?,
+            curves: self.curves,
+            of: match self.nu {
+                0 => Of::Point,
+                1 => Of::Velocity,
+                nu => return Err(invalid(format!("nu must be 0 or 1, not {nu}"))),
+            },
+        })
+    }
+}
+
+impl Slices<'_> {
+    fn derivative<'a, M: Space>(&'a self, space: &'a M, c: usize) -> Derivative<'a, M> {
+        let one = |end: End<'a>| match end {
+            End::Velocity(v) => End::Velocity(part(v, c, self.curves)),
+            End::Acceleration(v) => End::Acceleration(part(v, c, self.curves)),
+            other => other,
+        };
+        let ends = match self.ends {
+            Ends::Periodic => Ends::Periodic,
+            Ends::Open(ends) => Ends::Open(ends.map(one)),
+        };
+        let own = |array| part(array, c, self.curves);
+        Derivative::new(space, own(self.t), own(self.points), own(self.velocities), &ends)
+    }
+
+    fn times(&self, c: usize) -> &[f64] {
+        part(self.x, c, self.curves)
+    }
+}
+
+/// Runs `work` on every curve and its part of a result.
+fn each<T: Send>(items: Vec<(usize, T)>, monitor: &Monitor, work: impl Fn(usize, T) + Sync) {
+    parallel::for_each(items, true, monitor, |(curve, item)| {
+        work(curve, item);
+        monitor.advance(1);
+    });
+}
+
+/// How curves move: tangent vectors, for changes of points, knots and end vectors (empty for none).
+#[pyfunction]
+pub fn push<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    curves: Curves<'py>,
+    points: Array<'py>,
+    knots: Array<'py>,
+    ends: [Array<'py>; 2],
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let slices = curves.slices()?;
+    let len = with_space!(&handle.space, s => s.point_len());
+    let (points, knots) = (points.as_slice()?, knots.as_slice()?);
+    let ends = [ends[0].as_slice()?, ends[1].as_slice()?];
+    let out = PyArray1::zeros(py, slices.x.len() * len, false);
+    let mut write = out.readwrite();
+    let result = write.as_slice_mut()?;
+    if !result.is_empty() {
+        let size = result.len() / slices.curves;
+        let items = result.chunks_mut(size).enumerate().collect();
+        watched(py, None, slices.curves, |monitor| {
+            each(items, monitor, |c, out| {
+                let own = |array| part(array, c, slices.curves).to_vec();
+                let change = Data { points: own(points), knots: own(knots), ends: ends.map(own) };
+                with_space!(&handle.space, s => slices.derivative(s, c).push(slices.times(c), slices.of, &change, out));
+            });
+        })?;
+    }
+    drop(write);
+    Ok(out)
+}
+
+/// Gradients of Σ cotangent · curve: with respect to points, knots and the vectors at the ends.
+#[pyfunction]
+pub fn pull<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    curves: Curves<'py>,
+    cotangent: Array<'py>,
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
+    let slices = curves.slices()?;
+    let cotangent = cotangent.as_slice()?;
+    let mut gradients = vec![Data::default(); slices.curves];
+    let items = gradients.iter_mut().enumerate().collect();
+    watched(py, None, slices.curves, |monitor| {
+        each(items, monitor, |c, out| {
+            let own = part(cotangent, c, slices.curves);
+            *out = with_space!(&handle.space, s => slices.derivative(s, c).pull(slices.times(c), slices.of, own));
+        });
+    })?;
+    let column =
+        |f: fn(&Data) -> &[f64]| PyArray1::from_vec(py, gradients.iter().flat_map(f).copied().collect());
+    Ok([column(|g| &g.points), column(|g| &g.knots), column(|g| &g.ends[0]), column(|g| &g.ends[1])])
+}

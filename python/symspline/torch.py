@@ -1,0 +1,90 @@
+"""Splines as differentiable functions in PyTorch, on the CPU."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from ._adapters import fitted, split
+from .spaces import Space
+from .spaces import space as space_named
+
+
+def curve(
+    x: Any, t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", **options: Any
+) -> Any:
+    """The spline through points at times x: ``CubicSpline(t, points, space, ...)(x)``.
+
+    It has derivatives of first order, backward and forward, with respect to x, t, points and the vectors in
+    ``bc_type``. Numbers are computed in double precision, and come back in that of the points.
+
+    Points and vectors are first moved to the nearest of the space, so that points which an optimiser moved are
+    welcome. Where many arrays are one point (projective spaces, Grassmannians), differentiate what does not
+    depend on the choice.
+
+    Args:
+        x: times, any shape.
+        t: knots, shape (N+1,), or (..., N+1).
+        points: shape (..., N+1, *point_shape); for a `Product` a tuple.
+        space: the space or its name.
+        bc_type: as for `CubicSpline`; vectors may be tensors.
+        options: further options of `CubicSpline`.
+
+    Returns:
+        Shape batch axes + x.shape + point_shape; for a `Product` a tuple.
+    """
+    space = space_named(space)
+    if hasattr(space, "factors"):
+        from .product import _split_ends, check_tuple
+
+        factors: Any = space
+        check_tuple(points, space, "points")
+        pieces = zip(points, factors.factors, _split_ends(bc_type, factors), strict=True)
+        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in pieces)
+    kinds, vectors = split(bc_type)
+    points = torch.as_tensor(points)
+    x, t = torch.as_tensor(x), torch.as_tensor(t)
+    ends = [None if v is None else torch.as_tensor(v) for v in vectors]
+    return _Curve.apply(x, t, points, *ends, (space, kinds, options))
+
+
+class _Curve(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, x: Any, t: Any, points: Any, start: Any, end: Any, fixed: Any) -> Any:
+        space, kinds, options = fixed
+        arrays = [None if a is None else a.detach().numpy() for a in (x, t, points, start, end)]
+        ctx.x = np.asarray(arrays[0], float)
+        ctx.spline = fitted(arrays[1], arrays[2], (arrays[3], arrays[4]), space, kinds, options)
+        ctx.like = [None if a is None else (a.dtype, a.shape) for a in (x, t, points, start, end)]
+        return torch.as_tensor(ctx.spline(ctx.x)).to(points.dtype)
+
+    @staticmethod
+    def backward(ctx: Any, *cotangents: Any) -> Any:
+        cotangent = cotangents[0].detach().resolve_conj().numpy()
+        spline, x = ctx.spline, ctx.x
+        gradient = spline.vjp(x, cotangent)
+        axes = tuple(range(-len(spline.space.point_shape), 0))
+        along = np.sum((np.conj(cotangent) * spline(x, 1)).real, axis=axes).reshape(-1, *x.shape).sum(axis=0)
+        found = (along, gradient.t, gradient.points, *gradient.ends)
+        return *(_tensor(a, like) for a, like in zip(found, ctx.like, strict=True)), None
+
+    @staticmethod
+    def jvp(ctx: Any, *changes: Any) -> Any:
+        dx, dt, points, *ends = (
+            None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5]
+        )
+        spline, x = ctx.spline, ctx.x
+        moved = spline.jvp(x, points, dt, (ends[0], ends[1]))
+        if dx is not None:
+            moved = moved + spline(x, 1) * dx.reshape(dx.shape + (1,) * len(spline.space.point_shape))
+        return torch.as_tensor(moved).to(ctx.like[2][0])
+
+
+def _tensor(array: Any, like: Any) -> Any:
+    """A gradient in the type of its input."""
+    if array is None or like is None:
+        return None
+    dtype, shape = like
+    return torch.as_tensor(np.ascontiguousarray(array)).to(dtype).reshape(shape)

@@ -1,0 +1,52 @@
+"""The adapter for PyTorch, under PyTorch's own gradient checks: `make test-torch`."""
+
+import numpy as np
+import pytest
+import torch
+from cases import unit_tangent, walk
+
+import symspline as ss
+from symspline.torch import curve
+
+# PyTorch's forward mode warns of itself.
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:`torch.jit:FutureWarning", "ignore:`torch.jit:DeprecationWarning"
+)
+
+X = torch.tensor([0.3, 1.7, 3.1], dtype=torch.float64)
+T = torch.tensor([0.0, 1.0, 2.2, 3.0, 4.1], dtype=torch.float64)
+
+
+def points_of(name, seed=0):
+    return torch.tensor(walk(ss.space(name), 0.5, len(T), np.random.default_rng(seed)))
+
+
+def check(function, *inputs):
+    inputs = tuple(x.clone().requires_grad_() for x in inputs)
+    assert torch.autograd.gradcheck(function, inputs, check_forward_ad=True, atol=1e-6, rtol=1e-6)
+
+
+@pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", "clamped"])
+@pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "spd:2", "u:2"])
+def test_gradients_pass_the_checks_of_torch(name, bc_type):
+    check(lambda x, t, points: curve(x, t, points, name, bc_type=bc_type), X, T, points_of(name))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_vectors_at_the_ends_have_gradients(order):
+    space, points = ss.Sphere(2), points_of("sphere:2")
+    rng = np.random.default_rng(1)
+    a, b = (torch.tensor(0.3 * unit_tangent(space, points[i].numpy(), rng)) for i in (0, -1))
+    check(lambda a, b: curve(X, T, points, space, bc_type=((order, a), (order, b))), a, b)
+
+
+def test_products_batches_and_single_precision():
+    points = points_of("sphere:3"), points_of("r:3")
+    values = curve(X, T, points, "sphere:3 x r:3")
+    expected = ss.CubicSpline(T.numpy(), tuple(p.numpy() for p in points), "sphere:3 x r:3")(X.numpy())
+    for value, array in zip(values, expected, strict=True):
+        np.testing.assert_allclose(value, array, atol=1e-14)
+    many = torch.stack([points[0], points_of("sphere:3", 1)]).float().requires_grad_()
+    curve(X, T, many, "sphere:3").sum().backward()
+    assert many.grad.dtype == torch.float32
+    assert many.grad.shape == many.shape
