@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from cases import jumps
+from cases import jumps, steep_tangent
 from curves import EPS, SPACES, each, largest_difference, points_on, run_python, same, same_curve
 from scipy.interpolate import CubicSpline as FlatSpline
 
@@ -640,3 +640,35 @@ def test_state_is_described_by_plain_json():
     # Used by whoever logs reports.
     report = ss.CubicSpline(None, np.eye(3), S2).report
     assert json.loads(json.dumps(vars(report)))["converged"] is True
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7])
+@pytest.mark.parametrize("gap", [0.1, 1e-3, 1e-8, 1e-12, 1e-13, 1e-14])
+def test_the_last_digits_before_the_antipode(n, gap):
+    """A logarithm there is tangent, of the right length, and leads to the point; so do curves."""
+    space, rng = ss.Sphere(n), np.random.default_rng(n)
+    p = space.random_point(rng, 20)
+    v = space.random_tangent(rng, p)
+    q = space.exp(p, (np.pi - gap) * v / space.norm(p, v)[:, None])
+    log = space.log(p, q)
+    assert np.abs(np.sum(p * log, axis=-1)).max() < 1e-15
+    np.testing.assert_allclose(space.norm(p, log), np.pi - gap, rtol=0, atol=2e-15)
+    for t in (0.0, 0.3, 1.0):
+        np.testing.assert_allclose(space.geodesic(p, q, t), space.exp(p, t * log), atol=1e-15)
+    np.testing.assert_allclose(space.exp(p, log), q, atol=2e-15)
+    curves = ss.CubicSpline(None, np.stack([p, q], axis=1), space)
+    np.testing.assert_allclose(curves(1.0), q, atol=4e-15)
+    # A curve's points are normalised, which turns the direction by as much as rounding is of the gap.
+    np.testing.assert_allclose(curves(0.3), space.geodesic(p, q, 0.3), atol=4e-15 + 4 * EPS / gap)
+
+
+@pytest.mark.parametrize("name", ["gr:2,5", "cgr:2,4", "gr:1,3", "rp:2", "cp:2"])
+def test_b_splines_of_subspaces_that_reach_the_cut_locus(name):
+    space, rng = ss.space(name), np.random.default_rng(1)
+    for _ in range(5):
+        p = space.random_point(rng)
+        q = space.exp(p, space.injectivity_radius * (1 - 4e-15) * steep_tangent(space, p, rng))
+        curve = ss.BSpline([0, 0, 1, 1], [p, q], 1, space)
+        for nu in range(3):
+            assert np.isfinite(curve(0.3, nu)).all()
+        assert np.isclose(curve.speed(0.3), space.distance(p, q), atol=1e-12)

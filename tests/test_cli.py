@@ -552,6 +552,9 @@ def test_times_along_a_curve():
         ("1e-12d", "whole number of nanoseconds"),
         ("1e30d", "too long"),
         ("1ns", "samples of one curve"),
+        ("1e400", "too long"),
+        ("1e-999999999", "too short"),
+        ("1e99999999999999999999", "no number of any use"),
     ],
 )
 def test_steps_that_are_none(step, found):
@@ -565,8 +568,36 @@ def test_steps_of_numbers(fails, run):
     assert "give a step without a unit" in fails("sample a.npz --every 10min -o b.csv")
     assert "samples of one curve" in fails("sample a.npz --every 1e-300 -o b.csv")
     assert "-n 0: the number of samples" in fails("sample a.npz -n 0 -o b.csv")
+    assert "too long" in fails("sample a.npz --every 1e350 -o b.csv")
+    assert "too short" in fails("sample a.npz --every 1e-350 -o b.csv")
     with pytest.raises(Problem, match="large whole numbers"):
         times.every("0.5", np.array([2**60, 2**60 + 5]))
+
+
+@pytest.mark.parametrize(
+    "start, kind", [(2**60, ">i8"), (2**62, "<i8"), (-(2**63), "<i8"), (2**64 - 9, "<u8")]
+)
+def test_steps_of_large_whole_numbers(start, kind):
+    knots = np.array([start, start + 5, start + 8], kind)
+    assert times.every("3", knots).tolist() == [start, start + 3, start + 6]
+    assert times.every("99999999999999999999", knots).tolist() == [start]
+    assert times.spread(3, knots).tolist() == [start, start + 4, start + 8]
+
+
+def test_dates_that_cannot_be_counted():
+    far = np.array(["300000-01-01", "300000-01-03"], "datetime64[D]")
+    assert times.every("1d", far).astype("datetime64[D]")[-1] == far[-1]
+    short = np.array([0, 10**9], "datetime64[ns]")
+    assert times.every("200000d", short).tolist() == short[:1].tolist()
+    fine, long = np.array([1, 2], "datetime64[as]"), np.array([-(2**62) - 1, 2**62 + 1], "datetime64[s]")
+    assert times.spread(2, fine).tolist() == fine.tolist()
+    for knots in (far, fine, long):
+        step = "1s" if knots is not far else "1ns"
+        with pytest.raises(Problem, match=f"from {knots[0]} to {knots[1]} cannot be counted"):
+            times.every(step, knots)
+    for knots in (far + np.timedelta64(10**9), long):
+        with pytest.raises(Problem, match="cannot be counted in units of 1 microseconds"):
+            times.spread(3, knots)
 
 
 # ---- longitude and latitude ----
@@ -1001,7 +1032,7 @@ def test_bad_columns_of_complex_numbers_and_matrices(fails, text, options, probl
         ("so:3", lambda p: -p, "the point in line 5 is off the space: its determinant is -1"),
         ("o:3", lambda p: -p, "the point in line 4 and the point in line 5 of curve 'a' have opposite"),
         ("r:1 x o:3", lambda p: -p, "the point in line 4 and the point in line 5 of curve 'a' have opposite"),
-        ("su:2", lambda p: 1j * p, "its determinant is not 1 but has the phase 3.141593 (u:2 takes it)"),
+        ("su:2", lambda p: 1j * p, "its determinant is not 1 but has the phase 3.142e0 (u:2 takes it)"),
         ("spd:2", lambda p: -p, "the point in line 5 is off the space: it is not positive definite"),
         ("hpd:2", lambda p: p + 1j * p[0, 0] * np.eye(2), "line 5 is off the space by"),
         ("se:2", lambda p: p.T, "the point in line 5 is off the space by"),
@@ -1052,6 +1083,7 @@ def test_bad_usage(run, fails):
     )
     assert "unrecognized arguments: --tiem" in fails("fit a.csv --space s:2 --tiem t -o b.npz")
     assert "--every -n --at is required" in fails("sample a.npz -o b.csv")
+    assert "--" in fails("sample a.npz --every=-- -o b.csv")
     assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
     assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
     assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
@@ -1078,6 +1110,75 @@ def test_files_that_cannot_be_read(fails):
     assert fails("check a.npz").startswith("a.npz is damaged")
     Path("a.npz").write_bytes(Path("a.npz").read_bytes()[:-300])
     assert "a.npz" in fails("check a.npz")
+
+
+def in_archive(name, **arrays):
+    """A copy of a.npz in which some arrays are others."""
+    np.savez(name, **(dict(np.load("a.npz")) | arrays))
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        "no JSON",
+        pytest.param("[" * 100_000, id="deep"),
+        "[]",
+        "{}",
+        '{"points": 3}',
+        '{"points": ["x", "y"]}',
+        '{"points": ["x", "y", 3]}',
+        '{"points": ["x", "y", "z"], "time": null}',
+        '{"points": ["x", "y", "z"], "curve": 1}',
+        '{"points": ["x", "y", "z"], "lonlat": "no"}',
+        '{"points": ["x", "y", "z"], "utc": 2}',
+        '{"points": ["x", "y", "z"], "lonlat": true}',
+        '{"points": ["x", "y", "z"], "surprise": 1}',
+    ],
+)
+def test_names_of_columns_that_are_damaged(run, fails, columns):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o a.npz")
+    in_archive("b.npz", columns=columns)
+    assert fails("sample b.npz -n 3 -o c.csv").startswith("b.npz is damaged: ")
+
+
+def test_longitudes_of_other_spaces(fails):
+    ss.CubicSpline(None, [[0.0, 0], [1, 2]], "r:2").save("a.npz")
+    in_archive("b.npz", columns='{"points": ["lon", "lat"], "lonlat": true}')
+    assert fails("check b.npz") == "b.npz is damaged: its names of columns do not suit euclidean:2"
+
+
+def claim(entry, method):
+    """A copy of a.npz in which an entry claims to be compressed by a method by which it is not."""
+    data, name = bytearray(Path("a.npz").read_bytes()), f"{entry}.npy".encode()
+    # Names end the headers of entries, and their lines in the list of all at the end of the file.
+    data[data.index(name) - 30 + 8] = data[data.rindex(name) - 46 + 10] = method
+    Path("b.npz").write_bytes(data)
+
+
+@pytest.mark.parametrize("method", [8, 12, 14, 99], ids=["deflate", "bzip2", "lzma", "unknown"])
+def test_archives_that_cannot_be_unpacked(run, fails, method):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o a.npz")
+    for entry in ("points", "columns"):
+        claim(entry, method)
+        assert "b.npz" in fails("check b.npz")
+    np.savez("a.npz", t=[0.0, 1, 2], x=[0.0, 1, 0])
+    claim("x", method)
+    assert "b.npz" in fails("fit b.npz --space r:1 -o c.npz")
+
+
+def test_archives_with_a_damaged_list_of_entries(fails):
+    ss.CubicSpline(None, np.eye(3), "s:2").save("a.npz")
+    data = Path("a.npz").read_bytes()
+    for damaged in (data.replace(b"PK\1\2", b"PK\1\0"), data[:-10] + b"\xff" * 4 + data[-6:]):
+        Path("b.npz").write_bytes(damaged)
+        assert fails("check b.npz") == "b.npz is not a file of curves, such as `symspline fit` makes"
+
+
+def test_messages_are_short(fails):
+    write("a.csv", "t,x\n0,1\n1," + "9" * 5000 + "x\n")
+    assert 1000 < len(fails("fit a.csv --space r:1 -o a.npz")) < 1100
 
 
 def test_pictures_without_matplotlib(run, fails, monkeypatch):

@@ -300,6 +300,7 @@ BAD = [
     (convert.hyperboloid_to_half_space, [1.0, 0.1], "not on the hyperboloid"),
     (convert.ball_to_hyperboloid, [0.6, 0.8], r"not inside the unit ball: its length is 1\.0"),
     (convert.ball_to_half_space, [1e200, 0.8], r"not inside the unit ball: its length is 1e\+200"),
+    (convert.ball_to_half_space, [1.7e308, 1.7e308], "not inside the unit ball: its length is inf"),
     (convert.half_space_to_ball, [1.0, 0.0], r"height, is 0\.0; it must be positive"),
     (convert.half_space_to_ball, [1e30, 1.0], "too far out for the ball"),
     (convert.half_space_to_hyperboloid, [1.0, -2.0], r"height, is -2\.0; it must be positive"),

@@ -68,7 +68,7 @@ def by_differences(space, t, points, bc, change, x, nu):
         spline = moved(space, t, points, bc, change, size)
         if nu == 0:
             return space.log(base, spline(x))
-        return space.transport(spline(x), base, spline(x, 1))
+        return space.transport(spline(x), base, spline(x, nu))
 
     return (8 * (seen(STEP) - seen(-STEP)) - (seen(2 * STEP) - seen(-2 * STEP))) / (12 * STEP)
 
@@ -88,7 +88,7 @@ EACH = [
 ]
 
 
-@pytest.mark.parametrize("nu", (0, 1))
+@pytest.mark.parametrize("nu", (0, 1, 2))
 @pytest.mark.parametrize(("case", "end"), EACH, ids=[f"{c.name}-{e}" for c, e in EACH])
 def test_derivatives_are_those_of_finite_differences(case, end, nu):
     rng = np.random.default_rng(5)
@@ -102,7 +102,7 @@ def test_derivatives_are_those_of_finite_differences(case, end, nu):
     assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
 
 
-@pytest.mark.parametrize("nu", (0, 1))
+@pytest.mark.parametrize("nu", (0, 1, 2))
 @pytest.mark.parametrize(("case", "end"), EACH, ids=[f"{c.name}-{e}" for c, e in EACH])
 def test_the_gradient_is_the_transpose(case, end, nu):
     rng = np.random.default_rng(6)
@@ -132,7 +132,7 @@ def test_in_flat_space_they_are_those_of_scipy():
         for k in range(5):
             e = np.eye(5)[k]
             expected = scipy.CubicSpline(t, e, bc_type=bc)
-            for nu in (0, 1):
+            for nu in (0, 1, 2):
                 found = spline.jvp(x, points=e[:, None], nu=nu)[:, 0]
                 np.testing.assert_allclose(found, expected(x, nu), atol=1e-14)
 
@@ -164,7 +164,7 @@ def test_they_are_finite_where_points_coincide(name, end):
     # A curve that stands still.
     still = np.repeat(points[:1], len(t), axis=0)
     spline = ss.CubicSpline(t, still, space, bc_type="periodic" if end == "periodic" else "natural")
-    for nu in (0, 1):
+    for nu in (0, 1, 2):
         assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu).points).all()
 
 
@@ -243,7 +243,7 @@ def test_long_curves_and_saved_ones(tmp_path):
     ("change", "match"),
     [
         ({"x": 9.0}, r"x\[0\] = 9.0 is outside the knots \[0.0, 3.0\]"),
-        ({"nu": 2}, "nu must be 0 or 1"),
+        ({"nu": 3}, "nu must be 0, 1 or 2"),
         ({"points": np.zeros((3, 3))}, r"points has shape \(3, 3\), but \(4, 3\) is needed"),
         ({"t": [1.0]}, r"t has shape \(1,\), but \(4,\) is needed"),
         ({"ends": (np.zeros(3), None)}, "no vector was given at the start"),

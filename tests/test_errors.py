@@ -907,3 +907,23 @@ def test_a_bad_point_is_found_before_a_long_fit():
     points = points_on(S2, 2000)
     points[1999] = 0
     fit_error(r"points\[1999\] is off the space", points=points)
+
+
+def test_messages_quote_no_large_arrays():
+    # NumPy would write out all of it, as no axis is long.
+    wrong = np.zeros((2,) * 20)
+    with pytest.raises(ss.ValidationError, match=r"not an array of shape \(2, 2, 2, .*\)$"):
+        ss.CubicSpline(None, P, S2, on_failure=wrong)
+
+
+def test_messages_quote_no_large_part_of_a_file():
+    file = io.BytesIO()
+    ss.CubicSpline(None, P, S2).save(file)
+    # It quotes as much as the damaged length of a name says.
+    with zipfile.ZipFile(file) as archive:
+        info = archive.infolist()[1]
+    data = bytearray(file.getvalue())
+    data[info.header_offset + 26 : info.header_offset + 28] = (5000).to_bytes(2, "little")
+    with pytest.raises(ss.ValidationError, match="damaged or not a symspline curve") as caught:
+        ss.load(io.BytesIO(data + bytes(5000)))
+    assert len(str(caught.value)) < 300

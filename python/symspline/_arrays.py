@@ -20,8 +20,16 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
 
 def shown(value: Any) -> str:
     """A value in a message: on one line, and not too long."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 150 else f"{text[:150]}…"
+    if isinstance(value, np.ndarray) and value.size > 1000:
+        # With many short axes NumPy would write out all of it.
+        return f"an array of shape {value.shape}"
+    return brief(repr(value))
+
+
+def brief(text: object, most: int = 150) -> str:
+    """A text on one line, and not too long."""
+    line = " ".join(str(text).split())
+    return line if len(line) <= most else f"{line[:most]}…"
 
 
 def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:

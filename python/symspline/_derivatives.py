@@ -99,8 +99,8 @@ def pull(spline: CubicSpline, x: ArrayLike, cotangent: Any, nu: int) -> Gradient
 def _curves(spline: CubicSpline, x: ArrayLike, nu: int) -> tuple[_Curves, tuple[int, ...]]:
     """The spline and times as the core needs them, and the shape of the result but for the axes of a point."""
     space, batch = spline._space, spline._batch
-    if isinstance(nu, bool) or nu not in (0, 1):
-        raise ValidationError(f"nu must be 0 or 1 for derivatives with respect to the data, not {shown(nu)}")
+    if isinstance(nu, bool) or nu not in (0, 1, 2):
+        raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}")
     if is_large(space):
         raise ValidationError(
             f"derivatives with respect to the data are not made in as many dimensions as {space} has: "

@@ -93,8 +93,9 @@ def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None
 
 
 def length(x: Array) -> Array:
-    """|x| of real vectors without overflow; shape of the leading axes."""
-    result: Array = np.hypot.reduce(x, axis=-1)
+    """|x| of real vectors, infinite only if it is too large for doubles; shape of the leading axes."""
+    with np.errstate(over="ignore"):
+        result: Array = np.hypot.reduce(x, axis=-1)
     return result
 
 

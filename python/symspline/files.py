@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import shown
+from ._arrays import brief, shown
 from ._core import ValidationError
 from ._ends import ends_of
 from ._times import clock_of
@@ -176,7 +176,7 @@ def _opened(file: Any, read: Callable[[dict[str, NDArray[Any]]], _T]) -> _T:
         raise ValidationError(f"{name}: {error}") from None
     except Exception as error:
         # Damage shows as errors of zipfile, of its decompressors, of NumPy and of JSON.
-        raise ValidationError(f"{name} is damaged or not a symspline curve: {error}") from None
+        raise ValidationError(f"{name} is damaged or not a symspline curve: {brief(error)}") from None
 
 
 def _unit(dtype: np.dtype[Any]) -> str:

@@ -272,11 +272,11 @@ class CubicSpline:
             t: changes of the knots, of their shape; in seconds for dates.
             ends: changes of the vectors that were given at the two ends; None for no change. What is not changed
                 goes with its point in parallel.
-            nu: 0 for the point γ, 1 for the velocity γ'.
+            nu: 0 for the point γ, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
 
         Returns:
-            Tangent vectors at the points of the curve, shape batch axes + x.shape + point_shape. With ``nu=1``
-            the covariant derivative of γ': how it changes seen from the moving point.
+            Tangent vectors at the points of the curve, shape batch axes + x.shape + point_shape. With ``nu`` 1 or 2
+            covariant derivatives: how γ' or ∇γ' change seen from the moving point.
 
         Raises:
             ValidationError: the input is not what is described above, or the space has very many dimensions.
@@ -298,7 +298,7 @@ class CubicSpline:
             x: times between the first and the last knot, any shape.
             cotangent: any array of the shape of ``spline(x)``. Of complex numbers the sum is of the products of real
                 and of imaginary parts.
-            nu: 0 for the point γ, 1 for the velocity γ'.
+            nu: as for `jvp`.
 
         Returns:
             A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu))`` is

@@ -1,10 +1,11 @@
 //! Derivatives with respect to the data, called from Python.
 
+use crate::arrays::{room, zeros};
 use crate::errors::invalid;
 use crate::fit::{EndOf, end};
 use crate::space::Handle;
 use crate::watch::watched;
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use symspline::derivative::{Data, Derivative, Of};
 use symspline::fit::{End, Ends};
@@ -58,7 +59,8 @@ impl<'py> Curves<'py> {
             of: match self.nu {
                 0 => Of::Point,
                 1 => Of::Velocity,
-                nu => return Err(invalid(format!("nu must be 0 or 1, not {nu}"))),
+                2 => Of::Acceleration,
+                nu => return Err(invalid(format!("nu must be 0, 1 or 2, not {nu}"))),
             },
         })
     }
@@ -77,6 +79,14 @@ impl Slices<'_> {
         };
         let own = |array| part(array, c, self.curves);
         Derivative::new(space, own(self.t), own(self.points), own(self.velocities), &ends)
+    }
+
+    /// MemoryError unless there is room for the matrices of the curves that are worked on at once: about fifty
+    /// a knot.
+    fn room(&self, dim: usize) -> PyResult<()> {
+        let at_once = parallel::num_threads().min(self.curves).max(1);
+        let knots = self.t.len() / self.curves.max(1) * at_once;
+        room::<f64>(knots.saturating_mul(50 * (dim * dim + 8)) + 2 * self.points.len()).map(drop)
     }
 
     fn times(&self, c: usize) -> &[f64] {
@@ -101,12 +111,13 @@ pub fn push<'py>(
     points: Array<'py>,
     knots: Array<'py>,
     ends: [Array<'py>; 2],
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let slices = curves.slices()?;
     let len = with_space!(&handle.space, s => s.point_len());
     let (points, knots) = (points.as_slice()?, knots.as_slice()?);
     let ends = [ends[0].as_slice()?, ends[1].as_slice()?];
-    let out = PyArray1::zeros(py, slices.x.len() * len, false);
+    slices.room(with_space!(&handle.space, s => s.dim()))?;
+    let out = zeros(py, &[slices.x.len() * len])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
     if !result.is_empty() {
@@ -134,6 +145,7 @@ pub fn pull<'py>(
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
     let slices = curves.slices()?;
     let cotangent = cotangent.as_slice()?;
+    slices.room(with_space!(&handle.space, s => s.dim()))?;
     let mut gradients = vec![Data::default(); slices.curves];
     let items = gradients.iter_mut().enumerate().collect();
     watched(py, None, slices.curves, |monitor| {

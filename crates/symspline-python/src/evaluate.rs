@@ -1,5 +1,6 @@
 //! Evaluation, called from Python.
 
+use crate::arrays::zeros;
 use crate::errors::{invalid, number, place};
 use crate::space::Handle;
 use crate::validate::of_curve;
@@ -50,7 +51,7 @@ pub fn evaluate<'py>(
     if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
         shape.extend_from_slice(&points.shape()[points.ndim() - point_axes..]);
     }
-    let out = PyArrayDyn::zeros(py, shape, false);
+    let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
     watched(py, progress, result.len(), |monitor| {
@@ -90,7 +91,7 @@ pub fn evaluate_bspline<'py>(
         shape.extend_from_slice(&control.shape()[axes..]);
     }
     let curve = BSpline { knots: knots.as_slice()?, control: control.as_slice()?, degree };
-    let out = PyArrayDyn::zeros(py, shape, false);
+    let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let (x, result) = (x.as_slice()?, write.as_slice_mut()?);
     watched(py, None, result.len(), |monitor| {

@@ -1,5 +1,6 @@
 //! Fitting, called from Python.
 
+use crate::arrays::{room, zeros};
 use crate::errors::invalid;
 use crate::space::Handle;
 use crate::validate;
@@ -77,8 +78,10 @@ pub fn fit<'py>(
     let lead = points.ndim() - handle.point_axes() - 1;
     let batch = if different { vec![curves] } else { points.shape()[..lead].to_vec() };
 
-    let out = PyArrayDyn::zeros(py, points.shape(), false);
-    let velocities = PyArrayDyn::zeros(py, points.shape(), false);
+    // What the work itself needs, with some to spare: copies of ends, and the pieces and reports of curves.
+    drop(room::<f64>(nodes + curves * (64 + 4 * len))?);
+    let out = zeros(py, points.shape())?;
+    let velocities = zeros(py, points.shape())?;
     let (mut out_write, mut velocities_write) = (out.readwrite(), velocities.readwrite());
     let (p, u) = (out_write.as_slice_mut()?, velocities_write.as_slice_mut()?);
     p.copy_from_slice(points.as_slice()?);
@@ -89,7 +92,7 @@ pub fn fit<'py>(
             let t = if shared { t_slice } else { &t_slice[offsets[c]..offsets[c + 1]] };
             validate::knots(t, c, if shared { &[] } else { &batch })?;
         }
-        with_space!(&handle.space, s => validate::points(s, p, &offsets, &batch, point_tol))?;
+        py.detach(|| with_space!(&handle.space, s => validate::points(s, p, &offsets, &batch, point_tol)))?;
     }
     let ends_now = match &ends {
         None => Ends::Periodic,
@@ -97,7 +100,7 @@ pub fn fit<'py>(
     };
     let problem = Problem { t: t_slice, shared, points: p, offsets: &offsets, ends: ends_now };
     if check {
-        with_space!(&handle.space, s => validate::ends(s, &problem, &batch, point_tol))?;
+        py.detach(|| with_space!(&handle.space, s => validate::ends(s, &problem, &batch, point_tol)))?;
     }
     if dry {
         drop((out_write, velocities_write));

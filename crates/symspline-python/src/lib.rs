@@ -1,5 +1,6 @@
 //! The compiled module `symspline._core`: arrays in, arrays out, validation; no mathematics.
 
+mod arrays;
 mod derivative;
 mod errors;
 mod evaluate;

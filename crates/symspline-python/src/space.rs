@@ -1,5 +1,6 @@
 //! The compiled side of a space.
 
+use crate::arrays::{room, zeros};
 use crate::errors::{CutLocusError, invalid, place};
 use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -64,7 +65,7 @@ impl Handle {
         operation: &str,
         inputs: Vec<PyReadonlyArrayDyn<'py, f64>>,
         t: Option<PyReadonlyArrayDyn<'py, f64>>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let operation = match operation {
             "exp" => Operation::Exp,
             "log" => Operation::Log,
@@ -83,7 +84,7 @@ impl Handle {
         let t = t.as_ref().map_or(Ok(&[][..]), |t| t.as_slice())?;
         let len = with_space!(&self.space, s => s.point_len());
         let rows = slices[0].len() / len;
-        let out = PyArray1::zeros(py, rows * operation.row_len(len), false);
+        let out = zeros(py, &[rows * operation.row_len(len)])?;
         let mut write = out.readwrite();
         let result = write.as_slice_mut()?;
         let done = watched(
@@ -109,9 +110,18 @@ impl Handle {
     }
 
     /// Raises unless every row is a point within `tol`; `shape` is how the rows were laid out.
-    fn check_points(&self, points: PyReadonlyArrayDyn<f64>, shape: Vec<usize>, tol: f64) -> PyResult<()> {
-        let mut copy = points.as_slice()?.to_vec();
-        with_space!(&self.space, s => project_points(s, &mut copy, tol)).map_err(|(row, off, why)| {
+    fn check_points(
+        &self,
+        py: Python,
+        points: PyReadonlyArrayDyn<f64>,
+        shape: Vec<usize>,
+        tol: f64,
+    ) -> PyResult<()> {
+        let points = points.as_slice()?;
+        let mut copy = room(points.len())?;
+        copy.extend_from_slice(points);
+        let done = py.detach(|| with_space!(&self.space, s => project_points(s, &mut copy, tol)));
+        done.map_err(|(row, off, why)| {
             let which = if shape.is_empty() { "it".into() } else { format!("point {}", place(row, &shape)) };
             off_space(&which, off, tol, &why)
         })
@@ -124,6 +134,7 @@ impl Handle {
         points: PyReadonlyArrayDyn<'py, f64>,
         vectors: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        drop(room::<f64>(2 * points.shape()[0])?);
         let defects =
             with_space!(&self.space, s => tangent_defects(s, points.as_slice()?, vectors.as_slice()?));
         let shape = [points.shape()[0]];

@@ -1,6 +1,7 @@
 //! Independent pieces of work on all cores.
 
 use crate::monitor::Monitor;
+use crate::scalar::LANES;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex};
 use std::time::Duration;
@@ -48,6 +49,12 @@ fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
     Some(&made.pool)
 }
 
+/// Rows of `len` numbers that make one item of work: `most` of small ones, and so few of large ones that a
+/// request to stop is soon heard. Whole groups of lanes.
+pub fn block(most: usize, len: usize) -> usize {
+    (most * 4 / len.max(4)).next_multiple_of(LANES).min(most)
+}
+
 /// Calls `work` on every item, on all cores if `parallel` says that this pays. Stops early when the
 /// monitor is cancelled.
 pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
@@ -76,10 +83,18 @@ pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work:
                 wake.notify_one();
             });
         }
-        // The caller's thread only watches: it is the one that may be asked to stop.
-        let mut left = busy.lock().unwrap_or_else(|e| e.into_inner());
-        while *left > 0 {
-            (left, _) = wake.wait_timeout(left, Duration::from_millis(20)).unwrap_or_else(|e| e.into_inner());
+        // The caller's thread only watches: it is the one that may be asked to stop. It asks without the
+        // lock, because the answer may have to wait for others that wait for these threads.
+        let working = || {
+            let left = busy.lock().unwrap_or_else(|e| e.into_inner());
+            if *left == 0 {
+                return false;
+            }
+            let (left, _) =
+                wake.wait_timeout(left, Duration::from_millis(20)).unwrap_or_else(|e| e.into_inner());
+            *left > 0
+        };
+        while working() {
             monitor.poll();
         }
     });

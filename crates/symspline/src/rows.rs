@@ -5,7 +5,7 @@ use crate::parallel;
 use crate::scalar::{LANES, Lane, gather, lane, scatter};
 use crate::space::Space;
 
-/// Rows worked on by one thread at a time.
+/// Rows worked on by one thread at a time, at most.
 const BLOCK: usize = 4096;
 /// Numbers from which threads pay.
 const PARALLEL: usize = 1 << 16;
@@ -66,7 +66,8 @@ pub fn apply<M: Space>(
     let limit = lane(space.cut_angle() * (1.0 - 4.0 * f64::EPSILON));
     let parallel = out.len() > PARALLEL;
     let faults = std::sync::Mutex::new(None::<Fault>);
-    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * size).enumerate().collect();
+    let length = parallel::block(BLOCK, len);
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * size).enumerate().collect();
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
         let mut x: [Vec<Lane>; 3] = std::array::from_fn(|_| vec![Lane::ZERO; len]);
         let (mut result, mut log) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
@@ -74,7 +75,7 @@ pub fn apply<M: Space>(
         let rows = out.len() / size;
         for (group, out) in out.chunks_mut(LANES * size).enumerate() {
             let at: [usize; LANES] =
-                std::array::from_fn(|l| block * BLOCK + (group * LANES + l).min(rows - 1));
+                std::array::from_fn(|l| block * length + (group * LANES + l).min(rows - 1));
             for (x, input) in x.iter_mut().zip(inputs) {
                 gather(at.map(|i| &input[i * len..(i + 1) * len]), x);
             }
@@ -87,7 +88,16 @@ pub fn apply<M: Space>(
             match operation {
                 Operation::Exp => space.ray(a, b, Lane::ONE, &mut result),
                 Operation::Log => result.copy_from_slice(&log),
-                Operation::Geodesic => space.geodesic(a, b, Lane::new(at.map(|i| t[i])), &mut result),
+                Operation::Geodesic => {
+                    let t = Lane::new(at.map(|i| t[i]));
+                    space.geodesic(a, b, t, &mut result);
+                    // Weights of the end points cancel near the cut locus, where a direction does not.
+                    let far = angle.simd_gt(lane(0.9 * space.cut_angle()));
+                    if far.any() {
+                        space.ray(a, &log, t, c);
+                        result.iter_mut().zip(&*c).for_each(|(x, y)| *x = far.select(*y, *x));
+                    }
+                }
                 Operation::Distance => result[0] = space.distance(a, b, &log, angle),
                 Operation::Transvection => space.transvect(a, b, c, &mut result),
                 Operation::Transport => space.carry(a, b, &log, c, &mut result),
@@ -131,13 +141,14 @@ pub fn project_points<M: Space>(space: &M, points: &mut [f64], tol: f64) -> Resu
     let len = space.point_len();
     let first = std::sync::Mutex::new(None);
     let parallel = points.len() > PARALLEL;
-    let blocks: Vec<(usize, &mut [f64])> = points.chunks_mut(BLOCK * len).enumerate().collect();
+    let length = parallel::block(BLOCK, len);
+    let blocks: Vec<(usize, &mut [f64])> = points.chunks_mut(length * len).enumerate().collect();
     let quiet = |_| true;
     parallel::for_each(blocks, parallel, &Monitor::new(&quiet), |(block, rows)| {
         if let Err((row, off)) = project_block(space, rows, tol)
             && let Ok(mut first) = first.lock()
         {
-            let row = block * BLOCK + row;
+            let row = block * length + row;
             if first.is_none_or(|(earlier, _)| row < earlier) {
                 *first = Some((row, off));
             }

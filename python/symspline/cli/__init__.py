@@ -9,11 +9,14 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+from .._arrays import brief
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from . import check, demo, fit, plot, sample
 from .errors import Problem, with_names
 
 FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
+# Letters of a message, which may quote any file.
+_LONGEST = 1000
 
 _DESCRIPTION = "Smooth C2 curves through data in files, on spheres and other curved spaces."
 _EPILOG = """\
@@ -35,6 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
+        if any(isinstance(value, list) for value in vars(options).values()):
+            # What argparse makes of --option=--
+            raise Problem("an option has the value --, which means nothing here")
         code: int = options.run(options)
         print(end="", flush=True)
         return code
@@ -59,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _say(message: object, code: int) -> int:
     """Print one line on stderr."""
-    print("symspline:", " ".join(str(message).split()), file=sys.stderr)
+    print("symspline:", brief(message, _LONGEST), file=sys.stderr)
     return code
 
 

@@ -11,11 +11,13 @@ from typing import BinaryIO
 
 import numpy as np
 
+from .._arrays import brief
 from ..files import load, load_many, save, save_many
+from ..spaces import Space
 from ..spline import CubicSpline
 from .errors import Problem, reading, writing
 from .layout import labels
-from .points import LONLAT, require_globe
+from .points import GLOBE, LONLAT, require_globe
 
 ENDING = (".npz",)
 _COLUMNS = "columns"
@@ -80,11 +82,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         lonlat: whether to write longitudes and latitudes, also if the file does not say so.
     """
     with reading(path), open(path, "rb") as file:
-        if not zipfile.is_zipfile(file):
-            raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes")
-        file.seek(0)
-        entries = zipfile.ZipFile(file).namelist()
-        file.seek(0)
+        entries = _entries(path, file)
         if "names.npy" in entries:
             splines, named = load_many(file), True
         else:
@@ -94,7 +92,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         if lonlat:
             require_globe(space)
         file.seek(0)
-        columns = _columns(path, file) if f"{_COLUMNS}.npy" in entries else None
+        columns = _columns(path, file, space) if f"{_COLUMNS}.npy" in entries else None
     if columns is None:
         columns = Columns(labels(space))
     if lonlat and not columns.lonlat:
@@ -102,12 +100,34 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
     return Curves(splines, named, columns)
 
 
-def _columns(path: Path, file: BinaryIO) -> Columns:
+def _entries(path: Path, file: BinaryIO) -> list[str]:
+    """What is in the file."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return archive.namelist()
+    except (zipfile.BadZipFile, NotImplementedError, ValueError):
+        raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes") from None
+    finally:
+        file.seek(0)
+
+
+def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
     with np.load(file, allow_pickle=False) as archive:
         try:
-            return Columns(**json.loads(str(archive[_COLUMNS])))
-        except (ValueError, TypeError) as error:
-            raise Problem(f"{path} is damaged: {error}") from None
+            columns = Columns(**json.loads(str(archive[_COLUMNS])))
+        except (ValueError, TypeError, RecursionError) as error:
+            raise Problem(f"{path} is damaged: {brief(error)}") from None
+    names, wanted = columns.points, LONLAT if columns.lonlat else labels(space)
+    good = (
+        isinstance(names, list)
+        and len(names) == len(wanted)
+        and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
+        and isinstance(columns.lonlat, bool)
+        and isinstance(columns.utc, bool)
+    )
+    if not good or (columns.lonlat and space != GLOBE):
+        raise Problem(f"{path} is damaged: its names of columns do not suit {space}")
+    return columns
 
 
 def _singles(spline: CubicSpline, name: str = "") -> Iterator[tuple[str, CubicSpline]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .._arrays import brief
 from .errors import Problem, did_you_mean, reading
 from .layout import IM, RE
 from .tables import Array, ArrayTable
@@ -52,8 +53,11 @@ def _arrays(path: Path) -> dict[str, Array]:
         try:
             with np.load(file, allow_pickle=False) as archive:
                 arrays = {key: archive[key] for key in archive.files}
-        except (zipfile.BadZipFile, ValueError, EOFError) as error:
-            raise Problem(f"{path} is damaged, or holds other things than numbers: {error}") from None
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:
+            # Damage shows as errors of zipfile, of its decompressors and of NumPy.
+            raise Problem(f"{path} is damaged, or holds other things than numbers: {brief(error)}") from None
     if "format" in arrays:
         raise Problem(f"{path} is a curve that was fitted already, not a table")
     return arrays

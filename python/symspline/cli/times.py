@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from contextlib import suppress
-from decimal import Decimal
+from decimal import Decimal, InvalidOperation
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,8 @@ _NANOSECONDS = {
 }
 _DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
 _MOST = 10**9
+# Exponents of doubles are smaller.
+_EXPONENT = 400
 
 
 def is_number(text: str) -> bool:
@@ -140,21 +142,31 @@ def every(step: str, knots: Times) -> Times:
     number, unit = _duration(step)
     if knots.dtype.kind == "M":
         delta = _timedelta(number * _NANOSECONDS[unit or "s"], step)
-        start, stop = knots[0] + 0 * delta, knots[-1] + 0 * delta
-        dates: Times = start + delta * np.arange(_count((stop - start) // delta, step))
+        start, stop = _ends_in(delta, knots)
+        span = stop - start
+        if delta.astype(span.dtype).astype(delta.dtype) != delta:
+            # A step that overflows is longer than all that there is.
+            return np.array([start])
+        dates: Times = start + delta * np.arange(_count(span // delta, step))
         return dates
     if unit:
         raise Problem(f"--every {step}: the times of this curve are numbers; give a step without a unit")
-    if knots.dtype.kind == "i":
+    if knots.dtype.kind in "iu":
         if number != int(number):
             raise Problem(
                 f"--every {step}: the times of this curve are large whole numbers; give a whole step"
             )
-        whole: Times = knots[0] + int(number) * np.arange(_count((knots[-1] - knots[0]) // int(number), step))
-        return whole
+        whole = int(knots[-1]) - int(knots[0])
+        count = _count(whole // int(number), step)
+        # Modulo 2**64 all differences are exact.
+        jump = np.uint64(min(int(number), whole))
+        return (knots[:1].astype(np.uint64) + jump * np.arange(count, dtype=np.uint64)).astype(knots.dtype)
+    length = float(number)
+    if not 0 < length < float("inf"):
+        raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
     # A step that divides the curve up to rounding reaches its end.
-    count = _count((knots[-1] - knots[0]) / float(number) * (1 + 1e-12), step)
-    times: Times = np.minimum(knots[0] + float(number) * np.arange(count), knots[-1])
+    count = _count((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
+    times: Times = np.minimum(knots[0] + length * np.arange(count), knots[-1])
     return times
 
 
@@ -163,19 +175,32 @@ def spread(count: int, knots: Times) -> Times:
     if knots.dtype.kind == "f":
         return np.linspace(knots[0], knots[-1], count)
     dates = knots.dtype.kind == "M"
-    start, stop = (knot + np.timedelta64(0, "us") if dates else knot for knot in (knots[0], knots[-1]))
+    start, stop = _ends_in(np.timedelta64(1, "us"), knots) if dates else (knots[0], knots[-1])
     span = stop - start
     steps = np.rint(np.linspace(0, span.astype(np.int64), count)).astype(np.int64).astype(span.dtype)
     times = np.append(start + steps[:-1], stop) if count > 1 else np.array([start])
     return _coarsest(times) if dates else times
 
 
+def _ends_in(tick: Any, knots: Times) -> tuple[Any, Any]:
+    """The first and the last date, as exact as the tick or more."""
+    with suppress(OverflowError):
+        start, stop = knots[0] + 0 * tick, knots[-1] + 0 * tick
+        back = [end.astype(knots.dtype) for end in (start, stop)]
+        # NumPy lets dates and differences overflow; only between some units it says so.
+        if back == [knots[0], knots[-1]] and stop - start >= 0 * tick:
+            return start, stop
+    raise Problem(f"the dates from {knots[0]} to {knots[-1]} cannot be counted in units of {tick}")
+
+
 def _coarsest(dates: Times) -> Times:
     """The same dates in seconds if they are whole seconds, else in the next finer unit that will do."""
     for unit in ("s", "ms", "us"):
-        coarse = dates.astype(f"datetime64[{unit}]")
-        if (coarse == dates).all():
-            return coarse
+        # Attoseconds cannot become seconds.
+        with suppress(OverflowError):
+            coarse = dates.astype(f"datetime64[{unit}]")
+            if (coarse == dates).all():
+                return coarse
     return dates
 
 
@@ -203,7 +228,12 @@ def _duration(text: str) -> tuple[Decimal, str]:
             f"--every {text}: a step is a number such as 0.5, or a duration such as 10min; "
             f"units are {', '.join(_NANOSECONDS)}"
         )
-    number = Decimal(match[1])
+    try:
+        number = Decimal(match[1])
+    except InvalidOperation:
+        raise Problem(f"--every {text}: that is no number of any use") from None
     if number == 0:
         raise Problem(f"--every {text}: a step must be larger than zero")
+    if abs(number.adjusted()) > _EXPONENT:
+        raise Problem(f"--every {text}: that is too {'long' if number > 1 else 'short'}")
     return number, match[2].lower()

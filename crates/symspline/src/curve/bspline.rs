@@ -19,7 +19,7 @@ pub struct BSpline<'a> {
     pub degree: usize,
 }
 
-/// Samples evaluated by one thread at a time.
+/// Samples evaluated by one thread at a time, at most.
 const BLOCK: usize = 512;
 /// Samples times numbers from which threads pay.
 const PARALLEL: usize = 1 << 14;
@@ -50,10 +50,11 @@ pub fn evaluate_bspline<M: Space>(
 ) {
     let size = if matches!(quantity, Quantity::Speed | Quantity::Bend) { 1 } else { space.point_len() };
     let parallel = out.len() / size * space.point_len() * curve.degree.max(1) > PARALLEL;
-    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * size).enumerate().collect();
+    let length = parallel::block(BLOCK, space.point_len());
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * size).enumerate().collect();
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
         for (group, out) in out.chunks_mut(LANES * size).enumerate() {
-            let first = block * BLOCK + group * LANES;
+            let first = block * length + group * LANES;
             let samples = out.len() / size;
             let at = std::array::from_fn(|l| first + l.min(samples - 1));
             match quantity {

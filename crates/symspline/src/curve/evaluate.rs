@@ -55,7 +55,7 @@ pub enum Outside {
     Wrap,
 }
 
-/// Samples evaluated by one thread at a time.
+/// Samples evaluated by one thread at a time, at most.
 const BLOCK: usize = 2048;
 /// Samples times numbers from which threads pay.
 const PARALLEL: usize = 1 << 16;
@@ -98,11 +98,12 @@ pub fn evaluate<M: Space>(
     // A table over the knots pays for itself once there are about as many times as knots.
     let shared = curves.t.len() == curves.nodes;
     let locator = shared.then(|| Locator::new(curves.t, samples > 8 && samples >= curves.nodes / 4));
-    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * size).enumerate().collect();
+    let length = parallel::block(BLOCK, space.point_len());
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * size).enumerate().collect();
     let parallel = samples * space.point_len() > PARALLEL;
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
         let locator = locator.as_ref();
-        let job = Job { space, curves, times, quantity, outside, locator, first: block * BLOCK };
+        let job = Job { space, curves, times, quantity, outside, locator, first: block * length };
         match quantity {
             Quantity::Point => job.run::<Lane>(out, size),
             Quantity::Velocity | Quantity::Speed => job.run::<Dual>(out, size),

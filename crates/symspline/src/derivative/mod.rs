@@ -35,6 +35,8 @@ pub enum Of {
     Point,
     /// The velocity γ', covariantly.
     Velocity,
+    /// The covariant acceleration ∇γ', covariantly.
+    Acceleration,
 }
 
 /// The derivative of one spline curve with respect to its data.
@@ -93,15 +95,20 @@ impl<'a, M: Space> Derivative<'a, M> {
         let place = self.place(x);
         let bezier = &self.beziers[&place.segment];
         let inverse = 1.0 / self.system.segments[place.segment].h;
-        let point = bezier.point(self.space, place.tau);
-        let last = point.ncols() - 1;
+        let tau = place.tau;
+        // Behind the control points the last column is the derivative in τ.
+        let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
         match of {
-            Of::Point => (place, point, Vector::zeros(self.space.point_len())),
+            Of::Point => (place, bezier.point(self.space, tau), Vector::zeros(self.space.point_len())),
             // γ' = γ_τ/h
             Of::Velocity => {
-                let by_h = point.column(last) * (-inverse * inverse);
-                let velocity = bezier.velocity(self.space, place.tau) * inverse;
-                (place, velocity, by_h)
+                let by_h = along(bezier.point(self.space, tau), -inverse * inverse);
+                (place, bezier.velocity(self.space, tau) * inverse, by_h)
+            }
+            // ∇γ' = ∇γ_τ/h²
+            Of::Acceleration => {
+                let by_h = along(bezier.velocity(self.space, tau), -2.0 * inverse * inverse * inverse);
+                (place, bezier.acceleration(self.space, tau) * (inverse * inverse), by_h)
             }
         }
     }

@@ -85,7 +85,8 @@ pub fn residual<M: Space>(
     work: &mut NodeVectors<Lane>,
 ) -> Defect {
     let (u, mut r) = (std::mem::take(&mut chain.u), std::mem::take(&mut chain.r));
-    let defect = residual_of(space, chain, ends, &u, &mut r, work);
+    let at_rest = u.iter().all(|u| u.simd_eq(Lane::ZERO).all());
+    let defect = sweep(space, chain, ends, &u, &mut r, work, at_rest);
     (chain.u, chain.r) = (u, r);
     defect
 }
@@ -99,8 +100,21 @@ pub fn residual_of<S: Scalar, M: Space>(
     r: &mut [S],
     work: &mut NodeVectors<S>,
 ) -> Defect {
+    sweep(space, chain, ends, u, r, work, false)
+}
+
+/// The same; of velocities that are known to be zero the logarithms are the chords.
+fn sweep<S: Scalar, M: Space>(
+    space: &M,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    u: &[S],
+    r: &mut [S],
+    work: &mut NodeVectors<S>,
+    at_rest: bool,
+) -> Defect {
     work.resize(chain.m);
-    with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, m))
+    with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, at_rest, m))
 }
 
 #[inline(always)]
@@ -111,6 +125,7 @@ fn inside<S: Scalar, M: Space>(
     all_u: &[S],
     all_r: &mut [S],
     work: &mut NodeVectors<S>,
+    at_rest: bool,
     m: usize,
 ) -> Defect {
     let (n, keep) = (chain.n, space.chord_len());
@@ -128,8 +143,14 @@ fn inside<S: Scalar, M: Space>(
                 a[c] = u[c] * third;
                 b[c] = u[m + c] * third;
             }
-            let prepared = &chain.prepared[i * keep..][..keep];
-            space.legs(&chain.chord[i * m..][..m], prepared, a, b, right, next_left);
+            let (chord, prepared) = (&chain.chord[i * m..][..m], &chain.prepared[i * keep..][..keep]);
+            if at_rest {
+                for c in 0..m {
+                    (right[c], next_left[c]) = (S::constant(chord[c]), S::constant(-chord[c]));
+                }
+            } else {
+                space.legs(chord, prepared, a, b, right, next_left);
+            }
             let scale = Lane::ONE / (h_right * h_right);
             for c in 0..m {
                 right[c] = (right[c] - a[c]) * scale;

@@ -87,7 +87,35 @@ pub fn log<const K: i32>(p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let v = near.select(y.mul_add(p[i], q[i] - p[i]), (q[i] + p[i]) - rest * p[i]);
         out[i] = f * v;
     }
-    angle(y, rest, f)
+    let theta = angle(y, rest, f);
+    if K > 0 && near_antipode(rest).any() {
+        refine(p, theta, near_antipode(rest), out);
+    }
+    theta
+}
+
+/// Where sin θ is so small that θ/sin θ makes much of rounding errors.
+#[inline(always)]
+fn near_antipode(rest: Lane) -> Lane {
+    rest.simd_lt(lane(0.1))
+}
+
+/// Makes a logarithm near the antipode tangent again, and of length θ.
+#[cold]
+#[inline(never)]
+fn refine(p: &[Lane], theta: Lane, lanes: Lane, v: &mut [Lane]) {
+    for _ in 0..2 {
+        let along = dot(p, v);
+        let length2 = v.iter().zip(p).fold(Lane::ZERO, |sum, (v, p)| {
+            let x = along.mul_neg_add(*p, *v);
+            x.mul_add(x, sum)
+        });
+        // At the antipode itself there is no direction.
+        let scale = length2.simd_gt(Lane::ZERO).select(theta / length2.sqrt(), Lane::ONE);
+        for (v, p) in v.iter_mut().zip(p) {
+            *v = lanes.select(along.mul_neg_add(*p, *v) * scale, *v);
+        }
+    }
 }
 
 /// E_p(v) x for any x of the ambient space.
@@ -141,6 +169,9 @@ pub fn step<const K: i32>(frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mu
     let (y, rest) = (versine::<K, Lane>(p, q), versine_rest::<K, Lane>(p, q));
     let f = theta_over_sin(y, || rest);
     let scale = kappa::<K>() / rest;
+    let theta = angle(y, rest, f);
+    let far = near_antipode(rest);
+    let before = if K > 0 && far.any() { frame.to_vec() } else { Vec::new() };
     for (j, row) in frame.chunks_exact_mut(n).enumerate() {
         // ⟨e, q − p⟩ is exact for near points. The frame moves by ⟨e, q⟩, the same number for e
         // orthogonal to p, because that makes the new e orthogonal to q whatever e was.
@@ -161,7 +192,39 @@ pub fn step<const K: i32>(frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mu
         let shorten = lane(-0.5).mul_add(product::<K, Lane>(row, row), lane(1.5));
         row.iter_mut().for_each(|x| *x *= shorten);
     }
-    angle(y, rest, f)
+    if !before.is_empty() {
+        step_far(&before, frame, p, q, theta, far, chord);
+    }
+    theta
+}
+
+/// The same near the antipode, by the direction of the geodesic: a basis is moved in the plane of p and the
+/// direction only.
+#[cold]
+#[inline(never)]
+fn step_far(
+    before: &[Lane],
+    frame: &mut [Lane],
+    p: &[Lane],
+    q: &[Lane],
+    theta: Lane,
+    lanes: Lane,
+    chord: &mut [Lane],
+) {
+    let n = p.len();
+    let mut v = vec![Lane::ZERO; n];
+    log::<1>(p, q, &mut v);
+    let inverse = Lane::ONE / theta;
+    v.iter_mut().for_each(|v| *v *= inverse);
+    let (sin, cos) = theta.sin_cos();
+    for (j, (row, old)) in frame.chunks_exact_mut(n).zip(before.chunks_exact(n)).enumerate() {
+        let along = dot(old, &v);
+        chord[j] = lanes.select(along * theta, chord[j]);
+        for i in 0..n {
+            let moved = old[i] + along * ((cos - Lane::ONE) * v[i] - sin * p[i]);
+            row[i] = lanes.select(moved, row[i]);
+        }
+    }
 }
 
 /// Gram–Schmidt against p and the rows before.

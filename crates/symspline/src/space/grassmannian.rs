@@ -139,9 +139,18 @@ fn log_from<S: Scalar, const D: usize, A: Storage>(
             return value.map(S::constant);
         }
         let with_derivatives = rest.times(&top.adjoint_times(&arc(&versine)));
+        // Of subspaces that stand still derivatives are zero at the cut locus too, where the function's are not
+        // finite.
+        let moves = |m: &Matrix<S, D, A>| {
+            m.entries().as_flattened().iter().fold(Lane::ZERO, |any, x| {
+                let [_, d, dd] = x.parts();
+                any | d.simd_ne(Lane::ZERO) | dd.simd_ne(Lane::ZERO)
+            })
+        };
+        let moving = moves(top) | moves(rest);
         Matrix::from_fn(value.rows(), value.cols(), |i, j| {
             std::array::from_fn(|c| {
-                let [_, d, dd] = with_derivatives[(i, j)][c].parts();
+                let [_, d, dd] = with_derivatives[(i, j)][c].parts().map(|x| moving.select(x, Lane::ZERO));
                 S::from_parts([value[(i, j)][c], d, dd])
             })
         })

@@ -1,0 +1,31 @@
+//! New arrays, and memory that may not be there.
+
+use numpy::PyArrayDyn;
+use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+
+/// Numbers up to which memory is taken to be there.
+const SMALL: usize = 1 << 16;
+
+/// Zeros for a result.
+pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    if shape.iter().product::<usize>() <= SMALL {
+        return Ok(PyArrayDyn::zeros(py, shape, false));
+    }
+    // NumPy itself raises MemoryError, its bindings panic.
+    static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let make =
+        ZEROS.get_or_try_init(py, || Ok::<_, PyErr>(py.import("numpy")?.getattr("zeros")?.unbind()))?;
+    Ok(make.bind(py).call1((shape.to_vec(),))?.cast_into()?)
+}
+
+/// Room for so many numbers, or MemoryError where compiled code would stop the process.
+pub fn room<T>(count: usize) -> PyResult<Vec<T>> {
+    let mut room = Vec::new();
+    room.try_reserve_exact(count).map_err(|_| {
+        let size = count.saturating_mul(size_of::<T>());
+        PyMemoryError::new_err(format!("{size} bytes are needed and not there"))
+    })?;
+    Ok(room)
+}
