@@ -52,7 +52,7 @@ fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
 /// Rows of `len` numbers that make one item of work: `most` of small ones, and so few of large ones that a
 /// request to stop is soon heard. Whole groups of lanes.
 pub fn block(most: usize, len: usize) -> usize {
-    (most * 4 / len.max(4)).next_multiple_of(LANES).min(most)
+    (most * 4 / len.max(4)).max(1).next_multiple_of(LANES).min(most)
 }
 
 /// Calls `work` on every item, on all cores if `parallel` says that this pays. Stops early when the

@@ -85,7 +85,7 @@ pub fn residual<M: Space>(
     work: &mut NodeVectors<Lane>,
 ) -> Defect {
     let (u, mut r) = (std::mem::take(&mut chain.u), std::mem::take(&mut chain.r));
-    let at_rest = u.iter().all(|u| u.simd_eq(Lane::ZERO).all());
+    let at_rest = u.iter().fold(Lane::ZERO.simd_eq(Lane::ZERO), |rest, u| rest & u.simd_eq(Lane::ZERO));
     let defect = sweep(space, chain, ends, &u, &mut r, work, at_rest);
     (chain.u, chain.r) = (u, r);
     defect
@@ -100,10 +100,10 @@ pub fn residual_of<S: Scalar, M: Space>(
     r: &mut [S],
     work: &mut NodeVectors<S>,
 ) -> Defect {
-    sweep(space, chain, ends, u, r, work, false)
+    sweep(space, chain, ends, u, r, work, Lane::ZERO)
 }
 
-/// The same; of velocities that are known to be zero the logarithms are the chords.
+/// The same; on lanes whose velocities are zero the logarithms are the chords, to the last bit.
 fn sweep<S: Scalar, M: Space>(
     space: &M,
     chain: &mut Chain,
@@ -111,7 +111,7 @@ fn sweep<S: Scalar, M: Space>(
     u: &[S],
     r: &mut [S],
     work: &mut NodeVectors<S>,
-    at_rest: bool,
+    at_rest: Lane,
 ) -> Defect {
     work.resize(chain.m);
     with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, at_rest, m))
@@ -125,7 +125,7 @@ fn inside<S: Scalar, M: Space>(
     all_u: &[S],
     all_r: &mut [S],
     work: &mut NodeVectors<S>,
-    at_rest: bool,
+    at_rest: Lane,
     m: usize,
 ) -> Defect {
     let (n, keep) = (chain.n, space.chord_len());
@@ -144,12 +144,14 @@ fn inside<S: Scalar, M: Space>(
                 b[c] = u[m + c] * third;
             }
             let (chord, prepared) = (&chain.chord[i * m..][..m], &chain.prepared[i * keep..][..keep]);
-            if at_rest {
-                for c in 0..m {
-                    (right[c], next_left[c]) = (S::constant(chord[c]), S::constant(-chord[c]));
-                }
-            } else {
+            if !at_rest.all() {
                 space.legs(chord, prepared, a, b, right, next_left);
+            }
+            if at_rest.any() {
+                for c in 0..m {
+                    right[c] = S::select(at_rest, S::constant(chord[c]), right[c]);
+                    next_left[c] = S::select(at_rest, S::constant(-chord[c]), next_left[c]);
+                }
             }
             let scale = Lane::ONE / (h_right * h_right);
             for c in 0..m {
