@@ -180,6 +180,23 @@ fn arc_is_that_of_the_eigenvalues() {
 }
 
 #[test]
+fn derivatives_of_arc_are_divided_differences() {
+    // In the basis of eigenvectors; beyond 0.8 there is no power series.
+    for (x, y) in
+        [(0.1, 0.2), (0.5, 0.7), (0.9, 1.0), (0.9, 1.2), (1.2, 1.5), (1.5, 1.8), (1.9, 1.95), (0.1, 1.9)]
+    {
+        let off = Dual { v: lane(0.0), d: lane(1.0) };
+        let h = Matrix::<Dual, 1>::from_fn(2, 2, |i, j| {
+            [if i == j { Dual::constant(lane([x, y][i])) } else { off }]
+        });
+        let found = arc(&h)[(0, 1)][0].d.to_array()[0];
+        let f = |y: f64| (1.0 - y).acos() / (y * (2.0 - y)).sqrt();
+        let expected = (f(y) - f(x)) / (y - x);
+        assert!((found / expected - 1.0).abs() <= 1e-12, "{x}, {y}: {found}, not {expected}");
+    }
+}
+
+#[test]
 fn singular_values_keep_their_digits_in_graded_matrices() {
     let mut noise = Noise(6);
     for n in [2, 3, 6] {

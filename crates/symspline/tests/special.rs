@@ -1,7 +1,7 @@
 //! The special functions against values of 40 digits (`reference/make_special.py`).
 
 use symspline::scalar::{Jet, Lane, lane};
-use symspline::special::{Trig, slerp, theta_over_sin};
+use symspline::special::{Trig, arc_defect, slerp, theta_over_sin};
 
 const REFERENCE: &str = include_str!("reference/special.csv");
 
@@ -90,6 +90,21 @@ fn a_lane_does_not_depend_on_its_neighbours() {
             let row = Lane::new([*x, 1e-9, 0.05, 0.5, 1.9, -3.0, -0.01, f64::NAN]);
             let mixed = theta_over_sin(row, || lane(2.0) - row);
             assert_eq!(first(alone).to_bits(), first(mixed).to_bits(), "at {x}");
+        }
+    }
+}
+
+#[test]
+fn the_defect_is_that_of_the_arc() {
+    // θ/sin θ = 1 + y e, with derivatives e + y e' and 2e' + y e''.
+    for y in [1e-9, 1e-3, 0.0074, 0.0076, 0.05, 0.089, 0.091, 0.2, 0.29, 0.31, 0.4, 0.5, 0.59, 0.61, 0.8, 1.0]
+    {
+        let (x, e) = (jet(y), arc_defect(jet(y)));
+        let (f, g) = (theta_over_sin(x, || lane(2.0 - y)), e * x + Lane::ONE);
+        for (order, found, value) in [(0, g.v, f.v), (1, g.d, f.d), (2, g.dd, f.dd)] {
+            let (found, value) = (first(found), first(value));
+            let allowed = [4.0, 16.0, 200.0][order] * f64::EPSILON;
+            assert!((found - value).abs() <= allowed, "d{order} at {y}: {found}, not {value}");
         }
     }
 }
