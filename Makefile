@@ -34,7 +34,7 @@ test-oracles: .venv-oracles/built
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
 test-torch: .venv/built
 	$(INSTALL) 'torch>=2'
-	$(BIN)/python -m pytest tests/torch -o pythonpath='. tests'
+	$(BIN)/python -m pytest tests/pytorch -o pythonpath='. tests'
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time.
 fuzz: .venv/built
