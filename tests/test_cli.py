@@ -1338,3 +1338,10 @@ def test_progress_on_a_terminal(curves, capsys, monkeypatch):
     shown = capsys.readouterr().err
     assert "\rsampling: 100 %" in shown and "\rwriting: 40 %" in shown
     assert shown.endswith(" \r") and "\n" not in shown
+
+
+@pytest.mark.parametrize("names", ["\n0", "a\nb", '"a\n'])
+def test_lists_of_names_that_are_none(fails, names):
+    Path("points.csv").write_text("t,x\n0,1\n1,2\n")
+    line = shlex.join(["fit", "points.csv", "--space", "r:1", "--columns", names, "-o", "curve.npz"])
+    assert "list of names" in fails(line) or "no column" in fails(line)

@@ -18,7 +18,10 @@ from .tables import Table
 
 def split_names(text: str | None) -> list[str]:
     """Names with commas between them; one that has a comma itself is quoted."""
-    (names,) = csv.reader([text or ""], skipinitialspace=True)
+    try:
+        (names,) = csv.reader([text or ""], skipinitialspace=True)
+    except (csv.Error, ValueError):
+        raise Problem(f"{text!r} is no list of names with commas between them") from None
     return [name.strip() for name in names]
 
 
