@@ -11,8 +11,7 @@ use symspline::derivative::{Data, Derivative, Of};
 use symspline::fit::{End, Ends};
 use symspline::monitor::Monitor;
 use symspline::parallel;
-use symspline::space::Space;
-use symspline::with_space;
+use symspline::space::{Ambient, Erased, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
@@ -67,7 +66,7 @@ impl<'py> Curves<'py> {
 }
 
 impl Slices<'_> {
-    fn derivative<'a, M: Space>(&'a self, space: &'a M, c: usize) -> Derivative<'a, M> {
+    fn derivative<'a>(&'a self, space: &'a Erased<'a>, c: usize) -> Derivative<'a> {
         let one = |end: End<'a>| match end {
             End::Velocity(v) => End::Velocity(part(v, c, self.curves)),
             End::Acceleration(v) => End::Acceleration(part(v, c, self.curves)),
@@ -113,10 +112,10 @@ pub fn push<'py>(
     ends: [Array<'py>; 2],
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let slices = curves.slices()?;
-    let len = with_space!(&handle.space, s => s.point_len());
+    let len = handle.space.get().point_len();
     let (points, knots) = (points.as_slice()?, knots.as_slice()?);
     let ends = [ends[0].as_slice()?, ends[1].as_slice()?];
-    slices.room(with_space!(&handle.space, s => s.dim()))?;
+    slices.room(handle.space.get().dim())?;
     let out = zeros(py, &[slices.x.len() * len])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
@@ -127,7 +126,7 @@ pub fn push<'py>(
             each(items, monitor, |c, out| {
                 let own = |array| part(array, c, slices.curves).to_vec();
                 let change = Data { points: own(points), knots: own(knots), ends: ends.map(own) };
-                with_space!(&handle.space, s => slices.derivative(s, c).push(slices.times(c), slices.of, &change, out));
+                slices.derivative(&handle.space.get(), c).push(slices.times(c), slices.of, &change, out);
             });
         })?;
     }
@@ -145,13 +144,13 @@ pub fn pull<'py>(
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
     let slices = curves.slices()?;
     let cotangent = cotangent.as_slice()?;
-    slices.room(with_space!(&handle.space, s => s.dim()))?;
+    slices.room(handle.space.get().dim())?;
     let mut gradients = vec![Data::default(); slices.curves];
     let items = gradients.iter_mut().enumerate().collect();
     watched(py, None, slices.curves, |monitor| {
         each(items, monitor, |c, out| {
             let own = part(cotangent, c, slices.curves);
-            *out = with_space!(&handle.space, s => slices.derivative(s, c).pull(slices.times(c), slices.of, own));
+            *out = slices.derivative(&handle.space.get(), c).pull(slices.times(c), slices.of, own);
         });
     })?;
     let column =

@@ -10,7 +10,6 @@ use pyo3::prelude::*;
 use symspline::curve::{
     BSpline, Curves, Outside, Quantity, Times, evaluate as run, evaluate_bspline as run_bspline,
 };
-use symspline::with_space;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
@@ -55,7 +54,7 @@ pub fn evaluate<'py>(
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
     watched(py, progress, result.len(), |monitor| {
-        with_space!(&handle.space, s => run(s, &curves, &times, quantity, policy, monitor, result));
+        run(&handle.space.get(), &curves, &times, quantity, policy, monitor, result);
     })?;
     drop(write);
     Ok(out)
@@ -95,7 +94,7 @@ pub fn evaluate_bspline<'py>(
     let mut write = out.readwrite();
     let (x, result) = (x.as_slice()?, write.as_slice_mut()?);
     watched(py, None, result.len(), |monitor| {
-        with_space!(&handle.space, s => run_bspline(s, &curve, x, quantity, monitor, result));
+        run_bspline(&handle.space.get(), &curve, x, quantity, monitor, result);
     })?;
     drop(write);
     Ok(out)

@@ -9,8 +9,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use symspline::fit::{End, Ends, Method, Options, Problem, Report, Status, fit as solve};
-use symspline::space::Space;
-use symspline::with_space;
+use symspline::space::Ambient;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A kind, and the vectors that it prescribes: one a curve.
@@ -63,7 +62,7 @@ pub fn fit<'py>(
         return Err(invalid("max_iter must be at least 1"));
     }
     let options = Options { method, tol, max_iter };
-    let len = with_space!(&handle.space, s => s.point_len());
+    let len = handle.space.get().point_len();
     let nodes = points.len() / len;
     let t_slice = t.as_slice()?;
     let different = offsets.is_some();
@@ -92,7 +91,7 @@ pub fn fit<'py>(
             let t = if shared { t_slice } else { &t_slice[offsets[c]..offsets[c + 1]] };
             validate::knots(t, c, if shared { &[] } else { &batch })?;
         }
-        py.detach(|| with_space!(&handle.space, s => validate::points(s, p, &offsets, &batch, point_tol)))?;
+        py.detach(|| validate::points(&handle.space.get(), p, &offsets, &batch, point_tol))?;
     }
     let ends_now = match &ends {
         None => Ends::Periodic,
@@ -100,18 +99,14 @@ pub fn fit<'py>(
     };
     let problem = Problem { t: t_slice, shared, points: p, offsets: &offsets, ends: ends_now };
     if check {
-        py.detach(|| with_space!(&handle.space, s => validate::ends(s, &problem, &batch, point_tol)))?;
+        py.detach(|| validate::ends(&handle.space.get(), &problem, &batch, point_tol))?;
     }
     if dry {
         drop((out_write, velocities_write));
         return Ok((out, velocities, arrays(py, &[])?, Vec::new()));
     }
-    let reports = watched(
-        py,
-        progress,
-        nodes,
-        |monitor| with_space!(&handle.space, s => solve(s, &problem, &options, monitor, u)),
-    )?;
+    let reports =
+        watched(py, progress, nodes, |monitor| solve(&handle.space.get(), &problem, &options, monitor, u))?;
     let faults = faults(handle, &options, &reports, &batch);
     drop((out_write, velocities_write));
     Ok((out, velocities, arrays(py, &reports)?, faults))
@@ -144,7 +139,7 @@ fn faults(
     reports: &[Report],
     batch: &[usize],
 ) -> Vec<(usize, &'static str, String)> {
-    let limit = with_space!(&handle.space, s => s.cut_angle());
+    let limit = handle.space.get().cut_angle();
     // Unit quaternions are the usual reason for antipodes.
     let sign = if handle.space.name().0 == "sphere" { ", or check their sign" } else { "" };
     let describe = |(c, r): (usize, &Report)| {

@@ -6,8 +6,8 @@ use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline::rows::{Operation, apply, project_points, tangent_defects};
-use symspline::space::{AnySpace, Space};
-use symspline::with_space;
+use symspline::space::{Ambient, Origin};
+use symspline::spaces::{self, AnySpace};
 
 /// A space, as the compiled code sees it.
 #[pyclass(frozen, module = "symspline._core")]
@@ -18,7 +18,7 @@ pub struct Handle {
 impl Handle {
     /// Number of axes of a point's array of doubles.
     pub fn point_axes(&self) -> usize {
-        with_space!(&self.space, s => s.point_shape().len())
+        self.space.get().point_shape().len()
     }
 }
 
@@ -37,24 +37,24 @@ impl Handle {
     /// All names of all spaces.
     #[staticmethod]
     fn names() -> Vec<Vec<&'static str>> {
-        AnySpace::NAMES.iter().map(|names| names.to_vec()).collect()
+        spaces::all().map(|entry| entry.names.to_vec()).collect()
     }
 
     fn point_shape(&self) -> Vec<usize> {
-        with_space!(&self.space, s => s.point_shape())
+        self.space.get().point_shape()
     }
     /// Whether numbers are complex: pairs of doubles in all arrays of this module.
     fn is_complex(&self) -> bool {
-        with_space!(&self.space, s => s.is_complex())
+        self.space.get().is_complex()
     }
     fn dim(&self) -> usize {
-        with_space!(&self.space, s => s.dim())
+        self.space.get().dim()
     }
     fn injectivity_radius(&self) -> f64 {
-        with_space!(&self.space, s => s.injectivity_radius())
+        self.space.get().injectivity_radius()
     }
     fn curvature(&self) -> f64 {
-        with_space!(&self.space, s => s.curvature())
+        self.space.get().curvature()
     }
 
     /// Applies an operation to rows: arrays of equal shape (rows, numbers of a point).
@@ -82,17 +82,14 @@ impl Handle {
         };
         let slices = inputs.iter().map(|a| a.as_slice()).collect::<Result<Vec<_>, _>>()?;
         let t = t.as_ref().map_or(Ok(&[][..]), |t| t.as_slice())?;
-        let len = with_space!(&self.space, s => s.point_len());
+        let len = self.space.get().point_len();
         let rows = slices[0].len() / len;
         let out = zeros(py, &[rows * operation.row_len(len)])?;
         let mut write = out.readwrite();
         let result = write.as_slice_mut()?;
-        let done = watched(
-            py,
-            None,
-            rows,
-            |monitor| with_space!(&self.space, s => apply(s, operation, &slices, t, monitor, result)),
-        )?;
+        let done = watched(py, None, rows, |monitor| {
+            apply(&self.space.get(), operation, &slices, t, monitor, result)
+        })?;
         drop(write);
         done.map_err(|(row, angle)| {
             if angle.is_nan() {
@@ -100,7 +97,7 @@ impl Handle {
                     "pair {row} holds a number that is not finite, or no point of the space"
                 ));
             }
-            let limit = with_space!(&self.space, s => s.cut_angle());
+            let limit = self.space.get().cut_angle();
             CutLocusError::new_err(format!(
                 "pair {row}: the points lie at or past each other's cut locus: angle {angle}, limit {limit}; \
                  the geodesic between them is not unique"
@@ -120,7 +117,7 @@ impl Handle {
         let points = points.as_slice()?;
         let mut copy = room(points.len())?;
         copy.extend_from_slice(points);
-        let done = py.detach(|| with_space!(&self.space, s => project_points(s, &mut copy, tol)));
+        let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
         done.map_err(|(row, off, why)| {
             let which = if shape.is_empty() { "it".into() } else { format!("point {}", place(row, &shape)) };
             off_space(&which, off, tol, &why)
@@ -135,8 +132,7 @@ impl Handle {
         vectors: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         drop(room::<f64>(2 * points.shape()[0])?);
-        let defects =
-            with_space!(&self.space, s => tangent_defects(s, points.as_slice()?, vectors.as_slice()?));
+        let defects = tangent_defects(&self.space.get(), points.as_slice()?, vectors.as_slice()?);
         let shape = [points.shape()[0]];
         PyArray1::from_vec(py, defects).reshape(shape).map(|a| a.to_dyn().clone())
     }

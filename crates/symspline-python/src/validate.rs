@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use symspline::fit::{End, Ends, Problem};
 use symspline::monitor::Monitor;
 use symspline::rows::{Operation, apply, leg_angle, project_points, tangent_defects};
-use symspline::space::Space;
+use symspline::space::{Ambient, Erased};
 
 /// Where a curve stands in a batch, for messages; nothing for a single curve.
 pub fn of_curve(curve: usize, batch: &[usize]) -> String {
@@ -41,8 +41,8 @@ pub fn knots(t: &[f64], curve: usize, batch: &[usize]) -> PyResult<()> {
 }
 
 /// Points are projected in place, or the first that is off the space is named.
-pub fn points<M: Space>(
-    space: &M,
+pub fn points(
+    space: &Erased,
     points: &mut [f64],
     offsets: &[usize],
     batch: &[usize],
@@ -60,7 +60,7 @@ pub fn points<M: Space>(
 }
 
 /// Neighbours must lie in the same part of a space that has two.
-fn one_component<M: Space>(space: &M, points: &[f64], offsets: &[usize], batch: &[usize]) -> PyResult<()> {
+fn one_component(space: &Erased, points: &[f64], offsets: &[usize], batch: &[usize]) -> PyResult<()> {
     let len = space.point_len();
     for (curve, ends) in offsets.windows(2).enumerate() {
         let part = |i: usize| space.component(&points[i * len..(i + 1) * len]);
@@ -78,7 +78,7 @@ fn one_component<M: Space>(space: &M, points: &[f64], offsets: &[usize], batch: 
 }
 
 /// End vectors must be tangent and velocities not too fast; closed curves must be closed.
-pub fn ends<M: Space>(space: &M, problem: &Problem, batch: &[usize], tol: f64) -> PyResult<()> {
+pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyResult<()> {
     let len = space.point_len();
     let curves = problem.offsets.len() - 1;
     let mut first = Vec::with_capacity(curves * len);

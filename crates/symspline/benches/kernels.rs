@@ -7,7 +7,8 @@ use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline::fit::{End, Ends, Method, Options, Problem, fit};
 use symspline::monitor::Monitor;
 use symspline::parallel::set_num_threads;
-use symspline::space::{Space, Sphere};
+use symspline::space::Erased;
+use symspline::spaces::Sphere;
 
 fn main() {
     set_num_threads(1);
@@ -42,10 +43,10 @@ fn knots(n: usize) -> Vec<f64> {
     (0..n).map(|i| i as f64).collect()
 }
 
-fn run<M: Space>(space: &M, t: &[f64], points: &[f64], offsets: &[usize], u: &mut [f64]) {
+fn run(space: &Sphere, t: &[f64], points: &[f64], offsets: &[usize], u: &mut [f64]) {
     let ends = Ends::Open([End::Natural, End::Natural]);
     let problem = Problem { t, shared: true, points, offsets, ends };
-    black_box(fit(space, &problem, &OPTIONS, &Monitor::new(&ON), u));
+    black_box(fit(&Erased(space), &problem, &OPTIONS, &Monitor::new(&ON), u));
 }
 
 #[divan::bench(args = [10, 100, 1000, 100_000])]
@@ -82,6 +83,6 @@ fn evaluate_at(bencher: Bencher, quantity: Quantity, time: impl Fn(usize) -> f64
     let mut out = vec![0.0; 4 * SAMPLES];
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
         let monitor = Monitor::new(&ON);
-        evaluate(&sphere(), &curves, &times, quantity, Outside::Continue, &monitor, &mut out);
+        evaluate(&Erased(&sphere()), &curves, &times, quantity, Outside::Continue, &monitor, &mut out);
     });
 }

@@ -4,7 +4,7 @@
 // ---- the page begins ----
 use std::f64::consts::PI;
 use symspline::scalar::{Lane, Scalar, dot, lane, max_or_nan};
-use symspline::space::Space;
+use symspline::space::{Ambient, Frame, Origin, Space};
 use symspline::special::Trig;
 
 /// Tⁿ = S¹ × … × S¹: n unit vectors of R².
@@ -17,11 +17,6 @@ impl Torus {
     /// The torus of n circles.
     pub fn new(n: usize) -> Result<Self, String> {
         if n == 0 { Err("Torus(n) needs n >= 1".into()) } else { Ok(Torus { n }) }
-    }
-
-    /// n
-    pub fn parameters(&self) -> [usize; 1] {
-        [self.n]
     }
 }
 
@@ -66,30 +61,16 @@ fn largest(x: &[Lane]) -> Lane {
     x.iter().fold(Lane::ZERO, |most, x| max_or_nan(most, x.abs()))
 }
 
-impl Space for Torus {
-    type Chart = Self;
-
+impl Ambient for Torus {
     fn point_len(&self) -> usize {
         2 * self.n
     }
     fn point_shape(&self) -> Vec<usize> {
         vec![self.n, 2]
     }
-    fn dim(&self) -> usize {
-        self.n
-    }
-    fn frame_len(&self) -> usize {
-        0
-    }
     fn cut_angle(&self) -> f64 {
         PI
     }
-    fn curvature(&self) -> f64 {
-        0.0
-    }
-
-    // ---- in the ambient array ----
-
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         for (j, out) in out.chunks_exact_mut(2).enumerate() {
             let p = pair(p, j);
@@ -139,13 +120,6 @@ impl Space for Torus {
         }
         off
     }
-    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        let size = dot(v, v).sqrt();
-        let off = (0..self.n).fold(Lane::ZERO, |off, j| max_or_nan(off, dot(&pair(p, j), &pair(v, j)).abs()));
-        self.velocity(p, v);
-        // The library's ROUNDING_SIZE: a smaller vector may consist of rounding errors.
-        off / (size + lane(1e-7))
-    }
     fn scatter(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
@@ -153,9 +127,12 @@ impl Space for Torus {
         let norms: Vec<f64> = x.chunks_exact(2).map(|x| x[0].hypot(x[1])).collect();
         format!("its rows have the norms {norms:?}, not 1")
     }
+}
 
-    // ---- moving frame ----
-
+impl Frame for Torus {
+    fn frame_len(&self) -> usize {
+        0
+    }
     fn lift(&self, _p: &[Lane], _frame: &mut [Lane]) {}
     fn step(&self, _frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
         for (j, x) in chord.iter_mut().enumerate() {
@@ -163,7 +140,6 @@ impl Space for Torus {
         }
         largest(chord)
     }
-    fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
     fn coordinates(&self, _frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         for (j, x) in x.iter_mut().enumerate() {
             *x = cross(pair(p, j), pair(v, j));
@@ -174,9 +150,15 @@ impl Space for Torus {
             v.copy_from_slice(&along(pair(p, j), x[j]));
         }
     }
+}
 
-    // ---- at the origin ----
-
+impl Origin for Torus {
+    fn dim(&self) -> usize {
+        self.n
+    }
+    fn curvature(&self) -> f64 {
+        0.0
+    }
     fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
         for i in 0..self.n {
             // Transvections add up, and the logarithm takes whole turns away.
@@ -186,18 +168,24 @@ impl Space for Torus {
             w_minus[i] = -w_plus[i];
         }
     }
+    fn triple<S: Scalar>(&self, _a: &[S], _b: &[S], _c: &[S], out: &mut [S]) {
+        out.fill(S::constant(Lane::ZERO));
+    }
     fn stretch<S: Scalar>(&self, _v: &[S], _x: &mut [S]) {}
     fn angle(&self, v: &[Lane]) -> Lane {
         largest(v)
     }
 }
+
+impl Space for Torus {}
 // ---- the page ends ----
 
 use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
 use symspline::monitor::Monitor;
 use symspline::rows::{Fault, Operation, apply, project_points};
-use symspline::space::Euclidean;
+use symspline::space::Erased;
+use symspline::spaces::Euclidean;
 
 const ON: fn(usize) -> bool = |_| true;
 const QUANTITIES: [Quantity; 3] = [Quantity::Point, Quantity::Velocity, Quantity::Acceleration];
@@ -233,11 +221,11 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 fn run(operation: Operation, inputs: &[&[f64]], t: &[f64], len: usize) -> Result<Vec<f64>, Fault> {
     let mut out = vec![0.0; len];
-    apply(&Torus::new(2).unwrap(), operation, inputs, t, &Monitor::new(&ON), &mut out).map(|()| out)
+    apply(&Erased(&Torus::new(2).unwrap()), operation, inputs, t, &Monitor::new(&ON), &mut out).map(|()| out)
 }
 
 /// The velocities of the spline through points.
-fn spline<M: Space>(space: &M, points: &[f64], ends: [End; 2]) -> Result<Vec<f64>, Status> {
+fn spline(space: &Erased, points: &[f64], ends: [End; 2]) -> Result<Vec<f64>, Status> {
     let options = Options { method: Method::Auto, tol: 1e-13, max_iter: None };
     let problem =
         Problem { t: &KNOTS, shared: true, points, offsets: &[0, KNOTS.len()], ends: Ends::Open(ends) };
@@ -248,7 +236,7 @@ fn spline<M: Space>(space: &M, points: &[f64], ends: [End; 2]) -> Result<Vec<f64
     }
 }
 
-fn values<M: Space>(space: &M, curves: &Curves, times: &Times, quantity: Quantity) -> Vec<f64> {
+fn values(space: &Erased, curves: &Curves, times: &Times, quantity: Quantity) -> Vec<f64> {
     let mut out = vec![0.0; curves.points.len() / curves.nodes * times.count];
     evaluate(space, curves, times, quantity, Outside::Continue, &Monitor::new(&ON), &mut out);
     out
@@ -256,9 +244,9 @@ fn values<M: Space>(space: &M, curves: &Curves, times: &Times, quantity: Quantit
 
 #[test]
 fn parameters_are_checked() {
-    assert_eq!(Torus::new(2).unwrap().parameters(), [2]);
     assert!(Torus::new(0).is_err());
-    let (_, off, why) = project_points(&Torus::new(2).unwrap(), &mut [1.0, 0.0, 0.0, 2.0], 1e-8).unwrap_err();
+    let (_, off, why) =
+        project_points(&Erased(&Torus::new(2).unwrap()), &mut [1.0, 0.0, 0.0, 2.0], 1e-8).unwrap_err();
     assert_eq!((off, why.as_str()), (1.0, "its rows have the norms [1.0, 2.0], not 1"));
 }
 
@@ -289,13 +277,14 @@ fn the_cut_locus_is_at_pi_in_any_coordinate() {
     assert!((angle - PI).abs() < 1e-15);
     let mut points = ANGLES.concat();
     (points[6], points[7]) = (8.1, -4.0 + PI);
-    let fault = spline(&Torus::new(2).unwrap(), &point(&points), [End::Natural; 2]).unwrap_err();
+    let fault = spline(&Erased(&Torus::new(2).unwrap()), &point(&points), [End::Natural; 2]).unwrap_err();
     assert!(matches!(fault, Status::CutLocus { index: 2, .. }), "{fault:?}");
 }
 
 #[test]
 fn the_spline_is_the_flat_one_of_the_angles() {
     let (torus, flat) = (Torus::new(2).unwrap(), Euclidean::new(2).unwrap());
+    let (torus, flat) = (Erased(&torus), Erased(&flat));
     let angles = ANGLES.concat();
     let points = point(&angles);
     let x: Vec<f64> = (0..=200).map(|i| i as f64 * 7.1 / 200.0).collect();
@@ -321,6 +310,7 @@ fn the_spline_is_the_flat_one_of_the_angles() {
 #[test]
 fn the_spline_is_c2_at_the_knots() {
     let torus = Torus::new(2).unwrap();
+    let torus = Erased(&torus);
     let points = point(&ANGLES.concat());
     // A start so fast the wrong way that the first middle leg takes the other way round.
     let away = vector(&ANGLES[0], &[-8.5, 8.5]);

@@ -1,0 +1,429 @@
+//! Values and derivatives of spline curves at many times.
+
+use super::bezier::Segment;
+use super::locate::Locator;
+use crate::monitor::Monitor;
+use crate::parallel;
+use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
+use crate::space::{Ambient, Covered, Erased, Space};
+use crate::with_size;
+use std::ops::DerefMut;
+
+/// Spline curves with equally many knots: the triple (t, p, u).
+pub struct Curves<'a> {
+    /// Knots of each curve, or of one for all.
+    pub t: &'a [f64],
+    /// Number of knots of a curve.
+    pub nodes: usize,
+    /// Points, curve after curve.
+    pub points: &'a [f64],
+    /// Velocities in the same layout.
+    pub velocities: &'a [f64],
+}
+
+/// Times to evaluate at.
+pub struct Times<'a> {
+    /// The times, of each curve or of all.
+    pub x: &'a [f64],
+    /// Times of one curve.
+    pub count: usize,
+}
+
+/// What to compute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// γ
+    Point,
+    /// γ'
+    Velocity,
+    /// ∇γ'
+    Acceleration,
+    /// |γ'|
+    Speed,
+    /// |∇γ'|
+    Bend,
+}
+
+/// What happens at times outside the knots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outside {
+    /// The last Bézier segment goes on.
+    Continue,
+    /// The curve goes on with constant velocity.
+    Geodesic,
+    /// Time wraps around.
+    Wrap,
+}
+
+/// Samples evaluated by one thread at a time, at most.
+const BLOCK: usize = 2048;
+/// Samples times numbers from which threads pay.
+const PARALLEL: usize = 1 << 16;
+
+impl Curves<'_> {
+    fn knots(&self, curve: usize) -> &[f64] {
+        if self.t.len() == self.nodes {
+            self.t
+        } else {
+            &self.t[curve * self.nodes..(curve + 1) * self.nodes]
+        }
+    }
+
+    /// First and last knot of a curve.
+    pub fn domain(&self, curve: usize) -> (f64, f64) {
+        let t = self.knots(curve);
+        (t[0], t[self.nodes - 1])
+    }
+}
+
+impl Quantity {
+    /// Whether the result is one number, the length of a vector.
+    pub fn is_length(self) -> bool {
+        matches!(self, Quantity::Speed | Quantity::Bend)
+    }
+}
+
+/// Evaluates every curve at its times: `out` holds, curve by curve and time by time, a point or
+/// vector, or one number for [`Quantity::Speed`] and [`Quantity::Bend`].
+pub fn evaluate(
+    space: &Erased,
+    curves: &Curves,
+    times: &Times,
+    quantity: Quantity,
+    outside: Outside,
+    monitor: &Monitor,
+    out: &mut [f64],
+) {
+    let len = space.point_len();
+    let size = if quantity.is_length() { 1 } else { len };
+    let samples = out.len() / size;
+    if samples == 0 {
+        return;
+    }
+    // A table over the knots pays for itself once there are about as many times as knots.
+    let shared = curves.t.len() == curves.nodes;
+    let locator = shared.then(|| Locator::new(curves.t, samples > 8 && samples >= curves.nodes / 4));
+    let length = parallel::block(BLOCK, len);
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * size).enumerate().collect();
+    let parallel = samples * len > PARALLEL;
+    parallel::for_each(blocks, parallel, monitor, |(block, out)| {
+        let locator = locator.as_ref();
+        let job = Job { curves, times, quantity, outside, locator, first: block * length, size, len };
+        space.0.samples(&job, out);
+        monitor.advance(out.len() / size);
+    });
+}
+
+/// A block of samples.
+pub struct Job<'a> {
+    /// What is computed.
+    pub quantity: Quantity,
+    curves: &'a Curves<'a>,
+    times: &'a Times<'a>,
+    outside: Outside,
+    locator: Option<&'a Locator<'a>>,
+    /// The first sample of the block.
+    first: usize,
+    /// Numbers in a row of the result, and of a point.
+    size: usize,
+    len: usize,
+}
+
+/// Where eight samples fall. It goes along the samples of a block in their order.
+struct Places<'a> {
+    job: &'a Job<'a>,
+    /// The next sample: the i-th time of a curve.
+    curve: usize,
+    i: usize,
+    /// Samples that are left in the block.
+    left: usize,
+    segment: usize,
+    /// Where the data of each lane's segment begin.
+    at: [usize; LANES],
+    /// Times, first knots and lengths of the segments, and one over those.
+    x: Lane,
+    knot: Lane,
+    h: Lane,
+    rate: Lane,
+    /// Times beyond the last (positive) or before the first knot.
+    beyond: [f64; LANES],
+    /// First and last knot of the segment, if all lanes are in the same one.
+    shared: Option<[Lane; 2]>,
+}
+
+impl<'a> Places<'a> {
+    fn new(job: &'a Job<'a>, samples: usize) -> Self {
+        let count = job.times.count;
+        Places {
+            job,
+            curve: job.first / count,
+            i: job.first % count,
+            left: samples,
+            segment: 0,
+            at: [usize::MAX; LANES],
+            x: Lane::ZERO,
+            knot: Lane::ZERO,
+            h: Lane::ONE,
+            rate: Lane::ONE,
+            beyond: [0.0; LANES],
+            shared: None,
+        }
+    }
+
+    /// Goes to the next eight samples; lanes that are left over repeat the last one. Returns whether
+    /// they fall in other segments than those before.
+    #[inline(always)]
+    fn advance(&mut self) -> bool {
+        let Times { x, count } = *self.job.times;
+        if let Some([from, to]) = self.shared
+            && self.left >= LANES
+            && self.i + LANES <= count
+        {
+            // Dense samples in order stay in a segment for a while.
+            let row = if x.len() == count { self.i } else { self.curve * count + self.i };
+            let next = Lane::new(std::array::from_fn(|l| x[row..][..LANES][l]));
+            if (next.simd_ge(from) & next.simd_lt(to)).all() {
+                self.x = next;
+                self.step(LANES);
+                return false;
+            }
+        }
+        self.search()
+    }
+
+    #[inline(always)]
+    fn step(&mut self, samples: usize) {
+        self.left -= samples;
+        self.i += samples;
+        if self.i == self.job.times.count {
+            (self.curve, self.i) = (self.curve + 1, 0);
+            self.shared = None;
+        }
+    }
+
+    fn search(&mut self) -> bool {
+        let Job { curves, locator, outside, .. } = self.job;
+        let Times { x, count } = *self.job.times;
+        let len = self.job.len;
+        let (mut at, mut xs, mut knots, mut ends) = (self.at, [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let mut x = if x.len() == count { x[self.i] } else { x[self.curve * count + self.i] };
+            let t = curves.knots(self.curve);
+            let (start, end) = (t[0], t[t.len() - 1]);
+            self.beyond[l] = 0.0;
+            if x < start || x > end {
+                match outside {
+                    Outside::Continue => {}
+                    Outside::Geodesic => {
+                        self.beyond[l] = if x < start { x - start } else { x - end };
+                        x = x.max(start).min(end);
+                    }
+                    Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
+                }
+            }
+            let k = match locator {
+                Some(locator) => locator.find(x, self.segment),
+                None => Locator::new(t, false).find(x, self.segment),
+            };
+            self.segment = k;
+            at[l] = (self.curve * curves.nodes + k) * len;
+            (xs[l], knots[l], ends[l]) = (x, t[k], t[k + 1]);
+            if self.left > 1 {
+                self.step(1);
+            }
+        }
+        let changed = at != self.at;
+        self.at = at;
+        self.x = Lane::new(xs);
+        self.knot = Lane::new(knots);
+        self.h = Lane::new(ends) - self.knot;
+        self.rate = Lane::ONE / self.h;
+        // The next sample may be of another curve already.
+        let alike = at == [at[0]; LANES] && self.beyond == [0.0; LANES] && self.i >= LANES;
+        self.shared = alike.then(|| [self.knot, Lane::new(ends)]);
+        changed
+    }
+}
+
+impl Job<'_> {
+    /// Evaluates the block, eight samples at a time, whatever segments they fall in.
+    pub fn run<M: Space>(&self, space: &M, out: &mut [f64]) {
+        match self.quantity {
+            Quantity::Point => self.run_with::<Lane, M>(space, out),
+            Quantity::Velocity | Quantity::Speed => self.run_with::<Dual, M>(space, out),
+            Quantity::Acceleration | Quantity::Bend => self.run_with::<Jet, M>(space, out),
+        }
+    }
+
+    /// The same, compiled once.
+    pub fn run_by_table(&self, space: &Erased, out: &mut [f64]) {
+        self.run(space, out);
+    }
+
+    fn run_with<S: Scalar, M: Space>(&self, space: &M, out: &mut [f64]) {
+        with_size!(M::VECTORS, self.len, len => self.run_sized::<S, M>(space, out, len));
+    }
+
+    #[inline(always)]
+    fn run_sized<S: Scalar, M: Space>(&self, space: &M, out: &mut [f64], len: usize) {
+        self.each(
+            out,
+            len,
+            |places, segment: &mut Segment<S>| {
+                self.read(places, len, &mut segment.ends, &mut segment.legs);
+                segment.prepare(space, len);
+            },
+            |places, segment, gamma, vectors, out| {
+                let (p, vector) = self.sample(space, places, segment, gamma, vectors, len);
+                match vector {
+                    Some(v) if self.quantity.is_length() => scatter(&[norm(space, p, v)], out),
+                    vector => scatter(vector.unwrap_or(p), out),
+                }
+            },
+        );
+    }
+
+    /// The same in a space that covers this one.
+    pub fn run_covered<C: Covered>(&self, space: &C, out: &mut [f64]) {
+        match self.quantity {
+            Quantity::Point => self.run_covered_with::<Lane, C>(space, out),
+            Quantity::Velocity | Quantity::Speed => self.run_covered_with::<Dual, C>(space, out),
+            Quantity::Acceleration | Quantity::Bend => self.run_covered_with::<Jet, C>(space, out),
+        }
+    }
+
+    fn run_covered_with<S: Scalar, C: Covered>(&self, space: &C, out: &mut [f64]) {
+        let cover = space.cover();
+        let (len, ambient) = (cover.point_len(), self.len);
+        let mut buffer = vec![Lane::ZERO; 4 * ambient];
+        let mut result = vec![Lane::ZERO; 2 * ambient];
+        self.each(
+            out,
+            len,
+            |places, segment: &mut Segment<S>| {
+                let (p, v) = buffer.split_at_mut(2 * ambient);
+                let ([p0, p1], [v0, v1]) = (two(p, ambient), two(v, ambient));
+                self.read(places, ambient, &mut [&mut *p0, &mut *p1], &mut [&mut *v0, &mut *v1]);
+                let [y, z] = &mut segment.ends;
+                let [a, b] = &mut segment.legs;
+                space.enter([p0, p1], [v0, v1], [y, z], [a, b]);
+                segment.prepare(&cover, len);
+            },
+            |places, segment, gamma, vectors, out| {
+                let (p, vector) = self.sample(&cover, places, segment, gamma, vectors, len);
+                let [point, result] = two(&mut result, ambient);
+                space.leave(p, vector, result);
+                if self.quantity.is_length() {
+                    space.leave(p, None, point);
+                    scatter(&[norm(space, point, result)], out);
+                } else {
+                    scatter(result, out);
+                }
+            },
+        );
+    }
+
+    /// Goes through the samples: `enter` reads a segment, `write` evaluates eight samples.
+    #[inline(always)]
+    fn each<S: Scalar>(
+        &self,
+        out: &mut [f64],
+        len: usize,
+        mut enter: impl FnMut(&Places, &mut Segment<S>),
+        mut write: impl FnMut(&Places, &mut Segment<S>, &mut [S], &mut [Lane], &mut [f64]),
+    ) {
+        let mut segment = Segment::<S>::new(len);
+        let mut gamma = vec![S::constant(Lane::ZERO); len];
+        let mut vectors = vec![Lane::ZERO; 3 * len];
+        let mut places = Places::new(self, out.len() / self.size);
+        for out in out.chunks_mut(LANES * self.size) {
+            if places.advance() {
+                enter(&places, &mut segment);
+            }
+            write(&places, &mut segment, &mut gamma, &mut vectors, out);
+        }
+    }
+
+    /// Points of eight samples, and the vectors there if any are asked for.
+    #[inline(always)]
+    fn sample<'v, S: Scalar, M: Space>(
+        &self,
+        space: &M,
+        places: &Places,
+        segment: &mut Segment<S>,
+        gamma: &mut [S],
+        vectors: &'v mut [Lane],
+        len: usize,
+    ) -> (&'v [Lane], Option<&'v [Lane]>) {
+        // Exactly 1 at the last knot.
+        let tau = (places.x - places.knot) / places.h;
+        segment.at(space, len, S::from_parts([tau, places.rate, Lane::ZERO]), gamma);
+        if self.outside == Outside::Geodesic && places.beyond != [0.0; LANES] {
+            go_straight(space, places, segment, gamma);
+        }
+        let (p, derivatives) = vectors.split_at_mut(len);
+        let (d, dd) = derivatives.split_at_mut(len);
+        let (d, dd) = (&mut d[..len], &mut dd[..len]);
+        for (i, g) in gamma[..len].iter().enumerate() {
+            [p[i], d[i], dd[i]] = g.parts();
+        }
+        match self.quantity {
+            Quantity::Point => (p, None),
+            Quantity::Velocity | Quantity::Speed => {
+                space.velocity(p, d);
+                (p, Some(d))
+            }
+            Quantity::Acceleration | Quantity::Bend => {
+                space.acceleration(p, d, dd);
+                (p, Some(dd))
+            }
+        }
+    }
+
+    /// Gathers the ends of eight segments, and the legs there: h/3 times the velocities.
+    #[inline(always)]
+    fn read(
+        &self,
+        places: &Places,
+        len: usize,
+        ends: &mut [impl DerefMut<Target = [Lane]>; 2],
+        legs: &mut [impl DerefMut<Target = [Lane]>; 2],
+    ) {
+        let Places { at, h, .. } = places;
+        let third = *h * lane(1.0 / 3.0);
+        let (p, u) = (self.curves.points, self.curves.velocities);
+        for e in 0..2 {
+            gather(at.map(|i| &p[i + e * len..][..len]), &mut ends[e][..len]);
+            gather(at.map(|i| &u[i + e * len..][..len]), &mut legs[e][..len]);
+            legs[e].iter_mut().for_each(|u| *u *= third);
+        }
+    }
+}
+
+#[inline(always)]
+fn norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
+    max_or_nan(space.inner(p, v, v), Lane::ZERO).sqrt()
+}
+
+/// The first two rows of a buffer.
+fn two(buffer: &mut [Lane], len: usize) -> [&mut [Lane]; 2] {
+    let (a, b) = buffer.split_at_mut(len);
+    [a, &mut b[..len]]
+}
+
+/// Replaces the lanes outside the knots by the geodesic that leaves the end.
+#[cold]
+fn go_straight<S: Scalar, M: Space>(space: &M, places: &Places, segment: &Segment<S>, gamma: &mut [S]) {
+    let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
+    let (beyond, third) = (Lane::new(places.beyond), places.h * lane(1.0 / 3.0));
+    let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
+    let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
+        x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
+    };
+    let velocity: Vec<Lane> = pick(a, b).iter().map(|leg| *leg / third).collect();
+    let mut straight = gamma.to_vec();
+    space.ray(&pick(p0, p1), &velocity, S::from_parts([beyond, Lane::ONE, Lane::ZERO]), &mut straight);
+    for (g, s) in gamma.iter_mut().zip(&straight) {
+        *g = S::select(before | behind, *s, *g);
+    }
+}

@@ -1,0 +1,10 @@
+//! Curves: Bézier segments and their evaluation.
+
+mod bezier;
+mod bspline;
+mod evaluate;
+mod locate;
+
+pub use bezier::Segment;
+pub use bspline::{BSpline, evaluate_bspline};
+pub use evaluate::{Curves, Job, Outside, Quantity, Times, evaluate};

@@ -1,0 +1,170 @@
+//! A Bézier segment and how its points follow its control points.
+
+use super::operators::{Few, Matrix, Vector, columns, unit};
+use super::polygon::Node;
+use super::segment::Segment;
+use crate::scalar::{Dual, Jet, Lane, Scalar, lane};
+use crate::space::{Ambient, Erased, Frame, Origin};
+use smallvec::smallvec;
+
+/// Four control points, and a frame at each.
+pub struct Bezier {
+    points: [Few<Lane>; 4],
+    /// The frames of the knots, carried to q⁺ and q⁻ in parallel: vectors as columns.
+    bases: [Matrix; 4],
+    /// A length by which points move: one, and the length of the legs where space is flat, so that nothing is
+    /// lost beside large numbers.
+    reach: f64,
+}
+
+impl Bezier {
+    pub fn new(space: &Erased, nodes: &[Node], segment: &Segment) -> Self {
+        let len = space.point_len();
+        let inner = |node: &Node, leg: &Vector, sign: f64| {
+            let x: Few<Lane> = leg.iter().map(|&x| lane(sign * x)).collect();
+            let zero: Few<Lane> = smallvec![Lane::ZERO; len];
+            let (mut v, mut q, mut w) = (zero.clone(), zero.clone(), zero);
+            space.tangent(&node.frame, &node.p, &x, &mut v);
+            space.ray(&node.p, &v, Lane::ONE, &mut q);
+            let basis = columns(len, space.dim(), |k, out| {
+                node.tangent(space, k, &mut w);
+                space.carry(&node.p, &q, &v, &w, out);
+            });
+            (q, basis)
+        };
+        let [p0, p1] = [&nodes[0], &nodes[1]];
+        let (q0, b0) = inner(p0, &segment.legs[0], 1.0);
+        let (q1, b1) = inner(p1, &segment.legs[1], -1.0);
+        Bezier {
+            points: [p0.p.clone(), q0, q1, p1.p.clone()],
+            bases: [p0.basis(space), b0, b1, p1.basis(space)],
+            reach: if space.scales() {
+                segment.legs.iter().map(Vector::norm).fold(0.0, f64::max).max(1.0)
+            } else {
+                1.0
+            },
+        }
+    }
+
+    /// De Casteljau's algorithm (8) with control points that may move.
+    fn at<S: Scalar>(space: &Erased, mut points: [Few<S>; 4], t: S) -> Few<S> {
+        let mut next = points[0].clone();
+        for level in (1..4).rev() {
+            for i in 0..level {
+                let (a, b) = points.split_at_mut(i + 1);
+                space.geodesic(&a[i], &b[0], t, &mut next);
+                a[i].copy_from_slice(&next);
+            }
+        }
+        std::mem::take(&mut points[0])
+    }
+
+    /// The motions of the k-th control point in eight columns from `first` on.
+    fn motion(&self, k: usize, row: usize, first: usize) -> Lane {
+        let m = self.bases[k].ncols();
+        Lane::new(std::array::from_fn(|l| {
+            let column = (first + l).wrapping_sub(k * m);
+            if column < m { self.bases[k][(row, column)] } else { 0.0 }
+        }))
+    }
+
+    /// ∂γ for motions of the four control points along their frames, and in the last column for τ.
+    pub fn point(&self, space: &Erased, tau: f64) -> Matrix {
+        let (len, count) = (space.point_len(), self.count());
+        columns(len, count, |first, out| {
+            let points = std::array::from_fn(|k| {
+                (0..len).map(|r| Dual { v: self.points[k][r], d: self.motion(k, r, first) }).collect()
+            });
+            let gamma = Self::at(space, points, Dual { v: lane(tau), d: unit(count - 1, first) });
+            let (value, d): (Few<Lane>, Few<Lane>) = gamma.iter().map(|g| (g.v, g.d)).unzip();
+            out.copy_from_slice(&d);
+            space.velocity(&value, out);
+        })
+    }
+
+    /// The same for the velocity ∂γ/∂τ: covariant derivatives.
+    ///
+    /// Along the line (τ + r, ε = sr) of a family of curves the covariant acceleration is
+    /// `γ_ττ + 2s γ_τε + s² γ_εε`: a quarter of the difference of s = 1 and s = −1 is the mixed derivative.
+    pub fn velocity(&self, space: &Erased, tau: f64) -> Matrix {
+        let (len, count) = (space.point_len(), self.count());
+        columns(len, count, |first, out| {
+            let along = |s: f64| {
+                let points = std::array::from_fn(|k| {
+                    let v: Few<Lane> =
+                        (0..len).map(|r| self.motion(k, r, first) * lane(self.reach)).collect();
+                    let mut moving: Few<Jet> = smallvec![Jet::constant(Lane::ZERO); len];
+                    space.ray(
+                        &self.points[k],
+                        &v,
+                        Jet { v: Lane::ZERO, d: lane(s), dd: Lane::ZERO },
+                        &mut moving,
+                    );
+                    moving
+                });
+                let rate = Lane::ONE + unit(count - 1, first) * lane(s);
+                let gamma = Self::at(space, points, Jet { v: lane(tau), d: rate, dd: Lane::ZERO });
+                let [value, d, mut dd] = parts(&gamma);
+                space.acceleration(&value, &d, &mut dd);
+                dd
+            };
+            let (forth, back) = (along(1.0), along(-1.0));
+            let time = unit(count - 1, first).simd_gt(Lane::ZERO);
+            let factor = time.select(lane(0.25), lane(0.25 / self.reach));
+            for (out, (x, y)) in out.iter_mut().zip(forth.iter().zip(&back)) {
+                *out = (*x - *y) * factor;
+            }
+        })
+    }
+
+    /// The same for the covariant acceleration of ∂γ/∂τ: by central differences of order eight, which an analytic
+    /// function has to twelve digits at this step.
+    pub fn acceleration(&self, space: &Erased, tau: f64) -> Matrix {
+        const STEP: f64 = 0.015;
+        const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+        let (len, count) = (space.point_len(), self.count());
+        let zero: Few<Lane> = smallvec![Lane::ZERO; len];
+        let (mut way, mut back) = (zero.clone(), zero);
+        columns(len, count, |first, out| {
+            let here = Self::at(space, self.moved(space, first, Lane::ZERO), lane(tau));
+            out.fill(Lane::ZERO);
+            for (k, sign) in (0..8).map(|k| (k / 2, if k % 2 == 0 { 1.0 } else { -1.0 })) {
+                let r = lane(sign * STEP * (k + 1) as f64);
+                let points =
+                    self.moved(space, first, r).map(|p| p.iter().map(|&x| Jet::constant(x)).collect());
+                let v = lane(tau) + unit(count - 1, first) * r;
+                let gamma = Self::at(space, points, Jet { v, d: Lane::ONE, dd: Lane::ZERO });
+                let [value, d, mut dd] = parts(&gamma);
+                space.acceleration(&value, &d, &mut dd);
+                space.log(&value, &here, &mut way);
+                space.carry(&value, &here, &way, &dd, &mut back);
+                let weight = lane(sign * WEIGHTS[k] / (STEP * self.reach));
+                out.iter_mut().zip(&back).for_each(|(out, x)| *out += *x * weight);
+            }
+            // Time goes its own way, whatever the reach of the points.
+            let time = unit(count - 1, first).simd_gt(Lane::ZERO);
+            out.iter_mut().for_each(|x| *x = time.select(*x * lane(self.reach), *x));
+        })
+    }
+
+    /// The control points moved by r along their frames.
+    fn moved(&self, space: &Erased, first: usize, r: Lane) -> [Few<Lane>; 4] {
+        std::array::from_fn(|k| {
+            let v: Few<Lane> =
+                (0..space.point_len()).map(|row| self.motion(k, row, first) * lane(self.reach)).collect();
+            let mut out: Few<Lane> = smallvec![Lane::ZERO; v.len()];
+            space.ray(&self.points[k], &v, r, &mut out);
+            out
+        })
+    }
+
+    /// Columns of the derivatives.
+    fn count(&self) -> usize {
+        4 * self.bases[0].ncols() + 1
+    }
+}
+
+/// Values, first and second derivatives.
+fn parts(x: &[Jet]) -> [Few<Lane>; 3] {
+    std::array::from_fn(|k| x.iter().map(|x| x.parts()[k]).collect())
+}

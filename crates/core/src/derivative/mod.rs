@@ -1,0 +1,225 @@
+//! How a spline follows its data: derivatives with respect to points, knots and end vectors.
+//!
+//! The velocities are defined by the C² condition F(u, data) = 0, so that they follow the data like
+//! −F_u⁻¹ F_data (implicit differentiation). Everything is written in frames that move with the points.
+
+mod bezier;
+mod operators;
+mod polygon;
+mod segment;
+mod system;
+
+use crate::fit::{End, EndKind, Ends};
+use crate::space::{Ambient, Erased, Origin};
+use bezier::Bezier;
+use operators::{Matrix, Vector};
+use polygon::Polygon;
+use std::collections::BTreeMap;
+use system::{Change, System};
+
+/// What a curve is made of, or small changes of it, or a gradient with respect to it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Data {
+    /// Points, or tangent vectors there.
+    pub points: Vec<f64>,
+    /// Knots.
+    pub knots: Vec<f64>,
+    /// The vectors that are prescribed at the ends; empty where there is none.
+    pub ends: [Vec<f64>; 2],
+}
+
+/// What is differentiated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// The point γ.
+    Point,
+    /// The velocity γ', covariantly.
+    Velocity,
+    /// The covariant acceleration ∇γ', covariantly.
+    Acceleration,
+}
+
+/// The derivative of one spline curve with respect to its data.
+pub struct Derivative<'a> {
+    space: &'a Erased<'a>,
+    t: &'a [f64],
+    polygon: Polygon,
+    system: System,
+    beziers: BTreeMap<usize, Bezier>,
+}
+
+/// Where a time falls.
+struct Place {
+    segment: usize,
+    tau: f64,
+}
+
+impl<'a> Derivative<'a> {
+    /// Of the spline with these knots, points and velocities. Vectors in `ends` are those of this curve.
+    pub fn new(space: &'a Erased<'a>, t: &'a [f64], points: &[f64], velocities: &[f64], ends: &Ends) -> Self {
+        let closed = matches!(ends, Ends::Periodic);
+        let polygon = Polygon::new(space, points, velocities, closed);
+        let h: Vec<f64> = t.windows(2).map(|t| t[1] - t[0]).collect();
+        let kinds = match ends {
+            Ends::Periodic => None,
+            Ends::Open(ends) => Some(std::array::from_fn(|e| {
+                let node = &polygon.nodes[e * h.len()];
+                let at = |v: &[f64]| node.coordinates(space, v);
+                match &ends[e] {
+                    End::Natural => (EndKind::Acceleration, Vector::zeros(space.dim())),
+                    End::NotAKnot => (EndKind::NotAKnot, Vector::zeros(space.dim())),
+                    End::Velocity(v) => (EndKind::Velocity, at(v)),
+                    End::Acceleration(v) => (EndKind::Acceleration, at(v)),
+                }
+            })),
+        };
+        let system = System::new(space, &polygon, &h, kinds);
+        Derivative { space, t, polygon, system, beziers: BTreeMap::new() }
+    }
+
+    fn segments(&self) -> usize {
+        self.t.len() - 1
+    }
+
+    fn place(&mut self, x: f64) -> Place {
+        let segment = self.t[1..self.segments()].partition_point(|&t| t <= x);
+        let (space, nodes) = (self.space, &self.polygon.nodes[segment..segment + 2]);
+        self.beziers
+            .entry(segment)
+            .or_insert_with(|| Bezier::new(space, nodes, &self.system.segments[segment]));
+        Place { segment, tau: (x - self.t[segment]) / (self.t[segment + 1] - self.t[segment]) }
+    }
+
+    /// The columns by which a sample follows the four control points, τ and (behind a factor) h.
+    fn columns(&mut self, x: f64, of: Of) -> (Place, Matrix, Vector) {
+        let place = self.place(x);
+        let bezier = &self.beziers[&place.segment];
+        let inverse = 1.0 / self.system.segments[place.segment].h;
+        let tau = place.tau;
+        // Behind the control points the last column is the derivative in τ.
+        let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
+        match of {
+            Of::Point => (place, bezier.point(self.space, tau), Vector::zeros(self.space.point_len())),
+            // γ' = γ_τ/h
+            Of::Velocity => {
+                let by_h = along(bezier.point(self.space, tau), -inverse * inverse);
+                (place, bezier.velocity(self.space, tau) * inverse, by_h)
+            }
+            // ∇γ' = ∇γ_τ/h²
+            Of::Acceleration => {
+                let by_h = along(bezier.velocity(self.space, tau), -2.0 * inverse * inverse * inverse);
+                (place, bezier.acceleration(self.space, tau) * (inverse * inverse), by_h)
+            }
+        }
+    }
+
+    /// How the curve at times x moves with the data; `out` gets one tangent vector a time.
+    pub fn push(&mut self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
+        let change = self.in_frames(change);
+        let mut u = self.system.velocities(&change);
+        self.close(&mut u);
+        let m = self.space.dim();
+        for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
+            let (Place { segment: i, tau }, columns, by_h) = self.columns(x, of);
+            let segment = &self.system.segments[i];
+            let (dh, dt) = (change.lengths[i], change.knots[i]);
+            let mut z = Vector::zeros(4 * m + 1);
+            for e in 0..2 {
+                let (xi, f) = (&change.points[i + e], &segment.functions[e]);
+                // q⁺ = exp(h u/3), q⁻ = exp(−h u/3)
+                let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
+                let leg = &u[i + e] * (segment.h * sign) + &self.polygon.u[i + e] * (dh * sign);
+                z.rows_mut(3 * e * m, m).copy_from(xi);
+                z.rows_mut((1 + e) * m, m).copy_from(&(&f.cosh * xi + &f.stretch * leg));
+            }
+            z[4 * m] = -(dt + tau * dh) / segment.h;
+            let moved = columns * z + by_h * dh;
+            out.copy_from_slice(moved.as_slice());
+        }
+    }
+
+    /// The gradient of `Σ cotangent · curve` with respect to the data: tangent vectors at the points and ends.
+    pub fn pull(&mut self, x: &[f64], of: Of, cotangent: &[f64]) -> Data {
+        let (n, m, len) = (self.segments(), self.space.dim(), self.space.point_len());
+        let zero = || vec![Vector::zeros(m); n + 1];
+        let mut gradient = Change {
+            points: zero(),
+            lengths: vec![0.0; n],
+            ends: [Vector::zeros(m), Vector::zeros(m)],
+            knots: vec![0.0; n + 1],
+        };
+        let mut u = zero();
+        for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
+            let (Place { segment: i, tau }, columns, by_h) = self.columns(x, of);
+            let segment = &self.system.segments[i];
+            let cotangent = Vector::from_column_slice(cotangent);
+            let z = columns.tr_mul(&cotangent);
+            for e in 0..2 {
+                let f = &segment.functions[e];
+                let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
+                let inner = z.rows((1 + e) * m, m);
+                gradient.points[i + e] += z.rows(3 * e * m, m) + f.cosh.tr_mul(&inner);
+                let leg = f.stretch.tr_mul(&inner) * sign;
+                gradient.lengths[i] += leg.dot(&self.polygon.u[i + e]);
+                u[i + e] += leg * segment.h;
+            }
+            gradient.knots[i] -= z[4 * m] / segment.h;
+            gradient.lengths[i] += by_h.dot(&cotangent) - tau * z[4 * m] / segment.h;
+        }
+        self.fold(&mut u);
+        self.system.pull_back(u, &mut gradient);
+        self.fold(&mut gradient.points);
+        self.ambient(&gradient)
+    }
+
+    /// Changes as the system has them.
+    fn in_frames(&self, change: &Data) -> Change {
+        let (n, len) = (self.segments(), self.space.point_len());
+        let at = |i: usize, v: &[f64]| self.polygon.nodes[i].coordinates(self.space, v);
+        let mut points: Vec<Vector> = change.points.chunks(len).enumerate().map(|(i, v)| at(i, v)).collect();
+        self.close(&mut points);
+        let end = |e: usize| {
+            let v = &change.ends[e];
+            if v.is_empty() { Vector::zeros(self.space.dim()) } else { at(e * n, v) }
+        };
+        Change {
+            points,
+            lengths: change.knots.windows(2).map(|t| t[1] - t[0]).collect(),
+            ends: [end(0), end(1)],
+            knots: change.knots.clone(),
+        }
+    }
+
+    /// The last node of a closed curve moves like the first.
+    fn close(&self, x: &mut Vec<Vector>) {
+        if let Some(seam) = &self.polygon.seam {
+            x.resize(self.segments() + 1, Vector::zeros(self.space.dim()));
+            let last = seam * &x[0];
+            x[self.segments()] = last;
+        }
+    }
+
+    /// The transpose of [`close`](Self::close).
+    fn fold(&self, x: &mut [Vector]) {
+        if let Some(seam) = &self.polygon.seam {
+            let last = std::mem::replace(&mut x[self.segments()], Vector::zeros(self.space.dim()));
+            x[0] += seam.tr_mul(&last);
+        }
+    }
+
+    /// A gradient as ambient arrays.
+    fn ambient(&self, gradient: &Change) -> Data {
+        let n = self.segments();
+        let at = |i: usize, x: &Vector| self.polygon.nodes[i].gradient(self.space, x).as_slice().to_vec();
+        let mut knots = gradient.knots.clone();
+        for (i, g) in gradient.lengths.iter().enumerate() {
+            knots[i] -= g;
+            knots[i + 1] += g;
+        }
+        Data {
+            points: gradient.points.iter().enumerate().flat_map(|(i, x)| at(i, x)).collect(),
+            knots,
+            ends: std::array::from_fn(|e| at(e * n, &gradient.ends[e])),
+        }
+    }
+}

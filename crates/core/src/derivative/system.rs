@@ -1,0 +1,295 @@
+//! The linearised C² condition of a whole curve: how velocities follow points, knots and end vectors.
+
+use super::operators::{Functions, Matrix, Vector, curvature, splat, stretch, stretch_slope};
+use super::polygon::Polygon;
+use super::segment::{Segment, Side};
+use crate::fit::{Blocks, EndKind};
+use crate::scalar::{Lane, lane};
+use crate::space::{Erased, Origin};
+
+/// How the condition at one knot changes: with velocities and points of knots, lengths of segments, and
+/// the vector that is prescribed at an end.
+#[derive(Default)]
+struct Row {
+    u: Vec<(usize, Matrix)>,
+    points: Vec<(usize, Matrix)>,
+    lengths: Vec<(usize, Vector)>,
+    end: Option<(usize, Matrix)>,
+}
+
+/// Small changes, in the frames of the knots.
+#[derive(Clone)]
+pub struct Change {
+    /// Of points.
+    pub points: Vec<Vector>,
+    /// Of the lengths of segments.
+    pub lengths: Vec<f64>,
+    /// Of the vectors at the ends.
+    pub ends: [Vector; 2],
+    /// Of the times at which segments begin, and the last one ends; at fixed lengths in a gradient.
+    pub knots: Vec<f64>,
+}
+
+/// The linearised conditions of one curve.
+pub struct System {
+    pub segments: Vec<Segment>,
+    rows: Vec<Row>,
+    m: usize,
+    closed: bool,
+    both_not_a_knot: bool,
+}
+
+impl System {
+    /// `ends` are kinds and prescribed vectors in the frames of the ends; None for a closed curve.
+    pub fn new(space: &Erased, polygon: &Polygon, h: &[f64], ends: Option<[(EndKind, Vector); 2]>) -> Self {
+        let (n, m) = (h.len(), space.dim());
+        let segments: Vec<Segment> = (0..n)
+            .map(|i| Segment::new(space, h[i], &polygon.chords[i], [&polygon.u[i], &polygon.u[i + 1]]))
+            .collect();
+        let closed = ends.is_none();
+        let both_not_a_knot =
+            ends.as_ref().is_some_and(|e| e.iter().all(|(kind, _)| *kind == EndKind::NotAKnot));
+        let mut system = System { segments, rows: Vec::new(), m, closed, both_not_a_knot };
+        if let (true, Some(seam)) = (closed, &polygon.seam) {
+            system.close(seam);
+        }
+        let row = |i: usize| match &ends {
+            Some([first, _]) if i == 0 => system.end(space, polygon, 0, first),
+            Some([_, last]) if i == n => system.end(space, polygon, 1, last),
+            _ => system.inner(space, polygon, i),
+        };
+        // One segment from a point to itself stands still, whatever moves.
+        let nodes = if !closed {
+            n + 1
+        } else if n > 1 {
+            n
+        } else {
+            0
+        };
+        system.rows = (0..nodes).map(row).collect();
+        system
+    }
+
+    /// Brings the last node's side of a closed curve into the frame of the first node.
+    fn close(&mut self, seam: &Matrix) {
+        let Some(back) = seam.clone().try_inverse() else { return };
+        let Some(last) = self.segments.last_mut() else { return };
+        let [start, end] = &mut last.sides;
+        for block in [&mut start.u[1], &mut start.points[1], &mut end.u[1], &mut end.points[1]] {
+            *block = &*block * seam;
+        }
+        for block in end.u.iter_mut().chain(&mut end.points) {
+            *block = &back * &*block;
+        }
+        end.value = &back * &end.value;
+        end.length = &back * &end.length;
+    }
+
+    fn node(&self, i: usize) -> usize {
+        if self.closed { i % self.segments.len() } else { i }
+    }
+
+    /// `S(hᵢ₋₁u/3) right − S(hᵢu/3) left`
+    fn inner(&self, space: &Erased, polygon: &Polygon, i: usize) -> Row {
+        let n = self.segments.len();
+        let (l, r) = ((i + n - 1) % n, i);
+        let (before, behind) = (&self.segments[l], &self.segments[r]);
+        let u = &polygon.u[i];
+        let (left, right) = (&before.sides[1], &behind.sides[0]);
+        let mut row = Row::default();
+        let legs = [u * (before.h / 3.0), u * (behind.h / 3.0)];
+        // The seam of a closed curve lies between two frames.
+        let stretched = [
+            if i > 0 { before.functions[1].stretch.clone() } else { stretch(space, &legs[0]) },
+            behind.functions[0].stretch.clone(),
+        ];
+        let slopes =
+            [stretch_slope(space, &legs[0], &right.value), -stretch_slope(space, &legs[1], &left.value)];
+        row.side(&stretched[0], right, [r, r + 1].map(|k| self.node(k)), r);
+        row.side(&-&stretched[1], left, [l, l + 1].map(|k| self.node(k)), l);
+        for (slope, (segment, h)) in slopes.iter().zip([(l, before.h), (r, behind.h)]) {
+            row.u.push((i, slope * (h / 3.0)));
+            row.lengths.push((segment, slope * u / 3.0));
+        }
+        row
+    }
+
+    fn end(&self, space: &Erased, polygon: &Polygon, which: usize, (kind, value): &(EndKind, Vector)) -> Row {
+        let n = self.segments.len();
+        let (node, near, far) = if which == 0 { (0, 0, 1.min(n - 1)) } else { (n, n - 1, n.max(2) - 2) };
+        let identity = Matrix::identity(self.m, self.m);
+        let mut row = Row { u: vec![(node, identity.clone())], ..Row::default() };
+        match kind {
+            EndKind::Velocity => row.end = Some((which, -identity)),
+            EndKind::Acceleration => {
+                // The side that is there is S(leg) A/6.
+                let segment = &self.segments[near];
+                let (sixth, leg) = (value / 6.0, &segment.legs[which]);
+                let slope = stretch_slope(space, leg, &sixth);
+                row.u = vec![(node, &slope * (-segment.h / 3.0))];
+                row.lengths.push((near, &slope * &polygon.u[node] / -3.0));
+                row.side(&identity, &segment.sides[which], [near, near + 1], near);
+                row.end = Some((which, &segment.functions[which].stretch / -6.0));
+            }
+            EndKind::NotAKnot => {
+                let knot = NotAKnot::of(self.segments[near].h, self.segments[far].h, n, self.both_not_a_knot);
+                row.not_a_knot(space, polygon, which, [near, far], &knot);
+            }
+        }
+        row
+    }
+
+    /// How velocities follow changes.
+    pub fn velocities(&self, change: &Change) -> Vec<Vector> {
+        let right: Vec<Vector> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let mut sum = Vector::zeros(self.m);
+                row.points.iter().for_each(|(k, a)| sum -= a * &change.points[*k]);
+                row.lengths.iter().for_each(|(k, a)| sum -= a * change.lengths[*k]);
+                row.end.iter().for_each(|(k, a)| sum -= a * &change.ends[*k]);
+                sum
+            })
+            .collect();
+        self.solve(right, false)
+    }
+
+    /// Adds to a gradient in the changes what a gradient in the velocities makes of it.
+    pub fn pull_back(&self, velocities: Vec<Vector>, gradient: &mut Change) {
+        let multipliers = self.solve(velocities, true);
+        for (row, x) in self.rows.iter().zip(&multipliers) {
+            row.points.iter().for_each(|(k, a)| gradient.points[*k] -= a.tr_mul(x));
+            row.lengths.iter().for_each(|(k, a)| gradient.lengths[*k] -= a.dot(x));
+            row.end.iter().for_each(|(k, a)| gradient.ends[*k] -= a.tr_mul(x));
+        }
+    }
+
+    /// J⁻¹ x, or J⁻ᵀ x.
+    fn solve(&self, x: Vec<Vector>, transposed: bool) -> Vec<Vector> {
+        let (nodes, m) = (self.rows.len(), self.m);
+        if nodes == 0 {
+            return x;
+        }
+        let mut blocks = Blocks::default();
+        blocks.clear(nodes, m);
+        for (i, row) in self.rows.iter().enumerate() {
+            for (j, a) in &row.u {
+                let (row, column) = if transposed { (*j, i) } else { (i, *j) };
+                let side = if row == column {
+                    1
+                } else if column + 1 == row || (self.closed && row == 0 && column + 1 == nodes) {
+                    0
+                } else {
+                    2
+                };
+                let block = &mut blocks.sides[side][row * m * m..][..m * m];
+                for r in 0..m {
+                    for c in 0..m {
+                        block[r * m + c] += lane(if transposed { a[(c, r)] } else { a[(r, c)] });
+                    }
+                }
+            }
+        }
+        let mut lanes: Vec<Lane> = x.iter().flat_map(splat).collect();
+        if self.closed {
+            blocks.solve_cyclic(nodes, m, &mut lanes);
+        } else {
+            blocks.solve(nodes, m, 1, &mut lanes);
+        }
+        lanes.chunks(m).map(|x| Vector::from_iterator(m, x.iter().map(|x| x.as_array()[0]))).collect()
+    }
+}
+
+impl Row {
+    /// Adds a matrix times a side of a segment between two nodes.
+    fn side(&mut self, factor: &Matrix, side: &Side, nodes: [usize; 2], segment: usize) {
+        for (e, node) in nodes.into_iter().enumerate() {
+            self.u.push((node, factor * &side.u[e]));
+            self.points.push((node, factor * &side.points[e]));
+        }
+        self.lengths.push((segment, factor * &side.length));
+    }
+
+    /// Adds minus the velocity that not-a-knot asks for: `S(x₀) c'(t₀)`, seen from the frame of the end.
+    ///
+    /// The chord d from p₀ to p₁ changes by `−ad coth ξ + S⁻¹η` in the frame of p₀ and by `−S⁻¹ξ + ad coth η` in that of
+    /// p₁, and the frames turn by `tanh(ad_d/2)(ξ + η)` against each other along it.
+    fn not_a_knot(
+        &mut self,
+        space: &Erased,
+        polygon: &Polygon,
+        which: usize,
+        [near, far]: [usize; 2],
+        knot: &NotAKnot,
+    ) {
+        let (d0, d1) = (&polygon.chords[near], &polygon.chords[far]);
+        let (first, second) = (Functions::of(space, d0), Functions::of(space, d1));
+        // The end, its neighbour, and the node behind that; all vectors change sign at the right end.
+        let [end, next, third] = if which == 0 { [near, near + 1, far + 1] } else { [near + 1, near, far] };
+        let sign = if which == 0 { 1.0 } else { -1.0 };
+        let c = &polygon.u[next] * knot.u[0] + d0 * knot.near[0] + d1 * knot.far[0];
+        let target = &first.stretch * &c;
+        // In the frame of the neighbour.
+        let slope = stretch_slope(space, d0, &c) + &first.stretch * knot.near[0];
+        let turn = curvature(space, d0, &target) * &first.tanh * sign;
+        let own = &slope * &first.shrink * -sign + &turn;
+        let mut neighbour = &slope * &first.coth * sign + &turn;
+        if knot.far[0] != 0.0 {
+            let far_slope = &first.stretch * knot.far[0];
+            neighbour -= &far_slope * &second.coth * sign;
+            self.points.push((third, &far_slope * &second.shrink * -sign));
+        }
+        self.points.push((end, -own));
+        self.points.push((next, -neighbour));
+        if knot.u[0] != 0.0 {
+            self.u.push((next, &first.stretch * -knot.u[0]));
+        }
+        for (k, segment) in [near, far].into_iter().enumerate() {
+            let change = &polygon.u[next] * knot.u[1 + k] + d0 * knot.near[1 + k] + d1 * knot.far[1 + k];
+            self.lengths.push((segment, &first.stretch * change * -1.0));
+        }
+    }
+}
+
+/// The weights of u₁, of the chord at the end and of the next one in c'(t₀) of not-a-knot, each with its
+/// derivatives in the lengths of the two segments.
+struct NotAKnot {
+    u: [f64; 3],
+    near: [f64; 3],
+    far: [f64; 3],
+}
+
+impl NotAKnot {
+    /// For n segments; with three points and not-a-knot at both ends the curve is one parabola.
+    fn of(h0: f64, h1: f64, n: usize, both: bool) -> Self {
+        let sum = h0 + h1;
+        if n == 1 {
+            // The geodesic.
+            NotAKnot { u: [0.0; 3], near: [1.0 / h0, -1.0 / (h0 * h0), 0.0], far: [0.0; 3] }
+        } else if n == 2 && both {
+            // 2d₀/h₀ − (d₀h₁/h₀ + d₁h₀/h₁)/(h₀ + h₁)
+            let (x, y) = (h1 / (h0 * sum), h0 / (h1 * sum));
+            NotAKnot {
+                u: [0.0; 3],
+                near: [
+                    2.0 / h0 - x,
+                    -2.0 / (h0 * h0) + x * (1.0 / h0 + 1.0 / sum),
+                    -x * (1.0 / h1 - 1.0 / sum),
+                ],
+                far: [-y, -y * (1.0 / h0 - 1.0 / sum), y * (1.0 / h1 + 1.0 / sum)],
+            }
+        } else {
+            let (q, inverse) = (h0 / h1, 1.0 / sum);
+            NotAKnot {
+                u: [-1.0 - q, -1.0 / h1, q / h1],
+                near: [2.0 / h0 + inverse, -2.0 / (h0 * h0) - inverse * inverse, -inverse * inverse],
+                far: [
+                    q * q * inverse,
+                    q * q * inverse * (2.0 / h0 - inverse),
+                    -q * q * inverse * (2.0 / h1 + inverse),
+                ],
+            }
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! The interpolation polygon, unrolled into a moving frame.
+//!
+//! The frame at p₀ is carried in parallel along the geodesics p₀p₁, p₁p₂, … Seen from the frames
+//! every node is the origin, the polygon is its chords dᵢ (coordinates of `log_{pᵢ}(pᵢ₊₁)`), velocities
+//! are coordinate vectors, and transport between neighbours is the identity.
+//!
+//! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
+//! long curve.
+
+use crate::scalar::{LANES, Lane, Scalar, dot, gather, max_or_nan};
+use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
+use crate::with_size;
+
+/// After this many steps the rounding errors of a frame are removed, which costs the cube of the
+/// dimension: one step costs its square.
+fn tidy_every(dim: usize) -> usize {
+    dim.max(8)
+}
+
+/// What one lane of a chain is made of: a run of nodes of a curve, counted around the curve when
+/// it is closed.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    /// All knots of the curve.
+    pub t: &'a [f64],
+    /// All points of the curve, one after another.
+    pub points: &'a [f64],
+    /// The first node.
+    pub first: usize,
+}
+
+impl<'a> Run<'a> {
+    /// Length of the segment behind the i-th node.
+    fn h(&self, i: usize) -> f64 {
+        let k = (self.first + i) % (self.t.len() - 1);
+        self.t[k + 1] - self.t[k]
+    }
+
+    /// The point of the i-th node.
+    fn point(&self, i: usize, len: usize) -> &'a [f64] {
+        let last = self.t.len() - 1;
+        let k = self.first + i;
+        let k = if k <= last { k } else { k % last };
+        &self.points[k * len..(k + 1) * len]
+    }
+}
+
+/// Gets a node and its velocity.
+pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Lane]);
+
+/// A frame on its way along the polygon.
+#[derive(Default)]
+struct Walker {
+    frame: Vec<Lane>,
+    p: Vec<Lane>,
+    q: Vec<Lane>,
+    node: usize,
+}
+
+impl Walker {
+    fn start<M: Space>(&mut self, space: &M, runs: &[Run; LANES]) {
+        let len = space.point_len();
+        self.frame.resize(space.frame_len(), Lane::ZERO);
+        self.p.resize(len, Lane::ZERO);
+        self.q.resize(len, Lane::ZERO);
+        self.node = 0;
+        gather(runs.map(|r| r.point(0, len)), &mut self.p);
+        space.lift(&self.p, &mut self.frame);
+    }
+
+    /// One node on; returns the deciding angle of the chord.
+    #[inline(always)]
+    fn advance<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize, chord: &mut [Lane]) -> Lane {
+        self.node += 1;
+        gather(runs.map(|r| r.point(self.node, len)), &mut self.q[..len]);
+        let angle = space.step(&mut self.frame, &self.p[..len], &self.q[..len], chord);
+        std::mem::swap(&mut self.p, &mut self.q);
+        if self.node.is_multiple_of(tidy_every(chord.len())) {
+            space.tidy(&mut self.frame, &self.p);
+        }
+        angle
+    }
+}
+
+/// Eight unrolled polygons and everything the solvers keep of them. Reused from fit to fit.
+#[derive(Default)]
+pub struct Chain {
+    /// Number of segments.
+    pub n: usize,
+    /// Dimension of the space.
+    pub m: usize,
+    /// Segment lengths hᵢ.
+    pub h: Vec<Lane>,
+    /// Chords dᵢ, m numbers each.
+    pub chord: Vec<Lane>,
+    /// What [`Space::prepare`] keeps of each chord.
+    pub prepared: Vec<Lane>,
+    /// The unknown velocities uᵢ.
+    pub u: Vec<Lane>,
+    /// The C² defect at each node.
+    pub r: Vec<Lane>,
+    /// Prescribed end vectors, in the frames of the ends.
+    pub end_values: [Vec<Lane>; 2],
+    /// What chords and velocities are multiplied by, see [`Space::SCALES`].
+    scale: Lane,
+    /// The longest chord of each lane.
+    pub max_step: Lane,
+    /// The largest |dᵢ|/hᵢ of each lane.
+    pub pace: Lane,
+    /// By how much rounding errors may grow in each lane, see [`Space::condition`].
+    pub condition: Lane,
+    /// Where neighbours lie at or past the cut locus: the first segment and its deciding angle.
+    pub cut: [Option<(usize, f64)>; LANES],
+    walker: Walker,
+    /// Frame and point at the first node.
+    start: (Vec<Lane>, Vec<Lane>),
+    ambient: Vec<Lane>,
+    /// A vector at either side of a seam, and zero.
+    seam: [Vec<Lane>; 3],
+}
+
+impl Chain {
+    /// Unrolls `n` segments of eight polygons. `ends` are prescribed ambient vectors at the ends.
+    pub fn unroll(
+        &mut self,
+        space: &Erased,
+        runs: &[Run; LANES],
+        n: usize,
+        ends: [Option<[&[f64]; LANES]>; 2],
+    ) {
+        let (m, len, keep) = (space.dim(), space.point_len(), space.chord_len());
+        (self.n, self.m) = (n, m);
+        for (vector, size) in [
+            (&mut self.h, n),
+            (&mut self.chord, n * m),
+            (&mut self.prepared, n * keep),
+            (&mut self.u, (n + 1) * m),
+            (&mut self.r, (n + 1) * m),
+            (&mut self.ambient, len),
+        ] {
+            vector.resize(size, Lane::ZERO);
+        }
+        self.u.fill(Lane::ZERO);
+        (self.max_step, self.condition, self.cut) = (Lane::ZERO, Lane::ONE, [None; LANES]);
+        self.pace = Lane::ZERO;
+
+        self.scale = if space.scales() { scale_of(space, runs, n) } else { Lane::ONE };
+        self.walker.start(space, runs);
+        self.start.0.clone_from(&self.walker.frame);
+        self.start.1.clone_from(&self.walker.p);
+        self.read_end(space, 0, ends[0]);
+        space.0.walk(self, runs);
+        self.max_step = self.max_step.sqrt() / self.scale;
+        self.pace = self.pace.sqrt();
+        self.read_end(space, 1, ends[1]);
+    }
+
+    /// Goes along the polygon and keeps its chords.
+    pub fn walk<M: Space>(&mut self, space: &M, runs: &[Run; LANES]) {
+        with_size!(M::VECTORS, space.point_len(), len => self.walk_sized(space, runs, len));
+    }
+
+    /// The same, compiled once.
+    pub fn walk_by_table(&mut self, space: &Erased, runs: &[Run; LANES]) {
+        self.walk(space, runs);
+    }
+
+    #[inline(always)]
+    fn walk_sized<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize) {
+        let (m, keep, limit) = (self.m, space.chord_len(), below(space.cut_angle()));
+        let scales = space.scales();
+        for i in 0..self.n {
+            self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i)));
+            let d = &mut self.chord[i * m..(i + 1) * m];
+            let angle = self.walker.advance(space, runs, len, d);
+            if scales {
+                d.iter_mut().for_each(|x| *x *= self.scale);
+            }
+            space.prepare(d, &mut self.prepared[i * keep..(i + 1) * keep]);
+            let length2 = dot(d, d);
+            self.max_step = max_or_nan(self.max_step, length2);
+            self.pace = self.pace.max(length2 / (self.h[i] * self.h[i]));
+            self.condition = max_or_nan(self.condition, space.condition(d));
+            let inside = angle.simd_lt(limit);
+            if !inside.all() {
+                for l in 0..LANES {
+                    if inside.to_bitmask() >> l & 1 == 0 {
+                        self.cut[l].get_or_insert((i, angle.to_array()[l]));
+                    }
+                }
+            }
+        }
+    }
+
+    /// The prescribed vector at an end, in the frame there; the walker must stand at that end.
+    fn read_end(&mut self, space: &Erased, end: usize, value: Option<[&[f64]; LANES]>) {
+        self.end_values[end].resize(self.m, Lane::ZERO);
+        match value {
+            Some(rows) => {
+                gather(rows, &mut self.ambient);
+                let Walker { frame, p, .. } = &self.walker;
+                space.coordinates(frame, p, &self.ambient, &mut self.end_values[end]);
+                self.end_values[end].iter_mut().for_each(|x| *x *= self.scale);
+            }
+            None => self.end_values[end].fill(Lane::ZERO),
+        }
+    }
+
+    /// Carries coordinates across the seam of a closed curve: from the frame at its first node to
+    /// that at its last, or back.
+    pub fn across_seam<S: Scalar>(&mut self, space: &Erased, to_last: bool, x: &mut [S]) {
+        let (first, last) = ((&self.start.0, &self.start.1), (&self.walker.frame, &self.walker.p));
+        let (from, to) = if to_last { (first, last) } else { (last, first) };
+        let [here, there, none] = &mut self.seam;
+        for vector in [&mut *here, &mut *there, &mut *none] {
+            vector.resize(space.point_len(), Lane::ZERO);
+        }
+        let mut parts = [(); 3].map(|_| vec![Lane::ZERO; self.m]);
+        for (k, part) in parts.iter_mut().enumerate().take(S::ORDER + 1) {
+            for (p, x) in part.iter_mut().zip(&*x) {
+                *p = x.parts()[k];
+            }
+            space.tangent(from.0, from.1, part, here);
+            // One point, but maybe another array.
+            space.carry(from.1, to.1, none, here, there);
+            space.coordinates(to.0, to.1, there, part);
+        }
+        for (i, x) in x.iter_mut().enumerate() {
+            *x = S::from_parts([parts[0][i], parts[1][i], parts[2][i]]);
+        }
+    }
+
+    /// Hands out the velocities as ambient tangent vectors, node by node.
+    pub fn roll_up(&mut self, space: &Erased, runs: &[Run; LANES], mut visit: impl FnMut(usize, &[Lane])) {
+        space.0.walk_again(self, runs, &mut visit);
+    }
+
+    /// The way along the polygon for [`roll_up`](Self::roll_up).
+    pub fn walk_again<M: Space>(&mut self, space: &M, runs: &[Run; LANES], visit: Visit) {
+        with_size!(M::VECTORS, space.point_len(), len => self.walk_again_sized(space, runs, len, visit));
+    }
+
+    /// The same, compiled once.
+    pub fn walk_again_by_table(&mut self, space: &Erased, runs: &[Run; LANES], visit: Visit) {
+        self.walk_again(space, runs, visit);
+    }
+
+    #[inline(always)]
+    fn walk_again_sized<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize, visit: Visit) {
+        let (m, scales) = (self.m, space.scales());
+        self.walker.start(space, runs);
+        for i in 0..=self.n {
+            let Walker { frame, p, .. } = &self.walker;
+            let ambient = &mut self.ambient[..len];
+            space.tangent(frame, &p[..len], &self.u[i * m..(i + 1) * m], ambient);
+            if scales {
+                ambient.iter_mut().for_each(|x| *x /= self.scale);
+            }
+            visit(i, ambient);
+            if i < self.n {
+                // The chords are known; the residual is no longer needed and takes them.
+                self.walker.advance(space, runs, len, &mut self.r[..m]);
+            }
+        }
+    }
+}
+
+/// The power of two that brings the longest chord of each lane to a size near one; 1 for chords that
+/// vanish.
+fn scale_of(space: &Erased, runs: &[Run; LANES], n: usize) -> Lane {
+    let len = space.point_len();
+    Lane::new(runs.map(|run| {
+        let difference = |i: usize| {
+            let (p, q) = (run.point(i, len), run.point(i + 1, len));
+            p.iter().zip(q).fold(0.0_f64, |m, (p, q)| m.max((q - p).abs()))
+        };
+        let longest = (0..n).map(difference).fold(0.0, f64::max);
+        let exponent = longest.log2().round().clamp(-1000.0, 1000.0);
+        if longest > 0.0 && longest.is_finite() { (-exponent).exp2() } else { 1.0 }
+    }))
+}

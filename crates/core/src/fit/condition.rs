@@ -1,0 +1,341 @@
+//! The C² condition (13) on any knots, and the end conditions.
+//!
+//! With `v⁺ = hᵢuᵢ/3`, `v⁻ = −hᵢ₋₁uᵢ/3`, `w⁺ = log_{pᵢ}(E(−v⁺)·q⁻ᵢ₊₁)`, `w⁻ = log_{pᵢ}(E(−v⁻)·q⁺ᵢ₋₁)`, the curve is C² at
+//! knot i iff
+//!
+//! ```text
+//! S(v⁻)(w⁺ − v⁺)/hᵢ² = S(v⁺)(w⁻ − v⁻)/hᵢ₋₁²,    S(v) = sinh(ad_v)/ad_v,
+//! ```
+//!
+//! because the covariant acceleration beside the knot is `(6/h²) S(v)⁻¹(w − v)` (Popiel & Noakes 2007
+//! with Lemmas A.1–A.3), and S of multiples of one vector commute. On equal spacing S cancels and
+//! this is (13).
+
+use super::chain::Chain;
+use crate::scalar::{LANES, Lane, Scalar, lane, max_or_nan};
+use crate::space::{Erased, Origin, Space};
+use crate::with_size;
+
+/// A condition at one end of an open curve, as it is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EndKind {
+    /// The velocity is prescribed (the paper's clamped ends, (19)).
+    Velocity,
+    /// The covariant acceleration is prescribed; natural ends (20) prescribe zero.
+    Acceleration,
+    /// Not-a-knot in normal coordinates at the neighbouring knot.
+    NotAKnot,
+}
+
+/// The ends of eight chains: closed, or the kind at either end of each lane.
+#[derive(Clone, Copy)]
+pub enum ChainEnds {
+    /// The last node is the first one again.
+    Periodic,
+    /// First and last node, lane by lane.
+    Open([[EndKind; LANES]; 2]),
+}
+
+/// The lanes whose end is of a kind.
+pub fn of_kind(kinds: &[EndKind; LANES], kind: EndKind) -> Lane {
+    crate::scalar::mask_from(|l| kinds[l] == kind)
+}
+
+/// How far a lane is from C²: the largest defect, and the largest speed to measure it by.
+#[derive(Clone, Copy)]
+pub struct Defect {
+    /// Largest defect, divided by 1/hᵢ₋₁ + 1/hᵢ: a velocity.
+    pub defect: Lane,
+    /// Largest |uᵢ|.
+    pub speed: Lane,
+    /// Largest |h uᵢ/3|, the longest outer leg.
+    pub leg: Lane,
+}
+
+/// Vectors of one node, kept between residuals.
+pub struct NodeVectors<S> {
+    a: Vec<S>,
+    b: Vec<S>,
+    left: Vec<S>,
+    right: Vec<S>,
+    next_left: Vec<S>,
+}
+
+impl<S> Default for NodeVectors<S> {
+    fn default() -> Self {
+        NodeVectors { a: vec![], b: vec![], left: vec![], right: vec![], next_left: vec![] }
+    }
+}
+
+impl<S: Scalar> NodeVectors<S> {
+    fn resize(&mut self, m: usize) {
+        for vector in [&mut self.a, &mut self.b, &mut self.left, &mut self.right, &mut self.next_left] {
+            vector.resize(m, S::constant(Lane::ZERO));
+        }
+    }
+}
+
+const THIRD: Lane = lane(1.0 / 3.0);
+
+/// Fills `chain.r` with right side minus left side of the C² condition at every node.
+pub fn residual(space: &Erased, chain: &mut Chain, ends: &ChainEnds, work: &mut NodeVectors<Lane>) -> Defect {
+    let (u, mut r) = (std::mem::take(&mut chain.u), std::mem::take(&mut chain.r));
+    let at_rest = u.iter().fold(Lane::ZERO.simd_eq(Lane::ZERO), |rest, u| rest & u.simd_eq(Lane::ZERO));
+    let defect = space.0.sweep(chain, ends, &u, &mut r, work, at_rest);
+    (chain.u, chain.r) = (u, r);
+    defect
+}
+
+/// The same for velocities u that may carry derivatives. On lanes whose velocities are zero the logarithms are
+/// the chords, to the last bit.
+pub fn sweep<S: Scalar, M: Space>(
+    space: &M,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    u: &[S],
+    r: &mut [S],
+    work: &mut NodeVectors<S>,
+    at_rest: Lane,
+) -> Defect {
+    work.resize(chain.m);
+    with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, at_rest, m))
+}
+
+/// The same of plain numbers, compiled once.
+pub fn sweep_by_table(
+    space: &Erased,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    u: &[Lane],
+    r: &mut [Lane],
+    work: &mut NodeVectors<Lane>,
+    at_rest: Lane,
+) -> Defect {
+    sweep(space, chain, ends, u, r, work, at_rest)
+}
+
+#[inline(always)]
+fn inside<S: Scalar, M: Space>(
+    space: &M,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
+    at_rest: Lane,
+    m: usize,
+) -> Defect {
+    let (n, keep) = (chain.n, space.chord_len());
+    let NodeVectors { a, b, left, right, next_left } = work;
+    let (a, b) = (&mut a[..m], &mut b[..m]);
+    let (mut left, right, mut next_left) = (&mut left[..m], &mut right[..m], &mut next_left[..m]);
+    let mut result = Defect { defect: Lane::ZERO, speed: Lane::ZERO, leg: Lane::ZERO };
+    let mut first_right = Lane::ZERO;
+    for i in 0..=n {
+        let (h_left, h_right) = (chain.h[i.max(1) - 1], chain.h[i.min(n - 1)]);
+        let u = &all_u[i * m..][..if i < n { 2 * m } else { m }];
+        if i < n {
+            let third = h_right * THIRD;
+            for c in 0..m {
+                a[c] = u[c] * third;
+                b[c] = u[m + c] * third;
+            }
+            let (chord, prepared) = (&chain.chord[i * m..][..m], &chain.prepared[i * keep..][..keep]);
+            if !at_rest.all() {
+                space.legs(chord, prepared, a, b, right, next_left);
+            }
+            if at_rest.any() {
+                for c in 0..m {
+                    right[c] = S::select(at_rest, S::constant(chord[c]), right[c]);
+                    next_left[c] = S::select(at_rest, S::constant(-chord[c]), next_left[c]);
+                }
+            }
+            let scale = Lane::ONE / (h_right * h_right);
+            for c in 0..m {
+                right[c] = (right[c] - a[c]) * scale;
+                next_left[c] = (next_left[c] + b[c]) * scale;
+            }
+        }
+        let speed2 = length2(&u[..m]);
+        result.speed = max_or_nan(result.speed, speed2);
+        let h = h_left.max(h_right) * THIRD;
+        result.leg = max_or_nan(result.leg, h * h * speed2);
+
+        let r = &mut all_r[i * m..][..m];
+        if i > 0 && i < n {
+            join(space, h_left, h_right, &u[..m], left, right, r);
+            let weight = h_left * h_right / (h_left + h_right);
+            result.defect = max_or_nan(result.defect, length2(r) * (weight * weight));
+        } else {
+            // An end: keep the side that is there, the end condition comes below.
+            r.copy_from_slice(if i == 0 { &*right } else { &*left });
+            if i == 0 {
+                first_right = h_right;
+            }
+        }
+        std::mem::swap(&mut left, &mut next_left);
+    }
+    let at_ends = match ends {
+        ChainEnds::Periodic => close(&Erased(space), chain, all_u, all_r, work, first_right),
+        ChainEnds::Open(kinds) => {
+            let first = end(&Erased(space), chain, all_u, all_r, work, 0, &kinds[0]);
+            max_or_nan(first, end(&Erased(space), chain, all_u, all_r, work, 1, &kinds[1]))
+        }
+    };
+    result.defect = max_or_nan(result.defect, at_ends).sqrt();
+    (result.speed, result.leg) = (result.speed.sqrt(), result.leg.sqrt());
+    result
+}
+
+/// Squared length of the value of a coordinate vector.
+#[inline(always)]
+fn length2<S: Scalar>(x: &[S]) -> Lane {
+    x.iter().fold(Lane::ZERO, |sum, x| x.value().mul_add(x.value(), sum))
+}
+
+/// The defect at a knot, `S(v⁻) right − S(v⁺) left`; `left` and `right` are overwritten.
+#[inline(always)]
+fn join<S: Scalar, M: Space>(
+    space: &M,
+    h_left: Lane,
+    h_right: Lane,
+    u: &[S],
+    left: &mut [S],
+    right: &mut [S],
+    r: &mut [S],
+) {
+    let m = u.len();
+    // Spacing that is equal up to the rounding of the knots needs no S: it would change the
+    // defect by less than rounding.
+    let equal = (h_left - h_right).abs().simd_le(h_right * lane(4.0 * f64::EPSILON));
+    for c in 0..m {
+        r[c] = right[c] - left[c];
+    }
+    if equal.all() {
+        return;
+    }
+    stretch_by(space, h_left * THIRD, u, right);
+    stretch_by(space, h_right * THIRD, u, left);
+    for c in 0..m {
+        r[c] = S::select(equal, r[c], right[c] - left[c]);
+    }
+}
+
+/// `S(factor · u) x`.
+#[inline(always)]
+fn stretch_by<S: Scalar, M: Space>(space: &M, factor: Lane, u: &[S], x: &mut [S]) {
+    const SMALL: usize = 16;
+    if u.len() <= SMALL {
+        let mut v = [S::constant(Lane::ZERO); SMALL];
+        for c in 0..u.len() {
+            v[c] = u[c] * factor;
+        }
+        space.stretch(&v[..u.len()], x);
+    } else {
+        space.stretch(&u.iter().map(|&u| u * factor).collect::<Vec<_>>(), x);
+    }
+}
+
+/// The defect at the seam of a closed curve: the left side comes from the last node.
+fn close<S: Scalar>(
+    space: &Erased,
+    chain: &mut Chain,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
+    h_right: Lane,
+) -> Lane {
+    let (n, m) = (chain.n, chain.m);
+    let NodeVectors { left, right, b: r, .. } = work;
+    left.copy_from_slice(&all_r[n * m..]);
+    right.copy_from_slice(&all_r[..m]);
+    chain.across_seam(space, false, left);
+    let h_left = chain.h[n - 1];
+    join(space, h_left, h_right, &all_u[..m], left, right, r);
+    all_r[..m].copy_from_slice(r);
+    all_r[n * m..].fill(S::constant(Lane::ZERO));
+    let weight = h_left * h_right / (h_left + h_right);
+    length2(r) * (weight * weight)
+}
+
+/// The defect at an open end; `all_r` holds the one side that is there.
+fn end<S: Scalar>(
+    space: &Erased,
+    chain: &Chain,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
+    which: usize,
+    kinds: &[EndKind; LANES],
+) -> Lane {
+    let (n, m) = (chain.n, chain.m);
+    let NodeVectors { a, b, .. } = work;
+    // The end node, its neighbour, the segment between them, and the next segment.
+    let (node, next, i0, i1) =
+        if which == 0 { (0, 1, 0, 1.min(n - 1)) } else { (n, n - 1, n - 1, n.max(2) - 2) };
+    let (h0, h1) = (chain.h[i0], chain.h[i1]);
+    let sign = if which == 0 { Lane::ONE } else { lane(-1.0) };
+    let u = &all_u[node * m..(node + 1) * m];
+    let value = &chain.end_values[which];
+    let r = &mut all_r[node * m..(node + 1) * m];
+
+    // Acceleration A: w − v = (h²/6) S(v) A.
+    for c in 0..m {
+        a[c] = S::constant(value[c]);
+    }
+    if value.iter().any(|x| x.simd_ne(Lane::ZERO).any()) {
+        stretch_by(space, h0 * THIRD, u, a);
+    }
+    for c in 0..m {
+        a[c] = (r[c] - a[c] * lane(1.0 / 6.0)) * sign;
+    }
+    let mut size = length2(a) * (h0 * h0);
+    let velocity = of_kind(kinds, EndKind::Velocity);
+    if velocity.any() {
+        for c in 0..m {
+            b[c] = -u[c] + value[c];
+        }
+        size = velocity.select(length2(b), size);
+        for c in 0..m {
+            a[c] = S::select(velocity, b[c] * THIRD, a[c]);
+        }
+    }
+    let knot = of_kind(kinds, EndKind::NotAKnot);
+    if knot.any() {
+        let (d0, d1) = (&chain.chord[i0 * m..(i0 + 1) * m], &chain.chord[i1 * m..(i1 + 1) * m]);
+        not_a_knot(space, h0, h1, d0, d1, &all_u[next * m..(next + 1) * m], b);
+        for c in 0..m {
+            b[c] = b[c] - u[c];
+        }
+        size = knot.select(length2(b), size);
+        for c in 0..m {
+            a[c] = S::select(knot, b[c] * THIRD, a[c]);
+        }
+    }
+    r.copy_from_slice(a);
+    size
+}
+
+/// The end velocity that not-a-knot asks for: with c the cubic in `T_{p₁}M` through `x₀ = log_{p₁}(p₀)`, 0 and
+/// `x₂ = log_{p₁}(p₂)` that has `c'(t₁) = u₁`, it is `D exp_{p₁}(x₀)[c'(t₀)]`, in the frame at p₀ `S(x₀) c'(t₀)`.
+///
+/// The formula is the same at the right end, where all vectors change sign.
+pub fn not_a_knot<S: Scalar>(
+    space: &Erased,
+    h0: Lane,
+    h1: Lane,
+    d0: &[Lane],
+    d1: &[Lane],
+    u1: &[S],
+    out: &mut [S],
+) {
+    // Divided differences of c at the two nodes beside t₁.
+    let (i0, i1, i01) = (Lane::ONE / h0, Lane::ONE / h1, Lane::ONE / (h0 + h1));
+    for c in 0..u1.len() {
+        let (alpha, beta) = (u1[c] - d0[c] * i0, -u1[c] + d1[c] * i1);
+        let third = (beta * i1 - alpha * i0) * i01;
+        out[c] = u1[c] - alpha * lane(2.0) + third * (h0 * h0);
+    }
+    let d0: Vec<S> = d0.iter().map(|&d| S::constant(d)).collect();
+    space.stretch(&d0, out);
+}

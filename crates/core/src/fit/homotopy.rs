@@ -1,0 +1,120 @@
+//! Following the spline from flat space: for points far apart.
+//!
+//! With the polygon unrolled into its frames, all its steps are scaled by λ. At λ = 0 the spline is flat, at
+//! λ = 1 it is the one asked for; Newton's method follows it in between. Points that are far apart have
+//! several splines; this one is continued from points that are near.
+
+use super::auto::merge;
+use super::chain::Chain;
+use super::condition::ChainEnds;
+use super::solve::{Outcome, Workspace, solve};
+use super::{Method, Options};
+use crate::monitor::Monitor;
+use crate::scalar::{LANES, Lane, lane, mask_bits, mask_from};
+use crate::space::{Erased, Origin};
+
+/// The first step of λ, and the one at which a lane gives up.
+const FIRST: f64 = 0.25;
+const LEAST: f64 = 1.0 / 512.0;
+/// Newton steps for one λ; more mean that the step of λ was too long.
+const CORRECTIONS: usize = 12;
+/// How far a curve on the way is solved.
+const LOOSE: f64 = 1e-8;
+
+/// Solves the lanes that are not `idle` and adds to their outcome.
+pub fn follow(
+    space: &Erased,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    options: &Options,
+    idle: Lane,
+    work: &mut Workspace,
+    monitor: &Monitor,
+    outcome: &mut Outcome,
+) {
+    let (chords, values, best) = (chain.chord.clone(), chain.end_values.clone(), chain.u.clone());
+    // Where each lane is, how far it goes next, and the last two curves with their λ.
+    let (mut at, mut ahead) = (Lane::ZERO, lane(FIRST));
+    let mut curves = [vec![Lane::ZERO; best.len()], vec![Lane::ZERO; best.len()]];
+    let mut places = [Lane::ZERO; 2];
+    let mut lost = Lane::ZERO;
+    let mut used = 0;
+    loop {
+        let done = idle | lost | at.simd_ge(Lane::ONE);
+        let budget = options.max_iter.map_or(usize::MAX, |n| n.saturating_sub(used));
+        if done.all() || budget == 0 || monitor.poll() {
+            break;
+        }
+        let goal = (at + ahead).min(Lane::ONE);
+        scale(space, chain, &chords, &values, goal);
+        predict(chain, &curves, places, goal);
+        // On the way curves need not be exact.
+        let tol = options.tol.max(LOOSE);
+        let limits = Options { method: Method::Newton, tol, max_iter: Some(CORRECTIONS.min(budget)) };
+        let found = solve(space, chain, ends, &limits, done, work, monitor);
+        used += found.iterations.iter().max().copied().unwrap_or(0);
+        let reached = mask_from(|l| found.converged[l]) & !done;
+        let failed = !reached & !done;
+        for i in 0..chain.u.len() {
+            curves[0][i] = reached.select(curves[1][i], curves[0][i]);
+            curves[1][i] = reached.select(chain.u[i], curves[1][i]);
+        }
+        places = [reached.select(places[1], places[0]), reached.select(goal, places[1])];
+        at = reached.select(goal, at);
+        ahead = reached.select(ahead * lane(1.5), failed.select(ahead * lane(0.4), ahead));
+        lost |= ahead.simd_lt(lane(LEAST)) & !done;
+        for l in 0..LANES {
+            outcome.iterations[l] += found.iterations[l];
+        }
+    }
+    // The end of the way to the tolerance asked for, from what was reached.
+    scale(space, chain, &chords, &values, Lane::ONE);
+    chain.u.copy_from_slice(&best);
+    let arrived = at.simd_ge(Lane::ONE) & !idle;
+    for (u, c) in chain.u.iter_mut().zip(&curves[1]) {
+        *u = arrived.select(*c, *u);
+    }
+    let budget = options.max_iter.map_or(2 * CORRECTIONS, |n| n.saturating_sub(used).min(2 * CORRECTIONS));
+    if arrived.none() || budget == 0 {
+        return;
+    }
+    let options = Options { method: Method::Newton, tol: options.tol, max_iter: Some(budget) };
+    let last = solve(space, chain, ends, &options, !arrived, work, monitor);
+    for l in 0..LANES {
+        outcome.iterations[l] += last.iterations[l];
+    }
+    merge(chain, &best, outcome, &last, mask_bits(arrived), super::Solver::Homotopy);
+}
+
+/// Sets the polygon and the given end vectors to λ times what they were.
+fn scale(space: &Erased, chain: &mut Chain, chords: &[Lane], values: &[Vec<Lane>; 2], at: Lane) {
+    let (m, keep) = (chain.m, space.chord_len());
+    for (d, c) in chain.chord.iter_mut().zip(chords) {
+        *d = *c * at;
+    }
+    for i in 0..chain.n {
+        space.prepare(&chain.chord[i * m..(i + 1) * m], &mut chain.prepared[i * keep..(i + 1) * keep]);
+    }
+    for (value, all) in chain.end_values.iter_mut().zip(values) {
+        for (v, a) in value.iter_mut().zip(all) {
+            *v = *a * at;
+        }
+    }
+}
+
+/// The secant through the last two curves, u/λ being nearly constant.
+fn predict(chain: &mut Chain, curves: &[Vec<Lane>; 2], places: [Lane; 2], goal: Lane) {
+    let slope = |i: usize| {
+        let started = places[i].simd_gt(Lane::ZERO);
+        started.select(Lane::ONE / places[i], Lane::ZERO)
+    };
+    let (before, now) = (slope(0), slope(1));
+    // u/λ is extrapolated in λ; with one curve it is kept.
+    let twice = places[0].simd_gt(Lane::ZERO);
+    let gap = twice.select(places[1] - places[0], Lane::ONE);
+    let weight = twice.select((goal - places[1]) / gap, Lane::ZERO);
+    for i in 0..chain.u.len() {
+        let (b, n) = (curves[0][i] * before, curves[1][i] * now);
+        chain.u[i] = goal * (n + weight * (n - b));
+    }
+}

@@ -1,0 +1,168 @@
+//! From points to velocities: the spline through given points.
+
+mod auto;
+mod blocks;
+mod certificate;
+mod chain;
+mod condition;
+mod fixed_point;
+mod homotopy;
+mod newton;
+mod pieces;
+mod quasi_newton;
+mod solve;
+mod tridiagonal;
+
+pub use blocks::Blocks;
+pub use chain::{Chain, Run, Visit};
+pub use condition::{ChainEnds, Defect, EndKind, NodeVectors, sweep, sweep_by_table};
+pub use pieces::fit;
+
+/// Points to interpolate: curves one after another.
+pub struct Problem<'a> {
+    /// Knots, increasing: of every curve, or of one for all (see `shared`).
+    pub t: &'a [f64],
+    /// Whether all curves have the same knots.
+    pub shared: bool,
+    /// Points, on the space.
+    pub points: &'a [f64],
+    /// Nodes before each curve, and in the end the number of all.
+    pub offsets: &'a [usize],
+    /// What happens at the ends.
+    pub ends: Ends<'a>,
+}
+
+/// End conditions.
+#[derive(Clone, Copy)]
+pub enum Ends<'a> {
+    /// Last and first point are the same, and so are velocity and acceleration there.
+    Periodic,
+    /// A condition at either end.
+    Open([End<'a>; 2]),
+}
+
+/// A condition at one end; vectors are ambient, one a curve.
+#[derive(Clone, Copy)]
+pub enum End<'a> {
+    /// Zero covariant acceleration, (20).
+    Natural,
+    /// Given velocity, (19).
+    Velocity(&'a [f64]),
+    /// Given covariant acceleration.
+    Acceleration(&'a [f64]),
+    /// The first two segments are one cubic in normal coordinates.
+    NotAKnot,
+}
+
+/// How to solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// The best available.
+    Auto,
+    /// Algorithm 1 of the paper.
+    FixedPoint,
+    /// Transported tridiagonal solves with Anderson mixing.
+    QuasiNewton,
+    /// Newton's method with the block-tridiagonal Jacobian.
+    Newton,
+}
+
+/// The solver that a curve ended with, in the order in which they are tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Solver {
+    /// Algorithm 1 of the paper.
+    FixedPoint,
+    /// Transported tridiagonal solves.
+    QuasiNewton,
+    /// Newton's method.
+    Newton,
+    /// Newton's method along a homotopy from flat space.
+    Homotopy,
+}
+
+/// Solver options.
+#[derive(Clone, Copy)]
+pub struct Options {
+    /// The method.
+    pub method: Method,
+    /// Largest residual that counts as converged.
+    pub tol: f64,
+    /// Largest number of residual evaluations; `None` for the method's own.
+    pub max_iter: Option<usize>,
+}
+
+impl Options {
+    /// The iteration limit in force.
+    pub fn max_iter(&self) -> usize {
+        self.max_iter.unwrap_or(match self.method {
+            Method::FixedPoint => 2000,
+            Method::Auto | Method::QuasiNewton => 300,
+            Method::Newton => 100,
+        })
+    }
+}
+
+/// Why a curve could not be made, or whether it is good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Status {
+    /// The residual is below the tolerance or at the rounding floor.
+    Converged,
+    /// It is not.
+    Unconverged,
+    /// Points `index` and `index + 1` lie at or past each other's cut locus.
+    CutLocus {
+        /// Index of the first of the two points.
+        index: usize,
+        /// Deciding angle between them.
+        angle: f64,
+    },
+    /// A control leg at a point reaches the cut locus, or is too long for doubles.
+    LongLeg {
+        /// Index of the point.
+        index: usize,
+        /// Deciding angle of the leg.
+        angle: f64,
+    },
+    /// The work was stopped before this curve was done.
+    Stopped,
+}
+
+impl Status {
+    /// Whether there is no curve at all.
+    pub fn is_fault(self) -> bool {
+        matches!(self, Status::CutLocus { .. } | Status::LongLeg { .. })
+    }
+}
+
+/// What is known about a fitted curve.
+#[derive(Clone, Copy, Debug)]
+pub struct Report {
+    /// How it ended.
+    pub status: Status,
+    /// Residual evaluations.
+    pub iterations: usize,
+    /// C² defect divided by (1/hᵢ₋₁ + 1/hᵢ), relative to the largest speed.
+    pub residual: f64,
+    /// D of (21): the longest step between neighbours.
+    pub max_step: f64,
+    /// Mean contraction per iteration.
+    pub rate: f64,
+    /// The solver that it ended with.
+    pub solver: Solver,
+    /// The smallest V of (38), NaN where Theorem 3.1 says nothing.
+    pub invariant_radius: f64,
+}
+
+impl Default for Report {
+    fn default() -> Self {
+        Report {
+            status: Status::Stopped,
+            iterations: 0,
+            residual: f64::NAN,
+            max_step: 0.0,
+            rate: 0.0,
+            solver: Solver::FixedPoint,
+            invariant_radius: f64::NAN,
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Newton's method: the Jacobian of the C² condition by dual numbers, block by block.
+//!
+//! The defect at a node depends on the velocities there and at its two neighbours, so that the Jacobian
+//! is block tridiagonal, cyclic for closed curves. One sweep with dual numbers differentiates by one
+//! coordinate at every third node at once.
+
+use super::blocks::Blocks;
+use super::chain::Chain;
+use super::condition::{ChainEnds, NodeVectors, sweep};
+use crate::scalar::{Dual, Lane, Scalar};
+use crate::space::Erased;
+
+/// The Jacobian and memory to solve with it.
+#[derive(Default)]
+pub struct Newton {
+    blocks: Blocks,
+    vectors: NodeVectors<Dual>,
+    u: Vec<Dual>,
+    r: Vec<Dual>,
+}
+
+/// `step ← −J⁻¹ r` for the defect in `chain.r`.
+pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [Lane]) {
+    newton.differentiate(space, chain, ends);
+    step.copy_from_slice(&chain.r);
+    let (n, m) = (chain.n, chain.m);
+    match ends {
+        ChainEnds::Open(_) => newton.blocks.solve(n + 1, m, 1, step),
+        ChainEnds::Periodic if n > 1 => {
+            newton.blocks.solve_cyclic(n, m, step);
+            let (first, last) = step.split_at_mut(n * m);
+            last.copy_from_slice(&first[..m]);
+            chain.across_seam(space, true, last);
+        }
+        // One segment from a point to itself: the curve stands still.
+        ChainEnds::Periodic => step.fill(Lane::ZERO),
+    }
+    step.iter_mut().for_each(|x| *x = -*x);
+}
+
+impl Newton {
+    /// Fills the blocks with the derivatives of the defect.
+    fn differentiate(&mut self, space: &Erased, chain: &mut Chain, ends: &ChainEnds) {
+        let (n, m) = (chain.n, chain.m);
+        let closed = matches!(ends, ChainEnds::Periodic);
+        let nodes = if closed { n } else { n + 1 };
+        self.blocks.clear(nodes, m);
+        let zero = Dual::constant(Lane::ZERO);
+        self.r.resize(chain.r.len(), zero);
+        // No node has two neighbours (itself included) of one colour; those before the seam are special.
+        let color = |i: usize| if closed && i + 2 >= n { 3 + (n - 1 - i) } else { i % 3 };
+        for c in 0..if closed { 5 } else { 3 } {
+            if !(0..nodes).any(|i| color(i) == c) {
+                continue;
+            }
+            for k in 0..m {
+                self.u.clear();
+                self.u.extend(chain.u.iter().map(|&u| Dual::constant(u)));
+                for i in (0..nodes).filter(|&i| color(i) == c) {
+                    self.u[i * m + k].d = Lane::ONE;
+                }
+                if closed {
+                    let (first, last) = self.u.split_at_mut(n * m);
+                    let mut seed: Vec<Lane> = first[..m].iter().map(|u| u.d).collect();
+                    chain.across_seam(space, true, &mut seed);
+                    last.iter_mut().zip(seed).for_each(|(u, d)| u.d = d);
+                }
+                sweep(space, chain, ends, &self.u, &mut self.r, &mut self.vectors, Lane::ZERO);
+                for i in 0..nodes {
+                    // A row sees the coloured one of its three nodes; of two equal ones (a closed curve of
+                    // three points) the sum goes to either.
+                    for (side, block) in self.blocks.sides.iter_mut().enumerate() {
+                        let j = match side {
+                            0 if i > 0 => i - 1,
+                            0 if closed => n - 1,
+                            1 => i,
+                            2 if i + 1 < nodes => i + 1,
+                            2 if closed => 0,
+                            _ => continue,
+                        };
+                        let again = closed && n == 2 && side == 2;
+                        if color(j) == c && !again {
+                            for row in 0..m {
+                                block[(i * m + row) * m + k] = self.r[i * m + row].d;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Newton's method with the flat-space matrix T in transported frames, and Anderson's mixing.
+//!
+//! `T δu = 3r` is one tridiagonal solve a sweep. It is exact in flat space; on a curved space the
+//! iteration contracts by a factor that grows with the squared step between points. Where that
+//! factor is not small, Anderson mixing (type II; Walker & Ni 2011) of the last few updates takes over.
+
+use super::chain::Chain;
+use super::condition::ChainEnds;
+use super::tridiagonal::Tridiagonal;
+use crate::scalar::{Lane, lane};
+use crate::space::Erased;
+
+/// How many earlier updates are mixed.
+const DEPTH: usize = 5;
+/// Contraction above which mixing pays for its extra vectors.
+const MIX_ABOVE: f64 = 0.15;
+
+/// `step ← T⁻¹ 3r`.
+pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, t: &mut Tridiagonal, step: &mut [Lane]) {
+    for (s, r) in step.iter_mut().zip(&chain.r) {
+        *s = lane(3.0) * *r;
+    }
+    t.solve(space, chain, ends, step);
+}
+
+/// The history of Anderson mixing. A lane takes part from the iteration on at which its own
+/// contraction asks for it; before that its columns are zero, so that lanes stay independent.
+#[derive(Default)]
+pub struct Anderson {
+    /// Differences of updates, and of iterates plus updates, the youngest first.
+    columns: Vec<[Vec<Lane>; 2]>,
+    used: usize,
+    previous: [Vec<Lane>; 2],
+    active: Lane,
+}
+
+impl Anderson {
+    /// Forgets everything.
+    pub fn restart(&mut self) {
+        self.used = 0;
+        self.active = Lane::ZERO;
+        self.previous.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Forgets the history of some lanes: their next step is a plain one.
+    pub fn forget(&mut self, lanes: Lane) {
+        for [f, g] in &mut self.columns[..self.used] {
+            for x in f.iter_mut().chain(g) {
+                *x = lanes.select(Lane::ZERO, *x);
+            }
+        }
+        self.active = lanes.select(Lane::ZERO, self.active);
+    }
+
+    /// The lanes that take part.
+    pub fn active(&self) -> Lane {
+        self.active
+    }
+
+    /// Replaces the update f(u) by the mixed one. `contraction` is how the last iteration did; lanes
+    /// in `idle` do not take part now.
+    pub fn mix(&mut self, contraction: Lane, idle: Lane, u: &[Lane], f: &mut [Lane]) {
+        let slow = contraction.simd_gt(lane(MIX_ABOVE)) & !idle;
+        if self.active.none() && slow.none() {
+            return;
+        }
+        if !self.previous[0].is_empty() {
+            self.remember(u, f);
+        }
+        // A lane that starts now has no difference to remember yet, as if it were alone.
+        self.active |= slow;
+        let [old_f, old_g] = &mut self.previous;
+        old_f.clear();
+        old_f.extend_from_slice(f);
+        old_g.clear();
+        old_g.extend(u.iter().zip(&*f).map(|(u, f)| *u + *f));
+        if self.used > 0 {
+            self.project(f);
+        }
+    }
+
+    /// Takes in the differences to the last iteration as the youngest column.
+    fn remember(&mut self, u: &[Lane], f: &[Lane]) {
+        if self.used == self.columns.len() && self.used < DEPTH {
+            self.columns.push(Default::default());
+        }
+        self.used = (self.used + 1).min(DEPTH);
+        self.columns[..self.used].rotate_right(1);
+        let [df, dg] = &mut self.columns[0];
+        let active = self.active;
+        let [old_f, old_g] = &self.previous;
+        df.clear();
+        df.extend(f.iter().zip(old_f).map(|(f, o)| active.select(*f - *o, Lane::ZERO)));
+        dg.clear();
+        let g = u.iter().zip(f).map(|(u, f)| *u + *f);
+        dg.extend(g.zip(old_g).map(|(g, o)| active.select(g - *o, Lane::ZERO)));
+    }
+
+    /// f ← f − ΔG γ with the γ that minimises |f − ΔF γ| (normal equations, lane by lane).
+    fn project(&self, f: &mut [Lane]) {
+        let k = self.used;
+        let dot = |a: &[Lane], b: &[Lane]| crate::scalar::dot(a, b);
+        let mut gram = [[Lane::ZERO; DEPTH]; DEPTH];
+        let mut gamma = [Lane::ZERO; DEPTH];
+        for i in 0..k {
+            for j in 0..=i {
+                gram[i][j] = dot(&self.columns[i][0], &self.columns[j][0]);
+            }
+            gamma[i] = dot(&self.columns[i][0], f);
+        }
+        // L D Lᵀ; a column that depends on younger ones, or is empty, takes no part.
+        let mut inverse = [Lane::ZERO; DEPTH];
+        for i in 0..k {
+            let size = gram[i][i];
+            for j in 0..i {
+                let mut x = gram[i][j];
+                for l in 0..j {
+                    x -= gram[i][l] * gram[j][l] * inverse[l];
+                }
+                gram[i][j] = x;
+                gram[i][i] -= x * x * inverse[j];
+            }
+            let sound = gram[i][i].simd_gt(size * lane(1e-12));
+            inverse[i] = sound.select(Lane::ONE / gram[i][i], Lane::ZERO);
+        }
+        for i in 0..k {
+            for l in 0..i {
+                gamma[i] -= gram[i][l] * inverse[l] * gamma[l];
+            }
+        }
+        for i in 0..k {
+            gamma[i] *= inverse[i];
+        }
+        for i in (0..k).rev() {
+            for l in i + 1..k {
+                gamma[i] -= gram[l][i] * inverse[i] * gamma[l];
+            }
+        }
+        for i in 0..k {
+            for (f, g) in f.iter_mut().zip(&self.columns[i][1]) {
+                *f -= gamma[i] * *g;
+            }
+        }
+    }
+}

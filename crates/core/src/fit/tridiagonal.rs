@@ -1,0 +1,160 @@
+//! The flat-space Newton matrix T, on transported velocities.
+//!
+//! In the frames transport is the identity and T is a scalar tridiagonal matrix with rows
+//! `1/hᵢ₋₁, 2/hᵢ₋₁ + 2/hᵢ, 1/hᵢ`: the matrix of the classical cubic spline.
+
+use super::chain::Chain;
+use super::condition::{ChainEnds, EndKind, of_kind};
+use crate::scalar::{LANES, Lane, lane};
+use crate::space::Erased;
+use crate::with_size;
+
+/// T, factored by elimination without pivots (T is diagonally dominant but for not-a-knot rows,
+/// which are safe too: their first pivot is 1/h₀ + 1/h₁).
+#[derive(Default)]
+pub struct Tridiagonal {
+    /// Diagonal, also what Algorithm 1 divides by.
+    pub diagonal: Vec<Lane>,
+    lower: Vec<Lane>,
+    upper: Vec<Lane>,
+    inverse_pivot: Vec<Lane>,
+    /// For closed curves: the answers α, β to a unit velocity at the first and the last node.
+    answers: [Vec<Lane>; 2],
+    rhs: Vec<Lane>,
+    x: Vec<Lane>,
+}
+
+const TWO: Lane = lane(2.0);
+
+impl Tridiagonal {
+    /// Builds and factors T.
+    pub fn build(&mut self, chain: &Chain, ends: &ChainEnds) {
+        let n = chain.n;
+        for v in [&mut self.diagonal, &mut self.lower, &mut self.upper, &mut self.inverse_pivot] {
+            v.resize(n + 1, Lane::ZERO);
+        }
+        let inverse = |i: usize| Lane::ONE / chain.h[i];
+        for i in 0..=n {
+            // A closed curve has a segment on both sides of every node.
+            let left = inverse(if i == 0 { n - 1 } else { i - 1 });
+            let right = inverse(if i == n { 0 } else { i });
+            (self.lower[i], self.diagonal[i], self.upper[i]) = (left, TWO * (left + right), right);
+        }
+        if let ChainEnds::Open(kinds) = ends {
+            (self.diagonal[0], self.upper[0]) = end_row(chain, 0, &kinds[0]);
+            (self.diagonal[n], self.lower[n]) = end_row(chain, 1, &kinds[1]);
+            self.factor(0, n);
+        } else if n > 1 {
+            self.factor(1, n - 1);
+            for (end, node) in [(0, 1), (1, n - 1)] {
+                let coupling = if end == 0 { self.lower[1] } else { self.upper[n - 1] };
+                let mut answer = std::mem::take(&mut self.answers[end]);
+                answer.clear();
+                answer.resize(n + 1, Lane::ZERO);
+                answer[node] = -coupling;
+                self.solve_open(1, n - 1, 1, &mut answer);
+                self.answers[end] = answer;
+            }
+        }
+    }
+
+    fn factor(&mut self, first: usize, last: usize) {
+        self.inverse_pivot[first] = Lane::ONE / self.diagonal[first];
+        for i in first + 1..=last {
+            let eliminated = self.lower[i] * self.inverse_pivot[i - 1] * self.upper[i - 1];
+            self.inverse_pivot[i] = Lane::ONE / (self.diagonal[i] - eliminated);
+        }
+    }
+
+    /// Solves on the rows `first..=last` in place, for vectors of m numbers.
+    fn solve_open(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
+        with_size!(true, m, m => self.solve_rows(first, last, m, x));
+    }
+
+    #[inline(always)]
+    fn solve_rows(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
+        x[first * m..][..m].iter_mut().for_each(|x| *x *= self.inverse_pivot[first]);
+        for i in first + 1..=last {
+            let (before, here) = x[(i - 1) * m..][..2 * m].split_at_mut(m);
+            let (lower, pivot) = (self.lower[i], self.inverse_pivot[i]);
+            for c in 0..m {
+                here[c] = lower.mul_neg_add(before[c], here[c]) * pivot;
+            }
+        }
+        for i in (first..last).rev() {
+            let (here, behind) = x[i * m..][..2 * m].split_at_mut(m);
+            let factor = self.upper[i] * self.inverse_pivot[i];
+            for c in 0..m {
+                here[c] = factor.mul_neg_add(behind[c], here[c]);
+            }
+        }
+    }
+
+    /// Solves `T x = f` in place for the whole chain.
+    pub fn solve(&mut self, space: &Erased, chain: &mut Chain, ends: &ChainEnds, f: &mut [Lane]) {
+        match ends {
+            ChainEnds::Open(_) => self.solve_open(0, chain.n, chain.m, f),
+            ChainEnds::Periodic => self.solve_closed(space, chain, f),
+        }
+    }
+
+    /// Eliminates all nodes but the first. With H the transport around the curve,
+    /// `xᵢ = yᵢ + αᵢx₀ + βᵢHx₀` leaves `(A + c(H + H⁻¹)) x₀ = rhs`.
+    fn solve_closed(&mut self, space: &Erased, chain: &mut Chain, f: &mut [Lane]) {
+        let (n, m) = (chain.n, chain.m);
+        if n > 1 {
+            self.solve_open(1, n - 1, m, f);
+            let [alpha, beta] = &self.answers;
+            // rhs = f₀ − y₁/h₀ − H⁻¹ yₙ₋₁/hₙ₋₁
+            self.rhs.clear();
+            self.rhs.extend_from_slice(&f[(n - 1) * m..n * m]);
+            chain.across_seam(space, false, &mut self.rhs);
+            for c in 0..m {
+                self.rhs[c] = f[c] - self.upper[0] * f[m + c] - self.lower[0] * self.rhs[c];
+            }
+            let pivot = self.diagonal[0] + self.upper[0] * alpha[1] + self.lower[0] * beta[n - 1];
+            let coupling = self.upper[0] * beta[1];
+            let inverse = Lane::ONE / pivot;
+            // |2c/A| ≤ 1/7 on any knots, the worst case being two equal segments: twenty rounds
+            // of Richardson's iteration are below rounding.
+            self.x.clear();
+            self.x.extend(self.rhs.iter().map(|&x| x * inverse));
+            for _ in 0..20 {
+                f[..m].copy_from_slice(&self.x);
+                chain.across_seam(space, true, &mut f[..m]);
+                chain.across_seam(space, false, &mut self.x);
+                for c in 0..m {
+                    self.x[c] = (self.rhs[c] - coupling * (f[c] + self.x[c])) * inverse;
+                }
+            }
+            f[..m].copy_from_slice(&self.x);
+            chain.across_seam(space, true, &mut self.x);
+            for i in 1..n {
+                for c in 0..m {
+                    f[i * m + c] += alpha[i] * f[c] + beta[i] * self.x[c];
+                }
+            }
+            f[n * m..].copy_from_slice(&self.x);
+        } else {
+            // One segment from a point to itself: the curve stands still.
+            f.fill(Lane::ZERO);
+        }
+    }
+}
+
+/// Diagonal and off-diagonal of an end row, lane by lane.
+fn end_row(chain: &Chain, which: usize, kinds: &[EndKind; LANES]) -> (Lane, Lane) {
+    let n = chain.n;
+    let (h0, h1) = if which == 0 {
+        (chain.h[0], chain.h[1.min(n - 1)])
+    } else {
+        (chain.h[n - 1], chain.h[n.max(2) - 2])
+    };
+    let velocity = of_kind(kinds, EndKind::Velocity);
+    let knot = of_kind(kinds, EndKind::NotAKnot);
+    let inverse = Lane::ONE / h0;
+    (
+        (velocity | knot).select(Lane::ONE, TWO * inverse),
+        velocity.select(Lane::ZERO, knot.select(Lane::ONE + h0 / h1, inverse)),
+    )
+}

@@ -1,0 +1,564 @@
+//! Small dense matrices over lanes, jets and duals, real and complex.
+//!
+//! An entry is `[S; D]`: a real number for D = 1, real and imaginary part for D = 2. Every formula is
+//! written once for both.
+
+mod dense;
+mod eigen;
+mod function;
+mod large;
+mod series;
+
+pub use dense::{cholesky, determinant, orthonormalise, polar, reorthonormalise, solve_lower};
+pub use eigen::{diagonalise, orthogonalise, sort_columns};
+pub use function::{Unary, from_parts, function_of, parts_of};
+pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};
+
+use crate::scalar::{Each, Lane, Scalar, few, lane};
+use large::LARGE;
+use smallvec::{SmallVec, smallvec};
+use std::ops::{Add, Deref, DerefMut, Index, IndexMut, Neg, Sub};
+
+/// A real number (D = 1), or real and imaginary part of a complex one (D = 2).
+pub type Entry<S, const D: usize> = [S; D];
+
+/// `a b + c`, or `a b* + c` with `CONJUGATE`.
+#[inline(always)]
+fn mul_add<S: Scalar, const D: usize, const CONJUGATE: bool>(
+    a: Entry<S, D>,
+    b: Entry<S, D>,
+    c: Entry<S, D>,
+) -> Entry<S, D> {
+    let mut out = c;
+    if D == 1 {
+        out[0] = a[0].fma(b[0], c[0]);
+    } else {
+        let (ai, bi) = (a[D - 1], if CONJUGATE { -b[D - 1] } else { b[D - 1] });
+        out[0] = a[0].fma(b[0], (-ai).fma(bi, c[0]));
+        out[D - 1] = a[0].fma(bi, ai.fma(b[0], c[D - 1]));
+    }
+    out
+}
+
+/// `a b + c`.
+pub fn multiply_add<const D: usize>(
+    a: Entry<Lane, D>,
+    b: Entry<Lane, D>,
+    c: Entry<Lane, D>,
+) -> Entry<Lane, D> {
+    mul_add::<Lane, D, false>(a, b, c)
+}
+
+/// `Re a*b + c`.
+#[inline(always)]
+fn inner_add<S: Scalar, const D: usize>(a: Entry<S, D>, b: Entry<S, D>, c: S) -> S {
+    let c = a[0].fma(b[0], c);
+    if D == 1 { c } else { a[D - 1].fma(b[D - 1], c) }
+}
+
+#[inline(always)]
+fn conjugate<S: Scalar, const D: usize>(mut a: Entry<S, D>) -> Entry<S, D> {
+    if D > 1 {
+        a[D - 1] = -a[D - 1];
+    }
+    a
+}
+
+/// Where the entries of a matrix are, and how many.
+pub trait Storage: Copy + Send + Sync + 'static {
+    /// Whether matrices may be so large that products pay for another order of work.
+    const LARGE: bool = false;
+    /// Rows and columns.
+    type Shape: Copy;
+    /// A container of entries.
+    type Of<T: Copy>: Clone + Deref<Target = [T]> + DerefMut;
+    /// A shape that is asked for.
+    fn shape(rows: usize, cols: usize) -> Self::Shape;
+    /// The numbers of rows and columns.
+    fn size(shape: Self::Shape) -> (usize, usize);
+    /// Equal entries.
+    fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
+    /// Entries from their places, row by row. Writes each once, where `filled` and a loop write twice.
+    fn collected<T: Copy>(shape: Self::Shape, spare: T, f: impl FnMut(usize) -> T) -> Self::Of<T>;
+}
+
+/// Any size. Up to sixteen entries live on the stack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dynamic;
+
+impl Storage for Dynamic {
+    const LARGE: bool = true;
+    type Shape = (usize, usize);
+    type Of<T: Copy> = SmallVec<[T; 16]>;
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        (rows, cols)
+    }
+    #[inline(always)]
+    fn size(shape: Self::Shape) -> (usize, usize) {
+        shape
+    }
+    fn filled<T: Copy>((rows, cols): Self::Shape, x: T) -> Self::Of<T> {
+        smallvec![x; rows * cols]
+    }
+    #[inline(always)]
+    fn collected<T: Copy>((rows, cols): Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        (0..rows * cols).map(f).collect()
+    }
+}
+
+/// Any shape of at most CAPACITY entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Small<const CAPACITY: usize>;
+
+impl<const CAPACITY: usize> Storage for Small<CAPACITY> {
+    type Shape = (usize, usize);
+    type Of<T: Copy> = Entries<T, CAPACITY>;
+    #[inline(always)]
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        assert!(rows * cols <= CAPACITY, "a matrix of {rows} x {cols} is too large here");
+        (rows, cols)
+    }
+    #[inline(always)]
+    fn size(shape: Self::Shape) -> (usize, usize) {
+        shape
+    }
+    #[inline(always)]
+    fn filled<T: Copy>(_: Self::Shape, x: T) -> Self::Of<T> {
+        Entries([x; CAPACITY])
+    }
+    #[inline(always)]
+    fn collected<T: Copy>((rows, cols): Self::Shape, spare: T, mut f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        let mut out = Entries([spare; CAPACITY]);
+        for (i, x) in out[..rows * cols].iter_mut().enumerate() {
+            *x = f(i);
+        }
+        out
+    }
+}
+
+/// N × N matrices of NN = N² entries, a size known to the compiler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Known<const N: usize, const NN: usize>;
+
+/// An array that dereferences to a slice.
+#[derive(Clone, Copy)]
+pub struct Entries<T, const NN: usize>([T; NN]);
+
+impl<T, const NN: usize> Deref for Entries<T, NN> {
+    type Target = [T];
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T, const NN: usize> DerefMut for Entries<T, NN> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+}
+
+impl<const N: usize, const NN: usize> Storage for Known<N, NN> {
+    type Shape = ();
+    type Of<T: Copy> = Entries<T, NN>;
+    #[inline(always)]
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        debug_assert!(rows == N && cols == N && N * N == NN);
+    }
+    #[inline(always)]
+    fn size(_: Self::Shape) -> (usize, usize) {
+        (N, N)
+    }
+    #[inline(always)]
+    fn filled<T: Copy>(_: Self::Shape, x: T) -> Self::Of<T> {
+        Entries([x; NN])
+    }
+    #[inline(always)]
+    fn collected<T: Copy>(_: Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        Entries(few(f))
+    }
+}
+
+/// A matrix, row by row.
+pub struct Matrix<S: Scalar, const D: usize, A: Storage = Dynamic> {
+    shape: A::Shape,
+    data: A::Of<Entry<S, D>>,
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Clone for Matrix<S, D, A> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        Matrix { shape: self.shape, data: self.data.clone() }
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
+    /// The same matrix, stored in another way.
+    pub fn stored<B: Storage>(&self) -> Matrix<S, D, B> {
+        Matrix::from_fn(self.rows(), self.cols(), |i, j| self[(i, j)])
+    }
+
+    /// The rows `from..to`.
+    pub fn some_rows(&self, from: usize, to: usize) -> Self {
+        Self::from_fn(to - from, self.cols(), |i, j| self[(from + i, j)])
+    }
+
+    /// The columns `from..to`.
+    pub fn some_cols(&self, from: usize, to: usize) -> Self {
+        Self::from_fn(self.rows(), to - from, |i, j| self[(i, from + j)])
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
+    /// All zeros.
+    pub fn zeros(rows: usize, cols: usize) -> Self {
+        let shape = A::shape(rows, cols);
+        Matrix { shape, data: A::filled(shape, [S::constant(Lane::ZERO); D]) }
+    }
+
+    /// The identity.
+    pub fn identity(n: usize) -> Self {
+        Self::zeros(n, n).plus_identity(Lane::ONE)
+    }
+
+    /// From numbers row by row, imaginary parts behind real ones.
+    pub fn read(rows: usize, cols: usize, numbers: &[S]) -> Self {
+        let entries = &numbers.as_chunks::<D>().0[..rows * cols];
+        Self::collected(A::shape(rows, cols), |i| entries[i])
+    }
+
+    /// Constants.
+    pub fn constant(rows: usize, cols: usize, numbers: &[Lane]) -> Self {
+        Self::from_fn(rows, cols, |i, j| {
+            let at = (i * cols + j) * D;
+            few(|c| S::constant(numbers[at + c]))
+        })
+    }
+
+    /// From a function of row and column.
+    pub fn from_fn(rows: usize, cols: usize, mut f: impl FnMut(usize, usize) -> Entry<S, D>) -> Self {
+        let mut m = Self::zeros(rows, cols);
+        for i in 0..rows {
+            for j in 0..cols {
+                m[(i, j)] = f(i, j);
+            }
+        }
+        m
+    }
+
+    /// From a function of the place of an entry, counted row by row.
+    #[inline(always)]
+    fn collected(shape: A::Shape, f: impl FnMut(usize) -> Entry<S, D>) -> Self {
+        Matrix { shape, data: A::collected(shape, [S::constant(Lane::ZERO); D], f) }
+    }
+
+    /// A function of the numbers of one matrix.
+    #[inline(always)]
+    fn each(&self, f: impl Fn(S) -> S) -> Self {
+        let x = self.entries();
+        Self::collected(self.shape, |i| x[i].each(&f))
+    }
+
+    /// A function of the numbers of two matrices.
+    #[inline(always)]
+    fn zip(&self, b: &Self, f: impl Fn(S, S) -> S) -> Self {
+        let (x, y) = (self.entries(), b.entries());
+        Self::collected(self.shape, |i| few(|c| f(x[i][c], y[i][c])))
+    }
+
+    /// A real diagonal matrix.
+    pub fn diagonal(entries: &[S]) -> Self {
+        let mut m = Self::zeros(entries.len(), entries.len());
+        for (i, &x) in entries.iter().enumerate() {
+            m[(i, i)][0] = x;
+        }
+        m
+    }
+
+    /// Writes the numbers as [`read`](Self::read) takes them.
+    pub fn write(&self, out: &mut [S]) {
+        for (out, x) in out.as_chunks_mut::<D>().0.iter_mut().zip(self.data.iter()) {
+            *out = *x;
+        }
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    pub fn rows(&self) -> usize {
+        A::size(self.shape).0
+    }
+
+    /// Number of columns.
+    #[inline(always)]
+    pub fn cols(&self) -> usize {
+        A::size(self.shape).1
+    }
+
+    /// All entries, row by row.
+    #[inline(always)]
+    pub fn entries(&self) -> &[Entry<S, D>] {
+        &self.data[..self.rows() * self.cols()]
+    }
+
+    /// `A B`.
+    pub fn times(&self, b: &Self) -> Self {
+        if A::LARGE && b.is_large() {
+            return large::times(self, b);
+        }
+        let mut out = Self::zeros(self.rows(), b.cols());
+        for i in 0..self.rows() {
+            for j in 0..b.cols() {
+                let mut sum = [S::constant(Lane::ZERO); D];
+                for k in 0..self.cols() {
+                    sum = mul_add::<S, D, false>(self[(i, k)], b[(k, j)], sum);
+                }
+                out[(i, j)] = sum;
+            }
+        }
+        out
+    }
+
+    /// Whether products with it pay for another order of work.
+    #[inline(always)]
+    fn is_large(&self) -> bool {
+        self.rows() * self.cols() >= LARGE * LARGE
+    }
+
+    /// `A* B`.
+    pub fn adjoint_times(&self, b: &Self) -> Self {
+        if A::LARGE && b.is_large() {
+            return large::times(&self.adjoint(), b);
+        }
+        let mut out = Self::zeros(self.cols(), b.cols());
+        for k in 0..self.rows() {
+            for i in 0..self.cols() {
+                let a = conjugate(self.data[k * self.cols() + i]);
+                let row = &mut out.data[i * b.cols()..][..b.cols()];
+                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols()..][..b.cols()]) {
+                    *c = mul_add::<S, D, false>(a, *b, *c);
+                }
+            }
+        }
+        out
+    }
+
+    /// `A B*`.
+    pub fn times_adjoint(&self, b: &Self) -> Self {
+        if A::LARGE && b.is_large() {
+            return large::times(self, &b.adjoint());
+        }
+        Self::from_fn(self.rows(), b.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
+    }
+
+    /// `A*`.
+    pub fn adjoint(&self) -> Self {
+        Self::from_fn(self.cols(), self.rows(), |i, j| conjugate(self[(j, i)]))
+    }
+
+    /// `(A + A*)/2`, exactly Hermitian.
+    pub fn hermitian_part(&self) -> Self {
+        self.with_adjoint(Lane::ONE)
+    }
+
+    /// `(A − A*)/2`, exactly skew-Hermitian.
+    pub fn skew_part(&self) -> Self {
+        self.with_adjoint(lane(-1.0))
+    }
+
+    fn with_adjoint(&self, sign: Lane) -> Self {
+        let half = lane(0.5);
+        Self::from_fn(self.rows(), self.cols(), |i, j| {
+            let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
+            few(|c| (a[c] + b[c] * sign) * half)
+        })
+    }
+
+    /// `A + x`, x times the identity.
+    pub fn plus_identity(mut self, x: Lane) -> Self {
+        for i in 0..self.rows().min(self.cols()) {
+            self[(i, i)][0] = self[(i, i)][0] + x;
+        }
+        self
+    }
+
+    /// `x A`.
+    pub fn scaled(&self, x: Lane) -> Self {
+        self.each(|a| a * x)
+    }
+
+    /// `x A` with a scalar that may carry derivatives.
+    pub fn times_scalar(&self, x: S) -> Self {
+        self.each(|a| a * x)
+    }
+
+    /// `(1 + A)(1 + B) − 1`: products of what is near the identity keep their small digits.
+    pub fn compose(&self, b: &Self) -> Self {
+        let product = self.times(b);
+        let (x, y, z) = (product.entries(), self.entries(), b.entries());
+        Self::collected(self.shape, |i| few(|c| x[i][c] + y[i][c] + z[i][c]))
+    }
+
+    /// `(1 + A)(1 + A*) − 1`, exactly Hermitian.
+    pub fn gram(&self) -> Self {
+        if A::LARGE && self.is_large() {
+            return (&self.times_adjoint(self) + &(self + &self.adjoint())).hermitian_part();
+        }
+        Self::hermitian(self.rows(), |i, j| {
+            let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
+            self.row_product(i, self, j, few(|c| a[c] + b[c]))
+        })
+    }
+
+    /// `A B*` where that is Hermitian: one half of it is computed.
+    pub fn times_adjoint_hermitian(&self, b: &Self) -> Self {
+        if A::LARGE && b.is_large() {
+            return self.times_adjoint(b).hermitian_part();
+        }
+        Self::hermitian(self.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
+    }
+
+    /// From the entries on and above the diagonal, exactly Hermitian.
+    fn hermitian(n: usize, f: impl Fn(usize, usize) -> Entry<S, D>) -> Self {
+        let mut out = Self::zeros(n, n);
+        for i in 0..n {
+            for j in i..n {
+                let x = f(i, j);
+                out[(i, j)] = x;
+                out[(j, i)] = conjugate(x);
+            }
+            if D > 1 {
+                out[(i, i)][D - 1] = S::constant(Lane::ZERO);
+            }
+        }
+        out
+    }
+
+    /// Row i of A times the adjoint of row j of B, added to `sum`.
+    #[inline(always)]
+    fn row_product(&self, i: usize, b: &Self, j: usize, mut sum: Entry<S, D>) -> Entry<S, D> {
+        let (x, y) = (&self.data[i * self.cols()..][..self.cols()], &b.data[j * b.cols()..][..b.cols()]);
+        for (x, y) in x.iter().zip(y) {
+            sum = mul_add::<S, D, true>(*x, *y, sum);
+        }
+        sum
+    }
+
+    /// `Re tr A*B`.
+    pub fn inner(&self, b: &Self) -> S {
+        let mut sum = S::constant(Lane::ZERO);
+        for (a, b) in self.entries().iter().zip(b.entries()) {
+            sum = inner_add(*a, *b, sum);
+        }
+        sum
+    }
+
+    /// Frobenius norm of the values, a bound of all eigenvalues.
+    pub fn size(&self) -> Lane {
+        let mut sum = Lane::ZERO;
+        for a in self.entries().as_flattened() {
+            sum = a.value().mul_add(a.value(), sum);
+        }
+        sum.sqrt()
+    }
+
+    /// Real part of the trace.
+    pub fn trace(&self) -> S {
+        let mut sum = self[(0, 0)][0];
+        for i in 1..self.rows() {
+            sum = sum + self[(i, i)][0];
+        }
+        sum
+    }
+
+    /// The values without derivatives.
+    pub fn value(&self) -> Matrix<Lane, D, A> {
+        self.map(|x| x.value())
+    }
+
+    /// A function of every entry.
+    pub fn map_entries(&self, f: impl Fn(Entry<S, D>) -> Entry<S, D>) -> Self {
+        let x = self.entries();
+        Self::collected(self.shape, |i| f(x[i]))
+    }
+
+    /// A function of every number.
+    pub fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matrix<T, D, A> {
+        let x = self.entries();
+        Matrix::<T, D, A>::collected(self.shape, |i| x[i].each(&f))
+    }
+}
+
+/// What can be picked lane by lane.
+pub trait Select {
+    /// `a` on the lanes of a mask, `b` on the others.
+    fn select(mask: Lane, a: Self, b: Self) -> Self;
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Select for Matrix<S, D, A> {
+    fn select(mask: Lane, a: Self, b: Self) -> Self {
+        a.zip(&b, |a, b| S::select(mask, a, b))
+    }
+}
+
+impl<T: Select, const F: usize> Select for [T; F] {
+    fn select(mask: Lane, a: Self, b: Self) -> Self {
+        let mut pairs = a.into_iter().zip(b);
+        std::array::from_fn(|_| {
+            let (a, b) = pairs.next().expect("arrays are of one length");
+            T::select(mask, a, b)
+        })
+    }
+}
+
+/// Picks by size: lanes up to `limits[i]` get `f(i)`, larger ones `f(limits.len())`.
+///
+/// What a lane gets depends on its own size only, never on its neighbours'.
+pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -> R) -> R {
+    let within = |i: usize| size.simd_le(lane(limits[i]));
+    let top = (0..limits.len()).find(|&i| within(i).all()).unwrap_or(limits.len());
+    let mut result = f(top);
+    for i in (0..top).rev() {
+        if within(i).any() {
+            result = R::select(within(i), f(i), result);
+        }
+    }
+    result
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Index<(usize, usize)> for Matrix<S, D, A> {
+    type Output = Entry<S, D>;
+    #[inline(always)]
+    fn index(&self, (i, j): (usize, usize)) -> &Entry<S, D> {
+        &self.data[i * self.cols() + j]
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> IndexMut<(usize, usize)> for Matrix<S, D, A> {
+    #[inline(always)]
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut Entry<S, D> {
+        let cols = self.cols();
+        &mut self.data[i * cols + j]
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Add for &Matrix<S, D, A> {
+    type Output = Matrix<S, D, A>;
+    fn add(self, b: Self) -> Matrix<S, D, A> {
+        self.zip(b, |x, y| x + y)
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Sub for &Matrix<S, D, A> {
+    type Output = Matrix<S, D, A>;
+    fn sub(self, b: Self) -> Matrix<S, D, A> {
+        self.zip(b, |x, y| x - y)
+    }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Neg for Matrix<S, D, A> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        self.each(|x| -x)
+    }
+}

@@ -1,0 +1,342 @@
+//! Power series in a Hermitian matrix, and the functions made of them.
+//!
+//! Of a matrix of size three or less the powers reduce to I, H, H² by the theorem of Cayley and
+//! Hamilton, so that a series costs a few multiplications a term; larger ones use the scheme of
+//! Paterson & Stockmeyer (1973). Both carry derivatives along and are smooth where eigenvalues
+//! coincide. Beyond the radius of a series its argument is halved, or eigenvectors are used.
+
+use super::function::{Unary, function_of};
+use super::{Matrix, Select, Storage, by_size, inner_add, mul_add};
+use crate::scalar::{LANES, Lane, Scalar, few, lane};
+use crate::special::{ARC, SINC, VERSINE, arc_full_range};
+
+/// What the series in one matrix share.
+struct Powers<'a, S: Scalar, const D: usize, A: Storage> {
+    h: &'a Matrix<S, D, A>,
+    known: Known<S, D, A>,
+}
+
+enum Known<S: Scalar, const D: usize, A: Storage> {
+    Itself,
+    /// H² = e₁H − e₂
+    Two {
+        e1: S,
+        e2: S,
+    },
+    /// H³ = e₁H² − e₂H + e₃, with e₁, −e₂, e₃.
+    Three {
+        square: Matrix<S, D, A>,
+        e: [S; 3],
+    },
+    /// H, H², …
+    Many(Vec<Matrix<S, D, A>>),
+}
+
+impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
+    /// For several series of so many terms in all.
+    #[inline(always)]
+    fn of(h: &'a Matrix<S, D, A>, terms: usize) -> Self {
+        let known = match h.rows() {
+            1 => Known::Itself,
+            2 => {
+                let (a, d, off) = (h[(0, 0)][0], h[(1, 1)][0], h[(0, 1)]);
+                let zero = S::constant(Lane::ZERO);
+                Known::Two { e1: a + d, e2: a * d - inner_add(off, off, zero) }
+            }
+            3 => {
+                let square = h.times_adjoint_hermitian(h);
+                let e = invariants(h, &square);
+                Known::Three { square, e }
+            }
+            _ => {
+                // Paterson & Stockmeyer's best number of powers.
+                let block = (terms as f64).sqrt().round() as usize;
+                let mut powers = vec![h.clone()];
+                while powers.len() < block {
+                    powers.push(powers[powers.len() - 1].times(h));
+                }
+                Known::Many(powers)
+            }
+        };
+        Powers { h, known }
+    }
+
+    /// Σ cⱼ Hʲ
+    #[inline(always)]
+    fn sum(&self, c: &[f64]) -> Matrix<S, D, A> {
+        match &self.known {
+            Known::Itself => {
+                let x = self.h[(0, 0)][0];
+                let mut out = Matrix::zeros(1, 1);
+                out[(0, 0)][0] = c.iter().rev().fold(S::constant(Lane::ZERO), |sum, &c| sum * x + lane(c));
+                out
+            }
+            Known::Two { e1, e2 } => {
+                let zero = S::constant(Lane::ZERO);
+                let (mut x0, mut x1) = (zero, zero);
+                for &c in c.iter().rev() {
+                    (x0, x1) = (-(x1 * *e2) + lane(c), x1.fma(*e1, x0));
+                }
+                let mut out = self.h.times_scalar(x1);
+                for i in 0..2 {
+                    out[(i, i)][0] = out[(i, i)][0] + x0;
+                }
+                out
+            }
+            Known::Three { square, e } => combine(self.h, square, reduce(*e, c)),
+            Known::Many(powers) => paterson_stockmeyer(powers, c),
+        }
+    }
+}
+
+/// e₁, −e₂ and e₃ of a 3 × 3 matrix.
+fn invariants<S: Scalar, const D: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    square: &Matrix<S, D, A>,
+) -> [S; 3] {
+    let zero = S::constant(Lane::ZERO);
+    let e1 = h.trace();
+    let minus_e2 = (square.trace() - e1 * e1) * lane(0.5);
+    // e₃ = det H by the first row.
+    let minor = |j: usize, k: usize| {
+        let product = mul_add::<S, D, false>(h[(1, j)], h[(2, k)], [zero; D]);
+        let other = mul_add::<S, D, false>(h[(1, k)], h[(2, j)], [zero; D]);
+        few::<S, D>(|c| product[c] - other[c])
+    };
+    let mut det = [zero; D];
+    det = mul_add::<S, D, false>(h[(0, 0)], minor(1, 2), det);
+    det = mul_add::<S, D, false>(h[(0, 1)], minor(2, 0), det);
+    det = mul_add::<S, D, false>(h[(0, 2)], minor(0, 1), det);
+    [e1, minus_e2, det[0]]
+}
+
+/// The coefficients of 1, H and H² that a series comes down to.
+fn reduce<S: Scalar>([e1, minus_e2, e3]: [S; 3], c: &[f64]) -> [S; 3] {
+    let zero = S::constant(Lane::ZERO);
+    c.iter()
+        .rev()
+        .fold([zero; 3], |[x0, x1, x2], &c| [x2 * e3 + lane(c), x2.fma(minus_e2, x0), x2.fma(e1, x1)])
+}
+
+fn combine<S: Scalar, const D: usize, A: Storage>(
+    h: &Matrix<S, D, A>,
+    square: &Matrix<S, D, A>,
+    [x0, x1, x2]: [S; 3],
+) -> Matrix<S, D, A> {
+    let mut out = h.zip(square, |h, s| x2.fma(s, x1 * h));
+    for i in 0..3 {
+        out[(i, i)][0] = out[(i, i)][0] + x0;
+    }
+    out
+}
+
+fn paterson_stockmeyer<S: Scalar, const D: usize, A: Storage>(
+    powers: &[Matrix<S, D, A>],
+    c: &[f64],
+) -> Matrix<S, D, A> {
+    let (n, top) = (powers[0].rows(), &powers[powers.len() - 1]);
+    let mut sum = Matrix::zeros(n, n);
+    for (b, c) in c.chunks(powers.len()).rev().enumerate() {
+        if b > 0 {
+            sum = sum.times(top);
+        }
+        sum = sum.plus_identity(lane(c[0]));
+        for (c, power) in c[1..].iter().zip(powers) {
+            for (s, p) in sum.data.iter_mut().flatten().zip(power.data.iter().flatten()) {
+                *s = p.fma_lane(lane(*c), *s);
+            }
+        }
+    }
+    sum
+}
+
+/// Terms that leave less than a rounding error, one more for every derivative.
+fn terms<S: Scalar>(c: &[f64], n: usize) -> &[f64] {
+    &c[..(n + S::ORDER).min(c.len())]
+}
+
+/// How often sizes must be divided by `base` to come below a limit, lane by lane, and by what in all.
+#[cold]
+fn reductions(size: Lane, limit: f64, base: f64) -> (Lane, Lane) {
+    let (mut times, mut divisor) = ([0.0; LANES], [1.0; LANES]);
+    for (l, size) in size.to_array().into_iter().enumerate() {
+        // Infinity and NaN stay what they are; more than 2⁶⁴ is no length of a geodesic.
+        while size / divisor[l] > limit && divisor[l] < 1e19 {
+            (times[l], divisor[l]) = (times[l] + 1.0, divisor[l] * base);
+        }
+    }
+    (Lane::new(times), Lane::new(divisor))
+}
+
+/// Applies `step` so many times, lane by lane.
+fn repeat<R: Select + Clone>(mut x: R, times: Lane, step: impl Fn(&R) -> R) -> R {
+    let mut done = Lane::ZERO;
+    loop {
+        let on = times.simd_gt(done);
+        if on.none() {
+            return x;
+        }
+        let next = step(&x);
+        x = R::select(on, next, x);
+        done += Lane::ONE;
+    }
+}
+
+/// Largest argument of the series of [`trig`].
+const TRIG: [f64; 2] = [0.1, 2.5];
+
+/// `s(G) = sin√G/√G` and `k(G) = (cos√G − 1)/G` of a Hermitian G ≥ 0. The cosine is `1 + G k(G)`.
+pub fn trig<S: Scalar, const D: usize, A: Storage>(g: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {
+    let inside = |g: &Matrix<S, D, A>, n: usize| {
+        let powers = Powers::of(g, 2 * n);
+        [powers.sum(terms::<S>(&SINC, n)), -powers.sum(terms::<S>(&VERSINE, n))]
+    };
+    let size = g.size();
+    by_size(size, &TRIG, |tier| match tier {
+        0 => inside(g, 7),
+        1 => inside(g, VERSINE.len()),
+        _ => {
+            // s(4x) = s(x) c(x), k(4x) = −s(x)²/2
+            let (times, divisor) = reductions(size, TRIG[1], 4.0);
+            let small = g.scaled(Lane::ONE / divisor);
+            let [s, k] = inside(&small, VERSINE.len());
+            let [_, s, k] = repeat([small, s, k], times, |[x, s, k]| {
+                let c = x.times(k).plus_identity(Lane::ONE);
+                [x.scaled(lane(4.0)), s.times(&c), s.times(s).scaled(lane(-0.5))]
+            });
+            [s, k]
+        }
+    })
+}
+
+/// eˣ − 1 = Σ xʲ/j!, from j = 1
+const EXP: [f64; 25] = {
+    let mut c = [0.0; 25];
+    let (mut j, mut inverse) = (1, 1.0);
+    while j < 25 {
+        inverse /= j as f64;
+        c[j] = inverse;
+        j += 1;
+    }
+    c
+};
+
+/// `exp(A) − 1` of a Hermitian matrix.
+pub fn exp_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    const LIMITS: [f64; 3] = [0.1, 0.4, 1.5];
+    let inside = |a: &Matrix<S, D, A>, n: usize| Powers::of(a, n).sum(terms::<S>(&EXP, n));
+    let size = a.size();
+    by_size(size, &LIMITS, |tier| match tier {
+        0 => inside(a, 11),
+        1 => inside(a, 15),
+        2 => inside(a, EXP.len()),
+        _ => {
+            let (times, divisor) = reductions(size, LIMITS[2], 2.0);
+            let small = inside(&a.scaled(Lane::ONE / divisor), EXP.len());
+            repeat(small, times, |e| e.compose(e))
+        }
+    })
+}
+
+/// `exp(Ω) − 1` of a skew-Hermitian matrix: `Ω s(G) + G k(G)` with G = Ω*Ω.
+pub fn exp_skew_minus_one<S: Scalar, const D: usize, A: Storage>(omega: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    let g = omega.adjoint_times(omega);
+    let [s, k] = trig(&g);
+    &omega.times(&s) + &g.times(&k)
+}
+
+/// Up to this size of x [`LOG`] is used.
+const LOG_LIMIT: f64 = 0.35;
+/// log(1 + x) as a polynomial: log(1 + x)/x interpolated at the 28 Chebyshev nodes of |x| ≤ 0.35, which needs
+/// fewer terms than Taylor's 36. Relative error 3e-18, of the derivatives 1e-17 and 2e-16 (at 50 digits).
+#[allow(clippy::excessive_precision)]
+#[rustfmt::skip]
+const LOG: [f64; 29] = [
+    0.0,
+    1.0,
+    -0.5,
+    0.3333333333333333,
+    -0.25,
+    0.19999999999999982,
+    -0.1666666666666665,
+    0.1428571428571789,
+    -0.12500000000003492,
+    0.11111111110719639,
+    -0.09999999999620904,
+    0.09090909116328116,
+    -0.08333333357948537,
+    0.07692306625384897,
+    -0.07142856109689075,
+    0.06666696977197657,
+    -0.06250029350992092,
+    0.05881755151277276,
+    -0.05554976705481403,
+    0.05271417811194528,
+    -0.05007997921669766,
+    0.046824891336396626,
+    -0.04468561912329216,
+    0.04864738059111636,
+    -0.0466711711744112,
+    0.01861061849824667,
+    -0.017756056095513957,
+    0.08551686068864925,
+    -0.08263118345564845,
+];
+
+/// `log(1 + B)` of a Hermitian B with 1 + B positive definite.
+pub fn log_one_plus<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    by_size(b.size(), &[LOG_LIMIT], |tier| {
+        if tier == 0 { Powers::of(b, LOG.len()).sum(&LOG) } else { log_full_range(b) }
+    })
+}
+
+/// The same of two matrices with the same eigenvalues.
+pub fn log_one_plus_alike<S: Scalar, const D: usize, A: Storage>(
+    b: [&Matrix<S, D, A>; 2],
+) -> [Matrix<S, D, A>; 2] {
+    if b[0].rows() != 3 {
+        return b.map(log_one_plus);
+    }
+    by_size(b[0].size(), &[LOG_LIMIT], |tier| {
+        if tier > 0 {
+            return b.map(log_full_range);
+        }
+        // The coefficients of 1, B and B² are symmetric functions of the eigenvalues.
+        let squares = b.map(|b| b.times_adjoint_hermitian(b));
+        let x = reduce(invariants(b[0], &squares[0]), &LOG);
+        [0, 1].map(|i| combine(b[i], &squares[i], x))
+    })
+}
+
+fn log_full_range<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    let f = |x: Lane| {
+        let y = x + Lane::ONE;
+        let inverse = Lane::ONE / y;
+        [y.ln(), inverse, -(inverse * inverse)]
+    };
+    // The function is singular at x = −1.
+    function_of(b, &Unary { f, room: |x: Lane| (x + Lane::ONE).abs() })
+}
+
+/// `θ/sin θ` as a function of the Hermitian `Y = 1 − cos θ`; `rest` is `2 − Y`, known to more digits.
+pub fn arc<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    const LIMITS: [f64; 4] = [0.0075, 0.09, 0.3, 0.8];
+    by_size(y.size(), &LIMITS, |tier| {
+        let n = match tier {
+            0 => 7,
+            1 => 14,
+            2 => 22,
+            3 => 43,
+            _ => {
+                return function_of(
+                    y,
+                    &Unary {
+                        f: |y: Lane| arc_full_range(y, lane(2.0) - y),
+                        room: |y: Lane| (lane(2.0) - y).abs().min(Lane::ONE),
+                    },
+                );
+            }
+        };
+        Powers::of(y, n).sum(terms::<S>(&ARC, n))
+    })
+}

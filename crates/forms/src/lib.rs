@@ -1,0 +1,27 @@
+//! Positive definite matrices.
+
+mod positive_definite;
+
+pub use positive_definite::PositiveDefinite;
+
+use symspline_core::matrix::Known;
+use symspline_core::space::{Entry, Made, table};
+
+/// The spaces of this family.
+pub static FAMILY: &[Entry] = &[
+    Entry { names: &["spd", "symmetric-positive-definite"], parameters: &["n"], make: real },
+    Entry {
+        names: &["hpd", "hermitian-positive-definite"],
+        parameters: &["n"],
+        make: |p| table(PositiveDefinite::<2>::new(p[0])),
+    },
+];
+
+/// In code of its own where the size is known to the compiler.
+fn real(p: &[usize]) -> Made {
+    match p[0] {
+        2 => table(PositiveDefinite::<1, Known<2, 4>>::new(2)),
+        3 => table(PositiveDefinite::<1, Known<3, 9>>::new(3)),
+        n => table(PositiveDefinite::<1>::new(n)),
+    }
+}

@@ -1,0 +1,60 @@
+//! All spaces, by name.
+
+use std::sync::Arc;
+use symspline_core::space::{Entry, Erased, Table};
+
+pub use symspline_forms::PositiveDefinite;
+pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
+pub use symspline_subspaces::Subspaces;
+pub use symspline_vectors::{Curved, Euclidean, Hyperbolic, Sphere};
+
+/// Every kind of space.
+pub fn all() -> impl Iterator<Item = &'static Entry> {
+    [
+        symspline_vectors::FAMILY,
+        symspline_subspaces::FAMILY,
+        symspline_groups::FAMILY,
+        symspline_forms::FAMILY,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// Any of the spaces.
+#[derive(Clone)]
+pub struct AnySpace {
+    name: &'static str,
+    parameters: Vec<usize>,
+    table: Arc<dyn Table>,
+}
+
+impl AnySpace {
+    /// The space with a name (short or long) and parameters, e.g. `"sphere"`, `[2]`.
+    pub fn new(name: &str, parameters: &[usize]) -> Result<Self, String> {
+        let Some(entry) = all().find(|entry| entry.names.contains(&name)) else {
+            let known: Vec<String> = all().map(|entry| entry.names.join(" or ")).collect();
+            return Err(format!("unknown space {name:?}; known are {}", known.join(", ")));
+        };
+        let names = entry.parameters;
+        if names.len() != parameters.len() {
+            return Err(format!(
+                "{name} takes {} number(s) ({}), got {}",
+                names.len(),
+                names.join(", "),
+                parameters.len()
+            ));
+        }
+        let table = (entry.make)(parameters)?;
+        Ok(AnySpace { name: entry.names[0], parameters: parameters.to_vec(), table })
+    }
+
+    /// Its operations.
+    pub fn get(&self) -> Erased<'_> {
+        Erased(&*self.table)
+    }
+
+    /// The canonical name and the parameters.
+    pub fn name(&self) -> (&'static str, Vec<usize>) {
+        (self.name, self.parameters.clone())
+    }
+}
