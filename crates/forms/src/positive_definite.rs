@@ -9,7 +9,7 @@ use symspline_core::matrix::{
     Dynamic, Matrix, Storage, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus,
     log_one_plus_alike, orthogonalise, solve_lower,
 };
-use symspline_core::scalar::{Each, Lane, Scalar, dot, lane, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 
 /// Hermitian positive definite n × n matrices, real for D = 1, complex for D = 2.
@@ -35,6 +35,23 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
 
     fn algebra(&self) -> Algebra<D, A> {
         Algebra { n: self.n, skew: false, traceless: false, storage: PhantomData }
+    }
+
+    /// L e^{tw} L* with p = L L* and v = L w L*, and its derivatives in t, as many as are asked for.
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Vec<Matrix<Lane, D, A>> {
+        let p = self.read(p);
+        let l = cholesky(&p);
+        let w = whiten(&l, &self.read(v));
+        let e = exp_minus_one(&w.scaled(t));
+        let mut parts = vec![&congruent(&l, &e) + &p];
+        if order > 0 {
+            let d = &w.times(&e) + &w;
+            parts.push(congruent(&l, &d));
+            if order > 1 {
+                parts.push(congruent(&l, &w.times(&d)));
+            }
+        }
+        parts
     }
 
     fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
@@ -124,18 +141,9 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         17.0
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let p = self.read(p);
-        let l = cholesky(&p);
-        let w = whiten(&l, &self.read(v));
-        let e = exp_minus_one(&w.scaled(t.value()));
-        let x = &congruent(&l, &e) + &p;
-        let zero = Matrix::zeros(self.n, self.n);
-        let d = if S::ORDER > 0 { &w.times(&e) + &w } else { zero.clone() };
-        let dd = if S::ORDER > 1 { congruent(&l, &w.times(&d)) } else { zero.clone() };
-        let d = if S::ORDER > 0 { congruent(&l, &d) } else { zero };
+        let parts = self.moved(p, v, t.value(), S::ORDER);
         for (i, out) in out.iter_mut().enumerate() {
-            let part = |m: &Matrix<Lane, D, A>| m.entries()[i / D][i % D];
-            *out = t.compose([part(&x), part(&d), part(&dd)]);
+            *out = t.compose(few(|k| parts[k.min(S::ORDER)].entries()[i / D][i % D]));
         }
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {

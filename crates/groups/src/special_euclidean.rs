@@ -229,6 +229,11 @@ impl Ambient for SpecialEuclidean {
         let why = special_orthogonal(n).map_or(String::new(), |group| group.complaint(&r));
         format!("in its rotation, {why}")
     }
+    /// That of the translation, in whatever units it is.
+    fn rounding(&self, p: &[Lane]) -> Lane {
+        let t = self.translation(p);
+        dot(&t, &t).sqrt().max(Lane::ONE)
+    }
 }
 
 impl Frame for SpecialEuclidean {

@@ -11,7 +11,7 @@ use symspline_core::matrix::{
     Dynamic, Matrix, Storage, Unary, arc, by_size, determinant, diagonalise, exp_skew_minus_one, from_parts,
     orthonormalise, parts_of, polar, reorthonormalise, sort_columns,
 };
-use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, few, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 
 /// Matrices with p*p = 1: real for D = 1, complex for D = 2.
@@ -94,6 +94,17 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
         // Small steps have small angles.
         let bound = size.simd_le(lane(limit)).select(log.size(), angle);
         (log, angle.min(bound))
+    }
+
+    /// p e^{tΩ} and its derivatives in t, as many as are asked for.
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Vec<Matrix<Lane, D, A>> {
+        let p = self.read(p);
+        let omega = self.generator(&p, v);
+        let mut parts = vec![&p.times(&exp_skew_minus_one(&omega.scaled(t))) + &p];
+        for k in 0..order {
+            parts.push(parts[k].times(&omega));
+        }
+        parts
     }
 
     /// `log(p⁻¹q)` and its deciding angle.
@@ -264,14 +275,9 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         if self.is_su() { SQRT_2 * PI } else { PI }
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let p = self.read(p);
-        let omega = self.generator(&p, v);
-        let x = &p.times(&exp_skew_minus_one(&omega.scaled(t.value()))) + &p;
-        let d = if S::ORDER > 0 { x.times(&omega) } else { x.clone() };
-        let dd = if S::ORDER > 1 { d.times(&omega) } else { x.clone() };
+        let parts = self.moved(p, v, t.value(), S::ORDER);
         for (i, out) in out.iter_mut().enumerate() {
-            let part = |m: &Matrix<Lane, D, A>| m.entries()[i / D][i % D];
-            *out = t.compose([part(&x), part(&d), part(&dd)]);
+            *out = t.compose(few(|k| parts[k.min(S::ORDER)].entries()[i / D][i % D]));
         }
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {

@@ -195,6 +195,24 @@ impl<const D: usize, A: Storage> Subspaces<D, A> {
         Matrix::read(self.n - self.k, self.k, x)
     }
 
+    /// X c(t²G) + Δ t s(t²G) with G = Δ*Δ, and its derivatives in t, as many as are asked for.
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Vec<Matrix<Lane, D, A>> {
+        let (x, delta) = (self.read(p), self.read(v));
+        let g = delta.adjoint_times(&delta);
+        let Rotation { s, versed, .. } = Rotation::of(&g.scaled(t * t));
+        let c = versed.clone().plus_identity(Lane::ONE);
+        let ts = s.scaled(t);
+        let mut parts = vec![&(&x + &x.times(&versed)) + &delta.times(&ts)];
+        let minus_x = -x;
+        if order > 0 {
+            parts.push(&minus_x.times(&g.times(&ts)) + &delta.times(&c));
+        }
+        if order > 1 {
+            parts.push(&minus_x.times(&g.times(&c)) - &delta.times(&g.times(&ts)));
+        }
+        parts
+    }
+
     /// `log_X(Y)` in the ambient space.
     fn log_between<S: Scalar>(&self, x: &Matrix<S, D, A>, y: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
         log_from(&x.adjoint_times(y), &horizontal(x, &(y - x)))
@@ -227,23 +245,9 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         FRAC_PI_2
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let (x, delta) = (self.read(p), self.read(v));
-        let g = delta.adjoint_times(&delta);
-        let tv = t.value();
-        let Rotation { s, versed, .. } = Rotation::of(&g.scaled(tv * tv));
-        let c = versed.clone().plus_identity(Lane::ONE);
-        let ts = s.scaled(tv);
-        let gamma = &(&x + &x.times(&versed)) + &delta.times(&ts);
-        let minus_x = -x;
-        let d = if S::ORDER > 0 { &minus_x.times(&g.times(&ts)) + &delta.times(&c) } else { gamma.clone() };
-        let dd = if S::ORDER > 1 {
-            &minus_x.times(&g.times(&c)) - &delta.times(&g.times(&ts))
-        } else {
-            gamma.clone()
-        };
+        let parts = self.moved(p, v, t.value(), S::ORDER);
         for (i, out) in out.iter_mut().enumerate() {
-            let part = |m: &Matrix<Lane, D, A>| m.entries()[i / D][i % D];
-            *out = t.compose([part(&gamma), part(&d), part(&dd)]);
+            *out = t.compose(few(|k| parts[k.min(S::ORDER)].entries()[i / D][i % D]));
         }
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {

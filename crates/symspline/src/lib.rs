@@ -8,4 +8,6 @@
 
 pub mod spaces;
 
-pub use symspline_core::{curve, derivative, fit, matrix, monitor, parallel, rows, scalar, space, special};
+pub use symspline_core::{
+    curve, derivative, fit, laws, matrix, monitor, parallel, rows, scalar, space, special,
+};

@@ -1,0 +1,261 @@
+//! Laws of points and tangent vectors as arrays.
+
+use super::draw::{
+    Draw, STEPS, combined, distance, exp, is_other, length, log, minus, norm, rounding, scaled, tangent_at,
+};
+use super::{Verdict, within};
+use crate::scalar::{Jet, LANES, Lane, lane};
+use crate::space::{Ambient, Erased, Origin};
+
+pub fn points(space: &Erased, draw: &mut Draw) -> Verdict {
+    let p = draw.point(space);
+    let mut q = p.clone();
+    let off = space.project(&mut q);
+    within(off, rounding(space, 20.0 * p.len() as f64, &[&p], &[]), "a random point is off")?;
+    let again = q.clone();
+    space.project(&mut q);
+    if q.iter().zip(&again).any(|(a, b)| a.to_array() != b.to_array()) {
+        return Err("projecting twice is not projecting once".into());
+    }
+    Ok(())
+}
+
+/// Goes a way of coordinates x from a random point, and to another representative of its end.
+fn way(space: &Erased, draw: &mut Draw, part: f64) -> [Vec<Lane>; 4] {
+    let p = draw.point(space);
+    let x = draw.coordinates(space, part);
+    let v = tangent_at(space, &p, &x);
+    let q = exp(space, &p, &v);
+    [p, x, v, q]
+}
+
+pub fn exp_and_log(space: &Erased, draw: &mut Draw) -> Verdict {
+    for part in STEPS {
+        let [p, x, v, q] = way(space, draw, part);
+        let q = draw.representative(space, &q);
+        let (w, angle) = log(space, &p, &q);
+        // Near the cut locus rounding of q turns the direction by so much more.
+        let near = lane(1.0 / (1.0 - part));
+        let allowed = rounding(space, 300.0, &[&p, &q], &x) * near;
+        within(
+            length(space, &p, &minus(&w, &v)),
+            allowed,
+            &format!("log of exp at {part} of the largest step"),
+        )?;
+        let back = exp(space, &p, &w);
+        within(distance(space, &back, &q), allowed, &format!("exp of log at {part} of the largest step"))?;
+        if space.cut_angle().is_finite() && !angle.simd_lt(lane(space.cut_angle())).all() {
+            return Err(format!("the deciding angle at {part} of the largest step is not below the limit"));
+        }
+        let [forth, here] = [distance(space, &p, &q), length(space, &p, &v)];
+        within((forth - here).abs(), allowed, &format!("distance at {part} of the largest step"))?;
+    }
+    Ok(())
+}
+
+pub fn tangent(space: &Erased, draw: &mut Draw) -> Verdict {
+    for part in STEPS {
+        let [p, x, _, exact] = way(space, draw, part);
+        let q = draw.representative(space, &exact);
+        let (v, _) = log(space, &p, &q);
+        let mut w = v.clone();
+        space.velocity(&p, &mut w);
+        // Relative to the vector itself, however short it is, where a point is a class of arrays; elsewhere rounding
+        // puts q beside the space.
+        let size = norm(&v) + if is_other(&q, &exact) { Lane::ZERO } else { Lane::ONE };
+        let allowed = rounding(space, 30.0, &[&p, &q], &x) * size;
+        within(norm(&minus(&v, &w)), allowed, &format!("normal part of log at {part} of the largest step"))?;
+    }
+    Ok(())
+}
+
+pub fn geodesics(space: &Erased, draw: &mut Draw) -> Verdict {
+    for part in STEPS {
+        let [p, x, v, q] = way(space, draw, part);
+        let speed = length(space, &p, &v);
+        let allowed = rounding(space, 300.0, &[&p, &q], &x) * lane(1.0 / (1.0 - part));
+        let mut at = vec![Lane::ZERO; p.len()];
+        for t in [0.0, 0.3, 0.5, 1.0] {
+            space.geodesic(&p, &q, lane(t), &mut at);
+            let mut there = vec![Lane::ZERO; p.len()];
+            space.ray(&p, &v, lane(t), &mut there);
+            within(
+                distance(space, &at, &there),
+                allowed,
+                &format!("[p, q]_{t} at {part} of the largest step"),
+            )?;
+        }
+        // Constant speed and no acceleration, by jets in t.
+        let t = Jet { v: lane(0.3), d: Lane::ONE, dd: Lane::ZERO };
+        let jets = |x: &[Lane]| -> Vec<Jet> {
+            x.iter().map(|&v| Jet { v, d: Lane::ZERO, dd: Lane::ZERO }).collect()
+        };
+        let mut gamma = jets(&p);
+        space.geodesic(&jets(&p), &jets(&q), t, &mut gamma);
+        motion(space, &gamma, speed, allowed, "a geodesic")?;
+        space.ray(&p, &v, t, &mut gamma);
+        motion(space, &gamma, speed, allowed, "a ray")?;
+    }
+    Ok(())
+}
+
+/// A curve through a jet has a speed and no acceleration.
+fn motion(space: &Erased, gamma: &[Jet], speed: Lane, allowed: Lane, what: &str) -> Verdict {
+    let part = |f: fn(&Jet) -> Lane| -> Vec<Lane> { gamma.iter().map(f).collect() };
+    let (p, raw, mut dd) = (part(|x| x.v), part(|x| x.d), part(|x| x.dd));
+    let mut d = raw.clone();
+    space.velocity(&p, &mut d);
+    space.acceleration(&p, &raw, &mut dd);
+    within((length(space, &p, &d) - speed).abs(), allowed, &format!("speed of {what}"))?;
+    within(length(space, &p, &dd), allowed * lane(10.0), &format!("acceleration of {what}"))
+}
+
+pub fn transvections(space: &Erased, draw: &mut Draw) -> Verdict {
+    for part in [1e-6, 0.1, 0.4] {
+        let [p, x, v, q] = way(space, draw, part);
+        let w = draw.vector(space, &p, 0.2);
+        let y = exp(space, &p, &w);
+        let mut moved = vec![Lane::ZERO; p.len()];
+        space.transvect(&p, &v, &y, &mut moved);
+        // (10): the symmetry at p, then that at the middle of p and q.
+        let symmetry = |o: &[Lane], y: &[Lane]| exp(space, o, &scaled(&log(space, o, y).0, -1.0));
+        let middle = exp(space, &p, &scaled(&v, 0.5));
+        let expected = symmetry(&middle, &symmetry(&p, &y));
+        let allowed = rounding(space, 1000.0, &[&p, &q, &y, &expected], &x);
+        within(
+            distance(space, &moved, &expected),
+            allowed,
+            &format!("E_p(v) at {part} of the largest step"),
+        )?;
+        space.transvect(&p, &v, &p, &mut moved);
+        within(distance(space, &moved, &q), allowed, "E_p(v) of p")?;
+    }
+    Ok(())
+}
+
+pub fn transport(space: &Erased, draw: &mut Draw) -> Verdict {
+    for part in [1e-6, 0.1, 0.6, 0.95] {
+        let [p, x, _, q] = way(space, draw, part);
+        let q = draw.representative(space, &q);
+        let (v, _) = log(space, &p, &q);
+        let (a, b) = (draw.vector(space, &p, 0.1), draw.vector(space, &p, 0.1));
+        let carried = |a: &[Lane]| {
+            let mut out = vec![Lane::ZERO; p.len()];
+            space.carry(&p, &q, &v, a, &mut out);
+            out
+        };
+        let (at, bt) = (carried(&a), carried(&b));
+        let allowed = rounding(space, 300.0, &[&p, &q], &x) * lane(1.0 / (1.0 - part));
+        // K is NaN where no metric belongs to the space.
+        if !space.curvature().is_nan() {
+            let change = (space.inner(&p, &a, &b) - space.inner(&q, &at, &bt)).abs();
+            within(change, allowed, "inner product of what is carried")?;
+        }
+        let mut tangent = at.clone();
+        space.velocity(&q, &mut tangent);
+        within(
+            norm(&minus(&tangent, &at)),
+            allowed * norm(&at).max(Lane::ONE),
+            "normal part of what is carried",
+        )?;
+        // A geodesic carries its own velocity: to minus the logarithm of the way back.
+        let back = log(space, &q, &p).0;
+        within(
+            length(space, &q, &combined(&carried(&v), 1.0, &back)),
+            allowed * lane(10.0),
+            "velocity carried along",
+        )?;
+    }
+    Ok(())
+}
+
+pub fn derivatives(space: &Erased, draw: &mut Draw) -> Verdict {
+    // Between points that move, the second derivative of the array by differences of the first.
+    let (p, part) = (draw.point(space), 0.3);
+    let [u, v, w] = [(); 3].map(|()| draw.vector(space, &p, part));
+    let q = exp(space, &p, &w);
+    let carried = {
+        let mut out = vec![Lane::ZERO; p.len()];
+        space.carry(&p, &q, &w, &v, &mut out);
+        out
+    };
+    let at = |s: f64| -> Vec<Jet> {
+        let t = Jet { v: lane(s), d: Lane::ONE, dd: Lane::ZERO };
+        let mut ends =
+            [&p, &q].map(|p| p.iter().map(|&v| Jet { v, d: Lane::ZERO, dd: Lane::ZERO }).collect::<Vec<_>>());
+        space.ray(&p, &u, t, &mut ends[0]);
+        space.ray(&q, &carried, t, &mut ends[1]);
+        let mut out = ends[0].clone();
+        let tau = Jet { v: lane(0.4 + 0.1 * s), d: lane(0.1), dd: Lane::ZERO };
+        space.geodesic(&ends[0], &ends[1], tau, &mut out);
+        out
+    };
+    // Differences of order eight.
+    const STEP: f64 = 0.01;
+    const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+    let here = at(0.0);
+    let (mut d, mut dd) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; p.len()]);
+    for (k, w) in WEIGHTS.into_iter().enumerate() {
+        let r = STEP * (k + 1) as f64;
+        for ((d, dd), (a, b)) in d.iter_mut().zip(&mut dd).zip(at(r).iter().zip(&at(-r))) {
+            *d += (a.v - b.v) * lane(w / STEP);
+            *dd += (a.d - b.d) * lane(w / STEP);
+        }
+    }
+    let scale = norm(&here.iter().map(|x| x.v).collect::<Vec<_>>());
+    let allowed = rounding(space, 3000.0 / STEP, &[&p, &q], &[]) * scale.max(Lane::ONE);
+    within(
+        norm(&minus(&d, &here.iter().map(|x| x.d).collect::<Vec<_>>())),
+        allowed,
+        "first derivative of [p, q]_t",
+    )?;
+    within(
+        norm(&minus(&dd, &here.iter().map(|x| x.dd).collect::<Vec<_>>())),
+        allowed * lane(10.0),
+        "second derivative of [p, q]_t",
+    )
+}
+
+pub fn not_finite(space: &Erased, draw: &mut Draw) -> Verdict {
+    let (p, mut q) = (draw.point(space), draw.point(space));
+    q[0] = lane(f64::NAN);
+    let (v, angle) = log(space, &p, &q);
+    let found = angle.is_nan() | v.iter().fold(Lane::ZERO, |any, x| any | x.is_nan());
+    let mut r = q.clone();
+    let off = space.project(&mut r);
+    if !found.all() {
+        return Err("log of NaN is a number".into());
+    }
+    if off.simd_le(Lane::ONE).any() {
+        return Err("NaN counts as a point".into());
+    }
+    Ok(())
+}
+
+pub fn lanes(space: &Erased, draw: &mut Draw) -> Verdict {
+    // Eight steps of very different lengths, and each beside seven copies of itself.
+    let p = draw.point(space);
+    let x = draw.coordinates(space, 1.0);
+    let parts = Lane::new(std::array::from_fn(|l| STEPS[l % STEPS.len()]));
+    let x: Vec<Lane> = x.iter().map(|x| *x * parts).collect();
+    let v = tangent_at(space, &p, &x);
+    let q = exp(space, &p, &v);
+    let (w, _) = log(space, &p, &q);
+    let mut far = x.clone();
+    space.stretch(&x, &mut far);
+    for l in 0..LANES {
+        let alone = |x: &[Lane]| -> Vec<Lane> { x.iter().map(|x| lane(x.as_array()[l])).collect() };
+        let same = |a: &[Lane], b: &[Lane]| {
+            a.iter().zip(b).all(|(a, b)| a.as_array()[0].to_bits() == b.as_array()[l].to_bits())
+        };
+        let mut stretched = alone(&x);
+        space.stretch(&alone(&x), &mut stretched);
+        if !same(&exp(space, &alone(&p), &alone(&v)), &q)
+            || !same(&log(space, &alone(&p), &alone(&q)).0, &w)
+            || !same(&stretched, &far)
+        {
+            return Err(format!("lane {l} has other bits beside its neighbours"));
+        }
+    }
+    Ok(())
+}

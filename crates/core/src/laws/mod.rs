@@ -1,0 +1,65 @@
+//! The laws that every symmetric space obeys, for the tests of a new one: [`check`] runs them all.
+//!
+//! They know a space by its operations only. Every law draws its data at random, with eight cases in the lanes,
+//! over decades of step lengths up to just before the cut locus and with random representatives of points; it returns what it found where
+//! that is more than `allowed` rounding errors (times what the space says of its condition).
+
+mod algebra;
+mod ambient;
+mod draw;
+mod frame;
+
+pub use draw::Draw;
+
+use crate::scalar::Lane;
+use crate::space::Erased;
+
+/// What a law found wrong.
+pub type Verdict = Result<(), String>;
+
+/// One law.
+pub type Law = fn(&Erased, &mut Draw) -> Verdict;
+
+/// All laws, by name.
+pub static LAWS: &[(&str, Law)] = &[
+    ("points are projected to themselves", ambient::points),
+    ("exp and log are inverse", ambient::exp_and_log),
+    ("log is tangent at any representative", ambient::tangent),
+    ("geodesics join their ends at constant speed", ambient::geodesics),
+    ("a transvection is the product of two symmetries", ambient::transvections),
+    ("transport preserves the inner product", ambient::transport),
+    ("derivatives are those of the arrays", ambient::derivatives),
+    ("nothing is found in what is not finite", ambient::not_finite),
+    ("lanes do not see each other", ambient::lanes),
+    ("coordinates and tangent vectors are inverse", frame::coordinates),
+    ("a frame moves in parallel", frame::parallel),
+    ("a frame stays one for 600 knots", frame::long_walk),
+    ("legs are the logarithms of the C2 condition", frame::legs),
+    ("duals carry the derivatives of the legs", frame::duals),
+    ("the deciding angle is that of the logarithm", frame::angle),
+    ("the condition bounds the growth of errors", frame::condition),
+    ("the triple product is a Lie triple", algebra::lie_triple),
+    ("the triple product is the curvature", algebra::holonomy),
+    ("K is the largest curvature", algebra::largest_curvature),
+    ("the stretch is the derivative of exp", algebra::stretch),
+];
+
+/// Runs all laws; returns what was found wrong.
+pub fn check(space: &Erased, seed: u64) -> Vec<String> {
+    let run = |(i, (name, law)): (usize, &(&str, Law))| {
+        let mut draw = Draw::new(seed.wrapping_mul(1_000_003).wrapping_add(i as u64));
+        law(space, &mut draw).err().map(|why| format!("{name}: {why}"))
+    };
+    LAWS.iter().enumerate().filter_map(run).collect()
+}
+
+/// The largest lane of `found`, where it is more than `allowed`.
+fn within(found: Lane, allowed: Lane, what: &str) -> Verdict {
+    let (found, allowed) = (found.to_array(), allowed.to_array());
+    for (f, a) in found.into_iter().zip(allowed) {
+        if !(f <= a) {
+            return Err(format!("{what}: {f:.2e} where {a:.2e} is allowed"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,45 @@
+//! Every space obeys every law.
+
+use symspline::laws::check;
+use symspline::spaces::{AnySpace, all};
+
+/// A few sizes of every kind: the smallest, one for every path of the code, and one of another shape.
+const SIZES: &[(&str, &[&[usize]])] = &[
+    ("euclidean", &[&[1], &[3]]),
+    ("sphere", &[&[1], &[2], &[3], &[6]]),
+    ("hyperbolic", &[&[1], &[2], &[3], &[6]]),
+    ("rp", &[&[1], &[2], &[3], &[12]]),
+    ("cp", &[&[1], &[3], &[5]]),
+    ("gr", &[&[1, 3], &[2, 4], &[2, 5], &[3, 7], &[4, 5]]),
+    ("cgr", &[&[1, 3], &[2, 4], &[2, 5]]),
+    ("so", &[&[2], &[3], &[4], &[5]]),
+    ("o", &[&[3], &[4]]),
+    ("u", &[&[1], &[2], &[3], &[4]]),
+    ("su", &[&[2], &[3], &[4]]),
+    ("spd", &[&[1], &[2], &[3], &[4]]),
+    ("hpd", &[&[1], &[2], &[3]]),
+    ("se", &[&[2], &[3]]),
+];
+
+#[test]
+fn every_space_obeys_every_law() {
+    let mut broken = Vec::new();
+    for (name, sizes) in SIZES {
+        for parameters in *sizes {
+            let space = AnySpace::new(name, parameters).unwrap();
+            for seed in 0..3 {
+                broken.extend(
+                    check(&space.get(), seed).into_iter().map(|why| format!("{name} {parameters:?}: {why}")),
+                );
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{} laws broken:\n{}", broken.len(), broken.join("\n"));
+}
+
+#[test]
+fn every_kind_of_space_is_tested() {
+    for entry in all() {
+        assert!(SIZES.iter().any(|(name, _)| *name == entry.names[0]), "add {} to SIZES", entry.names[0]);
+    }
+}
