@@ -13,7 +13,7 @@ LAYERS = [
     ["arrays", "lonlat", "report", "threads", "times"],
     ["spaces"],
     ["curves"],
-    ["archive", "failures", "plotting"],
+    ["archive", "failures", "options", "plotting"],
     ["spline", "free"],
     ["functions"],
     ["adapters", "convert", "files", "jax", "pieces", "torch"],

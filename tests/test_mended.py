@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symspline as ss
-from symspline import spaces
+from symspline import _core, spaces
 from symspline.cli import main
 from symspline.jax import curve
 from symspline.lonlat import from_lonlat, to_lonlat
@@ -139,6 +139,21 @@ def test_pickles_and_parts_of_a_batch_are_splines(space):
         assert type(spline.report) is ss.Report
     assert pickle.loads(pickle.dumps(batch)) == batch
     assert pickle.loads(pickle.dumps(batch[1])).report == batch[1].report == batch.report.map(lambda c: c[1])
+
+
+@pytest.mark.parametrize("space, checks", [("sphere:2", 0), ("sphere:2 x r:3", 2), ("r:3 x sphere:299", 2)])
+def test_every_factor_is_checked_once(space, checks, monkeypatch):
+    space, fit, calls = ss.space(space), _core.fit, []
+
+    def counted(handle, *arguments):
+        calls.append((arguments[6], arguments[10]))
+        return fit(handle, *arguments)
+
+    monkeypatch.setattr(_core, "fit", counted)
+    points = tuple(np.eye(3, *factor.point_shape) for factor in spaces.factors_of(space))
+    ss.CubicSpline(None, points if checks else points[0], space)
+    # Whether the core checks, and whether it only checks.
+    assert calls == ([(True, True)] * checks + [(False, False)] * checks if checks else [(True, False)])
 
 
 # ---- progress of evaluation ----

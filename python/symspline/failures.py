@@ -7,19 +7,12 @@ import sys
 import warnings
 from typing import Any
 
-from ._core import ConvergenceError, CutLocusError, ValidationError
-from .arrays import shown
+from ._core import ConvergenceError, CutLocusError
 from .curves.solve import Fault
 from .report import ConvergenceWarning
 
 _PACKAGE = os.path.dirname(__file__)
 _FAULTS: dict[str, type[Exception]] = {"cut-locus": CutLocusError, "unconverged": ConvergenceError}
-
-
-def check_on_failure(on_failure: Any) -> None:
-    """Raise ValidationError unless it is one of the three words."""
-    if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
-        raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {shown(on_failure)}")
 
 
 def fail(faults: list[Fault], on_failure: str, spline: Any) -> None:

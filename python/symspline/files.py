@@ -14,10 +14,11 @@ from ._core import ValidationError
 from .archive import FORMAT, LISTS, MANY, VERSION, arrays_of, rich, write
 from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
+from .options import checked_policy
 from .report import Report
 from .spaces import Product, Space, factors_of, rounding
 from .spaces import space as space_named
-from .spline import CubicSpline, checked_policy
+from .spline import CubicSpline
 from .times import clock_of
 
 _T = TypeVar("_T")

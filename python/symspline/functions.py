@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._core import ValidationError
-from .arrays import as_array, read_only
+from .arrays import read_only
 from .curves import fit as fitting
 from .curves.curve import quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
-from .failures import check_on_failure, fail
+from .failures import fail
+from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
-from .spline import CubicSpline, check_progress, checked_policy, evaluated, options_of, outside
+from .spline import CubicSpline, evaluated
 from .times import knots_of
 
 
@@ -70,10 +71,8 @@ def evaluate(
     check_progress(progress)
     data = fitting.read(points, space)
     velocities = [
-        _velocities(factor, p, u)
-        for factor, p, u in zip(
-            factors_of(space), parts_of(points, space, "points"), parts_of(u, space, "u"), strict=True
-        )
+        _velocities(factor, part.doubles, own)
+        for factor, part, own in zip(factors_of(space), data, parts_of(u, space, "u"), strict=True)
     ]
     batch, nodes = data[0].batch, data[0].nodes
     clock, _, times = knots_of(t, batch, nodes)
@@ -86,15 +85,16 @@ def evaluate(
     return evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
 
 
-def _velocities(space: Space, points: Any, u: Any) -> Array:
-    """Velocities for points, not in a product, as an array of its own flags."""
-    velocities, shape = space._numbers(space._doubles(u, "u")), as_array(points, "points").shape
-    if velocities.shape != shape:
-        raise ValidationError(f"u has shape {velocities.shape}, but points {shape}")
+def _velocities(space: Space, points: Array, u: Any) -> Array:
+    """Velocities for points in doubles, not in a product, as an array that has flags of its own."""
+    doubles = space._doubles(u, "u")
+    velocities = read_only(space._numbers(doubles))
+    if doubles.shape != points.shape:
+        raise ValidationError(f"u has shape {velocities.shape}, but points {space._numbers(points).shape}")
     if not np.isfinite(velocities).all():
         index = np.argwhere(~np.isfinite(velocities))[0].tolist()
         raise ValidationError(f"u{index} is not finite")
-    return read_only(velocities)
+    return velocities
 
 
 def fit_many(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -79,13 +79,19 @@ class Report:
 
     def map(self, function: Any) -> Report:
         """The report with a function applied to the fields that are per curve."""
-        names = ["converged", "iterations", "residual", "max_step", "rate"]
         radius = self.invariant_radius
         if radius is not None:
             part = function(radius)
             radius = None if np.ndim(part) == 0 and np.isnan(part) else part
-        return replace(
-            self, invariant_radius=radius, **{name: function(getattr(self, name)) for name in names}
+        return Report(
+            self.method,
+            function(self.converged),
+            function(self.iterations),
+            function(self.residual),
+            function(self.max_step),
+            self.curvature,
+            radius,
+            function(self.rate),
         )
 
 

@@ -11,15 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import archive
 from ._core import ValidationError
-from .arrays import read_only, shown, whole_number
+from .arrays import read_only, shown
 from .curves.curve import Curve, quantity_of
 from .curves.derivatives import Gradient, Places, places
-from .curves.ends import ends_in_factors, is_closed, kept, picked
+from .curves.ends import ends_in_factors, kept, picked
 from .curves.fit import fit, read, read_ends
 from .curves.integrals import integrate
-from .curves.solve import Options, Progress
+from .curves.solve import Progress
 from .curves.together import longest_step
-from .failures import check_on_failure, fail
+from .failures import fail
+from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report, combined
 from .spaces import Array, Space
 from .spaces import space as space_named
@@ -27,8 +28,6 @@ from .times import Clock, knots_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
 
 
 class CubicSpline:
@@ -442,29 +441,3 @@ def evaluated(
         return curve.evaluate(times, quantity, outside, per_curve, progress)
     except ValidationError as error:
         raise clock.explain(error) from None
-
-
-def options_of(method: str, tol: float, max_iter: int | None) -> Options:
-    """How to solve; the core checks method and tol."""
-    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
-
-
-def checked_policy(extrapolate: Any) -> Any:
-    """What happens outside the knots, if it is one of the words for it."""
-    known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
-    if extrapolate is not None and extrapolate is not True and not known:
-        raise ValidationError(
-            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {shown(extrapolate)}"
-        )
-    return extrapolate
-
-
-def outside(policy: Any, bc_type: Any) -> str:
-    """The same as the core calls it; closed curves go on as they began."""
-    return "periodic" if policy is None and is_closed(bc_type) else _OUTSIDE[policy]
-
-
-def check_progress(progress: Any) -> None:
-    """Raise ValidationError unless it can be called, or is None."""
-    if progress is not None and not callable(progress):
-        raise ValidationError(f"progress must be a function of two numbers, not {shown(progress)}")

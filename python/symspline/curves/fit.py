@@ -21,10 +21,12 @@ from .curve import Curve
 from .ends import End, ends_in_factors, ends_of
 from .in_span import InSpan, kind_of
 from .plain import Plain
-from .solve import Fault, Options, Progress, Solved, Task, checked
+from .solve import Fault, Options, Progress, Solved, Task, checked, solve
 from .together import Together, share
 
 _T = TypeVar("_T")
+# Options for a fit that is not carried out.
+_ANY = Options("auto", 0.0, None)
 
 
 class Points(NamedTuple):
@@ -167,8 +169,7 @@ def validated(
         Task(factor, times, part.doubles, end, part.tol)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
-    ready = _checked(space, tasks, Options("auto", 0.0, None))
-    return [task.space._numbers(task.points) for task in ready]
+    return _in_factors(space, lambda _, task: solve(task, _ANY, dry=True).points, tasks)
 
 
 def _solve(space: Space, tasks: list[Task], options: Options, progress: Progress | None) -> list[Solved]:

@@ -4,7 +4,7 @@ from .base import Array, Space
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
 from .named import space
 from .positive import HermitianPositiveDefinite, SymmetricPositiveDefinite
-from .product import Product, check_tuple, factors_of, parts_of, together
+from .product import Product, factors_of, parts_of, together
 from .rounding import rounding
 from .subspaces import ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective
 from .tolerance import POINT_TOL_FLOAT32, point_tol
@@ -29,7 +29,6 @@ __all__ = [
     "Sphere",
     "SymmetricPositiveDefinite",
     "Unitary",
-    "check_tuple",
     "factors_of",
     "parts_of",
     "point_tol",
