@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import symspline as ss
-from symspline import _tracks as tracks
-from symspline import demo, hurdat
-from symspline._pieces import Pieces, pairs
+from symspline import demo, hurdat, tracks
 from symspline.cli import main
 from symspline.lonlat import from_lonlat, to_lonlat
+from symspline.pieces import Pieces, pairs
 
 HOUR = np.timedelta64(1, "h")
 

@@ -18,11 +18,10 @@ _cpu.check(_Path(__file__).parent)
 
 from . import convert  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
-from ._derivatives import Gradient  # noqa: E402
-from ._threads import set_num_threads  # noqa: E402
+from .curves.derivatives import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
-from .product import Product  # noqa: E402
+from .functions import evaluate, fit, fit_many  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .spaces import (  # noqa: E402
     ComplexGrassmannian,
@@ -32,6 +31,7 @@ from .spaces import (  # noqa: E402
     HermitianPositiveDefinite,
     Hyperbolic,
     Orthogonal,
+    Product,
     RealProjective,
     Space,
     SpecialEuclidean,
@@ -42,7 +42,8 @@ from .spaces import (  # noqa: E402
     Unitary,
     space,
 )
-from .spline import CubicSpline, evaluate, fit, fit_many  # noqa: E402
+from .spline import CubicSpline  # noqa: E402
+from .threads import set_num_threads  # noqa: E402
 
 __version__ = "0.1.0"
 __all__ = [
@@ -84,7 +85,7 @@ __all__ = [
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):
-    if not _threads.isdecimal() or len(_threads) > 9:
+    if not (_threads.isascii() and _threads.isdecimal()) or len(_threads) > 9:
         raise ImportError(f"SYMSPLINE_NUM_THREADS must be a whole number, not {_threads[:99]!r}")
     try:
         set_num_threads(int(_threads))

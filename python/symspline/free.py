@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._arrays import as_array, cast, shown, whole_number
-from ._control import checked_knots, checked_points, control_array
 from ._core import ValidationError
-from ._span import Span, is_large, lifted, span_of
-from .spaces import Space
+from .arrays import as_array, cast, whole_number
+from .curves.control import checked_knots, checked_points, control_array
+from .curves.curve import quantity_of
+from .curves.in_span import reduced
+from .spaces import Array, Product, Space
 from .spaces import space as space_named
-
-Array = NDArray[Any]
-
-_QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
 
 
 class BSpline:
@@ -66,11 +63,7 @@ class BSpline:
         Raises:
             ValidationError: a time is not finite or outside.
         """
-        try:
-            quantity = _QUANTITIES[nu]
-        except (KeyError, TypeError):
-            raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}") from None
-        return self._evaluate(x, quantity)
+        return self._evaluate(x, quantity_of(nu))
 
     def speed(self, x: ArrayLike) -> Array:
         """|γ'| at times x, shape batch axes + x.shape."""
@@ -78,20 +71,14 @@ class BSpline:
 
     def _evaluate(self, x: ArrayLike, quantity: str) -> Array:
         times = self._times(x)
-        space, control, span = self._space, self._control_points, None
-        if is_large(space):
-            span = self._span()
-            space, control = span.space, span.down(control)
+        space, control, span = reduced(self._space, self._control_points)
         values = _core.evaluate_bspline(
-            space._handle, self._knots, control.view(np.float64), self._degree, times, quantity
+            space._handle, self._knots, space._as_doubles(control), self._degree, times, quantity
         )
         if quantity == "speed":
             return values
         batch = control.shape[: control.ndim - len(space.point_shape) - 1]
-        return space._numbers(values) if span is None else lifted(span, space._numbers(values), batch)
-
-    def _span(self) -> Span:
-        return span_of(self._space, self._control_points)
+        return space._numbers(values) if span is None else span.lifted(space._numbers(values), batch)
 
     def _times(self, x: ArrayLike) -> NDArray[np.float64]:
         """Times of the curve as doubles."""
@@ -179,6 +166,6 @@ class BezierCurve(BSpline):
 def _factor(space: Space | str) -> Space:
     """The space, which is no product."""
     space = space_named(space)
-    if hasattr(space, "factors"):
+    if isinstance(space, Product):
         raise ValidationError("a curve in a product is one curve in every factor: make one for each")
     return space

@@ -22,10 +22,11 @@ from jax.core import ShapedArray
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from ._adapters import Kinds, fitted, joined, split
-from .spaces import Space
+from .adapters import Kinds, Movable, fitted, joined, known_velocities, split
+from .curves.ends import ends_in_factors
+from .curves.fit import curve_of
+from .spaces import Product, Space, parts_of
 from .spaces import space as space_named
-from .spline import CubicSpline
 
 Array = jax.Array
 
@@ -43,6 +44,9 @@ def curve(
     welcome. Where many arrays are one point (projective spaces, Grassmannians), differentiate what does not
     depend on the choice.
 
+    With ``on_failure="ignore"`` or ``"warn"`` a curve that did not converge has values, of the best iterate, but its
+    derivatives are NaN: they follow from the C² condition, which it does not fulfil.
+
     Args:
         x: times, any shape.
         t: knots, shape (N+1,), or (..., N+1).
@@ -55,12 +59,10 @@ def curve(
         Shape batch axes + x.shape + point_shape; for a `Product` a tuple.
     """
     space = space_named(space)
-    if hasattr(space, "factors"):
-        from .product import _split_ends, check_tuple
-
-        factors: Any = space
-        check_tuple(points, space, "points")
-        pieces = zip(points, factors.factors, _split_ends(bc_type, factors), strict=True)
+    if isinstance(space, Product):
+        pieces = zip(
+            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
+        )
         return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in pieces)
     kinds, given = split(bc_type)
     points = jnp.asarray(points)
@@ -87,17 +89,15 @@ class _Fixed:
         return hash(self._key())
 
     def fit(self, x: Any, t: Any, points: Any, vectors: Any) -> tuple[Any, Any]:
-        """The curve at x, and the velocities at the knots."""
+        """The curve at x, and the velocities at the knots from which its derivatives are made."""
         spline = fitted(t, points, vectors, self.space, self.kinds, dict(self.options))
-        return spline(x), spline.velocities
+        return spline(x), known_velocities(spline)
 
-    def spline(self, t: Any, points: Any, velocities: Any, vectors: Any) -> Any:
-        """The spline with known velocities."""
+    def movable(self, t: Any, points: Any, velocities: Any, vectors: Any) -> Movable:
+        """The curve with velocities that a fit found."""
         points = self.space.project(points)
         wide = velocities.astype(points.dtype)
-        return CubicSpline._with_velocities(
-            t, points, wide, self.space, joined(self.kinds, vectors), check=False
-        )
+        return Movable(curve_of(self.space, _doubles(t), [(points, wide)]), joined(self.kinds, vectors))
 
 
 def _results(fixed: _Fixed, x: Array, points: Array) -> Any:
@@ -138,9 +138,8 @@ def _push(change: Any, *leaves: Any, fixed: _Fixed, tree: Any) -> Any:
         *inputs, velocities = jax.tree.map(np.asarray, data)
         x, t, points, vectors = inputs
         dx, dt, moved, ends = _apart(np.asarray(change), inputs)
-        spline = fixed.spline(t, points, velocities, vectors)
-        dx = dx.reshape(dx.shape + (1,) * len(fixed.space.point_shape))
-        return (spline.jvp(x, moved, dt, ends) + spline(x, 1) * dx).astype(points.dtype)
+        found = fixed.movable(t, points, velocities, vectors).push(_doubles(x), dx, moved, dt, ends)
+        return found.astype(points.dtype)
 
     return jax.pure_callback(call, _results(fixed, data[0], data[2]), change, data)
 
@@ -151,17 +150,16 @@ def _pull(cotangent: Any, *leaves: Any, fixed: _Fixed, tree: Any) -> Any:
 
     def call(cotangent: Any, data: Any) -> Any:
         x, t, points, vectors, velocities = jax.tree.map(np.asarray, data)
-        spline = fixed.spline(t, points, velocities, vectors)
-        cotangent = np.conj(np.asarray(cotangent))
-        gradient = spline.vjp(x, cotangent)
-        axes = tuple(range(-len(fixed.space.point_shape), 0))
-        along = np.sum((np.conj(cotangent) * spline(x, 1)).real, axis=axes)
-        along = along.reshape(-1, *x.shape).sum(axis=0)
-        parts = jax.tree.leaves((along, gradient.t, gradient.points, gradient.ends))
+        made = fixed.movable(t, points, velocities, vectors)
+        parts = jax.tree.leaves(made.pull(_doubles(x), np.conj(np.asarray(cotangent))))
         return np.concatenate([np.conj(part).ravel() for part in parts]).astype(points.dtype)
 
     size = sum(leaf.size for leaf in jax.tree.leaves(data[:-1]))
     return jax.pure_callback(call, jax.ShapeDtypeStruct((size,), data[2].dtype), cotangent, data)
+
+
+def _doubles(x: Any) -> Any:
+    return np.array(x, np.float64)
 
 
 def _linear(name: str, call: Any) -> Any:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import as_array
+
 Array = NDArray[np.float64]
 
 
@@ -20,7 +22,7 @@ def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
     >>> from_lonlat(90, 0).round(15)
     array([0., 1., 0.])
     """
-    east, north = np.radians(np.asarray(lon, dtype=float)), np.radians(np.asarray(lat, dtype=float))
+    east, north = np.radians(_floats(lon, "lon")), np.radians(_floats(lat, "lat"))
     x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
     return np.stack([x, y, z], axis=-1)
 
@@ -32,7 +34,7 @@ def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
     >>> float(lon), float(lat)
     (90.0, 0.0)
     """
-    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
     return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
@@ -44,9 +46,13 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
     >>> east + 0.0, north + 0.0
     (array([0., 1., 0.]), array([0., 0., 1.]))
     """
-    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
     horizontal = np.hypot(x, y)
     pole = horizontal == 0
     cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
     zero = np.zeros_like(x)
     return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)
+
+
+def _floats(value: ArrayLike, name: str) -> Array:
+    return np.asarray(as_array(value, name), dtype=float)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -75,15 +77,21 @@ class Report:
         names = [field.name for field in fields(self)]
         return all(_same(getattr(self, name), getattr(other, name)) for name in names)
 
-    def _map(self, function: Any) -> Report:
+    def map(self, function: Any) -> Report:
         """The report with a function applied to the fields that are per curve."""
-        names = ["converged", "iterations", "residual", "max_step", "rate"]
         radius = self.invariant_radius
         if radius is not None:
             part = function(radius)
             radius = None if np.ndim(part) == 0 and np.isnan(part) else part
-        return replace(
-            self, invariant_radius=radius, **{name: function(getattr(self, name)) for name in names}
+        return Report(
+            self.method,
+            function(self.converged),
+            function(self.iterations),
+            function(self.residual),
+            function(self.max_step),
+            self.curvature,
+            radius,
+            function(self.rate),
         )
 
 
@@ -97,14 +105,44 @@ def _same(a: Any, b: Any) -> bool:
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy")
 
 
+def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Report:
+    """The report of curves in a product, from those in its factors: the worst of each field."""
+
+    def largest(name: str) -> Any:
+        result: NDArray[Any] = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
+        return result.item() if result.ndim == 0 else result
+
+    converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
+    return Report(
+        method=max((report.method for report in reports), key=SOLVERS.index),
+        converged=bool(converged) if np.ndim(converged) == 0 else converged,
+        iterations=largest("iterations"),
+        residual=largest("residual"),
+        max_step=max_step,
+        curvature=curvature,
+        # The theorem is about each factor by itself.
+        invariant_radius=None,
+        rate=largest("rate"),
+    )
+
+
 def shaped(
     columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float, method: str
 ) -> Report:
     """A report from the compiled core's columns; ``method`` is what was asked for."""
-    values = [column.item() if batch == () else column.reshape(batch) for column in columns]
-    converged, iterations, residual, max_step, rate, solver, radius = values
-    used = (
-        SOLVERS[int(np.max(solver))] if columns[0].size else ("quasi-newton" if method == "auto" else method)
-    )
+    if batch == ():
+        converged, iterations, residual, max_step, rate, last, radius = [c.item() for c in columns]
+        return Report(
+            SOLVERS[last],
+            converged,
+            iterations,
+            residual,
+            max_step,
+            curvature,
+            None if math.isnan(radius) else radius,
+            rate,
+        )
+    converged, iterations, residual, max_step, rate, solvers, radius = [c.reshape(batch) for c in columns]
+    used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
     known = None if np.isnan(radius).all() else radius
     return Report(used, converged, iterations, residual, max_step, curvature, known, rate)

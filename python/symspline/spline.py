@@ -2,41 +2,32 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from ._arrays import as_array, shown, whole_number
-from ._core import ConvergenceError, CutLocusError, ValidationError
-from ._ends import ends_of, kept, picked
-from ._integrals import integrate
-from ._span import Span, fit_in_span, is_large, lifted, span_of
-from ._times import Clock, clock_of
-from .report import ConvergenceWarning, Report, shaped
-from .spaces import Space, point_tol
+from . import archive
+from ._core import ValidationError
+from .arrays import read_only, shown
+from .curves.curve import Curve, quantity_of
+from .curves.derivatives import Gradient, Places, places
+from .curves.ends import ends_in_factors, kept, picked
+from .curves.fit import fit, read, read_ends
+from .curves.integrals import integrate
+from .curves.solve import Progress
+from .curves.together import longest_step
+from .failures import fail
+from .options import check_on_failure, check_progress, checked_policy, options_of, outside
+from .report import Report, combined
+from .spaces import Array, Space
 from .spaces import space as space_named
+from .times import Clock, knots_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from ._derivatives import Gradient
-
-_PACKAGE = os.path.dirname(__file__)
-
-Array = NDArray[Any]
-Progress = Callable[[int, int], object]
-
-_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
-_NORMS = ("speed", "bend")
-_QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
-_FAULTS: dict[str, type[Exception]] = {"cut-locus": CutLocusError, "unconverged": ConvergenceError}
 
 
 class CubicSpline:
@@ -85,27 +76,6 @@ class CubicSpline:
     (2, 3)
     """
 
-    _space: Space
-    _clock: Clock
-    _t: Array
-    _times: NDArray[np.float64]
-    _points: NDArray[np.float64]
-    _velocities: NDArray[np.float64]
-    _bc_type: Any
-    _extrapolate: Any
-    _report: Report
-    _faults: list[tuple[int, str, str]]
-    _small: tuple[Span, Array, Array] | None = None
-
-    def __new__(cls, t: Any = None, points: Any = None, space: Any = None, **options: Any) -> Self:
-        if cls is CubicSpline and space is not None and not isinstance(space, Space):
-            space = space_named(space)
-        if cls is CubicSpline and hasattr(space, "factors"):
-            from .product import ProductSpline
-
-            return object.__new__(ProductSpline)  # type: ignore[return-value]
-        return object.__new__(cls)
-
     def __init__(
         self,
         t: ArrayLike | None,
@@ -121,91 +91,44 @@ class CubicSpline:
         check: bool = True,
         progress: Progress | None = None,
     ) -> None:
-        self._space = space = space_named(space)
-        self._extrapolate = _policy(extrapolate)
-        _check_options(on_failure, progress)
-        self._fill(t, points, bc_type, method, tol, max_iter, check, progress)
-        if self._faults:
-            _fail(self._faults, on_failure, self)
+        space = space_named(space)
+        policy = checked_policy(extrapolate)
+        check_on_failure(on_failure)
+        options = options_of(method, tol, max_iter)
+        check_progress(progress)
+        data = read(points, space)
+        batch, nodes = data[0].batch, data[0].nodes
+        clock, shown_times, times = knots_of(t, batch, nodes)
+        ends = read_ends(bc_type, space, batch)
+        try:
+            curve, reports, faults = fit(space, times, data, ends, options, check, progress)
+        except ValidationError as error:
+            raise clock.explain(error) from None
+        self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
+        if faults:
+            fail(faults, on_failure, self)
 
     def _fill(
         self,
-        t: ArrayLike | None,
-        points: Any,
-        bc_type: Any,
-        method: str,
-        tol: float,
-        max_iter: int | None,
-        check: bool,
-        progress: Progress | None,
-        dry: bool = False,
-    ) -> None:
-        """Validate, and solve unless ``dry``."""
-        space = self._space
-        doubles, point_tol = _points(points, space)
-        axes = doubles.ndim - len(space.point_shape) - 1
-        batch, nodes = doubles.shape[:axes], doubles.shape[axes]
-        self._clock, self._t, self._times = _knots(t, batch, nodes)
-        ends = ends_of(bc_type, space, batch)
-        self._bc_type = kept(bc_type)
-        if max_iter is not None:
-            max_iter = whole_number(max_iter, "max_iter", 1)
-        options = (method, tol, max_iter)
-        try:
-            large = is_large(space)
-            points, velocities, columns, self._faults = _core.fit(
-                space._handle,
-                self._times,
-                doubles,
-                ends,
-                *options,
-                check,
-                point_tol,
-                None,
-                progress,
-                dry or large,
-            )
-        except ValidationError as error:
-            raise self._clock.explain(error) from None
-        self._points, self._velocities = space._numbers(points), space._numbers(velocities)
-        if large and not dry:
-            self._velocities, columns, self._faults = fit_in_span(
-                space, self._times, self._points, ends, options, progress
-            )
-        self._points.flags.writeable = self._velocities.flags.writeable = False
-        if not dry:
-            self._report = shaped(columns, batch, space.curvature, method)
-
-    @classmethod
-    def _made(
-        cls,
-        space: Space,
         clock: Clock,
         t: Array,
-        times: NDArray[np.float64],
-        points: NDArray[np.float64],
-        velocities: NDArray[np.float64],
+        curve: Curve,
         bc_type: Any,
         extrapolate: Any,
-        report: Report,
-    ) -> CubicSpline:
-        """A spline from its parts, without a fit."""
-        self = object.__new__(CubicSpline)
-        self._space, self._clock, self._t, self._times = space, clock, t, times
-        self._points, self._velocities = points, velocities
-        self._points.flags.writeable = self._velocities.flags.writeable = False
-        self._bc_type, self._extrapolate, self._report = bc_type, extrapolate, report
-        return self
+        reports: list[Report],
+    ) -> None:
+        self._clock, self._t, self._curve = clock, t, curve
+        self._bc_type, self._extrapolate, self._reports = bc_type, extrapolate, reports
+        self._outside = outside(extrapolate, bc_type)
+        self._report = (
+            reports[0] if len(reports) == 1 else combined(reports, longest_step(curve), curve.space.curvature)
+        )
 
     @classmethod
-    def _with_velocities(
-        cls, t: ArrayLike | None, points: Any, velocities: Array, space: Space, bc_type: Any, check: bool
-    ) -> CubicSpline:
-        """A spline whose velocities are known: validated, but not fitted."""
-        self = object.__new__(CubicSpline)
-        self._space, self._extrapolate = space, None
-        self._fill(t, points, bc_type, "auto", 0.0, None, check, None, dry=True)
-        self._velocities = velocities
+    def _of(cls, *parts: Any) -> Self:
+        """A spline that was fitted before, from all that it keeps."""
+        self = cls.__new__(cls)
+        self._fill(*parts)
         return self
 
     # ---- the curve ----
@@ -217,6 +140,7 @@ class CubicSpline:
         *,
         extrapolate: bool | str | None = None,
         per_curve: bool = False,
+        progress: Progress | None = None,
     ) -> Any:
         """The curve at times x.
 
@@ -225,6 +149,7 @@ class CubicSpline:
             nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
             extrapolate: as for the constructor, whose choice holds if None.
             per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
+            progress: called from time to time with the finished and the total number of points to compute.
 
         Returns:
             Shape batch axes + x.shape + point_shape (x.shape without its batch axes if ``per_curve``).
@@ -232,23 +157,33 @@ class CubicSpline:
         Raises:
             ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None.
         """
-        try:
-            quantity = _QUANTITIES[nu]
-        except (KeyError, TypeError):
-            raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}") from None
-        return self._at(x, quantity, extrapolate, per_curve)
+        if progress is not None:
+            check_progress(progress)
+        return self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
 
     def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
         """|γ'| at times x, shape batch axes + x.shape."""
         return self._at(x, "speed", extrapolate, per_curve)[()]
 
+    def _at(
+        self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        where = self._outside if extrapolate is None else outside(checked_policy(extrapolate), self._bc_type)
+        return evaluated(self._curve, self._clock, x, quantity, where, per_curve, progress)
+
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
-        return integrate(self._times, lambda x: self._evaluate(x, "speed", None, True), self._batch)
+        return self._integral("speed", 1)
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return integrate(self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch)
+        return self._integral("bend", 2)
+
+    def _integral(self, quantity: str, power: int) -> Any:
+        curve = self._curve
+        return integrate(
+            curve.times, lambda x: curve.evaluate(x, quantity, self._outside, True) ** power, curve.batch
+        )
 
     # ---- how it follows its data ----
 
@@ -287,9 +222,7 @@ class CubicSpline:
         >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
         array([0.6875])
         """
-        from ._derivatives import push
-
-        return push(self, x, points, t, ends, nu)
+        return self._curve.push(self._places(x, nu), self._bc_type, points, t, ends)
 
     def vjp(self, x: ArrayLike, cotangent: Any, nu: int = 0) -> Gradient:
         """The gradient of ``sum(cotangent * curve)`` with respect to the data: `jvp`, transposed.
@@ -313,99 +246,43 @@ class CubicSpline:
         >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
         [[0.40625], [0.6875], [-0.09375]]
         """
-        from ._derivatives import pull
+        return self._curve.pull(self._places(x, nu), self._bc_type, cotangent)
 
-        return pull(self, x, cotangent, nu)
-
-    def _at(self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Any:
-        """A quantity at times as the user gives them."""
-        if self._clock.plain and type(x) is float:
-            # A single time is worth a short way.
-            times = np.array(x)
-        else:
-            times, per_curve = self._clock.at(x, self._batch, per_curve)
+    def _places(self, x: ArrayLike, nu: int) -> Places:
+        curve = self._curve
+        times, per_curve = self._clock.at(x, curve.batch, False)
         try:
-            return self._evaluate(times, quantity, extrapolate, per_curve)
+            return places(curve.times, curve.batch, times, per_curve, nu)
         except ValidationError as error:
             raise self._clock.explain(error) from None
-
-    def _evaluate(
-        self, x: NDArray[np.float64], quantity: str, extrapolate: bool | str | None, per_curve: bool
-    ) -> Array:
-        policy = self._extrapolate if extrapolate is None else _policy(extrapolate)
-        if policy is None and type(self._bc_type) is str and self._bc_type == "periodic":
-            policy = "periodic"
-        if per_curve and x.shape[: len(self._batch)] != self._batch:
-            raise ValidationError(
-                f"with per_curve=True the shape of x must begin with the batch axes {self._batch}; got {x.shape}"
-            )
-        space, points, velocities, span = self._space, self._points, self._velocities, None
-        if is_large(space):
-            span, points, velocities = self._in_span()
-            space = span.space
-        values = _core.evaluate(
-            space._handle,
-            self._times,
-            points.view(np.float64),
-            velocities.view(np.float64),
-            x,
-            quantity,
-            _OUTSIDE[policy],
-            per_curve,
-        )
-        if quantity in _NORMS:
-            return values
-        return space._numbers(values) if span is None else lifted(span, space._numbers(values), self._batch)
-
-    def _in_span(self) -> tuple[Span, Array, Array]:
-        """The span, and points and velocities in it; kept from the first use on."""
-        if self._small is None:
-            # Velocities of a spline lie in the span of its points and end velocities.
-            at_ends = np.take(self._velocities, [0, -1], axis=len(self._batch))
-            self._small = self._down(span_of(self._space, self._points, at_ends))
-        return self._small
-
-    def _down(self, span: Span) -> tuple[Span, Array, Array]:
-        return span, span.down(self._points), span.down(self._velocities)
 
     # ---- what it is made of ----
 
     @property
     def t(self) -> Array:
         """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given."""
-        return _read_only(self._t)
+        return read_only(self._t)
 
     @property
     def points(self) -> Any:
         """The points, shape (..., N+1, *point_shape)."""
-        return self._points
+        return self._curve.points
 
     @property
     def velocities(self) -> Any:
         """Velocities γ' at the knots, the shape of the points. Together with knots and points they are
         the whole curve."""
-        return self._velocities
+        return self._curve.velocities
 
     @property
     def control_points(self) -> Any:
         """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
-        axis = len(self._batch)
-        h = np.diff(self._times)
-        third = h.reshape(h.shape + (1,) * len(self._space.point_shape)) / 3
-        first, last = (slice(None, -1), slice(1, None))
-        index = (slice(None),) * axis
-        p, q = self._points[(*index, first)], self._points[(*index, last)]
-        u, w = self._velocities[(*index, first)], self._velocities[(*index, last)]
-        with np.errstate(all="ignore"):
-            legs = third * u, -third * w
-        # Of curves that were not found they are NaN.
-        inner = [self._space._apply("exp", p=at, v=leg) for at, leg in zip((p, q), legs, strict=True)]
-        return np.stack([p, *inner, q], axis=axis + 1)
+        return self._curve.control_points()
 
     @property
     def space(self) -> Space:
         """The space."""
-        return self._space
+        return self._curve.space
 
     @property
     def bc_type(self) -> Any:
@@ -424,7 +301,23 @@ class CubicSpline:
 
     @property
     def _batch(self) -> tuple[int, ...]:
-        return self._points.shape[: self._points.ndim - len(self._space.point_shape) - 1]
+        return self._curve.batch
+
+    @property
+    def _times(self) -> NDArray[np.float64]:
+        """The knots as the core counts them."""
+        return self._curve.times
+
+    @property
+    def _parts(self) -> tuple[CubicSpline, ...]:
+        """The splines in the factors of a product; in another space the spline is its only part."""
+        if len(self._reports) == 1:
+            return (self,)
+        each = zip(self._curve.parts, ends_in_factors(self._bc_type, self.space), self._reports, strict=True)
+        return tuple(
+            CubicSpline._of(self._clock, self._t, curve, ends, self._extrapolate, [report])
+            for curve, ends, report in each
+        )
 
     # ---- a batch as a sequence ----
 
@@ -435,23 +328,18 @@ class CubicSpline:
 
     def __getitem__(self, index: Any) -> CubicSpline:
         """A curve, or a slice of curves, of a batch."""
-        if not self._batch:
+        axes = len(self._batch)
+        if not axes:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
         if not isinstance(index, (int, np.integer, slice)):
             raise TypeError(f"a curve is picked by a whole number or a slice, not {shown(index)}")
-        own = self._times.ndim > 1
-        return CubicSpline._made(
-            self._space,
-            Clock(self._clock.origin[index][()], self._clock.dates)
-            if np.ndim(self._clock.origin)
-            else self._clock,
-            self._t[index] if own else self._t,
-            np.ascontiguousarray(self._times[index]) if own else self._times,
-            np.ascontiguousarray(self._points[index]),
-            np.ascontiguousarray(self._velocities[index]),
-            picked(self._bc_type, index, len(self._batch), self._space),
+        return CubicSpline._of(
+            self._clock.picked(index),
+            self._t[index] if self._times.ndim > 1 else self._t,
+            self._curve.picked(index),
+            picked(self._bc_type, index, axes, self.space),
             self._extrapolate,
-            self._report._map(lambda column: column[index]),
+            [report.map(lambda column: column[index]) for report in self._reports],
         )
 
     def __bool__(self) -> bool:
@@ -467,39 +355,37 @@ class CubicSpline:
         if not isinstance(other, CubicSpline):
             return NotImplemented
         return (
-            self._space == other._space
+            self.space == other.space
             and self._t.dtype == other._t.dtype
             and np.array_equal(self._t, other._t)
-            and np.array_equal(self._points, other._points, equal_nan=True)
-            and np.array_equal(self._velocities, other._velocities, equal_nan=True)
+            and all(
+                np.array_equal(a.points, b.points, equal_nan=True)
+                and np.array_equal(a.velocities, b.velocities, equal_nan=True)
+                for a, b in zip(self._curve.parts, other._curve.parts, strict=True)
+            )
         )
 
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return CubicSpline._made, (
-            self._space,
+        return CubicSpline._of, (
             self._clock,
             self._t,
-            self._times,
-            self._points,
-            self._velocities,
+            self._curve,
             self._bc_type,
             self._extrapolate,
-            self._report,
+            self._reports,
         )
 
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
-        return f"<CubicSpline on {self._space!r}: {curves}{knots} points, {bc}>"
+        return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        from .files import save
-
-        save(self, file)
+        archive.write(file, archive.arrays_of(self))
 
     def plot(self, file: Any = None) -> Figure:
         """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.
@@ -536,165 +422,22 @@ class CubicSpline:
         return plot(self, file)
 
 
-def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
-    """The velocities of the C² spline through points, as plain arrays.
-
-    Takes the arguments of `CubicSpline`.
-
-    Returns:
-        The velocities, of the shape of the points, and the report.
-
-    >>> import symspline as ss
-    >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
-    >>> u.shape, report.converged
-    ((3, 3), True)
-    """
-    spline = CubicSpline(t, points, space, **options)
-    return spline.velocities, spline.report
-
-
-def evaluate(
+def evaluated(
+    curve: Curve,
+    clock: Clock,
     x: ArrayLike,
-    t: ArrayLike | None,
-    points: Any,
-    u: Any,
-    space: Space | str,
-    nu: int = 0,
-    *,
-    extrapolate: bool | str | None = None,
-    per_curve: bool = False,
+    quantity: str,
+    outside: str,
+    per_curve: bool,
+    progress: Progress | None,
 ) -> Any:
-    """The curve with given knots, points and velocities at times x, as plain arrays.
-
-    Args:
-        x: times, any shape and order.
-        t: knots, as for `CubicSpline`.
-        points, u: points and velocities, shape (..., N+1, *point_shape).
-        space: the space or its name.
-        nu, extrapolate, per_curve: as for calling a `CubicSpline`.
-
-    >>> import symspline as ss
-    >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> u, _ = ss.fit(None, p, "sphere:2")
-    >>> ss.evaluate(0.5, None, p, u, "sphere:2").round(8)
-    array([ 0.61308303,  0.76368565, -0.20227067])
-    """
-    space = space_named(space)
-    if hasattr(space, "factors"):
-        from .product import check_tuple
-
-        check_tuple(points, space, "points")
-        check_tuple(u, space, "u")
-        pieces = zip(points, u, space.factors, strict=True)
-        options = {"extrapolate": extrapolate, "per_curve": per_curve}
-        return tuple(evaluate(x, t, p, v, factor, nu, **options) for p, v, factor in pieces)  # type: ignore[arg-type]
-    velocities, shape = space._numbers(space._doubles(u, "u")), as_array(points, "points").shape
-    if velocities.shape != shape:
-        raise ValidationError(f"u has shape {velocities.shape}, but points {shape}")
-    if not np.isfinite(velocities).all():
-        index = np.argwhere(~np.isfinite(velocities))[0].tolist()
-        raise ValidationError(f"u{index} is not finite")
-    spline = CubicSpline._with_velocities(t, points, velocities, space, "natural", check=True)
-    if is_large(space):
-        # Any velocities, unlike those of a spline.
-        spline._small = spline._down(span_of(space, spline._points, velocities))
-    return spline(x, nu, extrapolate=extrapolate, per_curve=per_curve)
-
-
-def fit_many(
-    curves: Iterable[tuple[ArrayLike | None, Any]], space: Space | str, **options: Any
-) -> list[CubicSpline]:
-    """Fit curves of different lengths in one parallel call.
-
-    Args:
-        curves: pairs (t, points), one a curve; see `CubicSpline`.
-        space: the space of all curves, or its name.
-        options: the options of `CubicSpline`, for all curves alike.
-
-    Returns:
-        One `CubicSpline` a curve. If curves fail and ``on_failure="raise"``, the exception's ``.spline``
-        is this list.
-
-    >>> import symspline as ss
-    >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, 1]]
-    >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
-    [4, 2]
-    """
-    from ._many import fit_many as run
-
-    return run(list(curves), space_named(space), **options)
-
-
-def _points(points: Any, space: Space) -> tuple[NDArray[np.float64], float]:
-    """Points as doubles, and how far off the space they may be."""
-    array = as_array(points, "points")
-    if array.ndim == 0 or array.size == 0:
-        raise ValidationError("no points given; a curve needs at least two")
-    doubles = space._doubles(array, "points")
-    axes = doubles.ndim - len(space.point_shape)
-    if axes == 0:
-        raise ValidationError(
-            f"points has shape {array.shape}, which is one point; a curve needs shape (..., N+1, *point_shape)"
-        )
-    if doubles.shape[axes - 1] < 2:
-        raise ValidationError("a curve needs at least two points; got one")
-    return doubles, point_tol(array.dtype)
-
-
-def _knots(
-    t: ArrayLike | None, batch: tuple[int, ...], nodes: int
-) -> tuple[Clock, Array, NDArray[np.float64]]:
-    """The clock, the knots as shown and as the core counts them."""
-    if t is None:
-        knots = np.arange(nodes, dtype=np.float64)
-        return Clock(), knots, knots
-    clock, shown = clock_of(t)
-    if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
-        own = f" or {(*batch, nodes)}" if batch else ""
-        raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
-    return clock, shown, clock.knots(shown)
-
-
-def _policy(extrapolate: Any) -> Any:
-    known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
-    if extrapolate is not None and extrapolate is not True and not known:
-        raise ValidationError(
-            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {shown(extrapolate)}"
-        )
-    return extrapolate
-
-
-def _check_options(on_failure: Any, progress: Any) -> None:
-    if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
-        raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {shown(on_failure)}")
-    if progress is not None and not callable(progress):
-        raise ValidationError(f"progress must be a function of two numbers, not {shown(progress)}")
-
-
-def _fail(faults: list[tuple[int, str, str]], on_failure: str, spline: Any) -> None:
-    """Raise or warn, with the good curves attached."""
-    if on_failure == "ignore":
-        return
-    _, kind, message = faults[0]
-    if len(faults) > 1:
-        message += f" (and {len(faults) - 1} more curves failed)"
-    if on_failure == "warn":
-        warnings.warn(message, ConvergenceWarning, stacklevel=_callers_level())
-        return
-    error: Any = _FAULTS[kind](message)
-    error.spline = spline
-    raise error
-
-
-def _callers_level() -> int:
-    """How many frames up the code is that called this package."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
-        frame, level = frame.f_back, level + 1
-    return level
-
-
-def _read_only(array: Array) -> Array:
-    view = array.view()
-    view.flags.writeable = False
-    return view
+    """A quantity at times as the user gives them."""
+    if clock.plain and type(x) is float:
+        # A single time is worth a short way.
+        times = np.array(x)
+    else:
+        times, per_curve = clock.at(x, curve.batch, per_curve)
+    try:
+        return curve.evaluate(times, quantity, outside, per_curve, progress)
+    except ValidationError as error:
+        raise clock.explain(error) from None

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from ._adapters import fitted, split
-from .spaces import Space
+from .adapters import fitted, movable, split
+from .curves.ends import ends_in_factors
+from .spaces import Product, Space, parts_of
 from .spaces import space as space_named
 
 
@@ -24,6 +25,9 @@ def curve(
     welcome. Where many arrays are one point (projective spaces, Grassmannians), differentiate what does not
     depend on the choice.
 
+    With ``on_failure="ignore"`` or ``"warn"`` a curve that did not converge has values, of the best iterate, but its
+    derivatives are NaN: they follow from the C² condition, which it does not fulfil.
+
     Args:
         x: times, any shape.
         t: knots, shape (N+1,), or (..., N+1).
@@ -36,12 +40,10 @@ def curve(
         Shape batch axes + x.shape + point_shape; for a `Product` a tuple.
     """
     space = space_named(space)
-    if hasattr(space, "factors"):
-        from .product import _split_ends, check_tuple
-
-        factors: Any = space
-        check_tuple(points, space, "points")
-        pieces = zip(points, factors.factors, _split_ends(bc_type, factors), strict=True)
+    if isinstance(space, Product):
+        pieces = zip(
+            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
+        )
         return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in pieces)
     kinds, vectors = split(bc_type)
     points = torch.as_tensor(points)
@@ -55,30 +57,24 @@ class _Curve(torch.autograd.Function):
     def forward(ctx: Any, x: Any, t: Any, points: Any, start: Any, end: Any, fixed: Any) -> Any:
         space, kinds, options = fixed
         arrays = [None if a is None else a.detach().numpy() for a in (x, t, points, start, end)]
-        ctx.x = np.asarray(arrays[0], float)
-        ctx.spline = fitted(arrays[1], arrays[2], (arrays[3], arrays[4]), space, kinds, options)
+        ctx.x = np.array(arrays[0], float)
+        spline = fitted(arrays[1], arrays[2], (arrays[3], arrays[4]), space, kinds, options)
+        ctx.movable = movable(spline)
         ctx.like = [None if a is None else (a.dtype, a.shape) for a in (x, t, points, start, end)]
-        return torch.as_tensor(ctx.spline(ctx.x)).to(points.dtype)
+        return torch.as_tensor(spline(ctx.x)).to(points.dtype)
 
     @staticmethod
     def backward(ctx: Any, *cotangents: Any) -> Any:
         cotangent = cotangents[0].detach().resolve_conj().numpy()
-        spline, x = ctx.spline, ctx.x
-        gradient = spline.vjp(x, cotangent)
-        axes = tuple(range(-len(spline.space.point_shape), 0))
-        along = np.sum((np.conj(cotangent) * spline(x, 1)).real, axis=axes).reshape(-1, *x.shape).sum(axis=0)
-        found = (along, gradient.t, gradient.points, *gradient.ends)
-        return *(_tensor(a, like) for a, like in zip(found, ctx.like, strict=True)), None
+        along, t, points, ends = ctx.movable.pull(ctx.x, cotangent)
+        return *(_tensor(a, like) for a, like in zip((along, t, points, *ends), ctx.like, strict=True)), None
 
     @staticmethod
     def jvp(ctx: Any, *changes: Any) -> Any:
         dx, dt, points, *ends = (
             None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5]
         )
-        spline, x = ctx.spline, ctx.x
-        moved = spline.jvp(x, points, dt, (ends[0], ends[1]))
-        if dx is not None:
-            moved = moved + spline(x, 1) * dx.reshape(dx.shape + (1,) * len(spline.space.point_shape))
+        moved = ctx.movable.push(ctx.x, dx, points, dt, ends)
         return torch.as_tensor(moved).to(ctx.like[2][0])
 
 

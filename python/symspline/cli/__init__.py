@@ -9,8 +9,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from .._arrays import brief
 from .._core import ConvergenceError, CutLocusError, ValidationError
+from ..arrays import brief
 from . import check, demo, fit, plot, sample
 from .errors import Problem, with_names
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._pieces import is_closed, spline_pieces
-from ..product import ProductSpline
-from ..spaces import HermitianPositiveDefinite, Hyperbolic, Space, SymmetricPositiveDefinite
+from ..curves.ends import is_closed
+from ..pieces import spline_pieces
+from ..spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite, rounding
 from ..spline import CubicSpline
 from .curves import read_curves
 from .errors import Failure, listed
@@ -91,8 +89,7 @@ class Found:
 
 def measure(spline: CubicSpline) -> Found:
     """Distance from the points, and jumps at the knots; of a curve in a product, in its worst factor."""
-    parts = spline._parts if isinstance(spline, ProductSpline) else (spline,)
-    found = [_measure(part) for part in parts]
+    found = [_measure(part) for part in spline._parts]
     values = np.max([part.values for part in found], axis=0)
     return Found(tuple(values.tolist()), float(np.max([part.excess for part in found])))
 
@@ -101,26 +98,17 @@ def _measure(spline: CubicSpline) -> Found:
     if not np.isfinite(spline.velocities).all():
         return Found((np.nan,) * len(MEASURES), np.inf)
     pieces = spline_pieces(spline)
-    closed = is_closed(spline)
+    closed = is_closed(spline.bc_type)
     steps = np.diff(spline._times)
     shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
-    rounding = _ROUNDING * _condition(spline.space, spline.points)
+    floor = _ROUNDING * rounding(spline.space, spline.points)
     distance = float(spline.space.distance(pieces.at(pieces.t), pieces.points).max())
-    values, excess = [distance], [distance / (_RELATIVE + rounding)]
+    values, excess = [distance], [distance / (_RELATIVE + floor)]
     for nu in range(3):
         jumps = pieces.jumps(nu, closed)
         if nu == 0 and isinstance(spline.space, _POSITIVE):
             jumps = replace(jumps, largest=1.0)
-        allowed = _RELATIVE * jumps.largest + rounding / shorter**nu
+        allowed = _RELATIVE * jumps.largest + floor / shorter**nu
         values.append(jumps.relative)
         excess.append(float((jumps.size / allowed).max(initial=0.0)))
     return Found(tuple(values), max(excess))
-
-
-def _condition(space: Space, points: NDArray[Any]) -> float:
-    """By how much rounding counts near these points."""
-    if isinstance(space, Hyperbolic):
-        return float(np.square(points).sum(axis=-1).max())
-    if isinstance(space, _POSITIVE):
-        return float(np.linalg.cond(points).max())
-    return max(1.0, float(np.abs(points).max()))

@@ -15,9 +15,11 @@ import numpy as np
 
 from .errors import Problem, first_twice, reading
 from .layout import Doubles
+from .numbers import is_number
+from .numbers import numbers as as_numbers
 from .progress import Progress
 from .tables import Array, Rows, Table
-from .times import is_number, parse_times
+from .times import parse_times
 
 # Few enough rows to stay in the processor's cache: three times faster than many.
 _CHUNK = 2000
@@ -100,7 +102,7 @@ class CsvTable(Table):
         table = np.empty((len(lines), len(cells)))
         for column, (name, texts) in zip(table.T, cells.items(), strict=True):
             try:
-                column[:] = np.fromiter(map(float, texts), np.float64, len(texts))
+                column[:] = as_numbers(texts)
             except ValueError:
                 i = next(i for i, text in enumerate(texts) if not is_number(text))
                 found = f"holds {texts[i]!r}, which is not a number" if texts[i].strip() else "is empty"

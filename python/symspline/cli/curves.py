@@ -11,8 +11,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .._arrays import brief
-from ..files import load, load_many, save, save_many
+from ..arrays import brief
+from ..files import load, load_many, save_many
 from ..spaces import Space
 from ..spline import CubicSpline
 from .errors import Problem, reading, writing
@@ -68,7 +68,7 @@ def write_curves(path: Path, curves: Curves) -> None:
             if curves.named:
                 save_many(curves.splines, file)
             else:
-                save(next(iter(curves.splines.values())), file)
+                next(iter(curves.splines.values())).save(file)
         columns = np.array(json.dumps(asdict(curves.columns)))
         with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
             np.lib.format.write_array(entry, columns)

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from ..product import Product
-from ..spaces import Space
+from ..spaces import Product, Space
 from .errors import Problem, with_names
 from .layout import matrix, unflatten
 from .points import from_degrees, onto
@@ -22,6 +21,10 @@ Groups = Mapping[str, NDArray[np.int64]]
 
 # What helps in Python only.
 _ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter| \(np\.[^()]*\)")
+
+# Longitudes may count on where a track goes round the globe, but ten times is more than one does; what is beyond
+# stands for a place that is not known, such as 1e15 or 9999.
+_FARTHEST = 3600
 
 
 class Data:
@@ -76,6 +79,13 @@ class Data:
 
     def _places(self) -> NDArray[np.float64]:
         degrees = self._rows.numbers
+        wild = np.flatnonzero(np.abs(degrees[:, 0]) > _FARTHEST)
+        if wild.size:
+            where = self._rows.place(wild[0])
+            raise Problem(
+                f"{self._path}, {where}: longitude {degrees[wild[0], 0]:g} is not between -{_FARTHEST} and "
+                f"{_FARTHEST} degrees; leave out what is missing"
+            )
         off = np.flatnonzero(np.abs(degrees[:, 1]) > 90)
         if off.size:
             where = self._rows.place(off[0])

@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
-from ..files import replacing
-from ..spaces import _CLASSES
+from ..archive import replacing
+from ..spaces.base import CLASSES
 
-_NAMES = {cls.__name__: name for name, cls in _CLASSES.items()}
+_NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
 _SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\(([\w, ]+)\)")
 
 

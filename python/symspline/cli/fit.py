@@ -9,17 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
+from ..functions import fit_many
 from ..spaces import Space
 from ..spaces import space as space_named
-from ..spline import CubicSpline, fit_many
+from ..spline import CubicSpline
 from .curves import ENDING, Curves, write_curves
 from .data import Data
 from .entries import completed
 from .errors import Problem, check_target
+from .formats import open_table
+from .numbers import real
 from .points import GLOBE, require_globe
 from .progress import Progress
 from .roles import named_columns, point_entries, split_names, time_column
-from .tables import ending, open_table
+from .tables import ending
 
 SUMMARY = "fit C2 splines to the points in a table"
 DESCRIPTION = """\
@@ -74,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--method", default="auto", metavar="M", help="auto (default), quasi-newton or fixed-point")
     add(
         "--tol",
-        type=float,
+        type=real,
         default=1e-12,
         help="relative C2 defect that counts as converged (default: 1e-12)",
     )

@@ -9,27 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..product import Product
-from ..spaces import Space
+from ..spaces import Product, Space, factors_of
 
 Doubles = NDArray[np.float64]
 
 RE, IM = "_re", "_im"
 
 
-def factors(space: Space) -> tuple[Space, ...]:
-    """The factors of a product; any other space is its own."""
-    return space.factors if isinstance(space, Product) else (space,)
-
-
 def is_complex(space: Space) -> bool:
     """Whether points of a space, not a product, are complex."""
-    return space.dtype.kind == "c"
+    return bool(space.dtype.kind == "c")
 
 
 def complex_numbers(space: Space) -> list[bool]:
     """For every number of a point whether it is complex."""
-    return [is_complex(factor) for factor in factors(space) for _ in range(math.prod(factor.point_shape))]
+    return [is_complex(factor) for factor in factors_of(space) for _ in range(math.prod(factor.point_shape))]
 
 
 # ---- names ----
@@ -38,10 +32,10 @@ def complex_numbers(space: Space) -> list[bool]:
 def labels(space: Space) -> list[str]:
     """Names for the numbers of a point: x0, x1, … of vectors, m11, m12, … of a matrix, and of several
     matrices in a product m1_11, m1_12, …, m2_11, …"""
-    matrices = [factor for factor in factors(space) if _is_matrix(factor)]
+    matrices = [factor for factor in factors_of(space) if _is_matrix(factor)]
     names: list[str] = []
     vectors = number = 0
-    for factor in factors(space):
+    for factor in factors_of(space):
         if _is_matrix(factor):
             number += 1
             start = f"m{number}_" if len(matrices) > 1 else "m"
@@ -70,10 +64,10 @@ def column_names(space: Space, names: Sequence[str], nu: int = 0) -> list[str]:
 
 def described(space: Space) -> str:
     """How many numbers a point has, and in what order."""
-    parts = [_described(factor) for factor in factors(space)]
+    parts = [_described(factor) for factor in factors_of(space)]
     if len(parts) == 1:
         return parts[0]
-    each = "; ".join(f"{factor}: {part}" for factor, part in zip(factors(space), parts, strict=True))
+    each = "; ".join(f"{factor}: {part}" for factor, part in zip(factors_of(space), parts, strict=True))
     return f"{len(labels(space))} numbers ({each})"
 
 
@@ -108,7 +102,7 @@ def unflatten(space: Space, columns: Doubles) -> list[NDArray[Any]]:
     """The points of which these are the columns, in every factor."""
     parts: list[NDArray[Any]] = []
     start = 0
-    for factor in factors(space):
+    for factor in factors_of(space):
         width = math.prod(factor.point_shape) * (2 if is_complex(factor) else 1)
         part = np.ascontiguousarray(columns[:, start : start + width]).view(factor.dtype)
         parts.append(part.reshape(len(columns), *factor.point_shape))

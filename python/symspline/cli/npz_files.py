@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import brief
+from ..arrays import brief
 from .errors import Problem, did_you_mean, reading
 from .layout import IM, RE
 from .tables import Array, ArrayTable

@@ -6,8 +6,8 @@ import csv
 from collections.abc import Sequence
 
 from .. import spaces
-from ..product import Product
-from ..spaces import Space
+from ..spaces import Product, Space
+from ..spaces.base import COMPLEX_TWINS
 from .curves import Columns
 from .entries import Entry, paired
 from .errors import Problem, first_twice, listed
@@ -99,9 +99,9 @@ def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool)
 
 def _advice(space: Space, as_many: bool) -> str:
     """What to do about complex numbers where real ones belong."""
-    if not as_many or isinstance(space, Product) or space._name not in spaces._COMPLEX:
+    if not as_many or isinstance(space, Product) or space._name not in COMPLEX_TWINS:
         return "name its columns one by one with --columns"
-    meant: type[Space] = getattr(spaces, spaces._COMPLEX[space._name])
+    meant: type[Space] = getattr(spaces, COMPLEX_TWINS[space._name])
     return f"did you mean --space {meant._name}:{','.join(map(str, space._parameters))}?"
 
 

@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._pieces import is_closed
+from ..curves.ends import is_closed
 from ..spline import CubicSpline
 from .curves import Curves, read_curves
 from .data import Groups, group
 from .errors import Problem, check_target, did_you_mean, first_twice
+from .formats import open_table, write_table
 from .layout import column_names, flatten
+from .numbers import whole
 from .points import motion_degrees, motion_labels, to_degrees
 from .progress import Progress
 from .roles import time_column
-from .tables import ENDINGS, Rows, Table, ending, open_table, write_table
+from .tables import ENDINGS, Rows, Table, ending
 from .times import Times, every, spread
 
 SUMMARY = "make a table of points along curves"
@@ -56,7 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="from the start in steps: a number in the unit of the times, seconds for dates; or for dates "
         "a duration in ns, us, ms, s, min, h or d",
     )
-    which.add_argument("-n", dest="number", type=int, metavar="N", help="so many, from the start to the end")
+    which.add_argument(
+        "-n", dest="number", type=whole, metavar="N", help="so many, from the start to the end"
+    )
     which.add_argument(
         "--at", type=Path, metavar="FILE", help="at the times in a table: .csv, .npz or .parquet"
     )
@@ -142,7 +146,7 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
         kinds = "dates", "numbers"
         wanted, found = kinds if knots.dtype.kind == "M" else kinds[::-1]
         raise Problem(f"{path}: the times of {curves.called(name)} are {wanted}, but these are {found}")
-    if spline.extrapolate is not None or is_closed(spline):
+    if spline.extrapolate is not None or is_closed(spline.bc_type):
         return
     outside = np.flatnonzero((times < knots[0]) | (times > knots[-1]))
     if outside.size:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import Problem, did_you_mean, writing
+from .errors import Problem, did_you_mean
 from .layout import IM, RE, Doubles
 from .progress import Progress
 from .times import Fail, parse_times
@@ -160,35 +160,3 @@ def ending(path: Path, allowed: Sequence[str], what: str) -> str:
     if suffix not in allowed:
         raise Problem(f"{path}: the name of {what} must end in {' or '.join(allowed)}")
     return suffix
-
-
-def open_table(path: Path) -> Table:
-    """The table in a CSV, NPZ or Parquet file."""
-    suffix = ending(path, ENDINGS, "a table")
-    if suffix == ".csv":
-        from .csv_files import CsvTable
-
-        return CsvTable(path)
-    if suffix == ".npz":
-        from .npz_files import NpzTable
-
-        return NpzTable(path)
-    from .parquet_files import ParquetTable
-
-    return ParquetTable(path)
-
-
-def write_table(path: Path, columns: Mapping[str, Array], utc: bool) -> None:
-    """Write columns of equal length to a CSV, NPZ or Parquet file, by its ending."""
-    suffix = ending(path, ENDINGS, "a table")
-    with writing(path) as temporary, open(temporary, "wb") as file:
-        if suffix == ".csv":
-            from .csv_files import write_csv
-
-            write_csv(file, columns, utc)
-        elif suffix == ".npz":
-            np.savez(file, **columns)  # type: ignore[arg-type]
-        else:
-            from .parquet_files import write_parquet
-
-            write_parquet(file, columns, utc)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import Problem
+from .numbers import is_number, numbers
 
 Times = NDArray[Any]
 Fail = Callable[[int, str], Problem]
@@ -41,15 +42,6 @@ _MOST = 10**9
 _EXPONENT = 400
 
 
-def is_number(text: str) -> bool:
-    """Whether a text is a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 # ---- columns ----
 
 
@@ -69,7 +61,7 @@ def parse_times(cells: list[str], fail: Fail) -> tuple[Times, bool]:
 
 def _numbers(cells: list[str], fail: Fail) -> Times:
     try:
-        values = np.fromiter(map(float, cells), np.float64, len(cells))
+        values = numbers(cells)
     except ValueError:
         i = next(i for i, cell in enumerate(cells) if not is_number(cell))
         raise fail(

@@ -21,7 +21,7 @@ _NAMED, _OTHERS = 12, 100
 
 def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Every component against time, the first twelve with their names."""
-    space = curves[0].spline.space
+    space = curves[0].space
     kept = independent(space)
     names = component_names(space.point_shape, space.dtype.kind == "c")
     numbers = [components(curve.points)[:, kept] for curve in curves]

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from ..spline import CubicSpline
+from ..curves.curve import Curve as Data
+from ..report import Report
+from ..spaces import Space
 from .style import DATES, INK, colors
 
 Doubles = NDArray[np.float64]
@@ -22,12 +24,35 @@ MOST = 50
 """The largest number of curves of a batch that are drawn."""
 
 
+class Spline(Protocol):
+    """What is asked of a spline that is to be drawn: that is a `symspline.CubicSpline`."""
+
+    _curve: Data
+
+    @property
+    def t(self) -> NDArray[Any]:
+        """The knots as they were given."""
+
+    @property
+    def space(self) -> Space:
+        """The space."""
+
+    @property
+    def bc_type(self) -> Any:
+        """The end conditions."""
+
+    @property
+    def report(self) -> Report:
+        """How the fit went."""
+
+
 @dataclass(frozen=True)
 class Curve:
     """One curve and how it is drawn.
 
     Attributes:
-        spline: one curve, not a batch.
+        data: one curve, not a batch.
+        first: its first knot as it was given.
         x: times, as the core counts them; among them all knots.
         color: of its line.
         alone: whether it is the only curve of the figure.
@@ -35,12 +60,23 @@ class Curve:
         dates: whether time axes show dates: matplotlib's are good to a microsecond.
     """
 
-    spline: CubicSpline
+    data: Data
+    first: Any
     x: Doubles
     color: Any
     alone: bool
     start: Any
     dates: bool
+
+    @property
+    def space(self) -> Space:
+        """Where the curve runs."""
+        return self.data.space
+
+    @property
+    def given(self) -> Any:
+        """The given points."""
+        return self.data.points
 
     @cached_property
     def points(self) -> Any:
@@ -62,7 +98,7 @@ class Curve:
     @cached_property
     def times(self) -> Doubles:
         """The times x where matplotlib puts them on an axis."""
-        first, since = self.spline.t[0], self.x - self.x[0]
+        first, since = self.first, self.x - self.x[0]
         if self.dates:
             return np.asarray(DATES.date2num(first + np.rint(1e6 * since).astype("timedelta64[us]")))
         if self.start is not None:
@@ -72,7 +108,7 @@ class Curve:
     @property
     def knots(self) -> slice:
         """Where the knots are among the times x."""
-        return slice(None, None, (len(self.x) - 1) // (len(self.spline.t) - 1))
+        return slice(None, None, (len(self.x) - 1) // (self.data.times.size - 1))
 
     def picked(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Which of the times x to draw something large at: at most ``number`` knots, and times in between."""
@@ -92,10 +128,10 @@ class Curve:
 
     def part(self, number: int) -> Curve:
         """The curve in one factor of a product."""
-        return replace(self, spline=self.spline._parts[number])  # type: ignore[attr-defined]
+        return replace(self, data=self.data.parts[number])
 
     def _at(self, quantity: str) -> Any:
-        return self.spline._evaluate(self.x, quantity, None, False)
+        return self.data.evaluate(self.x, quantity, "raise", False)
 
     # ---- on axes of two or three dimensions ----
 
@@ -113,47 +149,47 @@ class Curve:
         axes.plot(*places[:1].T, "o", **look | {"color": "white", "markeredgewidth": 1.2})
 
 
-def curves_of(spline: CubicSpline) -> tuple[list[Curve], str]:
+def curves_of(spline: Spline) -> tuple[list[Curve], str]:
     """The curves to draw, and in words which they are.
 
     Raises:
         ValidationError: no curve is finite.
     """
-    batch = spline._batch
+    batch = spline._curve.batch
     everything = int(np.prod(batch))
-    good = np.flatnonzero(_finite(spline))
+    good = np.flatnonzero(_finite(spline._curve))
     if not good.size:
         raise ValidationError(
             "there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)"
         )
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), MOST)).astype(int))]
     number = f"{len(chosen)} of {everything}" if len(chosen) < everything else f"{everything}"
-    picked = [_pick(spline, np.unravel_index(number, batch)) for number in chosen]
-    alone = len(picked) == 1
+    alone = len(chosen) == 1
     start = spline.t.min() if spline.t.dtype.kind == "M" else None
     dates = start is not None and bool((spline.t.max() - start) / _SECOND > 1e-3)
-    curves = [
-        Curve(curve, _samples(curve._times), color, alone, start, dates)
-        for curve, color in zip(picked, colors(len(picked)), strict=True)
-    ]
+    firsts = np.broadcast_to(spline.t, (*batch, spline.t.shape[-1]))[..., 0]
+    curves = []
+    for i, color in zip(chosen, colors(len(chosen)), strict=True):
+        index = np.unravel_index(i, batch)
+        data = _pick(spline._curve, index)
+        curves.append(Curve(data, firsts[index], _samples(data.times), color, alone, start, dates))
     return curves, f"{number} curves, " if batch else ""
 
 
-def _finite(spline: CubicSpline) -> NDArray[np.bool_]:
+def _finite(data: Data) -> NDArray[np.bool_]:
     """Which curves are finite, one after the other."""
-    batch, times = spline._batch, spline._times
-    start = np.broadcast_to(times, (*batch, times.shape[-1]))[..., :1]
+    start = np.broadcast_to(data.times, (*data.batch, data.times.shape[-1]))[..., :1]
     finite: NDArray[np.bool_] = np.isfinite(
-        spline._evaluate(np.ascontiguousarray(start), "speed", None, True)
+        data.evaluate(np.ascontiguousarray(start), "speed", "raise", True)
     )
     return finite.ravel()
 
 
-def _pick(spline: CubicSpline, index: Sequence[Any]) -> CubicSpline:
+def _pick(data: Data, index: Sequence[Any]) -> Data:
     """One curve of a batch."""
     for i in index:
-        spline = spline[i]
-    return spline
+        data = data.picked(i)
+    return data
 
 
 def _samples(knots: Doubles) -> Doubles:

@@ -37,7 +37,7 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
     _draw_grid(axes, spacing)
     for curve in curves:
         curve.draw_line(axes, flat(curve.points, centre))
-        curve.draw_dots(axes, flat(curve.spline.points, centre))
+        curve.draw_dots(axes, flat(curve.given, centre))
     note = f"Poincaré disk; geodesics that cross the axes every {spacing:g}"
     if not np.array_equal(centre, _ORIGIN):
         note += "\nmiddle: " + "(" + ", ".join(f"{x:.4g}" for x in centre) + ")"

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
-from ..spaces import SpecialEuclidean
-from ..spline import CubicSpline
-from .curves import Curve, curves_of
+from ..spaces import Product, SpecialEuclidean, factors_of
+from .curves import Curve, Spline, curves_of
 from .pictures import Picture, picture_of
 from .style import DPI, INK, heading
 from .timeline import timelines
@@ -30,10 +29,10 @@ class CurveFigure(Figure):
         return buffer.getvalue()
 
 
-def plot(spline: CubicSpline, file: Any = None) -> Figure:
+def plot(spline: Spline, file: Any = None) -> Figure:
     """The figure of a spline, saved if ``file`` is given. See `symspline.CubicSpline.plot`."""
     curves, words = curves_of(spline)
-    picture = _of_factors(curves) if hasattr(spline.space, "factors") else picture_of(spline.space)
+    picture = _of_factors(curves) if isinstance(spline.space, Product) else picture_of(spline.space)
     wide = picture.width > 1.5 * picture.height
     if wide:
         widths, heights = [picture.width], [_HEAD, picture.height, _RATES_HEIGHT]
@@ -50,16 +49,20 @@ def plot(spline: CubicSpline, file: Any = None) -> Figure:
     return figure
 
 
-def _description(spline: CubicSpline) -> str:
+def _description(spline: Spline) -> str:
     """Points, end conditions and whether the solver got there."""
     ends = f"{spline.bc_type} ends" if isinstance(spline.bc_type, str) else "own end conditions"
-    words = f"{spline.t.shape[-1]} points{' each' if spline._batch else ''}, {ends}"
-    factors = len(getattr(spline.space, "factors", ()))
+    words = f"{spline.t.shape[-1]} points{' each' if spline._curve.batch else ''}, {ends}"
+    factors = len(factors_of(spline.space))
     if factors > _FACTORS:
         words += f", {_FACTORS} of {factors} factors"
     if np.all(spline.report.converged):
         return words
-    number = f"{np.size(spline.report.converged) - np.sum(spline.report.converged)} " if spline._batch else ""
+    number = (
+        f"{np.size(spline.report.converged) - np.sum(spline.report.converged)} "
+        if spline._curve.batch
+        else ""
+    )
     return f"{words}, {number}not converged"
 
 
@@ -67,7 +70,7 @@ def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """|γ'| and |∇γ'| of every curve."""
     per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
     # Rigid motions have no invariant lengths, see `SpecialEuclidean`.
-    rigid = isinstance(curves[0].spline.space, SpecialEuclidean)
+    rigid = isinstance(curves[0].space, SpecialEuclidean)
     first, second = ("|(ω, v)|", "|(ω′, v′)|") if rigid else ("|γ′|", "|∇γ′|")
     speed, bend = timelines(panel, curves, [f"speed\n{first}{per[0]}", f"acceleration\n{second}{per[1]}"])
     for curve in curves:
@@ -84,7 +87,7 @@ def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 def _of_factors(curves: Sequence[Curve]) -> Picture:
     """The pictures of a product's factors, side by side."""
-    factors = curves[0].spline.space.factors  # type: ignore[attr-defined]
+    factors = factors_of(curves[0].space)
     shown = factors[:_FACTORS]
     rows = 1 if len(shown) <= 3 else 2
     columns = -(-len(shown) // rows)

@@ -29,7 +29,7 @@ def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
     axes = plane(panel)
     for curve in curves:
         curve.draw_line(axes, curve.points)
-        curve.draw_dots(axes, curve.spline.points)
+        curve.draw_dots(axes, curve.given)
 
 
 def draw_room(panel: SubFigure, curves: Sequence[Curve]) -> None:
@@ -37,7 +37,7 @@ def draw_room(panel: SubFigure, curves: Sequence[Curve]) -> None:
     axes = room(panel, [curve.points for curve in curves])
     for curve in curves:
         curve.draw_line(axes, curve.points)
-        curve.draw_dots(axes, curve.spline.points)
+        curve.draw_dots(axes, curve.given)
 
 
 def plane(panel: SubFigure) -> Axes:

@@ -26,7 +26,7 @@ def draw_sphere(panel: SubFigure, curves: Sequence[Curve]) -> None:
     points = np.concatenate([curve.points for curve in curves])
     axes, view = part_of_globe(panel, points) or _globe(panel, points)
     for curve in curves:
-        draw_on_globe(axes, view, curve, curve.points, curve.spline.points)
+        draw_on_globe(axes, view, curve, curve.points, curve.given)
     width, height = size(panel)
     if width > 2 * height:
         _draw_map(panel, curves, height)

@@ -15,10 +15,10 @@ from textwrap import fill
 
 import numpy as np
 
-from ._tracks import GLOBE, Positions, Summary, comparison, fit_tracks, hourly, summary
-from .files import replacing
-from .hurdat import Storm, read_sample
-from .spline import CubicSpline
+from ..archive import replacing
+from ..hurdat import Storm, read_sample
+from ..spline import CubicSpline
+from ..tracks import GLOBE, Positions, Summary, comparison, fit_tracks, hourly, summary
 
 _GAP = np.timedelta64(1, "h")
 """Extra fixes closer to another fix are left out. Rounding to 0.1 degree makes an error of 11.1/√12 =
@@ -151,7 +151,7 @@ def _write_pictures(
     if find_spec("matplotlib") is None:
         print("No pictures without matplotlib; install it with: pip install 'symspline[plot]'")
         return []
-    from ._maps import draw_comparison, draw_three_points, draw_tracks
+    from .maps import draw_comparison, draw_three_points, draw_tracks
 
     tracks, points, c2 = (folder / name for name in ("tracks.png", "three-points.png", "c2.png"))
     with replacing(tracks) as file:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from ._arrays import as_array, cast
-from ._core import CutLocusError, ValidationError
-from .spaces import Space, point_tol
-
-Array = NDArray[Any]
-
-_OPEN: Any = [("natural", None), ("natural", None)]
+from .._core import CutLocusError, ValidationError
+from ..arrays import as_array, cast
+from ..spaces import Array, Space, point_tol
+from .ends import ends_of
+from .fit import Points, validated
 
 
 def control_array(value: ArrayLike, space: Space, least: int) -> tuple[NDArray[np.float64], float]:
@@ -34,21 +29,14 @@ def checked_points(space: Space, doubles: NDArray[np.float64], tol: float) -> Ar
     *batch, count = space._lead(doubles)
     try:
         # A fit that is not carried out: it looks at points in the same way.
-        projected = _core.fit(
-            space._handle,
+        (points,) = validated(
+            space,
             np.arange(count, dtype=np.float64),
-            doubles,
-            _OPEN,
-            "auto",
-            0.0,
-            None,
-            True,
-            tol,
-            dry=True,
-        )[0]
+            [Points(doubles, tol, tuple(batch), count)],
+            [ends_of("natural", space, tuple(batch))],
+        )
     except ValidationError as error:
         raise ValidationError(str(error).replace("points[", "control_points[")) from None
-    points = space._numbers(projected)
     index = (slice(None),) * len(batch)
     try:
         space._apply("log", p=points[(*index, slice(-1))], q=points[(*index, slice(1, None))])

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._core import ValidationError
-from ._reading import (
+from .._core import ValidationError
+from .reading import (
     Array,
     adjoint,
     largest,

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .functions import evaluate
 from .spaces import Space
-from .spline import CubicSpline, evaluate
+from .spline import CubicSpline
 
 Array = NDArray[Any]
 Doubles = NDArray[np.float64]
@@ -77,11 +78,6 @@ class Pieces:
 def spline_pieces(spline: CubicSpline) -> Pieces:
     """The segments of one curve, not in a product."""
     return Pieces(spline.space, pairs(spline.t), pairs(spline.points), pairs(spline.velocities))
-
-
-def is_closed(spline: CubicSpline) -> bool:
-    """Whether the curve goes on at its start where it ends."""
-    return isinstance(spline.bc_type, str) and spline.bc_type == "periodic"
 
 
 def pairs(values: Array) -> Array:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ._pieces import Pieces, pairs, spline_pieces
+from .functions import fit_many
 from .hurdat import Storm
 from .lonlat import compass, from_lonlat, to_lonlat
+from .pieces import Pieces, pairs, spline_pieces
 from .spaces import Sphere
-from .spline import CubicSpline, fit_many
+from .spline import CubicSpline
 
 Array = NDArray[np.float64]
 Times = NDArray[np.datetime64]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, cast
 from ._core import ValidationError
+from .arrays import as_array, cast
 
 Doubles = NDArray[np.float64]
 
@@ -57,6 +57,10 @@ class Clock:
         origin = self.origin.reshape(batch + (1,) * len(own))
         return self._doubles(np.broadcast_to(array, batch + own), origin, "x"), True
 
+    def picked(self, index: Any) -> Clock:
+        """The clock of part of a batch."""
+        return Clock(self.origin[index][()], self.dates) if np.ndim(self.origin) else self
+
     def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
         if self.dates:
             return _seconds(array, origin, name)
@@ -90,6 +94,18 @@ def clock_of(knots: ArrayLike) -> tuple[Clock, NDArray[Any]]:
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"t must be numbers or datetime64, not {array.dtype}")
     return Clock(), cast(array.copy())
+
+
+def knots_of(t: ArrayLike | None, batch: tuple[int, ...], nodes: int) -> tuple[Clock, NDArray[Any], Doubles]:
+    """The clock of curves with so many knots each, the knots as shown, and as the core counts them."""
+    if t is None:
+        knots = np.arange(nodes, dtype=np.float64)
+        return Clock(), knots, knots
+    clock, shown = clock_of(t)
+    if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
+        own = f" or {(*batch, nodes)}" if batch else ""
+        raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
+    return clock, shown, clock.knots(shown)
 
 
 def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._core import ValidationError
-from ._reading import Array, length, real_numbers, refuse, unmoved_by_underflow
+from .._core import ValidationError
+from .reading import Array, length, real_numbers, refuse, unmoved_by_underflow
 
 
 @unmoved_by_underflow

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import shown
-from ._core import ValidationError
-from .spaces import Space
+from .._core import ValidationError
+from ..arrays import shown
+from ..spaces import Product, Space, factors_of, parts_of
 
 # A kind, and the vectors that it prescribes.
 End = tuple[str, NDArray[np.float64] | None]
@@ -72,10 +72,18 @@ def _copy(vector: Any) -> Any:
     return array
 
 
+def is_closed(bc_type: Any) -> bool:
+    """Whether the curve goes on at its start where it ends."""
+    return isinstance(bc_type, str) and bc_type == "periodic"
+
+
 def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
     """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
     if isinstance(bc_type, str):
         return bc_type
+    if isinstance(space, Product):
+        each = zip(ends_in_factors(bc_type, space), space.factors, strict=True)
+        return _joined([picked(ends, index, batch_axes, factor) for ends, factor in each])
 
     def pick(end: Any) -> Any:
         if isinstance(end, str):
@@ -89,3 +97,36 @@ def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
         return (end[0], vector[index])
 
     return tuple(pick(end) for end in bc_type)
+
+
+# ---- in a product, where prescribed vectors are tuples ----
+
+
+def ends_in_factors(bc_type: Any, space: Space) -> list[Any]:
+    """End conditions for each factor; those of a space that is no product are the only ones."""
+    factors = factors_of(space)
+    if isinstance(bc_type, str) or len(factors) == 1:
+        return [bc_type] * len(factors)
+    if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
+        raise ValidationError(f"bc_type must be a word or a pair, not {shown(bc_type)}")
+
+    def vectors(end: Any) -> Any:
+        if isinstance(end, str):
+            return (end,) * len(factors)
+        if not isinstance(end, (tuple, list)) or len(end) != 2:
+            raise ValidationError(
+                f"an end condition is a word or a pair (order, tuple of vectors), not {shown(end)}"
+            )
+        return tuple((end[0], vector) for vector in parts_of(end[1], space, "an end vector"))
+
+    return list(zip(*map(vectors, bc_type), strict=True))
+
+
+def _joined(ends: list[Any]) -> Any:
+    """The inverse of `ends_in_factors`."""
+
+    def both(e: int) -> Any:
+        first = ends[0][e]
+        return first if isinstance(first, str) else (first[0], tuple(end[e][1] for end in ends))
+
+    return both(0), both(1)

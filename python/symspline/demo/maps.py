@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ._tracks import GLOBE, KMH, Comparison, Times, comparison, every, samples, slerp_pieces
-from .hurdat import Storm
-from .lonlat import from_lonlat, to_lonlat
-from .plotting.globe import View, degrees, draw_frame, draw_globe
-from .plotting.style import DPI, EDGE, GRID, HALO, INK, SPLINE, heading, window
-from .spline import CubicSpline
+from ..hurdat import Storm
+from ..lonlat import from_lonlat, to_lonlat
+from ..plotting.globe import View, degrees, draw_frame, draw_globe
+from ..plotting.style import DPI, EDGE, GRID, HALO, INK, SPLINE, heading, window
+from ..spline import CubicSpline
+from ..tracks import GLOBE, KMH, Comparison, Times, comparison, every, samples, slerp_pieces
 
 Array = NDArray[np.float64]
 

@@ -11,11 +11,33 @@ from ._core import ValidationError
 
 
 def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
-    """The value as an array; ragged nested lists are an error of the caller's."""
+    """The value as an array; ragged nested lists and masked numbers are an error of the caller's."""
+    if type(value) is np.ndarray:
+        return value
+    masked = _first_masked(value)
+    if masked is not None:
+        raise ValidationError(
+            f"{name}{list(masked) or ''} is masked: what stands below a mask is no number; leave out what is missing"
+        )
     try:
         return np.asarray(value)
     except ValueError as error:
         raise ValidationError(f"{name} is not an array of equally long rows: {error}") from None
+
+
+def _first_masked(value: Any) -> tuple[int, ...] | None:
+    """The index of the first masked number of an array, or of a list of arrays."""
+    if isinstance(value, np.ma.MaskedArray):
+        found = np.argwhere(np.ma.getmaskarray(value))
+        return tuple(found[0].tolist()) if len(found) else None
+    if isinstance(value, (list, tuple)) and any(
+        issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))
+    ):
+        for i, row in enumerate(value):
+            index = _first_masked(row)
+            if index is not None:
+                return i, *index
+    return None
 
 
 def shown(value: Any) -> str:
@@ -33,11 +55,20 @@ def brief(text: object, most: int = 150) -> str:
 
 
 def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
-    """The numbers in contiguous memory and of a type; those it cannot hold become infinite or zero."""
+    """The numbers in contiguous, aligned memory and of a type; those it cannot hold become infinite or zero."""
     if array.dtype == dtype:
-        return np.asarray(array, order="C")
+        flags = array.flags
+        # Arrays in memory that others laid out, such as columns of packed records, may begin anywhere.
+        return array if flags.c_contiguous and flags.aligned else np.array(array, order="C")
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         return np.asarray(array, dtype=dtype, order="C")
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A view that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def whole_number(value: Any, name: str, least: int) -> int:

@@ -9,9 +9,9 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, cast
-from ._core import ValidationError
-from .spaces import point_tol
+from .._core import ValidationError
+from ..arrays import as_array, cast
+from ..spaces import point_tol
 
 Array = NDArray[Any]
 

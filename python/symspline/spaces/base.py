@@ -1,30 +1,36 @@
-"""The spaces: where points live, and their geometry."""
+"""What all spaces share: the operations on arrays of points, and how arrays go to the compiled core."""
 
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, cast, shown, whole_number
-from ._core import CutLocusError, Handle, ValidationError
+from .._core import Handle, ValidationError
+from ..arrays import as_array, cast, shown, whole_number
+from .tolerance import point_tol
 
 Array = NDArray[Any]
 
-POINT_TOL = 1e-8
-POINT_TOL_FLOAT32 = 1e-4
 # From this ambient dimension on nothing is made that needs a frame of all tangent vectors.
 LARGE = 256
 # So many numbers are 8 TB.
 _MOST = 2**40
 
 
-def point_tol(dtype: np.dtype[Any]) -> float:
-    """How far off a space points of a type may be."""
-    return POINT_TOL_FLOAT32 if dtype in (np.float32, np.float16, np.complex64) else POINT_TOL
+# The classes of all spaces by their names, products apart.
+CLASSES: dict[str, type[Space]] = {}
+# What a complex array may have been meant for.
+COMPLEX_TWINS = {
+    "rp": "ComplexProjective",
+    "gr": "ComplexGrassmannian",
+    "o": "Unitary",
+    "so": "SpecialUnitary",
+    "spd": "HermitianPositiveDefinite",
+    "sphere": "ComplexProjective",
+}
 
 
 class Space:
@@ -40,6 +46,8 @@ class Space:
     _handle: Handle
     _parameters: tuple[int, ...]
     _complex: bool
+    # Shape of one point's doubles, where a complex number is two.
+    _doubles_shape: tuple[int, ...]
 
     def __init__(self, *parameters: int) -> None:
         for value in parameters:
@@ -54,6 +62,9 @@ class Space:
         if max(self._parameters, default=0) >= _MOST or math.prod(self._point_shape) >= _MOST:
             raise ValidationError(f"{self!r} is too large: no memory holds a point of it")
         self._complex = self._handle.is_complex()
+        self._dtype = np.dtype(np.complex128 if self._complex else np.float64)
+        *first, last = self._point_shape
+        self._doubles_shape = (*first, 2 * last if self._complex else last)
 
     # ---- what it is ----
 
@@ -77,6 +88,11 @@ class Space:
         """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r; NaN for poses, which have no
         invariant metric."""
         return self._handle.curvature()
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the numbers of a point: float64, or complex128."""
+        return self._dtype
 
     def __str__(self) -> str:
         return f"{self._name}:{','.join(map(str, self._parameters))}"
@@ -232,14 +248,13 @@ class Space:
 
     # ---- arrays ----
 
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Type of the numbers of a point: float64, or complex128."""
-        return np.dtype(np.complex128 if self._complex else np.float64)
-
     def _numbers(self, doubles: NDArray[np.float64]) -> Array:
         """The compiled core's doubles as the numbers of points: pairs are complex numbers."""
         return doubles.view(np.complex128) if self._complex else doubles
+
+    def _as_doubles(self, numbers: Array) -> NDArray[np.float64]:
+        """The inverse: numbers of points, in contiguous memory, as doubles."""
+        return numbers.view(np.float64) if self._complex else numbers
 
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
@@ -250,7 +265,7 @@ class Space:
         array = as_array(value, name)
         if array.dtype.kind not in ("biufc" if self._complex else "biuf"):
             numbers = "numbers" if self._complex else "real numbers"
-            complex_twin = _COMPLEX.get(self._name) if array.dtype.kind == "c" else None
+            complex_twin = COMPLEX_TWINS.get(self._name) if array.dtype.kind == "c" else None
             hint = f"; did you mean {complex_twin}?" if complex_twin else ""
             raise ValidationError(f"{name} must be an array of {numbers}, not of {array.dtype}{hint}")
         shape = self.point_shape
@@ -258,16 +273,11 @@ class Space:
             raise ValidationError(
                 f"{name} has shape {array.shape}, but {self!r} needs shape (..., {', '.join(map(str, shape))})"
             )
-        return cast(array, self.dtype).view(np.float64)
+        return cast(array, self._dtype).view(np.float64)
 
     def _rows(self, array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
         shape = self._doubles_shape
         return np.ascontiguousarray(np.broadcast_to(array, lead + shape).reshape(-1, math.prod(shape)))
-
-    @property
-    def _doubles_shape(self) -> tuple[int, ...]:
-        *first, last = self.point_shape
-        return (*first, 2 * last if self._complex else last)
 
     def _lead(self, array: NDArray[np.float64]) -> tuple[int, ...]:
         """The axes before those of a point."""
@@ -301,304 +311,4 @@ class Space:
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, "_name"):
-            _CLASSES[cls._name] = cls
-
-
-_CLASSES: dict[str, type[Space]] = {}
-
-
-class Euclidean(Space):
-    """Flat space Rⁿ: points are arrays of n numbers, splines the classical ones.
-
-    >>> import symspline as ss
-    >>> ss.Euclidean(3)
-    Euclidean(3)
-    """
-
-    _name = "euclidean"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class Sphere(Space):
-    """The unit sphere Sⁿ: points are unit vectors of n + 1 numbers.
-
-    S² are directions or places on a globe, S³ unit quaternions. Distance is the angle.
-
-    >>> import symspline as ss
-    >>> ss.Sphere(2).distance([1, 0, 0], [0, 1, 0]).round(8)
-    np.float64(1.57079633)
-    """
-
-    _name = "sphere"
-    _linear = True
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class Hyperbolic(Space):
-    """Hyperbolic space Hⁿ: points are arrays (x₀, x₁, …, xₙ) on the hyperboloid
-    −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first.
-
-    >>> import numpy as np, symspline as ss
-    >>> ss.Hyperbolic(1).distance([1, 0], [np.cosh(2), np.sinh(2)]).round(8)
-    np.float64(2.0)
-    """
-
-    _name = "hyperbolic"
-    _linear = True
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
-        # Only at the middle is the metric that of the ambient numbers.
-        middle = np.eye(1, self.point_shape[0])[0]
-        noise[..., 0] = 0.0
-        return self.transport(middle, p, noise)
-
-
-class RealProjective(Space):
-    """Real projective space RPⁿ, lines through the origin of Rⁿ⁺¹: points are unit vectors of n + 1
-    numbers, of which x and −x are the same point. Distance is the angle between lines, at most π/2.
-
-    >>> import symspline as ss
-    >>> ss.RealProjective(2).distance([1, 0, 0], [-1, 0, 0]).round(8)
-    np.float64(0.0)
-    """
-
-    _name = "rp"
-    _linear = True
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class ComplexProjective(Space):
-    """Complex projective space CPⁿ, pure quantum states of n + 1 levels: points are complex unit vectors
-    of n + 1 numbers up to a phase, with the Fubini–Study metric: distance is arccos |⟨p, q⟩|.
-
-    CP¹ is the Bloch sphere, of radius ½.
-
-    >>> import symspline as ss
-    >>> ss.ComplexProjective(1).distance([1, 0], [0.6, 0.8j]).round(8)
-    np.float64(0.92729522)
-    """
-
-    _name = "cp"
-    _linear = True
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class Grassmannian(Space):
-    """The Grassmannian Gr(k, n), k-dimensional subspaces of Rⁿ: points are n × k matrices with
-    orthonormal columns, any basis of the subspace. Distance is √(Σ θᵢ²) of the principal angles.
-
-    >>> import symspline as ss
-    >>> ss.Grassmannian(2, 5).dim
-    6
-    """
-
-    _name = "gr"
-    _linear = True
-
-    def __init__(self, k: int, n: int) -> None:
-        super().__init__(k, n)
-
-
-class ComplexGrassmannian(Space):
-    """The complex Grassmannian, k-dimensional subspaces of Cⁿ: points are complex n × k matrices with
-    orthonormal columns, any basis of the subspace.
-
-    >>> import symspline as ss
-    >>> ss.ComplexGrassmannian(2, 5).dim
-    12
-    """
-
-    _name = "cgr"
-    _linear = True
-
-    def __init__(self, k: int, n: int) -> None:
-        super().__init__(k, n)
-
-
-class SpecialOrthogonal(Space):
-    """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
-    In SO(3) distance is the angle of the rotation from one to the other.
-
-    >>> import numpy as np, symspline as ss
-    >>> quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    >>> ss.SpecialOrthogonal(3).distance(np.eye(3), quarter).round(8)
-    np.float64(1.57079633)
-    """
-
-    _name = "so"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class Orthogonal(Space):
-    """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
-    of the two parts.
-
-    >>> import symspline as ss
-    >>> ss.Orthogonal(2).dim
-    1
-    """
-
-    _name = "o"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
-        try:
-            return super()._finite(operation, t, **inputs)
-        except (CutLocusError, ValidationError):
-            if "q" in inputs:
-                self._check_same_part(inputs["p"], inputs["q"])
-            raise
-
-    def _check_same_part(self, p: ArrayLike, q: ArrayLike) -> None:
-        pairs: Array = np.zeros((0, 0), int)
-        # Arrays of a wrong shape have an error of their own.
-        with np.errstate(all="ignore"), suppress(ValueError):
-            pairs = np.argwhere(
-                np.linalg.det(self._doubles(p, "p")) * np.linalg.det(self._doubles(q, "q")) < -0.5
-            )
-        if len(pairs):
-            pair = ",".join(map(str, pairs[0])) or "0"
-            raise ValidationError(
-                f"pair {pair} has opposite determinants: no curve joins a rotation and a reflection"
-            )
-
-
-class Unitary(Space):
-    """Unitary n × n matrices, with ⟨u, v⟩ = Re tr u*v.
-
-    >>> import symspline as ss
-    >>> ss.Unitary(1).distance([[1]], [[1j]]).round(8)
-    np.float64(1.57079633)
-    """
-
-    _name = "u"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class SpecialUnitary(Space):
-    """Unitary n × n matrices of determinant 1, with ⟨u, v⟩ = Re tr u*v.
-
-    >>> import symspline as ss
-    >>> ss.SpecialUnitary(2).dim
-    3
-    """
-
-    _name = "su"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class SymmetricPositiveDefinite(Space):
-    """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
-    covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
-
-    >>> import numpy as np, symspline as ss
-    >>> ss.SymmetricPositiveDefinite(2).geodesic(np.eye(2), 4 * np.eye(2), 0.5).round(12)
-    array([[2., 0.],
-           [0., 2.]])
-    """
-
-    _name = "spd"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class HermitianPositiveDefinite(Space):
-    """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
-
-    >>> import symspline as ss
-    >>> ss.HermitianPositiveDefinite(2).dim
-    4
-    """
-
-    _name = "hpd"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-class SpecialEuclidean(Space):
-    """Rigid motions of n = 2 or 3 dimensions, poses: homogeneous (n+1) × (n+1) matrices [[R, t], [0, 1]].
-
-    Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of
-    (ω, v) = g⁻¹u, the rates in the body, and serve for reporting only. For positions that move
-    independently of the rotation use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
-
-    >>> import symspline as ss
-    >>> ss.SpecialEuclidean(3).point_shape
-    (4, 4)
-    """
-
-    _name = "se"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
-
-# No number of a space is as long.
-_DIGITS = 40
-
-# What a complex array may have been meant for.
-_COMPLEX = {
-    "rp": "ComplexProjective",
-    "gr": "ComplexGrassmannian",
-    "o": "Unitary",
-    "so": "SpecialUnitary",
-    "spd": "HermitianPositiveDefinite",
-    "sphere": "ComplexProjective",
-}
-
-
-def space(name: str | Space) -> Space:
-    """The space with a name, e.g. ``"sphere:2"``, ``"h:3"``, or ``"sphere:3 x r:3"`` for a product.
-
-    Args:
-        name: the name in long or short form, a colon, and the parameters; a space is returned as it is.
-
-    >>> import symspline as ss
-    >>> ss.space("sphere:2")
-    Sphere(2)
-    """
-    if isinstance(name, Space):
-        return name
-    if not isinstance(name, str):
-        raise ValidationError(f"a space or its name is needed, not {shown(name)}")
-    factors = name.split(" x ")
-    if len(factors) > 1:
-        from .product import Product
-
-        return Product(*map(space, factors))
-    word, _, parameters = name.partition(":")
-    word = word.strip().lower()
-    names = {alias: row[0] for row in Handle.names() for alias in row}
-    if word not in names:
-        known = ", ".join(" or ".join(row) for row in Handle.names())
-        raise ValidationError(f"unknown space {shown(name)}; known are {known}, e.g. 'sphere:2'")
-    values = [part.strip() for part in parameters.split(",")]
-    if not all(value.isdecimal() and len(value) <= _DIGITS for value in values):
-        raise ValidationError(f"{shown(name)}: behind the colon come whole numbers, e.g. 'sphere:2'")
-    cls: Any = _CLASSES[names[word]]
-    try:
-        made: Space = cls(*map(int, values))
-    except TypeError:
-        raise ValidationError(f"{shown(name)}: {cls.__name__} does not take {len(values)} numbers") from None
-    return made
+            CLASSES[cls._name] = cls

@@ -1,8 +1,8 @@
 """How many threads parallel work uses."""
 
 from . import _core
-from ._arrays import whole_number
 from ._core import ValidationError
+from .arrays import whole_number
 
 # More would only wait for each other, and a system has no room for very many.
 _MOST = 1024

@@ -8,7 +8,7 @@ off by 1e-8, of single precision by 1e-4; what comes out is exact to rounding.
 array([0.76159416])
 """
 
-from ._models import (
+from .models import (
     ball_to_half_space,
     ball_to_hyperboloid,
     half_space_to_ball,
@@ -16,8 +16,8 @@ from ._models import (
     hyperboloid_to_ball,
     hyperboloid_to_half_space,
 )
-from ._projectors import basis_to_projector, density_to_state, projector_to_basis, state_to_density
-from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
+from .projectors import basis_to_projector, density_to_state, projector_to_basis, state_to_density
+from .quaternions import matrix_to_quaternion, quaternion_to_matrix
 
 __all__ = [
     "ball_to_half_space",

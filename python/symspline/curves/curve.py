@@ -1,0 +1,76 @@
+"""What every kind of curve can do."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from ..arrays import shown
+from ..spaces import Space
+from .derivatives import Gradient, Places
+from .solve import Progress
+
+Doubles = NDArray[np.float64]
+
+NORMS = ("speed", "bend")
+_QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
+
+
+def quantity_of(nu: Any) -> str:
+    """What the core calls a derivative of order nu."""
+    try:
+        return _QUANTITIES[nu]
+    except (KeyError, TypeError):
+        raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}") from None
+
+
+class Curve(ABC):
+    """Curves of a batch, made of knots, points and velocities, with times as the compiled core counts them.
+
+    Attributes:
+        space: where they run.
+        times: knots, shape (N+1,) or (..., N+1).
+        points, velocities: shape (..., N+1, *point_shape); in a product tuples of such arrays.
+    """
+
+    space: Space
+    times: Doubles
+    points: Any
+    velocities: Any
+
+    @property
+    @abstractmethod
+    def batch(self) -> tuple[int, ...]:
+        """The axes of the batch."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> tuple[Curve, ...]:
+        """The curves in the factors of a product; a curve in another space is its only part."""
+
+    @abstractmethod
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        """A quantity (``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|) at
+        times x; ``outside`` the knots ``"raise"``, ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+
+    @abstractmethod
+    def control_points(self) -> Any:
+        """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
+
+    @abstractmethod
+    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
+        """How the curve moves with its data, see `symspline.CubicSpline.jvp`."""
+
+    @abstractmethod
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+        """The transpose, see `symspline.CubicSpline.vjp`."""
+
+    @abstractmethod
+    def picked(self, index: Any) -> Curve:
+        """One curve, or a slice, along the first axis of the batch."""

@@ -1,0 +1,218 @@
+"""From points to curves: the same for one curve, a batch, and many of different lengths, in any space.
+
+A space has its kind of curve: plain, in the span of its points, or, for a product, one in every factor. A further
+kind is a class with the methods of `Curve` and a `solve`, and its line in `kind_of`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from ..arrays import as_array
+from ..report import Report, shaped
+from ..spaces import Array, Product, Space, factors_of, parts_of, point_tol
+from .curve import Curve
+from .ends import End, ends_in_factors, ends_of
+from .in_span import InSpan, kind_of
+from .plain import Plain
+from .solve import Fault, Options, Progress, Solved, Task, checked, solve
+from .together import Together, share
+
+_T = TypeVar("_T")
+# Options for a fit that is not carried out.
+_ANY = Options("auto", 0.0, None)
+
+
+class Points(NamedTuple):
+    """Points of curves in a space that is no product.
+
+    Attributes:
+        doubles: their numbers, shape (*batch, nodes, *doubles of a point).
+        tol: how far off the space they may be.
+    """
+
+    doubles: NDArray[np.float64]
+    tol: float
+    batch: tuple[int, ...]
+    nodes: int
+
+
+class Fit(NamedTuple):
+    """What came of a fit: the curves, a report a factor, and what failed."""
+
+    curve: Curve
+    reports: list[Report]
+    faults: list[Fault]
+
+
+def read(points: Any, space: Space) -> list[Points]:
+    """Points as a user gives them, in every factor."""
+    if not isinstance(space, Product):
+        return [_read(space, points)]
+    found = _in_factors(space, _read, parts_of(points, space, "points"))
+    if len({(part.batch, part.nodes) for part in found}) > 1:
+        described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in found)
+        raise ValidationError(f"points: the factors differ in length, or batch axes differ: {described}")
+    return found
+
+
+def _read(space: Space, points: Any) -> Points:
+    array = as_array(points, "points")
+    if array.ndim == 0 or array.size == 0:
+        raise ValidationError("no points given; a curve needs at least two")
+    doubles = space._doubles(array, "points")
+    lead = doubles.shape[: doubles.ndim - len(space._point_shape)]
+    if not lead:
+        raise ValidationError(
+            f"points has shape {array.shape}, which is one point; a curve needs shape (..., N+1, *point_shape)"
+        )
+    if lead[-1] < 2:
+        raise ValidationError("a curve needs at least two points; got one")
+    return Points(doubles, point_tol(array.dtype), lead[:-1], lead[-1])
+
+
+def read_ends(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[list[End] | None]:
+    """End conditions in every factor."""
+    if not isinstance(space, Product):
+        return [ends_of(bc_type, space, batch)]
+    conditions = ends_in_factors(bc_type, space)
+    return _in_factors(space, lambda factor, ends: ends_of(ends, factor, batch), conditions)
+
+
+def curve_of(
+    space: Space, times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
+) -> Curve:
+    """The curve with points and velocities, which are there for every factor.
+
+    Args:
+        fitted: whether velocities are those of a C² curve, not any.
+    """
+    if isinstance(space, Product):
+        each = zip(space.factors, arrays, strict=True)
+        return Together(space, tuple(_part(factor, times, *pair, fitted) for factor, pair in each))
+    return _part(space, times, *arrays[0], fitted)
+
+
+def _part(space: Space, times: NDArray[np.float64], points: Array, velocities: Array, fitted: bool) -> Plain:
+    if kind_of(space) is InSpan:
+        return InSpan(space, times, points, velocities, fitted)
+    return Plain(space, times, points, velocities)
+
+
+def fit(
+    space: Space,
+    times: NDArray[np.float64],
+    points: list[Points],
+    ends: list[list[End] | None],
+    options: Options,
+    check: bool,
+    progress: Progress | None,
+) -> Fit:
+    """Curves of equal length."""
+    tasks = [
+        Task(factor, times, part.doubles, end, part.tol if check else None)
+        for factor, part, end in zip(factors_of(space), points, ends, strict=True)
+    ]
+    solved = _solve(space, tasks, options, progress)
+    batch = points[0].batch
+    reports = [
+        shaped(found.columns, batch, task.space.curvature, options.method)
+        for task, found in zip(tasks, solved, strict=True)
+    ]
+    return Fit(curve_of(space, times, [found[:2] for found in solved]), reports, _first(solved))
+
+
+def fit_many(
+    space: Space,
+    times: list[NDArray[np.float64]],
+    points: list[list[Points]],
+    ends: list[list[End] | None],
+    options: Options,
+    check: bool,
+    progress: Progress | None,
+) -> tuple[list[Fit], list[Fault]]:
+    """Single curves of different lengths, in one call of the core a factor; and what failed."""
+    offsets = np.cumsum([0, *map(len, times)]).tolist()
+    row = np.concatenate(times)
+    if check:
+        _check_doubles(space, points)
+    tasks = []
+    for i, (factor, end) in enumerate(zip(factors_of(space), ends, strict=True)):
+        parts = [own[i] for own in points]
+        tol = max(part.tol for part in parts) if check else None
+        tasks.append(Task(factor, row, np.concatenate([part.doubles for part in parts]), end, tol, offsets))
+    solved = _solve(space, tasks, options, progress)
+
+    def one(i: int, start: int, stop: int) -> Fit:
+        own = slice(start, stop)
+        reports = [
+            shaped(tuple(c[i : i + 1] for c in found.columns), (), task.space.curvature, options.method)
+            for task, found in zip(tasks, solved, strict=True)
+        ]
+        arrays = [(found.points[own], found.velocities[own]) for found in solved]
+        return Fit(curve_of(space, times[i], arrays), reports, [])
+
+    return [one(i, *pair) for i, pair in enumerate(pairwise(offsets))], _first(solved)
+
+
+def validated(
+    space: Space, times: NDArray[np.float64], points: list[Points], ends: list[list[End] | None]
+) -> list[Array]:
+    """The points in every factor, moved onto it, after the checks of a fit."""
+    tasks = [
+        Task(factor, times, part.doubles, end, part.tol)
+        for factor, part, end in zip(factors_of(space), points, ends, strict=True)
+    ]
+    return _in_factors(space, lambda _, task: solve(task, _ANY, dry=True).points, tasks)
+
+
+def _solve(space: Space, tasks: list[Task], options: Options, progress: Progress | None) -> list[Solved]:
+    """What every factor's kind of curve makes of its task; everything is checked before any work."""
+    if len(tasks) == 1 and kind_of(space) is Plain:
+        # The core checks before it solves.
+        return [Plain.solve(tasks[0], options, progress)]
+    return [
+        kind_of(task.space).solve(task, options, share(progress, i, len(tasks)))
+        for i, task in enumerate(_checked(space, tasks, options))
+    ]
+
+
+def _checked(space: Space, tasks: list[Task], options: Options) -> list[Task]:
+    return _in_factors(space, lambda _, task: checked(task, options), tasks)
+
+
+def _first(solved: list[Solved]) -> list[Fault]:
+    """The faults in the first factor that has some."""
+    return next((found.faults for found in solved if found.faults), [])
+
+
+def _in_factors(space: Space, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
+    """What work gives in every factor for its value; errors say in which."""
+    if not isinstance(space, Product):
+        return [work(space, values[0])]
+    results = []
+    for i, (factor, value) in enumerate(zip(space.factors, values, strict=True)):
+        try:
+            results.append(work(factor, value))
+        except ValidationError as error:
+            raise ValidationError(f"factor {i}, {factor!r}: {error}") from None
+    return results
+
+
+def _check_doubles(space: Space, points: list[list[Points]]) -> None:
+    """Points in double precision may not be as far off as those in single precision beside them."""
+    for i, factor in enumerate(factors_of(space)):
+        most = max(own[i].tol for own in points)
+        for number, own in enumerate(points):
+            if own[i].tol < most:
+                doubles = own[i].doubles
+                try:
+                    factor._handle.check_points(doubles.reshape(len(doubles), -1), [len(doubles)], own[i].tol)
+                except ValidationError as error:
+                    raise ValidationError(f"curve {number}: {error}") from None

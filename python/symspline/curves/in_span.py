@@ -1,0 +1,143 @@
+"""Curves in the span of their points: high ambient dimension without high cost.
+
+Vectors or subspaces of n dimensions that span only m < n lie in a copy of the space of m dimensions that
+is totally geodesic: geodesics and transvections between them never leave it. One QR decomposition gives
+coordinates there; the curve is fitted and evaluated in them and lifted back.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import Any, Never, Self
+
+import numpy as np
+
+from .._core import ValidationError
+from ..spaces import Array, Space
+from ..spaces.base import LARGE as _LARGE
+from .curve import NORMS, Doubles
+from .derivatives import Places
+from .plain import Plain
+from .solve import Options, Progress, Solved, Task, solve
+from .span import Span, span_of
+
+
+def is_large(space: Space) -> bool:
+    """Whether curves in a space are made in the span of their points."""
+    return space._linear and space.point_shape[0] >= _LARGE
+
+
+def kind_of(space: Space) -> type[Plain]:
+    """How curves are made in a space that is no product."""
+    return InSpan if is_large(space) else Plain
+
+
+def reduced(space: Space, points: Array) -> tuple[Space, Array, Span | None]:
+    """A space, and points in it, to compute with; and the span to lift results from, if they lie in one."""
+    if not is_large(space):
+        return space, points, None
+    span = span_of(space, points)
+    return span.space, span.down(points), span
+
+
+class InSpan(Plain):
+    """Curves in a large space, made of plain ones in a small space.
+
+    Args:
+        fitted: whether velocities are those of a C² curve, which lie in the span of the points and the velocities
+            at the ends.
+    """
+
+    def __init__(
+        self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True
+    ) -> None:
+        super().__init__(space, times, points, velocities)
+        self._fitted = fitted
+
+    @staticmethod
+    def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+        if task.offsets is None:
+            return _solve(task, options, progress)
+        return _solve_each(task, task.offsets, options, progress)
+
+    @cached_property
+    def small(self) -> tuple[Span, Plain]:
+        """The span, and the curves in it; kept from the first use on."""
+        vectors = self.velocities
+        if self._fitted:
+            vectors = np.take(vectors, [0, -1], axis=len(self.batch))
+        span = span_of(self.space, self.points, vectors)
+        return span, Plain(span.space, self.times, span.down(self.points), span.down(self.velocities))
+
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        span, small = self.small
+        values = small.evaluate(x, quantity, outside, per_curve, progress)
+        return values if quantity in NORMS else span.lifted(values, self.batch)
+
+    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
+        self._refuse_derivatives()
+
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Never:
+        self._refuse_derivatives()
+
+    def _refuse_derivatives(self) -> Never:
+        raise ValidationError(
+            f"derivatives with respect to the data are not made in as many dimensions as {self.space} has: "
+            "motions of points leave the span in which the curve is computed"
+        )
+
+    def _with(self, times: Doubles, points: Array, velocities: Array) -> Self:
+        return type(self)(self.space, times, points, velocities, self._fitted)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        kind, arguments = super().__reduce__()
+        return kind, (*arguments, self._fitted)
+
+
+def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+    """Curves of one length."""
+    space = task.space
+    points = space._numbers(task.points)
+    # Vectors at the ends as rows of one knot.
+    axis = -1 - len(space.point_shape)
+    vectors = [
+        None if value is None else np.expand_dims(space._numbers(value), axis) for _, value in task.ends or []
+    ]
+    span = span_of(space, points, *(vector for vector in vectors if vector is not None))
+    ends = task.ends and [
+        (kind, None if vector is None else span.space._as_doubles(span.down(vector).squeeze(axis)))
+        for (kind, _), vector in zip(task.ends, vectors, strict=True)
+    ]
+    small = task._replace(space=span.space, points=span.space._as_doubles(span.down(points)), ends=ends)
+    found = solve(small, options, progress)
+    return found._replace(points=points, velocities=span.up(found.velocities))
+
+
+def _solve_each(task: Task, offsets: list[int], options: Options, progress: Progress | None) -> Solved:
+    """Curves that follow each other in one array, each in a span of its own."""
+    each = []
+    for i, (start, stop) in enumerate(pairwise(offsets)):
+        ends = task.ends and [
+            (kind, None if value is None else value[i : i + 1]) for kind, value in task.ends
+        ]
+        one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
+        each.append(_solve(one, options, progress and partial(_advance, progress, start, offsets[-1])))
+    faults = [
+        (i, kind, why.replace(" of curve 0", f" of curve {i}"))
+        for i, found in enumerate(each)
+        for _, kind, why in found.faults
+    ]
+    columns = zip(*(found.columns for found in each), strict=True)
+    return Solved(
+        task.space._numbers(task.points),
+        np.concatenate([found.velocities[0] for found in each]),
+        tuple(map(np.concatenate, columns)),
+        faults,
+    )
+
+
+def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:
+    return progress(before + finished, total)

@@ -1,0 +1,101 @@
+"""Curves that the compiled core fits and evaluates as they are."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Self
+
+import numpy as np
+
+from .. import _core
+from .._core import ValidationError
+from ..spaces import Array, Space
+from . import derivatives
+from .curve import NORMS, Curve, Doubles
+from .derivatives import Gradient, Places
+from .solve import Options, Progress, Solved, Task, solve
+
+
+class Plain(Curve):
+    """Curves in a space that is no product."""
+
+    points: Array
+    velocities: Array
+
+    def __init__(self, space: Space, times: Doubles, points: Array, velocities: Array) -> None:
+        self.space, self.times, self.points, self.velocities = space, times, points, velocities
+        points.flags.writeable = velocities.flags.writeable = False
+
+    @staticmethod
+    def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+        """The velocities that make the curve C²; only plain curves are checked on the way."""
+        return solve(task, options, progress)
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        return self.points.shape[: self.points.ndim - len(self.space._point_shape) - 1]
+
+    @property
+    def parts(self) -> tuple[Self]:
+        return (self,)
+
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        if per_curve and x.shape[: len(self.batch)] != self.batch:
+            raise ValidationError(
+                f"with per_curve=True the shape of x must begin with the batch axes {self.batch}; got {x.shape}"
+            )
+        if progress is not None:
+            progress = _counting(progress, x.size if per_curve else math.prod(self.batch) * x.size)
+        space = self.space
+        values = _core.evaluate(
+            space._handle,
+            self.times,
+            space._as_doubles(self.points),
+            space._as_doubles(self.velocities),
+            x,
+            quantity,
+            outside,
+            per_curve,
+            progress,
+        )
+        return values if quantity in NORMS else space._numbers(values)
+
+    def control_points(self) -> Array:
+        axis = len(self.batch)
+        h = np.diff(self.times)
+        third = h.reshape(h.shape + (1,) * len(self.space.point_shape)) / 3
+        first, last = (slice(None, -1), slice(1, None))
+        index = (slice(None),) * axis
+        p, q = self.points[(*index, first)], self.points[(*index, last)]
+        u, w = self.velocities[(*index, first)], self.velocities[(*index, last)]
+        with np.errstate(all="ignore"):
+            legs = third * u, -third * w
+        # Of curves that were not found they are NaN.
+        inner = [self.space._apply("exp", p=at, v=leg) for at, leg in zip((p, q), legs, strict=True)]
+        return np.stack([p, *inner, q], axis=axis + 1)
+
+    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
+        return derivatives.push(self, at, bc_type, points, t, ends)
+
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+        return derivatives.pull(self, at, bc_type, cotangent)
+
+    def picked(self, index: Any) -> Self:
+        times = np.ascontiguousarray(self.times[index]) if self.times.ndim > 1 else self.times
+        return self._with(
+            times, np.ascontiguousarray(self.points[index]), np.ascontiguousarray(self.velocities[index])
+        )
+
+    def _with(self, times: Doubles, points: Array, velocities: Array) -> Self:
+        """Other curves of this kind in the same space."""
+        return type(self)(self.space, times, points, velocities)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.space, self.times, self.points, self.velocities)
+
+
+def _counting(progress: Progress, samples: int) -> Progress:
+    """Progress in samples, in which the core counts; only its total is in numbers."""
+    return lambda finished, _: progress(min(finished, samples), samples)

@@ -1,0 +1,109 @@
+"""Groups of matrices: rotations, unitary matrices and rigid motions."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._core import CutLocusError, ValidationError
+from .base import Array, Space
+
+
+class SpecialOrthogonal(Space):
+    """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
+    In SO(3) distance is the angle of the rotation from one to the other.
+
+    >>> import numpy as np, symspline as ss
+    >>> quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    >>> ss.SpecialOrthogonal(3).distance(np.eye(3), quarter).round(8)
+    np.float64(1.57079633)
+    """
+
+    _name = "so"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Orthogonal(Space):
+    """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
+    of the two parts.
+
+    >>> import symspline as ss
+    >>> ss.Orthogonal(2).dim
+    1
+    """
+
+    _name = "o"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+        try:
+            return super()._finite(operation, t, **inputs)
+        except (CutLocusError, ValidationError):
+            if "q" in inputs:
+                self._check_same_part(inputs["p"], inputs["q"])
+            raise
+
+    def _check_same_part(self, p: ArrayLike, q: ArrayLike) -> None:
+        pairs: Array = np.zeros((0, 0), int)
+        # Arrays of a wrong shape have an error of their own.
+        with np.errstate(all="ignore"), suppress(ValueError):
+            pairs = np.argwhere(
+                np.linalg.det(self._doubles(p, "p")) * np.linalg.det(self._doubles(q, "q")) < -0.5
+            )
+        if len(pairs):
+            pair = ",".join(map(str, pairs[0])) or "0"
+            raise ValidationError(
+                f"pair {pair} has opposite determinants: no curve joins a rotation and a reflection"
+            )
+
+
+class SpecialUnitary(Space):
+    """Unitary n × n matrices of determinant 1, with ⟨u, v⟩ = Re tr u*v.
+
+    >>> import symspline as ss
+    >>> ss.SpecialUnitary(2).dim
+    3
+    """
+
+    _name = "su"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Unitary(Space):
+    """Unitary n × n matrices, with ⟨u, v⟩ = Re tr u*v.
+
+    >>> import symspline as ss
+    >>> ss.Unitary(1).distance([[1]], [[1j]]).round(8)
+    np.float64(1.57079633)
+    """
+
+    _name = "u"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class SpecialEuclidean(Space):
+    """Rigid motions of n = 2 or 3 dimensions, poses: homogeneous (n+1) × (n+1) matrices [[R, t], [0, 1]].
+
+    Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of
+    (ω, v) = g⁻¹u, the rates in the body, and serve for reporting only. For positions that move
+    independently of the rotation use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
+
+    >>> import symspline as ss
+    >>> ss.SpecialEuclidean(3).point_shape
+    (4, 4)
+    """
+
+    _name = "se"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)

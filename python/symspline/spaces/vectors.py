@@ -1,0 +1,61 @@
+"""Flat space, spheres and hyperbolic spaces: points are vectors, the curvature is constant."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .base import Array, Space
+
+
+class Euclidean(Space):
+    """Flat space Rⁿ: points are arrays of n numbers, splines the classical ones.
+
+    >>> import symspline as ss
+    >>> ss.Euclidean(3)
+    Euclidean(3)
+    """
+
+    _name = "euclidean"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Sphere(Space):
+    """The unit sphere Sⁿ: points are unit vectors of n + 1 numbers.
+
+    S² are directions or places on a globe, S³ unit quaternions. Distance is the angle.
+
+    >>> import symspline as ss
+    >>> ss.Sphere(2).distance([1, 0, 0], [0, 1, 0]).round(8)
+    np.float64(1.57079633)
+    """
+
+    _name = "sphere"
+    _linear = True
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class Hyperbolic(Space):
+    """Hyperbolic space Hⁿ: points are arrays (x₀, x₁, …, xₙ) on the hyperboloid
+    −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first.
+
+    >>> import numpy as np, symspline as ss
+    >>> ss.Hyperbolic(1).distance([1, 0], [np.cosh(2), np.sinh(2)]).round(8)
+    np.float64(2.0)
+    """
+
+    _name = "hyperbolic"
+    _linear = True
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+        # Only at the middle is the metric that of the ambient numbers.
+        middle = np.eye(1, self.point_shape[0])[0]
+        noise[..., 0] = 0.0
+        return self.transport(middle, p, noise)

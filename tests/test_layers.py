@@ -1,0 +1,94 @@
+"""Layers of the package: a module imports from its own layer and those below, and never in a circle."""
+
+import ast
+from pathlib import Path
+
+import symspline
+
+ROOT = Path(symspline.__file__).parent
+
+# From below. A folder stands for all that is in it.
+LAYERS = [
+    ["_core", "_cpu"],
+    ["arrays", "lonlat", "report", "threads", "times"],
+    ["spaces"],
+    ["curves"],
+    ["archive", "failures", "options", "plotting"],
+    ["spline", "free"],
+    ["functions"],
+    ["adapters", "convert", "files", "jax", "pieces", "torch"],
+    ["hurdat", "tracks"],
+    ["cli", "demo"],
+    ["__init__", "__main__"],
+]
+
+
+def name_of(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 1 else parts)
+
+
+MODULES = {name_of(path): path for path in ROOT.rglob("*.py")} | {"_core": None}
+
+
+def running(node):
+    """All nodes that run, also in functions: not those for type checkers."""
+    if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+        return
+    yield node
+    for child in ast.iter_child_nodes(node):
+        yield from running(child)
+
+
+def imports(name, path):
+    """What a module of the package imports from it."""
+    package = name.split(".") if path.name == "__init__.py" and name != "__init__" else name.split(".")[:-1]
+    found = set()
+    for node in running(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            # The package imports itself by dots only, so that nothing is missed here.
+            assert not any(alias.name.split(".")[0] == "symspline" for alias in node.names)
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        base = package[: len(package) + 1 - node.level] + (node.module or "").split(".")
+        base = ".".join(filter(None, base)) or "__init__"
+        for alias in node.names:
+            below = alias.name if base == "__init__" else f"{base}.{alias.name}"
+            found.add(below if below in MODULES else base)
+    assert found <= set(MODULES), found - set(MODULES)
+    return found
+
+
+GRAPH = {name: imports(name, path) if path else set() for name, path in MODULES.items()}
+
+
+def layer(name):
+    (number,) = [i for i, names in enumerate(LAYERS) if name.split(".")[0] in names]
+    return number
+
+
+def test_the_graph_is_that_of_the_package():
+    assert {"spaces.base", "curves.curve", "arrays"} <= GRAPH["curves.plain"] | GRAPH["spaces"] | GRAPH[
+        "times"
+    ]
+    # An import inside a function, and one for type checkers only.
+    assert "plotting" in GRAPH["spline"] and "spline" not in GRAPH["archive"]
+
+
+def test_every_module_imports_from_layers_below():
+    wrong = [(name, used) for name, uses in GRAPH.items() for used in uses if layer(used) > layer(name)]
+    assert not wrong
+
+
+def test_there_is_no_circle():
+    left = {name: set(uses) for name, uses in GRAPH.items()}
+    while ends := [name for name, uses in left.items() if not uses]:
+        left = {name: uses.difference(ends) for name, uses in left.items() if name not in ends}
+    assert not left
+
+
+def test_few_names_at_the_top_are_private():
+    private = {
+        name for name in MODULES if name.startswith("_") and not name.startswith("__") and "." not in name
+    }
+    assert private == {"_core", "_cpu"}
