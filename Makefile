@@ -6,18 +6,21 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-oracles test-torch fuzz bench check-tools clean
+.PHONY: demo check test test-oracles test-torch fuzz bench check-tools clean
 
 demo: .venv/built
 	$(BIN)/symspline demo --out demo-output
 
-test: .venv/built
+# Format, lints, types, and the laws of every space in Rust: what to run before a commit.
+check: .venv/tools
 	cargo fmt --all --check
 	cargo clippy --quiet --all-targets -- -D warnings
-	cargo test --quiet -p symspline
+	cargo test --quiet --workspace
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+test: check
 	$(BIN)/python -m pytest --numprocesses auto --doctest-modules python tests
 
 # Compares with geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
@@ -26,27 +29,35 @@ test-oracles: .venv-oracles/built
 	.venv-oracles/bin/python -m pytest tests/oracles -o pythonpath='python tests' \
 		-W 'ignore:BackendImporter:ImportWarning'
 
-.venv-oracles/built: tests/oracles/requirements.txt | .venv/built
+.venv-oracles/built: tests/oracles/requirements.txt | .venv/tools
 	test -x .venv-oracles/bin/python || $(BIN)/python -m venv .venv-oracles
 	.venv-oracles/bin/python -m pip install --quiet --disable-pip-version-check -r $<
 	touch $@
 
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.
-test-torch: .venv/built
+test-torch: .venv/tools
 	$(INSTALL) 'torch>=2'
 	$(BIN)/python -m pytest tests/pytorch -o pythonpath='. tests'
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time.
-fuzz: .venv/built
+fuzz: .venv/tools
 	$(BIN)/python -m pytest --numprocesses auto tests/fuzz --hypothesis-profile=long
 
 # Some minutes; the machine should have nothing else to do.
-bench: .venv/built
+bench: .venv/tools
 	$(BIN)/python -m benchmarks
 
+# The compiled module, and what the demonstration needs.
 .venv/built: pyproject.toml $(RUST) | check-tools
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(INSTALL) --editable '.[bench,test]'
+	$(INSTALL) --editable '.[plot]'
+	touch $@
+
+# What tests and benchmarks need besides: 1.1 GB with JAX.
+.venv/tools: .venv/built
+	$(BIN)/python -c 'import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
+		print(*extras["bench"], *extras["test"], sep="\n")' > .venv/requirements.txt
+	$(INSTALL) -r .venv/requirements.txt
 	touch $@
 
 check-tools:

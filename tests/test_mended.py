@@ -89,13 +89,15 @@ def test_digits_of_other_scripts_name_no_space():
 
 
 def test_rounding_of_points():
-    """One function for files and `symspline check`: |p|², the condition, |p|, and 1 or more."""
+    """|p|², the condition, |p|, and 1 or more."""
     far = ss.Hyperbolic(1).exp([1.0, 0.0], [[0.0, 5.0], [0.0, 0.0]])
-    assert spaces.rounding(ss.Hyperbolic(1), far) == pytest.approx(np.cosh(10), rel=1e-12)
+    assert ss.Hyperbolic(1).rounding(far) == pytest.approx([np.cosh(10), 1.0], rel=1e-12)
     for space in (ss.SymmetricPositiveDefinite(2), ss.HermitianPositiveDefinite(2)):
-        assert spaces.rounding(space, np.diag([1e-3, 10.0])[None]) == pytest.approx(1e4, rel=1e-12)
-    assert spaces.rounding(ss.Euclidean(1), np.array([[-7.0], [3.0]])) == 7.0
-    assert spaces.rounding(S2, 0.5 * AXES) == 1.0
+        assert space.rounding(np.diag([1e-3, 10.0])) == pytest.approx(10.001 * 1000.1, rel=1e-12)
+    assert ss.Euclidean(1).rounding([[-7.0], [0.3]]).tolist() == [7.0, 1.0]
+    assert (S2.rounding(AXES) == 1.0).all()
+    pair = ss.space("r:1 x h:1")
+    assert pair.rounding(([3.0], [1.25, 0.75])) == 3.0
 
 
 # ---- splines ----

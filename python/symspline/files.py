@@ -16,7 +16,7 @@ from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
 from .options import checked_policy
 from .report import Report
-from .spaces import Product, Space, factors_of, rounding
+from .spaces import Product, Space, factors_of
 from .spaces import space as space_named
 from .spline import CubicSpline
 from .times import clock_of
@@ -191,7 +191,7 @@ def _check_velocities(space: Space, points: Any, velocities: Any, report: Report
     if not (finite | ~np.asarray(report.converged)).all():
         raise ValidationError("velocities are not finite")
     off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
-    allowed = 1e-8 + 100 * np.finfo(np.float64).eps * rounding(space, points)
+    allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max())
     if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):
         raise ValidationError("velocities are not tangent")
 

@@ -47,13 +47,14 @@ pub fn evaluate<'py>(
     check_times(&curves, &times, batch, x.shape(), strict)?;
 
     let mut shape = [batch, count_axes].concat();
+    let samples = shape.iter().product();
     if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
         shape.extend_from_slice(&points.shape()[points.ndim() - point_axes..]);
     }
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    watched(py, progress, result.len(), |monitor| {
+    watched(py, progress, samples, |monitor| {
         run(&handle.space.get(), &curves, &times, quantity, policy, monitor, result);
     })?;
     drop(write);

@@ -71,6 +71,9 @@ impl Ambient for Euclidean {
     fn complaint(&self, _x: &[f64]) -> String {
         "any finite numbers are a point".into()
     }
+    fn rounding(&self, p: &[Lane]) -> Lane {
+        dot(p, p).sqrt().max(Lane::ONE)
+    }
 }
 
 impl Frame for Euclidean {

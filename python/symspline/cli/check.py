@@ -10,7 +10,7 @@ import numpy as np
 
 from ..curves.ends import is_closed
 from ..pieces import spline_pieces
-from ..spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite, rounding
+from ..spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from ..spline import CubicSpline
 from .curves import read_curves
 from .errors import Failure, listed
@@ -101,7 +101,7 @@ def _measure(spline: CubicSpline) -> Found:
     closed = is_closed(spline.bc_type)
     steps = np.diff(spline._times)
     shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
-    floor = _ROUNDING * rounding(spline.space, spline.points)
+    floor = _ROUNDING * float(spline.space.rounding(spline.points).max())
     distance = float(spline.space.distance(pieces.at(pieces.t), pieces.points).max())
     values, excess = [distance], [distance / (_RELATIVE + floor)]
     for nu in range(3):

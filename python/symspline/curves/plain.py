@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Self
 
 import numpy as np
@@ -46,8 +45,6 @@ class Plain(Curve):
             raise ValidationError(
                 f"with per_curve=True the shape of x must begin with the batch axes {self.batch}; got {x.shape}"
             )
-        if progress is not None:
-            progress = _counting(progress, x.size if per_curve else math.prod(self.batch) * x.size)
         space = self.space
         values = _core.evaluate(
             space._handle,
@@ -94,8 +91,3 @@ class Plain(Curve):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.space, self.times, self.points, self.velocities)
-
-
-def _counting(progress: Progress, samples: int) -> Progress:
-    """Progress in samples, in which the core counts; only its total is in numbers."""
-    return lambda finished, _: progress(min(finished, samples), samples)

@@ -5,7 +5,6 @@ from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnit
 from .named import space
 from .positive import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, together
-from .rounding import rounding
 from .subspaces import ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective
 from .tolerance import POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
@@ -32,7 +31,6 @@ __all__ = [
     "factors_of",
     "parts_of",
     "point_tol",
-    "rounding",
     "space",
     "together",
 ]

@@ -195,6 +195,17 @@ class Space:
         """The tangential part of v at p."""
         return self._finite("project_tangent", p=p, v=v)
 
+    def rounding(self, p: ArrayLike) -> Any:
+        """By how much rounding counts at points p: how far apart neighbouring floating-point points are, in units of
+        2.2e-16, shape of the leading axes. |p|² in hyperbolic space, tr p · tr p⁻¹ (about the condition) of positive
+        definite matrices, the length of vectors and translations; 1 or more.
+
+        >>> import symspline as ss
+        >>> ss.Sphere(1).rounding([1.0, 0.0]), ss.Hyperbolic(1).rounding([1.25, 0.75])
+        (np.float64(1.0), np.float64(2.125))
+        """
+        return self._apply("rounding", p=p)
+
     def check_point(self, p: ArrayLike) -> None:
         """Raise ValidationError unless p (or every one of an array of points) is a point."""
         array = self._doubles(p, "p")
@@ -293,7 +304,7 @@ class Space:
         rows = [self._rows(a, lead) for a in arrays.values()]
         times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
         result = self._handle.apply(operation, rows, times)
-        if operation in ("distance", "inner"):
+        if operation in ("distance", "inner", "rounding"):
             return result.reshape(lead)[()]
         return self._numbers(result.reshape(lead + self._doubles_shape))
 

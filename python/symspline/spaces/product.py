@@ -78,6 +78,9 @@ class Product(Space):
     def project(self, x: Any) -> Any:
         return self._each("project", x)
 
+    def rounding(self, p: Any) -> Any:
+        return np.max(np.stack(np.broadcast_arrays(*self._each("rounding", p))), axis=0)[()]
+
     def check_point(self, p: Any) -> None:
         self._each("check_point", p)
 

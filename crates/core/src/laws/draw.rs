@@ -141,7 +141,5 @@ pub fn norm(a: &[Lane]) -> Lane {
 /// of itself.
 pub fn rounding(space: &Erased, count: f64, points: &[&[Lane]], x: &[Lane]) -> Lane {
     let at = points.iter().fold(Lane::ONE, |most, p| most.max(space.rounding(p)));
-    let size =
-        points.iter().fold(Lane::ONE, |most, p| most.max(if space.scales() { norm(p) } else { Lane::ONE }));
-    lane(count * f64::EPSILON) * at * size * space.condition(x)
+    lane(count * f64::EPSILON) * at * space.condition(x)
 }

@@ -104,7 +104,7 @@ pub trait Ambient: Copy + Send + Sync {
     fn scatter(&self, noise: &mut [Lane]);
     /// Says in words and numbers why x, which is finite, is not a point.
     fn complaint(&self, x: &[f64]) -> String;
-    /// How far apart neighbouring floating-point points are at p, in units of a rounding error.
+    /// How far apart neighbouring floating-point points are at p, in units of a rounding error; 1 or more.
     fn rounding(&self, _p: &[Lane]) -> Lane {
         Lane::ONE
     }
