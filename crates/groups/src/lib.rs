@@ -1,5 +1,6 @@
 //! Groups as symmetric spaces: rotations, unitary matrices and rigid motions.
 
+mod logarithm;
 mod rigid;
 mod rotations;
 mod special_euclidean;

@@ -1,6 +1,7 @@
 //! Subspaces: Grassmannians and projective spaces.
 
 mod grassmannian;
+mod logarithm;
 
 pub use grassmannian::Subspaces;
 

@@ -2,6 +2,7 @@
 
 use super::bezier::Segment;
 use super::locate::Locator;
+use super::places::Places;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
@@ -61,7 +62,7 @@ const BLOCK: usize = 2048;
 const PARALLEL: usize = 1 << 16;
 
 impl Curves<'_> {
-    fn knots(&self, curve: usize) -> &[f64] {
+    pub(super) fn knots(&self, curve: usize) -> &[f64] {
         if self.t.len() == self.nodes {
             self.t
         } else {
@@ -118,131 +119,15 @@ pub fn evaluate(
 pub struct Job<'a> {
     /// What is computed.
     pub quantity: Quantity,
-    curves: &'a Curves<'a>,
-    times: &'a Times<'a>,
-    outside: Outside,
-    locator: Option<&'a Locator<'a>>,
+    pub(super) curves: &'a Curves<'a>,
+    pub(super) times: &'a Times<'a>,
+    pub(super) outside: Outside,
+    pub(super) locator: Option<&'a Locator<'a>>,
     /// The first sample of the block.
-    first: usize,
+    pub(super) first: usize,
     /// Numbers in a row of the result, and of a point.
     size: usize,
-    len: usize,
-}
-
-/// Where eight samples fall. It goes along the samples of a block in their order.
-struct Places<'a> {
-    job: &'a Job<'a>,
-    /// The next sample: the i-th time of a curve.
-    curve: usize,
-    i: usize,
-    /// Samples that are left in the block.
-    left: usize,
-    segment: usize,
-    /// Where the data of each lane's segment begin.
-    at: [usize; LANES],
-    /// Times, first knots and lengths of the segments, and one over those.
-    x: Lane,
-    knot: Lane,
-    h: Lane,
-    rate: Lane,
-    /// Times beyond the last (positive) or before the first knot.
-    beyond: [f64; LANES],
-    /// First and last knot of the segment, if all lanes are in the same one.
-    shared: Option<[Lane; 2]>,
-}
-
-impl<'a> Places<'a> {
-    fn new(job: &'a Job<'a>, samples: usize) -> Self {
-        let count = job.times.count;
-        Places {
-            job,
-            curve: job.first / count,
-            i: job.first % count,
-            left: samples,
-            segment: 0,
-            at: [usize::MAX; LANES],
-            x: Lane::ZERO,
-            knot: Lane::ZERO,
-            h: Lane::ONE,
-            rate: Lane::ONE,
-            beyond: [0.0; LANES],
-            shared: None,
-        }
-    }
-
-    /// Goes to the next eight samples; lanes that are left over repeat the last one. Returns whether
-    /// they fall in other segments than those before.
-    #[inline(always)]
-    fn advance(&mut self) -> bool {
-        let Times { x, count } = *self.job.times;
-        if let Some([from, to]) = self.shared
-            && self.left >= LANES
-            && self.i + LANES <= count
-        {
-            // Dense samples in order stay in a segment for a while.
-            let row = if x.len() == count { self.i } else { self.curve * count + self.i };
-            let next = Lane::new(std::array::from_fn(|l| x[row..][..LANES][l]));
-            if (next.simd_ge(from) & next.simd_lt(to)).all() {
-                self.x = next;
-                self.step(LANES);
-                return false;
-            }
-        }
-        self.search()
-    }
-
-    #[inline(always)]
-    fn step(&mut self, samples: usize) {
-        self.left -= samples;
-        self.i += samples;
-        if self.i == self.job.times.count {
-            (self.curve, self.i) = (self.curve + 1, 0);
-            self.shared = None;
-        }
-    }
-
-    fn search(&mut self) -> bool {
-        let Job { curves, locator, outside, .. } = self.job;
-        let Times { x, count } = *self.job.times;
-        let len = self.job.len;
-        let (mut at, mut xs, mut knots, mut ends) = (self.at, [0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for l in 0..LANES {
-            let mut x = if x.len() == count { x[self.i] } else { x[self.curve * count + self.i] };
-            let t = curves.knots(self.curve);
-            let (start, end) = (t[0], t[t.len() - 1]);
-            self.beyond[l] = 0.0;
-            if x < start || x > end {
-                match outside {
-                    Outside::Continue => {}
-                    Outside::Geodesic => {
-                        self.beyond[l] = if x < start { x - start } else { x - end };
-                        x = x.max(start).min(end);
-                    }
-                    Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
-                }
-            }
-            let k = match locator {
-                Some(locator) => locator.find(x, self.segment),
-                None => Locator::new(t, false).find(x, self.segment),
-            };
-            self.segment = k;
-            at[l] = (self.curve * curves.nodes + k) * len;
-            (xs[l], knots[l], ends[l]) = (x, t[k], t[k + 1]);
-            if self.left > 1 {
-                self.step(1);
-            }
-        }
-        let changed = at != self.at;
-        self.at = at;
-        self.x = Lane::new(xs);
-        self.knot = Lane::new(knots);
-        self.h = Lane::new(ends) - self.knot;
-        self.rate = Lane::ONE / self.h;
-        // The next sample may be of another curve already.
-        let alike = at == [at[0]; LANES] && self.beyond == [0.0; LANES] && self.i >= LANES;
-        self.shared = alike.then(|| [self.knot, Lane::new(ends)]);
-        changed
-    }
+    pub(super) len: usize,
 }
 
 impl Job<'_> {

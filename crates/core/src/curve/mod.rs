@@ -4,6 +4,7 @@ mod bezier;
 mod bspline;
 mod evaluate;
 mod locate;
+mod places;
 
 pub use bezier::Segment;
 pub use bspline::{BSpline, evaluate_bspline};

@@ -1,0 +1,121 @@
+//! Which segments eight samples at a time fall in.
+
+use super::evaluate::{Job, Outside, Times};
+use super::locate::Locator;
+use crate::scalar::{LANES, Lane};
+
+/// Where eight samples fall. It goes along the samples of a block in their order.
+pub struct Places<'a> {
+    job: &'a Job<'a>,
+    /// The next sample: the i-th time of a curve.
+    curve: usize,
+    i: usize,
+    /// Samples that are left in the block.
+    left: usize,
+    segment: usize,
+    /// Where the data of each lane's segment begin.
+    pub at: [usize; LANES],
+    /// Times, first knots and lengths of the segments, and one over those.
+    pub x: Lane,
+    pub knot: Lane,
+    pub h: Lane,
+    pub rate: Lane,
+    /// Times beyond the last (positive) or before the first knot.
+    pub beyond: [f64; LANES],
+    /// First and last knot of the segment, if all lanes are in the same one.
+    shared: Option<[Lane; 2]>,
+}
+
+impl<'a> Places<'a> {
+    pub fn new(job: &'a Job<'a>, samples: usize) -> Self {
+        let count = job.times.count;
+        Places {
+            job,
+            curve: job.first / count,
+            i: job.first % count,
+            left: samples,
+            segment: 0,
+            at: [usize::MAX; LANES],
+            x: Lane::ZERO,
+            knot: Lane::ZERO,
+            h: Lane::ONE,
+            rate: Lane::ONE,
+            beyond: [0.0; LANES],
+            shared: None,
+        }
+    }
+
+    /// Goes to the next eight samples; lanes that are left over repeat the last one. Returns whether
+    /// they fall in other segments than those before.
+    #[inline(always)]
+    pub fn advance(&mut self) -> bool {
+        let Times { x, count } = *self.job.times;
+        if let Some([from, to]) = self.shared
+            && self.left >= LANES
+            && self.i + LANES <= count
+        {
+            // Dense samples in order stay in a segment for a while.
+            let row = if x.len() == count { self.i } else { self.curve * count + self.i };
+            let next = Lane::new(std::array::from_fn(|l| x[row..][..LANES][l]));
+            if (next.simd_ge(from) & next.simd_lt(to)).all() {
+                self.x = next;
+                self.step(LANES);
+                return false;
+            }
+        }
+        self.search()
+    }
+
+    #[inline(always)]
+    fn step(&mut self, samples: usize) {
+        self.left -= samples;
+        self.i += samples;
+        if self.i == self.job.times.count {
+            (self.curve, self.i) = (self.curve + 1, 0);
+            self.shared = None;
+        }
+    }
+
+    fn search(&mut self) -> bool {
+        let Job { curves, locator, outside, .. } = self.job;
+        let Times { x, count } = *self.job.times;
+        let len = self.job.len;
+        let (mut at, mut xs, mut knots, mut ends) = (self.at, [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let mut x = if x.len() == count { x[self.i] } else { x[self.curve * count + self.i] };
+            let t = curves.knots(self.curve);
+            let (start, end) = (t[0], t[t.len() - 1]);
+            self.beyond[l] = 0.0;
+            if x < start || x > end {
+                match outside {
+                    Outside::Continue => {}
+                    Outside::Geodesic => {
+                        self.beyond[l] = if x < start { x - start } else { x - end };
+                        x = x.max(start).min(end);
+                    }
+                    Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
+                }
+            }
+            let k = match locator {
+                Some(locator) => locator.find(x, self.segment),
+                None => Locator::new(t, false).find(x, self.segment),
+            };
+            self.segment = k;
+            at[l] = (self.curve * curves.nodes + k) * len;
+            (xs[l], knots[l], ends[l]) = (x, t[k], t[k + 1]);
+            if self.left > 1 {
+                self.step(1);
+            }
+        }
+        let changed = at != self.at;
+        self.at = at;
+        self.x = Lane::new(xs);
+        self.knot = Lane::new(knots);
+        self.h = Lane::new(ends) - self.knot;
+        self.rate = Lane::ONE / self.h;
+        // The next sample may be of another curve already.
+        let alike = at == [at[0]; LANES] && self.beyond == [0.0; LANES] && self.i >= LANES;
+        self.shared = alike.then(|| [self.knot, Lane::new(ends)]);
+        changed
+    }
+}
