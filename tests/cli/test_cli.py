@@ -23,7 +23,7 @@ from symspline.cli import main, times
 from symspline.cli.errors import Problem
 from symspline.lonlat import from_lonlat, to_lonlat
 
-README = Path(__file__).parents[1] / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 FIXES = [("00:00", 178.5, 28.0), ("06:00", -179.0, 29.1), ("12:00", -177.0, 30.0), ("18:00", -176.2, 31.5)]
 TRACK = "time,lon,lat\n" + "".join(f"2021-08-29T{clock}Z,{lon},{lat}\n" for clock, lon, lat in FIXES)
 AXES = "t,x,y,z\n0,1,0,0\n1,0,1,0\n3,0,0,1\n"

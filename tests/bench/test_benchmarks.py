@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 TINY = timing.Effort(runs=2, shortest=0, longest=1)
 
 

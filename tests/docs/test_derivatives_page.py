@@ -5,7 +5,7 @@ from pathlib import Path
 
 import derivatives_figure as figure
 
-PAGE = Path(__file__).parents[1] / "docs/derivatives.md"
+PAGE = Path(__file__).parents[2] / "docs/derivatives.md"
 
 
 def test_examples_run():
