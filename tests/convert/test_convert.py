@@ -214,13 +214,18 @@ def test_quaternions_multiply_as_rotations(rng):
     assert np.abs(r @ s - t).max() <= 10 * EPS
 
 
-def test_the_order_must_be_said():
-    for call in (convert.matrix_to_quaternion, convert.quaternion_to_matrix):
-        for order in ({}, {"scalar_first": None}, {"scalar_first": "xyzw"}, {"scalar_first": 1}):
-            with pytest.raises(ss.ValidationError, match=r"in doubt.*scalar_first=True.*scalar_first=False"):
-                call(np.eye(3), **order)
-        with pytest.raises(TypeError):
-            call(np.eye(3), True)
+@pytest.mark.parametrize("order", [None, 1, 0, "wxyz", "xyzw", np.True_])
+@pytest.mark.parametrize(
+    "call, value", [(convert.matrix_to_quaternion, np.eye(3)), (convert.quaternion_to_matrix, [1.0, 0, 0, 0])]
+)
+def test_the_order_must_be_said(call, value, order):
+    match = r"in doubt.* scalar_first=True for \(w, x, y, z\) or scalar_first=False for \(x, y, z, w\) as in SciPy"
+    with pytest.raises(ss.ValidationError, match=match):
+        call(value, scalar_first=order)
+    with pytest.raises(ss.ValidationError, match=match):
+        call(value)
+    with pytest.raises(TypeError):
+        call(value, True)
 
 
 # ---- shapes and bad input ----

@@ -3,124 +3,71 @@ each other."""
 
 import numpy as np
 import pytest
-from cases import CASES, closed_walk, unit_tangent, walk
+from cases import (
+    CASES,
+    LARGE,
+    LOOPS,
+    Case,
+    loop,
+    unit_tangent,
+    walk,
+)
+from changes import ENDS, by_differences, data, inside, motion, moved
 
 import symspline as ss
 
-STEP = 2e-3
-
-
-def data(case, end, seed=0, n=6, step=None):
-    """Knots, points and end conditions of a curve."""
-    rng = np.random.default_rng(seed)
-    space = case.space
-    size = step or min(0.6, case.far / 2)
-    points = closed_walk(space, size, n, rng) if end == "periodic" else walk(space, size, n, rng)
-    n = len(points)
-    t = np.cumsum(rng.uniform(0.7, 1.3, n))
-    vectors = [0.4 * unit_tangent(space, points[i], rng) for i in (0, -1)]
-    bc = {
-        "velocities": ((1, vectors[0]), (1, vectors[1])),
-        "accelerations": ((2, vectors[0]), (2, vectors[1])),
-        "mixed": ("not-a-knot", (1, vectors[1])),
-        "turned": ((2, vectors[0]), "not-a-knot"),
-    }.get(end, end)
-    return space, t, points, bc
-
-
-def motion(space, t, points, bc, rng):
-    """A random change of all data."""
-    vectors = np.array([unit_tangent(space, p, rng) for p in points])
-    if isinstance(bc, str) and bc == "periodic":
-        vectors[-1] = space.transport(points[0], points[-1], vectors[0])
-    ends = tuple(
-        None if isinstance(bc, str) or isinstance(b, str) else unit_tangent(space, points[-i], rng)
-        for i, b in enumerate(bc if not isinstance(bc, str) else (bc, bc))
-    )
-    return vectors, 0.3 * rng.normal(size=len(t)), ends
-
-
-def moved(space, t, points, bc, change, size):
-    """The spline through data that moved; vectors at the ends go with their points in parallel."""
-    vectors, knots, ends = change
-    new = space.project(space.exp(points, size * vectors))
-    if isinstance(bc, str):
-        if bc == "periodic":
-            new[-1] = new[0]
-        return ss.CubicSpline(t + size * knots, new, space, bc_type=bc)
-    conditions = []
-    for i, (given, end) in enumerate(zip(bc, ends, strict=True)):
-        if not isinstance(given, str):
-            order, vector = given
-            vector = vector + size * end
-            if size:
-                vector = space.transport(points[-i], new[-i], vector)
-            given = (order, space.project_tangent(new[-i], vector))
-        conditions.append(given)
-    return ss.CubicSpline(t + size * knots, new, space, bc_type=tuple(conditions))
-
-
-def by_differences(space, t, points, bc, change, x, nu):
-    """The change of the curve at times x by central differences of order four."""
-    base = moved(space, t, points, bc, change, 0.0)(x)
-
-    def seen(size):
-        spline = moved(space, t, points, bc, change, size)
-        if nu == 0:
-            return space.log(base, spline(x))
-        return space.transport(spline(x), base, spline(x, nu))
-
-    return (8 * (seen(STEP) - seen(-STEP)) - (seen(2 * STEP) - seen(-2 * STEP))) / (12 * STEP)
-
-
-def inside(t, rng, n=7):
-    """Times between the knots that stay there when the knots move a little."""
-    return np.sort(rng.uniform(t[0] + 0.05, t[-1] - 0.05, n))
-
-
-ENDS = ("natural", "clamped", "not-a-knot", "periodic", "velocities", "accelerations", "mixed", "turned")
 LONG = [case.name for case in CASES if not case.few]
+
+
 EACH = [
     (case, end)
     for case in CASES
     for end in ENDS
     if not case.few or case.name == "o:3" or end in ("mixed", "periodic")
 ]
+FURTHER = [(case, end) for case in LARGE for end in ("mixed", "periodic")]
 
 
-@pytest.mark.parametrize("nu", (0, 1, 2))
-@pytest.mark.parametrize(("case", "end"), EACH, ids=[f"{c.name}-{e}" for c, e in EACH])
-def test_derivatives_are_those_of_finite_differences(case, end, nu):
+def named(pairs):
+    return {
+        "argnames": ("case", "end"),
+        "argvalues": pairs,
+        "ids": [f"{case.name}-{end}" for case, end in pairs],
+    }
+
+
+@pytest.mark.parametrize(**named(EACH + FURTHER))
+def test_derivatives_are_those_of_finite_differences(case, end):
     rng = np.random.default_rng(5)
     space, t, points, bc = data(case, end)
     change = motion(space, t, points, bc, rng)
     x = inside(t, rng)
     spline = moved(space, t, points, bc, change, 0.0)
-    found = spline.jvp(x, *change, nu)
-    expected = by_differences(space, t, points, bc, change, x, nu)
-    # Of the differences: the fourth power of the step, and residuals of 1e-14 divided by it.
-    assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
+    for nu, expected in enumerate(by_differences(space, t, points, bc, change, x)):
+        found = spline.jvp(x, *change, nu)
+        # Of the differences: the fourth power of the step, and residuals of 1e-14 divided by it.
+        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
 
 
-@pytest.mark.parametrize("nu", (0, 1, 2))
-@pytest.mark.parametrize(("case", "end"), EACH, ids=[f"{c.name}-{e}" for c, e in EACH])
-def test_the_gradient_is_the_transpose(case, end, nu):
+@pytest.mark.parametrize(**named(EACH))
+def test_the_gradient_is_the_transpose(case, end):
     rng = np.random.default_rng(6)
     space, t, points, bc = data(case, end)
     vectors, knots, ends = motion(space, t, points, bc, rng)
     x = inside(t, rng)
     spline = ss.CubicSpline(t, points, space, bc_type=bc)
-    cotangent = rng.normal(size=spline(x).shape)
-    if space.dtype.kind == "c":
-        cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
-    forward = spline.jvp(x, vectors, knots, ends, nu)
-    gradient = spline.vjp(x, cotangent, nu)
-    pairs = [(cotangent, forward), (gradient.points, vectors), (gradient.t, knots)]
-    pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
-    left, *right = [np.vdot(a, b).real for a, b in pairs]
-    scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
-    assert abs(left - sum(right)) <= 1e-12 * scale
-    space.check_tangent(points, gradient.points)
+    for nu in range(3):
+        cotangent = rng.normal(size=spline(x).shape)
+        if space.dtype.kind == "c":
+            cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
+        forward = spline.jvp(x, vectors, knots, ends, nu)
+        gradient = spline.vjp(x, cotangent, nu)
+        pairs = [(cotangent, forward), (gradient.points, vectors), (gradient.t, knots)]
+        pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
+        left, *right = [np.vdot(a, b).real for a, b in pairs]
+        scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
+        assert abs(left - sum(right)) <= 1e-12 * scale, nu
+        space.check_tangent(points, gradient.points)
 
 
 def test_in_flat_space_they_are_those_of_scipy():
@@ -265,3 +212,68 @@ def test_cotangents_must_have_the_shape_of_the_curve():
     large = ss.CubicSpline(None, np.eye(300)[:3], "sphere:299")
     with pytest.raises(ss.ValidationError, match="not made in as many dimensions"):
         large.vjp(0.5, np.ones(300))
+
+
+# ---- few points ----
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.parametrize("end", ["not-a-knot", "mixed", "turned", "natural", "accelerations"])
+@pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3", "gr:2,5", "se:3", "spd:2"])
+def test_derivatives_of_curves_of_few_points(name, end, n):
+    case = Case(name)
+    rng = np.random.default_rng(14)
+    space, t, p, bc = data(case, end, n=n)
+    change = motion(space, t, p, bc, rng)
+    x = inside(t, rng)
+    spline = moved(space, t, p, bc, change, 0.0)
+    for nu, expected in enumerate(by_differences(space, t, p, bc, change, x, (0, 1))):
+        found = spline.jvp(x, *change, nu)
+        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
+
+
+# ---- loops ----
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1815)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_derivatives_of_a_loop(name, rng):
+    space = ss.space(name)
+    t, p = loop(space, 6, rng)
+    change = motion(space, t, p, "periodic", rng)
+    x = inside(t, rng)
+    spline = ss.CubicSpline(t, p, space, bc_type="periodic")
+    for nu, expected in enumerate(by_differences(space, t, p, "periodic", change, x, (0, 1))):
+        found = spline.jvp(x, *change, nu)
+        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
+        cotangent = rng.normal(size=found.shape) + (
+            1j * rng.normal(size=found.shape) if found.dtype == complex else 0
+        )
+        gradient = spline.vjp(x, cotangent, nu)
+        left, *right = (
+            np.vdot(a, b).real
+            for a, b in ((cotangent, found), (gradient.points, change[0]), (gradient.t, change[1]))
+        )
+        assert abs(left - sum(right)) <= 1e-12 * np.linalg.norm(cotangent) * np.linalg.norm(found)
+
+
+@pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,4"])
+def test_derivatives_of_a_loop_that_ends_in_another_array(name, rng):
+    space = ss.space(name)
+    t, p = loop(space, 5, rng)
+    vectors, knots, _ = motion(space, t, p, "periodic", rng)
+    turn = ss.space("u:2" if name.startswith("cgr") else "o:2").random_point(rng)
+    turn = {"rp:2": -1.0, "cp:2": np.exp(0.7j)}.get(name, turn)
+
+    def other(x):
+        return np.concatenate([x[:-1], [x[-1] @ turn if np.ndim(turn) else x[-1] * turn]])
+
+    x = inside(t, rng)
+    one, two = (ss.CubicSpline(t, points, space, bc_type="periodic") for points in (p, other(p)))
+    for nu in (0, 1):
+        here, there = one.jvp(x, vectors, knots, nu=nu), two.jvp(x, other(vectors), knots, nu=nu)
+        assert np.abs(space.transport(two(x), one(x), there) - here).max() <= 1e-12 * np.abs(here).max()

@@ -2,16 +2,17 @@
 
 import numpy as np
 import pytest
-from cases import EPS, closed_walk, condition, jumps, steep_tangent, unit_tangent, walk
-from curves import same
+from cases import EPS, closed_walk, condition, jumps, walk, zigzag, zigzag_on
+from curves import S2, same
 from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
 
-S2 = ss.Sphere(2)
 # What an iteration counts: 120 sweeps, 50 steps of Newton's method, and the homotopy, whose steps of λ have
 # twelve at most. The longest run seen is 476.
 MOST = 1000
+
+
 # Times that suit no curve with equal steps.
 UNEVEN = np.cumsum([0.0, 20, 1, 20, 1, 20, 1, 20])
 
@@ -23,23 +24,6 @@ def rng():
 
 def fit(p, space, t=None, **options):
     return ss.CubicSpline(t, p, space, on_failure="ignore", **options)
-
-
-def zigzag(step, n=20, rise=0.1):
-    """Points on S² whose longitude alternates between 0 and `step`, one above the other."""
-    i = np.arange(n)
-    lon, lat = step * (i % 2), rise * (i - (n - 1) / 2)
-    return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
-
-
-def zigzag_on(space, step, n, rng):
-    """Points to either side of a geodesic, in the direction of the nearest cut locus."""
-    o = space.random_point(rng)
-    side, along = steep_tangent(space, o, rng), unit_tangent(space, o, rng)
-    centres = space.exp(o, np.multiply.outer(0.1 * (np.arange(n) - (n - 1) / 2), along))
-    across = np.array([space.project_tangent(c, space.transport(o, c, side)) for c in centres])
-    signs = np.reshape(0.5 * (-1.0) ** np.arange(n), (n, *[1] * len(space.point_shape)))
-    return space.project(space.exp(centres, step * signs * across))
 
 
 def wild(space, step, n, rng):
@@ -97,6 +81,39 @@ def test_fixed_point_is_linear_with_a_rate_of_one_half(rng):
     for space in (S2, ss.SpecialOrthogonal(3), ss.Grassmannian(2, 5)):
         report = ss.CubicSpline(None, walk(space, 0.1, 20, rng), space, method="fixed-point").report
         assert report.rate == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "mixed"])
+@pytest.mark.parametrize("n", [4, 5, 12])
+def test_quasi_newton_takes_one_step_in_flat_space(n, ends, rng):
+    t, p = np.cumsum(rng.uniform(0.2, 2, n)), rng.standard_normal((n, 2))
+    if ends == "periodic":
+        p[-1] = p[0]
+    bc = ("not-a-knot", (1, p[0])) if ends == "mixed" else ends
+    spline = ss.CubicSpline(t, p, "r:2", bc_type=bc, method="quasi-newton")
+    assert spline.report.iterations == 2
+
+
+def test_the_rate_is_the_mean_contraction(rng):
+    p = walk(ss.Sphere(2), 0.4, 20, rng)
+    options = {"method": "fixed-point", "on_failure": "ignore"}
+    done = ss.CubicSpline(None, p, "sphere:2", **options).report
+    second = ss.CubicSpline(None, p, "sphere:2", max_iter=2, **options).report.residual
+    assert done.rate == pytest.approx((done.residual / second) ** (1 / (done.iterations - 2)), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton"])
+def test_it_does_not_matter_where_a_closed_curve_starts(method, rng):
+    """The residual of an unfinished curve is the largest of all knots, that of the seam among them."""
+    h, p = rng.uniform(0.7, 1.3, 6), walk(ss.Sphere(2), 0.7, 6, rng)
+    found = []
+    for k in range(6):
+        points, steps = np.roll(p, -k, axis=0), np.roll(h, -k)
+        t = np.concatenate([[0.0], np.cumsum(steps)])
+        closed = np.concatenate([points, points[:1]])
+        options = {"method": method, "bc_type": "periodic", "max_iter": 2, "on_failure": "ignore"}
+        found.append(ss.CubicSpline(t, closed, "sphere:2", **options).report.residual)
+    assert np.ptp(found) <= 1e-12 * found[0]
 
 
 # ---- they find the same curve ----
@@ -220,7 +237,11 @@ def test_points_too_far_are_an_error_with_advice():
 
 
 EASY, HARD, HARDEST = zigzag(0.5, 8), zigzag(2.8, 8), zigzag(2.3, 8, 0.3)
+
+
 ANTIPODES = np.concatenate([EASY[:4], -EASY[3:4], EASY[5:]])
+
+
 IMPOSSIBLE = zigzag(1.0, 8)
 """With the times `UNEVEN`."""
 

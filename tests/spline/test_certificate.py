@@ -4,14 +4,13 @@ import pickle
 
 import numpy as np
 import pytest
-from cases import base_point, closed_walk, unit_tangent, walk
+from cases import CURVED, base_point, closed_walk, unit_tangent, walk
 
 import symspline as ss
 
 S2 = ss.Sphere(2)
 # Where the smallest and the largest V of (38) meet.
 LARGEST_KD, LARGEST_KV = 0.2610895, 0.4420886
-CURVED = ["sphere:2", "hyperbolic:2", "rp:2", "cp:2", "gr:2,5", "so:3", "su:2", "u:2", "spd:2", "hpd:2"]
 
 
 @pytest.fixture
