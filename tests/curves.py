@@ -3,14 +3,23 @@
 import os
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
-from cases import walk
+import pytest
+from cases import COMMON, QUOTIENTS, SINGLE, SPACES, apart, walk
 
 import symspline as ss
 
-SPACES = [ss.Euclidean(3), ss.Sphere(2), ss.Hyperbolic(2), ss.Product(ss.Sphere(3), ss.Euclidean(2))]
-EPS = np.finfo(float).eps
+every_space = pytest.mark.parametrize("space", SPACES, ids=str)
+every_single = pytest.mark.parametrize("space", SINGLE, ids=str)
+every_common = pytest.mark.parametrize("space", COMMON, ids=str)
+every_batch = pytest.mark.parametrize("batch", [(), (2, 3)], ids=str)
+
+S2, S3 = ss.Sphere(2), ss.Sphere(3)
+# Its axes, as points of S².
+THREE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+KNOTS = np.array([0.0, 1.0, 1.5, 3.0, 4.0, 4.5])
 
 
 def points_on(space, n=6, batch=(), step=0.7, seed=1):
@@ -25,6 +34,10 @@ def points_on(space, n=6, batch=(), step=0.7, seed=1):
 def parts(value):
     """The arrays of a value, of which there are several in a product."""
     return value if isinstance(value, tuple) else (value,)
+
+
+def factors(space):
+    return space.factors if isinstance(space, ss.Product) else (space,)
 
 
 def each(function, *values):
@@ -71,3 +84,63 @@ def at_node(space, value, i):
 def tangents_at(space, points, size=0.3, seed=5):
     """Random tangent vectors at points."""
     return each(lambda v: size * v, space.random_tangent(np.random.default_rng(seed), points))
+
+
+def pick(value, index):
+    return each(lambda array: array[index], value)
+
+
+def with_ends(space, p):
+    """End conditions with a vector at either end, for every curve its own."""
+    return (
+        (1, tangents_at(space, at_node(space, p, 0))),
+        (2, tangents_at(space, at_node(space, p, -1), seed=6)),
+    )
+
+
+def shaped(space, lead):
+    """Shapes and types of points or vectors with some leading axes."""
+    return [((*lead, *f.point_shape), f.dtype) for f in factors(space)]
+
+
+def found(value):
+    return [(np.shape(part), part.dtype) for part in parts(value)]
+
+
+def off(space, x, y):
+    """How far points are apart, whatever their arrays."""
+    return max(
+        float(np.max(apart(f, a, b))) for f, a, b in zip(factors(space), parts(x), parts(y), strict=True)
+    )
+
+
+def vectors_off(space, x, u, y, v):
+    """How far vectors are apart at points that may have other arrays."""
+    return max(
+        float(np.abs((f.transport(a, b, p) if isinstance(f, QUOTIENTS) else p) - q).max())
+        for f, a, p, b, q in zip(factors(space), *map(parts, (x, u, y, v)), strict=True)
+    )
+
+
+def bezier(space, control, tau):
+    """De Casteljau's algorithm with geodesics, (8), at one time."""
+    control = [pick(control, k) for k in range(len(parts(control)[0]))]
+    while len(control) > 1:
+        control = [space.geodesic(p, q, tau) for p, q in pairwise(control)]
+    return control[0]
+
+
+def failing(kind):
+    """Three curves of which the middle one fails, and the options with which it does."""
+    good = points_on(S2, 20, (3,), step=0.2)
+    if kind == "cut locus":
+        good[1, 4] = -good[1, 3]
+        return good, {}
+    # Steps this long take Algorithm 1 hundreds of sweeps, short ones about forty.
+    good[1] = points_on(S2, 20, step=2.2, seed=3)
+    return good, {"method": "fixed-point", "max_iter": 60}
+
+
+def scattered(n, seed=0):
+    """Points on S³ that are far apart: hard work for Algorithm 1."""
+    return S3.random_point(np.random.default_rng(seed), n)

@@ -47,12 +47,12 @@ def use(draw, spline, mood, checked):
     assert isinstance(spline, ss.CubicSpline)
     note(repr(spline.report))
     converged = np.asarray(spline.report.converged)
-    assert converged.shape == spline._batch
+    assert converged.shape == batch_of(spline)
     if checked and converged.all():
         holds(spline)
         comes_back(spline)
     policy, per_curve = draw(st.sampled_from(POLICIES)), rarely(draw)
-    x = draw(times(spline.t, mood, spline._batch if per_curve else ()))
+    x = draw(times(spline.t, mood, batch_of(spline) if per_curve else ()))
     nu = draw(st.sampled_from([0, 1, 2]))
     if mood == ODD:
         nu, policy = draw(st.one_of(st.just(nu), nonsense)), draw(st.one_of(st.just(policy), nonsense))
@@ -60,7 +60,7 @@ def use(draw, spline, mood, checked):
         lambda: spline(x, nu, extrapolate=policy, per_curve=per_curve), x, wrong_types=mood == ODD
     )
     if not isinstance(values, Refusal):
-        lead = np.shape(x) if per_curve else spline._batch + np.shape(x)
+        lead = np.shape(x) if per_curve else batch_of(spline) + np.shape(x)
         for factor, value in zip(parts(spline.space), parts(values), strict=True):
             assert value.shape == lead + factor.point_shape and value.dtype == factor.dtype
     for quantity in (
@@ -71,14 +71,29 @@ def use(draw, spline, mood, checked):
     ):
         result = attempt(quantity)
         if quantity in (spline.length, spline.bending_energy) and not isinstance(result, Refusal):
-            assert np.shape(result) == spline._batch
+            assert np.shape(result) == batch_of(spline)
     assert "CubicSpline" in repr(spline)
+
+
+def batch_of(spline):
+    """The leading axes of a batch of curves."""
+    space, points = parts(spline.space)[0], parts(spline.points)[0]
+    return points.shape[: points.ndim - 1 - len(space.point_shape)]
+
+
+def seconds(steps):
+    """Differences of numbers or dates."""
+    if steps.dtype.kind != "m":
+        return steps.astype(float)
+    unit, count = np.datetime_data(steps.dtype)
+    # Of all units a second is a whole number, or the other way round.
+    return steps.astype(np.int64) * (np.timedelta64(count, unit) / np.timedelta64(1, "s"))
 
 
 def holds(spline):
     """A curve that converged goes through its points, and is finite all along."""
     space, own = spline.space, spline.t.ndim > 1
-    steps = np.diff(spline._times, axis=-1)
+    steps = seconds(np.diff(spline.t, axis=-1))
     if steps.min() < 1e-60 or steps.max() > 1e60:
         # Derivatives may be too large for doubles.
         return

@@ -3,7 +3,7 @@
 import pickle
 
 import numpy as np
-from cases import EPS, condition
+from cases import EPS, FAMILIES, condition
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -105,7 +105,7 @@ def test_random_points(data):
         assert w.shape == q.shape and np.isfinite(w).all()
 
 
-NAMES = [name for row in ss._core.Handle.names() for name in row]
+NAMES = [name for row in FAMILIES for name in row]
 NUMBERS = [
     0, 1, 2, 3, 4, 10**6, 2**31, 2**32, 2**33, 10**12, 2**53, 2**62, 2**63 - 1, 2**63, 2**64 - 1, 2**64, 10**30,
 ]  # fmt: skip

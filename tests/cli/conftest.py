@@ -1,0 +1,52 @@
+"""A folder for every test, and the command line in it."""
+
+import os
+import shlex
+
+import pytest
+from tabular import AXES, write
+
+from symspline.cli import main
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Every test has the current folder to itself."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(capsys):
+    """Runs a command line that works, and returns what it prints."""
+
+    def run(line):
+        code = main(shlex.split(line))
+        out, err = capsys.readouterr()
+        assert (code, err) == (0, ""), err
+        return out
+
+    return run
+
+
+@pytest.fixture
+def fails(capsys):
+    """Runs a command line that fails, and returns the one line that it says."""
+
+    def fails(line, code=2):
+        before = sorted(os.listdir())
+        assert main(shlex.split(line)) == code
+        err = capsys.readouterr().err
+        assert err.startswith("symspline: ") and err.count("\n") == 1 and err.endswith("\n"), err
+        assert sorted(os.listdir()) == before
+        return err[len("symspline: ") : -1]
+
+    return fails
+
+
+@pytest.fixture
+def curves(run):
+    """Files to begin with: ``a.npz``, and ``long.csv``."""
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    write("long.csv", "x\n" + "".join(f"{i}\n" for i in range(3000)))

@@ -1,0 +1,141 @@
+"""Tables and files of curves that are wrong, damaged or not there."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tabular import AXES, write
+
+import symspline as ss
+
+
+@pytest.mark.parametrize(
+    "text, options, problem",
+    [
+        (AXES, "--space s:2 --time tt", "a.csv has no column 'tt'; did you mean 't'?"),
+        (AXES, "--space s:2 --columns X,Y,Q", "a.csv has no column 'X'; did you mean 'x'?"),
+        (AXES, "--space s:2 --curve storm", "a.csv has no column 'storm'; there are t, x, y, z"),
+        (
+            AXES,
+            "--space r:2",
+            "a.csv: a point of euclidean:2 has 2 numbers, and there are 3 columns: x, y, z; say which",
+        ),
+        (AXES, "--space r:2 --columns x,x", "column 'x' of a.csv cannot have two meanings"),
+        (AXES, "--space r:2 --columns t,x --time t", "column 't' of a.csv cannot have two meanings"),
+        (AXES, "", "say which space the points are on with --space, such as --space sphere:2"),
+        (AXES, "--space foo:2", "unknown space 'foo:2'; known are"),
+        (AXES + "4,1,0,n/a\n", "--space s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
+        (AXES + "\n\n4,1,0,\n", "--space s:2", "a.csv, line 7: column 'z' is empty"),
+        (
+            AXES + "4,1,0,inf\n",
+            "--space s:2",
+            "a.csv, line 5: column 'z' holds inf, which is not a finite number",
+        ),
+        (AXES + "4,1,0\n", "--space s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
+        (AXES + '4,1,0,"0\n', "--space s:2", "a.csv, line 5: unexpected end of data"),
+        (AXES + "4,1.001,0,0\n", "--space s:2", "a.csv: the point in line 5 is off the space by 1.000e-3"),
+        (
+            AXES + "4,0,0,-1\n",
+            "--space s:2",
+            "a.csv: the point in line 4 and the point in line 5 of the curve lie at or",
+        ),
+        ("", "--space s:2", "a.csv is empty"),
+        ("\n\n", "--space s:2", "a.csv is empty"),
+        ("t,x\n", "--space r:1", "a.csv has no rows below the names of its columns"),
+        ("t,x\n1,2\n", "--space r:1", "a.csv, line 2: this is the only point; a curve needs two"),
+        ("1,2\n3,4\n", "--space r:2", "a.csv: the first line must name the columns, but holds numbers"),
+        ("t;x\n1;2\n", "--space r:1", "a.csv: cells must be separated by commas; the first line is 't;x'"),
+        ("t,x,x\n1,2,3\n", "--space r:1", "a.csv: the first line names two columns 'x'"),
+        (
+            "t,x,y\n1,a,3\n2,4,5\n",
+            "--space r:2",
+            "has 2 numbers, and there are 1 columns: y; say which with --columns (no numbers in the first row of x)",
+        ),
+    ],
+)
+def test_bad_tables(fails, text, options, problem):
+    write("a.csv", text)
+    assert problem in fails(f"fit a.csv {options} -o a.npz")
+
+
+def test_files_that_cannot_be_read(fails):
+    assert fails("fit no.csv --space s:2 -o a.npz") == "cannot read no.csv: No such file or directory"
+    assert fails("fit no.npz --space s:2 -o a.npz") == "cannot read no.npz: No such file or directory"
+    assert fails("check no.npz") == "cannot read no.npz: No such file or directory"
+    os.mkdir("folder.csv")
+    assert fails("fit folder.csv --space s:2 -o a.npz") == "cannot read folder.csv: Is a directory"
+    Path("latin.csv").write_bytes("t,x\n0,1\n1,2°\n".encode("latin-1"))
+    assert fails("fit latin.csv --space r:1 -o a.npz") == "latin.csv is not text in UTF-8"
+    write("a.npz", "no zip")
+    assert fails("check a.npz") == "a.npz is not a file of curves, such as `symspline fit` makes"
+    np.savez("a.npz", x=1)
+    assert "a.npz" in fails("check a.npz")
+    ss.CubicSpline(None, [[0], [1]], "r:1").save("a.npz")
+    np.savez("a.npz", **dict(np.load("a.npz")), columns="{}")
+    assert fails("check a.npz").startswith("a.npz is damaged")
+    Path("a.npz").write_bytes(Path("a.npz").read_bytes()[:-300])
+    assert "a.npz" in fails("check a.npz")
+
+
+def in_archive(name, **arrays):
+    """A copy of a.npz in which some arrays are others."""
+    np.savez(name, **(dict(np.load("a.npz")) | arrays))
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        "no JSON",
+        pytest.param("[" * 100_000, id="deep"),
+        "[]",
+        "{}",
+        '{"points": 3}',
+        '{"points": ["x", "y"]}',
+        '{"points": ["x", "y", 3]}',
+        '{"points": ["x", "y", "z"], "time": null}',
+        '{"points": ["x", "y", "z"], "curve": 1}',
+        '{"points": ["x", "y", "z"], "lonlat": "no"}',
+        '{"points": ["x", "y", "z"], "utc": 2}',
+        '{"points": ["x", "y", "z"], "lonlat": true}',
+        '{"points": ["x", "y", "z"], "surprise": 1}',
+    ],
+)
+def test_names_of_columns_that_are_damaged(run, fails, columns):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o a.npz")
+    in_archive("b.npz", columns=columns)
+    assert fails("sample b.npz -n 3 -o c.csv").startswith("b.npz is damaged: ")
+
+
+def claim(entry, method):
+    """A copy of a.npz in which an entry claims to be compressed by a method by which it is not."""
+    data, name = bytearray(Path("a.npz").read_bytes()), f"{entry}.npy".encode()
+    # Names end the headers of entries, and their lines in the list of all at the end of the file.
+    data[data.index(name) - 30 + 8] = data[data.rindex(name) - 46 + 10] = method
+    Path("b.npz").write_bytes(data)
+
+
+@pytest.mark.parametrize("method", [8, 12, 14, 99], ids=["deflate", "bzip2", "lzma", "unknown"])
+def test_archives_that_cannot_be_unpacked(run, fails, method):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o a.npz")
+    for entry in ("points", "columns"):
+        claim(entry, method)
+        assert "b.npz" in fails("check b.npz")
+    np.savez("a.npz", t=[0.0, 1, 2], x=[0.0, 1, 0])
+    claim("x", method)
+    assert "b.npz" in fails("fit b.npz --space r:1 -o c.npz")
+
+
+def test_archives_with_a_damaged_list_of_entries(fails):
+    ss.CubicSpline(None, np.eye(3), "s:2").save("a.npz")
+    data = Path("a.npz").read_bytes()
+    for damaged in (data.replace(b"PK\1\2", b"PK\1\0"), data[:-10] + b"\xff" * 4 + data[-6:]):
+        Path("b.npz").write_bytes(damaged)
+        assert fails("check b.npz") == "b.npz is not a file of curves, such as `symspline fit` makes"
+
+
+def test_messages_are_short(fails):
+    write("a.csv", "t,x\n0,1\n1," + "9" * 5000 + "x\n")
+    assert 1000 < len(fails("fit a.csv --space r:1 -o a.npz")) < 1100

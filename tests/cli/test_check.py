@@ -1,0 +1,107 @@
+"""`symspline check`: good curves pass, bent ones do not."""
+
+import json
+
+import numpy as np
+import pytest
+from cases import SPACES, walk
+from curves import points_on
+
+import symspline as ss
+from symspline.cli import main
+
+
+@pytest.mark.parametrize("name", [*map(str, SPACES), "s:1", "h:5"])
+def test_check_on_every_space(run, fails, name):
+    space = ss.space(name)
+    t = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 30))
+    ss.CubicSpline(t, points_on(space, 30, step=0.5), space, bc_type="not-a-knot").save("a.npz")
+    assert "All is within what rounding allows." in run("check a.npz")
+    arrays = dict(np.load("a.npz"))
+    last = max(key for key in arrays if key.startswith("velocities"))
+    arrays[last][17] *= 1 + 1e-6
+    np.savez("bent.npz", **arrays)
+    assert "more than rounding allows" in fails("check bent.npz", code=1)
+
+
+@pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,4", "cgr:2,4"])
+def test_check_where_a_point_has_many_arrays(run, name):
+    space, rng = ss.space(name), np.random.default_rng(6)
+    p = points_on(space, 20, step=0.5)
+    if len(space.point_shape) == 1:
+        p = (
+            p * np.exp(1j * rng.uniform(0, 6, (20, 1)))
+            if name[0] == "c"
+            else p * rng.choice([-1, 1], (20, 1))
+        )
+    else:
+        p = p @ ss.space("u:2" if name[0] == "c" else "o:2").random_point(rng, 20)
+    ss.CubicSpline(None, p, space).save("a.npz")
+    run("check a.npz")
+
+
+@pytest.mark.parametrize("name", ["spd:2", "hpd:3"])
+@pytest.mark.parametrize("unit", [1e-9, 1, 1e9])
+def test_check_of_positive_definite_matrices_of_any_size(run, fails, name, unit):
+    """Neither long and thin nor tiny ones count as worse than others."""
+    space = ss.space(name)
+    stretch = unit * np.geomspace(1, 1e3, space.point_shape[0])
+    p = points_on(space, 20, step=0.5)
+    spline = ss.CubicSpline(None, stretch[:, None] * p * stretch / unit, space)
+    spline.save("a.npz")
+    position = run("check a.npz").splitlines()[1].split()[2]
+    assert float(position) < 1e-8
+    arrays = dict(np.load("a.npz"))
+    arrays["velocities"][7] *= 1 + 1e-4
+    np.savez("bent.npz", **arrays)
+    fails("check bent.npz", code=1)
+
+
+@pytest.mark.parametrize("far", [1e-6, 1e3, 1e6])
+@pytest.mark.parametrize("name", ["se:2", "se:3"])
+def test_check_of_poses_far_away(run, name, far):
+    p = points_on(ss.space(name), 20, step=0.5)
+    p[:, :-1, -1] += far
+    ss.CubicSpline(None, p, name).save("a.npz")
+    run("check a.npz")
+
+
+def test_check_far_out_in_hyperbolic_space(run):
+    """Ambient numbers are large there; lengths of the space are not."""
+    rng = np.random.default_rng(4)
+    space = ss.Hyperbolic(2)
+    for far in (2, 4, 6):
+        moved = space.transvection([1, 0, 0], [0, far, 0], walk(space, 0.3, 20, rng))
+        ss.CubicSpline(None, space.project(moved), space).save("a.npz")
+        run("check a.npz")
+
+
+def test_check_finds_what_is_wrong(run, fails, capsys):
+    good = ss.CubicSpline(None, walk(ss.Sphere(2), 0.5, 8, np.random.default_rng(1)), "s:2")
+    good.save("a.npz")
+    arrays = dict(np.load("a.npz"))
+    arrays["velocities"][3] *= 1 + 1e-6
+    np.savez("bent.npz", **arrays)
+    assert main(["check", "bent.npz"]) == 1
+    out, err = capsys.readouterr()
+    assert err == "symspline: bent.npz: more than rounding allows in the curve\n"
+    position, velocity, acceleration = map(float, out.splitlines()[1].split()[2:])
+    assert max(position, velocity) < 1e-14 and 1e-7 < acceleration < 1e-4
+    bent, lost = ss.load("bent.npz"), np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0.0]])
+    lost = ss.CubicSpline(None, lost, "s:2", on_failure="ignore")
+    ss.save_many({"good": good, "bent": bent, "lost": lost}, "many.npz")
+    problem = fails("check many.npz", code=1)
+    assert problem == "many.npz: more than rounding allows in 2 of 3 curves: bent, lost"
+
+
+def test_check_sees_the_seam(fails):
+    ring = walk(ss.Sphere(2), 0.5, 6, np.random.default_rng(2))
+    ss.CubicSpline(None, [*ring, ring[0]], "s:2", bc_type="periodic").save("ring.npz")
+    arrays = dict(np.load("ring.npz"))
+    arrays["velocities"][0] *= 1.01
+    np.savez("ring.npz", **arrays)
+    fails("check ring.npz", code=1)
+    arrays["bc_type"] = json.dumps("natural")
+    arrays["velocities"][0] /= 1.01
+    np.savez("ring.npz", **arrays)
+    assert main(["check", "ring.npz"]) == 0

@@ -1,0 +1,230 @@
+"""Columns of points on every space."""
+
+import re
+
+import numpy as np
+import pytest
+from cases import SPACES
+from curves import each, parts, points_on, same_curve
+from tabular import TIMES, assert_same_columns, numbered, numbers, read_table, table, write, write_table
+
+import symspline as ss
+
+TABLES = pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
+
+
+@TABLES
+@pytest.mark.parametrize("name", [str(space) for space in SPACES])
+def test_tables_of_every_space(run, name, ending):
+    space, p = ss.space(name), points_on(ss.space(name), step=0.4)
+    write_table(f"a.{ending}", {"t": TIMES, **numbered(p)})
+    run(f"fit a.{ending} --space '{name}' --bc-type not-a-knot -o fitted.npz")
+    spline = ss.CubicSpline(TIMES, p, space, bc_type="not-a-knot")
+    loaded = ss.load("fitted.npz")
+    assert same_curve(loaded, spline)
+    run("check fitted.npz")
+    run(f"sample fitted.npz -n 11 --nu 0,1,2 -o b.{ending}")
+    x = np.linspace(0, 5, 11)
+    smooth = {"t": x, **numbered(spline(x)), **numbered(spline(x, 1), "_d1"), **numbered(spline(x, 2), "_d2")}
+    assert_same_columns(read_table(f"b.{ending}"), smooth)
+    # What was written can be read again.
+    names = ",".join(key.removesuffix("_re") for key in numbered(p) if not key.endswith("_im"))
+    run(f"fit b.{ending} --space '{name}' --columns {names} -o again.npz")
+    assert same_curve(ss.load("again.npz"), ss.CubicSpline(x, spline(x), space))
+    run("check again.npz")
+
+
+@pytest.mark.parametrize("name", [str(space) for space in SPACES])
+def test_many_curves_of_every_space(run, name):
+    space, p = ss.space(name), points_on(ss.space(name), step=0.4)
+    columns = {"t": np.array([*"001122"], float), **numbered(p)}
+    write_table("a.npz", {"id": np.array([*"ababab"]), **columns})
+    run(f"fit a.npz --space '{name}' --curve id -o b.npz")
+    first, second = each(lambda part: part[::2], p), each(lambda part: part[1::2], p)
+    fitted = ss.fit_many([([0, 1, 2], first), ([0, 1, 2], second)], space)
+    assert ss.load_many("b.npz") == dict(zip("ab", fitted, strict=True))
+    run("sample b.npz --every 1 --nu 1 -o c.npz")
+    rates = [numbered(spline([0, 1, 2], 1), "_d1") for spline in fitted]
+    found = read_table("c.npz")
+    assert found.pop("id").tolist() == [*"aaabbb"] and found.pop("t").tolist() == [0, 1, 2] * 2
+    assert_same_columns(found, {key: np.concatenate([rate[key] for rate in rates]) for key in rates[0]})
+    run("plot b.npz --curve b -o b.png")
+
+
+@pytest.mark.parametrize(
+    "name, names",
+    [
+        ("s:2", ["x0", "x1", "x2"]),
+        ("cp:1", ["x0_re", "x0_im", "x1_re", "x1_im"]),
+        ("gr:1,2", ["m11", "m21"]),
+        ("u:1", ["m11_re", "m11_im"]),
+        ("r:1 x so:2 x s:1", ["x0", "m11", "m12", "m21", "m22", "x1", "x2"]),
+        ("spd:1 x u:1 x r:1", ["m1_11", "m2_11_re", "m2_11_im", "x0"]),
+    ],
+)
+def test_names_of_curves_that_were_made_in_python(run, name, names):
+    ss.CubicSpline(None, points_on(ss.space(name), step=0.4), name).save("a.npz")
+    run("sample a.npz -n 2 -o b.csv")
+    assert list(table("b.csv")) == ["time", *names]
+    run("sample a.npz -n 2 --nu 2 -o b.csv")
+    assert list(table("b.csv")) == ["time", *(re.sub("(_re|_im|)$", r"_d2\1", key, count=1) for key in names)]
+
+
+def test_names_in_large_matrices(run):
+    ss.CubicSpline(None, points_on(ss.space("so:11"), n=3, step=0.4), "so:11").save("a.npz")
+    run("sample a.npz -n 2 -o b.csv")
+    names = list(table("b.csv"))
+    assert (names[1], names[2], names[11], names[121]) == ("m1_1", "m1_2", "m1_11", "m11_11")
+
+
+def test_arrays_of_matrices_and_of_complex_numbers(run):
+    p = points_on(ss.space("so:3 x cp:1"), step=0.4)
+    spline = ss.CubicSpline(TIMES, p, "so:3 x cp:1")
+    np.savez("a.npz", psi=p[1], when=TIMES, R=p[0])
+    run("fit a.npz --space 'so:3 x cp:1' --time when --columns R,psi -o b.npz")
+    assert same_curve(ss.load("b.npz"), spline)
+    np.savez("a.npz", points=p[0], t=TIMES, R=p[0])
+    run("fit a.npz --space so:3 -o b.npz")
+    assert same_curve(ss.load("b.npz"), ss.CubicSpline(TIMES, p[0], "so:3"))
+
+
+def test_columns_of_complex_numbers(run):
+    """Halves may stand anywhere; a column of its own is a complex number that is real."""
+    up, down = np.array([1, 0.8, 0.6]), np.array([0, 0.6j, 0.64 + 0.48j])
+    spline = ss.CubicSpline(None, np.stack([up, down], axis=1), "cp:1")
+    columns = {"down_im": down.imag, "note": 0 * up, "up": up, "down_re": down.real}
+    write_table("a.csv", columns)
+    for names in ("up,down", "up,down_re,down_im", "up,down_im,down_re", "down_im,up,down_re"):
+        run(f"fit a.csv --space cp:1 --columns {names} -o a.npz")
+        loaded = ss.load("a.npz")
+        swapped = np.flip(spline.points, axis=1)
+        np.testing.assert_array_equal(loaded.points, swapped if names[:7] == "down_im" else spline.points)
+    run("fit a.csv --space cp:1 --columns up,down -o a.npz")
+    run("sample a.npz --every 1 -o b.csv")
+    assert list(table("b.csv")) == ["time", "up_re", "up_im", "down_re", "down_im"]
+    written = numbers(table("b.csv"), "up_re", "up_im", "down_re", "down_im").view(complex)
+    np.testing.assert_array_equal(written, spline([0, 1, 2]))
+    # In a real space they are two numbers, if both are named.
+    run("fit a.csv --space r:2 --columns down_re,down_im -o a.npz")
+    np.testing.assert_array_equal(ss.load("a.npz").points, np.stack([down.real, down.imag], 1))
+
+
+# ---- bad columns ----
+
+
+HALVES = "t,a_re,a_im,b_re,b_im\n0,1,0,0,0\n1,0.6,0,0,0.8\n"
+
+
+@pytest.mark.parametrize(
+    "text, options, problem",
+    [
+        (
+            HALVES,
+            "--space sphere:1",
+            "a.csv: a_re and a_im are a complex number where a real one belongs: a point of sphere:1 has 2 numbers; "
+            "did you mean --space cp:1?",
+        ),
+        (
+            HALVES,
+            "--space r:2 --columns a",
+            "a point of euclidean:2 has 2 numbers; name its columns one by one with",
+        ),
+        (
+            HALVES,
+            "--space 'r:1 x cp:1' --columns a,b_re,b_im,t --time t",
+            "column 't' of a.csv cannot have two meanings",
+        ),
+        (
+            "t,x," + HALVES[2:].replace("\n0,", "\n0,0,").replace("\n1,", "\n1,0,"),
+            "--space 'cp:1 x r:1'",
+            "a.csv: b_re and b_im are a complex number where a real one belongs: a point of cp:1 x euclidean:1 has 3 "
+            "numbers (cp:1: 2 complex numbers, A_re and A_im each; euclidean:1: 1 number); name its columns",
+        ),
+        (
+            HALVES,
+            "--space su:2",
+            "a.csv: a point of su:2 has 4 complex numbers, A_re and A_im each, a 2 x 2 matrix row by row, and there "
+            "are 2 numbers: a, b; say which with --columns",
+        ),
+        (
+            HALVES,
+            "--space se:2 --columns a_re,b_re",
+            "a.csv: a point of se:2 has 9 numbers, a 3 x 3 matrix row by row, and there are 2 columns: a_re, b_re",
+        ),
+        (
+            HALVES,
+            "--space cp:1 --columns a,b_re",
+            "a.csv: column 'b_re' is half of a complex number, and there is no 'b_im' in --columns",
+        ),
+        (HALVES, "--space cp:1 --columns a,a_re", "column 'a_re' of a.csv cannot have two meanings"),
+        (
+            HALVES,
+            "--space cp:1 --columns a,c",
+            "a.csv has no column 'c'; there are t, a_re, a_im, b_re, b_im",
+        ),
+        (
+            HALVES.replace("b_im", "c"),
+            "--space cp:1 --columns a,b",
+            "a.csv has a column 'b_re', but no 'b_im'; a complex number needs both",
+        ),
+        (
+            HALVES.replace("b_re", "c"),
+            "--space cp:2",
+            "a.csv: column 'b_im' is half of a complex number, and there is no 'b_re' in the table",
+        ),
+        (
+            HALVES.replace("0,1,0,0,0", "0,1,0,0,"),
+            "--space cp:1",
+            "a.csv: column 'b_re' is half of a complex number, and there is no 'b_im' with numbers",
+        ),
+        (
+            HALVES.replace("0,1,0,0,0", "0,1,0,0,"),
+            "--space cp:1 --columns a,b",
+            "a.csv, line 2: column 'b_im' is empty",
+        ),
+        (HALVES + "2,1,0,0,\n", "--space cp:1", "a.csv, line 4: column 'b_im' is empty"),
+        (HALVES + "2,1,0,0,0.1\n", "--space cp:1", "a.csv: the point in line 4 is off the space by 5.000e-3"),
+        (HALVES, "--space gr:4,2", "gr:4,2 asks for subspaces larger than the space; did you mean gr:2,4?"),
+        (HALVES, "--space se:4", "se:n needs n = 2 or 3, not 4"),
+    ],
+)
+def test_bad_columns_of_complex_numbers_and_matrices(fails, text, options, problem):
+    write("a.csv", text)
+    assert problem in fails(f"fit a.csv {options} -o a.npz")
+
+
+@pytest.mark.parametrize(
+    "name, change, problem",
+    [
+        ("so:3", lambda p: 1.01 * p, "the point in line 5 is off the space by 1.741e-2: its columns are not"),
+        ("so:3", lambda p: -p, "the point in line 5 is off the space: its determinant is -1"),
+        ("o:3", lambda p: -p, "the point in line 4 and the point in line 5 of curve 'a' have opposite"),
+        ("r:1 x o:3", lambda p: -p, "the point in line 4 and the point in line 5 of curve 'a' have opposite"),
+        ("su:2", lambda p: 1j * p, "its determinant is not 1 but has the phase 3.142e0 (u:2 takes it)"),
+        ("spd:2", lambda p: -p, "the point in line 5 is off the space: it is not positive definite"),
+        ("hpd:2", lambda p: p + 1j * p[0, 0] * np.eye(2), "line 5 is off the space by"),
+        ("se:2", lambda p: p.T, "the point in line 5 is off the space by"),
+        ("gr:1,2", lambda p: 2 * p, "the point in line 5 is off the space by"),
+        ("r:2 x gr:2,4", lambda p: 2 * p, "the part in gr:2,4 of the point in line 5 is off the space by"),
+        (
+            "so:3",
+            lambda p: p @ np.diag([1, -1, -1]),
+            "line 4 and the point in line 5 of curve 'a' lie at or past",
+        ),
+        ("r:1 x u:1", lambda p: -p, "line 4 and the point in line 5 of curve 'a' lie at or past"),
+    ],
+)
+def test_bad_points_in_matrix_spaces(fails, name, change, problem):
+    """The fourth of equal points is another one."""
+    space = ss.space(name)
+    points = points_on(space, 2, step=0.4)
+    rows = each(lambda part: np.concatenate([part[[0, 0, 0]], part[:1]]), points)
+    parts(rows)[-1][3] = change(parts(rows)[-1][3])
+    columns = {"t": np.arange(4), "id": np.array([*"aaaa"]), **numbered(rows)}
+    write_table("a.csv", columns)
+    found = fails(f"fit a.csv --space '{name}' --curve id -o b.npz")
+    assert found.startswith("a.csv: ") and problem in found
+    write_table("a.npz", columns)
+    for line, row in (("line 4", "row 2 (counted from 0)"), ("line 5", "row 3 (counted from 0)")):
+        problem = problem.replace(line, row)
+    assert problem in fails(f"fit a.npz --space '{name}' --curve id -o b.npz")

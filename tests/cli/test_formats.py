@@ -1,0 +1,137 @@
+"""Tables in CSV, NPZ and Parquet."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tabular import AXES, FIXES, TRACK, table, write
+
+import symspline as ss
+
+
+def test_formats_read_the_same(run):
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    write("a.csv", TRACK)
+    clock = np.array([f"2021-08-29T{row[0]}" for row in FIXES], "datetime64[s]")
+    lon, lat = np.array([row[1:] for row in FIXES]).T
+    np.savez("a.npz", time=clock, lon=lon, lat=lat)
+    parquet.write_table(
+        pa.table({"time": pa.array(clock, pa.timestamp("s", "UTC")), "lon": lon, "lat": lat}), "a.parquet"
+    )
+    parquet.write_table(
+        pa.table({"time": [f"{c} +00:00" for c in clock], "lon": lon, "lat": lat}), "b.parquet"
+    )
+    splines = []
+    for name in ("a.csv", "a.npz", "a.parquet", "b.parquet"):
+        run(f"fit {name} --lonlat -o curve.npz")
+        splines.append(ss.load("curve.npz"))
+    for spline in splines:
+        np.testing.assert_array_equal(spline.t, clock)
+        np.testing.assert_array_equal(spline.velocities, splines[0].velocities)
+
+
+def test_formats_write_the_same(run):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o curve.npz")
+    for ending in ("csv", "npz", "parquet", "CSV"):
+        run(f"sample curve.npz --every 1.5h --nu 0,1 -o out.{ending}")
+    texts = table("out.csv")
+    assert Path("out.CSV").read_bytes() == Path("out.csv").read_bytes()
+    arrays, columns = np.load("out.npz"), parquet.read_table("out.parquet")
+    assert list(texts) == list(arrays) == columns.column_names
+    assert columns.schema.field("time").type.tz == "UTC"
+    assert [text.removesuffix("Z") for text in texts["time"]] == arrays["time"].astype(str).tolist()
+    np.testing.assert_array_equal(arrays["time"], columns["time"].to_numpy())
+    for name in list(texts)[1:]:
+        np.testing.assert_array_equal(np.array(texts[name], float), arrays[name])
+        np.testing.assert_array_equal(arrays[name], columns[name].to_numpy())
+
+
+def test_t_and_points_of_an_npz_file(run, fails):
+    np.savez("a.npz", t=[0, 1, 3], points=np.eye(3), velocities=np.ones((3, 3)), note="hello")
+    run("fit a.npz --space s:2 -o curve.npz")
+    assert ss.load("curve.npz") == ss.CubicSpline([0, 1, 3], np.eye(3), "s:2")
+    np.savez("b.npz", when=[0, 1, 3], u=np.eye(3)[:, :2], w=np.eye(3)[:, 2])
+    run("fit b.npz --space s:2 --time when --columns u,w -o curve2.npz")
+    assert ss.load("curve.npz") == ss.load("curve2.npz")
+    np.savez("c.npz", t=[0, 1], points=np.eye(3))
+    assert fails("fit c.npz --space s:2 -o d.npz") == "c.npz: arrays differ in length: 2 and 3"
+    np.savez("c.npz", t=[0, 1, np.inf], points=np.eye(3))
+    assert "c.npz, row 2 (counted from 0): column 't' holds inf" in fails("fit c.npz --space s:2 -o d.npz")
+    np.savez("c.npz", t=np.array(["2020-01-01", "NaT"], "datetime64[D]"), points=np.eye(2))
+    assert "column 't' holds no time" in fails("fit c.npz --space s:1 -o d.npz")
+    assert "did you mean 'points'?" in fails("fit c.npz --space s:1 --columns point -o d.npz")
+    np.savez("c.npz", t=[], points=np.empty((0, 2)))
+    assert fails("fit c.npz --space s:1 -o d.npz") == "c.npz has no rows"
+    np.savez("c.npz", t=[0, 1], points=np.array([["a"], ["b"]]))
+    assert "not numbers" in fails("fit c.npz --space r:1 -o d.npz")
+    np.savez("c.npz", t=np.array([{}, {}]))
+    assert "c.npz is damaged" in fails("fit c.npz --space r:1 -o d.npz")
+    assert "was fitted already" in fails("fit curve.npz --space s:2 -o d.npz")
+    write("e.npz", "no zip")
+    assert fails("fit e.npz --space s:2 -o d.npz") == "e.npz is not an NPZ file"
+
+
+def test_parquet_of_all_kinds(run, fails):
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    from decimal import Decimal
+
+    columns = {
+        "id": pa.array(["a", "a", "b", "b"]).dictionary_encode(),
+        "time": pa.array(np.array(["2020-01-01", "2020-01-02"] * 2, "datetime64[D]")),
+        "x": pa.array([1, 2, 3, 4]),
+        "y": pa.array([Decimal("1.5")] * 4),
+        "z": pa.array([1.0, None, 2.0, 3.0]),
+    }
+    parquet.write_table(pa.table(columns), "a.parquet")
+    run("fit a.parquet --space r:2 --curve id --columns x,y -o a.npz")
+    made = ss.load_many("a.npz")
+    assert list(made) == ["a", "b"]
+    np.testing.assert_array_equal(made["b"].points, [[3, 1.5], [4, 1.5]])
+    assert str(made["a"].t[1]) == "2020-01-02"
+    problem = fails("fit a.parquet --space r:3 --curve id -o b.npz")
+    assert problem == "a.parquet, row 1 (counted from 0): column 'z' is empty"
+    Path("b.parquet").write_bytes(Path("a.parquet").read_bytes()[:300])
+    assert fails("fit b.parquet --space r:3 -o b.npz") == "b.parquet is damaged or not a Parquet file"
+
+
+def test_parquet_without_pyarrow(run, fails, monkeypatch):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o axes.npz")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "pip install 'symspline[parquet]'" in fails("sample axes.npz -n 3 -o out.parquet")
+    assert "pip install 'symspline[parquet]'" in fails("fit out.parquet --space s:2 -o a.npz")
+
+
+def test_what_programs_write_as_csv(run):
+    """A byte order mark, Windows line ends, blanks behind commas, quotes, blank lines, no last line end."""
+    text = '\ufeff"t", "x"\r\n0,1.5\r\n\r\n 1 , "2.5"\r\n\r\n3,1e-3'
+    write("a.csv", text)
+    run("fit a.csv --space r:1 -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 3], [[1.5], [2.5], [1e-3]], "r:1")
+    # Columns without a name: an index, and commas at the end of lines.
+    write("b.csv", ",t,x,,\n0,0,1.5,,\n1,1,2.5,,\n2,3,1e-3,,\n")
+    run("fit b.csv --space r:1 -o b.npz")
+    assert ss.load("b.npz") == ss.load("a.npz")
+
+
+def test_long_files_are_read_in_pieces(run, fails):
+    n = 4500
+    angle = np.arange(n) / 10
+    rows = [f"{i},{np.cos(a):.17g},{np.sin(a):.17g},note\n" for i, a in enumerate(angle)]
+    rows.insert(3000, "\n" * 5000)
+    write("a.csv", "t,x,y,remark\n" + "".join(rows))
+    run("fit a.csv --space s:1 -o a.npz")
+    np.testing.assert_allclose(
+        ss.load("a.npz").points, np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-15
+    )
+    rows[4000] = "17,1,one,\n"
+    write("a.csv", "t,x,y,remark\n" + "".join(rows))
+    assert (
+        fails("fit a.csv --space s:1 -o b.npz")
+        == "a.csv, line 9001: column 'y' holds 'one', which is not a number"
+    )
+    run("sample a.npz --every 0.5 -o b.csv")
+    assert len(table("b.csv")["t"]) == 2 * n - 1

@@ -1,0 +1,150 @@
+"""Output that cannot be written, interruptions, and progress on a terminal."""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tabular import AXES, write
+
+from symspline.cli import main
+
+
+def test_pictures_without_matplotlib(run, fails, monkeypatch):
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "pip install 'symspline[plot]'" in fails("plot a.npz -o a.png")
+
+
+def test_output_that_cannot_be_written(run, fails, monkeypatch):
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    assert fails("fit a.csv --space s:2 -o no/b.npz") == "cannot write no/b.npz: there is no folder no"
+    os.mkdir("b.npz")
+    assert fails("fit a.csv --space s:2 -o b.npz") == "cannot write b.npz: it is a folder"
+    assert fails("plot a.npz -o no/b.png").startswith("cannot write no/b.png")
+    assert fails("sample a.npz -n 3 -o no/b.csv").startswith("cannot write no/b.csv")
+    assert fails("demo --out a.csv") == "cannot make the folder a.csv: File exists"
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert fails("fit a.csv --space s:2 -o c.npz") == "cannot write c.npz: no permission to write into ."
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(run, fails, folder):
+    write("a.csv", AXES)
+    folder.chmod(0o500)
+    try:
+        assert "no permission" in fails("fit a.csv --space s:2 -o a.npz")
+    finally:
+        folder.chmod(0o700)
+
+
+ENDINGS = pytest.mark.parametrize("ending", ["csv", "npz", "parquet", "png", "fit"])
+
+
+def written_into(ending, folder):
+    """A line that writes more than 16 kB into a folder, and the name of the file."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    if ending == "fit":
+        return f"fit long.csv --space r:1 -o {folder}/out.npz", f"{folder}/out.npz"
+    verb = "plot a.npz" if ending == "png" else "sample a.npz -n 3000"
+    return f"{verb} -o {folder}/out.{ending}", f"{folder}/out.{ending}"
+
+
+@ENDINGS
+def test_a_full_disk(curves, fails, folder, ending):
+    os.mkdir("disk")
+    mount = ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", "disk"]
+    if not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("only root can mount a small disk")
+    try:
+        line, out = written_into(ending, "disk")
+        write(out, "as it was")
+        assert fails(line) == f"cannot write {out}: No space left on device"
+        assert [(path.name, path.read_text()) for path in Path("disk").iterdir()] == [(out[5:], "as it was")]
+    finally:
+        subprocess.run(["umount", "disk"], check=True)
+
+
+@ENDINGS
+def test_writing_that_fails_midway(curves, fails, ending):
+    resource = pytest.importorskip("resource")
+    line, out = written_into(ending, ".")
+    write(out, "as it was")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, hard))
+    try:
+        assert fails(line) == f"cannot write {Path(out)}: File too large"
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert Path(out).read_text() == "as it was"
+
+
+@pytest.mark.parametrize("where", ["fitting", "saving"])
+def test_interrupted(fails, monkeypatch, where):
+    def interrupt(file, *_, **__):
+        if where == "saving":
+            file.write(b"half of it")
+        raise KeyboardInterrupt
+
+    write("a.csv", AXES)
+    write("a.npz", "as it was")
+    target = {"fitting": "symspline.cli.fit.fit_many", "saving": "numpy.savez"}[where]
+    monkeypatch.setattr(target, interrupt)
+    assert fails("fit a.csv --space s:2 -o a.npz", code=130) == "interrupted"
+    assert Path("a.npz").read_text() == "as it was"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_interrupted_by_a_signal(curves, folder):
+    os.mkdir("out")
+    line = [sys.executable, "-m", "symspline", "sample", "a.npz", "-n", "1000000", "-o", "out/out.csv"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 20
+        while not any(path.stat().st_size for path in Path("out").iterdir()) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert (process.returncode, out, err) == (130, "", "symspline: interrupted\n")
+    assert not os.listdir("out")
+
+
+def test_nobody_reads_on(curves):
+    line = [sys.executable, "-m", "symspline", "check", "a.npz"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 141
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_output_into_a_full_disk(curves):
+    with open("/dev/full", "w") as full:
+        line = [sys.executable, "-m", "symspline", "check", "a.npz"]
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=20)
+    problem = "symspline: cannot write the output: No space left on device\n"
+    assert (done.returncode, done.stderr) == (2, problem)
+
+
+def test_not_enough_memory(curves, fails, monkeypatch):
+    def too_much(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("symspline.cli.sample.spread", too_much)
+    assert fails("sample a.npz -n 3 -o b.csv") == "there is not enough memory for this"
+
+
+def test_progress_on_a_terminal(curves, capsys, monkeypatch):
+    monkeypatch.setattr("symspline.cli.progress._WAIT", 0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
+    shown = capsys.readouterr().err
+    assert "\rsampling: 100 %" in shown and "\rwriting: 40 %" in shown
+    assert shown.endswith(" \r") and "\n" not in shown

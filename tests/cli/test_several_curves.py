@@ -1,0 +1,67 @@
+"""Several curves in one table or file."""
+
+from pathlib import Path
+
+import numpy as np
+from tabular import PAIR, numbers, table, write
+
+import symspline as ss
+
+
+def test_curves_in_one_file(run):
+    write("pair.csv", PAIR)
+    out = run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    assert out.startswith("pair.npz: 2 curves through 5 points of sphere:2, converged: ")
+    e = np.eye(3)
+    fitted = ss.fit_many([([0, 2, 3], e[[0, 2, 1]]), ([1, 2], e[1:])], "s:2")
+    assert ss.load_many("pair.npz") == dict(zip("ab", fitted, strict=True))
+    run("sample pair.npz --every 0.5 -o out.csv")
+    columns = table("out.csv")
+    assert list(columns) == ["t", "id", "x", "y", "z"]
+    assert columns["id"] == ["a"] * 7 + ["b"] * 3
+    np.testing.assert_array_equal(numbers(columns, *"xyz")[7:], fitted[1]([1, 1.5, 2]))
+    lines = run("check pair.npz").splitlines()
+    assert [line.split()[0] for line in lines] == ["curve", "a", "b", "All"]
+    run("plot pair.npz --curve b -o b.svg")
+    assert "<svg" in Path("b.svg").read_text(encoding="utf-8")
+
+
+def test_one_curve_with_a_name_is_a_collection_too(run):
+    write("pair.csv", "\n".join(line for line in PAIR.splitlines() if not line.startswith("b")))
+    run("fit pair.csv --space s:2 --curve id -o one.npz")
+    assert list(ss.load_many("one.npz")) == ["a"]
+    run("sample one.npz -n 2 -o out.csv")
+    assert table("out.csv")["id"] == ["a", "a"]
+    run("plot one.npz -o one.png")
+
+
+def test_a_batch_made_in_python(run):
+    p = np.stack([np.eye(3), np.eye(3)[::-1]])
+    ss.CubicSpline(None, p, "s:2").save("batch.npz")
+    run("sample batch.npz -n 3 -o out.csv")
+    columns = table("out.csv")
+    assert columns["curve"] == ["0"] * 3 + ["1"] * 3
+    np.testing.assert_allclose(numbers(columns, "x0", "x1", "x2"), p.reshape(6, 3), atol=1e-15)
+    ss.CubicSpline(None, np.stack([p, p]), "s:2").save("batch.npz")
+    run("sample batch.npz -n 1 -o out.csv")
+    assert table("out.csv")["curve"] == ["0,0", "0,1", "1,0", "1,1"]
+
+
+def test_problems_of_one_curve_name_it(run, fails):
+    write("pair.csv", PAIR)
+    run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    assert fails("plot pair.npz -o a.png") == "pair.npz has 2 curves; say which with --curve: a, b"
+    assert fails("plot pair.npz --curve c -o a.png") == "pair.npz has no curve 'c'; there are a, b"
+    write("bad.csv", PAIR + "c,3,1,0,0\n")
+    problem = "bad.csv, line 7: this is the only point of curve 'c'; a curve needs two"
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == problem
+    write("bad.csv", PAIR + "b,1.5,1,0,0\n")
+    problem = "bad.csv, line 7: time 1.5 of curve 'b' does not come after 2.0 in line 5; times must increase"
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == problem
+    write("bad.csv", PAIR + "b,4,0,0,-1\n")
+    problem = fails("fit bad.csv --space s:2 --curve id -o bad.npz")
+    assert problem.startswith(
+        "bad.csv: the point in line 5 and the point in line 7 of curve 'b' lie at or past"
+    )
+    write("bad.csv", PAIR + ",5,0,0,1\n")
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == "bad.csv, line 7: column 'id' is empty"

@@ -1,0 +1,201 @@
+"""The command line: every verb, and what it says when it is misused."""
+
+import re
+import shlex
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tabular import AXES, PAIR, numbers, table, write
+
+import symspline as ss
+from symspline.cli import main
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def test_the_example_of_the_readme(run):
+    section = README.read_text(encoding="utf-8").split("## Command line")[1].split("\n## ")[0]
+    write("ida.csv", re.search(r"```csv\n(.*?)```", section, re.S)[1])
+    lines = re.search(r"```sh\n(.*?)```", section, re.S)[1].splitlines()
+    assert [line.split()[1] for line in lines] == ["fit", "check", "sample", "plot"]
+    for line in lines:
+        run(line.removeprefix("symspline ").partition("#")[0])
+    columns = table("smooth.csv")
+    assert list(columns) == ["time", "lon", "lat"]
+    assert len(columns["time"]) == 36 * 6 + 1
+    assert columns["time"][1] == "2021-08-28T00:10:00Z"
+    assert Path("ida.png").read_bytes().startswith(b"\x89PNG")
+    assert len(ss.load("ida.npz").t) == 7
+
+
+def test_a_fit_is_that_of_the_library(run):
+    write("axes.csv", AXES)
+    out = run("fit axes.csv --space sphere:2 --bc-type not-a-knot,clamped --extrapolate geodesic -o axes.npz")
+    assert out.startswith("axes.npz: 1 curve through 3 points of sphere:2, converged: quasi-newton, ")
+    spline = ss.CubicSpline(
+        [0, 1, 3], np.eye(3), "sphere:2", bc_type=("not-a-knot", "clamped"), extrapolate="geodesic"
+    )
+    loaded = ss.load("axes.npz")
+    assert loaded == spline and loaded.extrapolate == "geodesic"
+    run("sample axes.npz -n 7 --nu 0,1,2 -o out.csv")
+    columns = table("out.csv")
+    assert list(columns) == ["t", *(f"{x}{end}" for end in ("", "_d1", "_d2") for x in "xyz")]
+    x = np.linspace(0, 3, 7)
+    np.testing.assert_array_equal(np.array(columns["t"], float), x)
+    for nu, end in enumerate(("", "_d1", "_d2")):
+        np.testing.assert_array_equal(numbers(columns, *(f"{x}{end}" for x in "xyz")), spline(x, nu))
+
+
+def test_options_of_the_solver(run, fails):
+    write("axes.csv", AXES)
+    assert "fixed-point" in run("fit axes.csv --space s:2 --method fixed-point --tol 1e-6 -o axes.npz")
+    assert 1e-12 < ss.load("axes.npz").report.residual < 1e-6
+    assert fails("fit axes.csv --space s:2 --method foo -o b.npz").startswith("method must be")
+    assert "tol" in fails("fit axes.csv --space s:2 --tol -1 -o b.npz")
+    assert "--tol" in fails("fit axes.csv --space s:2 --tol x -o b.npz")
+    assert fails("fit axes.csv --space s:2 --bc-type foo -o b.npz").startswith("--bc-type foo: give natural")
+    assert fails("fit axes.csv --space s:2 --bc-type periodic,natural -o b.npz").startswith("--bc-type")
+    assert fails("fit axes.csv --space s:2 --bc-type periodic -o b.npz").startswith(
+        "axes.csv: bc_type='periodic'"
+    )
+
+
+def test_rows_without_times_are_at_whole_numbers(run):
+    write("a.csv", "x,y\n1,2\n3,4\n5,7\n")
+    run("fit a.csv --space r:2 -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline(None, [[1, 2], [3, 4], [5, 7]], "r:2")
+    run("sample a.npz --every 1 -o b.csv")
+    assert list(table("b.csv")) == ["time", "x", "y"]
+    write("a.csv", "t,y\n1,2\n3,4\n5,7\n")
+    run("fit a.csv --space r:2 --columns t,y -o b.npz")
+    assert ss.load("a.npz") == ss.load("b.npz")
+
+
+def test_products(run):
+    write("a.csv", "t,a,b,c,d,x\n0,1,0,0,0,1\n1,0,1,0,0,2\n2,0,0,1,0,4\n")
+    run("fit a.csv --space 'sphere:3 x r:1' -o a.npz")
+    spline = ss.CubicSpline(None, (np.eye(4)[:3], [[1], [2], [4]]), "sphere:3 x r:1")
+    assert ss.load("a.npz") == spline
+    run("check a.npz")
+    run("sample a.npz --every 0.5 --nu 1 -o b.csv")
+    found = numbers(table("b.csv"), *(f"{name}_d1" for name in "abcdx"))
+    np.testing.assert_array_equal(found, np.concatenate(spline(np.arange(5) / 2, 1), axis=1))
+
+
+def test_help_has_examples(capsys):
+    for verb in ("", "fit", "sample", "plot", "check", "demo"):
+        with pytest.raises(SystemExit) as end:
+            main([*verb.split(), "--help"])
+        assert end.value.code == 0
+        assert f"  symspline {verb}" in capsys.readouterr().out.split("\nexample")[1]
+
+
+def test_as_a_module():
+    write("axes.csv", AXES)
+    line = [sys.executable, "-m", "symspline", "fit", "axes.csv", "--space", "s:2", "-o", "axes.npz"]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=20)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert Path("axes.npz").exists()
+    done = subprocess.run([*line, "--time", "tt"], capture_output=True, text=True, timeout=20)
+    assert done.returncode == 2
+    assert done.stderr == "symspline: axes.csv has no column 'tt'; did you mean 't'?\n"
+
+
+def test_samples_at_given_times(run, fails):
+    write("pair.csv", PAIR)
+    run("fit pair.csv --space s:2 --curve id -o pair.npz")
+    a, b = ss.load_many("pair.npz").values()
+    write("at.csv", "id,t\nb,1.5\na,0.5\nb,1.25\n")
+    run("sample pair.npz --at at.csv -o out.csv")
+    columns = table("out.csv")
+    assert (columns["id"], columns["t"]) == (["b", "a", "b"], ["1.5", "0.5", "1.25"])
+    np.testing.assert_array_equal(numbers(columns, *"xyz"), [b(1.5), a(0.5), b(1.25)])
+    np.savez("at.npz", T=[1.5, 1.25])
+    run("sample pair.npz --at at.npz -o out.csv")
+    assert table("out.csv")["id"] == ["a", "a", "b", "b"]
+    write("at.csv", "when\n1\n")
+    run("sample pair.npz --at at.csv -o out.csv")
+    write("at.csv", "t,id\n1.5,q\n")
+    assert (
+        fails("sample pair.npz --at at.csv -o x.csv")
+        == "at.csv, line 2: there is no curve 'q'; there are a, b"
+    )
+    write("at.csv", "t\n1.5\n2.5\n")
+    problem = (
+        "at.csv, line 3: time 2.5 is outside curve 'b', which runs from 1.0 to 2.0; fit with --extrapolate"
+    )
+    assert fails("sample pair.npz --at at.csv -o x.csv").startswith(problem)
+    write("at.csv", "when,id\n1.5,a\n")
+    assert "at.csv has no column 't' of times; there are when, id" in fails(
+        "sample pair.npz --at at.csv -o x.csv"
+    )
+    write("at.csv", "t\n2020-01-01\n")
+    assert "are numbers, but these are dates" in fails("sample pair.npz --at at.csv -o x.csv")
+
+
+def test_samples_outside(run):
+    write("axes.csv", AXES)
+    write("at.csv", "t\n-1\n4\n")
+    run("fit axes.csv --space s:2 --extrapolate continue -o axes.npz")
+    run("sample axes.npz --at at.csv -o out.csv")
+    spline = ss.CubicSpline([0, 1, 3], np.eye(3), "s:2", extrapolate=True)
+    np.testing.assert_array_equal(numbers(table("out.csv"), *"xyz"), spline([-1, 4]))
+    write("ring.csv", AXES + "4,1,0,0\n")
+    run("fit ring.csv --space s:2 --bc-type periodic -o ring.npz")
+    run("sample ring.npz --at at.csv -o out.csv")
+    run("check ring.npz")
+
+
+def test_bad_usage(run, fails):
+    write("a.csv", AXES)
+    run("fit a.csv --space s:2 -o a.npz")
+    assert fails("").endswith("(see symspline --help)")
+    assert "invalid choice: 'ft'" in fails("ft")
+    assert (
+        fails("fit a.csv --space s:2")
+        == "the following arguments are required: -o (see symspline fit --help)"
+    )
+    assert "unrecognized arguments: --tiem" in fails("fit a.csv --space s:2 --tiem t -o b.npz")
+    assert "--every -n --at is required" in fails("sample a.npz -o b.csv")
+    assert "--" in fails("sample a.npz --every=-- -o b.csv")
+    assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
+    assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
+    assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
+    ending = "b.txt: the name of a table must end in .csv or .npz or .parquet"
+    assert fails("sample a.npz -n 3 -o b.txt") == ending
+    assert fails("plot a.npz -o b.txt").startswith("b.txt: the name of a picture must end in .")
+    assert "must end in .csv" in fails("fit a.txt --space s:2 -o b.npz")
+
+
+def test_a_fit_that_does_not_converge(fails, monkeypatch):
+    monkeypatch.setattr("symspline.cli.fit.fit_many", partial(ss.fit_many, max_iter=2))
+    write("pair.csv", PAIR)
+    write("old.npz", "as it was")
+    problem = fails("fit pair.csv --space s:2 --columns x,y,z --curve id -o old.npz", code=1)
+    assert problem.startswith("pair.csv: no convergence of curve 'a': residual")
+    assert "max_iter" not in problem
+    write("axes.csv", AXES)
+    problem = fails("fit axes.csv --space s:2 -o old.npz", code=1)
+    assert problem.startswith("axes.csv: no convergence of the curve: residual")
+    assert Path("old.npz").read_text() == "as it was"
+
+
+def test_points_are_moved_onto_the_space_by_rounding_only(run, fails):
+    write("a.csv", "t,x,y\n0,1.00001,0\n1,0.70711,0.70711\n")
+    run("fit a.csv --space s:1 -o a.npz")
+    np.testing.assert_allclose(np.linalg.norm(ss.load("a.npz").points, axis=1), 1, atol=1e-15)
+    write("a.csv", "t,x,y\n0,1.001,0\n1,0.70711,0.70711\n")
+    problem = fails("fit a.csv --space s:1 -o b.npz")
+    assert problem.startswith("a.csv: the point in line 2 is off the space by 1.000e-3")
+    assert "1e-4" in problem and "space.project" not in problem
+
+
+@pytest.mark.parametrize("names", ["\n0", "a\nb", '"a\n'])
+def test_lists_of_names_that_are_none(fails, names):
+    Path("points.csv").write_text("t,x\n0,1\n1,2\n")
+    line = shlex.join(["fit", "points.csv", "--space", "r:1", "--columns", names, "-o", "curve.npz"])
+    assert "list of names" in fails(line) or "no column" in fails(line)

@@ -1,0 +1,279 @@
+"""Derivatives of curves with respect to their data: against finite differences, and both directions against
+each other."""
+
+import numpy as np
+import pytest
+from cases import (
+    CASES,
+    LARGE,
+    LOOPS,
+    Case,
+    loop,
+    unit_tangent,
+    walk,
+)
+from changes import ENDS, by_differences, data, inside, motion, moved
+
+import symspline as ss
+
+LONG = [case.name for case in CASES if not case.few]
+
+
+EACH = [
+    (case, end)
+    for case in CASES
+    for end in ENDS
+    if not case.few or case.name == "o:3" or end in ("mixed", "periodic")
+]
+FURTHER = [(case, end) for case in LARGE for end in ("mixed", "periodic")]
+
+
+def named(pairs):
+    return {
+        "argnames": ("case", "end"),
+        "argvalues": pairs,
+        "ids": [f"{case.name}-{end}" for case, end in pairs],
+    }
+
+
+@pytest.mark.parametrize(**named(EACH + FURTHER))
+def test_derivatives_are_those_of_finite_differences(case, end):
+    rng = np.random.default_rng(5)
+    space, t, points, bc = data(case, end)
+    change = motion(space, t, points, bc, rng)
+    x = inside(t, rng)
+    spline = moved(space, t, points, bc, change, 0.0)
+    for nu, expected in enumerate(by_differences(space, t, points, bc, change, x)):
+        found = spline.jvp(x, *change, nu)
+        # Of the differences: the fourth power of the step, and residuals of 1e-14 divided by it.
+        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
+
+
+@pytest.mark.parametrize(**named(EACH))
+def test_the_gradient_is_the_transpose(case, end):
+    rng = np.random.default_rng(6)
+    space, t, points, bc = data(case, end)
+    vectors, knots, ends = motion(space, t, points, bc, rng)
+    x = inside(t, rng)
+    spline = ss.CubicSpline(t, points, space, bc_type=bc)
+    for nu in range(3):
+        cotangent = rng.normal(size=spline(x).shape)
+        if space.dtype.kind == "c":
+            cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
+        forward = spline.jvp(x, vectors, knots, ends, nu)
+        gradient = spline.vjp(x, cotangent, nu)
+        pairs = [(cotangent, forward), (gradient.points, vectors), (gradient.t, knots)]
+        pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
+        left, *right = [np.vdot(a, b).real for a, b in pairs]
+        scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
+        assert abs(left - sum(right)) <= 1e-12 * scale, nu
+        space.check_tangent(points, gradient.points)
+
+
+def test_in_flat_space_they_are_those_of_scipy():
+    """The curve is linear in points there: a column of a jvp is a cardinal spline."""
+    scipy = pytest.importorskip("scipy.interpolate")
+    t, x = np.array([0.0, 0.7, 2.0, 2.5, 4.0]), np.linspace(0, 4, 9)
+    for bc in ("natural", "clamped", "not-a-knot"):
+        spline = ss.CubicSpline(t, np.zeros((5, 1)), "r:1", bc_type=bc)
+        for k in range(5):
+            e = np.eye(5)[k]
+            expected = scipy.CubicSpline(t, e, bc_type=bc)
+            for nu in (0, 1, 2):
+                found = spline.jvp(x, points=e[:, None], nu=nu)[:, 0]
+                np.testing.assert_allclose(found, expected(x, nu), atol=1e-14)
+
+
+def test_knots_in_flat_space_are_those_of_scipy():
+    scipy = pytest.importorskip("scipy.interpolate")
+    rng, x = np.random.default_rng(13), np.linspace(0.1, 3.9, 9)
+    t, y, change = np.array([0.0, 0.7, 2.0, 2.5, 4.0]), rng.normal(size=5), rng.normal(size=5)
+    for bc in ("natural", "clamped", "not-a-knot"):
+        low, high = (scipy.CubicSpline(t + e * change, y, bc_type=bc) for e in (-1e-5, 1e-5))
+        found = ss.CubicSpline(t, y[:, None], "r:1", bc_type=bc).jvp(x, t=change)[:, 0]
+        # Central differences of second order.
+        np.testing.assert_allclose(found, (high(x) - low(x)) / 2e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("name", LONG)
+def test_they_are_finite_where_points_coincide(name, end):
+    case = next(c for c in CASES if c.name == name)
+    space, t, points, bc = data(case, end)
+    points[3] = points[2]
+    if end != "periodic":
+        points[4] = points[2]
+    spline = ss.CubicSpline(t, points, space, bc_type=bc)
+    rng = np.random.default_rng(7)
+    x = inside(t, rng)
+    gradient = spline.vjp(x, np.ones(spline(x).shape))
+    assert all(np.isfinite(g).all() for g in (gradient.points, gradient.t))
+    # A curve that stands still.
+    still = np.repeat(points[:1], len(t), axis=0)
+    spline = ss.CubicSpline(t, still, space, bc_type="periodic" if end == "periodic" else "natural")
+    for nu in (0, 1, 2):
+        assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu).points).all()
+
+
+def test_batches_are_curves_by_themselves():
+    space, rng = ss.Sphere(2), np.random.default_rng(8)
+    t = np.array([0.0, 1.0, 2.5, 3.0])
+    points = np.array([[walk(space, 0.5, 4, rng) for _ in range(3)] for _ in range(2)])
+    vector = 0.3 * np.array([unit_tangent(space, p, rng) for p in points[:, :, 0].reshape(-1, 3)]).reshape(
+        2, 3, 3
+    )
+    bc = ((1, vector), "natural")
+    spline = ss.CubicSpline(t, points, space, bc_type=bc)
+    x = rng.uniform(0, 3, (2, 2))
+    cotangent = rng.normal(size=(2, 3, 2, 2, 3))
+    found = spline.vjp(x, cotangent)
+    knots = np.zeros(4)
+    for i in np.ndindex(2, 3):
+        one = ss.CubicSpline(t, points[i], space, bc_type=((1, vector[i]), "natural"))
+        expected = one.vjp(x, cotangent[i])
+        np.testing.assert_array_equal(found.points[i], expected.points)
+        np.testing.assert_array_equal(found.ends[0][i], expected.ends[0])
+        np.testing.assert_array_equal(
+            spline.jvp(x, points=vector[:, :, None] * np.ones((4, 1)))[i],
+            one.jvp(x, points=vector[i] * np.ones((4, 1))),
+        )
+        knots += expected.t
+    np.testing.assert_allclose(found.t, knots, atol=1e-13)
+    own = ss.CubicSpline(np.broadcast_to(t, (2, 3, 4)), points, space)
+    assert own.vjp(x, cotangent).t.shape == (2, 3, 4)
+    assert found.ends[1] is None
+
+
+def test_one_vector_for_many_curves_collects_their_gradients():
+    space = ss.Euclidean(2)
+    points = np.random.default_rng(9).normal(size=(3, 4, 2))
+    spline = ss.CubicSpline(None, points, space, bc_type=((1, [1.0, 0.0]), "natural"))
+    gradient = spline.vjp(0.5, np.ones((3, 2)))
+    one = ss.CubicSpline(None, points[0], space, bc_type=((1, [1.0, 0.0]), "natural")).vjp(0.5, np.ones(2))
+    assert gradient.ends[0].shape == (2,)
+    np.testing.assert_allclose(gradient.ends[0], 3 * one.ends[0], rtol=1e-14)
+
+
+def test_products_and_dates():
+    space = ss.Product("sphere:2", "r:1")
+    rng = np.random.default_rng(10)
+    points = walk(ss.Sphere(2), 0.5, 4, rng), rng.normal(size=(4, 1))
+    t = np.datetime64("2024-01-01") + np.array([0, 10, 25, 30]).astype("m8[s]")
+    spline = ss.CubicSpline(t, points, space)
+    x = t[1] + np.timedelta64(3, "s")
+    alone = ss.CubicSpline([0, 10, 25, 30], points, space)
+    cotangent = (np.ones(3), np.ones(1))
+    found, expected = spline.vjp(x, cotangent), alone.vjp(13, cotangent)
+    np.testing.assert_allclose(found.t, expected.t, atol=1e-13)
+    for a, b in zip(found.points, expected.points, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-13)
+    moved = spline.jvp(x, points=expected.points, t=expected.t)
+    right = sum(np.sum(g * g) for g in expected.points) + np.sum(expected.t**2)
+    assert np.isclose(sum(np.sum(m) for m in moved), right, rtol=1e-12)
+
+
+def test_long_curves_and_saved_ones(tmp_path):
+    space, rng = ss.Sphere(3), np.random.default_rng(11)
+    points = walk(space, 0.2, 1500, rng)
+    spline = ss.CubicSpline(None, points, space, bc_type=((1, 0 * points[0]), "not-a-knot"))
+    spline.save(tmp_path / "curve.npz")
+    again = ss.load(tmp_path / "curve.npz")
+    x, cotangent = [3.3, 700.5, 1498.9], rng.normal(size=(3, 4))
+    gradient = spline.vjp(x, cotangent)
+    np.testing.assert_array_equal(again.vjp(x, cotangent).points, gradient.points)
+    # What happens at a knot fades like 0.27 a knot.
+    assert np.abs(gradient.points[300:600]).max() < 1e-30
+    assert np.abs(gradient.points[700]).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"x": 9.0}, r"x\[0\] = 9.0 is outside the knots \[0.0, 3.0\]"),
+        ({"nu": 3}, "nu must be 0, 1 or 2"),
+        ({"points": np.zeros((3, 3))}, r"points has shape \(3, 3\), but \(4, 3\) is needed"),
+        ({"t": [1.0]}, r"t has shape \(1,\), but \(4,\) is needed"),
+        ({"ends": (np.zeros(3), None)}, "no vector was given at the start"),
+        ({"ends": 3}, "ends must be a pair"),
+    ],
+)
+def test_bad_input_says_what_is_needed(change, match):
+    points = walk(ss.Sphere(2), 0.5, 4, np.random.default_rng(12))
+    spline = ss.CubicSpline(None, points, "sphere:2")
+    with pytest.raises(ss.ValidationError, match=match):
+        spline.jvp(**{"x": 0.5, **change})
+
+
+def test_cotangents_must_have_the_shape_of_the_curve():
+    points = walk(ss.Sphere(2), 0.5, 4, np.random.default_rng(12))
+    spline = ss.CubicSpline(None, points, "sphere:2")
+    with pytest.raises(ss.ValidationError, match=r"cotangent has shape \(2, 3\), but \(3, 3\) is needed"):
+        spline.vjp([0, 1, 2], np.ones((2, 3)))
+    large = ss.CubicSpline(None, np.eye(300)[:3], "sphere:299")
+    with pytest.raises(ss.ValidationError, match="not made in as many dimensions"):
+        large.vjp(0.5, np.ones(300))
+
+
+# ---- few points ----
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.parametrize("end", ["not-a-knot", "mixed", "turned", "natural", "accelerations"])
+@pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3", "gr:2,5", "se:3", "spd:2"])
+def test_derivatives_of_curves_of_few_points(name, end, n):
+    case = Case(name)
+    rng = np.random.default_rng(14)
+    space, t, p, bc = data(case, end, n=n)
+    change = motion(space, t, p, bc, rng)
+    x = inside(t, rng)
+    spline = moved(space, t, p, bc, change, 0.0)
+    for nu, expected in enumerate(by_differences(space, t, p, bc, change, x, (0, 1))):
+        found = spline.jvp(x, *change, nu)
+        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
+
+
+# ---- loops ----
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1815)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_derivatives_of_a_loop(name, rng):
+    space = ss.space(name)
+    t, p = loop(space, 6, rng)
+    change = motion(space, t, p, "periodic", rng)
+    x = inside(t, rng)
+    spline = ss.CubicSpline(t, p, space, bc_type="periodic")
+    for nu, expected in enumerate(by_differences(space, t, p, "periodic", change, x, (0, 1))):
+        found = spline.jvp(x, *change, nu)
+        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
+        cotangent = rng.normal(size=found.shape) + (
+            1j * rng.normal(size=found.shape) if found.dtype == complex else 0
+        )
+        gradient = spline.vjp(x, cotangent, nu)
+        left, *right = (
+            np.vdot(a, b).real
+            for a, b in ((cotangent, found), (gradient.points, change[0]), (gradient.t, change[1]))
+        )
+        assert abs(left - sum(right)) <= 1e-12 * np.linalg.norm(cotangent) * np.linalg.norm(found)
+
+
+@pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,4"])
+def test_derivatives_of_a_loop_that_ends_in_another_array(name, rng):
+    space = ss.space(name)
+    t, p = loop(space, 5, rng)
+    vectors, knots, _ = motion(space, t, p, "periodic", rng)
+    turn = ss.space("u:2" if name.startswith("cgr") else "o:2").random_point(rng)
+    turn = {"rp:2": -1.0, "cp:2": np.exp(0.7j)}.get(name, turn)
+
+    def other(x):
+        return np.concatenate([x[:-1], [x[-1] @ turn if np.ndim(turn) else x[-1] * turn]])
+
+    x = inside(t, rng)
+    one, two = (ss.CubicSpline(t, points, space, bc_type="periodic") for points in (p, other(p)))
+    for nu in (0, 1):
+        here, there = one.jvp(x, vectors, knots, nu=nu), two.jvp(x, other(vectors), knots, nu=nu)
+        assert np.abs(space.transport(two(x), one(x), there) - here).max() <= 1e-12 * np.abs(here).max()

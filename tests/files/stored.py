@@ -1,0 +1,42 @@
+"""Files that tests damage."""
+
+import io
+import zipfile
+
+import numpy as np
+from curves import S2
+from refused import P
+
+import symspline as ss
+
+
+def stored(spline=None):
+    file = io.BytesIO()
+    (spline or ss.CubicSpline(None, P, S2)).save(file)
+    return file.getvalue()
+
+
+def load(data):
+    return ss.load(io.BytesIO(data))
+
+
+def with_arrays(**changes):
+    """A well-formed file with some arrays replaced, or taken out."""
+    arrays = dict(np.load(io.BytesIO(stored()))) | changes
+    file = io.BytesIO()
+    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    return file.getvalue()
+
+
+def npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def archive(**members):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as target:
+        for name, content in members.items():
+            target.writestr(name.replace("__", "."), content)
+    return file.getvalue()

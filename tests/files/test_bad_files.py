@@ -1,0 +1,249 @@
+"""Files that are damaged, foreign, or not there."""
+
+import contextlib
+import gc
+import io
+import json
+import warnings
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from curves import (
+    S2,
+)
+from refused import INF, NAN, P
+from stored import archive, load, npy, stored, with_arrays
+
+import symspline as ss
+
+
+def is_good_or_refused(data):
+    """A damaged file must be refused, or be read as what it was (damage may be where it does not matter)."""
+    try:
+        return load(data) == ss.CubicSpline(None, P, S2)
+    except (ss.ValidationError, OSError):
+        return True
+
+
+def test_truncated_files():
+    data = stored()
+    for n in range(len(data)):
+        with pytest.raises(ss.ValidationError, match="the file"):
+            load(data[:n])
+
+
+@pytest.mark.parametrize("mask", [0x01, 0xFF])
+def test_files_with_one_bad_byte(mask):
+    data = stored()
+    for i in range(len(data)):
+        assert is_good_or_refused(data[:i] + bytes([data[i] ^ mask]) + data[i + 1 :])
+
+
+def test_files_with_many_bad_bytes():
+    data, rng = np.frombuffer(stored(), np.uint8), np.random.default_rng(0)
+    for _ in range(500):
+        bad = data.copy()
+        bad[rng.integers(len(bad), size=rng.integers(1, 200))] = rng.integers(256)
+        assert is_good_or_refused(bad.tobytes())
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        zipfile.ZIP_DEFLATED,
+        zipfile.ZIP_BZIP2,
+        zipfile.ZIP_LZMA,
+    ],
+)
+def test_compressed_files(method):
+    file = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(stored())) as source, zipfile.ZipFile(file, "w", method) as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name))
+    data = file.getvalue()
+    assert load(data) == ss.CubicSpline(None, P, S2)
+    for i in range(0, len(data), 7):
+        assert is_good_or_refused(data[:i] + bytes([data[i] ^ 0xFF]) + data[i + 1 :])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\0",
+        b"hello",
+        b"PK\x03\x04",
+        b"PK\x05\x06" + 18 * b"\0",
+        b"\x93NUMPY",
+        b"\x80\x04N.",
+        npy(np.eye(3)),
+        npy(np.array("symspline-curve")),
+        archive(readme__txt="hello"),
+        archive(format__npy="hello"),
+        archive(format__npy=b"\x93NUMPY\x01\0\x76\0{"),
+        archive(format="symspline-curve"),
+    ],
+    # Without the time of day that is in an archive: workers must find the same tests.
+    ids=lambda data: str(data[:8]),
+)
+def test_foreign_files(data):
+    with pytest.raises(ss.ValidationError, match="the file"):
+        load(data)
+
+
+def test_messages_name_the_file(tmp_path):
+    (tmp_path / "curve.npz").write_bytes(npy(np.eye(3)))
+    for path in (tmp_path / "curve.npz", str(tmp_path / "curve.npz")):
+        with pytest.raises(ss.ValidationError, match=r"curve\.npz"):
+            ss.load(path)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        npy(np.eye(3)),
+        archive(readme__txt="hello"),
+        stored()[:500],
+    ],
+    ids=["array", "archive", "truncated"],
+)
+def test_files_are_closed_when_refused(tmp_path, data):
+    (tmp_path / "curve.npz").write_bytes(data)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        with contextlib.suppress(ss.ValidationError):
+            ss.load(tmp_path / "curve.npz")
+        gc.collect()
+    assert not caught
+
+
+class Bomb:
+    """Leaves a mark when it is unpickled."""
+
+    def __reduce__(self):
+        return Path.touch, (Path(self.path),)
+
+
+@pytest.mark.parametrize("name", ["format", "points", "report", "something"])
+def test_files_are_read_without_pickle(tmp_path, name):
+    bomb = Bomb()
+    bomb.path = str(tmp_path / "exploded")
+    with pytest.raises(ss.ValidationError):
+        load(with_arrays(**{name: np.array([bomb], object)}))
+    with pytest.raises(ss.ValidationError):
+        load(npy(np.array([bomb], object)))
+    assert not (tmp_path / "exploded").exists()
+
+
+ARRAYS = dict(np.load(io.BytesIO(stored())))
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_files_with_a_missing_array(name):
+    with pytest.raises(ss.ValidationError, match=name if name != "format" else "not a symspline curve"):
+        load(with_arrays(**{name: None}))
+
+
+def report_with(**changes):
+    return json.dumps([json.loads(str(ARRAYS["report"]))[0] | changes])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"format": "other"},
+        {"version": 99},
+        {"version": "one"},
+        {"space": "klein:2"},
+        {"space": "sphere:3"},
+        {"space": "sphere:" + "9" * 30},
+        {"space": "sphere:2 x sphere:2"},
+        {"t": [0.0, 2, 1]},
+        {"t": [0.0, 1, 1]},
+        {"t": [0.0, NAN, 1]},
+        {"t": [0.0, 1, INF]},
+        {"t": [0.0, 1]},
+        {"t": 1.0},
+        {"t": [[0.0, 1, 2]]},
+        {"t": ["a", "b", "c"]},
+        {"t": [0, 1j, 2]},
+        {"t": []},
+        {"t_unit": "parsec", "t": [0, 1, 2]},
+        {"t_unit": "s", "t": [0, 1, np.iinfo(np.int64).min]},
+        {"points": 2 * P},
+        {"points": NAN * P},
+        {"points": P + 0j},
+        {"points": 3.0},
+        {"points": P[:2]},
+        {"points": P.astype(str)},
+        {"velocities": P[:2]},
+        {"velocities": NAN * P},
+        {"bc_type": "{"},
+        {"bc_type": "5"},
+        {"bc_type": "null"},
+        {"extrapolate": '"foo"'},
+        {"extrapolate": "[1]"},
+        {"report": "[]"},
+        {"report": "{}"},
+        {"report": "[{}]"},
+        {"report": "5"},
+        {"report": "[" * 100_000},
+        {"report": report_with(surprise=1)},
+    ],
+    ids=lambda changes: str(changes)[:40],
+)
+def test_files_with_a_wrong_array(changes):
+    with pytest.raises(ss.ValidationError):
+        load(with_arrays(**changes))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"t": [0.0], "points": P[:1], "velocities": P[:1]},
+        {"bc_type": '"foo"'},
+        {"bc_type": "{}"},
+        {"bc_type": '[["x", 1], "natural"]'},
+        {"velocities": P},
+        {"report": report_with(converged="no", rate={}, method=5)},
+    ],
+    ids=lambda changes: str(changes)[:40],
+)
+def test_files_with_a_wrong_array_that_are_read_all_the_same(changes):
+    with pytest.raises(ss.ValidationError):
+        load(with_arrays(**changes))
+
+
+def test_newer_files_say_so():
+    with pytest.raises(ss.ValidationError, match=r"version 99; this symspline reads version 1"):
+        load(with_arrays(version=99))
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        ss.load(tmp_path / "missing.npz")
+    with pytest.raises(OSError):
+        ss.load(tmp_path)
+    with pytest.raises(OSError):
+        ss.CubicSpline(None, P, S2).save(tmp_path)
+
+
+@pytest.mark.parametrize("what", [None, 5, [1, 2]], ids=str)
+def test_things_that_are_no_files(what):
+    with pytest.raises((ss.ValidationError, TypeError, OSError)):
+        ss.load(what)
+
+
+def test_messages_quote_no_large_part_of_a_file():
+    file = io.BytesIO()
+    ss.CubicSpline(None, P, S2).save(file)
+    # It quotes as much as the damaged length of a name says.
+    with zipfile.ZipFile(file) as archive:
+        info = archive.infolist()[1]
+    data = bytearray(file.getvalue())
+    data[info.header_offset + 26 : info.header_offset + 28] = (5000).to_bytes(2, "little")
+    with pytest.raises(ss.ValidationError, match="damaged or not a symspline curve") as caught:
+        ss.load(io.BytesIO(data + bytes(5000)))
+    assert len(str(caught.value)) < 300

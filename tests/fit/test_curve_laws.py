@@ -1,0 +1,180 @@
+"""Laws that every spline obeys."""
+
+import numpy as np
+import pytest
+from cases import CASES, EPS, QUOTIENTS, apart, base_point, closed_walk, condition, unit_tangent, walk
+from laws import ENDS, end_conditions, knots, sharpness
+from scipy.interpolate import CubicSpline as FlatSpline
+
+import symspline as ss
+
+every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+
+
+every_smooth = pytest.mark.parametrize(
+    "case", [c for c in CASES if c.smooth and not c.few], ids=lambda case: case.name
+)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20180308)
+
+
+@every
+@pytest.mark.parametrize("ends", ["natural", "not-a-knot", "periodic", "velocity"])
+def test_solvers_agree(case, ends, rng):
+    space = case.space
+    if case.few and ends in ("natural", "velocity"):
+        # What these ask of a space is part of what the others ask.
+        return
+    # Far apart, several splines fit: the solvers may find different ones.
+    for step in (1e-3, 0.3, 1.0 / sharpness(space)):
+        p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
+        t = knots("random", len(p), rng)
+        bc = end_conditions(ends, space, p)
+        one, *others = (
+            ss.CubicSpline(t, p, space, bc_type=bc, method=m, tol=1e-13).velocities
+            for m in ("fixed-point", "quasi-newton", "newton")
+        )
+        # A residual of 1e-13 leaves velocities some 1e-12 apart where the contraction is slow.
+        for other in others:
+            assert np.abs(one - other).max() <= 2e-12 * np.abs(one).max() * condition(space, p)
+
+
+@every
+def test_the_spline_commutes_with_isometries(case, rng):
+    space = case.space
+    p = walk(space, 0.6, 9, rng)
+    t = knots("random", len(p), rng)
+    o = base_point(space, rng)
+    v, w = (0.8 * unit_tangent(space, o, rng) for _ in range(2))
+
+    def move(x):
+        return space.transvection(o, w, space.transvection(o, v, x))
+
+    x = np.linspace(t[0], t[-1], 50)
+    for ends in ("natural", "not-a-knot"):
+        here = ss.CubicSpline(t, p, space, bc_type=ends)
+        there = ss.CubicSpline(t, move(p), space, bc_type=ends)
+        allowed = 200 * EPS * condition(space, [*p, *move(p)])
+        assert apart(space, there(x), move(here(x))) <= allowed
+
+
+@every
+def test_reversing_time_reverses_the_curve(case, rng):
+    space = case.space
+    p = walk(space, 0.7, 9, rng)
+    t = knots("random", len(p), rng)
+    x = np.linspace(t[0], t[-1], 50)
+    for ends in ("natural", "not-a-knot", "clamped"):
+        forth = ss.CubicSpline(t, p, space, bc_type=ends)
+        back = ss.CubicSpline(-t[::-1], p[::-1], space, bc_type=ends)
+        allowed = 200 * EPS * condition(space, p)
+        assert apart(space, forth(x), back(-x)) <= allowed
+        for nu, sign, factor in ((1, -1, 10), (2, 1, 100)):
+            there = back(-x, nu)
+            if isinstance(space, QUOTIENTS):
+                there = space.transport(back(-x), forth(x), there)
+            assert np.abs(forth(x, nu) - sign * there).max() <= factor * allowed
+
+
+@every
+def test_derivatives_agree_with_differences(case, rng):
+    space = case.space
+    p = walk(space, 0.8, 7, rng)
+    t = knots("random", len(p), rng)
+    spline = ss.CubicSpline(t, p, space)
+    # Inside segments: differences across a knot see its jump in the third derivative.
+    x = (t[:-1, None] + np.diff(t)[:, None] * [0.1, 0.37, 0.5, 0.8]).ravel()
+    y = spline(x)
+
+    def differences(h):
+        plus, minus = (space.log(y, spline(x + s * h)) for s in (1, -1))
+        return (plus - minus) / (2 * h), (plus + minus) / h**2
+
+    # Richardson's extrapolation of central differences at h and h/2.
+    (d1, d2), (half1, half2) = differences(0.02), differences(0.01)
+    velocity, acceleration = spline(x, 1), spline(x, 2)
+    scale = np.abs(acceleration).max() + np.abs(velocity).max()
+    assert np.abs((4 * half1 - d1) / 3 - velocity).max() <= 1e-6 * scale
+    assert np.abs((4 * half2 - d2) / 3 - acceleration).max() <= 1e-5 * scale
+
+
+def smooth_curve(space, t, closed):
+    """A smooth curve through the space, by exp of a smooth curve of tangent vectors."""
+    rng = np.random.default_rng(7)
+    o = base_point(space, rng)
+    axes = [unit_tangent(space, o, rng) for _ in range(3)]
+    w = 2 * np.pi * t
+    if closed:
+        waves = 0.6 * np.cos(w) + 0.2 * np.sin(2 * w), 0.5 * np.sin(w), 0.2 * np.cos(2 * w)
+    else:
+        waves = 0.9 * t + 0.3 * np.sin(3 * t), 0.5 * np.cos(2 * t), 0.4 * np.sin(4 * t)
+    v = sum(np.multiply.outer(wave, axis) for wave, axis in zip(waves, axes, strict=True))
+    return space.exp(o, v)
+
+
+@every_smooth
+@pytest.mark.parametrize(
+    ("ends", "order"), [("velocity", 4), ("not-a-knot", 4), ("periodic", 4), ("natural", 2)]
+)
+def test_a_smooth_curve_is_recovered(case, ends, order):
+    space = case.space
+    x = np.linspace(0, 1, 2001)
+    errors = []
+    for n in (48, 96):
+        t = np.linspace(0, 1, n + 1)
+        p = smooth_curve(space, t, ends == "periodic")
+        bc = ends
+        if ends == "periodic":
+            p[-1] = p[0]
+        elif ends == "velocity":
+            e = 1e-3 * np.array([-2, -1, 1, 2])
+            difference = np.array([1, -8, 8, -1]) / 12e-3
+            around = [smooth_curve(space, end + e, False) for end in (0.0, 1.0)]
+            # Fourth-order differences: 1e-12, far below the curve's own error.
+            bc = [
+                (1, space.project_tangent(p[i], np.tensordot(difference, a, 1)))
+                for i, a in zip((0, -1), around, strict=True)
+            ]
+        spline = ss.CubicSpline(t, p, space, bc_type=bc)
+        errors.append(space.distance(spline(x), smooth_curve(space, x, ends == "periodic")).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+@every
+def test_a_batch_is_its_curves_bit_for_bit(case, rng):
+    space = case.space
+    p = np.stack([walk(space, step, 11, rng) for step in np.linspace(1e-3, 1.5, 11)])
+    t = knots("random", 11, rng)
+    # In any order, in one segment (from curve to curve too), and dense over all.
+    times = rng.uniform(t[0], t[-1], 37), np.linspace(t[2], t[3], 40)[1:-1], np.linspace(t[0], t[-1], 331)
+    for ends in ("natural", "not-a-knot"):
+        batch = ss.CubicSpline(t, p, space, bc_type=ends)
+        values = [(x, nu, batch(x, nu)) for x in times for nu in range(3)]
+        for i, points in enumerate(p):
+            one = ss.CubicSpline(t, points, space, bc_type=ends)
+            assert batch[i] == one
+            for x, nu, value in values:
+                assert np.array_equal(value[i], one(x, nu))
+
+
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 17])
+def test_flat_space_is_scipy(ends, n, rng):
+    space = ss.Euclidean(3)
+    t = np.cumsum(rng.uniform(0.2, 2, n))
+    p = rng.standard_normal((n, 3))
+    if ends == "periodic":
+        p[-1] = p[0]
+    bc = end_conditions(ends, space, p)
+    ours, flat = ss.CubicSpline(t, p, space, bc_type=bc), FlatSpline(t, p, bc_type=bc)
+    x = np.linspace(t[0], t[-1], 101)
+    h = np.diff(t).min()
+    for nu in range(3):
+        assert np.abs(ours(x, nu) - flat(x, nu)).max() <= 200 * EPS * np.abs(p).max() / h**nu
+    outside = [t[0] - 0.5, t[-1] + 0.7]
+    assert np.allclose(
+        ours(outside, extrapolate=True), flat(outside, extrapolate=True), rtol=1e-11, atol=1e-11
+    )

@@ -1,0 +1,317 @@
+"""The solvers: one step in flat space, quadratic convergence, points far apart, and never silent failure."""
+
+import numpy as np
+import pytest
+from cases import EPS, closed_walk, condition, jumps, walk, zigzag, zigzag_on
+from curves import S2, same
+from scipy.interpolate import CubicSpline as FlatSpline
+
+import symspline as ss
+
+# What an iteration counts: 120 sweeps, 50 steps of Newton's method, and the homotopy, whose steps of λ have
+# twelve at most. The longest run seen is 476.
+MOST = 1000
+
+
+# Times that suit no curve with equal steps.
+UNEVEN = np.cumsum([0.0, 20, 1, 20, 1, 20, 1, 20])
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1)
+
+
+def fit(p, space, t=None, **options):
+    return ss.CubicSpline(t, p, space, on_failure="ignore", **options)
+
+
+def wild(space, step, n, rng):
+    """A walk that turns by about 70° at every point, in any direction."""
+    return walk(space, step, n, rng, turn=3.0)
+
+
+def ends_on(space, p):
+    """Every kind of end condition, for points that need not be closed."""
+    v, w = space.log(p[0], p[1]), 0.5 * space.log(p[-1], p[-2])
+    return ["natural", "clamped", "not-a-knot", ((1, v), (1, w)), ((2, v), (2, w)), ("not-a-knot", (1, w))]
+
+
+# ---- Newton's method ----
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 17])
+@pytest.mark.parametrize("dim", [1, 3])
+def test_newton_takes_one_step_in_flat_space(dim, n, rng):
+    space, t = ss.Euclidean(dim), np.cumsum(rng.uniform(0.2, 2, n))
+    p = rng.standard_normal((n, dim))
+    closed = np.concatenate([p[:-1], p[:1]])
+    for ends, points in [*((ends, p) for ends in ends_on(space, p)), ("periodic", closed)]:
+        spline = ss.CubicSpline(t, points, space, bc_type=ends, method="newton")
+        # One to see the defect, one to see that it is gone.
+        assert spline.report.iterations == 2, ends
+        flat = FlatSpline(t, points, bc_type=ends)
+        assert np.abs(spline.velocities - flat(t, 1)).max() < 1e-12 * np.abs(flat(t, 1)).max()
+
+
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [
+        *((name, 0.3) for name in ("sphere:2", "so:3", "spd:3", "gr:2,5", "cp:2", "se:3", "hyperbolic:2")),
+        *((name, 1.0) for name in ("sphere:2", "so:3", "spd:3", "gr:2,5", "se:3", "hyperbolic:2")),
+        ("cp:2", 0.6),
+    ],
+)
+@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic"])
+def test_newton_converges_quadratically(name, step, ends, rng):
+    space = ss.space(name)
+    p = (closed_walk if ends == "periodic" else walk)(space, step, 12, rng)
+    found = [
+        fit(p, space, bc_type=ends, method="newton", tol=0.0, max_iter=k).report.residual
+        for k in range(2, 13)
+    ]
+    near = next(k for k, r in enumerate(found) if r < 0.03)
+    for before, after in zip(found[near:], found[near + 1 :], strict=False):
+        assert after <= 10 * before**2 + 20 * EPS * condition(space, p), found
+    # Three steps square 0.03 to far below rounding.
+    assert found[near + 3] <= 20 * EPS * condition(space, p), found
+
+
+def test_fixed_point_is_linear_with_a_rate_of_one_half(rng):
+    for space in (S2, ss.SpecialOrthogonal(3), ss.Grassmannian(2, 5)):
+        report = ss.CubicSpline(None, walk(space, 0.1, 20, rng), space, method="fixed-point").report
+        assert report.rate == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "mixed"])
+@pytest.mark.parametrize("n", [4, 5, 12])
+def test_quasi_newton_takes_one_step_in_flat_space(n, ends, rng):
+    t, p = np.cumsum(rng.uniform(0.2, 2, n)), rng.standard_normal((n, 2))
+    if ends == "periodic":
+        p[-1] = p[0]
+    bc = ("not-a-knot", (1, p[0])) if ends == "mixed" else ends
+    spline = ss.CubicSpline(t, p, "r:2", bc_type=bc, method="quasi-newton")
+    assert spline.report.iterations == 2
+
+
+def test_the_rate_is_the_mean_contraction(rng):
+    p = walk(ss.Sphere(2), 0.4, 20, rng)
+    options = {"method": "fixed-point", "on_failure": "ignore"}
+    done = ss.CubicSpline(None, p, "sphere:2", **options).report
+    second = ss.CubicSpline(None, p, "sphere:2", max_iter=2, **options).report.residual
+    assert done.rate == pytest.approx((done.residual / second) ** (1 / (done.iterations - 2)), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton"])
+def test_it_does_not_matter_where_a_closed_curve_starts(method, rng):
+    """The residual of an unfinished curve is the largest of all knots, that of the seam among them."""
+    h, p = rng.uniform(0.7, 1.3, 6), walk(ss.Sphere(2), 0.7, 6, rng)
+    found = []
+    for k in range(6):
+        points, steps = np.roll(p, -k, axis=0), np.roll(h, -k)
+        t = np.concatenate([[0.0], np.cumsum(steps)])
+        closed = np.concatenate([points, points[:1]])
+        options = {"method": method, "bc_type": "periodic", "max_iter": 2, "on_failure": "ignore"}
+        found.append(ss.CubicSpline(t, closed, "sphere:2", **options).report.residual)
+    assert np.ptp(found) <= 1e-12 * found[0]
+
+
+# ---- they find the same curve ----
+
+
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [
+        ("sphere:2", (0.1, 0.5, 1.2)),
+        ("sphere:3", (0.1, 0.5, 1.2)),
+        ("so:3", (0.1, 0.8, 2.0)),
+        ("rp:2", (0.1, 0.5, 1.2)),
+        ("cp:2", (0.1, 0.3, 0.6)),
+        ("gr:2,5", (0.1, 0.5, 0.9)),
+        ("spd:3", (0.1, 0.5, 1.5)),
+        ("se:3", (0.1, 0.5, 1.5)),
+        ("hyperbolic:2", (0.1, 0.5, 1.2)),
+    ],
+)
+def test_solvers_agree_on_wild_walks(name, steps):
+    space = ss.space(name)
+    for step in steps:
+        p = np.array([wild(space, step, 20, np.random.default_rng(seed)) for seed in range(8)])
+        ours, *others = (
+            ss.CubicSpline(None, p, space, method=method).velocities
+            for method in ("auto", "fixed-point", "quasi-newton", "newton")
+        )
+        allowed = 1e-11 * np.abs(ours).max() * condition(space, p)
+        assert max(np.abs(ours - other).max() for other in others) <= allowed
+
+
+def test_auto_is_quasi_newton_where_that_is_quick(rng):
+    p = wild(S2, 1.2, 20, rng)
+    auto, quick = (ss.CubicSpline(None, p, S2, method=method) for method in ("auto", "quasi-newton"))
+    assert auto == quick and auto.report == quick.report
+
+
+# ---- points far apart ----
+
+
+@pytest.mark.parametrize(
+    ("points", "method"),
+    [(zigzag(1.0), "quasi-newton"), (zigzag(2.5), "newton"), (zigzag(2.3, 8, 0.3), "homotopy")],
+)
+def test_auto_says_which_solver_got_there(points, method):
+    spline = ss.CubicSpline(None, points, S2)
+    assert spline.report.method == method
+    assert max(jumps(spline)) < 1
+
+
+def far_curves(name, part, count=20):
+    """Walks and zigzags whose neighbours are `part` of the way to the cut locus."""
+    space = ss.space(name)
+    step = part * space.injectivity_radius
+    return space, np.array(
+        [wild(space, step, 20, np.random.default_rng(seed)) for seed in range(count)]
+        + [zigzag_on(space, step, 20, np.random.default_rng(seed)) for seed in range(count)]
+    )
+
+
+FAR = ["sphere:2", "sphere:3", "so:3", "rp:2", "cp:1", "gr:2,5"]
+
+
+@pytest.mark.parametrize("name", FAR)
+@pytest.mark.parametrize(("part", "at_least"), [(0.5, 1.0), (0.7, 1.0), (0.8, 0.9), (0.9, 0.9), (0.95, 0.75)])
+def test_far_points_converge_or_are_reported(name, part, at_least):
+    """Near the cut locus not every curve can be expected to converge, but none may be wrong in silence."""
+    space, curves = far_curves(name, part)
+    good = 0
+    for p in curves:
+        try:
+            spline = ss.CubicSpline(None, p, space)
+        except (ss.ConvergenceError, ss.CutLocusError) as error:
+            assert "put more points" in str(error)
+            spline = error.spline
+            assert not spline.report.converged
+        else:
+            good += 1
+            assert spline.report.converged and spline.report.residual <= 1e-12
+            assert space.distance(spline(spline.t), p).max() <= 10 * EPS * condition(space, p)
+            # `jumps` counts multiples of 1e-12, and a residual of 1e-12 is a jump of 12e-12.
+            assert max(jumps(spline)) < 20
+        assert spline.report.iterations <= MOST
+    assert good >= at_least * len(curves)
+
+
+@pytest.mark.parametrize("name", FAR)
+@pytest.mark.parametrize("part", [0.3, 0.5, 0.7])
+def test_auto_converges_wherever_fixed_point_does(name, part):
+    space, p = far_curves(name, part, 10)
+    auto, fixed = (fit(p, space, method=method).report.converged for method in ("auto", "fixed-point"))
+    assert (auto | ~fixed).all()
+
+
+@pytest.mark.parametrize("step", np.arange(0.2, 3.11, 0.1))
+def test_auto_converges_on_zigzags_wherever_fixed_point_does(step):
+    for n in (5, 10, 20):
+        auto, fixed = (fit(zigzag(step, n), S2, method=m).report for m in ("auto", "fixed-point"))
+        assert auto.converged or not fixed.converged, n
+
+
+@pytest.mark.parametrize(("name", "method"), [("sphere:3", "newton"), ("cp:2", "fixed-point")])
+def test_auto_converges_near_the_cut_locus_wherever_another_solver_does(name, method):
+    space = ss.space(name)
+    step = 0.95 * space.injectivity_radius
+    p = np.array([zigzag_on(space, step, 20, np.random.default_rng(seed)) for seed in range(60)])
+    auto, other = (fit(p, space, method=m).report.converged for m in ("auto", method))
+    assert (auto | ~other).all()
+
+
+def test_points_too_far_are_an_error_with_advice():
+    advice = "put more points where steps are long, choose times that suit the distances"
+    with pytest.raises(ss.ConvergenceError, match=f"longest step 1.0.*{advice}") as error:
+        ss.CubicSpline(UNEVEN, zigzag(1.0, 8), S2)
+    assert not error.value.spline.report.converged
+    with pytest.raises(ss.CutLocusError, match="put a point between"):
+        ss.CubicSpline(None, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]], S2)
+
+
+# ---- batches ----
+
+
+EASY, HARD, HARDEST = zigzag(0.5, 8), zigzag(2.8, 8), zigzag(2.3, 8, 0.3)
+
+
+ANTIPODES = np.concatenate([EASY[:4], -EASY[3:4], EASY[5:]])
+
+
+IMPOSSIBLE = zigzag(1.0, 8)
+"""With the times `UNEVEN`."""
+
+
+def assert_is_its_curves(p, t, **options):
+    batch = fit(p, S2, t, **options)
+    for i, points in enumerate(p):
+        one = fit(points, S2, t[i], **options)
+        for field in ("converged", "iterations", "residual", "max_step", "rate"):
+            assert same(getattr(batch.report, field)[i], getattr(one.report, field)), (i, field)
+        assert same(batch.velocities[i], one.velocities), i
+
+
+def test_a_batch_of_easy_and_hard_curves_and_one_that_has_no_spline():
+    p, t = np.array([EASY, HARDEST, ANTIPODES, HARD, zigzag(0.3, 8)]), np.arange(8.0)
+    assert_is_its_curves(p, np.broadcast_to(t, (len(p), 8)))
+    batch = fit(p, S2)
+    assert batch.report.converged.tolist() == [True, True, False, True, True]
+    assert np.isnan(batch.velocities[2]).all() and np.isfinite(np.delete(batch.velocities, 2, 0)).all()
+    # The last solver that any curve needed.
+    assert batch.report.method == fit(HARDEST, S2).report.method == "homotopy"
+    with pytest.raises(ss.CutLocusError, match=r"points\[3\] and points\[4\] of curve 2") as error:
+        ss.CubicSpline(None, p, S2)
+    assert error.value.spline == batch
+    with pytest.warns(ss.ConvergenceWarning, match="of curve 2"):
+        ss.CubicSpline(None, p, S2, on_failure="warn")
+
+
+def test_a_batch_with_a_curve_that_does_not_converge():
+    p = np.array([EASY, HARDEST, IMPOSSIBLE, HARD])
+    assert_is_its_curves(p, np.array([UNEVEN if i == 2 else np.arange(8.0) for i in range(len(p))]))
+
+
+@pytest.mark.parametrize("tol", [1e-12, 0.0])
+def test_a_batch_of_curves_that_are_all_hard(tol):
+    p = np.array([zigzag(step, 8, rise) for rise in (0.02, 0.1, 0.3) for step in np.arange(1.5, 3.0, 0.05)])
+    assert_is_its_curves(p, np.broadcast_to(np.arange(8.0), (len(p), 8)), tol=tol)
+
+
+def test_a_product_names_the_last_solver_that_any_factor_needed():
+    spline = ss.CubicSpline(None, (EASY, HARD, HARDEST), ss.Product(S2, S2, S2))
+    assert spline.report.method == "homotopy"
+
+
+# ---- limits ----
+
+
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "auto"])
+def test_no_solver_exceeds_max_iter(method):
+    for points in (zigzag(1.0), zigzag(2.5), zigzag(2.3, 8, 0.3), zigzag(1.9, 12, 0.02)):
+        for most in (1, 2, 8, 9, 50, 119, 120, 121, 125, 150, 170, 200, 250, 400):
+            report = fit(points, S2, method=method, max_iter=most).report
+            assert report.iterations <= most
+            assert report.converged == (report.residual <= 1e-12)
+
+
+@pytest.mark.parametrize("most", [200, 1000])
+def test_auto_converges_within_a_larger_max_iter(most):
+    assert ss.CubicSpline(None, zigzag(2.5), S2).report.iterations < 200
+    assert fit(zigzag(2.5), S2, max_iter=most).report.converged
+
+
+def test_a_curve_of_the_homotopy_can_be_solved_to_rounding():
+    space = ss.RealProjective(2)
+    p = [zigzag_on(space, 0.95 * np.pi / 2, 20, np.random.default_rng(seed)) for seed in range(20)]
+    assert fit(np.array(p), space).report.converged.all()
+    assert all(fit(points, space, tol=0.0).report.converged for points in p)
+
+
+def test_flat_space_needs_no_other_solver_than_the_first(rng):
+    p = 1e3 * rng.standard_normal((30, 2))
+    report = ss.CubicSpline(np.cumsum(rng.uniform(0.1, 5, 30)), p, ss.Euclidean(2)).report
+    assert report.method == "quasi-newton" and report.iterations == 2

@@ -1,0 +1,363 @@
+"""Curves with control points: `BSpline` and `BezierCurve` on every space."""
+
+import math
+
+import numpy as np
+import pytest
+from cases import CASES, EPS, QUOTIENTS, apart, base_point, condition, steep_tangent, unit_tangent, walk
+from scipy.interpolate import BSpline as FlatBSpline
+
+import symspline as ss
+
+every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+
+
+DEGREES = range(1, 6)
+
+
+every_degree = pytest.mark.parametrize("degree", DEGREES)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(2007)
+
+
+def control_points(space, n, rng, step=0.4):
+    return walk(space, step, n, rng)
+
+
+def clamped(interior, degree, end=3.0):
+    """Knots from 0 to ``end`` at which the curve starts and ends in its control points."""
+    return np.concatenate([[0.0] * (degree + 1), interior, [end] * (degree + 1)])
+
+
+def here(space, x, y, v):
+    """Vectors at y, at arrays x of the same points."""
+    return space.transport(y, x, v) if isinstance(space, QUOTIENTS) else v
+
+
+def backwards(curve):
+    """The same curve in the other direction: what it has from the right this one has from the left."""
+    points = np.flip(curve.control_points, axis=-1 - len(curve.space.point_shape))
+    return ss.BSpline(-curve.knots[::-1], points, curve.degree, curve.space)
+
+
+# ---- flat space ----
+
+
+INTERIOR = {
+    "none": [],
+    "uniform": [1.0, 2.0],
+    "random": [0.3, 1.1, 1.25, 2.9],
+    "double": [0.5, 1.5, 1.5, 2.0],
+    "to the degree": None,
+    "a jump": None,
+}
+
+
+def some_knots(kind, degree):
+    interior = INTERIOR[kind]
+    if interior is None:
+        interior = [0.5, *[1.5] * (degree + (kind == "a jump")), 2.0]
+    return clamped(interior, degree)
+
+
+@pytest.mark.parametrize("kind", [*INTERIOR, "not clamped", "one end"])
+@every_degree
+def test_flat_space_is_scipy(kind, degree, rng):
+    if kind == "double" and degree == 1:
+        return
+    if kind == "not clamped":
+        knots = np.cumsum(rng.uniform(0.2, 1.0, 2 * degree + 7))
+    elif kind == "one end":
+        knots = np.concatenate([[0.0] * (degree + 1), np.cumsum(rng.uniform(0.2, 1.0, degree + 5))])
+    else:
+        knots = some_knots(kind, degree)
+    points = rng.standard_normal((2, len(knots) - degree - 1, 3))
+    ours = ss.BSpline(knots, points, degree, "r:3")
+    flat = FlatBSpline(knots, np.moveaxis(points, 1, 0), degree)
+    start, end = ours.domain
+    assert (start, end) == (knots[degree], knots[-degree - 1])
+    inside = knots[(knots >= start) & (knots <= end)]
+    x = np.concatenate([inside, rng.uniform(start, end, 100), [start, end]])
+    h = np.diff(np.unique(knots)).min()
+    for nu in range(3):
+        expected = np.moveaxis(flat(x, nu), 1, 0)
+        assert (
+            np.abs(ours(x, nu) - expected).max()
+            <= 100 * degree * EPS * np.abs(points).max() * (degree / h) ** nu
+        )
+    assert np.allclose(ours.speed(x), np.linalg.norm(ours(x, 1), axis=-1), rtol=1e-13, atol=1e-13)
+
+
+@every_degree
+def test_flat_bezier_curves_are_bernstein_polynomials(degree, rng):
+    points = rng.standard_normal((degree + 1, 2))
+    x = np.linspace(0, 1, 21)
+    weights = [math.comb(degree, i) * x**i * (1 - x) ** (degree - i) for i in range(degree + 1)]
+    assert np.abs(ss.BezierCurve(points, "r:2")(x) - np.transpose(weights) @ points).max() < 1e-14
+
+
+# ---- every space ----
+
+
+@every
+def test_a_cubic_is_a_segment_of_the_spline(case, rng):
+    space = case.space
+    p = walk(space, 0.6, 6, rng)
+    t = np.array([0.0, 1.0, 1.5, 3.0, 4.0, 4.5])
+    spline = ss.CubicSpline(t, p, space)
+    segments = ss.BezierCurve(spline.control_points, space)
+    tau = np.linspace(0, 1, 9)
+    h = np.diff(t)
+    x = t[:-1, None] + tau * h[:, None]
+    x[:, -1] = t[1:]
+    allowed = 200 * EPS * condition(space, p)
+    y = spline(x)
+    assert apart(space, segments(tau), y) <= allowed
+    for nu in (1, 2):
+        scale = h.reshape(-1, *[1] * (1 + len(space.point_shape))) ** nu
+        ours = here(space, y, segments(tau), segments(tau, nu)) / scale
+        theirs = spline(x, nu)
+        # ∇γ' of the two segments at a knot agrees up to the residual of the fit.
+        assert np.abs(ours - theirs).max() <= 100 * allowed / h.min() ** nu + 1e-11 * np.abs(theirs).max()
+
+
+@every
+@every_degree
+def test_clamped_ends(case, degree, rng):
+    space = case.space
+    n = degree + 3
+    points = control_points(space, n, rng)
+    knots = clamped([0.8, 1.7], degree)
+    curve = ss.BSpline(knots, points, degree, space)
+    allowed = 100 * EPS * condition(space, points)
+    for x, first, second, h in ((0.0, 0, 1, knots[degree + 1]), (3.0, -1, -2, -(3.0 - knots[-degree - 2]))):
+        assert apart(space, curve(x), curve.control_points[first]) <= allowed
+        leg = space.log(curve.control_points[first], curve.control_points[second])
+        velocity = here(space, curve.control_points[first], curve(x), curve(x, nu=1))
+        assert np.abs(velocity - degree / h * leg).max() <= 10 * degree * allowed
+
+
+@every
+@every_degree
+def test_control_points_on_a_geodesic(case, degree, rng):
+    space = case.space
+    p = base_point(space, rng)
+    q = space.exp(p, unit_tangent(space, p, rng))
+    points = space.geodesic(p, q, np.linspace(0, 1, degree + 1))
+    curve = ss.BezierCurve(points, space)
+    x = np.linspace(0, 1, 7)
+    allowed = 100 * EPS * condition(space, points)
+    assert apart(space, curve(x), space.geodesic(p, q, x)) <= allowed
+    assert np.abs(curve.speed(x) - 1.0).max() <= 30 * allowed
+    assert np.abs(curve(x, nu=2)).max() <= 300 * allowed
+
+
+@every
+def test_points_stay_on_the_space(case, rng):
+    space = case.space
+    curve = ss.BSpline(clamped([1.0, 1.0, 2.0], 3), control_points(space, 7, rng), 3, space)
+    x = np.linspace(0, 3, 50)
+    space.check_point(curve(x))
+    for nu in (1, 2):
+        space.check_tangent(curve(x), curve(x, nu))
+    assert np.allclose(curve.speed(x), space.norm(curve(x), curve(x, nu=1)), rtol=1e-12)
+
+
+@every
+@pytest.mark.parametrize("degree", [2, 3, 5])
+def test_derivatives_agree_with_differences(case, degree, rng):
+    space = case.space
+    knots = clamped([0.7, 1.9], degree)
+    curve = ss.BSpline(knots, control_points(space, degree + 3, rng), degree, space)
+    # Inside the intervals: higher derivatives jump at knots.
+    x = np.array([0.1, 0.4, 0.6, 0.8, 1.2, 1.8, 2.1, 2.5, 2.9])
+    y = curve(x)
+
+    def differences(h):
+        plus, minus = (space.log(y, curve(x + s * h)) for s in (1, -1))
+        return (plus - minus) / (2 * h), (plus + minus) / h**2
+
+    # Richardson's extrapolation of central differences at h and h/2.
+    (d1, d2), (half1, half2) = differences(0.02), differences(0.01)
+    velocity, acceleration = curve(x, 1), curve(x, 2)
+    scale = np.abs(acceleration).max() + np.abs(velocity).max()
+    assert np.abs((4 * half1 - d1) / 3 - velocity).max() <= 1e-5 * scale
+    assert np.abs((4 * half2 - d2) / 3 - acceleration).max() <= 1e-4 * scale
+
+
+FAR = [
+    *(
+        ("sphere:2", 2.2),
+        ("hyperbolic:2", 2.2),
+        ("so:3", 2.4),
+        ("rp:2", 1.3),
+        ("gr:2,5", 1.3),
+        ("cgr:2,4", 1.3),
+    ),
+    *(("so:5", 2.2), ("o:4", 2.2), ("u:1", 2.2), ("u:2", 2.2), ("u:5", 2.2), ("su:2", 2.8), ("su:3", 2.8)),
+    *(("spd:2", 3.0), ("spd:3", 3.0), ("hpd:2", 3.0), ("hpd:5", 3.0), ("se:2", 2.6), ("se:3", 2.6)),
+]
+
+
+def far_control_points(space, step, rng):
+    """Three points with steps in the direction of the nearest cut locus, and a turn of about 30°."""
+    p = space.random_point(rng) if np.isfinite(space.injectivity_radius) else walk(space, 0.1, 1, rng)[0]
+    v = steep_tangent(space, p, rng)
+    if isinstance(space, ss.SpecialEuclidean):
+        v = v.copy()
+        # Mostly a rotation.
+        v[:-1, -1] *= 0.3
+        v /= space.norm(p, v)
+    q = space.project(space.exp(p, step * v))
+    w = space.project_tangent(q, space.transport(p, q, v) + 0.5 * unit_tangent(space, q, rng))
+    return np.array([p, q, space.project(space.exp(q, step * w / space.norm(q, w)))])
+
+
+@pytest.mark.parametrize(("name", "step"), FAR)
+def test_derivatives_far_apart(name, step, rng):
+    space = ss.space(name)
+    for _ in range(5):
+        curve = ss.BezierCurve(far_control_points(space, step, rng), space)
+        x = np.array([0.05, 0.15, 0.3, 0.7, 0.85, 0.95])
+        y = curve(x)
+
+        def differences(h, curve=curve, x=x, y=y):
+            plus, minus = (space.log(y, curve(x + s * h)) for s in (1, -1))
+            return (plus - minus) / (2 * h), (plus + minus) / h**2
+
+        (d1, d2), (half1, half2) = differences(0.01), differences(0.005)
+        velocity, acceleration = curve(x, 1), curve(x, 2)
+        scale = np.abs(acceleration).max() + np.abs(velocity).max()
+        assert np.abs((4 * half1 - d1) / 3 - velocity).max() <= 1e-5 * scale
+        assert np.abs((4 * half2 - d2) / 3 - acceleration).max() <= 1e-4 * scale
+
+
+@every
+def test_curves_commute_with_isometries(case, rng):
+    space = case.space
+    points = control_points(space, 6, rng)
+    o = base_point(space, rng)
+    v, w = (0.8 * unit_tangent(space, o, rng) for _ in range(2))
+
+    def move(x):
+        return space.transvection(o, w, space.transvection(o, v, x))
+
+    knots, x = clamped([0.9, 0.9], 3), np.linspace(0, 3, 31)
+    curve, moved = ss.BSpline(knots, points, 3, space), ss.BSpline(knots, move(points), 3, space)
+    allowed = 200 * EPS * condition(space, [*points, *move(points)])
+    assert apart(space, moved(x), move(curve(x))) <= allowed
+    if not isinstance(space, ss.SpecialEuclidean):
+        # Lengths on the group of poses are those of one side only.
+        assert np.abs(moved.speed(x) - curve.speed(x)).max() <= 30 * allowed
+
+
+@pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,4"])
+def test_the_array_of_a_point_does_not_matter(name, rng):
+    space = ss.space(name)
+    points = control_points(space, 6, rng)
+    if len(space.point_shape) == 1:
+        turn = np.array([1, -1, -1, 1, -1, 1])[:, None] * (
+            np.exp(1j * np.arange(6))[:, None] if name[0] == "c" else 1
+        )
+        other = points * turn
+    else:
+        group = (ss.Unitary if name[0] == "c" else ss.Orthogonal)(2)
+        other = points @ group.random_point(rng, 6)
+    x = np.linspace(0, 3, 31)
+    one, two = (ss.BSpline(clamped([1.0, 1.5], 3), p, 3, space) for p in (points, other))
+    assert apart(space, one(x), two(x)) <= 100 * EPS
+    for nu in (1, 2):
+        assert np.abs(one(x, nu) - here(space, one(x), two(x), two(x, nu))).max() <= 1e-11
+
+
+# ---- at knots ----
+
+
+@every
+@pytest.mark.parametrize(("degree", "times"), [(2, 1), (3, 1), (3, 2), (5, 1), (5, 4)])
+def test_curves_are_c1(case, degree, times, rng):
+    """At knots that are repeated less often than the degree."""
+    space = case.space
+    interior = [0.8, *[1.5] * times, 2.1]
+    points = control_points(space, len(interior) + degree + 1, rng)
+    curve = ss.BSpline(clamped(interior, degree), points, degree, space)
+    back = backwards(curve)
+    x = np.array([0.8, 1.5, 2.1])
+    allowed = 100 * EPS * condition(space, points)
+    assert apart(space, curve(x), back(-x)) <= allowed
+    jump = curve(x, nu=1) + here(space, curve(x), back(-x), back(-x, nu=1))
+    assert np.abs(jump).max() <= 30 * degree * allowed
+
+
+@every
+def test_corners(case, rng):
+    """At a knot repeated as often as the degree the curve goes through a control point, and has a velocity
+    from either side."""
+    space = case.space
+    points = control_points(space, 7, rng)
+    curve = ss.BSpline(clamped([1.0, 1.0, 1.0], 3), points, 3, space)
+    points = curve.control_points
+    allowed = 100 * EPS * condition(space, points)
+    assert apart(space, curve(1.0), points[3]) <= allowed
+    right = here(space, points[3], curve(1.0), curve(1.0, nu=1))
+    assert np.abs(right - 3 / 2.0 * space.log(points[3], points[4])).max() <= 30 * allowed
+    back = backwards(curve)
+    left = -here(space, points[3], back(-1.0), back(-1.0, nu=1))
+    assert np.abs(left + 3 / 1.0 * space.log(points[3], points[2])).max() <= 30 * allowed
+    # Either side is the Bézier curve of its control points.
+    tau = np.linspace(0, 1, 7)[:-1]
+    for first, start, h in ((0, 0.0, 1.0), (3, 1.0, 2.0)):
+        alone = ss.BezierCurve(points[first : first + 4], space)
+        assert apart(space, curve(start + h * tau), alone(tau)) <= allowed
+        if start + h * tau[0] == 1.0:
+            y = curve(1.0)
+            bend = here(space, y, alone(0.0), alone(0.0, nu=2)) / h**2
+            assert np.abs(curve(1.0, nu=2) - bend).max() <= 300 * allowed
+
+
+@every
+def test_curves_that_jump(case, rng):
+    """At a knot repeated once more often than the degree."""
+    space = case.space
+    points = control_points(space, 6, rng)
+    curve = ss.BSpline(clamped([1.0] * 3, 2), points, 2, space)
+    points = curve.control_points
+    allowed = 100 * EPS * condition(space, points)
+    assert apart(space, curve(1.0), points[3]) <= allowed
+    assert apart(space, backwards(curve)(-1.0), points[2]) <= allowed
+    assert apart(space, curve(np.nextafter(1.0, 0.0)), points[2]) <= allowed
+    assert apart(space, curve(3.0), points[5]) <= allowed
+
+
+def test_a_control_point_matters_near_its_knots_only(rng):
+    space = ss.Sphere(2)
+    knots, points = clamped([0.5, 1.0, 1.5, 2.0, 2.5], 3), control_points(space, 9, rng)
+    moved = points.copy()
+    moved[4] = space.exp(points[4], 0.1 * space.log(points[4], points[6]))
+    x = np.linspace(0, 3, 301)
+    same = (ss.BSpline(knots, points, 3, space)(x) == ss.BSpline(knots, moved, 3, space)(x)).all(axis=-1)
+    outside = (x < knots[4]) | (x >= knots[8])
+    assert same[outside].all() and not same[~outside][1:].any()
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "gr:2,5", "u:2", "spd:3"])
+def test_the_unit_of_time_does_not_matter(name, rng):
+    space = ss.space(name)
+    knots, points = clamped([0.9, 2.0], 3), control_points(space, 6, rng)
+    one, other = ss.BSpline(knots, points, 3, space), ss.BSpline(8 * knots - 4, points, 3, space)
+    x = np.linspace(0, 3, 31)
+    for nu in range(3):
+        assert np.abs(one(x, nu) - 8.0**nu * other(8 * x - 4, nu)).max() <= 1e-13
+
+
+def test_a_bspline_that_ends_at_a_knot_that_repeats(rng):
+    """Knots go on beyond the end, where intervals are empty."""
+    knots, points = np.array([0.0, 1, 2, 3, 3, 3, 4, 5]), rng.standard_normal((5, 2))
+    curve, x = ss.BSpline(knots, points, 2, "r:2"), np.array([2.0, 2.5, 3.0])
+    assert curve.domain == (2.0, 3.0)
+    # From the left; SciPy takes the end from the right.
+    expected = FlatBSpline(knots, points, 2)(np.minimum(x, np.nextafter(3.0, 0.0)))
+    assert np.abs(curve(x) - expected).max() <= 20 * EPS

@@ -1,0 +1,222 @@
+"""Curves with control points as arrays and values, and bad input."""
+
+import copy
+import math
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+from cases import CASES, EPS, apart, walk
+from refused import CLAMPED, INF, NAN, REFLECTION, P
+
+import symspline as ss
+
+every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(2007)
+
+
+def control_points(space, n, rng, step=0.4):
+    return walk(space, step, n, rng)
+
+
+def clamped(interior, degree, end=3.0):
+    """Knots from 0 to ``end`` at which the curve starts and ends in its control points."""
+    return np.concatenate([[0.0] * (degree + 1), interior, [end] * (degree + 1)])
+
+
+@every
+@pytest.mark.parametrize("batch", [(), (2, 3)], ids=str)
+def test_batches(case, batch, rng):
+    space = case.space
+    points = np.array([control_points(space, 5, rng) for _ in range(math.prod(batch))])
+    points = points.reshape(*batch, 5, *space.point_shape)
+    curve = ss.BSpline(clamped([1.3], 3), points, 3, space)
+    alone = {i: ss.BSpline(curve.knots, points[i], 3, space) for i in np.ndindex(*batch)}
+    for x in (0.7, np.array(2), np.zeros(0), [0.5, 3.0], np.ones((2, 1, 3)), np.linspace(0, 3, 40)):
+        for nu in range(3):
+            value = curve(x, nu=nu)
+            assert value.shape == (*batch, *np.shape(x), *space.point_shape) and value.dtype == space.dtype
+            for i, one in alone.items():
+                assert np.array_equal(value[i], one(x, nu=nu))
+        assert np.shape(curve.speed(x)) == (*batch, *np.shape(x))
+
+
+def test_many_threads_change_nothing(rng):
+    space = ss.Sphere(3)
+    points = space.random_point(rng, (40, 6))
+    curve, x = ss.BSpline(clamped([1.0, 2.0], 3), points, 3, space), np.linspace(0, 3, 999)
+    try:
+        ss.set_num_threads(1)
+        alone = curve(x, nu=1)
+    finally:
+        ss.set_num_threads(0)
+    assert np.array_equal(curve(x, nu=1), alone)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "u:2", "cp:1", "so:3"])
+def test_what_goes_in(name, rng):
+    space = ss.space(name)
+    points, knots = control_points(space, 4, rng), clamped([], 3)
+    curve = ss.BSpline(knots, points, 3, space)
+    copies = points.copy(), knots.copy()
+    assert curve == ss.BSpline(knots.tolist(), points.tolist(), 3, name)
+    assert curve == ss.BSpline(knots.astype("f4"), np.asfortranarray(points), np.int8(3), space)
+    assert curve == ss.BSpline(knots.astype(int), points, 3, space)
+    single = ss.BSpline(knots, points.astype("c8" if points.dtype.kind == "c" else "f4"), 3, space)
+    assert single.control_points.dtype == space.dtype
+    assert apart(space, single.control_points, points) < 1e-5
+    assert np.array_equal(points, copies[0]) and np.array_equal(knots, copies[1])
+    points[:], knots[:] = 7, 7
+    assert np.array_equal(curve.knots, copies[1]) and apart(space, curve.control_points, copies[0]) <= 4 * EPS
+    for array in (curve.knots, curve.control_points):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
+def test_real_control_points_of_a_complex_space(rng):
+    points = control_points(ss.SpecialOrthogonal(2), 4, rng)
+    curve = ss.BezierCurve(points, "u:2")
+    assert curve == ss.BezierCurve(points + 0j, "u:2") and curve(0.3).dtype == np.complex128
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "u:2", "gr:2,5"])
+@pytest.mark.parametrize("kind", ["BSpline", "BezierCurve"])
+def test_curves_as_values(name, kind, rng):
+    space = ss.space(name)
+    points = control_points(space, 4, rng)
+    if kind == "BezierCurve":
+        curve = ss.BezierCurve(points, space)
+    else:
+        curve = ss.BSpline([0, 0, 0, 1, 2, 2, 2], points, 2, space)
+    assert curve.space == space and curve.degree == (3 if kind == "BezierCurve" else 2)
+    assert repr(curve) == f"<{kind} on {space!r}: 4 control points, degree {curve.degree}>"
+    for made in (pickle.loads(pickle.dumps(curve)), copy.copy(curve), copy.deepcopy(curve)):
+        assert type(made) is type(curve) and made == curve and repr(made) == repr(curve)
+        assert np.array_equal(made(0.3, nu=2), curve(0.3, nu=2))
+        assert made.domain == curve.domain
+        assert not (made.knots.flags.writeable or made.control_points.flags.writeable)
+    assert curve != ss.BezierCurve(points[::-1], space) and curve != ss.BezierCurve(points[:3], space)
+    assert curve != "curve"
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(curve)
+
+
+def test_a_bezier_curve_is_a_bspline(rng):
+    points = control_points(ss.Sphere(2), 4, rng)
+    curve = ss.BezierCurve(points, "sphere:2")
+    assert curve == ss.BSpline([0] * 4 + [1] * 4, points, 3, "sphere:2")
+    assert curve.domain == (0.0, 1.0) and isinstance(curve, ss.BSpline)
+
+
+# ---- bad input ----
+
+
+@pytest.mark.parametrize(
+    "knots, degree, match",
+    [
+        (CLAMPED[1:], 2, r"3 control points of degree 2 need 6 knots, got 5"),
+        ([], 2, r"need 6 knots, got 0"),
+        ([0, 0, 0, 1, 0.5, 1], 2, r"knots\[4\] = 0\.5 is before knots\[3\]"),
+        ([0, 0, NAN, 1, 1, 1], 2, r"knots\[2\] is not finite"),
+        ([0, 0, 0, 1, 1, INF], 2, r"knots\[5\] is not finite"),
+        ([CLAMPED, CLAMPED], 2, r"knots must be a row of real numbers, not int64 of shape \(2, 6\)"),
+        ([0, 0, 0, 1, 1, 1j], 2, r"knots must be a row of real numbers, not complex128"),
+        (list("aaabbb"), 2, r"knots must be a row of real numbers, not <U1"),
+        (np.array(CLAMPED, "M8[s]"), 2, r"knots must be a row of real numbers, not datetime64"),
+        ([[0, 0], [1]], 2, r"knots is not an array of equally long rows"),
+        (
+            [0, 0, 0, 0, 1, 1],
+            2,
+            r"knots repeat 0\.0 4 times; with degree 2 a knot may repeat at most 3 times",
+        ),
+        ([0, 1, 2, 2, 3, 4], 2, r"the curve lives between knots\[2\] and knots\[3\], which are equal"),
+        ([-1e308] * 3 + [1e308] * 3, 2, r"knots span more than a double can hold"),
+        (CLAMPED, 3, r"degree 3 needs at least 4 control points, got 3"),
+        (CLAMPED, 0, r"degree must be at least 1"),
+        (CLAMPED, -1, r"degree must be at least 1"),
+        (CLAMPED, 1.5, r"degree must be a whole number, not 1\.5"),
+        (CLAMPED, True, r"degree must be a whole number, not True"),
+        (CLAMPED, None, r"degree must be a whole number, not None"),
+        (CLAMPED, 10**30, r"degree must be "),
+    ],
+    ids=str,
+)
+def test_knots_and_degrees(knots, degree, match):
+    with warnings.catch_warnings(), pytest.raises(ss.ValidationError, match=match):
+        warnings.simplefilter("error")
+        ss.BSpline(knots, P, degree, "sphere:2")
+
+
+@pytest.mark.parametrize("kind", ["BSpline", "BezierCurve"])
+@pytest.mark.parametrize(
+    "points, match",
+    [
+        (P[0], r"control_points has shape \(3,\); a curve needs shape \(\.\.\., n, 3\) with n >= 2"),
+        (P[:1], r"control_points has shape \(1, 3\); a curve needs .* n >= 2"),
+        (P[:0], r"control_points has shape \(0, 3\); a curve needs"),
+        (np.ones((0, 3, 3)), r"control_points has shape \(0, 3, 3\); a curve needs"),
+        ([], r"control_points has shape \(0,\); a curve needs"),
+        (None, r"control_points has shape \(\); a curve needs"),
+        (np.eye(4)[:3], r"control_points has shape \(3, 4\), but Sphere\(2\) needs shape \(\.\.\., 3\)"),
+        (P + 0j, r"control_points must be .*complex128; did you mean ComplexProjective"),
+        (P.astype(str), r"control_points must be an array of real numbers"),
+        ([[1, 0, 0], [1]], r"control_points is not an array of equally long rows"),
+        (2 * P, r"control_points\[0\] is off the space by 1\.000e0: its norm is 2"),
+        ([P[0], P[1], [0, 0, 0]], r"control_points\[2\] is off .*zero vector"),
+        ([P[0], P[1], [NAN, 0, 0]], r"control_points\[2\] is off the space"),
+        ([P, [P[0], 2 * P[1], P[2]]], r"control_points\[1\] of curve 1 is off the space by 1\.000e0"),
+    ],
+    ids=lambda x: None if isinstance(x, str) else str(np.shape(x)) if not isinstance(x, list) else "list",
+)
+def test_control_points(kind, points, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(
+            points, "sphere:2"
+        )
+
+
+def test_control_points_of_two_parts():
+    match = r"control_points\[0\] and control_points\[1\] have opposite determinants"
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.BezierCurve([np.eye(3), REFLECTION], "o:3")
+    with pytest.raises(ss.ValidationError, match=r"control_points\[1\] is off .*reflection"):
+        ss.BezierCurve([np.eye(3), REFLECTION], "so:3")
+
+
+def test_control_points_in_a_product():
+    for make in (lambda s: ss.BezierCurve((P, P), s), lambda s: ss.BSpline(CLAMPED, (P, P), 2, s)):
+        with pytest.raises(ss.ValidationError, match="one curve in every factor: make one for each"):
+            make("sphere:2 x r:3")
+
+
+@pytest.mark.parametrize(
+    "x, match",
+    [
+        (-0.1, r"x = -0\.1 is outside the curve's times \[0\.0, 1\.0\]"),
+        ([0.5, 2], r"x\[1\] = 2\.0 is outside"),
+        (np.nextafter(1, 2), r"x = 1\.0000000000000002 is outside"),
+        (NAN, r"x = nan is not finite"),
+        ([[0, 1], [INF, 0]], r"x\[1, 0\] = inf is not finite"),
+        ("a", r"x must be real numbers, not <U1"),
+        (None, r"x must be real numbers, not object"),
+        (1j, r"x must be real numbers, not complex128"),
+        (np.datetime64("2020-01-01"), r"x must be real numbers, not datetime64"),
+    ],
+    ids=str,
+)
+def test_times_outside(x, match):
+    curve = ss.BezierCurve(P, "sphere:2")
+    for call in (curve, curve.speed):
+        with pytest.raises(ss.ValidationError, match=match):
+            call(x)
+
+
+@pytest.mark.parametrize("nu", [3, -1, 1.5, "1", None, [1]])
+def test_derivatives_that_there_are_not(nu):
+    with pytest.raises(ss.ValidationError, match=r"nu must be 0, 1 or 2, not "):
+        ss.BezierCurve(P, "sphere:2")(0.5, nu=nu)

@@ -1,0 +1,204 @@
+"""Progress, exceptions in it, and Ctrl-C."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from curves import S2, S3, run_python, scattered
+
+import symspline as ss
+
+
+def hard_fit(progress, n=400_000, **options):
+    options = {
+        "method": "fixed-point",
+        "max_iter": 100,
+        "on_failure": "ignore",
+        "progress": progress,
+    } | options
+    return ss.CubicSpline(None, scattered(n), S3, **options)
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_progress(threads, n):
+    ss.set_num_threads(n)
+    calls = []
+    hard_fit(lambda *call: calls.append(call))
+    finished, total = np.transpose(calls)
+    assert len(calls) >= 3
+    assert (total == 400_000).all()
+    # Nothing may have been finished between two calls, but nothing is ever taken back.
+    assert finished[0] >= 0 and (np.diff(finished) >= 0).all() and finished[-1] == 400_000
+
+
+def test_progress_of_a_short_fit():
+    calls = []
+    ss.CubicSpline(None, np.eye(3), S2, progress=lambda *call: calls.append(call))
+    assert calls[-1] == (3, 3)
+    calls.clear()
+    ss.fit_many([(None, np.eye(3)), (None, np.eye(3)[:2])], S2, progress=lambda *call: calls.append(call))
+    assert calls[-1] == (5, 5)
+
+
+def test_progress_never_passes_its_total(threads):
+    ss.set_num_threads(1)
+    rng, n = np.random.default_rng(0), 150_000
+    p = [S3.random_point(rng)]
+    directions = rng.standard_normal((n, 4))
+    for d in directions[1:]:
+        d -= d @ p[-1] * p[-1]
+        p.append(np.cos(1.6) * p[-1] + np.sin(1.6) / np.sqrt(d @ d) * d)
+    calls = []
+    ss.CubicSpline(None, S3.project(p), S3, on_failure="ignore", progress=lambda *call: calls.append(call))
+    finished, total = np.transpose(calls)
+    assert (finished <= total).all() and (np.diff(finished) >= 0).all()
+
+
+def test_progress_of_a_product():
+    calls = []
+    ss.CubicSpline(None, (np.eye(3), np.eye(3)), "sphere:2 x r:3", progress=lambda *call: calls.append(call))
+    assert [finished for finished, total in calls].count(calls[-1][0]) == 1
+
+
+class Enough(Exception):
+    pass
+
+
+@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize("after", [1, 2])
+def test_an_exception_in_progress_stops_the_work(threads, n, after):
+    ss.set_num_threads(n)
+    calls, error = [], Enough("enough")
+
+    def progress(finished, total):
+        calls.append(finished)
+        if len(calls) == after:
+            raise error
+
+    with pytest.raises(Enough) as caught:
+        hard_fit(progress)
+    assert caught.value is error
+    assert len(calls) == after and calls[-1] < 400_000
+
+
+def test_an_exception_in_the_last_call_of_progress_comes_out():
+    def progress(finished, total):
+        raise Enough
+
+    with pytest.raises(Enough):
+        ss.CubicSpline(None, np.eye(3), S2, progress=progress)
+    with pytest.raises(Enough):
+        ss.fit_many([(None, np.eye(3))], S2, progress=progress)
+
+
+NESTED = """
+import sys, numpy as np, symspline as ss
+ss.set_num_threads(int(sys.argv[1]))
+rng = np.random.default_rng(0)
+inner = ss.CubicSpline(None, np.eye(3), "sphere:2")
+calls = []
+
+def progress(finished, total):
+    calls.append(ss.CubicSpline(None, np.eye(3), "sphere:2") == inner and inner(0.5).shape == (3,))
+
+p = ss.Sphere(3).random_point(rng, 400_000)
+ss.CubicSpline(None, p, "sphere:3", method="fixed-point", max_iter=100, on_failure="ignore", progress=progress)
+assert len(calls) > 2 and all(calls)
+"""
+
+
+@pytest.mark.parametrize(
+    "n",
+    [
+        1,
+        2,
+    ],
+)
+def test_progress_may_fit_another_curve(n):
+    run_python(NESTED, n, RUST_BACKTRACE="0")
+
+
+INTERRUPTED = """
+import sys, time, numpy as np, symspline as ss
+ss.set_num_threads(int(sys.argv[1]))
+p = ss.Sphere(3).random_point(np.random.default_rng(0), 2_000_000)
+started = lambda *call: print("started", flush=True)
+try:
+    ss.CubicSpline(None, p, "sphere:3", method="fixed-point", progress=started)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    # Everything still works.
+    assert ss.CubicSpline(None, p[:2], "sphere:3", on_failure="ignore").report.iterations >= 0
+    print("well", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
+@pytest.mark.parametrize("n", [1, 2])
+def test_ctrl_c_stops_a_long_fit(n):
+    command = [sys.executable, "-c", INTERRUPTED, str(n)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "started\n"
+            start = time.perf_counter()
+            process.send_signal(signal.SIGINT)
+            while (line := process.stdout.readline()) == "started\n":
+                pass
+            seconds = time.perf_counter() - start
+            assert line == "interrupted\n"
+            assert process.stdout.read() == "well\n"
+            assert process.wait(10) == 0
+            # It takes about 0.05 s; the whole fit takes minutes.
+            assert seconds < 2
+        finally:
+            process.kill()
+
+
+INTERRUPTED = """
+import sys, numpy as np, symspline as ss
+
+space = ss.space("{name}")
+p = np.broadcast_to(space.random_point(np.random.default_rng(0)), (2, *space.point_shape))
+v = space.random_tangent(np.random.default_rng(1), p)
+spline = ss.CubicSpline(None, space.exp(p, 0.3 * v / space.norm(p, v)[:, None, None]), space)
+before = spline(0.5, nu=2)
+print("started", flush=True)
+try:
+    {work}
+    print("finished", flush=True)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+assert (spline(0.5, nu=2) == before).all()
+print("well", flush=True)
+"""
+
+
+# All of it takes much longer than the test.
+@pytest.mark.parametrize(
+    "name, work",
+    [
+        ("spd:3", "spline(np.broadcast_to(0.5, 20_000_000), nu=2)"),
+        ("spd:3", "spline.speed(np.broadcast_to(0.5, 50_000_000))"),
+        ("so:8", "space.log(*np.broadcast_to(spline.points[:, None], (2, 1_000_000, 8, 8)))"),
+        ("so:80", "spline(np.broadcast_to(0.5, 4_000), nu=2)"),
+    ],
+    ids=["points", "speeds", "operations", "large-matrices"],
+)
+def test_ctrl_c_stops_long_work(name, work):
+    command = [sys.executable, "-c", INTERRUPTED.format(name=name, work=work)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "started\n"
+            # By then arrays are copied, and compiled code runs.
+            time.sleep(0.6)
+            start = time.perf_counter()
+            process.send_signal(signal.SIGINT)
+            out, _ = process.communicate(timeout=1.5)
+            # It takes about 0.05 s.
+            assert time.perf_counter() - start < 1.5
+            assert out == "interrupted\nwell\n" and process.returncode == 0
+        finally:
+            process.kill()

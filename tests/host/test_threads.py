@@ -1,0 +1,254 @@
+"""Threads: how many there are, and that they change no bit."""
+
+import multiprocessing
+import os
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from cases import SPACES
+from curves import S3, each, every_common, points_on, run_python, same, same_curve, scattered
+
+import symspline as ss
+
+
+def test_set_num_threads(threads):
+    for n in (1, 2, 3):
+        ss.set_num_threads(n)
+        assert ss.num_threads() == n
+    ss.set_num_threads(0)
+    assert 1 <= ss.num_threads() <= os.cpu_count()
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_threads_from_the_environment(n):
+    printed = run_python("import symspline as ss; print(ss.num_threads())", SYMSPLINE_NUM_THREADS=str(n))
+    assert int(printed) == n
+
+
+def test_a_bad_number_of_threads_in_the_environment():
+    code = """
+try:
+    import symspline
+except ImportError as error:
+    print(error)
+"""
+    assert "SYMSPLINE_NUM_THREADS must be a whole number, not 'many'" in run_python(
+        code, SYMSPLINE_NUM_THREADS="many"
+    )
+    assert run_python(code, SYMSPLINE_NUM_THREADS="") == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+@pytest.mark.parametrize(
+    "counts, most",
+    [
+        ([1], 0),
+        ([2], 2),
+        ([2, 3] * 8, 5),
+    ],
+    ids=str,
+)
+def test_no_more_threads_than_allowed(counts, most):
+    code = """
+import json, os, sys, numpy as np, symspline as ss
+spline = ss.CubicSpline(None, np.eye(3), "sphere:2")
+x = np.linspace(0, 2, 200_000)
+before = len(os.listdir("/proc/self/task"))
+for n in json.loads(sys.argv[1]):
+    ss.set_num_threads(n)
+    spline(x)
+print(len(os.listdir("/proc/self/task")) - before)
+"""
+    assert int(run_python(code, counts)) <= most
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_other_threads_run_during_a_fit(threads, n):
+    ss.set_num_threads(n)
+    ticks, stop = [], threading.Event()
+
+    def tick():
+        while not stop.wait(0.001):
+            ticks.append(time.perf_counter())
+
+    other = threading.Thread(target=tick)
+    other.start()
+    try:
+        size, seconds = 50_000, 0.0
+        while seconds < 0.2:
+            size *= 2
+            p = scattered(size)
+            start = time.perf_counter()
+            ss.CubicSpline(None, p, S3, method="fixed-point", max_iter=60, on_failure="ignore")
+            end = time.perf_counter()
+            seconds = end - start
+    finally:
+        stop.set()
+        other.join()
+    # About 200 ticks fit in; if the lock were held, all but one or two would come later.
+    assert sum(start < t < end for t in ticks) > 10
+
+
+# ---- the same bits ----
+
+
+def work(seed):
+    space = SPACES[seed % len(SPACES)]
+    p = points_on(space, 40, (3,), step=0.5, seed=seed % 8)
+    spline = ss.CubicSpline(None, p, space, bc_type="not-a-knot")
+    x = np.linspace(0, 39, 200)
+    return spline, *(spline(x, nu=nu) for nu in range(3))
+
+
+def test_calls_from_many_threads_give_the_same_bits(threads):
+    ss.set_num_threads(2)
+    expected = [work(seed) for seed in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        for seed, (spline, *values) in enumerate(pool.map(work, range(64))):
+            assert same_curve(spline, expected[seed % 8][0])
+            assert all(map(same, values, expected[seed % 8][1:]))
+
+
+def test_parallel_calls_from_many_threads_give_the_same_bits(threads):
+    ss.set_num_threads(2)
+    p = S3.geodesic([1, 0, 0, 0], [0, 1, 0, 0], np.linspace(0, 9, 20_000))
+    x = np.random.default_rng(0).uniform(0, 19_999, 30_000)
+    expected = ss.CubicSpline(None, p, S3)
+    values = expected(x, nu=2)
+
+    def fit_and_evaluate(_):
+        spline = ss.CubicSpline(None, p, S3)
+        return same_curve(spline, expected) and same(spline(x, nu=2), values)
+
+    with ThreadPoolExecutor(6) as pool:
+        assert all(pool.map(fit_and_evaluate, range(24)))
+
+
+@every_common
+@pytest.mark.parametrize("kind", ["long", "closed", "batch", "many"])
+def test_one_thread_and_two_give_the_same_bits(threads, space, kind):
+    if kind == "many":
+        curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 20
+        fits = [(lambda c=curves: ss.fit_many(c, space))]
+    else:
+        n, batch = (300, ()) if kind != "batch" else (30, (40,))
+        p = points_on(space, n, batch, step=0.4)
+        if kind != "batch":
+            # There and back again and again: 20 000 points.
+            p = each(lambda q: np.concatenate([*[q, q[-2:0:-1]] * 33, q[:1]]), p)
+        else:
+            p = each(lambda q: np.concatenate([q] * 30), p)
+        bc_type = "periodic" if kind == "closed" else "natural"
+        fits = [lambda: [ss.CubicSpline(None, p, space, bc_type=bc_type)]]
+    for fit in fits:
+        results = []
+        for n in (1, 2, 3):
+            ss.set_num_threads(n)
+            results.append(fit())
+        for one, *others in zip(*results, strict=True):
+            assert all(same_curve(one, other) for other in others)
+
+
+@every_common
+@pytest.mark.parametrize("quantity", [0, 1, 2, "speed", "per curve"])
+def test_one_thread_and_two_evaluate_the_same_bits(threads, space, quantity):
+    spline = ss.CubicSpline(None, points_on(space, 50, (2,), step=0.4), space)
+    x = np.random.default_rng(0).uniform(0, 49, (2, 20_000))
+
+    def values():
+        if quantity == "speed":
+            return spline.speed(x)
+        return spline(x, per_curve=True) if quantity == "per curve" else spline(x, nu=quantity)
+
+    results = []
+    for n in (1, 2, 3):
+        ss.set_num_threads(n)
+        results.append(values())
+    assert same(results[0], results[1]) and same(results[0], results[2])
+
+
+def in_child(queue):
+    spline, *values = work(1)
+    p = S3.geodesic([1, 0, 0, 0], [0, 1, 0, 0], np.linspace(0, 9, 20_000))
+    long = ss.CubicSpline(None, p, S3)
+    queue.put((spline.velocities, *values, long.velocities, long(np.linspace(0, 19_999, 50_000))))
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+# JAX, which other tests import, warns of its own threads.
+@pytest.mark.filterwarnings("ignore:os.fork:RuntimeWarning")
+def test_a_forked_process_works(threads):
+    ss.set_num_threads(2)
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+
+    class Here:
+        def put(self, value):
+            self.value = value
+
+    # The parent's threads are running when it forks, and again between two children.
+    expected = Here()
+    in_child(expected)
+    for _ in range(2):
+        children = [context.Process(target=in_child, args=(queue,)) for _ in range(2)]
+        for child in children:
+            child.start()
+        found = [queue.get(timeout=20) for _ in children]
+        for child in children:
+            child.join(20)
+            assert child.exitcode == 0
+        assert all(map(same, found[0], expected.value)) and all(map(same, found[1], expected.value))
+        in_child(expected)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_fork_in_the_middle_of_work():
+    run_python("""
+import os, threading, time, numpy as np, symspline as ss
+ss.set_num_threads(2)
+p = ss.Sphere(3).random_point(np.random.default_rng(0), 200_000)
+q = ss.Sphere(3).geodesic(p[0], p[1], np.linspace(0, 1, 20_000))
+options = dict(method="fixed-point", max_iter=60, on_failure="ignore")
+other = threading.Thread(target=lambda: ss.CubicSpline(None, p, "sphere:3", **options))
+expected = ss.CubicSpline(None, q, "sphere:3")
+other.start()
+time.sleep(0.05)
+child = os.fork()
+if child == 0:
+    os._exit(0 if ss.CubicSpline(None, q, "sphere:3") == expected else 1)
+assert os.waitpid(child, 0)[1] == 0
+other.join()
+""")
+
+
+CROWD = """
+import threading, time, numpy as np, symspline as ss
+
+ss.set_num_threads(2)
+space = ss.Sphere(2)
+p = space.geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 40_000))
+spline, x = ss.CubicSpline(None, p, space), np.linspace(0, 39_999, 400_000)
+until = time.monotonic() + 1.5
+
+def work(call):
+    while time.monotonic() < until:
+        call()
+
+calls = [lambda: spline(x, nu=2), lambda: ss.CubicSpline(None, p, space), lambda: space.check_point(p)]
+threads = [threading.Thread(target=work, args=(call,), daemon=True) for call in calls * 2]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join(20)
+    assert not thread.is_alive(), "threads wait for each other"
+"""
+
+
+def test_threads_do_not_wait_for_each_other():
+    """Some ask Python whether to go on while others hold its lock and wait for the same cores."""
+    run_python(CROWD, timeout=60)

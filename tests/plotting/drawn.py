@@ -1,0 +1,48 @@
+"""Pictures that tests look at."""
+
+from io import BytesIO
+
+import matplotlib
+import numpy as np
+
+import symspline as ss
+
+
+def points_around(space, rng, shape):
+    """Points less than a radian or so from each other."""
+    middle = space.random_point(rng)
+    around = np.broadcast_to(middle, (*shape, *space.point_shape))
+    return space.project(space.exp(middle, 0.3 * space.random_tangent(rng, around)))
+
+
+def spline_on(name, shape=(6,), t=None, **options):
+    space = ss.space(name)
+    return ss.CubicSpline(t, points_around(space, np.random.default_rng(1), shape), space, **options)
+
+
+def rendered(figure):
+    """The figure, drawn: any warning would be an error."""
+    file = BytesIO()
+    figure.savefig(file, format="png", dpi=40)
+    assert file.getvalue().startswith(b"\x89PNG")
+    return figure
+
+
+def axes_named(figure, label):
+    """The axes whose vertical axis has a label, or which have the name themselves."""
+    (found,) = [axes for axes in figure.axes if label in (axes.get_ylabel().split("\n")[0], axes.get_label())]
+    return found
+
+
+def lines_of(axes):
+    return [line.get_xydata() for line in axes.lines]
+
+
+def dots_of(axes):
+    """Where the dots of the only curve are, near and far side together: all, and the first."""
+    dots = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    return [np.where(np.isnan(far), near, far) for far, near in zip(dots[:2], dots[2:], strict=True)]
+
+
+def texts_of(figure):
+    return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]

@@ -1,0 +1,242 @@
+"""Figures: what is in them, batches, times, files, and what they leave alone."""
+
+import subprocess
+import sys
+from io import BytesIO
+
+import numpy as np
+import pytest
+from drawn import axes_named, lines_of, points_around, rendered, spline_on, texts_of
+from matplotlib.dates import date2num
+from matplotlib.figure import Figure
+
+import symspline as ss
+from symspline.plotting import (
+    angle,
+    bloch,
+    components,
+    disk,
+    dome,
+    ellipses,
+    flat,
+    frames,
+    poses,
+    sphere,
+    subspaces,
+)
+from symspline.plotting.pictures import picture_of
+
+KINDS = {
+    "euclidean:1": flat.draw_graph,
+    "euclidean:2": flat.draw_plane,
+    "euclidean:3": flat.draw_room,
+    "euclidean:5": components.draw_components,
+    "sphere:1": angle.draw_circle,
+    "sphere:2": sphere.draw_sphere,
+    "sphere:3": frames.draw_quaternions,
+    "sphere:15": components.draw_components,
+    "hyperbolic:1": components.draw_components,
+    "hyperbolic:2": disk.draw_disk,
+    "rp:1": angle.draw_slope,
+    "rp:2": dome.draw_lines,
+    "rp:4": subspaces.draw_principal_angles,
+    "cp:1": bloch.draw_bloch,
+    "cp:2": subspaces.draw_principal_angles,
+    "gr:1,2": angle.draw_slope,
+    "gr:1,3": dome.draw_lines,
+    "gr:2,3": dome.draw_normals,
+    "gr:2,5": subspaces.draw_principal_angles,
+    "gr:4,5": subspaces.draw_principal_angles,
+    "cgr:1,2": bloch.draw_bloch,
+    "cgr:2,3": subspaces.draw_principal_angles,
+    "so:2": angle.draw_turn,
+    "so:3": frames.draw_rotations,
+    "so:4": components.draw_components,
+    "o:2": angle.draw_turn,
+    "o:3": frames.draw_rotations,
+    "u:1": angle.draw_phase,
+    "u:3": components.draw_components,
+    "su:2": frames.draw_spins,
+    "su:3": components.draw_components,
+    "spd:1": components.draw_components,
+    "spd:2": ellipses.draw_ellipses,
+    "spd:3": ellipses.draw_ellipsoids,
+    "spd:4": components.draw_components,
+    "hpd:2": components.draw_components,
+    "se:2": poses.draw_flat_poses,
+    "se:3": poses.draw_poses,
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("shape", [(6,), (3, 6)], ids=["one curve", "batch"])
+def test_every_space_is_drawn(name, shape):
+    spline = spline_on(name, shape)
+    assert picture_of(spline.space).draw is KINDS[name]
+    figure = rendered(spline.plot())
+    assert isinstance(figure, Figure)
+    assert f"C² spline on {spline.space!r}" in texts_of(figure)
+    curves = shape[0] if len(shape) > 1 else 1
+    for label, nu in (("speed", 1), ("acceleration", 2)):
+        lines = lines_of(axes_named(figure, label))
+        assert len(lines) == curves
+        for line, curve in zip(lines, spline if len(shape) > 1 else [spline], strict=True):
+            norm = spline.space.norm(curve(line[:, 0]), curve(line[:, 0], nu))
+            np.testing.assert_allclose(line[:, 1], norm, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_curve_that_stands_still(name):
+    point = ss.space(name).random_point(np.random.default_rng(3))
+    figure = ss.CubicSpline(None, np.stack([point] * 3), name).plot()
+    assert axes_named(figure, "speed").get_ylim()[1] > 0.5
+
+
+def test_knots_are_marked():
+    t = [0.0, 0.5, 2.0, 3.5]
+    for label in ("speed", "acceleration"):
+        (marks,) = axes_named(spline_on("r:2", (4,), t).plot(), label).collections
+        np.testing.assert_array_equal([path[0, 0] for path in marks.get_segments()], t)
+
+
+def test_many_knots_are_marked_at_the_bottom():
+    (marks,) = axes_named(spline_on("r:2", (5000,)).plot(), "speed").collections
+    assert len(marks.get_segments()) < 2500
+    assert marks.get_segments()[0][1, 1] < 0.1
+
+
+def test_rounding_is_not_blown_up():
+    """A great circle at constant speed has acceleration 0, whatever the rounding."""
+    angle = np.arange(5)
+    spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
+    assert axes_named(spline.plot(), "acceleration").get_ylim()[1] > 0.1
+
+
+# ---- batches, times, products ----
+
+
+def test_batch_is_thinned_with_a_note():
+    figure = spline_on("r:2", (7, 10, 4)).plot()
+    assert len(axes_named(figure, "speed").lines) == 50
+    assert "50 of 70 curves, 4 points each, natural ends" in texts_of(figure)
+
+
+def test_bad_curves_are_left_out():
+    good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
+    points = [good, [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]], good]
+    figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())
+    assert len(axes_named(figure, "speed").lines) == 2
+    assert "2 of 3 curves, 3 points each, natural ends, 1 not converged" in texts_of(figure)
+    with pytest.raises(ss.ValidationError, match="nothing to plot"):
+        ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot()
+
+
+def test_unconverged_curve_is_drawn_and_named():
+    figure = spline_on("sphere:2", max_iter=1, on_failure="ignore").plot()
+    assert any(text.endswith("not converged") for text in texts_of(figure))
+
+
+@pytest.mark.parametrize(
+    "name, unit, step",
+    [
+        ("r:1", "us", 500),
+        ("r:2", "s", 3),
+        ("r:1", "m", 70),
+        ("r:2", "h", 10),
+        ("r:1", "D", 1),
+        ("r:2", "D", 300),
+    ],
+)
+def test_dates(name, unit, step):
+    t = np.datetime64("2024-02-27", unit) + step * np.array([0, 1, 2, 4, 5]).astype(f"timedelta64[{unit}]")
+    figure = rendered(spline_on(name, (5,), t).plot())
+    axes = axes_named(figure, "speed")
+    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], date2num(t[[0, -1]]), rtol=0, atol=2e-11)
+    assert axes.get_ylabel().endswith("1/s")
+    labels = [text.get_text() for text in axes_named(figure, "acceleration").get_xticklabels()]
+    assert 2 <= sum(map(bool, labels)) <= 12
+
+
+def test_curves_with_dates_of_their_own():
+    t = np.array([["2024-01-01", "2024-01-03"], ["2024-01-02", "2024-01-09"]], "datetime64[D]")
+    lines = lines_of(axes_named(rendered(spline_on("r:2", (2, 2), t).plot()), "speed"))
+    for line, dates in zip(lines, t, strict=True):
+        np.testing.assert_allclose(line[[0, -1], 0], date2num(dates))
+
+
+def test_nanoseconds_are_finer_than_dates_on_an_axis():
+    t = np.datetime64("2024-01-01", "ns") + np.arange(5) * np.timedelta64(100, "ns")
+    axes = axes_named(rendered(spline_on("r:2", (5,), t).plot()), "acceleration")
+    assert axes.get_xlabel().startswith("seconds since 2024-01-01")
+    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], [0, 4e-7], atol=1e-15)
+
+
+def test_large_whole_numbers_as_times():
+    t = 1_700_000_000_000_000_000 + 10**9 * np.arange(4)
+    axes = axes_named(rendered(spline_on("r:2", (4,), t).plot()), "speed")
+    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], t[[0, -1]].astype(float))
+
+
+@pytest.mark.parametrize("shape", [(5,), (3, 5)], ids=["one curve", "batch"])
+@pytest.mark.parametrize("name", ["sphere:2 x sphere:3 x h:2 x r:4", "cp:1 x gr:2,3 x spd:3 x u:3"])
+def test_product_has_a_picture_a_factor(name, shape):
+    space = ss.space(name)
+    rng = np.random.default_rng(2)
+    spline = ss.CubicSpline(None, tuple(points_around(s, rng, shape) for s in space.factors), space)
+    figure = rendered(spline.plot())
+    assert {repr(factor) for factor in space.factors} <= set(texts_of(figure))
+    first = spline[0] if len(shape) > 1 else spline
+    line = lines_of(axes_named(figure, "speed"))[0]
+    np.testing.assert_allclose(line[:, 1], first.speed(line[:, 0]), atol=1e-12)
+    assert len(figure.axes) == 4 + 2
+
+
+def test_product_of_many_factors():
+    spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
+    figure = rendered(spline.plot())
+    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure)
+    assert len(figure.axes) == 6 + 2
+
+
+# ---- files, and the rest of the program ----
+
+
+@pytest.mark.parametrize("suffix, start", [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_figure_is_saved(tmp_path, suffix, start):
+    path = tmp_path / f"curve.{suffix}"
+    assert isinstance(spline_on("r:2").plot(path), Figure)
+    assert path.read_bytes().startswith(start)
+
+
+def test_figure_is_saved_into_an_open_file():
+    file = BytesIO()
+    spline_on("r:2").plot(file)
+    assert file.getvalue().startswith(b"\x89PNG")
+
+
+def test_notebooks_show_the_figure():
+    assert spline_on("r:2").plot()._repr_png_().startswith(b"\x89PNG")
+
+
+def test_without_matplotlib(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError, match=r"^plots need matplotlib.*pip install 'symspline\[plot\]'$"):
+        spline_on("r:2").plot()
+
+
+def test_nothing_global_is_touched(tmp_path):
+    code = """
+import sys, warnings
+warnings.simplefilter("error")
+import symspline as ss, numpy as np
+assert "matplotlib" not in sys.modules
+import matplotlib
+def settings():  # read so that matplotlib does not choose a backend on the way
+    return {name: dict.__getitem__(matplotlib.rcParams, name) for name in matplotlib.rcParams}
+before = settings()
+ss.CubicSpline(None, np.eye(3), "sphere:2").plot("a.png")
+ss.CubicSpline(np.arange(3).astype("datetime64[D]"), np.eye(3), "r:3").plot("b.png")
+assert settings() == before
+assert "matplotlib.pyplot" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)

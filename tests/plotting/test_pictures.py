@@ -1,0 +1,226 @@
+"""The pictures of spaces: maps, spheres, disks, frames, ellipses and components."""
+
+import numpy as np
+import pytest
+from drawn import axes_named, dots_of, lines_of, rendered, texts_of
+
+import symspline as ss
+from symspline.lonlat import from_lonlat
+from symspline.plotting import bloch, disk, dome, globe, sphere
+
+# ---- maps and globes ----
+
+
+MERIDIAN = np.array([[1.0, 0, 0], [1, 0, 1], [0, 0, 1], [-1, 0, 2], [-1, 0, 0]])
+
+
+DATE_LINE = from_lonlat([150, 170, -170, 175, -160], [-20, 10, 20, 30, 40])
+
+
+ROUND = from_lonlat([0, 120, 240, 360], [10, 20, 30, 10])
+
+
+NEAR_POLE = from_lonlat([20, 25, -150, -140], [40, 80, 85, 30])
+
+
+@pytest.mark.parametrize("points", [MERIDIAN, -MERIDIAN, DATE_LINE, ROUND, NEAR_POLE, ROUND[::-1]])
+def test_no_line_jumps_across_the_map(points):
+    spline = ss.CubicSpline(None, ss.Sphere(2).project(points), "sphere:2")
+    line = lines_of(axes_named(rendered(spline.plot()), "map"))[0]
+    steps = np.abs(np.diff(line, axis=0))
+    assert np.isnan(line).any()
+    assert np.nanmax(steps[:, 0]) < 60 and np.nanmax(steps[:, 1]) < 5
+    assert np.nanmax(np.abs(line), axis=0) == pytest.approx([180, 90], abs=90)
+
+
+def test_map_line_is_broken_where_it_leaves_the_map():
+    broken = sphere.broken(np.array([[170.0, 10], [-170, 20], [-160, 30]]))
+    np.testing.assert_array_equal(
+        broken, [[170, 10], [180, 15], [np.nan] * 2, [-180, 15], [-170, 20], [-160, 30]]
+    )
+    broken = sphere.broken(np.array([[30.0, 88], [-150, 89]]))
+    np.testing.assert_array_equal(broken, [[30, 88], [30, 90], [np.nan] * 2, [-150, 90], [-150, 89]])
+
+
+def test_longitude_at_a_pole_is_that_before():
+    places = sphere.lonlat_of(from_lonlat([50, 50, 50, -130], [80, 89, 90, 89]))
+    np.testing.assert_allclose(places[:, 0], [50, 50, 50, -130])
+    places = sphere.lonlat_of(np.array([[0, 0, 1.0], [0, 0.6, 0.8]]))
+    np.testing.assert_allclose(places[:, 0], [90, 90])
+
+
+def test_globe_is_turned_towards_the_curve():
+    rng = np.random.default_rng(4)
+    for size in (1e-5, 0.1, 0.6):
+        points = ss.Sphere(2).project(from_lonlat(130, -40) + size * rng.uniform(-1, 1, (30, 3)))
+        view = globe.View.above(*globe.middle_of(points))
+        assert (points @ view.up > 0).all()
+        assert np.linalg.norm(view.flat(points), axis=-1).max() < 1.8 * size
+    equator = from_lonlat(np.arange(0, 360, 5), 0)
+    view = globe.View.above(*globe.middle_of(equator))
+    assert np.ptp(view.flat(equator), axis=0).min() > 0.5  # not seen from its edge
+
+
+@pytest.mark.parametrize("lon, lat", [(10, 50), (179.9, 0), (40, 89), (0, -89.9)])
+@pytest.mark.parametrize("size", [1e-5, 10])
+def test_small_curve_is_enlarged_with_labels(lon, lat, size):
+    rng = np.random.default_rng(5)
+    offsets = np.radians(size) * rng.uniform(-1, 1, (6, 3))
+    spline = ss.CubicSpline(None, ss.Sphere(2).project(from_lonlat(lon, lat) + offsets), "sphere:2")
+    axes = rendered(spline.plot()).axes[0]
+    assert np.ptp(axes.get_xlim()) < 10 * np.radians(size)
+    for axis, letters in ((axes.xaxis, "°EW"), (axes.yaxis, "°NS")):
+        labels = [text.get_text() for text in axis.get_ticklabels()]
+        assert 1 <= len(labels) <= 12 and all(set(label) & set(letters) for label in labels)
+
+
+def test_degrees():
+    values = [-30, 0, 30, 180, -180, 190, 12.5]
+    words = ["30°W", "0°", "30°E", "180°", "180°", "170°W", "12.5°E"]
+    assert [globe.degrees(value, "E", "W") for value in values] == words
+
+
+# ---- angles, disks and spheres ----
+
+
+TURN = 1.3 * np.arange(12)
+
+
+DIRECTION = np.stack([np.cos(TURN), np.sin(TURN)], axis=-1)
+
+
+TURNED = np.stack([DIRECTION, DIRECTION[:, ::-1] * [-1, 1]], axis=-1)
+
+
+SIGNS = np.random.default_rng(9).choice([-1, 1], (12, 1))
+
+
+@pytest.mark.parametrize(
+    "name, points",
+    [
+        ("sphere:1", DIRECTION),
+        ("so:2", TURNED),
+        ("o:2", TURNED * [1, -1]),
+        ("u:1", np.exp(1j * TURN)[:, None, None]),
+        ("rp:1", DIRECTION * SIGNS),
+        ("gr:1,2", (DIRECTION * SIGNS)[:, :, None]),
+    ],
+)
+def test_angle_does_not_jump(name, points):
+    spline = ss.CubicSpline(None, points, name)
+    line = lines_of(axes_named(spline.plot(), "angle, degrees"))[0]
+    np.testing.assert_allclose(line[-1, 1] - line[0, 1], np.degrees(TURN[-1]))
+    assert np.abs(np.diff(line[:, 1])).max() < 5
+    assert (line[0, 1] - np.degrees(TURN[0])) % 180 == pytest.approx(0, abs=1e-9)
+
+
+def test_poincare_disk():
+    plane, origin = ss.Hyperbolic(2), np.array([1.0, 0, 0])
+    p = plane.random_point(np.random.default_rng(7), 20)
+    places = disk.flat(p, origin)
+    np.testing.assert_allclose(np.linalg.norm(places, axis=-1), np.tanh(plane.distance(origin, p) / 2))
+    np.testing.assert_allclose(disk.flat(p[0], p[0]), 0, atol=1e-14)
+    moved = disk.flat(p, p[0])
+    np.testing.assert_allclose(
+        np.linalg.norm(moved, axis=-1), np.tanh(plane.distance(p[0], p) / 2), atol=1e-7
+    )
+
+
+def test_disk_moves_to_a_curve_that_is_far_away():
+    far = [[np.sqrt(1 + x * x + y * y), x, y] for x, y in ((50, 20), (52, 22), (50, 25))]
+    figure = rendered(ss.CubicSpline(None, far, "h:2").plot())
+    assert any("middle: (" in text for text in texts_of(figure))
+    assert np.abs(lines_of(figure.axes[0])[-3]).max() < 0.7  # the curve; after it come its dots
+
+
+BLOCH = {
+    (1, 0): (0, 0, 1),
+    (0, 1j): (0, 0, -1),
+    (0.5**0.5, 0.5**0.5): (1, 0, 0),
+    (0.5**0.5, 0.5**0.5 * 1j): (0, 1, 0),
+    (0.6, 0.8j): (0, 0.96, -0.28),
+}
+
+
+def test_bloch_vectors():
+    states = np.array(list(BLOCH))
+    vectors = bloch.bloch_vectors(states)
+    np.testing.assert_allclose(vectors, list(BLOCH.values()), atol=1e-15)
+    np.testing.assert_allclose(bloch.bloch_vectors(states[:, :, None] * np.exp(2j)), vectors, atol=1e-15)
+    p, q = ss.ComplexProjective(1).random_point(np.random.default_rng(11), (2, 20))
+    angle = np.arccos(np.sum(bloch.bloch_vectors(p) * bloch.bloch_vectors(q), axis=1))
+    np.testing.assert_allclose(angle, 2 * ss.ComplexProjective(1).distance(p, q))
+
+
+@pytest.mark.parametrize("size, zoomed", [(0.3, False), (0.03, True)])
+def test_states_are_drawn_on_the_bloch_sphere(size, zoomed):
+    """The dots are a right-angled projection of the Bloch vectors, as the labels are, with |0⟩ up."""
+    space, rng = ss.ComplexProjective(1), np.random.default_rng(12)
+    middle = space.random_point(rng)
+    points = space.exp(middle, size * space.random_tangent(rng, np.stack([middle] * 8)))
+    figure = rendered(ss.CubicSpline(None, points, "cp:1").plot())
+    axes, vectors = figure.axes[0], bloch.bloch_vectors(points)
+    places, first = dots_of(axes)
+    view = np.linalg.lstsq(vectors, places)[0]
+    np.testing.assert_allclose(vectors @ view, places, atol=1e-9)
+    np.testing.assert_allclose(view.T @ view, np.eye(2), atol=1e-9)
+    np.testing.assert_array_equal(first, places[:1])
+    labels = {text.get_text(): text.get_position() for text in axes.texts}
+    assert not labels if zoomed else labels.keys() == {"|0⟩", "|1⟩", "x", "y"}
+    for label, direction in {"|0⟩": 2, "x": 0, "y": 1}.items() if labels else ():
+        np.testing.assert_allclose(labels[label], 1.17 * view[direction], atol=1e-9)
+    assert not labels or labels["|0⟩"][1] > 1 > -1 > labels["|1⟩"][1]
+
+
+# Through the rim three times, and along it.
+HALF_SPHERE = ss.Sphere(2).project(
+    np.array([[1.0, 0, 1], [1, 0.5, 0.2], [0.5, 1, -0.3], [-0.5, 1, -0.2], [-1, 0, 0.3], [-1, -1, -0.4]])
+)
+
+
+RIM = ss.Sphere(2).project(np.array([[1.0, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0]]))
+
+
+def planes(normals, rng):
+    """Any orthonormal bases of the planes with these normals."""
+    bases = np.linalg.svd(normals[:, None])[2][:, 1:].swapaxes(1, 2)
+    return bases @ ss.Orthogonal(2).random_point(rng, len(normals))
+
+
+@pytest.mark.parametrize("name", ["rp:2", "gr:1,3", "gr:2,3"])
+@pytest.mark.parametrize("points, crossings", [(HALF_SPHERE, 3), (HALF_SPHERE[::-1], 3), (RIM, 0)])
+def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
+    rng = np.random.default_rng(13)
+    signs = rng.choice([-1, 1], (len(points), 1))
+    made = {
+        "rp:2": points * signs,
+        "gr:1,3": (points * signs)[:, :, None],
+        "gr:2,3": planes(points, rng),
+    }
+    spline = ss.CubicSpline(None, made[name], name)
+    axes = rendered(spline.plot()).axes[0]
+    (far, near), (dots, _) = [line for line in lines_of(axes) if len(line) > 1000], dots_of(axes)
+    line = np.where(np.isnan(near), far, near)
+    broken = np.isnan(line[:, 0])
+    assert broken.sum() == crossings
+    assert np.nanmax(np.linalg.norm(np.diff(line, axis=0), axis=1)) < 0.05
+    # At a break the line goes on at the opposite point.
+    (gaps,) = np.nonzero(broken)
+    np.testing.assert_allclose(line[gaps - 1], -line[gaps + 1], atol=1e-12)
+    for dot in dots:
+        assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
+
+
+def test_half_sphere_is_the_upper_one():
+    line = dome.broken(dome.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001))))
+    np.testing.assert_allclose(np.linalg.norm(line[~np.isnan(line[:, 0])], axis=1), 1)
+    assert np.nanmin(line) >= -1 and np.nanmin(line[:, 2]) >= 0
+
+
+def test_small_curve_on_the_half_sphere_is_enlarged():
+    """Also across the rim, where nothing is broken."""
+    points = ss.Sphere(2).project(np.array([[1, 0, 0.02], [1, 0.03, -0.01], [1, 0.04, -0.05]]))
+    axes = rendered(ss.CubicSpline(None, [[1], [-1], [1]] * points, "rp:2").plot()).axes[0]
+    assert np.ptp(axes.get_xlim()) < 0.2
+    (line,) = [line for line in lines_of(axes) if len(line) > 1000 and np.isfinite(line).all()]
+    assert np.linalg.norm(np.diff(line, axis=0), axis=1).max() < 0.01

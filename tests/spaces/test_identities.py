@@ -1,0 +1,457 @@
+"""Spaces that are each other under another name: distances, exp and log, and whole splines must agree."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from cases import EPS, QUOTIENTS, base_point, closed_walk, condition, unit_tangent, walk
+
+import symspline as ss
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1729)
+
+
+def adjoint(x):
+    return np.swapaxes(x, -1, -2).conj()
+
+
+def columns(space, x):
+    return x[..., None] if len(space.point_shape) == 1 else x
+
+
+def plain(space, x):
+    """Points as arrays that do not depend on the representative."""
+    if not isinstance(space, QUOTIENTS):
+        return x
+    y = columns(space, x)
+    return y @ adjoint(y)
+
+
+def plain_vector(space, x, v):
+    """Tangent vectors as arrays that do not depend on the representative."""
+    if not isinstance(space, QUOTIENTS):
+        return v
+    y, d = columns(space, x), columns(space, v)
+    return d @ adjoint(y) + y @ adjoint(d)
+
+
+# ---- the maps ----
+
+
+@dataclass(frozen=True)
+class Identity:
+    """A map from a space to another that multiplies all lengths by a number.
+
+    Attributes:
+        source, target: names of the spaces.
+        scale: length there, divided by length here.
+        f: points to points.
+        df: its derivative, of points p, vectors v, and points f(p).
+    """
+
+    source: str
+    target: str
+    scale: float
+    f: Callable
+    df: Callable
+
+
+def linear(source, target, scale, f):
+    return Identity(source, target, scale, f, lambda p, v, fp: f(v))
+
+
+def quadratic(source, target, scale, f):
+    """Of a homogeneous f of second degree the derivative is a difference, exactly."""
+    return Identity(source, target, scale, f, lambda p, v, fp: (f(p + v) - f(p - v)) / 2)
+
+
+def matrices(*rows):
+    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+
+
+def bloch(psi):
+    a, b = np.moveaxis(psi, -1, 0)
+    c = 2 * a.conj() * b
+    return np.stack([c.real, c.imag, np.abs(a) ** 2 - np.abs(b) ** 2], axis=-1)
+
+
+def rotation(q):
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    return matrices(
+        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+
+
+def quaternion_in_su2(q):
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    return matrices((w + 1j * z, y + 1j * x), (-y + 1j * x, w - 1j * z))
+
+
+def minkowski_in_hermitian(x):
+    """The quadratic form of H² or H³ is the determinant."""
+    t, a, b, *c = np.moveaxis(x, -1, 0)
+    off = b + 1j * c[0] if c else b
+    return matrices((t + a, off), (np.conj(off), t - a))
+
+
+def turn_in_plane(x):
+    c, s = np.moveaxis(x, -1, 0)
+    return matrices((c, -s), (s, c))
+
+
+def complement(y):
+    return np.linalg.svd(y).U[..., y.shape[-1] :]
+
+
+def pose(rotation=None, place=None):
+    """Homogeneous matrices; without a part, that of the identity."""
+    some = rotation if place is None else place
+    n = some.shape[-1]
+    g = np.zeros((*(some.shape[:-2] if place is None else some.shape[:-1]), n + 1, n + 1))
+    g[..., :n, :n] = np.eye(n) if rotation is None else rotation
+    g[..., n, n] = 1
+    if place is not None:
+        g[..., :n, n] = place
+    return g
+
+
+def posing(source, target, part):
+    """R or t alone in a pose; the derivative has zeros elsewhere."""
+
+    def df(p, v, fp):
+        return pose(**{part: v}) - pose(**{part: np.zeros_like(v)})
+
+    return Identity(source, target, 1.0, lambda p: pose(**{part: p}), df)
+
+
+def as_complex(source, target, scale=1.0):
+    return linear(source, target, scale, lambda x: x.astype(complex))
+
+
+def complementary(family, k, n):
+    return Identity(
+        f"{family}:{k},{n}",
+        f"{family}:{n - k},{n}",
+        1.0,
+        complement,
+        # The projector is 1 − P, its derivative −P'.
+        lambda y, v, z: -y @ (adjoint(v) @ z),
+    )
+
+
+ROOT = np.sqrt(2)
+IDENTITIES = [
+    linear("gr:1,5", "rp:4", 1.0, lambda y: y[..., 0]),
+    linear("cgr:1,3", "cp:2", 1.0, lambda y: y[..., 0]),
+    # The Bloch sphere has radius ½.
+    quadratic("cp:1", "sphere:2", 2.0, bloch),
+    # A rotation turns by twice the angle of its quaternion.
+    quadratic("rp:3", "so:3", 2.0, rotation),
+    quadratic("sphere:3", "so:3", 2.0, rotation),
+    quadratic("sphere:3", "o:3", 2.0, rotation),
+    linear("sphere:3", "rp:3", 1.0, lambda q: q),
+    linear("sphere:3", "su:2", ROOT, quaternion_in_su2),
+    linear("sphere:3", "u:2", ROOT, quaternion_in_su2),
+    linear("u:1", "sphere:1", 1.0, lambda z: np.stack([z[..., 0, 0].real, z[..., 0, 0].imag], axis=-1)),
+    linear("sphere:1", "so:2", 1.0, turn_in_plane),
+    quadratic(
+        "rp:1",
+        "sphere:1",
+        2.0,
+        lambda x: np.stack([x[..., 0] ** 2 - x[..., 1] ** 2, 2 * x[..., 0] * x[..., 1]], axis=-1),
+    ),
+    Identity(
+        "spd:1", "euclidean:1", 1.0, lambda p: np.log(p[..., 0]), lambda p, v, fp: v[..., 0] / p[..., 0]
+    ),
+    Identity(
+        "hyperbolic:1",
+        "euclidean:1",
+        1.0,
+        lambda x: np.arcsinh(x[..., 1:]),
+        lambda x, v, fp: v[..., 1:] / x[..., :1],
+    ),
+    linear("hyperbolic:2", "spd:2", ROOT, minkowski_in_hermitian),
+    linear("hyperbolic:3", "hpd:2", ROOT, minkowski_in_hermitian),
+    complementary("gr", 1, 4),
+    complementary("gr", 2, 5),
+    complementary("cgr", 1, 3),
+    complementary("cgr", 2, 5),
+    as_complex("rp:3", "cp:3"),
+    as_complex("gr:2,5", "cgr:2,5"),
+    as_complex("spd:3", "hpd:3"),
+    # ½ tr becomes tr.
+    as_complex("so:4", "u:4", ROOT),
+    as_complex("so:4", "su:4", ROOT),
+    posing("euclidean:3", "se:3", "place"),
+    posing("euclidean:2", "se:2", "place"),
+    posing("so:3", "se:3", "rotation"),
+    posing("so:2", "se:2", "rotation"),
+]
+every = pytest.mark.parametrize("case", IDENTITIES, ids=lambda case: f"{case.source}={case.target}")
+
+
+# ---- the laws ----
+
+
+@every
+@pytest.mark.parametrize("length", [1e-12, 1e-8, 1e-4, 1e-2, 0.3, 1.2])
+def test_geometry_agrees(case, length, rng):
+    here, there = ss.space(case.source), ss.space(case.target)
+    for _ in range(10):
+        p = base_point(here, rng)
+        v, w = length * unit_tangent(here, p, rng), unit_tangent(here, p, rng)
+        q, x = here.exp(p, v), here.exp(p, 0.4 * w)
+        fp, fq, fx = case.f(np.stack([p, q, x]))
+        fv, fw = case.df(p, v, fp), case.df(p, w, fp)
+        there.check_tangent([fp, fp], [fv, fw])
+        allowed = 50 * EPS * condition(here, [p, q, x]) * condition(there, [fp, fq, fx])
+        assert abs(there.distance(fp, fq) - case.scale * length) <= allowed
+        assert there.inner(fp, fv, fw) == pytest.approx(case.scale**2 * here.inner(p, v, w), abs=allowed)
+        assert np.abs(plain(there, there.exp(fp, fv)) - plain(there, fq)).max() <= allowed
+        assert np.abs(there.log(fp, fq) - fv).max() <= allowed
+        for t in (-0.5, 0.3, 2.0):
+            if t * length < 1.5:
+                a, b = case.f(here.geodesic(p, q, t)), there.geodesic(fp, fq, t)
+                assert np.abs(plain(there, a) - plain(there, b)).max() <= 2 * allowed
+        a, b = case.f(here.transvection(p, v, x)), there.transvection(fp, fv, fx)
+        assert np.abs(plain(there, a) - plain(there, b)).max() <= 4 * allowed
+        a, b = case.df(q, here.transport(p, q, w), fq), there.transport(fp, fq, fw)
+        assert np.abs(a - b).max() <= 4 * allowed
+
+
+ENDS = ["natural", "not-a-knot", "periodic", "velocity", "acceleration"]
+
+
+@every
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("step", [1e-6, 0.1, 0.7])
+def test_splines_agree(case, ends, step, rng):
+    here, there = ss.space(case.source), ss.space(case.target)
+    p = (closed_walk if ends == "periodic" else walk)(here, step, 12, rng)
+    if ends == "periodic":
+        p[-1] = p[0]
+    fp = case.f(p)
+    t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.7, 1.3, len(p) - 1))])
+    bc = fbc = ends
+    if ends in ("velocity", "acceleration"):
+        order = 1 if ends == "velocity" else 2
+        v = [0.7 * here.log(p[i], p[j]) for i, j in ((0, 1), (-1, -2))]
+        fv = [case.df(p[i], u, fp[i]) for i, u in zip((0, -1), v, strict=True)]
+        bc, fbc = ([(order, u) for u in w] for w in (v, fv))
+    one, other = (
+        ss.CubicSpline(t, p, here, bc_type=bc, tol=0.0),
+        ss.CubicSpline(t, fp, there, bc_type=fbc, tol=0.0),
+    )
+    x = np.concatenate([t, np.linspace(t[0], t[-1], 60)])
+    y, fy = one(x), other(x)
+    image = case.f(y)
+    # Rounding of the points, through two solvers and two formulas.
+    allowed = 50 * EPS * condition(here, p) * condition(there, fp)
+    assert np.abs(plain(there, image) - plain(there, fy)).max() <= allowed
+    for nu in (1, 2):
+        v, w = one(x, nu), other(x, nu)
+        # Accelerations are second differences, with steps from 0.7.
+        assert np.abs(case.scale * here.norm(y, v) - there.norm(fy, w)).max() <= 10**nu * allowed
+        mapped = plain_vector(there, image, case.df(y, v, image))
+        assert np.abs(mapped - plain_vector(there, fy, w)).max() <= 10**nu * allowed
+
+
+# ---- maps from products ----
+
+
+def quaternion_product(a, b):
+    return np.stack(
+        [
+            a[..., 0] * b[..., 0] - np.sum(a[..., 1:] * b[..., 1:], axis=-1),
+            *np.moveaxis(
+                a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:]), -1, 0
+            ),
+        ],
+        axis=-1,
+    )
+
+
+def turn_in_four(a, b):
+    """The rotation q → a q b̄ of R⁴."""
+    b = b * [1, -1, -1, -1]
+    images = [quaternion_product(quaternion_product(a, e), b) for e in np.eye(4)]
+    return np.stack(np.broadcast_arrays(*images), axis=-1)
+
+
+def duals(y):
+    """The self-dual and the anti-self-dual part of y₁ ∧ y₂, unit vectors of R³: the oriented planes of R⁴ are
+    S² × S²."""
+    a, b = y[..., 0], y[..., 1]
+    w = a[..., :, None] * b[..., None, :] - a[..., None, :] * b[..., :, None]
+    one, two = [w[..., 0, i] for i in (1, 2, 3)], [w[..., 2, 3], w[..., 3, 1], w[..., 1, 2]]
+    return tuple(np.stack([p + s * q for p, q in zip(one, two, strict=True)], axis=-1) for s in (1, -1))
+
+
+def fit_pair(space, product, points, parts, t, ends):
+    return (
+        ss.CubicSpline(t, points, space, bc_type=ends, tol=0.0),
+        ss.CubicSpline(t, parts, product, bc_type=ends, tol=0.0),
+    )
+
+
+def pair_norm(product, x, v):
+    return np.sqrt(sum(f.norm(y, w) ** 2 for f, y, w in zip(product.factors, x, v, strict=True)))
+
+
+@pytest.mark.parametrize("ends", ["natural", "not-a-knot"])
+def test_so4_is_two_quaternions(ends, rng):
+    space, product = ss.SpecialOrthogonal(4), ss.Product(ss.Sphere(3), ss.Sphere(3))
+    a, b = walk(ss.Sphere(3), 0.5, 12, rng), walk(ss.Sphere(3), 0.7, 12, rng)
+    p = turn_in_four(a, b)
+    # The angles of the rotation are the sum and the difference of those of the quaternions.
+    angles = np.hypot(ss.Sphere(3).distance(a[1:], a[:-1]), ss.Sphere(3).distance(b[1:], b[:-1]))
+    assert np.abs(space.distance(p[1:], p[:-1]) - np.sqrt(2) * angles).max() <= 20 * EPS
+    t = np.cumsum(rng.uniform(0.7, 1.3, 12))
+    one, other = fit_pair(space, product, p, (a, b), t, ends)
+    x = np.linspace(t[0], t[-1], 80)
+    assert np.abs(one(x) - turn_in_four(*other(x))).max() <= 50 * EPS
+    for nu in (1, 2):
+        norm = np.sqrt(2) * pair_norm(product, other(x), other(x, nu))
+        assert np.abs(space.norm(one(x), one(x, nu)) - norm).max() <= 1000 * EPS
+
+
+@pytest.mark.parametrize("ends", ["natural", "not-a-knot"])
+def test_planes_of_r4_are_two_spheres(ends, rng):
+    space, product = ss.Grassmannian(2, 4), ss.Product(ss.Sphere(2), ss.Sphere(2))
+    p = walk(space, 0.6, 12, rng)
+    for before, y in pairwise(p):
+        # One orientation along the walk.
+        if np.linalg.det(before.T @ y) < 0:
+            y[:, 0] *= -1
+    parts = duals(p)
+    far = [ss.Sphere(2).distance(x[1:], x[:-1]) for x in parts]
+    assert np.abs(space.distance(p[1:], p[:-1]) - np.hypot(*far) / np.sqrt(2)).max() <= 20 * EPS
+    t = np.cumsum(rng.uniform(0.7, 1.3, 12))
+    one, other = fit_pair(space, product, p, parts, t, ends)
+    x = np.linspace(t[0], t[-1], 80)
+    y, z = duals(one(x)), other(x)
+    sign = np.sign(np.sum(y[0] * z[0], axis=-1, keepdims=True))
+    assert max(np.abs(sign * u - v).max() for u, v in zip(y, z, strict=True)) <= 50 * EPS
+    for nu in (1, 2):
+        norm = pair_norm(product, z, other(x, nu)) / np.sqrt(2)
+        assert np.abs(space.norm(one(x), one(x, nu)) - norm).max() <= 1000 * EPS
+
+
+def test_covariances_of_the_plane_are_size_and_shape(rng):
+    """SPD(2) is H² × R: shape with determinant one, and half the logarithm of the determinant."""
+    space, product = ss.SymmetricPositiveDefinite(2), ss.Product(ss.Hyperbolic(2), ss.Euclidean(1))
+    shape, size = walk(ss.Hyperbolic(2), 0.5, 12, rng), np.cumsum(rng.standard_normal((12, 1)), axis=0) / 2
+
+    def matrix(shape, size):
+        return np.exp(size[..., None]) * minkowski_in_hermitian(shape)
+
+    t = np.cumsum(rng.uniform(0.7, 1.3, 12))
+    one, other = fit_pair(space, product, matrix(shape, size), (shape, size), t, "natural")
+    x = np.linspace(t[0], t[-1], 80)
+    allowed = 50 * EPS * condition(space, one.points)
+    assert np.abs(one(x) - matrix(*other(x))).max() <= allowed
+    for nu in (1, 2):
+        norm = np.sqrt(2) * pair_norm(product, other(x), other(x, nu))
+        assert np.abs(space.norm(one(x), one(x, nu)) - norm).max() <= 10**nu * allowed
+
+
+def test_rotations_have_two_quaternions(rng):
+    """Distances past the equator of S³: the other quaternion is nearer."""
+    p, q = ss.Sphere(3).random_point(rng, (2, 200))
+    angle = ss.Sphere(3).distance(p, q)
+    there = ss.SpecialOrthogonal(3).distance(rotation(p), rotation(q))
+    assert np.abs(there - 2 * np.minimum(angle, np.pi - angle)).max() <= 50 * EPS
+    assert np.abs(ss.RealProjective(3).distance(p, q) - there / 2).max() <= 50 * EPS
+
+
+# ---- the representative does not matter ----
+
+
+def gauges(space, n, rng):
+    """Random signs, phases, orthogonal or unitary matrices, that multiply a point from the right."""
+    if len(space.point_shape) == 1:
+        noise = rng.standard_normal((n, 1)) + (
+            1j * rng.standard_normal((n, 1)) if space.dtype.kind == "c" else 0
+        )
+        return noise / np.abs(noise)
+    k = space.point_shape[1]
+    noise = rng.standard_normal((n, k, k)) + (
+        1j * rng.standard_normal((n, k, k)) if space.dtype.kind == "c" else 0
+    )
+    return np.linalg.qr(noise).Q
+
+
+@pytest.mark.parametrize("name", ["rp:3", "cp:3", "gr:2,5", "cgr:2,4", "gr:4,5", "cgr:1,2"])
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton"])
+def test_representatives_do_not_matter(name, ends, method, rng):
+    space = ss.space(name)
+
+    def multiply(x, g):
+        return x * g if len(space.point_shape) == 1 else x @ g
+
+    for step in (1e-6, 0.1, 0.7, 1.1):
+        p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
+        g = gauges(space, len(p), rng)
+        moved = multiply(p, g)
+        t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.7, 1.3, len(p) - 1))])
+        bc = there = ends
+        if ends in ("velocity", "acceleration"):
+            order = 1 if ends == "velocity" else 2
+            v = [0.7 * space.log(p[i], p[j]) for i, j in ((0, 1), (-1, -2))]
+            bc = [(order, u) for u in v]
+            there = [(order, multiply(u, g[i])) for i, u in zip((0, -1), v, strict=True)]
+        one, other = (
+            ss.CubicSpline(t, points, space, bc_type=end, method=method, tol=0.0)
+            for points, end in ((p, bc), (moved, there))
+        )
+        x = np.concatenate([t, np.linspace(t[0], t[-1], 60)])
+        y, z = one(x), other(x)
+        allowed = 100 * EPS
+        assert np.abs(plain(space, y) - plain(space, z)).max() <= allowed
+        for nu in (1, 2):
+            v, w = one(x, nu), other(x, nu)
+            assert np.abs(space.norm(y, v) - space.norm(z, w)).max() <= 10**nu * allowed
+            assert np.abs(plain_vector(space, y, v) - plain_vector(space, z, w)).max() <= 10**nu * allowed
+        if step == 0.7:
+            assert one.length() == pytest.approx(other.length(), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["rp:3", "cp:3", "gr:2,5", "cgr:2,4"])
+def test_operations_follow_the_representative(name, rng):
+    """What depends on the representative of p only, turns with it."""
+    space = ss.space(name)
+
+    def multiply(x, g):
+        return x * g if len(space.point_shape) == 1 else x @ g
+
+    for length in (1e-8, 1e-3, 0.3, 1.2, 1.5):
+        p = base_point(space, rng)
+        v, w = length * unit_tangent(space, p, rng), unit_tangent(space, p, rng)
+        q = space.exp(p, v)
+        g, h = gauges(space, 2, rng)
+        # The direction of the logarithm is known to ε/(π/2 − length).
+        allowed = 20 * EPS / (np.pi / 2 - length)
+        assert (
+            np.abs(space.log(multiply(p, g), multiply(q, h)) - multiply(space.log(p, q), g)).max() <= allowed
+        )
+        assert abs(space.distance(multiply(p, g), multiply(q, h)) - length) <= 20 * EPS
+        moved = space.transport(multiply(p, g), multiply(q, h), multiply(w, g))
+        here, there = (
+            plain_vector(space, q, space.transport(p, q, w)),
+            plain_vector(space, multiply(q, h), moved),
+        )
+        assert np.abs(here - there).max() <= allowed
+        x = space.exp(p, 0.5 * w)
+        here, there = (
+            space.transvection(p, v, x),
+            space.transvection(multiply(p, g), multiply(v, g), multiply(x, h)),
+        )
+        assert np.abs(plain(space, here) - plain(space, there)).max() <= allowed

@@ -1,0 +1,217 @@
+"""Spaces as values: their names, what they say of themselves, and spaces that there are not."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from cases import COMMON, FAMILIES, SINGLE, SPACES
+from curves import S2, every_single, every_space, points_on
+from refused import INF, fit_error
+
+import symspline as ss
+
+# ---- names ----
+
+
+@pytest.mark.parametrize(
+    "name, space",
+    [
+        ("euclidean:3", ss.Euclidean(3)),
+        ("r:3", ss.Euclidean(3)),
+        ("sphere:2", ss.Sphere(2)),
+        ("Sphere:2", ss.Sphere(2)),
+        ("hyperbolic:4", ss.Hyperbolic(4)),
+        ("h:4", ss.Hyperbolic(4)),
+        ("sphere:3 x r:3", ss.Product(ss.Sphere(3), ss.Euclidean(3))),
+        ("h:2 x sphere:2 x r:1", ss.Product(ss.Hyperbolic(2), ss.Sphere(2), ss.Euclidean(1))),
+    ],
+)
+def test_names_of_spaces(name, space):
+    assert ss.space(name) == space
+    assert ss.CubicSpline(None, points_on(space, 3), name).space == space
+
+
+def test_names_are_the_documented_ones():
+    names = ["euclidean:3", "sphere:2", "hyperbolic:2", "sphere:3 x euclidean:2"]
+    assert [str(space) for space in COMMON] == names
+    assert repr(COMMON[3]) == "Product(Sphere(3), Euclidean(2))"
+
+
+def test_a_product_of_products_is_flat():
+    inner = ss.Product("sphere:2", "r:1")
+    assert ss.Product(inner, "h:2") == ss.Product("sphere:2", "r:1", "h:2")
+
+
+def test_numpy_integers_make_spaces():
+    assert ss.Sphere(np.int64(2)) == S2 and repr(ss.Sphere(np.int8(2))) == "Sphere(2)"
+
+
+@pytest.mark.parametrize("aliases", FAMILIES, ids=lambda aliases: aliases[0])
+def test_names(aliases):
+    short = aliases[0]
+    names = [str(space) for space in SINGLE]
+    sizes = [name.partition(":")[2] for name in names if name.partition(":")[0] == short]
+    assert sizes
+    for size in sizes:
+        space = ss.space(f"{short}:{size}")
+        assert str(space) == f"{short}:{size}"
+        assert repr(space) == f"{type(space).__name__}({size.replace(',', ', ')})"
+        for alias in aliases:
+            for name in (f"{alias}:{size}", f" {alias.upper()} : {size.replace(',', ' , ')} "):
+                assert ss.space(name) == space and hash(ss.space(name)) == hash(space)
+
+
+@every_space
+def test_spaces_as_values(space):
+    assert ss.space(str(space)) == space and ss.space(space) is space
+    assert eval(repr(space), vars(ss)) == space
+    for made in (pickle.loads(pickle.dumps(space)), copy.copy(space), copy.deepcopy(space)):
+        assert made == space and hash(made) == hash(space) and made.dim == space.dim
+        assert type(made) is type(space) and repr(made) == repr(space)
+    assert [other for other in SPACES if other == space] == [space]
+
+
+def test_spaces_compare():
+    assert len({*SPACES, *map(copy.copy, SPACES)}) == len(SPACES)
+    assert ss.Sphere(2) != ss.Sphere(3)
+    assert ss.Sphere(2) != ss.Hyperbolic(2)
+    assert ss.Sphere(2) != "sphere:2"
+
+
+# ---- what they say of themselves ----
+
+
+@pytest.mark.parametrize(
+    "space, point_shape, dim, radius, curvature",
+    [
+        (ss.Euclidean(3), (3,), 3, INF, 0),
+        (ss.Sphere(2), (3,), 2, np.pi, 1),
+        (ss.Hyperbolic(2), (3,), 2, INF, 1),
+        (ss.Product(ss.Sphere(3), ss.Euclidean(2)), ((4,), (2,)), 5, np.pi, 1),
+        (ss.Product("h:2", "r:1", "h:3"), ((3,), (1,), (4,)), 6, INF, 1),
+        (ss.space("u:2 x cp:1 x r:3"), ((2, 2), (2,), (3,)), 4 + 2 + 3, np.pi / 2, 2),
+    ],
+    ids=str,
+)
+def test_numbers_of_some_spaces(space, point_shape, dim, radius, curvature):
+    assert space.point_shape == point_shape
+    assert space.dim == dim
+    assert space.injectivity_radius == radius
+    assert space.curvature == curvature
+
+
+DIMENSIONS = {
+    "euclidean": lambda n: n,
+    "sphere": lambda n: n,
+    "hyperbolic": lambda n: n,
+    "rp": lambda n: n,
+    "cp": lambda n: 2 * n,
+    "gr": lambda k, n: k * (n - k),
+    "cgr": lambda k, n: 2 * k * (n - k),
+    "so": lambda n: n * (n - 1) // 2,
+    "o": lambda n: n * (n - 1) // 2,
+    "u": lambda n: n * n,
+    "su": lambda n: n * n - 1,
+    "spd": lambda n: n * (n + 1) // 2,
+    "hpd": lambda n: n * n,
+    "se": lambda n: n * (n + 1) // 2,
+}
+
+
+COMPLEX_FAMILIES = {"cp", "cgr", "u", "su", "hpd"}
+
+
+@every_single
+def test_what_a_space_says_of_itself(space):
+    family, _, size = str(space).partition(":")
+    assert space.dim == DIMENSIONS[family](*map(int, size.split(",")))
+    assert space.dtype == (np.complex128 if family in COMPLEX_FAMILIES else np.float64)
+    assert space.injectivity_radius > 0
+    # Poses have no invariant metric, and so no K.
+    assert np.isnan(space.curvature) if family == "se" else space.curvature >= 0
+    assert points_on(space).shape[1:] == space.point_shape
+
+
+def test_poses_have_no_curvature_in_products():
+    assert all(np.isnan(ss.space(name).curvature) for name in ("se:3 x s:2", "s:2 x se:3"))
+
+
+# ---- spaces that there are not ----
+
+
+@pytest.mark.parametrize(
+    "space, match",
+    [
+        ("spere:2", r"unknown space 'spere:2'; known are .*sphere.*, e\.g\. 'sphere:2'"),
+        ("", r"unknown space ''"),
+        ("sphere:2 x klein:2", r"unknown space 'klein:2'"),
+        ("sphere", r"'sphere': behind the colon come whole numbers"),
+        ("sphere:", r"'sphere:': behind the colon come whole numbers"),
+        ("sphere:-1", r"'sphere:-1': behind the colon come whole numbers"),
+        ("sphere:2.0", r"behind the colon come whole numbers"),
+        ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 numbers"),
+        ("sphere:0", r"Sphere\(n\) needs n >= 1"),
+        (None, r"a space or its name is needed, not None"),
+        (ss.Sphere, r"a space or its name is needed, not <class"),
+        (2, r"a space or its name is needed, not 2"),
+    ],
+    ids=str,
+)
+def test_unknown_spaces(space, match):
+    fit_error(match, space=space)
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.space(space)
+
+
+@pytest.mark.parametrize("n", [-1, 2.0, "2", None, True, 0])
+@pytest.mark.parametrize("kind", [ss.Sphere, ss.Hyperbolic, ss.Euclidean])
+def test_bad_dimensions(kind, n):
+    with pytest.raises(ss.ValidationError, match=rf"{kind.__name__} takes whole numbers, not|needs n >= 1"):
+        kind(n)
+
+
+@pytest.mark.parametrize("make", [lambda: ss.Sphere(10**30), lambda: ss.space("sphere:" + "9" * 30)])
+def test_huge_dimensions(make):
+    with pytest.raises(ss.ValidationError):
+        make()
+
+
+@pytest.mark.parametrize(
+    "name, match",
+    [
+        ("gr:5,2", r"asks for subspaces larger than the space; did you mean Grassmannian\(2, 5\)\?"),
+        ("cgr:5,2", r"did you mean ComplexGrassmannian\(2, 5\)\?"),
+        ("gr:3,3", r"Grassmannian\(k, n\) needs 1 <= k < n; Grassmannian\(3, 3\) is a single point"),
+        ("cgr:1,1", r"needs 1 <= k < n; ComplexGrassmannian\(1, 1\) is a single point"),
+        ("gr:0,3", r"needs 1 <= k < n"),
+        ("gr:2", r"'gr:2': Grassmannian does not take 1 numbers"),
+        ("so:2,3", r"'so:2,3': SpecialOrthogonal does not take 2 numbers"),
+        ("se:4", r"SpecialEuclidean\(n\) needs n = 2 or 3, not 4"),
+        ("se:1", r"needs n = 2 or 3, not 1"),
+        ("o:1", r"Orthogonal\(n\) needs n >= 2"),
+        ("so:1", r"SpecialOrthogonal\(n\) needs n >= 2"),
+        ("su:1", r"SpecialUnitary\(n\) needs n >= 2"),
+        *((f"{name}:0", r"\(n\) needs n >= ") for name in ("rp", "cp", "o", "so", "u", "su", "spd", "hpd", "r", "h")),
+        ("gr:2.0,5", r"behind the colon come whole numbers"),
+        ("gr:2;5", r"behind the colon come whole numbers"),
+        ("cp:1xso:3", r"behind the colon come whole numbers"),
+        ("cp:1 x ", r"unknown space"),
+        ("so:99999999999", r"too large"),
+        ("gr:3,99999999999999999999", r"too large"),
+        ("sphere:18446744073709551615", r"too large"),
+    ],
+)  # fmt: skip
+def test_spaces_that_there_are_not(name, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.space(name)
+
+
+@pytest.mark.parametrize("value", [-1, 2.0, "2", None, True])
+@pytest.mark.parametrize(
+    "kind", ["Grassmannian", "SpecialOrthogonal", "Unitary", "SpecialEuclidean", "ComplexProjective"]
+)
+def test_sizes_that_are_no_whole_numbers(kind, value):
+    cls = getattr(ss, kind)
+    with pytest.raises(ss.ValidationError, match=rf"{kind} takes whole numbers, not {value!r}"):
+        cls(value, 5) if kind == "Grassmannian" else cls(value)

@@ -1,0 +1,303 @@
+"""Points that are off a space: what is wrong, where, by how much, and what to do."""
+
+import numpy as np
+import pytest
+from cases import CASES, EPS
+from curves import KNOTS, S2, points_on, same
+from refused import INF, NAN, TWO, P, changed, fails, fit_error, points, spoiled
+
+import symspline as ss
+
+PROJECT = r".*Points within 1e-8 are projected; use space\.project\(x\)"
+
+
+MATRICES = ["so:2", "so:3", "so:5", "o:3", "u:2", "u:5", "su:2", "su:3"]
+FRAMES = ["gr:2,5", "gr:3,8", "cgr:2,4"]
+LINES = ["rp:2", "rp:7", "cp:1", "cp:7", "gr:1,3", "cgr:1,2"]
+DEFINITE = ["spd:2", "spd:3", "spd:8", "hpd:2", "hpd:5"]
+POSES = ["se:2", "se:3"]
+
+
+@pytest.mark.parametrize("name", MATRICES + FRAMES)
+def test_columns_that_are_not_orthonormal(name):
+    product = r"x\*x" if ss.space(name).dtype == np.complex128 else "xᵀx"
+    columns = ss.space(name).point_shape[1]
+    # |1.01² − 1| √columns
+    size = f"{0.0201 * np.sqrt(columns):.3e}".replace("e-0", "e-")
+    match = (
+        rf"points\[2\] is off the space by .*columns are not orthonormal: \|{product} - 1\| = {size}{PROJECT}"
+    )
+    fails(match, spoiled(name, 2, lambda x: 1.01 * x), name)
+    fails(r"points\[1\] is off the space.* 1\.\d+e0", spoiled(name, 1, lambda x: 0 * x), name)
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_how_to_make_a_basis(name):
+    fails(r"np\.linalg\.qr gives an orthonormal basis", spoiled(name, 2, lambda x: 1.01 * x), name)
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_vectors_that_are_not_of_length_one(name):
+    fails(rf"points\[3\] is off .* norm is 1\.01\d*, not 1 \(off by 1\.000e-2\){PROJECT}",
+          spoiled(name, 3, lambda x: 1.01 * x), name)  # fmt: skip
+    fails(r"points\[0\] is off the space.*it is the zero vector", spoiled(name, 0, lambda x: 0 * x), name)
+
+
+@pytest.mark.parametrize("name", ["so:2", "so:3", "so:5", *POSES])
+def test_reflections_among_rotations(name):
+    def reflect(x):
+        x = x.copy()
+        x[:-1, 0] *= -1
+        if name[:2] == "so":
+            x[-1, 0] *= -1
+        return x
+
+    match = r"points\[2\] is off the space.* determinant is -1: it is a reflection, not a rotation \(swap two columns"
+    fails(match, spoiled(name, 2, reflect), name)
+    with pytest.raises(ss.ValidationError, match=r"x\[2\] cannot be projected"):
+        ss.space(name).project(spoiled(name, 2, reflect))
+
+
+@pytest.mark.parametrize("name", ["su:2", "su:3", "su:8"])
+@pytest.mark.parametrize("phase", [0.3, -1e-5])
+def test_the_phase_of_the_determinant(name, phase):
+    mantissa, exponent = f"{phase:.3e}".split("e")
+    n = ss.space(name).point_shape[0]
+    p = spoiled(name, 1, lambda x: x * np.exp(1j * phase / n))
+    fails(
+        rf"points\[1\] is off .* determinant is not 1 but has the phase {mantissa}e{int(exponent)} "
+        rf"\(Unitary\({n}\) takes",
+        p,
+        name,
+    )
+    ss.CubicSpline(None, p, f"u:{n}")
+    ss.CubicSpline(None, ss.space(name).project(p), name)
+
+
+def test_a_rotation_next_to_a_reflection():
+    p = spoiled("o:3", 2, lambda x: x * [-1, 1, 1])
+    match = r"points\[1\] and points\[2\]{} have opposite determinants: no curve joins a rotation and a reflection"
+    with pytest.raises(ss.ValidationError, match=match.format("")):
+        ss.CubicSpline(None, p, "o:3")
+    both = np.stack([points("o:3"), p])
+    with pytest.raises(ss.ValidationError, match=match.format(" of curve 1")):
+        ss.CubicSpline(None, both, "o:3")
+    with pytest.raises(ss.ValidationError, match=match.format(" of curve 1")):
+        ss.fit_many([(None, q) for q in both], "o:3")
+    # All on one side is fine on either side.
+    ss.CubicSpline(None, both[0] * [-1, 1, 1], "o:3")
+
+
+@pytest.mark.parametrize("name", DEFINITE)
+def test_matrices_that_are_not_symmetric(name):
+    def skew(x):
+        return x + 1e-2 * np.eye(*x.shape, k=1)
+
+    what = "symmetric" if name[:3] == "spd" else "Hermitian"
+    match = (
+        rf"points\[1\] is off the space by .*it is not {what}: the skew part is \d\.\d+e-\d of it{PROJECT}"
+    )
+    fails(match, spoiled(name, 1, skew), name)
+    # The symmetric part is what is close.
+    ss.CubicSpline(None, ss.space(name).project(spoiled(name, 1, skew)), name)
+
+
+def test_a_diagonal_that_is_not_real():
+    fails(r"points\[1\] is off .*not Hermitian", spoiled("hpd:2", 1, lambda x: x + 0.1j * np.eye(2)), "hpd:2")
+    fails(r"points\[1\] is off .*not Hermitian", spoiled("hpd:1", 1, lambda x: x + 0.1j), "hpd:1")
+
+
+@pytest.mark.parametrize("name", [*DEFINITE, "spd:1", "hpd:1"])
+def test_matrices_that_are_not_positive(name):
+    def negative(x):
+        values, vectors = np.linalg.eigh(x)
+        values[0] = -0.25
+        return (vectors * values) @ vectors.conj().T
+
+    match = r"points\[3\] is off the space: it is not positive definite: its smallest eigenvalue is -2\.5000\d*e-1"
+    fails(match, spoiled(name, 3, negative), name)
+    with pytest.raises(ss.ValidationError, match=r"x\[3\] cannot be projected"):
+        ss.space(name).project(spoiled(name, 3, negative))
+
+
+@pytest.mark.parametrize("name", [*DEFINITE, "spd:1", "hpd:1"])
+def test_the_zero_matrix_is_not_positive(name):
+    fails(r"not positive definite: its smallest eigenvalue is -?0", spoiled(name, 1, lambda x: 0 * x), name)
+
+
+@pytest.mark.parametrize("name", ["spd:2", "spd:3", "hpd:2"])
+def test_singular_matrices(name):
+    n = ss.space(name).point_shape[0]
+    singular = np.diag([1.0] * (n - 1) + [0.0])
+    match = r"points\[1\] is off the space: it is not positive definite: its smallest eigenvalue is -?0"
+    fails(match, spoiled(name, 1, lambda x: singular), name)
+
+
+@pytest.mark.parametrize("name", ["spd:3", "hpd:3", "spd:8"])
+def test_a_matrix_that_is_singular_to_rounding_is_refused(name):
+    """Whatever the sign of the rounding errors, and whatever the units of its rows."""
+    n, rng = ss.space(name).point_shape[0], np.random.default_rng(3)
+    for _ in range(20):
+        a = rng.normal(size=(n, n - 1))
+        points = np.array([np.eye(n), a @ a.T], dtype=ss.space(name).dtype)
+        fails(
+            r"points\[1\] is off the space: it is not positive definite: its smallest eigenvalue",
+            points,
+            name,
+        )
+    units = 10.0 ** rng.uniform(-6, 6, n)
+    regular = np.eye(n) + 0.3
+    assert ss.CubicSpline(
+        None, np.array([np.eye(n), regular * units * units[:, None]]), name
+    ).report.converged
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_the_last_row_of_a_pose(name):
+    n = ss.space(name).point_shape[0] - 1
+    for entry in (0, n):
+        p = points(name)
+        p[1, n, entry] += 0.5
+        fails(r"points\[1\] is off the space by .*its last row is \[.*\], not \(0, …, 0, 1\)", p, name)
+    # Positions on the left, where matrices for rows have them.
+    with pytest.raises(ss.ValidationError, match="its last row is"):
+        ss.CubicSpline(None, np.swapaxes(points(name) + 0.1 * np.eye(n + 1, k=n), -1, -2), name)
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_the_rotation_of_a_pose(name):
+    def stretched(x):
+        x = x.copy()
+        x[:-1, :-1] *= 1.01
+        return x
+
+    fails(
+        r"points\[2\] is off .*in its rotation, its columns are not orthonormal",
+        spoiled(name, 2, stretched),
+        name,
+    )
+
+
+# ---- spheres and hyperbolic space ----
+
+
+OFF = r" is off the space"
+
+
+@pytest.mark.parametrize(
+    "space, points, match",
+    [
+        (
+            "sphere:2",
+            changed(2, [0, 0, 1.1]),
+            r"points\[2\] is off the space by 1\.000e-1: its norm is 1\.1, not 1",
+        ),
+        ("sphere:2", changed(1, 0), r"points\[1\] is off the space by 1\.000e0: it is the zero vector"),
+        (
+            "hyperbolic:2",
+            [[1, 0, 0], [1.1, 0, 0]],
+            r"points\[1\] is off .* by 1\.000e-1: its Minkowski square is -1\.21",
+        ),
+        ("hyperbolic:2", [[-1, 0, 0], [1, 0, 0]], r"points\[0\] is off .*the first, is -1, not positive"),
+        ("hyperbolic:2", [[1, 0, 0], [0, 0, 0]], r"points\[1\] is off .*the first, is 0, not positive"),
+    ],
+)
+def test_points_off_the_space(space, points, match):
+    fit_error(match + r".*Points within 1e-8 are projected; use space\.project\(x\)", None, points, space)
+
+
+def test_the_bad_point_of_a_batch_is_named():
+    fit_error(
+        r"points\[2\] of curve 1 is off the space by 5\.000e-1", points=changed((1, 2), [0, 0, 1.5], TWO)
+    )
+    with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
+        ss.fit_many([(None, P), (None, changed(1, [0, 2, 0])[:2])], S2)
+
+
+@pytest.mark.parametrize("dtype, tol", [("f8", "1e-8"), ("f4", "1e-4")])
+def test_how_far_off_is_allowed(dtype, tol):
+    fit_error(
+        rf"off the space by 1\.0\d*e-2.*Points within {tol} are projected", points=(P * 1.01).astype(dtype)
+    )
+
+
+def test_a_bad_point_is_found_before_a_long_fit():
+    points = points_on(S2, 2000)
+    points[1999] = 0
+    fit_error(r"points\[1999\] is off the space", points=points)
+
+
+# ---- not finite ----
+
+
+EVERY = [case.name for case in CASES]
+
+
+@pytest.mark.parametrize("value", [NAN, INF, -INF])
+@pytest.mark.parametrize("name", EVERY)
+def test_numbers_that_are_not_finite(name, value):
+    space = ss.space(name)
+    p = points(name)
+    for place in {0, p[0].size - 1}:
+        bad = p.copy()
+        bad[2].flat[place] = value
+        fails(r"points\[2\] is off the space", bad, name)
+        with pytest.raises(ss.ValidationError, match=r"point 2 is off the space"):
+            space.check_point(bad)
+        with pytest.raises(ss.ValidationError, match=r"x\[2\] cannot be projected"):
+            space.project(bad)
+
+
+@pytest.mark.parametrize("value", [NAN, INF, -INF])
+@pytest.mark.parametrize(
+    "space, points", [("sphere:2", P), ("euclidean:3", P), ("hyperbolic:2", P[[0, 0, 0]])]
+)
+def test_points_that_are_not_finite(space, points, value):
+    fit_error(
+        rf"points\[1\]{OFF}.*(NaN|inf|not finite).*space\.project\(x\)",
+        None,
+        changed((1, 2), value, points),
+        space,
+    )
+
+
+# ---- by rounding ----
+
+
+@pytest.mark.parametrize("dtype, off", [("f8", 9e-9), ("f4", 9e-5)])
+def test_points_nearly_on_the_space_are_projected(dtype, off):
+    p = points_on(S2, 5)
+    spline = ss.CubicSpline(None, (p * (1 + off)).astype(dtype), S2)
+    assert np.abs(np.linalg.norm(spline.points, axis=-1) - 1).max() <= 2 * EPS
+    assert np.abs(spline.points - p).max() < 1.2 * np.finfo(dtype).eps
+    h = points_on(ss.Hyperbolic(2), 5)
+    spline = ss.CubicSpline(None, (h * [1 + off, 1, 1]).astype(dtype), "h:2")
+    squares = spline.points**2 @ [-1, 1, 1]
+    assert np.abs(squares + 1).max() <= 8 * EPS * np.square(h).max()
+
+
+@pytest.mark.parametrize("dtype, off", [("f8", 1.1e-8), ("f4", 1.1e-4)])
+def test_points_farther_off_are_an_error(dtype, off):
+    p = points_on(S2, 5)
+    with pytest.raises(ss.ValidationError, match=r"points\[0\] is off the space by 1\.1\d+e-[48]"):
+        ss.CubicSpline(None, (p * (1 + off)).astype(dtype), S2)
+
+
+def test_check_false_gives_the_same_curve():
+    p = points_on(S2, 6)
+    checked, unchecked = (ss.CubicSpline(KNOTS, p, S2, check=c) for c in (True, False))
+    # Checking projects once more, which may turn a last bit.
+    assert np.abs(checked.velocities - unchecked.velocities).max() < 20 * EPS
+
+
+def test_check_false_skips_the_checks():
+    assert same(ss.CubicSpline(None, 2 * np.eye(3), S2, check=False).points, 2 * np.eye(3))
+
+
+def test_double_precision_is_not_excused_by_single_precision_beside_it():
+    good = np.array([[1, 0, 0], [0, 1, 0]])
+    off = good + 1e-6
+    curves = [(None, good.astype(np.float32)), (None, off)]
+    with pytest.raises(ss.ValidationError, match=r"curve 1: .*off the space by"):
+        ss.fit_many(curves, "sphere:2")
+    assert len(ss.fit_many([(None, off.astype(np.float32)), (None, good)], "sphere:2")) == 2

@@ -1,0 +1,251 @@
+"""The region of Theorem 3.1 that Algorithm 1 does not leave: what a report says of it, and whether it holds."""
+
+import pickle
+
+import numpy as np
+import pytest
+from cases import CURVED, base_point, closed_walk, unit_tangent, walk
+
+import symspline as ss
+
+S2 = ss.Sphere(2)
+# Where the smallest and the largest V of (38) meet.
+LARGEST_KD, LARGEST_KV = 0.2610895, 0.4420886
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(2)
+
+
+def steps(space, kd, rng, n=10, turn=3.0):
+    """A walk with K D = `kd`."""
+    return walk(space, kd / space.curvature, n, rng, turn=turn)
+
+
+def excess(kd, kv):
+    """The left side of (38) minus the right one, times K."""
+    ku = kd + 2 * kv
+    return 0.5 * ku / np.sin(ku) * (ku - kv) - kv
+
+
+def longest_leg(space, points, velocities):
+    return space.norm(points, velocities).max() / 3
+
+
+# ---- the number ----
+
+
+@pytest.mark.parametrize("name", CURVED)
+@pytest.mark.parametrize("kd", [1e-6, 0.01, 0.1, 0.2, 0.25, 0.26, 0.26108])
+def test_radius_is_the_smallest_of_38(name, kd, rng):
+    space = ss.space(name)
+    report = ss.CubicSpline(None, steps(space, kd, rng), space).report
+    kd, kv = report.curvature * report.max_step, report.curvature * report.invariant_radius
+    assert kv <= LARGEST_KV
+    assert excess(kd, kv) <= 1e-14 * kv
+    assert excess(kd, kv * (1 - 1e-6)) > 0
+
+
+@pytest.mark.parametrize("name", CURVED)
+@pytest.mark.parametrize("kd", [0.26110, 0.3, 1.0])
+def test_there_is_none_for_far_steps(name, kd, rng):
+    space = ss.space(name)
+    assert ss.CubicSpline(None, steps(space, kd, rng, turn=0.5), space).report.invariant_radius is None
+
+
+@pytest.mark.parametrize("name", ["euclidean:3", "so:2", "spd:1", "rp:1"])
+def test_in_flat_space_it_is_the_longest_step(name, rng):
+    space = ss.space(name)
+    report = ss.CubicSpline(None, walk(space, 0.7, 6, rng), space).report
+    assert report.curvature == 0.0
+    assert report.invariant_radius == pytest.approx(report.max_step, rel=1e-15)
+
+
+def test_one_far_step_is_enough_to_have_none(rng):
+    p = steps(S2, 0.1, rng)
+    p = np.concatenate([p, S2.exp(p[-1], 0.27 * unit_tangent(S2, p[-1], rng))[None]])
+    assert ss.CubicSpline(None, p, S2).report.invariant_radius is None
+
+
+# ---- the theorem ----
+
+
+@pytest.mark.parametrize("name", CURVED)
+@pytest.mark.parametrize("kd", [0.01, 0.2, 0.26])
+@pytest.mark.parametrize("ends", ["natural", "clamped", "velocity"])
+def test_algorithm_1_stays_within(name, kd, ends, rng):
+    space = ss.space(name)
+    for turn in (0.5, 3.0, 100.0):
+        p = steps(space, kd, rng, turn=turn)
+        bc = ends
+        if ends == "velocity":
+            # Three times the velocity of the nearest step: the leg h u/3 is as long as the step.
+            bc = (
+                (1, 3 * space.log(p[0], p[1])),
+                (1, 3 * unit_tangent(space, p[-1], rng) * kd / space.curvature),
+            )
+        options = {"bc_type": bc, "method": "fixed-point", "on_failure": "ignore"}
+        radius = ss.CubicSpline(None, p, space, bc_type=bc).report.invariant_radius
+        for sweeps in range(1, 11):
+            spline = ss.CubicSpline(None, p, space, max_iter=sweeps, **options)
+            assert spline.report.iterations == sweeps
+            assert longest_leg(space, p, spline.velocities) <= radius * (1 + 1e-12)
+        done = ss.CubicSpline(None, p, space, **options)
+        assert done.report.converged and done.report.rate < 0.6
+        assert done.report.invariant_radius == radius
+        assert longest_leg(space, p, done.velocities) <= radius
+
+
+# ---- when there is one ----
+
+
+@pytest.mark.parametrize("method", ["auto", "fixed-point", "quasi-newton", "newton"])
+def test_radius_does_not_depend_on_the_solver(method, rng):
+    p = steps(S2, 0.2, rng)
+    radius = ss.CubicSpline(None, p, S2, method=method).report.invariant_radius
+    assert radius == pytest.approx(0.23405665250997934, rel=1e-9)
+
+
+@pytest.mark.parametrize("t", [None, np.arange(10) * 1e-3, 7 + 60.0 * np.arange(10), "dates"])
+def test_equal_knots_of_any_size(t, rng):
+    if isinstance(t, str):
+        t = np.datetime64("2020-01-01") + np.arange(10) * np.timedelta64(6, "h")
+    p = steps(S2, 0.2, rng)
+    radii = [ss.CubicSpline(knots, p, S2).report.invariant_radius for knots in (t, None)]
+    assert radii[0] == radii[1] is not None
+
+
+@pytest.mark.parametrize("nodes", [2, 3, 600, 1500])
+def test_curves_of_any_length(nodes, rng):
+    report = ss.CubicSpline(None, steps(S2, 0.2, rng, nodes), S2).report
+    assert report.invariant_radius == pytest.approx(0.23405665250997934, rel=1e-9)
+
+
+def test_there_is_none_for_unequal_knots(rng):
+    p = steps(S2, 0.1, rng)
+    t = np.arange(10.0)
+    t[4] += 1e-6
+    assert ss.CubicSpline(t, p, S2).report.invariant_radius is None
+    assert ss.CubicSpline(np.cumsum(rng.uniform(0.5, 2, 10)), p, S2).report.invariant_radius is None
+
+
+def test_there_is_none_for_other_ends(rng):
+    p = steps(S2, 0.1, rng)
+    v = 0.1 * unit_tangent(S2, p[0], rng)
+    for ends in ("not-a-knot", ("natural", "not-a-knot"), ((2, v), "natural")):
+        assert ss.CubicSpline(None, p, S2, bc_type=ends).report.invariant_radius is None, ends
+    loop = closed_walk(S2, 0.1, 10, rng)
+    assert ss.CubicSpline(None, loop, S2, bc_type="periodic").report.invariant_radius is None
+
+
+def test_there_is_none_without_an_invariant_metric(rng):
+    space = ss.SpecialEuclidean(3)
+    assert ss.CubicSpline(None, walk(space, 0.01, 6, rng), space).report.invariant_radius is None
+
+
+@pytest.mark.parametrize("end", [0, -1])
+def test_given_velocities_widen_the_region(end, rng):
+    p = steps(S2, 0.1, rng)
+    smallest = ss.CubicSpline(None, p, S2).report.invariant_radius
+    # The largest root of (38), by bisection between the two.
+    low, high = 0.5, 1.4
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(0.1, middle) < 0 else (low, middle)
+    for leg, radius in [
+        (0.0, smallest),
+        (0.99 * smallest, smallest),
+        (1.01 * smallest, 1.01 * smallest),
+        (0.5, 0.5),
+        (low * (1 - 1e-6), low * (1 - 1e-6)),
+        (low * (1 + 1e-6), None),
+        (1.2, None),
+    ]:
+        given = (1, 3 * leg * unit_tangent(S2, p[end], rng))
+        ends = (given, "natural") if end == 0 else ("natural", given)
+        report = ss.CubicSpline(None, p, S2, bc_type=ends, on_failure="ignore").report
+        assert report.invariant_radius == (radius and pytest.approx(radius, rel=1e-12)), leg
+
+
+def test_clamped_ends_are_velocities_of_zero(rng):
+    p = steps(S2, 0.2, rng)
+    radii = {
+        ss.CubicSpline(None, p, S2, bc_type=ends).report.invariant_radius
+        for ends in ("natural", "clamped", ("clamped", "natural"), ((1, np.zeros(3)), (1, np.zeros(3))))
+    }
+    assert len(radii) == 1 and None not in radii
+
+
+# ---- batches, files, words ----
+
+
+@pytest.fixture
+def batch(rng):
+    return ss.CubicSpline(None, np.array([steps(S2, kd, rng) for kd in (0.1, 0.2, 0.5)]), S2)
+
+
+def test_a_batch_has_an_array(batch):
+    radius = batch.report.invariant_radius
+    assert radius.shape == (3,) and np.isnan(radius).tolist() == [False, False, True]
+    assert [batch[i].report.invariant_radius for i in range(3)] == [radius[0], radius[1], None]
+    assert np.array_equal(batch[1:].report.invariant_radius, radius[1:], equal_nan=True)
+    far = ss.CubicSpline(None, batch.points[2:], S2)
+    assert far.report.invariant_radius is None
+
+
+def test_own_knots_have_own_radii(batch):
+    t = np.array([np.arange(10.0), np.arange(10.0) ** 2, np.arange(10.0)])
+    radius = ss.CubicSpline(t, batch.points, S2).report.invariant_radius
+    assert np.isnan(radius).tolist() == [False, True, True]
+    many = ss.fit_many(list(zip(t, batch.points, strict=True)), S2)
+    assert [one.report.invariant_radius for one in many] == [radius[0], None, None]
+
+
+def test_it_survives_pickles_and_files(batch, tmp_path):
+    for spline in (batch, batch[:2], *batch):
+        spline.save(tmp_path / "curve.npz")
+        for other in (ss.load(tmp_path / "curve.npz"), pickle.loads(pickle.dumps(spline))):
+            assert other.report == spline.report
+            assert str(other.report) == str(spline.report)
+
+
+def test_a_loaded_batch_has_an_array(batch, tmp_path):
+    batch.save(tmp_path / "batch.npz")
+    assert isinstance(ss.load(tmp_path / "batch.npz").report.invariant_radius, np.ndarray)
+
+
+def test_it_reads_well(batch):
+    assert str(batch[1].report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
+    assert "Theorem" not in str(batch[2].report)
+    assert str(batch[:2].report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
+
+
+def test_it_does_not_speak_for_curves_that_have_none(batch):
+    assert ", control legs stay below" not in str(batch.report)
+
+
+# ---- elsewhere ----
+
+
+@pytest.mark.parametrize("first", [S2, ss.Euclidean(2)])
+def test_a_product_has_none_where_a_factor_has_none(first, rng):
+    near = steps(S2, 0.2, rng) if first == S2 else rng.standard_normal((10, 2))
+    spline = ss.CubicSpline(None, (near, steps(S2, 1.0, rng)), ss.Product(first, S2))
+    assert spline.report.invariant_radius is None
+
+
+def test_the_order_of_factors_does_not_matter(rng):
+    p, q = steps(S2, 0.2, rng), 5 * rng.standard_normal((10, 2))
+    plane = ss.Euclidean(2)
+    one = ss.CubicSpline(None, (p, q), ss.Product(S2, plane)).report
+    other = ss.CubicSpline(None, (q, p), ss.Product(plane, S2)).report
+    assert one.invariant_radius == other.invariant_radius
+
+
+def test_it_is_the_same_anywhere_on_the_space(rng):
+    p = steps(S2, 0.2, rng)
+    o = base_point(S2, rng)
+    moved = S2.transvection(o, unit_tangent(S2, o, rng), p)
+    radii = [ss.CubicSpline(None, q, S2).report.invariant_radius for q in (p, moved)]
+    assert radii[0] == pytest.approx(radii[1], rel=1e-12)

@@ -1,0 +1,338 @@
+"""End conditions: words, vectors, closed curves, and bad ones."""
+
+import numpy as np
+import pytest
+from cases import CASES, EPS, unit_tangent, walk
+from curves import (
+    KNOTS,
+    S2,
+    at_node,
+    each,
+    every_common,
+    every_space,
+    largest_difference,
+    off,
+    pick,
+    points_on,
+    same,
+    same_curve,
+    tangents_at,
+    vectors_off,
+)
+from refused import INF, NAN, TWO, P, fit_error, points
+from scipy.interpolate import CubicSpline as FlatSpline
+
+import symspline as ss
+
+
+def held_at(space, spline, e, end):
+    """How far an end condition is from being fulfilled: end 0 or -1."""
+    if end == "not-a-knot":
+        return 0.0
+    p = at_node(space, spline.points, e)
+    order, vector = (
+        {"natural": (2, None), "clamped": (1, None)}.get(end, end) if isinstance(end, str) else end
+    )
+    found = spline(spline.t[e], nu=order)
+    wanted = vector if vector is not None else each(np.zeros_like, p)
+    return largest_difference(found, np.broadcast_to(wanted, found.shape) if space is S2 else wanted)
+
+
+def ends_for(space, p, e):
+    q = at_node(space, p, e)
+    v, a = tangents_at(space, q, seed=3), tangents_at(space, q, seed=4)
+    return ["natural", "clamped", "not-a-knot", (1, v), (2, a)]
+
+
+@every_common
+@pytest.mark.parametrize("left", range(5))
+@pytest.mark.parametrize("right", range(5))
+def test_every_pair_of_end_conditions(space, left, right):
+    p = points_on(space, 6)
+    bc_type = (ends_for(space, p, 0)[left], ends_for(space, p, -1)[right])
+    spline = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type)
+    assert spline.report.converged
+    # The acceleration at a knot is known to 50 ε/h².
+    assert held_at(space, spline, 0, bc_type[0]) < 1e-12
+    assert held_at(space, spline, -1, bc_type[1]) < 1e-12
+
+
+@pytest.mark.parametrize("word", ["natural", "clamped", "not-a-knot"])
+def test_a_word_holds_at_both_ends(word):
+    p = points_on(S2, 6)
+    spline = ss.CubicSpline(KNOTS, p, S2, bc_type=word)
+    assert spline.bc_type == word
+    assert same_curve(spline, ss.CubicSpline(KNOTS, p, S2, bc_type=(word, word)))
+    assert same_curve(spline, ss.CubicSpline(KNOTS, p, S2, bc_type=[word, word]))
+
+
+def test_natural_is_the_default():
+    p = points_on(S2, 6)
+    assert ss.CubicSpline(KNOTS, p, S2) == ss.CubicSpline(KNOTS, p, S2, bc_type="natural")
+    assert ss.CubicSpline(KNOTS, p, S2).bc_type == "natural"
+
+
+@every_common
+def test_bare_clamped_is_zero_velocity(space):
+    p = points_on(space, 6)
+    zero = each(np.zeros_like, at_node(space, p, 0))
+    spline = ss.CubicSpline(KNOTS, p, space, bc_type="clamped")
+    assert same_curve(spline, ss.CubicSpline(KNOTS, p, space, bc_type=((1, zero), (1, zero))))
+    assert spline.speed(KNOTS[[0, -1]]).max() < 4 * EPS
+
+
+def test_a_given_velocity_is_kept_to_the_last_bits():
+    p = points_on(S2, 6)
+    v, w = tangents_at(S2, p[0]), tangents_at(S2, p[-1])
+    spline = ss.CubicSpline(KNOTS, p, S2, bc_type=((1, v), (1, w)))
+    assert np.abs(spline.velocities[0] - v).max() < 4 * EPS
+    assert np.abs(spline.velocities[-1] - w).max() < 4 * EPS
+
+
+@every_space
+def test_end_vectors_are_kept(space):
+    p = points_on(space, step=0.5)
+    for orders in ((1, 2), (2, 1)):
+        ends = tuple(
+            (order, tangents_at(space, at_node(space, p, e)))
+            for order, e in zip(orders, (0, -1), strict=True)
+        )
+        spline = ss.CubicSpline(KNOTS, p, space, bc_type=ends)
+        for (order, vector), e in zip(ends, (0, -1), strict=True):
+            here, found = at_node(space, spline.points, e), spline(KNOTS[e], nu=order)
+            most = 1e-13 if order == 1 else 1e-11
+            assert vectors_off(space, spline(KNOTS[e]), found, here, vector) < most
+
+
+@every_space
+def test_a_closed_curve(space):
+    p = points_on(space, step=0.5)
+    p = each(lambda a, b: np.concatenate([a, b]), p, pick(p, slice(-2, None, -1)))
+    spline = ss.CubicSpline(None, p, space, bc_type="periodic")
+    x, y = spline(0.0), spline(10.0)
+    assert off(space, x, y) < 100 * EPS
+    for nu in (1, 2):
+        assert vectors_off(space, x, spline(0.0, nu), y, spline(10.0, nu)) < 1e-12
+
+
+@pytest.mark.parametrize(
+    "bc_type", ["natural", "clamped", "not-a-knot", ((1, [1.0, 2]), (2, [0.5, -1]))], ids=str
+)
+def test_end_conditions_mean_what_they_mean_in_scipy(bc_type):
+    p = points_on(ss.Euclidean(2), 6)
+    spline, flat = ss.CubicSpline(KNOTS, p, "r:2", bc_type=bc_type), FlatSpline(KNOTS, p, bc_type=bc_type)
+    assert np.abs(spline.velocities - flat(KNOTS, 1)).max() < 1e-13
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (1,), (2, 1), (1, 3), (2, 3)], ids=str)
+@pytest.mark.parametrize("order", [1, 2])
+def test_end_vectors_broadcast_to_the_batch(shape, order):
+    p = np.array(points_on(S2, 6, (2, 3)))
+    # One start for all curves, so that one vector is tangent to all.
+    p[..., 0, :] = p[0, 0, 0]
+    v = tangents_at(S2, np.broadcast_to(p[0, 0, 0], (*shape, 3)))
+    spline = ss.CubicSpline(KNOTS, p, S2, bc_type=((order, v), "natural"))
+    for i in np.ndindex(2, 3):
+        own = np.broadcast_to(v, (2, 3, 3))[i]
+        alone = ss.CubicSpline(KNOTS, p[i], S2, bc_type=((order, own), "natural"))
+        assert same(spline.velocities[i], alone.velocities)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1815)
+
+
+@pytest.mark.parametrize("part", [0.5, 0.93, 0.97, 0.995])
+def test_given_velocities_stay_near_the_cut_locus(part, rng):
+    p = walk(ss.Sphere(2), 0.3, 5, rng)
+    v = 3 * part * np.pi * unit_tangent(ss.Sphere(2), p[0], rng)
+    spline = ss.CubicSpline(None, p, "sphere:2", bc_type=((1, v), "natural"), on_failure="ignore")
+    assert np.abs(spline.velocities[0] - v).max() <= 1e-12 * np.abs(v).max()
+
+
+# ---- bad end conditions ----
+
+
+TANGENT, ACROSS = [0, 0.5, 0], [0.5, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "bc_type, match",
+    [
+        ("foo", r"bc_type is 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair .*'foo'"),
+        (None, r"bc_type is .*got None"),
+        (3, r"bc_type is .*got 3"),
+        (("natural",), r"bc_type is .*got \('natural',\)"),
+        (("natural",) * 3, r"bc_type is .*got \('natural', 'natural', 'natural'\)"),
+        (("natural", "foo"), r"the end is 'foo'"),
+        (("periodic", "natural"), r"the start is 'periodic'"),
+        ((1, TANGENT), r"the start is 1"),
+        (("natural", (3, TANGENT)), r"the end is \(3, \[0, 0\.5, 0\]\)"),
+        (("natural", (0, TANGENT)), r"the end is \(0, "),
+        (((1,), "natural"), r"the start is \(1,\)"),
+        (((1, [0, 1]), "natural"), r"the start velocity has shape \(2,\), but Sphere\(2\) needs shape"),
+        (((2, 0.5), "natural"), r"the start acceleration has shape \(\), but"),
+        (
+            ((1, np.zeros((2, 3))), "natural"),
+            r"the start velocity has shape \(2, 3\), which does not broadcast to \(3,\)",
+        ),
+        (
+            ((1, [0, 1j, 0]), "natural"),
+            r"the start velocity must be an array of real numbers, not of complex128",
+        ),
+        (((1, None), "natural"), r"the start velocity must be an array of real numbers, not of object"),
+        (("natural", (1, ["a", "b", "c"])), r"the end velocity must be an array of real numbers, not of <U1"),
+        (((1, [0, NAN, 0]), "natural"), r"the start velocity holds NaN; it must be finite"),
+        (("natural", (2, [0, INF, 0])), r"the end acceleration holds inf; it must be finite"),
+        (
+            ((1, ACROSS), "natural"),
+            r"the start velocity is not tangent at its point: a part of 1\.000e0 .*project_tangent",
+        ),
+        (("natural", (2, [0, 1, 1])), r"the end acceleration is not tangent .*a part of 7\.071e-1"),
+    ],
+    ids=str,
+)
+def test_bad_end_conditions(bc_type, match):
+    fit_error(match, bc_type=bc_type)
+
+
+def test_bad_end_conditions_in_a_batch():
+    fit_error(
+        r"the start velocity of curve 1 is not tangent",
+        None,
+        TWO,
+        bc_type=((1, [TANGENT, ACROSS]), "natural"),
+    )
+    fit_error(
+        r"the start velocity of curve 1 holds NaN",
+        None,
+        TWO,
+        bc_type=((1, [TANGENT, [NAN, 0, 0]]), "natural"),
+    )
+    fit_error(r"does not broadcast to \(2, 3\)", None, TWO, bc_type=((1, np.zeros((3, 3))), "natural"))
+
+
+def test_curves_that_are_not_closed():
+    match = r"first and last point are 1\.571e0 apart \(allowed: 1e-8\); repeat the first point at the end"
+    fit_error(match, bc_type="periodic")
+    closed = [*P, P[0]]
+    fit_error(r"first and last point of curve 1 are", None, [closed, [*P, P[1]]], bc_type="periodic")
+
+
+@pytest.mark.parametrize("name", [case.name for case in CASES])
+def test_end_vectors_that_are_not_finite(name):
+    p = points(name)
+    v = tangents_at(ss.space(name), p[0])
+    v.flat[-1] = NAN
+    with pytest.raises(ss.ValidationError, match=r"the start velocity holds NaN; it must be finite"):
+        ss.CubicSpline(None, p, name, bc_type=((1, v), "natural"))
+    with pytest.raises(ss.ValidationError, match=r"u\[0.* is not finite"):
+        ss.evaluate(0.5, None, p, np.stack([v] * 4), name)
+
+
+@pytest.mark.parametrize("name", [case.name for case in CASES])
+def test_end_vectors_that_are_not_tangent(name):
+    space = ss.space(name)
+    p = points(name)
+    rng = np.random.default_rng(0)
+    v = rng.standard_normal(p[0].shape) + (
+        1j * rng.standard_normal(p[0].shape) if space.dtype.kind == "c" else 0
+    )
+    if np.abs(space.project_tangent(p[0], v) - v).max() < 1e-6:
+        assert isinstance(space, ss.Euclidean) or p[0].size == 1
+        return
+    match = r"the start velocity is not tangent at its point: a part of .*project_tangent"
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.CubicSpline(None, p, space, bc_type=((1, v), "natural"))
+
+
+@pytest.mark.parametrize("name", ["cp:1", "u:2", "hpd:2"])
+def test_shapes_in_messages_are_those_that_were_given(name):
+    space = ss.space(name)
+    p = points(name)
+    shape = space.point_shape
+    with pytest.raises(ss.ValidationError) as caught:
+        ss.CubicSpline(None, p, space, bc_type=((1, np.zeros((3, *shape))), "natural"))
+    assert f"has shape {(3, *shape)}, which does not broadcast to {shape}" in str(caught.value)
+    for call in (space.log, space.check_tangent):
+        with pytest.raises(ss.ValidationError) as caught:
+            call(p, p[:3])
+        assert str((4, *shape)) in str(caught.value) and str((3, *shape)) in str(caught.value)
+    with pytest.raises(ss.ValidationError) as caught:
+        space.exp(np.zeros((4, 7)), p)
+    assert "p has shape (4, 7)" in str(caught.value)
+
+
+# ---- too fast ----
+
+
+@pytest.mark.parametrize("h, largest", [(1.0, r"9\.42477\d"), (0.5, r"18\.8495\d*")])
+def test_too_fast_end_velocities(h, largest):
+    t = [0, h, 2, 3 - h / 2, 3 + h / 2]
+    p = S2.geodesic(P[0], P[1], np.linspace(0, 1, 5))
+    match = (
+        rf"velocity has speed 20\.0+, too fast for its segment of length {h:g}: .*must stay below {largest}"
+    )
+    fit_error("the start " + match, t, p, bc_type=((1, [0, 20, 0]), "natural"))
+    fit_error("the end " + match, t, p, bc_type=("natural", (1, [-20, 0, 0])))
+
+
+def test_the_largest_end_velocity_is_the_one_named():
+    limit = 3 * np.pi
+    fit_error("too fast", points=P[:2], bc_type=((1, [0, limit * (1 + 1e-15), 0]), "natural"))
+    fit_error(
+        "too fast for .* of curve 1|of curve 1 .*too fast",
+        None,
+        TWO,
+        bc_type=((1, [[0, 1, 0], [0, 10, 0]]), "natural"),
+    )
+    # Just below is no matter of validation; whether there is a curve is another question.
+    ss.CubicSpline(None, P, S2, bc_type=((1, [0, limit * 0.99, 0]), "natural"), on_failure="ignore")
+
+
+def test_no_end_velocity_is_too_fast_without_a_cut_locus():
+    ss.CubicSpline(None, P, "r:3", bc_type=((1, [1e6, 0, 0]), "natural"))
+
+
+@pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,5", "so:3", "u:2", "su:2", "se:3"])
+def test_end_velocities_that_are_too_fast(name):
+    space = ss.space(name)
+    p = points(name)
+    v = tangents_at(space, p[0])
+    v *= 30 / space.norm(p[0], v)
+    match = r"the start velocity has speed 30\.0+, too fast for its segment of length 1: .* must stay below \d+\.\d+"
+    with pytest.raises(ss.ValidationError, match=match) as caught:
+        ss.CubicSpline(None, p, space, bc_type=((1, v), "natural"))
+    allowed = float(str(caught.value).rpartition(" ")[2])
+    # Whether there is a curve is another question.
+    ss.CubicSpline(None, p, space, bc_type=((1, v * 0.99 * allowed / 30), "natural"), on_failure="ignore")
+
+
+@pytest.mark.parametrize(
+    ("name", "angles", "most"),
+    [
+        # A plane turns by its largest angle, whatever the others.
+        ("gr:2,5", [1.0, 1.0], np.pi / 2),
+        ("cgr:2,4", [1.0, 0.9], np.pi / 2),
+        # Eigenvalues meet when their phases are 2π apart.
+        ("su:3", [1.0, -1.0, 0.0], np.pi),
+        ("su:3", [1.0, -0.5, -0.5], 4 * np.pi / 3),
+        ("u:3", [1.0, -1.0, 0.9], np.pi),
+    ],
+)
+def test_end_velocities_are_too_fast_from_the_cut_locus_on(name, angles, most, rng):
+    space = ss.space(name)
+    p = walk(space, 0.1, 4, rng)
+    k = len(angles)
+    if name[0] in "gc":
+        u, _, w = np.linalg.svd(space.random_tangent(rng, p[0]), full_matrices=False)
+        v = (u * angles) @ w
+    else:
+        turn = ss.Unitary(k).random_point(rng)
+        v = p[0] @ (turn * (1j * np.array(angles))) @ turn.conj().T
+    v = space.project_tangent(p[0], v)
+    # The leg is a third of the velocity.
+    ss.CubicSpline(None, p, space, bc_type=((1, 3 * 0.98 * most * v), "natural"), on_failure="ignore")
+    with pytest.raises(ss.ValidationError, match="too fast"):
+        ss.CubicSpline(None, p, space, bc_type=((1, 3 * 1.02 * most * v), "natural"), on_failure="ignore")

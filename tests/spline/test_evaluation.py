@@ -1,0 +1,198 @@
+"""Evaluation: shapes, times in any order, derivatives, speed, and bad times."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from curves import (
+    KNOTS,
+    S2,
+    each,
+    every_batch,
+    every_common,
+    every_space,
+    found,
+    pick,
+    points_on,
+    same,
+    shaped,
+)
+from refused import INF, NAN, TWO, P
+
+import symspline as ss
+
+
+@every_space
+@every_batch
+def test_what_evaluation_returns(space, batch):
+    spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)
+    for x in (
+        0.7,
+        np.float32(0.7),
+        np.array(2),
+        np.zeros(0),
+        [0.5, 4.0],
+        np.ones((2, 0, 3)),
+        np.ones((2, 1, 3)),
+        [[1, 2]],
+    ):
+        lead = (*batch, *np.shape(x))
+        for nu in range(3):
+            assert found(spline(x, nu=nu)) == shaped(space, lead)
+        assert np.shape(spline.speed(x)) == lead and spline.speed(x).dtype == np.float64
+    x = np.linspace(0, 4, math.prod(batch) * 2).reshape(*batch, 2)
+    for nu in range(3):
+        own = spline(x, nu, per_curve=True)
+        assert found(own) == shaped(space, x.shape)
+        for i in np.ndindex(*batch):
+            assert same(pick(own, i), pick(spline(x[i], nu), i))
+
+
+@every_common
+def test_any_order_of_times(space):
+    spline = ss.CubicSpline(KNOTS, points_on(space, 6, (2,)), space)
+    x = np.random.default_rng(2).uniform(0, 4.5, (3, 50))
+    order = np.argsort(x, axis=None)
+    for nu in range(3):
+        at_once = spline(x, nu=nu)
+        sorted_ones = spline(x.ravel()[order], nu=nu)
+        flat = each(lambda y: y.reshape(2, 150, *y.shape[3:])[:, order], at_once)
+        assert same(flat, sorted_ones)
+
+
+@pytest.mark.parametrize("x", [2, 2.0, np.float32(2), np.int8(2), np.array(2.0), True + 1], ids=repr)
+def test_one_time_gives_one_point(x):
+    spline = ss.CubicSpline(KNOTS, points_on(S2, 6), S2)
+    assert same(spline(x), spline([2.0])[0])
+
+
+def test_many_times_equal_one_by_one():
+    spline = ss.CubicSpline(KNOTS, points_on(S2, 6), S2)
+    x = np.linspace(0, 4.5, 37)
+    for nu in range(3):
+        assert same(spline(x, nu=nu), np.array([spline(y, nu=nu) for y in x]))
+
+
+@every_common
+def test_per_curve(space):
+    spline = ss.CubicSpline(KNOTS, points_on(space, 6, (2, 3)), space)
+    for own in [(), (4,), (2, 2)]:
+        x = np.random.default_rng(1).uniform(0, 4.5, (2, 3, *own))
+        value, speed = spline(x, nu=1, per_curve=True), spline.speed(x, per_curve=True)
+        assert found(value) == shaped(space, x.shape)
+        assert speed.shape == x.shape
+        for i, j in np.ndindex(2, 3):
+            assert same(each(lambda v, i=i, j=j: v[i, j], value), spline[i][j](x[i, j], nu=1))
+
+
+def test_per_curve_of_one_curve_changes_nothing():
+    spline = ss.CubicSpline(KNOTS, points_on(S2, 6), S2)
+    assert same(spline([0.5, 2], per_curve=True), spline([0.5, 2]))
+
+
+@every_space
+def test_velocity_and_speed(space):
+    spline = ss.CubicSpline(KNOTS, points_on(space, batch=(2,), step=0.5), space)
+    x = np.linspace(0, 4, 9)
+    y, v = spline(x), spline(x, nu=1)
+    space.check_point(y)
+    space.check_tangent(y, v)
+    space.check_tangent(y, spline(x, nu=2))
+    assert np.allclose(spline.speed(x), space.norm(y, v), rtol=1e-13, atol=0)
+
+
+# ---- bad times ----
+
+
+@pytest.mark.parametrize(
+    "x, match",
+    [
+        (NAN, r"x is NaN; times must be finite"),
+        ([0.5, NAN], r"x\[1\] is NaN; times must be finite"),
+        ([0.5, 1, INF], r"x\[2\] is inf; times must be finite"),
+        (2.5, r"x = 2\.5 is outside the knots \[0, 2\].*extrapolate=True, 'geodesic' or 'periodic'"),
+        ([0, 2, -0.25], r"x\[2\] = -0\.25 is outside the knots"),
+        (np.nextafter(2, 3), r"x = 2\.0000000000000004 is outside the knots"),
+        (1j, r"x must be numbers, not complex128"),
+        ("a", r"x must be numbers, not <U1"),
+        (None, r"x must be numbers, not object"),
+        (np.timedelta64(1, "s"), r"x must be numbers, not timedelta64"),
+        (np.datetime64("2024-01-01"), r"the knots are numbers, so x must be numbers, not datetime64"),
+    ],
+    ids=str,
+)
+def test_bad_times_of_evaluation(x, match):
+    spline = ss.CubicSpline(None, P, S2)
+    for call in (spline, spline.speed, lambda x: ss.evaluate(x, None, P, spline.velocities, S2)):
+        with pytest.raises(ss.ValidationError, match=match):
+            call(x)
+
+
+@pytest.mark.parametrize("policy", [None, True, "geodesic", "periodic"])
+@pytest.mark.parametrize("x", [NAN, INF, -INF])
+def test_no_policy_makes_sense_of_nan(policy, x):
+    spline = ss.CubicSpline(None, P, S2, extrapolate=policy)
+    with pytest.raises(ss.ValidationError, match=r"x\[1\] is (NaN|-?inf); times must be finite"):
+        spline([1.0, x])
+
+
+def test_the_curve_of_a_bad_time_is_named():
+    spline = ss.CubicSpline([[0, 1, 2], [0, 1, 3]], TWO, S2)
+    with pytest.raises(ss.ValidationError, match=r"x = 2\.5 is outside the knots \[0, 2\] of curve 0"):
+        spline(2.5)
+    with pytest.raises(ss.ValidationError, match=r"x\[1,1\] is NaN"):
+        spline([[1, 1], [1, NAN]], per_curve=True)
+    with pytest.raises(ss.ValidationError, match=r"must begin with the batch axes \(2,\); got \(3,\)"):
+        spline(np.ones(3), per_curve=True)
+
+
+def test_dates_and_numbers_do_not_mix():
+    spline = ss.CubicSpline(np.datetime64("2024-01-01") + np.arange(3), P, S2)
+    with pytest.raises(
+        ss.ValidationError, match=r"the knots are dates, so x must be datetime64, not float64"
+    ):
+        spline(0.5)
+    with pytest.raises(ss.ValidationError, match=r"x\[1\] is NaT"):
+        spline(np.array(["2024-01-01", "NaT"], "M8[D]"))
+    with pytest.raises(ss.ValidationError, match=r"x = .* is outside the knots"):
+        spline(np.datetime64("2023-12-31"))
+
+
+def named(message, arrays):
+    """The element that the first subscript in a message picks."""
+    name, subscript = re.match(r"(\w+)((?:\[[^]]*\])+)", message).groups()
+    value = arrays[name]
+    for index in re.findall(r"\[([^]]*)\]", subscript):
+        value = value[tuple(map(int, index.split(",")))]
+    return value
+
+
+@pytest.mark.parametrize("argument", ["t", "x"])
+def test_indices_are_those_of_the_array_that_was_given(argument):
+    t = np.broadcast_to([0.0, 1, 2], (2, 2, 3)).copy()
+    with pytest.raises(ss.ValidationError) as caught:
+        if argument == "t":
+            t[1, 0, 1] = NAN
+            ss.CubicSpline(t, np.stack([TWO, TWO]), S2)
+        else:
+            x = np.array([[0.5, 1.5], [1.0, NAN]])
+            ss.CubicSpline(None, P, S2)(x)
+    assert np.isnan(named(str(caught.value), {"t": t} if argument == "t" else {"x": x}))
+
+
+def test_messages_are_short():
+    with pytest.raises(ss.ValidationError) as caught:
+        ss.CubicSpline(None, P, S2)(-1e-300)
+    assert len(str(caught.value)) < 250
+
+
+@pytest.mark.parametrize("nu", [3, -1, 1.5, "1", None])
+def test_bad_derivatives(nu):
+    with pytest.raises(ss.ValidationError, match=r"nu must be 0, 1 or 2, not "):
+        ss.CubicSpline(None, P, S2)(0.5, nu=nu)
+
+
+def test_bad_policies_of_a_call():
+    with pytest.raises(ss.ValidationError, match=r"extrapolate must be .*not 'foo'"):
+        ss.CubicSpline(None, P, S2)(0.5, extrapolate="foo")

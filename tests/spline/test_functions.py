@@ -1,0 +1,135 @@
+"""`fit`, `evaluate` and `fit_many` do what the class does."""
+
+import numpy as np
+import pytest
+from curves import (
+    KNOTS,
+    S2,
+    THREE,
+    at_node,
+    each,
+    every_batch,
+    every_common,
+    every_space,
+    pick,
+    points_on,
+    same,
+    same_curve,
+    tangents_at,
+    with_ends,
+)
+from refused import NAN, P
+
+import symspline as ss
+
+
+@every_common
+def test_evaluate_per_curve(space):
+    spline = ss.CubicSpline(None, points_on(space, 5, (2,)), space)
+    x = np.array([[0.5, 1], [2, 3.5]])
+    found = ss.evaluate(x, None, spline.points, spline.velocities, space, per_curve=True)
+    assert same(found, spline(x, per_curve=True))
+
+
+def test_evaluate_over_dates():
+    spline = ss.CubicSpline(np.datetime64("2024-01-01T00", "h") + np.array([0, 1, 3]), THREE, S2)
+    x = spline.t[0] + np.timedelta64(90, "m")
+    assert same(ss.evaluate(x, spline.t, spline.points, spline.velocities, S2, 1), spline(x, nu=1))
+
+
+@every_common
+def test_fit_many_equals_one_at_a_time(space):
+    curves = []
+    for i, n in enumerate([6, 2, 3, 6, 40, 2, 7, 3, 6, 6, 600]):
+        t = None if i % 3 == 0 else np.cumsum(np.random.default_rng(i).uniform(0.5, 1.5, n))
+        curves.append((t, points_on(space, n, step=0.4, seed=i)))
+    for bc_type in ("natural", "not-a-knot", "clamped"):
+        fitted = ss.fit_many(iter(curves), str(space), bc_type=bc_type, extrapolate=True)
+        assert isinstance(fitted, list) and len(fitted) == len(curves)
+        for spline, (t, p) in zip(fitted, curves, strict=True):
+            alone = ss.CubicSpline(t, p, space, bc_type=bc_type, extrapolate=True)
+            assert type(spline) is type(alone) and same_curve(spline, alone)
+            assert (spline.bc_type, spline.extrapolate) == (bc_type, True)
+
+
+def test_fit_many_with_a_vector_for_every_curve():
+    v = tangents_at(S2, np.broadcast_to([1.0, 0, 0], (2, 3)))
+    curves = [(None, THREE), ([0, 2], THREE[:2])]
+    fitted = ss.fit_many(curves, S2, bc_type=((1, v), "natural"))
+    for i, (t, p) in enumerate(curves):
+        assert same_curve(fitted[i], ss.CubicSpline(t, p, S2, bc_type=((1, v[i]), "natural")))
+        assert same(fitted[i].bc_type[0][1], v[i])
+
+
+def test_fit_many_of_closed_curves_and_of_dates():
+    closed = [(None, [*THREE, THREE[0]]), (np.datetime64("2024-01-01") + np.arange(4), [*THREE, THREE[0]])]
+    for spline, (t, p) in zip(ss.fit_many(closed, S2, bc_type="periodic"), closed, strict=True):
+        assert same_curve(spline, ss.CubicSpline(t, p, S2, bc_type="periodic"))
+
+
+def test_fit_many_of_nothing():
+    assert ss.fit_many([], S2) == []
+
+
+def test_everything_is_exported():
+    for name in ss.__all__:
+        assert getattr(ss, name) is not None
+    assert {"CubicSpline", "fit", "evaluate", "fit_many", "load", "space", "Product"} <= set(ss.__all__)
+
+
+@every_space
+@every_batch
+def test_fit_and_evaluate_are_the_class(space, batch):
+    p = points_on(space, batch=batch, step=0.5)
+    options = {"bc_type": ("not-a-knot", with_ends(space, p)[1]), "method": "fixed-point", "tol": 1e-10}
+    spline = ss.CubicSpline(KNOTS, p, space, **options)
+    u, report = ss.fit(KNOTS, p, str(space), **options)
+    assert same(u, spline.velocities) and report == spline.report
+    x = np.linspace(-0.5, 4.75, 8)
+    for nu in range(3):
+        values = ss.evaluate(x, KNOTS, spline.points, u, str(space), nu, extrapolate="geodesic")
+        assert same(values, spline(x, nu, extrapolate="geodesic"))
+    with pytest.raises(ss.ValidationError, match="outside the knots"):
+        ss.evaluate(x, KNOTS, spline.points, u, space)
+
+
+@every_space
+def test_fit_many_is_one_at_a_time(space):
+    curves = []
+    for i, n in enumerate([5, 2, 9, 3]):
+        t = None if i % 2 else np.cumsum(np.random.default_rng(i).uniform(0.5, 1.5, n))
+        curves.append((t, points_on(space, n, step=0.4, seed=i)))
+    starts = each(lambda *rows: np.stack(rows), *(at_node(space, p, 0) for _, p in curves))
+    v = tangents_at(space, starts)
+    fitted = ss.fit_many(curves, str(space), bc_type=((1, v), "natural"))
+    for i, (t, p) in enumerate(curves):
+        alone = ss.CubicSpline(t, p, space, bc_type=((1, pick(v, i)), "natural"))
+        assert same_curve(fitted[i], alone)
+        assert same(fitted[i].bc_type[0][1], alone.bc_type[0][1])
+
+
+# ---- bad input ----
+
+
+def test_evaluate_compares_shapes():
+    with pytest.raises(ss.ValidationError, match=r"u has shape \(2, 3\), but points \(3, 3\)"):
+        ss.evaluate(0.5, None, P, P[:2], S2)
+    with pytest.raises(ss.ValidationError, match=r"t has shape \(2,\), but 3 points"):
+        ss.evaluate(0.5, [0, 1], P, P, S2)
+    with pytest.raises(ss.ValidationError, match=r"at least two points"):
+        ss.evaluate(0.5, None, P[:1], P[:1], S2)
+
+
+@pytest.mark.parametrize(
+    "t, p, u",
+    [
+        ([0, 2, 1], P, 0 * P),
+        ([0, 1, 1], P, 0 * P),
+        ([0, NAN, 2], P, 0 * P),
+        ([0, 1, 2], 2 * P, 0 * P),
+        ([0, 1, 2], NAN * P, 0 * P),
+    ],
+)
+def test_evaluate_checks_its_input(t, p, u):
+    with pytest.raises(ss.ValidationError):
+        ss.evaluate(0.5, t, p, u, S2)

@@ -1,0 +1,106 @@
+"""Options of a fit: methods and limits, and what is none."""
+
+import numpy as np
+import pytest
+from curves import KNOTS, S2, every_common, largest_difference, points_on
+from refused import INF, NAN, P, fit_error
+
+import symspline as ss
+
+
+@every_common
+def test_methods_agree(space):
+    p = points_on(space, 6)
+    reference = ss.CubicSpline(KNOTS, p, space)
+    for method in ("fixed-point", "quasi-newton"):
+        spline = ss.CubicSpline(KNOTS, p, space, method=method)
+        assert spline.report.method == method
+        assert spline.report.converged
+        assert largest_difference(spline.velocities, reference.velocities) < 1e-12
+
+
+def test_newton_is_a_method():
+    p = points_on(S2, 6)
+    newton, auto = (ss.CubicSpline(KNOTS, p, S2, method=method) for method in ("newton", "auto"))
+    assert newton.report.method == "newton"
+    assert newton.report.iterations < auto.report.iterations
+    assert largest_difference(newton.velocities, auto.velocities) < 1e-12
+
+
+def test_tol_and_max_iter_bound_the_work():
+    p = points_on(S2, 6)
+    fine, rough = (ss.CubicSpline(KNOTS, p, S2, tol=tol).report for tol in (1e-12, 1e-3))
+    assert rough.iterations < fine.iterations
+    assert fine.residual <= 1e-12 and rough.residual <= 1e-3
+    few = ss.CubicSpline(KNOTS, p, S2, max_iter=2, on_failure="ignore").report
+    assert few.iterations == 2 and not few.converged
+    enough = ss.CubicSpline(KNOTS, p, S2, max_iter=fine.iterations).report
+    assert enough.converged
+
+
+# ---- bad options ----
+
+
+@pytest.mark.parametrize(
+    "options, match",
+    [
+        ({"method": "foo"}, r"method must be .*'auto'.*'quasi-newton'.*foo"),
+        ({"tol": -1}, r"tol must be a number >= 0, not -1"),
+        ({"tol": NAN}, r"tol must be a number >= 0, not NaN"),
+        ({"tol": INF}, r"tol must be a number >= 0, not inf"),
+        ({"max_iter": 0}, r"max_iter must be at least 1"),
+        ({"extrapolate": "foo"}, r"extrapolate must be None, True, 'geodesic' or 'periodic', not 'foo'"),
+        ({"extrapolate": False}, r"extrapolate must be .*, not False"),
+        ({"on_failure": "foo"}, r"on_failure must be 'raise', 'warn' or 'ignore', not 'foo'"),
+        ({"on_failure": None}, r"on_failure must be .*, not None"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("how", ["class", "product", "fit", "fit_many"])
+def test_bad_options(options, match, how):
+    if how == "class":
+        fit_error(match, **options)
+    with pytest.raises(ss.ValidationError, match=match):
+        if how == "product":
+            ss.CubicSpline(None, (P, P), "sphere:2 x r:3", **options)
+        elif how == "fit_many":
+            ss.fit_many([(None, P)], S2, **options)
+        else:
+            ss.fit(None, P, S2, **options)
+
+
+@pytest.mark.parametrize("options", [{"max_iter": 1.5}, {"tol": "small"}, {"method": None}], ids=str)
+def test_options_of_a_wrong_type(options):
+    with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
+        ss.CubicSpline(None, P, S2, **options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"max_iter": -1},
+        {"max_iter": 10**30},
+        {"extrapolate": np.array([1, 2])},
+        {"bc_type": (([1], [0, 0.5, 0]), "natural")},
+        {"progress": 5},
+    ],
+    ids=str,
+)
+def test_options_that_cannot_be_understood(options):
+    with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
+        ss.CubicSpline(None, P, S2, **options)
+
+
+def test_unknown_options():
+    for call in (ss.CubicSpline, ss.fit):
+        with pytest.raises(TypeError, match="smooth"):
+            call(None, P, S2, smooth=True)
+    with pytest.raises(TypeError, match="smooth"):
+        ss.fit_many([(None, P)], S2, smooth=True)
+
+
+def test_messages_quote_no_large_arrays():
+    # NumPy would write out all of it, as no axis is long.
+    wrong = np.zeros((2,) * 20)
+    with pytest.raises(ss.ValidationError, match=r"not an array of shape \(2, 2, 2, .*\)$"):
+        ss.CubicSpline(None, P, S2, on_failure=wrong)

@@ -1,0 +1,248 @@
+"""Points of a curve: arrays of any type and layout, batches, and what is no array of points."""
+
+import pickle
+
+import numpy as np
+import pytest
+from cases import CASES, EPS
+from curves import (
+    KNOTS,
+    S2,
+    THREE,
+    at_node,
+    each,
+    every_batch,
+    every_single,
+    every_space,
+    found,
+    off,
+    parts,
+    pick,
+    points_on,
+    same,
+    same_curve,
+    shaped,
+    tangents_at,
+    with_ends,
+)
+from refused import P, fit_error, points
+
+import symspline as ss
+
+
+@every_space
+@every_batch
+@pytest.mark.parametrize("ends", ["not-a-knot", "vectors"])
+def test_leading_axes_are_curves(space, batch, ends):
+    p = points_on(space, batch=batch, step=0.5)
+    bc_type = with_ends(space, p) if ends == "vectors" else ends
+    spline = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type)
+    assert found(spline.points) == found(spline.velocities) == shaped(space, (*batch, 6))
+    assert np.all(spline.report.converged)
+    assert off(space, spline(KNOTS), p) < 20 * EPS
+    for i in np.ndindex(*batch):
+        own = bc_type if ends != "vectors" else tuple((order, pick(v, i)) for order, v in bc_type)
+        alone = ss.CubicSpline(KNOTS, pick(p, i), space, bc_type=own)
+        assert same(pick(spline.velocities, i), alone.velocities)
+
+
+# ---- types ----
+
+
+@pytest.mark.parametrize("dtype", [int, "i1", "u8", "f2", "f4", ">f8", bool])
+def test_points_of_any_number_type(dtype):
+    p = np.array(THREE, dtype)
+    spline = ss.CubicSpline(None, p, S2)
+    assert spline.points.dtype == spline.velocities.dtype == spline(0.5).dtype == np.float64
+    assert spline == ss.CubicSpline(None, THREE, S2)
+
+
+def origin(space):
+    """A point of whole numbers."""
+    shape = space.point_shape
+    return np.eye(*shape, dtype=int) if len(shape) == 2 else np.eye(1, *shape, dtype=int)[0]
+
+
+@every_single
+@pytest.mark.parametrize("dtype", ["i8", "i1", "f2", "f4", "f8"])
+def test_whole_numbers(space, dtype):
+    p = np.stack([origin(space)] * 3).astype(dtype)
+    spline = ss.CubicSpline(None, p, space)
+    assert spline.points.dtype == spline.velocities.dtype == spline(0.5).dtype == space.dtype
+    assert same(spline.points, p.astype(space.dtype))
+    assert spline == ss.CubicSpline(None, p.astype(float), space)
+    assert not spline.velocities.any()
+
+
+@every_space
+def test_single_precision(space):
+    p = points_on(space, step=0.5)
+    single = each(lambda a: a.astype(np.complex64 if a.dtype.kind == "c" else np.float32), p)
+    space.check_point(single)
+    spline = ss.CubicSpline(KNOTS, single, space)
+    assert found(spline.points) == found(spline.velocities) == shaped(space, (6,))
+    assert found(spline(0.5)) == shaped(space, ())
+    assert off(space, spline.points, p) < 1e-5
+    space.check_point(spline.points)
+
+
+REAL = {"cp": "rp", "cgr": "gr", "u": "so", "su": "so", "hpd": "spd"}
+
+
+@pytest.mark.parametrize("name", ["cp:2", "cgr:2,5", "u:2", "u:3", "su:2", "su:5", "hpd:2", "hpd:5"])
+def test_real_points_of_a_complex_space(name):
+    """They run in the real space inside it."""
+    space = ss.space(name)
+    family, _, size = name.partition(":")
+    inside = ss.space(f"{REAL[family]}:{size}")
+    p = points_on(inside, step=0.5)
+    v = tangents_at(inside, p[0])
+    spline = ss.CubicSpline(KNOTS, p, space, bc_type=((1, v), "natural"))
+    assert same_curve(spline, ss.CubicSpline(KNOTS, p + 0j, space, bc_type=((1, v + 0j), "natural")))
+    real = ss.CubicSpline(KNOTS, p, inside, bc_type=((1, v), "natural"))
+    x = np.linspace(0, 4, 9)
+    assert spline(x).dtype == np.complex128
+    assert off(space, spline(x), real(x) + 0j) < 1e-12
+    assert space.exp(p, 0 * p).dtype == space.log(p[0], p[1]).dtype == np.complex128
+
+
+# ---- memory ----
+
+
+@every_space
+@pytest.mark.parametrize("layout", ["lists", "Fortran", "strided", "backwards", "big-endian", "read-only"])
+def test_any_layout(space, layout):
+    def laid(array):
+        if layout == "lists":
+            return array.tolist()
+        if layout == "Fortran":
+            return np.asfortranarray(array)
+        if layout == "backwards":
+            return np.ascontiguousarray(array[..., ::-1])[..., ::-1]
+        if layout == "big-endian":
+            return array.astype(array.dtype.newbyteorder(">"))
+        if layout == "read-only":
+            array = array.copy()
+            array.flags.writeable = False
+            return array
+        wide = np.full((*array.shape, 2), 7, array.dtype)
+        wide[..., 0] = array
+        return wide[..., 0]
+
+    p = points_on(space, batch=(2,), step=0.5)
+    spline = ss.CubicSpline(KNOTS, p, space)
+    assert same_curve(ss.CubicSpline(laid(KNOTS), each(laid, p), space), spline)
+    x = np.array([0.5, 2.0])
+    assert same(spline(laid(x)), spline(x))
+
+
+@every_space
+def test_input_is_never_changed(space):
+    # Slightly off the space, so that there is something to change.
+    p = each(lambda a: a + 1e-10 * np.ones_like(a), points_on(space, step=0.5))
+    q = at_node(space, p, 0)
+    v, t, x = tangents_at(space, q), KNOTS.copy(), np.array([3.0, 0.1])
+    arrays = [t, x, *parts(p), *parts(v)]
+    copies = [a.copy() for a in arrays]
+    spline = ss.CubicSpline(t, p, space, bc_type=((1, v), "not-a-knot"))
+    spline(x), spline(x, nu=2), spline.speed(x), spline.length(), spline.control_points
+    ss.evaluate(x, t, p, spline.velocities, space)
+    ss.fit_many([(t, p)], space)
+    space.check_point(p), space.project(p), space.project_tangent(q, v), space.exp(q, v), space.norm(q, v)
+    space.distance(q, p), space.log(q, at_node(space, p, 1)), space.random_tangent(np.random.default_rng(), p)
+    assert all(same(a, b) for a, b in zip(arrays, copies, strict=True))
+
+
+@every_space
+def test_a_spline_keeps_its_own_arrays(space):
+    p, t = points_on(space, step=0.5), KNOTS.copy()
+    v = tangents_at(space, at_node(space, p, 0))
+    spline = ss.CubicSpline(t, p, space, bc_type=((1, v), "natural"))
+    before = pickle.loads(pickle.dumps(spline))
+    for array in (t, *parts(p), *parts(v)):
+        array[...] = 7
+    assert same_curve(spline, before) and same(spline.bc_type[0][1], before.bc_type[0][1])
+    for array in (spline.t, *parts(spline.points), *parts(spline.velocities), *parts(spline.bc_type[0][1])):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+
+
+# ---- what is no array of points ----
+
+
+@pytest.mark.parametrize(
+    "points, match",
+    [
+        (np.ones((3, 4)), r"points has shape \(3, 4\), but Sphere\(2\) needs shape \(\.\.\., 3\)"),
+        (np.ones((3, 1)), r"points has shape \(3, 1\), but Sphere\(2\) needs"),
+        (
+            np.ones(3),
+            r"shape \(3,\), which is one point; a curve needs shape \(\.\.\., N\+1, \*point_shape\)",
+        ),
+        (np.ones(()), r"no points given; a curve needs at least two"),
+        ([], r"no points given; a curve needs at least two"),
+        (np.ones((0, 3)), r"no points given; a curve needs at least two"),
+        ([[1, 0, 0]], r"at least two points; got one"),
+        (np.ones((4, 1, 3)), r"at least two points; got one"),
+    ],
+    ids=lambda x: str(np.shape(x)) if not isinstance(x, str) else "",
+)
+def test_shapes_of_points(points, match):
+    fit_error(match, points=points)
+
+
+@pytest.mark.parametrize(
+    "points", [P + 0j, P.astype(str), P.astype(object), None, P.astype("M8[s]"), "points"]
+)
+def test_points_are_real_numbers(points):
+    fit_error(r"points must be an array of real numbers, not of|no points given", points=points)
+
+
+@pytest.mark.parametrize("argument", ["points", "t", "x", "end vector"])
+def test_ragged_lists(argument):
+    ragged = [[1, 0, 0], [0, 1]]
+    with pytest.raises(ss.ValidationError):
+        if argument == "x":
+            ss.CubicSpline(None, P, S2)(ragged)
+        elif argument == "end vector":
+            ss.CubicSpline(None, P, S2, bc_type=((1, ragged), "natural"))
+        else:
+            ss.CubicSpline(**{"t": None, "points": P, argument: ragged}, space=S2)
+
+
+@pytest.mark.parametrize("name", [case.name for case in CASES])
+@pytest.mark.parametrize("dtype", [str, object, "M8[s]"])
+def test_points_that_are_no_numbers(name, dtype):
+    space = ss.space(name)
+    p = np.zeros((3, *space.point_shape), int).astype(dtype)
+    with pytest.raises(ss.ValidationError, match=r"points must be an array of (real )?numbers, not of "):
+        ss.CubicSpline(None, p, space)
+
+
+@pytest.mark.parametrize(
+    "name, meant",
+    [
+        ("sphere:3", "ComplexProjective"),
+        ("rp:2", "ComplexProjective"),
+        ("gr:2,5", "ComplexGrassmannian"),
+        ("so:3", "SpecialUnitary"),
+        ("o:3", "Unitary"),
+        ("spd:2", "HermitianPositiveDefinite"),
+    ],
+)
+def test_complex_points_of_a_real_space(name, meant):
+    p = points(name) + 0j
+    match = rf"points must be an array of real numbers, not of complex128; did you mean {meant}\?"
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.CubicSpline(None, p, name)
+    with pytest.raises(ss.ValidationError, match=rf"p must be .*did you mean {meant}\?"):
+        ss.space(name).exp(p, p)
+    with pytest.raises(ss.ValidationError, match=rf"factor 1, .*did you mean {meant}\?"):
+        ss.CubicSpline(None, (np.zeros((4, 1)), p), f"r:1 x {name}")
+    assert hasattr(ss, meant)
+
+
+@pytest.mark.parametrize("name", ["euclidean:3", "hyperbolic:2", "se:3"])
+def test_complex_points_where_nothing_else_is_meant(name):
+    with pytest.raises(ss.ValidationError, match=r"real numbers, not of complex128$"):
+        ss.CubicSpline(None, points(name) + 0j, name)

@@ -1,0 +1,93 @@
+"""Products: tuples go in, tuples come out, and every factor is a curve of its own."""
+
+import numpy as np
+import pytest
+from curves import KNOTS, S2, found, points_on, same, shaped
+from refused import TWO, P, changed, fit_error
+
+import symspline as ss
+
+
+def test_a_product_speaks_in_tuples():
+    space = ss.Product(ss.Sphere(3), ss.Euclidean(2))
+    p = points_on(space, 5)
+    spline = ss.CubicSpline(None, p, space)
+    x = [0.5, 2.0]
+    for value in (spline.points, spline.velocities, spline.control_points, spline(0.5), spline(x, nu=1)):
+        assert isinstance(value, tuple) and len(value) == 2
+    assert found(spline(x)) == shaped(space, (2,))
+    for i, factor in enumerate(space.factors):
+        alone = ss.CubicSpline(None, p[i], factor)
+        assert all(same(spline(x, nu=nu)[i], alone(x, nu=nu)) for nu in range(3))
+    assert spline == ss.CubicSpline(None, list(p), space)
+
+
+def test_lengths_add_as_in_pythagoras_in_a_product():
+    p = points_on(S2, 6)
+    one, both = ss.CubicSpline(KNOTS, p, S2), ss.CubicSpline(KNOTS, (p, p), ss.Product(S2, S2))
+    x = np.linspace(0, 4.5, 11)
+    assert np.allclose(both.speed(x), np.sqrt(2) * one.speed(x), rtol=1e-14)
+    assert both.length() == pytest.approx(np.sqrt(2) * one.length(), rel=1e-13)
+    assert both.bending_energy() == pytest.approx(2 * one.bending_energy(), rel=1e-13)
+
+
+def test_max_step_of_a_product():
+    space = ss.Product("r:1", "r:1")
+    p = np.array([[0.0], [3], [3]]), np.array([[0.0], [0], [4]])
+    # The steps are 3 and 4; no two neighbours are 5 apart.
+    assert ss.CubicSpline(None, p, space).report.max_step == pytest.approx(4)
+
+
+# ---- bad input ----
+
+
+PRODUCT = "sphere:2 x r:1"
+
+
+FLAT = np.zeros((3, 1))
+
+
+@pytest.mark.parametrize(
+    "points, options, match",
+    [
+        (
+            P,
+            {},
+            r"points must be a tuple of 2 arrays, one a factor of Product\(Sphere\(2\), Euclidean\(1\)\)",
+        ),
+        ((P,), {}, r"points must be a tuple of 2 arrays"),
+        ((P, FLAT, FLAT), {}, r"points must be a tuple of 2 arrays"),
+        ((FLAT, P), {}, r"points has shape \(3, 1\), but Sphere\(2\) needs"),
+        ((P, FLAT), {"bc_type": ((1, [0, 0, 0]), "natural")}, r"an end vector must be a tuple of 2 arrays"),
+        ((P, FLAT), {"bc_type": "foo"}, r"the start is 'foo'"),
+        ((P, FLAT), {"bc_type": ("natural",)}, r"a pair, not \('natural',\)"),
+        ((P, FLAT), {"bc_type": ("natural", (1,))}, r"an end condition is a word or a pair"),
+    ],
+)
+def test_bad_products(points, options, match):
+    fit_error(match, None, points, PRODUCT, **options)
+
+
+def test_a_product_has_factors():
+    with pytest.raises(ss.ValidationError, match="at least two factors"):
+        ss.Product("sphere:2")
+    space = ss.space(PRODUCT)
+    with pytest.raises(ss.ValidationError, match=r"needs tuples of 2 arrays, one a factor"):
+        space.exp((P, FLAT), (P,))
+
+
+def test_factors_of_different_lengths():
+    fit_error("points", None, (P, np.zeros((4, 1))), PRODUCT)
+
+
+def test_factors_of_different_batch_axes():
+    fit_error("batch axes differ", None, (TWO, np.zeros((3, 3, 1))), PRODUCT)
+
+
+def test_the_bad_factor_of_a_product_is_named():
+    flat = np.zeros((3, 1))
+    fit_error(r"points\[1\]\[2\]|factor 1|Sphere\(2\)", None, (flat, changed(2, [0, 0, 2])), "r:1 x sphere:2")
+
+
+def test_a_product_is_checked_before_any_work():
+    fit_error("off the space", None, (np.zeros((3, 1)), changed(2, [0, 0, 2])), "r:1 x sphere:2")

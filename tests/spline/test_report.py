@@ -1,0 +1,89 @@
+"""What a report says of a fit."""
+
+import json
+
+import numpy as np
+import pytest
+from curves import (
+    KNOTS,
+    S2,
+    at_node,
+    every_batch,
+    every_common,
+    every_single,
+    every_space,
+    failing,
+    points_on,
+)
+
+import symspline as ss
+
+FIELDS = [
+    "method",
+    "converged",
+    "iterations",
+    "residual",
+    "max_step",
+    "curvature",
+    "invariant_radius",
+    "rate",
+]
+
+
+@every_space
+def test_report_of_one_curve(space):
+    p = points_on(space, step=0.5)
+    report = ss.CubicSpline(KNOTS, p, space).report
+    assert list(vars(report)) == FIELDS
+    assert report.method in ("fixed-point", "quasi-newton", "newton")
+    assert report.converged is True
+    assert isinstance(report.iterations, int) and report.iterations >= 1
+    assert 0 <= report.residual <= 1e-12
+    assert report.curvature == space.curvature or np.isnan(space.curvature)
+    assert 0 <= report.rate < 1
+
+
+@every_single
+@every_batch
+def test_max_step_is_the_longest_distance(space, batch):
+    if isinstance(space, ss.SpecialEuclidean):
+        # There is no invariant metric: it is measured elsewhere.
+        return
+    p = points_on(space, batch=batch, step=0.5)
+    before, after = at_node(space, p, 2), at_node(space, p, 3)
+    np.moveaxis(p, len(batch), 0)[3] = space.exp(before, 1.4 * space.log(before, after))
+    steps = [space.distance(at_node(space, p, i), at_node(space, p, i + 1)) for i in range(5)]
+    found = ss.CubicSpline(KNOTS, p, space).report.max_step
+    assert np.allclose(found, np.max(steps, axis=0), rtol=1e-13, atol=0)
+
+
+@every_common
+@pytest.mark.parametrize("batch", [(1,), (4,), (2, 3)], ids=str)
+def test_report_of_a_batch(space, batch):
+    report = ss.CubicSpline(KNOTS, points_on(space, 6, batch), space).report
+    for name in ("converged", "iterations", "residual", "max_step", "rate"):
+        assert getattr(report, name).shape == batch
+    assert report.converged.dtype == bool and report.iterations.dtype.kind == "i"
+    assert isinstance(report.method, str) and report.curvature == space.curvature
+
+
+@every_space
+@every_batch
+def test_report_reads_as_one_line(space, batch):
+    spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)
+    line = str(spline.report)
+    assert "\n" not in line and 20 < len(line) < 160
+    assert "converged" in line and spline.report.method in line
+
+
+def test_report_says_what_failed():
+    p, options = failing("cut locus")
+    spline = ss.CubicSpline(None, p, S2, on_failure="ignore", **options)
+    assert "2 of 3 curves converged" in str(spline.report)
+    assert "NOT converged" in str(spline[1].report)
+
+
+def test_state_is_described_by_plain_json():
+    # Used by whoever logs reports.
+    report = ss.CubicSpline(None, np.eye(3), S2).report
+    assert json.loads(json.dumps(vars(report)))["converged"] is True
