@@ -14,7 +14,7 @@ from tabular import AXES, PAIR, numbers, table, write
 import symspline as ss
 from symspline.cli import main
 
-README = Path(__file__).parents[1] / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 
 
 def test_the_example_of_the_readme(run):

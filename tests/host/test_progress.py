@@ -157,7 +157,7 @@ def test_ctrl_c_stops_a_long_fit(n):
             process.kill()
 
 
-INTERRUPTED = """
+WORKING = """
 import sys, numpy as np, symspline as ss
 
 space = ss.space("{name}")
@@ -188,7 +188,7 @@ print("well", flush=True)
     ids=["points", "speeds", "operations", "large-matrices"],
 )
 def test_ctrl_c_stops_long_work(name, work):
-    command = [sys.executable, "-c", INTERRUPTED.format(name=name, work=work)]
+    command = [sys.executable, "-c", WORKING.format(name=name, work=work)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "started\n"

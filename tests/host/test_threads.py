@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from cases import SPACES
+from cases import COMMON
 from curves import S3, each, every_common, points_on, run_python, same, same_curve, scattered
 
 import symspline as ss
@@ -97,7 +97,7 @@ def test_other_threads_run_during_a_fit(threads, n):
 
 
 def work(seed):
-    space = SPACES[seed % len(SPACES)]
+    space = COMMON[seed % len(COMMON)]
     p = points_on(space, 40, (3,), step=0.5, seed=seed % 8)
     spline = ss.CubicSpline(None, p, space, bc_type="not-a-knot")
     x = np.linspace(0, 39, 200)
