@@ -120,9 +120,20 @@ def _curves(spline: CubicSpline, x: ArrayLike, nu: int) -> tuple[_Curves, tuple[
                 "derivatives with respect to the data are known between the first and the last knot"
             )
         )
-    velocities = np.ascontiguousarray(spline._velocities).view(np.float64)
+    velocities = np.ascontiguousarray(solved(spline)).view(np.float64)
     points = np.ascontiguousarray(spline._points).view(np.float64)
     return _Curves(knots, points, velocities, ends_of(spline._bc_type, space, batch), own, curves, nu), shape
+
+
+def solved(spline: CubicSpline) -> Array:
+    """The velocities; NaN of curves that have not converged, as what holds at a solution does not hold there."""
+    # A spline that was made of velocities has no report.
+    if not hasattr(spline, "_report"):
+        return spline._velocities
+    converged = np.reshape(
+        spline._report.converged, (*spline._batch, *(1,) * (len(spline._space.point_shape) + 1))
+    )
+    return np.asarray(np.where(converged, spline._velocities, np.nan))
 
 
 def _per_curve(knots: Array, batch: tuple[int, ...]) -> NDArray[np.float64]:

@@ -23,6 +23,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 from ._adapters import Kinds, fitted, joined, split
+from ._derivatives import solved
 from .spaces import Space
 from .spaces import space as space_named
 from .spline import CubicSpline
@@ -49,7 +50,8 @@ def curve(
         points: shape (..., N+1, *point_shape); for a `Product` a tuple.
         space: the space or its name.
         bc_type: as for `CubicSpline`; vectors may be arrays of JAX.
-        options: further options of `CubicSpline`.
+        options: further options of `CubicSpline`. With ``on_failure="ignore"`` derivatives of curves that have not
+            converged are NaN.
 
     Returns:
         Shape batch axes + x.shape + point_shape; for a `Product` a tuple.
@@ -87,9 +89,9 @@ class _Fixed:
         return hash(self._key())
 
     def fit(self, x: Any, t: Any, points: Any, vectors: Any) -> tuple[Any, Any]:
-        """The curve at x, and the velocities at the knots."""
+        """The curve at x, and the velocities at the knots: NaN of curves that have not converged."""
         spline = fitted(t, points, vectors, self.space, self.kinds, dict(self.options))
-        return spline(x), spline.velocities
+        return spline(x), solved(spline)
 
     def spline(self, t: Any, points: Any, velocities: Any, vectors: Any) -> Any:
         """The spline with known velocities."""

@@ -248,7 +248,15 @@ class CubicSpline:
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return integrate(self._times, lambda x: self._evaluate(x, "bend", None, True) ** 2, self._batch)
+        # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
+        unit = np.broadcast_to(self._times[..., -1:] - self._times[..., :1], (*self._batch, 1))
+
+        def power(x: NDArray[np.float64]) -> Array:
+            bend: Array = self._evaluate(x, "bend", None, True) * unit * unit
+            return bend * bend / unit
+
+        with np.errstate(all="ignore"):
+            return integrate(self._times, power, self._batch) / unit[..., 0] / unit[..., 0] / unit[..., 0]
 
     # ---- how it follows its data ----
 
@@ -276,7 +284,8 @@ class CubicSpline:
 
         Returns:
             Tangent vectors at the points of the curve, shape batch axes + x.shape + point_shape. With ``nu`` 1 or 2
-            covariant derivatives: how γ' or ∇γ' change seen from the moving point.
+            covariant derivatives: how γ' or ∇γ' change seen from the moving point. NaN for curves that have not
+            converged.
 
         Raises:
             ValidationError: the input is not what is described above, or the space has very many dimensions.
@@ -303,7 +312,8 @@ class CubicSpline:
         Returns:
             A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu))`` is
             ``sum(g.points * points) + sum(g.t * t)`` and the same for the vectors at the ends: plain sums of products.
-            Vectors in it are tangent. Of a closed curve the last point has no gradient of its own.
+            Vectors in it are tangent. Of a closed curve the last point has no gradient of its own. NaN for curves that
+            have not converged.
 
         Raises:
             ValidationError: the input is not what is described above, or the space has very many dimensions.
