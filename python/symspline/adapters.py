@@ -9,7 +9,6 @@ import numpy as np
 from ._core import ValidationError
 from .curves.curve import Curve
 from .curves.derivatives import places
-from .curves.fit import curve_of
 from .spaces import Array, Space
 from .spline import CubicSpline
 
@@ -54,14 +53,6 @@ def fitted(
     return CubicSpline(t, projected, space, bc_type=joined(kinds, (ends[0], ends[1])), **options)
 
 
-def known_velocities(spline: CubicSpline) -> Array:
-    """The velocities from which derivatives are made: NaN for a curve that did not converge. Derivatives follow
-    from the C² condition, which only curves that converged fulfil; without it they would be wrong in silence."""
-    velocities: Array = np.array(spline.velocities)
-    velocities[~np.asarray(spline.report.converged)] = np.nan
-    return velocities
-
-
 class Movable(NamedTuple):
     """A fitted curve in a space that is no product, and the end conditions that it follows its data by."""
 
@@ -92,5 +83,4 @@ class Movable(NamedTuple):
 
 def movable(spline: CubicSpline) -> Movable:
     """A spline, not in a product, whose derivatives are wanted."""
-    curve = curve_of(spline.space, spline._times, [(spline.points, known_velocities(spline))])
-    return Movable(curve, spline.bc_type)
+    return Movable(spline._solved(), spline.bc_type)

@@ -22,7 +22,7 @@ from jax.core import ShapedArray
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from .adapters import Kinds, Movable, fitted, joined, known_velocities, split
+from .adapters import Kinds, Movable, fitted, joined, split
 from .curves.ends import ends_in_factors
 from .curves.fit import curve_of
 from .spaces import Product, Space, parts_of
@@ -91,7 +91,7 @@ class _Fixed:
     def fit(self, x: Any, t: Any, points: Any, vectors: Any) -> tuple[Any, Any]:
         """The curve at x, and the velocities at the knots from which its derivatives are made."""
         spline = fitted(t, points, vectors, self.space, self.kinds, dict(self.options))
-        return spline(x), known_velocities(spline)
+        return spline(x), spline._solved().velocities
 
     def movable(self, t: Any, points: Any, velocities: Any, vectors: Any) -> Movable:
         """The curve with velocities that a fit found."""

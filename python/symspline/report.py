@@ -26,11 +26,13 @@ class Report:
         method: the solver that was used: ``"auto"`` tries quasi-newton, then newton, then the homotopy; of
             a batch the last that any curve needed.
         converged: whether the residual is below the tolerance, or at the rounding floor (256 ε times
-            the condition of the data).
+            the condition of the data), and all control legs are inside the cut locus. It is true of the curve:
+            across the seam of a closed curve, too.
         iterations: how often the C² residual was evaluated.
         residual: the C² defect of a knot divided by 1/hᵢ₋₁ + 1/hᵢ, relative to the largest speed |u| (or to
             a thousandth of the largest distance over time between neighbours, if all speeds are smaller);
-            the largest of all knots.
+            the largest of all knots. At an end with not-a-knot it is the error of the velocity there, divided by
+            1 + h₀/h₁.
         max_step: D of (21), the longest distance between neighbouring points.
         curvature: K of (22).
         invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so

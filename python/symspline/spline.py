@@ -15,7 +15,7 @@ from .arrays import read_only, shown
 from .curves.curve import Curve, quantity_of
 from .curves.derivatives import Gradient, Places, places
 from .curves.ends import ends_in_factors, kept, picked
-from .curves.fit import fit, read, read_ends
+from .curves.fit import curve_of, fit, read, read_ends
 from .curves.integrals import integrate
 from .curves.solve import Progress
 from .curves.together import longest_step
@@ -173,17 +173,21 @@ class CubicSpline:
 
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
-        return self._integral("speed", 1)
+        curve = self._curve
+        return integrate(curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch)
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return self._integral("bend", 2)
+        # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
+        times = self._times
+        unit = np.broadcast_to(times[..., -1:] - times[..., :1], (*self._batch, 1))
 
-    def _integral(self, quantity: str, power: int) -> Any:
-        curve = self._curve
-        return integrate(
-            curve.times, lambda x: curve.evaluate(x, quantity, self._outside, True) ** power, curve.batch
-        )
+        def power(x: NDArray[np.float64]) -> Array:
+            bend: Array = self._curve.evaluate(x, "bend", self._outside, True) * unit * unit
+            return bend * bend / unit
+
+        with np.errstate(all="ignore"):
+            return integrate(times, power, self._batch) / unit[..., 0] / unit[..., 0] / unit[..., 0]
 
     # ---- how it follows its data ----
 
@@ -211,7 +215,8 @@ class CubicSpline:
 
         Returns:
             Tangent vectors at the points of the curve, shape batch axes + x.shape + point_shape. With ``nu`` 1 or 2
-            covariant derivatives: how γ' or ∇γ' change seen from the moving point.
+            covariant derivatives: how γ' or ∇γ' change seen from the moving point. NaN for curves that have not
+            converged.
 
         Raises:
             ValidationError: the input is not what is described above, or the space has very many dimensions.
@@ -222,7 +227,7 @@ class CubicSpline:
         >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
         array([0.6875])
         """
-        return self._curve.push(self._places(x, nu), self._bc_type, points, t, ends)
+        return self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
 
     def vjp(self, x: ArrayLike, cotangent: Any, nu: int = 0) -> Gradient:
         """The gradient of ``sum(cotangent * curve)`` with respect to the data: `jvp`, transposed.
@@ -236,7 +241,8 @@ class CubicSpline:
         Returns:
             A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu))`` is
             ``sum(g.points * points) + sum(g.t * t)`` and the same for the vectors at the ends: plain sums of products.
-            Vectors in it are tangent. Of a closed curve the last point has no gradient of its own.
+            Vectors in it are tangent. Of a closed curve the last point has no gradient of its own. NaN for curves that
+            have not converged.
 
         Raises:
             ValidationError: the input is not what is described above, or the space has very many dimensions.
@@ -246,7 +252,19 @@ class CubicSpline:
         >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
         [[0.40625], [0.6875], [-0.09375]]
         """
-        return self._curve.pull(self._places(x, nu), self._bc_type, cotangent)
+        return self._solved().pull(self._places(x, nu), self._bc_type, cotangent)
+
+    def _solved(self) -> Curve:
+        """The curve from which derivatives are made: NaN where it did not converge. They follow from the C² condition,
+        which only curves that converged fulfil; without it they would be wrong in silence."""
+        if all(np.all(report.converged) for report in self._reports):
+            return self._curve
+        found = []
+        for part, report in zip(self._curve.parts, self._reports, strict=True):
+            velocities = np.array(part.velocities)
+            velocities[~np.asarray(report.converged)] = np.nan
+            found.append((part.points, velocities))
+        return curve_of(self.space, self._times, found)
 
     def _places(self, x: ArrayLike, nu: int) -> Places:
         curve = self._curve

@@ -34,7 +34,8 @@ def curve(
         points: shape (..., N+1, *point_shape); for a `Product` a tuple.
         space: the space or its name.
         bc_type: as for `CubicSpline`; vectors may be tensors.
-        options: further options of `CubicSpline`.
+        options: further options of `CubicSpline`. With ``on_failure="ignore"`` derivatives of curves that have not
+            converged are NaN.
 
     Returns:
         Shape batch axes + x.shape + point_shape; for a `Product` a tuple.

@@ -74,15 +74,15 @@ pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work:
     pool.in_place_scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|_| {
+                let _done = Done { queue: &queue, busy: &busy, wake: &wake };
                 while !monitor.cancelled()
                     && let Some(item) = take(&queue)
                 {
                     work(item);
                 }
-                *busy.lock().unwrap_or_else(|e| e.into_inner()) -= 1;
-                wake.notify_one();
             });
         }
+        // When a thread panics the scope passes it on, once all have stopped.
         // The caller's thread only watches: it is the one that may be asked to stop. It asks without the
         // lock, because the answer may have to wait for others that wait for these threads.
         let working = || {
@@ -102,4 +102,49 @@ pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work:
 
 fn take<T>(queue: &Mutex<std::vec::IntoIter<T>>) -> Option<T> {
     queue.lock().unwrap_or_else(|e| e.into_inner()).next()
+}
+
+/// Says that a thread works no longer, also one that panics: then nothing more is begun.
+struct Done<'a, T> {
+    queue: &'a Mutex<std::vec::IntoIter<T>>,
+    busy: &'a Mutex<usize>,
+    wake: &'a Condvar,
+}
+
+impl<T> Drop for Done<'_, T> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            *self.queue.lock().unwrap_or_else(|e| e.into_inner()) = Vec::new().into_iter();
+        }
+        *self.busy.lock().unwrap_or_else(|e| e.into_inner()) -= 1;
+        self.wake.notify_one();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::sync::mpsc;
+
+    #[test]
+    fn a_panic_of_a_thread_comes_to_the_caller_at_once() {
+        set_num_threads(2);
+        let (send, receive) = mpsc::channel();
+        std::thread::spawn(move || {
+            let quiet = |_| true;
+            let begun = AtomicUsize::new(0);
+            let work = |i: usize| {
+                begun.fetch_add(1, Ordering::Relaxed);
+                assert!(i != 3, "the fourth item");
+                std::thread::sleep(Duration::from_millis(5));
+            };
+            let run = || for_each((0..10_000).collect(), true, &Monitor::new(&quiet), work);
+            let failed = catch_unwind(AssertUnwindSafe(run)).is_err();
+            // Nobody listens any more if this comes too late.
+            let _ = send.send((failed, begun.load(Ordering::Relaxed)));
+        });
+        let (failed, begun) = receive.recv_timeout(Duration::from_secs(2)).expect("the call returns");
+        assert!(failed && begun < 100);
+    }
 }

@@ -1,5 +1,6 @@
 //! Rotations of three dimensions, SO(3), by unit quaternions: S³ covers SO(3) twice, and a rotation
-//! vector ω is twice a tangent vector of S³. What is solved and evaluated is the sphere's.
+//! vector ω is twice a tangent vector of S³. What is solved and evaluated is the sphere's, with q and −q as one
+//! point.
 
 use crate::rigid::{Quaternion, Vector, conjugate, cross, multiply, of_matrix, rotate, to_matrix};
 use crate::unitary::{UnitaryGroup, special_orthogonal};
@@ -222,7 +223,7 @@ impl Origin for Rotations {
     ) {
         let half = |x: &[S]| [x[0], x[1], x[2]].each(|x| x * HALF);
         let d = [d[0], d[1], d[2]].each(|x| x * HALF);
-        cc::legs::<1, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
+        cc::legs::<1, true, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
         w_plus.iter_mut().chain(w_minus).for_each(|w| *w = *w * TWO);
     }
     #[inline(always)]
@@ -252,14 +253,17 @@ impl Covered for Rotations {
     }
     #[inline(always)]
     fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]) {
-        let first = quaternion(p[0]);
-        let mut last = quaternion(p[1]);
-        // Of q and −q the one that is nearer.
-        let flip = dot(&first, &last).simd_lt(Lane::ZERO);
-        last = last.each(|x| flip.select(-x, x));
-        for (e, q) in [first, last].into_iter().enumerate() {
+        for e in 0..2 {
+            let q = quaternion(p[e]);
             y[e].copy_from_slice(&q);
             w[e].copy_from_slice(&times_pure(q, vector(p[e], v[e]).each(|x| x * HALF)));
+        }
+    }
+    #[inline(always)]
+    fn choose(&self, from: &[Lane], [q, y, w]: [&mut [Lane]; 3]) {
+        let flip = dot(from, q).simd_lt(Lane::ZERO);
+        if flip.any() {
+            q.iter_mut().chain(y).chain(w).for_each(|x| *x = flip.select(-*x, *x));
         }
     }
     #[inline(always)]

@@ -92,6 +92,9 @@ pub fn fit<'py>(
             validate::knots(t, c, if shared { &[] } else { &batch })?;
         }
         py.detach(|| validate::points(&handle.space.get(), p, &offsets, &batch, point_tol))?;
+        if ends.is_none() {
+            py.detach(|| validate::closed(&handle.space.get(), p, &offsets, &batch, point_tol))?;
+        }
     }
     let ends_now = match &ends {
         None => Ends::Periodic,
@@ -166,6 +169,23 @@ fn faults(
                 format!(
                     "the control leg at points[{index}]{of} passes the cut locus: angle {angle}, limit {limit}; \
                      put more points there, or give times that suit the distances"
+                ),
+            ),
+            Status::MiddleLeg { index, angle } => (
+                "cut-locus",
+                format!(
+                    "the control points between points[{index}] and points[{}]{of} lie at or past each other's cut \
+                     locus: angle {angle}, limit {limit}; put a point between them, or give times that suit the \
+                     distances",
+                    index + 1
+                ),
+            ),
+            Status::Unconverged if !r.residual.is_finite() => (
+                "unconverged",
+                format!(
+                    "no convergence{of}: after {} iterations the numbers were too large for doubles (longest step \
+                     {:.3}); put more points where steps are long, or choose times that suit the distances",
+                    r.iterations, r.max_step
                 ),
             ),
             Status::Unconverged => (

@@ -48,11 +48,14 @@ pub fn points(
     batch: &[usize],
     tol: f64,
 ) -> PyResult<()> {
-    project_points(space, points, tol).map_err(|(row, off, why)| {
+    let which = |row: usize| {
         let curve = offsets.partition_point(|&o| o <= row) - 1;
-        let which = format!("points[{}]{}", row - offsets[curve], of_curve(curve, batch));
-        off_space(&which, off, tol, &why)
-    })?;
+        format!("points[{}]{}", row - offsets[curve], of_curve(curve, batch))
+    };
+    project_points(space, points, tol).map_err(|(row, off, why)| off_space(&which(row), off, tol, &why))?;
+    if let Some((row, why)) = space.beyond_doubles(points) {
+        return Err(invalid(format!("{} {why}", which(row))));
+    }
     if !space.is_connected() {
         one_component(space, points, offsets, batch)?;
     }
@@ -77,7 +80,42 @@ fn one_component(space: &Erased, points: &[f64], offsets: &[usize], batch: &[usi
     Ok(())
 }
 
-/// End vectors must be tangent and velocities not too fast; closed curves must be closed.
+/// Closed curves must be closed. What is left between last and first point goes: the last array becomes one of
+/// the first point.
+pub fn closed(
+    space: &Erased,
+    points: &mut [f64],
+    offsets: &[usize],
+    batch: &[usize],
+    tol: f64,
+) -> PyResult<()> {
+    let len = space.point_len();
+    let quiet = |_| true;
+    let monitor = Monitor::new(&quiet);
+    for (c, ends) in offsets.windows(2).enumerate() {
+        let first = points[ends[0] * len..(ends[0] + 1) * len].to_vec();
+        let last = &mut points[(ends[1] - 1) * len..ends[1] * len];
+        if first == *last {
+            continue;
+        }
+        let (mut distance, mut way) = ([0.0], vec![0.0; len]);
+        let _ = apply(space, Operation::Distance, &[&first, last], &[], &monitor, &mut distance);
+        if !(distance[0] <= tol) {
+            return Err(invalid(format!(
+                "bc_type='periodic' needs a closed curve, but first and last point{} are {:.3e} apart \
+                 (allowed: {tol:.0e}); repeat the first point at the end",
+                of_curve(c, batch),
+                distance[0]
+            )));
+        }
+        let _ = apply(space, Operation::Log, &[last, &first], &[], &monitor, &mut way);
+        let from = last.to_vec();
+        let _ = apply(space, Operation::Exp, &[&from, &way], &[], &monitor, last);
+    }
+    Ok(())
+}
+
+/// End vectors must be tangent and velocities not too fast.
 pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyResult<()> {
     let len = space.point_len();
     let curves = problem.offsets.len() - 1;
@@ -90,19 +128,7 @@ pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyR
     }
     let quiet = |_| true;
     let monitor = Monitor::new(&quiet);
-    let Ends::Open(ends) = problem.ends else {
-        let mut distance = vec![0.0; curves];
-        let _ = apply(space, Operation::Distance, &[&first, &last], &[], &monitor, &mut distance);
-        return match distance.iter().position(|d| !(*d <= tol)) {
-            Some(c) => Err(invalid(format!(
-                "bc_type='periodic' needs a closed curve, but first and last point{} are {:.3e} apart \
-                 (allowed: {tol:.0e}); repeat the first point at the end",
-                of_curve(c, batch),
-                distance[c]
-            ))),
-            None => Ok(()),
-        };
-    };
+    let Ends::Open(ends) = problem.ends else { return Ok(()) };
     for (e, end) in ends.iter().enumerate() {
         let (name, p) = if e == 0 { ("start", &first) } else { ("end", &last) };
         let (order, v) = match end {
@@ -118,8 +144,8 @@ pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyR
         let mut scaled = v.to_vec();
         for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
             let h = end_segment(problem, c, e);
-            let scale = if order == "velocity" { h } else { h * h };
-            v.iter_mut().for_each(|x| *x *= scale);
+            let scale = if order == "velocity" { 1.0 } else { h };
+            v.iter_mut().for_each(|x| *x = *x * h * scale);
         }
         let defects = tangent_defects(space, p, &scaled);
         if let Some(c) = defects.iter().position(|d| !(*d <= tol)) {

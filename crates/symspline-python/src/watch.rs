@@ -1,6 +1,8 @@
 //! Ctrl-C and progress while compiled code runs without the GIL.
 
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use symspline::monitor::Monitor;
@@ -9,7 +11,7 @@ use symspline::monitor::Monitor;
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// Runs `work` without the GIL. From time to time signals are checked and `progress` is called with
-/// the finished and the total number of units; an exception in either stops the work.
+/// the finished and the total number of units; an exception in either stops the work. A panic is a RuntimeError.
 pub fn watched<T: Send>(
     py: Python,
     progress: Option<Py<PyAny>>,
@@ -29,10 +31,16 @@ pub fn watched<T: Send>(
         *state = (Instant::now(), seen.err());
         state.1.is_none()
     };
-    let result = py.detach(|| work(&Monitor::new(&go_on)));
+    let monitor = Monitor::new(&go_on);
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&monitor))));
     if let Ok(Some(error)) = state.into_inner().map(|s| s.1) {
         return Err(error);
     }
+    let result = result.map_err(|panic| {
+        let what = panic.downcast_ref::<String>().map(String::as_str);
+        let what = what.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no reason was given");
+        PyRuntimeError::new_err(format!("this is an error in symspline, please report it: {what}"))
+    })?;
     if let Some(progress) = progress {
         progress.call1(py, (total, total))?;
     }

@@ -278,9 +278,10 @@ pub fn prepare<const K: i32>(chord: &[Lane], prepared: &mut [Lane]) {
     prepared.copy_from_slice(&[trig.s, trig.k * kappa::<K>(), square]);
 }
 
-/// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only.
+/// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only. With `PAIRS`
+/// x and −x are one point, and the nearer one is meant.
 #[inline(always)]
-pub fn legs<const K: i32, S: Scalar>(
+pub fn legs<const K: i32, const PAIRS: bool, S: Scalar>(
     d: &[Lane],
     prepared: &[Lane],
     a: &[S],
@@ -304,7 +305,10 @@ pub fn legs<const K: i32, S: Scalar>(
     let (plus, height) = leg::<K, S>(chord, ta, tb, ab, ad, bd);
     // M⁻¹ = E(b) E(−d) E(a) is M with d, a, b replaced by −d, −b, −a.
     let (minus, _) = leg::<K, S>(chord, tb, ta, ab, bd, ad);
+    let away = if PAIRS { height.value().simd_lt(Lane::ZERO) } else { Lane::ZERO };
+    let height = if PAIRS { S::select(away, -height, height) } else { height };
     let f = theta_over_sin(-height + Lane::ONE, || height.value() + Lane::ONE);
+    let f = if PAIRS { S::select(away, -f, f) } else { f };
     let (plus, minus) = (plus.map(|x| f * x), minus.map(|x| -(f * x)));
     for i in 0..d.len() {
         w_plus[i] = plus[0].fma_lane(d[i], plus[1].fma(a[i], plus[2] * b[i]));

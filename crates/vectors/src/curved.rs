@@ -18,8 +18,8 @@ impl<const K: i32> Ambient for Curved<K> {
     fn cut_angle(&self) -> f64 {
         if K > 0 { std::f64::consts::PI } else { f64::INFINITY }
     }
-    fn longest_leg(&self) -> f64 {
-        if K > 0 { self.cut_angle() } else { hyperbolic::LONGEST_LEG }
+    fn longest_ray(&self) -> f64 {
+        if K > 0 { f64::INFINITY } else { hyperbolic::LONGEST_RAY }
     }
     #[inline(always)]
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
@@ -61,6 +61,9 @@ impl<const K: i32> Ambient for Curved<K> {
     }
     fn complaint(&self, x: &[f64]) -> String {
         if K > 0 { sphere::complaint(x) } else { hyperbolic::complaint(x) }
+    }
+    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
+        if K > 0 { None } else { hyperbolic::beyond_doubles(points, self.point_len()) }
     }
     fn rounding(&self, p: &[Lane]) -> Lane {
         if K > 0 { Lane::ONE } else { hyperbolic::rounding(p) }
@@ -118,7 +121,7 @@ impl<const K: i32> Origin for Curved<K> {
         w_plus: &mut [S],
         w_minus: &mut [S],
     ) {
-        cc::legs::<K, S>(d, prepared, a, b, w_plus, w_minus);
+        cc::legs::<K, false, S>(d, prepared, a, b, w_plus, w_minus);
     }
     #[inline(always)]
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {

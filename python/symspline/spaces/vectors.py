@@ -41,7 +41,8 @@ class Sphere(Space):
 
 class Hyperbolic(Space):
     """Hyperbolic space Hⁿ: points are arrays (x₀, x₁, …, xₙ) on the hyperboloid
-    −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first.
+    −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first. Rounding errors of a point p are ε|p|²;
+    curves are made as far as distance 15 from (1, 0, …), where they are 10⁻³.
 
     >>> import numpy as np, symspline as ss
     >>> ss.Hyperbolic(1).distance([1, 0], [np.cosh(2), np.sinh(2)]).round(8)

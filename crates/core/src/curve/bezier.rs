@@ -13,6 +13,8 @@ pub struct Segment<S> {
     controls: [Vec<Lane>; 2],
     /// `log_{q⁺}(q⁻)`.
     middle: Vec<Lane>,
+    /// Lanes in which that leg is too long for a ray, see [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
+    long: Lane,
     level: [Vec<S>; 3],
 }
 
@@ -26,6 +28,7 @@ impl<S: Scalar> Segment<S> {
             legs: [lanes(), lanes()],
             controls: [lanes(), lanes()],
             middle: lanes(),
+            long: Lane::ZERO,
             level: [points(), points(), points()],
         }
     }
@@ -33,12 +36,26 @@ impl<S: Scalar> Segment<S> {
     /// Computes control points and middle leg from ends and outer legs.
     #[inline(always)]
     pub fn prepare<M: Space>(&mut self, space: &M, len: usize) {
-        let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
-        let [a, b] = self.legs.each_ref().map(|x| &x[..len]);
+        self.prepare_chosen(space, len, |_, _| {});
+    }
+
+    /// The same in a space that covers another one, where `choose` takes one of the points over the second
+    /// control point; see [`Covered::choose`](crate::space::Covered::choose).
+    #[inline(always)]
+    pub fn prepare_chosen<M: Space>(
+        &mut self,
+        space: &M,
+        len: usize,
+        choose: impl FnOnce(&[Lane], [&mut [Lane]; 3]),
+    ) {
+        let [p0, p1] = self.ends.each_mut().map(|x| &mut x[..len]);
+        let [a, b] = self.legs.each_mut().map(|x| &mut x[..len]);
         let [q0, q1] = self.controls.each_mut().map(|x| &mut x[..len]);
         space.ray(p0, a, Lane::ONE, q0);
         space.ray(p1, b, lane(-1.0), q1);
-        space.log(q0, q1, &mut self.middle[..len]);
+        choose(q0, [q1, p1, b]);
+        let angle = space.log(q0, q1, &mut self.middle[..len]);
+        self.long = angle.simd_gt(lane(space.longest_ray()));
     }
 
     /// γ(t), for t in units of the segment.
@@ -53,10 +70,24 @@ impl<S: Scalar> Segment<S> {
         let gamma = &mut gamma[..len];
         space.ray(p0, a, t, x);
         space.ray(&self.controls[0][..len], &self.middle[..len], t, y);
+        if self.long.any() {
+            between(space, &self.controls, self.long, t, y);
+        }
         space.ray(p1, b, t - Lane::ONE, z);
         space.geodesic(x, y, t, gamma);
         space.geodesic(y, z, t, x);
         space.geodesic(gamma, x, t, y);
         gamma.copy_from_slice(y);
     }
+}
+
+/// Replaces points on rays from the first control point by ones on geodesics between both.
+#[cold]
+#[inline(never)]
+fn between<S: Scalar, M: Space>(space: &M, controls: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {
+    let [p, q] =
+        controls.each_ref().map(|q| q[..y.len()].iter().map(|&x| S::constant(x)).collect::<Vec<S>>());
+    let mut x = y.to_vec();
+    space.geodesic(&p, &q, t, &mut x);
+    y.iter_mut().zip(&x).for_each(|(y, x)| *y = S::select(lanes, *x, *y));
 }

@@ -192,7 +192,7 @@ impl Job<'_> {
                 let [y, z] = &mut segment.ends;
                 let [a, b] = &mut segment.legs;
                 space.enter([p0, p1], [v0, v1], [y, z], [a, b]);
-                segment.prepare(&cover, len);
+                segment.prepare_chosen(&cover, len, |from, over| space.choose(from, over));
             },
             |places, segment, gamma, vectors, out| {
                 let (p, vector) = self.sample(&cover, places, segment, gamma, vectors, len);
@@ -287,7 +287,21 @@ impl Job<'_> {
 
 #[inline(always)]
 fn norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
-    max_or_nan(space.inner(p, v, v), Lane::ZERO).sqrt()
+    let square = max_or_nan(space.inner(p, v, v), Lane::ZERO);
+    // What is left of squares that neither overflow nor vanish.
+    let plain = square.simd_ge(lane(1e-280)) & square.simd_le(lane(1e280));
+    if plain.all() { square.sqrt() } else { plain.select(square.sqrt(), scaled_norm(space, p, v)) }
+}
+
+/// The same of vectors of any size: of the vector over its largest number.
+#[cold]
+#[inline(never)]
+fn scaled_norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
+    let largest = v.iter().fold(Lane::ZERO, |most, v| max_or_nan(most, v.abs()));
+    let zero = largest.simd_eq(Lane::ZERO);
+    let unit = zero.select(Lane::ONE, largest);
+    let v: Vec<Lane> = v.iter().map(|v| *v / unit).collect();
+    max_or_nan(space.inner(p, &v, &v), Lane::ZERO).sqrt() * largest
 }
 
 /// The first two rows of a buffer.

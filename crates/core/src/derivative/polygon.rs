@@ -77,12 +77,13 @@ impl Node {
         columns(space.point_len(), space.dim(), |k, out| self.tangent(space, k, out))
     }
 
-    /// The tangent vector g with `Σ g δ = gradient · coordinates(δ)` for all tangent vectors δ.
+    /// The tangent vector g with `Σ g δ = gradient · coordinates(δ)` for all tangent vectors δ: the shortest solution
+    /// of `basisᵀ g = gradient`. By the factors QR of the basis, since its normal equations would square its
+    /// condition.
     pub fn gradient(&self, space: &Erased, gradient: &Vector) -> Vector {
-        let basis = self.basis(space);
-        let gram = basis.tr_mul(&basis);
-        let x = gram.lu().solve(gradient).unwrap_or_else(|| Vector::from_element(gradient.len(), f64::NAN));
-        basis * x
+        let (q, r) = self.basis(space).qr().unpack();
+        let x = r.tr_solve_upper_triangular(gradient);
+        q * x.unwrap_or_else(|| Vector::from_element(gradient.len(), f64::NAN))
     }
 }
 

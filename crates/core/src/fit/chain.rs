@@ -7,6 +7,7 @@
 //! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
 //! long curve.
 
+use super::condition::{ChainEnds, EndKind, of_kind};
 use crate::scalar::{LANES, Lane, Scalar, dot, gather, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 use crate::with_size;
@@ -37,7 +38,7 @@ impl<'a> Run<'a> {
     }
 
     /// The point of the i-th node.
-    fn point(&self, i: usize, len: usize) -> &'a [f64] {
+    pub fn point(&self, i: usize, len: usize) -> &'a [f64] {
         let last = self.t.len() - 1;
         let k = self.first + i;
         let k = if k <= last { k } else { k % last };
@@ -89,20 +90,24 @@ pub struct Chain {
     pub n: usize,
     /// Dimension of the space.
     pub m: usize,
-    /// Segment lengths hᵢ.
+    /// Segment lengths hᵢ, in units of `clock`.
     pub h: Vec<Lane>,
     /// Chords dᵢ, m numbers each.
     pub chord: Vec<Lane>,
     /// What [`Space::prepare`] keeps of each chord.
     pub prepared: Vec<Lane>,
-    /// The unknown velocities uᵢ.
-    pub u: Vec<Lane>,
+    /// The velocities uᵢ.
+    u: Vec<Lane>,
+    /// Whether the last node is the first again.
+    closed: bool,
     /// The C² defect at each node.
     pub r: Vec<Lane>,
     /// Prescribed end vectors, in the frames of the ends.
     pub end_values: [Vec<Lane>; 2],
-    /// What chords and velocities are multiplied by, see [`Space::SCALES`].
+    /// What chords and velocities are multiplied by, see [`Ambient::scales`].
     scale: Lane,
+    /// What times are multiplied by.
+    clock: Lane,
     /// The longest chord of each lane.
     pub max_step: Lane,
     /// The largest |dᵢ|/hᵢ of each lane.
@@ -120,16 +125,17 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Unrolls `n` segments of eight polygons. `ends` are prescribed ambient vectors at the ends.
+    /// Unrolls `n` segments of eight polygons. `values` are prescribed ambient vectors at the ends.
     pub fn unroll(
         &mut self,
         space: &Erased,
         runs: &[Run; LANES],
         n: usize,
-        ends: [Option<[&[f64]; LANES]>; 2],
+        ends: &ChainEnds,
+        values: [Option<[&[f64]; LANES]>; 2],
     ) {
         let (m, len, keep) = (space.dim(), space.point_len(), space.chord_len());
-        (self.n, self.m) = (n, m);
+        (self.n, self.m, self.closed) = (n, m, matches!(ends, ChainEnds::Periodic));
         for (vector, size) in [
             (&mut self.h, n),
             (&mut self.chord, n * m),
@@ -145,14 +151,15 @@ impl Chain {
         self.pace = Lane::ZERO;
 
         self.scale = if space.scales() { scale_of(space, runs, n) } else { Lane::ONE };
+        self.clock = clock_of(runs);
         self.walker.start(space, runs);
         self.start.0.clone_from(&self.walker.frame);
         self.start.1.clone_from(&self.walker.p);
-        self.read_end(space, 0, ends[0]);
+        self.read_end(space, 0, ends, values[0]);
         space.0.walk(self, runs);
         self.max_step = self.max_step.sqrt() / self.scale;
         self.pace = self.pace.sqrt();
-        self.read_end(space, 1, ends[1]);
+        self.read_end(space, 1, ends, values[1]);
     }
 
     /// Goes along the polygon and keeps its chords.
@@ -170,7 +177,7 @@ impl Chain {
         let (m, keep, limit) = (self.m, space.chord_len(), below(space.cut_angle()));
         let scales = space.scales();
         for i in 0..self.n {
-            self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i)));
+            self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i))) * self.clock;
             let d = &mut self.chord[i * m..(i + 1) * m];
             let angle = self.walker.advance(space, runs, len, d);
             if scales {
@@ -193,17 +200,70 @@ impl Chain {
     }
 
     /// The prescribed vector at an end, in the frame there; the walker must stand at that end.
-    fn read_end(&mut self, space: &Erased, end: usize, value: Option<[&[f64]; LANES]>) {
-        self.end_values[end].resize(self.m, Lane::ZERO);
-        match value {
-            Some(rows) => {
-                gather(rows, &mut self.ambient);
-                let Walker { frame, p, .. } = &self.walker;
-                space.coordinates(frame, p, &self.ambient, &mut self.end_values[end]);
-                self.end_values[end].iter_mut().for_each(|x| *x *= self.scale);
-            }
-            None => self.end_values[end].fill(Lane::ZERO),
+    fn read_end(&mut self, space: &Erased, end: usize, ends: &ChainEnds, value: Option<[&[f64]; LANES]>) {
+        let vector = &mut self.end_values[end];
+        vector.resize(self.m, Lane::ZERO);
+        let (ChainEnds::Open(kinds), Some(rows)) = (ends, value) else {
+            vector.fill(Lane::ZERO);
+            return;
+        };
+        gather(rows, &mut self.ambient);
+        // First in units of time: coordinates hold squares.
+        let velocity = of_kind(&kinds[end], EndKind::Velocity);
+        for x in &mut self.ambient {
+            let once = *x / self.clock;
+            *x = velocity.select(once, once / self.clock);
         }
+        let Walker { frame, p, .. } = &self.walker;
+        space.coordinates(frame, p, &self.ambient, vector);
+        vector.iter_mut().for_each(|x| *x *= self.scale);
+    }
+
+    /// The velocities of all nodes.
+    pub fn velocities(&self) -> &[Lane] {
+        &self.u
+    }
+
+    /// The unknowns: the velocities of all nodes, of a closed curve without the last, which is the first again.
+    pub fn unknowns(&self) -> &[Lane] {
+        &self.u[..self.count()]
+    }
+
+    fn count(&self) -> usize {
+        if self.closed { self.n * self.m } else { self.u.len() }
+    }
+
+    /// Changes the unknowns. The last velocity of a closed curve is the first, carried around the curve.
+    pub fn update(&mut self, space: &Erased, change: impl FnOnce(&Self, &mut [Lane])) {
+        let (count, mut u) = (self.count(), std::mem::take(&mut self.u));
+        let (unknowns, last) = u.split_at_mut(count);
+        change(self, unknowns);
+        if self.closed {
+            last.copy_from_slice(&unknowns[..self.m]);
+            self.across_seam(space, true, last);
+        }
+        self.u = u;
+    }
+
+    /// Lets the velocities be read while the rest of the chain changes.
+    pub fn with_velocities<T>(&mut self, work: impl FnOnce(&mut Self, &[Lane]) -> T) -> T {
+        let u = std::mem::take(&mut self.u);
+        let result = work(self, &u);
+        self.u = u;
+        result
+    }
+
+    /// The length of the longer segment at a node, of which a closed curve has two at its ends, too.
+    pub fn longer(&self, node: usize) -> Lane {
+        let n = self.n;
+        let (before, behind) =
+            if self.closed { ((node + n - 1) % n, node % n) } else { (node.max(1) - 1, node.min(n - 1)) };
+        self.h[before].max(self.h[behind])
+    }
+
+    /// Length of the i-th segment on each lane, in units of the knots.
+    pub fn duration(&self, i: usize) -> Lane {
+        self.h[i] / self.clock
     }
 
     /// Carries coordinates across the seam of a closed curve: from the frame at its first node to
@@ -256,6 +316,7 @@ impl Chain {
             if scales {
                 ambient.iter_mut().for_each(|x| *x /= self.scale);
             }
+            ambient.iter_mut().for_each(|x| *x *= self.clock);
             visit(i, ambient);
             if i < self.n {
                 // The chords are known; the residual is no longer needed and takes them.
@@ -274,8 +335,21 @@ fn scale_of(space: &Erased, runs: &[Run; LANES], n: usize) -> Lane {
             let (p, q) = (run.point(i, len), run.point(i + 1, len));
             p.iter().zip(q).fold(0.0_f64, |m, (p, q)| m.max((q - p).abs()))
         };
-        let longest = (0..n).map(difference).fold(0.0, f64::max);
-        let exponent = longest.log2().round().clamp(-1000.0, 1000.0);
-        if longest > 0.0 && longest.is_finite() { (-exponent).exp2() } else { 1.0 }
+        power_of_two_over((0..n).map(difference).fold(0.0, f64::max))
     }))
+}
+
+/// The power of two that brings the mean segment of the curve on each lane to a length near one: squares of
+/// times neither overflow nor vanish, and no digit changes.
+fn clock_of(runs: &[Run; LANES]) -> Lane {
+    Lane::new(runs.map(|Run { t, .. }| {
+        let last = t.len() - 1;
+        power_of_two_over((t[last] - t[0]) / last as f64)
+    }))
+}
+
+/// The power of two that brings a number to a size near one; 1 for zero.
+fn power_of_two_over(size: f64) -> f64 {
+    let exponent = size.log2().round().clamp(-1000.0, 1000.0);
+    if size > 0.0 && size.is_finite() { (-exponent).exp2() } else { 1.0 }
 }

@@ -44,7 +44,8 @@ pub fn of_kind(kinds: &[EndKind; LANES], kind: EndKind) -> Lane {
 /// How far a lane is from C²: the largest defect, and the largest speed to measure it by.
 #[derive(Clone, Copy)]
 pub struct Defect {
-    /// Largest defect, divided by 1/hᵢ₋₁ + 1/hᵢ: a velocity.
+    /// Largest defect, divided by 1/hᵢ₋₁ + 1/hᵢ: a velocity. At an end with not-a-knot it is that of the
+    /// velocity there, divided by 1 + h₀/h₁: so much its formula makes of rounding in the other velocities.
     pub defect: Lane,
     /// Largest |uᵢ|.
     pub speed: Lane,
@@ -79,11 +80,13 @@ const THIRD: Lane = lane(1.0 / 3.0);
 
 /// Fills `chain.r` with right side minus left side of the C² condition at every node.
 pub fn residual(space: &Erased, chain: &mut Chain, ends: &ChainEnds, work: &mut NodeVectors<Lane>) -> Defect {
-    let (u, mut r) = (std::mem::take(&mut chain.u), std::mem::take(&mut chain.r));
-    let at_rest = u.iter().fold(Lane::ZERO.simd_eq(Lane::ZERO), |rest, u| rest & u.simd_eq(Lane::ZERO));
-    let defect = space.0.sweep(chain, ends, &u, &mut r, work, at_rest);
-    (chain.u, chain.r) = (u, r);
-    defect
+    chain.with_velocities(|chain, u| {
+        let mut r = std::mem::take(&mut chain.r);
+        let at_rest = u.iter().fold(Lane::ZERO.simd_eq(Lane::ZERO), |rest, u| rest & u.simd_eq(Lane::ZERO));
+        let defect = space.0.sweep(chain, ends, u, &mut r, work, at_rest);
+        chain.r = r;
+        defect
+    })
 }
 
 /// The same for velocities u that may carry derivatives. On lanes whose velocities are zero the logarithms are
@@ -307,7 +310,8 @@ fn end<S: Scalar>(
         for c in 0..m {
             b[c] = b[c] - u[c];
         }
-        size = knot.select(length2(b), size);
+        let weight = h1 / (h0 + h1);
+        size = knot.select(length2(b) * (weight * weight), size);
         for c in 0..m {
             a[c] = S::select(knot, b[c] * THIRD, a[c]);
         }

@@ -6,23 +6,16 @@
 //! is (20).
 
 use super::chain::Chain;
-use super::condition::ChainEnds;
 use super::tridiagonal::Tridiagonal;
 use crate::scalar::{Lane, lane};
-use crate::space::Erased;
 
 /// Turns the defect in `chain.r` into the update of the velocities.
-pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, t: &Tridiagonal, step: &mut [Lane]) {
-    let (n, m) = (chain.n, chain.m);
-    for i in 0..=n {
+pub fn update(chain: &Chain, t: &Tridiagonal, step: &mut [Lane]) {
+    let m = chain.m;
+    for (i, (step, r)) in step.chunks_exact_mut(m).zip(chain.r.chunks_exact(m)).enumerate() {
         let factor = lane(3.0) / t.diagonal[i];
-        for c in i * m..(i + 1) * m {
-            step[c] = factor * chain.r[c];
+        for c in 0..m {
+            step[c] = factor * r[c];
         }
-    }
-    if let ChainEnds::Periodic = ends {
-        let (first, last) = step.split_at_mut(n * m);
-        last.copy_from_slice(&first[..m]);
-        chain.across_seam(space, true, last);
     }
 }

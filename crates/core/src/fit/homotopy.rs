@@ -4,13 +4,12 @@
 //! λ = 1 it is the one asked for; Newton's method follows it in between. Points that are far apart have
 //! several splines; this one is continued from points that are near.
 
-use super::auto::merge;
 use super::chain::Chain;
 use super::condition::ChainEnds;
-use super::solve::{Outcome, Workspace, solve};
-use super::{Method, Options};
+use super::solve::{Limits, Outcome, Workspace, solve};
+use super::{Options, Solver};
 use crate::monitor::Monitor;
-use crate::scalar::{LANES, Lane, lane, mask_bits, mask_from};
+use crate::scalar::{LANES, Lane, lane, mask_from};
 use crate::space::{Erased, Origin};
 
 /// The first step of λ, and the one at which a lane gives up.
@@ -21,7 +20,7 @@ const CORRECTIONS: usize = 12;
 /// How far a curve on the way is solved.
 const LOOSE: f64 = 1e-8;
 
-/// Solves the lanes that are not `idle` and adds to their outcome.
+/// Solves the lanes that are neither `idle` nor settled and adds to their outcome.
 pub fn follow(
     space: &Erased,
     chain: &mut Chain,
@@ -32,7 +31,10 @@ pub fn follow(
     monitor: &Monitor,
     outcome: &mut Outcome,
 ) {
-    let (chords, values, best) = (chain.chord.clone(), chain.end_values.clone(), chain.u.clone());
+    let idle = outcome.settled(idle);
+    let left = options.max_iter.map(|n| n.saturating_sub(outcome.used()));
+    let (chords, values) = (chain.chord.clone(), chain.end_values.clone());
+    let best = chain.unknowns().to_vec();
     // Where each lane is, how far it goes next, and the last two curves with their λ.
     let (mut at, mut ahead) = (Lane::ZERO, lane(FIRST));
     let mut curves = [vec![Lane::ZERO; best.len()], vec![Lane::ZERO; best.len()]];
@@ -41,23 +43,22 @@ pub fn follow(
     let mut used = 0;
     loop {
         let done = idle | lost | at.simd_ge(Lane::ONE);
-        let budget = options.max_iter.map_or(usize::MAX, |n| n.saturating_sub(used));
+        let budget = left.map_or(CORRECTIONS, |n| n.saturating_sub(used).min(CORRECTIONS));
         if done.all() || budget == 0 || monitor.poll() {
             break;
         }
         let goal = (at + ahead).min(Lane::ONE);
         scale(space, chain, &chords, &values, goal);
-        predict(chain, &curves, places, goal);
+        chain.update(space, |_, u| predict(u, &curves, places, goal));
         // On the way curves need not be exact.
-        let tol = options.tol.max(LOOSE);
-        let limits = Options { method: Method::Newton, tol, max_iter: Some(CORRECTIONS.min(budget)) };
-        let found = solve(space, chain, ends, &limits, done, work, monitor);
+        let limits = Limits { tol: options.tol.max(LOOSE), max_iter: budget };
+        let found = solve(space, chain, ends, Solver::Homotopy, limits, done, work, monitor);
         used += found.iterations.iter().max().copied().unwrap_or(0);
         let reached = mask_from(|l| found.converged[l]) & !done;
         let failed = !reached & !done;
-        for i in 0..chain.u.len() {
+        for (i, u) in chain.unknowns().iter().enumerate() {
             curves[0][i] = reached.select(curves[1][i], curves[0][i]);
-            curves[1][i] = reached.select(chain.u[i], curves[1][i]);
+            curves[1][i] = reached.select(*u, curves[1][i]);
         }
         places = [reached.select(places[1], places[0]), reached.select(goal, places[1])];
         at = reached.select(goal, at);
@@ -69,21 +70,19 @@ pub fn follow(
     }
     // The end of the way to the tolerance asked for, from what was reached.
     scale(space, chain, &chords, &values, Lane::ONE);
-    chain.u.copy_from_slice(&best);
     let arrived = at.simd_ge(Lane::ONE) & !idle;
-    for (u, c) in chain.u.iter_mut().zip(&curves[1]) {
-        *u = arrived.select(*c, *u);
-    }
-    let budget = options.max_iter.map_or(2 * CORRECTIONS, |n| n.saturating_sub(used).min(2 * CORRECTIONS));
+    chain.update(space, |_, u| {
+        for ((u, b), c) in u.iter_mut().zip(&best).zip(&curves[1]) {
+            *u = arrived.select(*c, *b);
+        }
+    });
+    let budget = left.map_or(2 * CORRECTIONS, |n| n.saturating_sub(used).min(2 * CORRECTIONS));
     if arrived.none() || budget == 0 {
         return;
     }
-    let options = Options { method: Method::Newton, tol: options.tol, max_iter: Some(budget) };
-    let last = solve(space, chain, ends, &options, !arrived, work, monitor);
-    for l in 0..LANES {
-        outcome.iterations[l] += last.iterations[l];
-    }
-    merge(chain, &best, outcome, &last, mask_bits(arrived), super::Solver::Homotopy);
+    let limits = Limits { tol: options.tol, max_iter: budget };
+    let last = solve(space, chain, ends, Solver::Homotopy, limits, !arrived, work, monitor);
+    outcome.take(space, chain, &best, &last, arrived);
 }
 
 /// Sets the polygon and the given end vectors to λ times what they were.
@@ -103,7 +102,7 @@ fn scale(space: &Erased, chain: &mut Chain, chords: &[Lane], values: &[Vec<Lane>
 }
 
 /// The secant through the last two curves, u/λ being nearly constant.
-fn predict(chain: &mut Chain, curves: &[Vec<Lane>; 2], places: [Lane; 2], goal: Lane) {
+fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], places: [Lane; 2], goal: Lane) {
     let slope = |i: usize| {
         let started = places[i].simd_gt(Lane::ZERO);
         started.select(Lane::ONE / places[i], Lane::ZERO)
@@ -113,8 +112,8 @@ fn predict(chain: &mut Chain, curves: &[Vec<Lane>; 2], places: [Lane; 2], goal: 
     let twice = places[0].simd_gt(Lane::ZERO);
     let gap = twice.select(places[1] - places[0], Lane::ONE);
     let weight = twice.select((goal - places[1]) / gap, Lane::ZERO);
-    for i in 0..chain.u.len() {
+    for (i, u) in u.iter_mut().enumerate() {
         let (b, n) = (curves[0][i] * before, curves[1][i] * now);
-        chain.u[i] = goal * (n + weight * (n - b));
+        *u = goal * (n + weight * (n - b));
     }
 }

@@ -5,8 +5,11 @@ mod blocks;
 mod certificate;
 mod chain;
 mod condition;
+mod convergence;
 mod fixed_point;
 mod homotopy;
+mod legs;
+mod line_search;
 mod newton;
 mod pieces;
 mod quasi_newton;
@@ -91,17 +94,6 @@ pub struct Options {
     pub max_iter: Option<usize>,
 }
 
-impl Options {
-    /// The iteration limit in force.
-    pub fn max_iter(&self) -> usize {
-        self.max_iter.unwrap_or(match self.method {
-            Method::FixedPoint => 2000,
-            Method::Auto | Method::QuasiNewton => 300,
-            Method::Newton => 100,
-        })
-    }
-}
-
 /// Why a curve could not be made, or whether it is good.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Status {
@@ -123,6 +115,13 @@ pub enum Status {
         /// Deciding angle of the leg.
         angle: f64,
     },
+    /// The two control points between points `index` and `index + 1` lie at each other's cut locus.
+    MiddleLeg {
+        /// Index of the first of the two points.
+        index: usize,
+        /// Deciding angle between the control points.
+        angle: f64,
+    },
     /// The work was stopped before this curve was done.
     Stopped,
 }
@@ -130,7 +129,18 @@ pub enum Status {
 impl Status {
     /// Whether there is no curve at all.
     pub fn is_fault(self) -> bool {
-        matches!(self, Status::CutLocus { .. } | Status::LongLeg { .. })
+        matches!(self, Status::CutLocus { .. } | Status::LongLeg { .. } | Status::MiddleLeg { .. })
+    }
+
+    /// The same with the point at fault counted otherwise.
+    fn counted(mut self, count: impl Fn(usize) -> usize) -> Self {
+        if let Status::CutLocus { index, .. }
+        | Status::LongLeg { index, .. }
+        | Status::MiddleLeg { index, .. } = &mut self
+        {
+            *index = count(*index);
+        }
+        self
     }
 }
 

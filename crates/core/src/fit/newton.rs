@@ -22,16 +22,11 @@ pub struct Newton {
 /// `step ← −J⁻¹ r` for the defect in `chain.r`.
 pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [Lane]) {
     newton.differentiate(space, chain, ends);
-    step.copy_from_slice(&chain.r);
+    step.copy_from_slice(&chain.r[..step.len()]);
     let (n, m) = (chain.n, chain.m);
     match ends {
         ChainEnds::Open(_) => newton.blocks.solve(n + 1, m, 1, step),
-        ChainEnds::Periodic if n > 1 => {
-            newton.blocks.solve_cyclic(n, m, step);
-            let (first, last) = step.split_at_mut(n * m);
-            last.copy_from_slice(&first[..m]);
-            chain.across_seam(space, true, last);
-        }
+        ChainEnds::Periodic if n > 1 => newton.blocks.solve_cyclic(n, m, step),
         // One segment from a point to itself: the curve stands still.
         ChainEnds::Periodic => step.fill(Lane::ZERO),
     }
@@ -55,7 +50,7 @@ impl Newton {
             }
             for k in 0..m {
                 self.u.clear();
-                self.u.extend(chain.u.iter().map(|&u| Dual::constant(u)));
+                self.u.extend(chain.velocities().iter().map(|&u| Dual::constant(u)));
                 for i in (0..nodes).filter(|&i| color(i) == c) {
                     self.u[i * m + k].d = Lane::ONE;
                 }

@@ -9,6 +9,7 @@ use super::auto;
 use super::certificate::{equally_spaced, invariant_radius};
 use super::chain::{Chain, Run};
 use super::condition::{ChainEnds, EndKind, of_kind};
+use super::legs::noisy_legs;
 use super::solve::Workspace;
 use super::{End, Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
@@ -64,8 +65,13 @@ pub fn fit(
     }
     let len = space.point_len();
     for (curve, report) in reports.iter().enumerate() {
+        let own = &mut velocities[problem.offsets[curve] * len..problem.offsets[curve + 1] * len];
         if report.status.is_fault() {
-            velocities[problem.offsets[curve] * len..problem.offsets[curve + 1] * len].fill(f64::NAN);
+            own.fill(f64::NAN);
+        } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
+            // Pieces agree to the tolerance; first and last velocity are one.
+            let carried = problem.across_seam(space, curve, &own[..len]);
+            own[problem.segments(curve) * len..].copy_from_slice(&carried);
         }
     }
     reports
@@ -215,7 +221,7 @@ fn fit_in(
             })
         })
     });
-    chain.unroll(space, &runs, nodes - 1, rows);
+    chain.unroll(space, &runs, nodes - 1, &ends, rows);
     let ends = few_points(space, chain, ends);
     let cut = chain.cut;
     let idle = mask_from(|l| cut[l].is_some());
@@ -223,21 +229,22 @@ fn fit_in(
     let options = Options { tol: pieces_tol, ..*options };
     let outcome = auto::run(space, chain, &ends, &options, idle, work, monitor);
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
-    let legs = long_legs(space, chain, outcome.leg);
+    let noisy = noisy_legs(space, chain, &runs, outcome.leg);
     let steps = chain.max_step.to_array();
     let given = given_legs(chain, &ends);
     for (l, p) in group.iter_mut().enumerate() {
         let status = if let Some((index, angle)) = cut[l] {
-            Status::CutLocus { index: p.first + index, angle }
+            Status::CutLocus { index, angle }
         } else if monitor.cancelled() {
             Status::Stopped
+        } else if let Some(fault) = outcome.fault[l] {
+            fault
         } else if !outcome.converged[l] {
             Status::Unconverged
-        } else if let Some((index, angle)) = legs[l] {
-            Status::LongLeg { index: p.first + index, angle }
         } else {
-            Status::Converged
+            noisy[l].unwrap_or(Status::Converged)
         };
+        let status = status.counted(|index| p.first + index);
         p.report = Report {
             status,
             iterations: outcome.iterations[l],
@@ -284,29 +291,6 @@ fn few_points(space: &Erased, chain: &mut Chain, ends: ChainEnds) -> ChainEnds {
         }
     }
     ChainEnds::Open(kinds)
-}
-
-/// The first leg of each lane that is too long, by deciding angle.
-fn long_legs(space: &Erased, chain: &Chain, leg: Lane) -> [Option<(usize, f64)>; LANES] {
-    let mut found = [None; LANES];
-    if leg.simd_lt(lane(space.injectivity_radius().min(space.longest_leg()))).all() {
-        return found;
-    }
-    let m = chain.m;
-    let mut v = vec![Lane::ZERO; m];
-    for i in 0..=chain.n {
-        let h = chain.h[i.max(1) - 1].max(chain.h[i.min(chain.n - 1)]);
-        for c in 0..m {
-            v[c] = chain.u[i * m + c] * h * lane(1.0 / 3.0);
-        }
-        let angle = space.angle(&v).to_array();
-        for l in 0..LANES {
-            if angle[l] >= space.longest_leg() {
-                found[l].get_or_insert((i, angle[l]));
-            }
-        }
-    }
-    found
 }
 
 fn write_velocities(space: &Erased, chain: &mut Chain, runs: &[Run; LANES], group: &mut [Piece]) {
@@ -358,15 +342,20 @@ fn merge(
                 }
             }
         }
+        if let ([first, .., last], Ends::Periodic) = (same, problem.ends) {
+            // The last knot is the first again.
+            let carried = problem.across_seam(space, curve, &first.velocities[..len]);
+            for (a, b) in carried.iter().zip(&last.velocities[last.velocities.len() - len..]) {
+                mismatch = mismatch.max((a - b).abs());
+            }
+        }
         if report.status == Status::Converged && mismatch > 0.0 {
             report.residual = report.residual.max(mismatch / largest / 3.0);
             if mismatch > options.tol * largest {
                 differing.push(curve);
             }
         }
-        if let Status::CutLocus { index, .. } | Status::LongLeg { index, .. } = &mut report.status {
-            *index %= problem.segments(curve);
-        }
+        report.status = report.status.counted(|index| index % problem.segments(curve));
         let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
         if known && equally_spaced(problem.knots(curve)) {
             let leg = same.iter().map(|p| p.end_leg).fold(0.0, f64::max);
@@ -389,6 +378,17 @@ impl<'a> Problem<'a> {
         if self.shared { self.t } else { &self.t[self.offsets[curve]..self.offsets[curve + 1]] }
     }
 
+    /// A velocity at the first point of a closed curve as one at its last, which may be another array.
+    fn across_seam(&self, space: &Erased, curve: usize, velocity: &[f64]) -> Vec<f64> {
+        let len = velocity.len();
+        let lanes = |row: &[f64]| -> Vec<Lane> { row.iter().map(|&x| lane(x)).collect() };
+        let point = |node: usize| lanes(&self.points[node * len..(node + 1) * len]);
+        let (first, last) = (point(self.offsets[curve]), point(self.offsets[curve + 1] - 1));
+        let (still, mut carried) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
+        space.carry(&first, &last, &still, &lanes(velocity), &mut carried);
+        carried.iter().map(|x| x.as_array()[0]).collect()
+    }
+
     fn run(&self, piece: &Piece, len: usize) -> Run<'a> {
         let (from, to) = (self.offsets[piece.curve], self.offsets[piece.curve + 1]);
         Run { t: self.knots(piece.curve), points: &self.points[from * len..to * len], first: piece.first }
@@ -401,7 +401,7 @@ fn given_legs(chain: &Chain, ends: &ChainEnds) -> [f64; LANES] {
     let (n, m) = (chain.n, chain.m);
     let mut longest = Lane::ZERO;
     for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
-        let u = &chain.u[node * m..(node + 1) * m];
+        let u = &chain.velocities()[node * m..(node + 1) * m];
         let leg = dot(u, u).sqrt() * chain.h[segment] * lane(1.0 / 3.0);
         longest = of_kind(kinds, EndKind::Velocity).select(longest.max(leg), longest);
     }

@@ -134,7 +134,6 @@ impl Tridiagonal {
                     f[i * m + c] += alpha[i] * f[c] + beta[i] * self.x[c];
                 }
             }
-            f[n * m..].copy_from_slice(&self.x);
         } else {
             // One segment from a point to itself: the curve stands still.
             f.fill(Lane::ZERO);

@@ -158,6 +158,7 @@ table! {
         fn cut_angle(&self) -> f64;
         fn longest_leg(&self) -> f64;
         fn injectivity_radius(&self) -> f64;
+        fn longest_ray(&self) -> f64;
         fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
         fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane;
         fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
@@ -169,6 +170,7 @@ table! {
         fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane;
         fn scatter(&self, noise: &mut [Lane]);
         fn complaint(&self, x: &[f64]) -> String;
+        fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)>;
         fn rounding(&self, p: &[Lane]) -> Lane;
     }
     Frame {

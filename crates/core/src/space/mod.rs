@@ -66,6 +66,12 @@ pub trait Ambient: Copy + Send + Sync {
         self.cut_angle()
     }
 
+    /// Length from which a [`ray`](Ambient::ray) makes so much of rounding errors at its start that a geodesic
+    /// between its ends is better.
+    fn longest_ray(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// `exp_p(t v)`: the geodesic from p with velocity v.
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]);
     /// `log_p(q)`, (11); returns the deciding angle.
@@ -104,6 +110,10 @@ pub trait Ambient: Copy + Send + Sync {
     fn scatter(&self, noise: &mut [Lane]);
     /// Says in words and numbers why x, which is finite, is not a point.
     fn complaint(&self, x: &[f64]) -> String;
+    /// The first of some points that lies where doubles have too few digits, and that in words and numbers.
+    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
+        None
+    }
     /// How far apart neighbouring floating-point points are at p, in units of a rounding error; 1 or more.
     fn rounding(&self, _p: &[Lane]) -> Lane {
         Lane::ONE
@@ -198,6 +208,9 @@ pub trait Covered: Space {
     fn cover(&self) -> Self::Cover;
     /// Brings a segment of a curve into the cover: its end points and tangent vectors there.
     fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]);
+    /// Of the points of the cover over a control point q takes the one nearest to the other control point, and with
+    /// it the end y of the segment and the tangent vector w there.
+    fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
     /// Brings a point of the cover and, if given, a tangent vector there back: writes the point, or the
     /// vector.
     fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);

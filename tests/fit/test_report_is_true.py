@@ -1,0 +1,309 @@
+"""What a report says is true of the curve that is returned, and what cannot be true is an error."""
+
+import itertools
+import zlib
+
+import numpy as np
+import pytest
+from cases import EPS, base_point, compact, steep_tangent, unit_tangent, walk
+from truth import truth
+
+import symspline as ss
+
+# Spaces of few dimensions, so that Newton's method is quick; all kinds of pages and of cut loci.
+SPACES = [
+    *("r:2", "sphere:1", "sphere:2", "sphere:3", "h:2", "rp:2", "cp:1", "cp:2", "gr:2,4", "cgr:1,2"),
+    *("so:2", "so:3", "o:3", "so:4", "u:1", "u:2", "su:2", "spd:2", "hpd:2", "se:2", "se:3"),
+]
+ENDS = ("natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed")
+METHODS = ("auto", "fixed-point", "quasi-newton", "newton")
+FAR = 0.999
+
+
+def seeded(*names):
+    return np.random.default_rng(zlib.crc32(" ".join(names).encode()))
+
+
+def reach(space):
+    """The longest step between neighbours."""
+    return FAR * space.injectivity_radius if compact(space) or np.isfinite(space.injectivity_radius) else 2.0
+
+
+def far_points(space, n, rng, closed):
+    """Steps of any length up to nearly the cut locus, also in directions that are the first to meet it. A closed
+    curve goes between points around one."""
+    p = [base_point(space, rng)]
+    for _ in range(n - 1):
+        tangent = steep_tangent if rng.random() < 0.3 else unit_tangent
+        start = p[0] if closed else p[-1]
+        step = reach(space) * rng.choice([1.0, rng.random()]) * (0.5 if closed else 1.0)
+        p.append(space.project(space.exp(start, step * tangent(space, start, rng))))
+    return [*p, p[0]] if closed else p
+
+
+def unequal_knots(n, curves, rng):
+    """Gaps that differ by up to ten, thirty times as long or short as one."""
+    gaps = 10.0 ** -rng.random((curves, n - 1)) * rng.choice([0.03, 1.0, 30.0])
+    return np.concatenate([np.zeros((curves, 1)), np.cumsum(gaps, axis=1)], axis=1)
+
+
+def end_conditions(kind, space, p, t, rng):
+    """Vectors at the ends are legs of up to half the way to the cut locus."""
+    if kind not in ("velocity", "acceleration", "mixed"):
+        return kind
+    order = 2 if kind == "acceleration" else 1
+    vectors = []
+    for node, near in ((0, 1), (-1, -2)):
+        leg = np.stack([0.5 * reach(space) * rng.random() * unit_tangent(space, x, rng) for x in p[:, node]])
+        h = np.abs(t[:, near] - t[:, node])
+        vectors.append((order, 3 * leg / h.reshape(-1, *(1,) * (leg.ndim - 1)) ** order))
+    return ("not-a-knot", vectors[1]) if kind == "mixed" else tuple(vectors)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_converged_curves_are_what_they_are_said_to_be(name):
+    space, rng = ss.space(name), seeded(name)
+    converged = curves = 0
+    for kind, method in itertools.product(ENDS, METHODS):
+        n = int(rng.integers(3, 6))
+        p = np.array([far_points(space, n, rng, kind == "periodic") for _ in range(4)])
+        t = unequal_knots(p.shape[1], len(p), rng)
+        bc = end_conditions(kind, space, p, t, rng)
+        options = {"bc_type": bc, "method": method, "max_iter": 60, "on_failure": "ignore"}
+        spline = ss.CubicSpline(t, p, space, **options)
+        found = truth(spline)
+        assert (np.nan_to_num(found.worst) <= 1.0).all(), (kind, method, found)
+        converged, curves = converged + np.sum(spline.report.converged), curves + len(p)
+    assert converged > 0.3 * curves
+
+
+# ---- closed curves ----
+
+TRIANGLE = [[1, 1, -1], [-1, 1, -1], [-1, 0, 1], [1, 1, -1]]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_closed_curve_on_unequal_knots_closes(method):
+    p = ss.Sphere(2).project(TRIANGLE / np.linalg.norm(TRIANGLE, axis=-1, keepdims=True))
+    options = {"bc_type": "periodic", "method": method, "on_failure": "ignore"}
+    for turn in range(3):
+        # Wherever it begins.
+        t = np.concatenate([[0], np.cumsum(np.roll([3.0, 3.0, 1.0], turn))])
+        spline = ss.CubicSpline(t, np.roll(p[:3], turn, axis=0)[[0, 1, 2, 0]], "sphere:2", **options)
+        assert np.nan_to_num(truth(spline).worst) <= 1.0
+        if method == "auto":
+            assert spline.report.converged
+
+
+@pytest.mark.parametrize("method", ["auto", "newton"])
+@pytest.mark.parametrize(("name", "step"), [("sphere:2", 3.0), ("so:3", 1.2), ("cp:1", 0.7)])
+def test_far_closed_curves_have_no_kink_at_the_seam(name, step, method):
+    space, rng = ss.space(name), seeded(name, method)
+    centre = np.stack([space.random_point(rng) for _ in range(60)])[:, None]
+    noise = space.random_tangent(rng, np.repeat(centre, 4, axis=1))
+    noise *= 0.5 * step / space.norm(centre, noise).reshape(60, 4, *(1,) * len(space.point_shape))
+    p = space.project(space.exp(centre, noise))
+    p = np.concatenate([p, p[:, :1]], axis=1)
+    t = unequal_knots(5, len(p), rng)
+    spline = ss.CubicSpline(t, p, space, bc_type="periodic", method=method, on_failure="ignore")
+    assert spline.report.converged.sum() > 15
+    assert np.nanmax(truth(spline).worst) <= 1.0
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "gr:2,4", "so:3", "r:2"])
+def test_ends_of_a_closed_curve_that_nearly_meet_are_made_one(name):
+    """Last and first point may be 1e-8 apart; the curve has no such gap."""
+    space, rng = ss.space(name), seeded(name)
+    p = walk(space, 0.4, 4, rng)
+    near = space.exp(p[0], 5e-9 * unit_tangent(space, p[0], rng))
+    spline = ss.CubicSpline([0, 1, 3, 4, 6], [*p, near], space, bc_type="periodic")
+    assert truth(spline).worst <= 1.0
+    assert space.distance(spline.points[-1], spline.points[0]) <= 4 * EPS
+    assert space.distance(spline.points[-1], near) <= 6e-9
+
+
+def test_a_long_closed_curve_closes():
+    """It is solved in pieces; the first and the last each have the seam inside."""
+    rng = seeded("long")
+    x = np.linspace(0, 2 * np.pi, 1301)
+    p = ss.Sphere(2).project(np.stack([np.cos(x), np.sin(x), 0.3 * np.sin(5 * x)], axis=-1))
+    p[-1] = p[0]
+    t = np.concatenate([[0], np.cumsum(rng.uniform(0.5, 1.5, 1300))])
+    spline = ss.CubicSpline(t, p, "sphere:2", bc_type="periodic")
+    assert (
+        np.abs(spline.velocities[-1] - spline.velocities[0]).max()
+        <= 4 * EPS * np.abs(spline.velocities).max()
+    )
+    assert truth(spline).worst <= 1.0
+
+
+# ---- rotations ----
+
+AROUND = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 0]])
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def test_the_middle_geodesic_of_rotations_is_the_shortest():
+    """The control points between are 170° + 2·(1.5/3) rad = 227° apart, and 133° the other way."""
+    p = np.array([np.eye(3), turned(np.radians(170))])
+    ends = ((1, -1.5 * p[0] @ AROUND), (1, -1.5 * p[1] @ AROUND))
+    one, other = (ss.CubicSpline([0, 1], p, name, bc_type=ends) for name in ("so:3", "o:3"))
+    x = np.linspace(0, 1, 21)
+    for nu in range(3):
+        assert np.abs(one(x, nu) - other(x, nu)).max() <= 1e-13 * max(1, np.abs(other(x, nu)).max())
+    assert np.abs(one(0.5) - turned(np.radians(-95))).max() <= 1e-14
+    assert truth(one).bezier <= 1.0
+
+
+@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot"])
+def test_far_rotations_agree_with_orthogonal_matrices(ends):
+    rng = seeded(ends)
+    p = np.array([far_points(ss.space("so:3"), 5, rng, False) for _ in range(40)])
+    t = unequal_knots(5, len(p), rng)
+    one, other = (ss.CubicSpline(t, p, name, bc_type=ends, on_failure="ignore") for name in ("so:3", "o:3"))
+    assert np.nanmax(truth(one).worst) <= 1.0
+    # Both solve the same equations; the paths of their iterations may part near the cut locus.
+    both = one.report.converged & other.report.converged
+    same = np.abs(one.velocities - other.velocities).max(axis=(1, 2, 3))[both] < 1e-8
+    assert same.sum() >= 0.9 * both.sum() > 5
+
+
+# ---- derivatives ----
+
+
+def badly_scaled(name, scale, rng):
+    """Points whose tangent vectors have components of very different sizes."""
+    space = ss.space(name)
+    p = walk(space, 0.5, 6, rng)
+    if name == "se:3":
+        p[:, :3, 3] *= scale
+        return p
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    g = turn * [1, scale**-0.25, scale**-0.5]
+    p = g @ p @ g.T
+    return (p + np.swapaxes(p, -1, -2)) / 2
+
+
+@pytest.mark.parametrize(("name", "scale"), [("spd:3", 3e8), ("spd:3", 1e4), ("se:3", 1e6), ("se:3", 1.0)])
+def test_gradients_keep_their_digits(name, scale):
+    """By the points: `vjp` is the transpose of `jvp` to ε times the condition, not its square."""
+    space, rng = ss.space(name), seeded(name)
+    p = badly_scaled(name, scale, rng)
+    spline = ss.CubicSpline(None, p, space)
+    x = np.array([0.4, 1.7, 2.2, 4.9])
+    for nu in range(2):
+        weights = rng.standard_normal(spline(x).shape)
+        gradient = spline.vjp(x, weights, nu).points
+        for _ in range(5):
+            motion = space.random_tangent(rng, p)
+            moved = weights * spline.jvp(x, motion, nu=nu)
+            allowed = 1000 * EPS * scale * np.abs(moved).sum()
+            assert abs(np.sum(gradient * motion) - moved.sum()) <= allowed
+        # The gradient is tangent, the one array of many that pair alike.
+        assert np.abs(space.project_tangent(p, gradient) - gradient).max() <= 1e-7 * np.abs(gradient).max()
+
+
+def test_curves_that_have_not_converged_have_no_derivatives():
+    p = np.stack([walk(ss.Sphere(2), step, 6, seeded("derivatives")) for step in (0.4, 2.9)])
+    spline = ss.CubicSpline(None, p, "sphere:2", max_iter=12, on_failure="ignore")
+    assert spline.report.converged.tolist() == [True, False]
+    moved = spline.jvp(1.5, points=np.ones_like(p))
+    gradient = spline.vjp(1.5, np.ones((2, 3)))
+    for found in (moved, gradient.points):
+        assert np.isfinite(found[0]).all() and np.isnan(found[1]).all()
+
+
+# ---- times ----
+
+
+@pytest.mark.parametrize("ratio", [1e3, 1e5, 1e6, 1e8])
+@pytest.mark.parametrize("method", ["auto", "newton"])
+def test_not_a_knot_on_alternating_gaps(ratio, method):
+    """The end formula takes differences of numbers h₀/h₁ times as large."""
+    t = np.concatenate([[0], np.cumsum([1, *(1 / ratio, 1) * 5])])
+    x = 2 * t / t[-1]
+    p = ss.Sphere(2).project(np.stack([np.cos(x), np.sin(x), 0.3 * np.sin(2 * x)], axis=-1))
+    spline = ss.CubicSpline(t, p, "sphere:2", bc_type="not-a-knot", method=method)
+    assert spline.report.residual <= 1e-12
+    assert truth(spline).worst <= 1.0
+
+
+UNITS = [1e-300, 1e-150, 1e-100, 1e-60, 1e60, 1e78, 1e150, 1e300]
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("ends", ["natural", "not-a-knot", "periodic", "velocity", "acceleration"])
+def test_times_may_have_any_unit(unit, ends):
+    """Powers of two change nothing but the exponents."""
+    unit = 2.0 ** np.round(np.log2(unit))
+    space, t = ss.Sphere(2), np.array([0, 1, 2.5, 3.0])
+    p = space.project(TRIANGLE / np.linalg.norm(TRIANGLE, axis=-1, keepdims=True))
+    v = 0.5 * space.log(p[0], p[1])
+    many = {
+        "velocity": lambda s: ((1, v / s), "natural"),
+        "acceleration": lambda s: ((2, v / s / s), "natural"),
+    }
+    if ends == "acceleration" and not 1e-140 < unit < 1e140:
+        # The acceleration is no double.
+        return
+    one, scaled = (
+        ss.CubicSpline(t * s, p, space, bc_type=many[ends](s) if ends in many else ends) for s in (1.0, unit)
+    )
+    assert scaled.report == one.report
+    assert np.array_equal(scaled.velocities * unit, one.velocities)
+    x = np.linspace(0, 3, 31)
+    assert np.array_equal(scaled(x * unit), one(x))
+    assert np.abs(scaled(x * unit, 1) * unit - one(x, 1)).max() <= 1e-15 * np.abs(one(x, 1)).max()
+    assert np.abs(scaled.speed(x * unit) * unit - one.speed(x)).max() <= 1e-15 * one.speed(x).max()
+    assert scaled.length() == pytest.approx(one.length(), rel=1e-14)
+
+
+@pytest.mark.parametrize("unit", [1e-200, 1e-90, 1.0, 1e90, 1e200])
+def test_length_is_a_double_where_it_can_be(unit):
+    for s in (1e-200, 1.0, 1e200):
+        if not 1e-300 < s / unit < 1e300:
+            # Velocities are no doubles.
+            continue
+        spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
+        assert spline.length() == pytest.approx(10 * s, rel=0.1, abs=0)
+        straight = ss.CubicSpline(
+            np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2"
+        )
+        assert straight.length() == pytest.approx(10 * s, rel=1e-14, abs=0)
+
+
+@pytest.mark.parametrize("unit", [1e-90, 1e-40, 1.0, 1e40, 1e90])
+def test_bending_energy_is_a_double_where_it_can_be(unit):
+    spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, np.eye(3), "sphere:2")
+    assert spline.bending_energy() * unit**3 == pytest.approx(
+        ss.CubicSpline([0, 1, 3.0], np.eye(3), "sphere:2").bending_energy(), rel=1e-12
+    )
+
+
+# ---- far out in hyperbolic space ----
+
+
+def far_out(r, n=6):
+    """Points of H² at distance r from (1, 0, 0), steps of about one along a horocycle."""
+    angle = np.arange(n) * 2 * np.exp(-r)
+    return np.stack([np.full(n, np.cosh(r)), np.sinh(r) * np.cos(angle), np.sinh(r) * np.sin(angle)], axis=-1)
+
+
+@pytest.mark.parametrize("r", [1.0, 8.0, 12.0, 15.0])
+def test_hyperbolic_curves_are_true_as_far_as_they_are_allowed(r):
+    spline = ss.CubicSpline(None, ss.Hyperbolic(2).project(far_out(r)), "h:2")
+    assert spline.report.converged and truth(spline).worst <= 1.0
+
+
+@pytest.mark.parametrize("r", [17.0, 18.0, 20.0, 25.0])
+def test_hyperbolic_points_that_doubles_cannot_tell_apart_are_an_error(r):
+    p = ss.Hyperbolic(2).project(far_out(r))
+    p[:3] = far_out(1.0)[:3]
+    with pytest.raises(
+        ss.ValidationError, match=rf"points\[3\] .*distance {r:.1f}.* from \(1, 0, .*transvection"
+    ):
+        ss.CubicSpline(None, p, "h:2")
