@@ -145,6 +145,7 @@ mod tests {
             let _ = send.send((failed, begun.load(Ordering::Relaxed)));
         });
         let (failed, begun) = receive.recv_timeout(Duration::from_secs(2)).expect("the call returns");
-        assert!(failed && begun < 100);
+        // The others go on while the panic is printed, with a backtrace for some tenths of a second.
+        assert!(failed && begun < 1000);
     }
 }

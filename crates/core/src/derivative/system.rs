@@ -1,10 +1,10 @@
 //! The linearised C² condition of a whole curve: how velocities follow points, knots and end vectors.
 
-use super::operators::{Functions, Matrix, Vector, curvature, splat, stretch, stretch_slope};
+use super::operators::{Functions, Matrix, Vector, curvature, splat, stretch, stretch_slope, unit};
 use super::polygon::Polygon;
 use super::segment::{Segment, Side};
-use crate::fit::{Blocks, EndKind};
-use crate::scalar::{Lane, lane};
+use crate::fit::{Blocks, EndKind, NotAKnot};
+use crate::scalar::{Dual, Lane, lane};
 use crate::space::{Erased, Origin};
 
 /// How the condition at one knot changes: with velocities and points of knots, lengths of segments, and
@@ -132,8 +132,10 @@ impl System {
                 row.end = Some((which, &segment.functions[which].stretch / -6.0));
             }
             EndKind::NotAKnot => {
-                let knot = NotAKnot::of(self.segments[near].h, self.segments[far].h, n, self.both_not_a_knot);
-                row.not_a_knot(space, polygon, which, [near, far], &knot);
+                // Differentiated by the lengths of the two segments, one a lane.
+                let h = |segment: usize, k| Dual { v: lane(self.segments[segment].h), d: unit(k, 0) };
+                let weights = NotAKnot::of(h(near, 0), h(far, 1), n, self.both_not_a_knot);
+                row.not_a_knot(space, polygon, which, [near, far], &weights);
             }
         }
         row
@@ -221,75 +223,36 @@ impl Row {
         polygon: &Polygon,
         which: usize,
         [near, far]: [usize; 2],
-        knot: &NotAKnot,
+        weights: &NotAKnot<Dual>,
     ) {
         let (d0, d1) = (&polygon.chords[near], &polygon.chords[far]);
+        // Value, and derivatives.
+        let [u, near_by, far_by] = [weights.u, weights.near, weights.far]
+            .map(|w| [w.v.as_array()[0], w.d.as_array()[0], w.d.as_array()[1]]);
         let (first, second) = (Functions::of(space, d0), Functions::of(space, d1));
         // The end, its neighbour, and the node behind that; all vectors change sign at the right end.
         let [end, next, third] = if which == 0 { [near, near + 1, far + 1] } else { [near + 1, near, far] };
         let sign = if which == 0 { 1.0 } else { -1.0 };
-        let c = &polygon.u[next] * knot.u[0] + d0 * knot.near[0] + d1 * knot.far[0];
+        let c = &polygon.u[next] * u[0] + d0 * near_by[0] + d1 * far_by[0];
         let target = &first.stretch * &c;
         // In the frame of the neighbour.
-        let slope = stretch_slope(space, d0, &c) + &first.stretch * knot.near[0];
+        let slope = stretch_slope(space, d0, &c) + &first.stretch * near_by[0];
         let turn = curvature(space, d0, &target) * &first.tanh * sign;
         let own = &slope * &first.shrink * -sign + &turn;
         let mut neighbour = &slope * &first.coth * sign + &turn;
-        if knot.far[0] != 0.0 {
-            let far_slope = &first.stretch * knot.far[0];
+        if far_by[0] != 0.0 {
+            let far_slope = &first.stretch * far_by[0];
             neighbour -= &far_slope * &second.coth * sign;
             self.points.push((third, &far_slope * &second.shrink * -sign));
         }
         self.points.push((end, -own));
         self.points.push((next, -neighbour));
-        if knot.u[0] != 0.0 {
-            self.u.push((next, &first.stretch * -knot.u[0]));
+        if u[0] != 0.0 {
+            self.u.push((next, &first.stretch * -u[0]));
         }
         for (k, segment) in [near, far].into_iter().enumerate() {
-            let change = &polygon.u[next] * knot.u[1 + k] + d0 * knot.near[1 + k] + d1 * knot.far[1 + k];
+            let change = &polygon.u[next] * u[1 + k] + d0 * near_by[1 + k] + d1 * far_by[1 + k];
             self.lengths.push((segment, &first.stretch * change * -1.0));
-        }
-    }
-}
-
-/// The weights of u₁, of the chord at the end and of the next one in c'(t₀) of not-a-knot, each with its
-/// derivatives in the lengths of the two segments.
-struct NotAKnot {
-    u: [f64; 3],
-    near: [f64; 3],
-    far: [f64; 3],
-}
-
-impl NotAKnot {
-    /// For n segments; with three points and not-a-knot at both ends the curve is one parabola.
-    fn of(h0: f64, h1: f64, n: usize, both: bool) -> Self {
-        let sum = h0 + h1;
-        if n == 1 {
-            // The geodesic.
-            NotAKnot { u: [0.0; 3], near: [1.0 / h0, -1.0 / (h0 * h0), 0.0], far: [0.0; 3] }
-        } else if n == 2 && both {
-            // 2d₀/h₀ − (d₀h₁/h₀ + d₁h₀/h₁)/(h₀ + h₁)
-            let (x, y) = (h1 / (h0 * sum), h0 / (h1 * sum));
-            NotAKnot {
-                u: [0.0; 3],
-                near: [
-                    2.0 / h0 - x,
-                    -2.0 / (h0 * h0) + x * (1.0 / h0 + 1.0 / sum),
-                    -x * (1.0 / h1 - 1.0 / sum),
-                ],
-                far: [-y, -y * (1.0 / h0 - 1.0 / sum), y * (1.0 / h1 + 1.0 / sum)],
-            }
-        } else {
-            let (q, inverse) = (h0 / h1, 1.0 / sum);
-            NotAKnot {
-                u: [-1.0 - q, -1.0 / h1, q / h1],
-                near: [2.0 / h0 + inverse, -2.0 / (h0 * h0) - inverse * inverse, -inverse * inverse],
-                far: [
-                    q * q * inverse,
-                    q * q * inverse * (2.0 / h0 - inverse),
-                    -q * q * inverse * (2.0 / h1 + inverse),
-                ],
-            }
         }
     }
 }

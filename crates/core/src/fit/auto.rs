@@ -1,7 +1,7 @@
 //! Which solver runs: the one asked for, or one after the other until one converges.
 
 use super::chain::Chain;
-use super::condition::ChainEnds;
+use super::ends::ChainEnds;
 use super::homotopy;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{Method, Options, Solver};

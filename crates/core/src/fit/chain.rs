@@ -7,7 +7,7 @@
 //! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
 //! long curve.
 
-use super::condition::{ChainEnds, EndKind, of_kind};
+use super::ends::{ChainEnds, EndKind, of_kind};
 use crate::scalar::{LANES, Lane, Scalar, dot, gather, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 use crate::with_size;

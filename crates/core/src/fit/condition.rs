@@ -1,4 +1,4 @@
-//! The C² condition (13) on any knots, and the end conditions.
+//! The C² condition (13) on any knots.
 //!
 //! With `v⁺ = hᵢuᵢ/3`, `v⁻ = −hᵢ₋₁uᵢ/3`, `w⁺ = log_{pᵢ}(E(−v⁺)·q⁻ᵢ₊₁)`, `w⁻ = log_{pᵢ}(E(−v⁻)·q⁺ᵢ₋₁)`, the curve is C² at
 //! knot i iff
@@ -12,34 +12,10 @@
 //! this is (13).
 
 use super::chain::Chain;
-use crate::scalar::{LANES, Lane, Scalar, lane, max_or_nan};
-use crate::space::{Erased, Origin, Space};
+use super::ends::{self, ChainEnds};
+use crate::scalar::{Lane, Scalar, lane, max_or_nan};
+use crate::space::{Erased, Space};
 use crate::with_size;
-
-/// A condition at one end of an open curve, as it is solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EndKind {
-    /// The velocity is prescribed (the paper's clamped ends, (19)).
-    Velocity,
-    /// The covariant acceleration is prescribed; natural ends (20) prescribe zero.
-    Acceleration,
-    /// Not-a-knot in normal coordinates at the neighbouring knot.
-    NotAKnot,
-}
-
-/// The ends of eight chains: closed, or the kind at either end of each lane.
-#[derive(Clone, Copy)]
-pub enum ChainEnds {
-    /// The last node is the first one again.
-    Periodic,
-    /// First and last node, lane by lane.
-    Open([[EndKind; LANES]; 2]),
-}
-
-/// The lanes whose end is of a kind.
-pub fn of_kind(kinds: &[EndKind; LANES], kind: EndKind) -> Lane {
-    crate::scalar::mask_from(|l| kinds[l] == kind)
-}
 
 /// How far a lane is from C²: the largest defect, and the largest speed to measure it by.
 #[derive(Clone, Copy)]
@@ -55,8 +31,8 @@ pub struct Defect {
 
 /// Vectors of one node, kept between residuals.
 pub struct NodeVectors<S> {
-    a: Vec<S>,
-    b: Vec<S>,
+    pub(super) a: Vec<S>,
+    pub(super) b: Vec<S>,
     left: Vec<S>,
     right: Vec<S>,
     next_left: Vec<S>,
@@ -181,8 +157,8 @@ fn inside<S: Scalar, M: Space>(
     let at_ends = match ends {
         ChainEnds::Periodic => close(&Erased(space), chain, all_u, all_r, work, first_right),
         ChainEnds::Open(kinds) => {
-            let first = end(&Erased(space), chain, all_u, all_r, work, 0, &kinds[0]);
-            max_or_nan(first, end(&Erased(space), chain, all_u, all_r, work, 1, &kinds[1]))
+            let first = ends::defect(&Erased(space), chain, all_u, all_r, work, 0, &kinds[0]);
+            max_or_nan(first, ends::defect(&Erased(space), chain, all_u, all_r, work, 1, &kinds[1]))
         }
     };
     result.defect = max_or_nan(result.defect, at_ends).sqrt();
@@ -192,7 +168,7 @@ fn inside<S: Scalar, M: Space>(
 
 /// Squared length of the value of a coordinate vector.
 #[inline(always)]
-fn length2<S: Scalar>(x: &[S]) -> Lane {
+pub fn length2<S: Scalar>(x: &[S]) -> Lane {
     x.iter().fold(Lane::ZERO, |sum, x| x.value().mul_add(x.value(), sum))
 }
 
@@ -226,7 +202,7 @@ fn join<S: Scalar, M: Space>(
 
 /// `S(factor · u) x`.
 #[inline(always)]
-fn stretch_by<S: Scalar, M: Space>(space: &M, factor: Lane, u: &[S], x: &mut [S]) {
+pub fn stretch_by<S: Scalar, M: Space>(space: &M, factor: Lane, u: &[S], x: &mut [S]) {
     const SMALL: usize = 16;
     if u.len() <= SMALL {
         let mut v = [S::constant(Lane::ZERO); SMALL];
@@ -259,87 +235,4 @@ fn close<S: Scalar>(
     all_r[n * m..].fill(S::constant(Lane::ZERO));
     let weight = h_left * h_right / (h_left + h_right);
     length2(r) * (weight * weight)
-}
-
-/// The defect at an open end; `all_r` holds the one side that is there.
-fn end<S: Scalar>(
-    space: &Erased,
-    chain: &Chain,
-    all_u: &[S],
-    all_r: &mut [S],
-    work: &mut NodeVectors<S>,
-    which: usize,
-    kinds: &[EndKind; LANES],
-) -> Lane {
-    let (n, m) = (chain.n, chain.m);
-    let NodeVectors { a, b, .. } = work;
-    // The end node, its neighbour, the segment between them, and the next segment.
-    let (node, next, i0, i1) =
-        if which == 0 { (0, 1, 0, 1.min(n - 1)) } else { (n, n - 1, n - 1, n.max(2) - 2) };
-    let (h0, h1) = (chain.h[i0], chain.h[i1]);
-    let sign = if which == 0 { Lane::ONE } else { lane(-1.0) };
-    let u = &all_u[node * m..(node + 1) * m];
-    let value = &chain.end_values[which];
-    let r = &mut all_r[node * m..(node + 1) * m];
-
-    // Acceleration A: w − v = (h²/6) S(v) A.
-    for c in 0..m {
-        a[c] = S::constant(value[c]);
-    }
-    if value.iter().any(|x| x.simd_ne(Lane::ZERO).any()) {
-        stretch_by(space, h0 * THIRD, u, a);
-    }
-    for c in 0..m {
-        a[c] = (r[c] - a[c] * lane(1.0 / 6.0)) * sign;
-    }
-    let mut size = length2(a) * (h0 * h0);
-    let velocity = of_kind(kinds, EndKind::Velocity);
-    if velocity.any() {
-        for c in 0..m {
-            b[c] = -u[c] + value[c];
-        }
-        size = velocity.select(length2(b), size);
-        for c in 0..m {
-            a[c] = S::select(velocity, b[c] * THIRD, a[c]);
-        }
-    }
-    let knot = of_kind(kinds, EndKind::NotAKnot);
-    if knot.any() {
-        let (d0, d1) = (&chain.chord[i0 * m..(i0 + 1) * m], &chain.chord[i1 * m..(i1 + 1) * m]);
-        not_a_knot(space, h0, h1, d0, d1, &all_u[next * m..(next + 1) * m], b);
-        for c in 0..m {
-            b[c] = b[c] - u[c];
-        }
-        let weight = h1 / (h0 + h1);
-        size = knot.select(length2(b) * (weight * weight), size);
-        for c in 0..m {
-            a[c] = S::select(knot, b[c] * THIRD, a[c]);
-        }
-    }
-    r.copy_from_slice(a);
-    size
-}
-
-/// The end velocity that not-a-knot asks for: with c the cubic in `T_{p₁}M` through `x₀ = log_{p₁}(p₀)`, 0 and
-/// `x₂ = log_{p₁}(p₂)` that has `c'(t₁) = u₁`, it is `D exp_{p₁}(x₀)[c'(t₀)]`, in the frame at p₀ `S(x₀) c'(t₀)`.
-///
-/// The formula is the same at the right end, where all vectors change sign.
-pub fn not_a_knot<S: Scalar>(
-    space: &Erased,
-    h0: Lane,
-    h1: Lane,
-    d0: &[Lane],
-    d1: &[Lane],
-    u1: &[S],
-    out: &mut [S],
-) {
-    // Divided differences of c at the two nodes beside t₁.
-    let (i0, i1, i01) = (Lane::ONE / h0, Lane::ONE / h1, Lane::ONE / (h0 + h1));
-    for c in 0..u1.len() {
-        let (alpha, beta) = (u1[c] - d0[c] * i0, -u1[c] + d1[c] * i1);
-        let third = (beta * i1 - alpha * i0) * i01;
-        out[c] = u1[c] - alpha * lane(2.0) + third * (h0 * h0);
-    }
-    let d0: Vec<S> = d0.iter().map(|&d| S::constant(d)).collect();
-    space.stretch(&d0, out);
 }

@@ -5,7 +5,7 @@
 //! several splines; this one is continued from points that are near.
 
 use super::chain::Chain;
-use super::condition::ChainEnds;
+use super::ends::ChainEnds;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{Options, Solver};
 use crate::monitor::Monitor;

@@ -6,8 +6,10 @@ mod certificate;
 mod chain;
 mod condition;
 mod convergence;
+mod ends;
 mod fixed_point;
 mod homotopy;
+mod lanes;
 mod legs;
 mod line_search;
 mod newton;
@@ -18,8 +20,16 @@ mod tridiagonal;
 
 pub use blocks::Blocks;
 pub use chain::{Chain, Run, Visit};
-pub use condition::{ChainEnds, Defect, EndKind, NodeVectors, sweep, sweep_by_table};
-pub use pieces::fit;
+pub use condition::{Defect, NodeVectors, sweep, sweep_by_table};
+pub use ends::{ChainEnds, EndKind, NotAKnot};
+
+use crate::monitor::Monitor;
+use crate::scalar::{Lane, lane};
+use crate::space::{Ambient, Erased};
+use pieces::{OVERLAP, Piece, fit_cut};
+
+/// Curves with more segments than this are cut into pieces.
+const LONG: usize = 512;
 
 /// Points to interpolate: curves one after another.
 pub struct Problem<'a> {
@@ -174,5 +184,65 @@ impl Default for Report {
             solver: Solver::FixedPoint,
             invariant_radius: f64::NAN,
         }
+    }
+}
+
+/// Fits all curves of a problem; velocities get the layout of the points. Curves at fault are NaN.
+pub fn fit(
+    space: &Erased,
+    problem: &Problem,
+    options: &Options,
+    monitor: &Monitor,
+    velocities: &mut [f64],
+) -> Vec<Report> {
+    let curves = problem.offsets.len() - 1;
+    let mut reports = vec![Report::default(); curves];
+    let whole: Vec<usize> = (0..curves).filter(|&c| problem.segments(c) <= LONG).collect();
+    let mut rest: Vec<usize> = (0..curves).filter(|&c| problem.segments(c) > LONG).collect();
+    fit_cut(space, problem, options, monitor, velocities, &whole, None, &mut reports);
+    let mut overlap = OVERLAP;
+    while !rest.is_empty() && !monitor.cancelled() {
+        rest = fit_cut(space, problem, options, monitor, velocities, &rest, Some(overlap), &mut reports);
+        overlap *= 2;
+    }
+    let len = space.point_len();
+    for (curve, report) in reports.iter().enumerate() {
+        let own = &mut velocities[problem.offsets[curve] * len..problem.offsets[curve + 1] * len];
+        if report.status.is_fault() {
+            own.fill(f64::NAN);
+        } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
+            // Pieces agree to the tolerance; first and last velocity are one.
+            let carried = problem.across_seam(space, curve, &own[..len]);
+            own[problem.segments(curve) * len..].copy_from_slice(&carried);
+        }
+    }
+    reports
+}
+
+impl<'a> Problem<'a> {
+    /// Number of segments of a curve.
+    fn segments(&self, curve: usize) -> usize {
+        self.offsets[curve + 1] - self.offsets[curve] - 1
+    }
+
+    /// The knots of a curve.
+    pub fn knots(&self, curve: usize) -> &'a [f64] {
+        if self.shared { self.t } else { &self.t[self.offsets[curve]..self.offsets[curve + 1]] }
+    }
+
+    /// A velocity at the first point of a closed curve as one at its last, which may be another array.
+    fn across_seam(&self, space: &Erased, curve: usize, velocity: &[f64]) -> Vec<f64> {
+        let len = velocity.len();
+        let lanes = |row: &[f64]| -> Vec<Lane> { row.iter().map(|&x| lane(x)).collect() };
+        let point = |node: usize| lanes(&self.points[node * len..(node + 1) * len]);
+        let (first, last) = (point(self.offsets[curve]), point(self.offsets[curve + 1] - 1));
+        let (still, mut carried) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
+        space.carry(&first, &last, &still, &lanes(velocity), &mut carried);
+        carried.iter().map(|x| x.as_array()[0]).collect()
+    }
+
+    fn run(&self, piece: &Piece, len: usize) -> Run<'a> {
+        let (from, to) = (self.offsets[piece.curve], self.offsets[piece.curve + 1]);
+        Run { t: self.knots(piece.curve), points: &self.points[from * len..to * len], first: piece.first }
     }
 }

@@ -6,7 +6,8 @@
 
 use super::blocks::Blocks;
 use super::chain::Chain;
-use super::condition::{ChainEnds, NodeVectors, sweep};
+use super::condition::{NodeVectors, sweep};
+use super::ends::ChainEnds;
 use crate::scalar::{Dual, Lane, Scalar};
 use crate::space::Erased;
 

@@ -1,8 +1,9 @@
 //! The iteration that the solvers share: residual, convergence lane by lane, step.
 
 use super::chain::Chain;
-use super::condition::{ChainEnds, EndKind, NodeVectors, of_kind, residual};
+use super::condition::{NodeVectors, residual};
 use super::convergence::{Best, Convergence};
+use super::ends::ChainEnds;
 use super::legs::{long_legs, shorten};
 use super::line_search::{LineSearch, halve};
 use super::newton::{self, Newton};
@@ -146,7 +147,7 @@ pub fn solve(
                 *s = worse.select(-*n, *n);
             }
             if long.any() {
-                shorten(space, chain, limit, |node| !long | given(ends, chain.n, node), u);
+                shorten(space, chain, limit, |node| !long | ends.given(chain.n, node), u);
             }
         });
     }
@@ -161,14 +162,5 @@ pub fn solve(
         leg: state.leg,
         rate: state.rate(),
         solver: [solver; LANES],
-    }
-}
-
-/// The lanes in which the velocity at a node of n segments is given.
-fn given(ends: &ChainEnds, n: usize, node: usize) -> Lane {
-    match ends {
-        ChainEnds::Open(kinds) if node == 0 => of_kind(&kinds[0], EndKind::Velocity),
-        ChainEnds::Open(kinds) if node == n => of_kind(&kinds[1], EndKind::Velocity),
-        _ => Lane::ZERO,
     }
 }

@@ -4,8 +4,8 @@
 //! `1/hᵢ₋₁, 2/hᵢ₋₁ + 2/hᵢ, 1/hᵢ`: the matrix of the classical cubic spline.
 
 use super::chain::Chain;
-use super::condition::{ChainEnds, EndKind, of_kind};
-use crate::scalar::{LANES, Lane, lane};
+use super::ends::{self, ChainEnds};
+use crate::scalar::{Lane, lane};
 use crate::space::Erased;
 use crate::with_size;
 
@@ -41,8 +41,8 @@ impl Tridiagonal {
             (self.lower[i], self.diagonal[i], self.upper[i]) = (left, TWO * (left + right), right);
         }
         if let ChainEnds::Open(kinds) = ends {
-            (self.diagonal[0], self.upper[0]) = end_row(chain, 0, &kinds[0]);
-            (self.diagonal[n], self.lower[n]) = end_row(chain, 1, &kinds[1]);
+            (self.diagonal[0], self.upper[0]) = ends::row(chain, 0, &kinds[0]);
+            (self.diagonal[n], self.lower[n]) = ends::row(chain, 1, &kinds[1]);
             self.factor(0, n);
         } else if n > 1 {
             self.factor(1, n - 1);
@@ -139,21 +139,4 @@ impl Tridiagonal {
             f.fill(Lane::ZERO);
         }
     }
-}
-
-/// Diagonal and off-diagonal of an end row, lane by lane.
-fn end_row(chain: &Chain, which: usize, kinds: &[EndKind; LANES]) -> (Lane, Lane) {
-    let n = chain.n;
-    let (h0, h1) = if which == 0 {
-        (chain.h[0], chain.h[1.min(n - 1)])
-    } else {
-        (chain.h[n - 1], chain.h[n.max(2) - 2])
-    };
-    let velocity = of_kind(kinds, EndKind::Velocity);
-    let knot = of_kind(kinds, EndKind::NotAKnot);
-    let inverse = Lane::ONE / h0;
-    (
-        (velocity | knot).select(Lane::ONE, TWO * inverse),
-        velocity.select(Lane::ZERO, knot.select(Lane::ONE + h0 / h1, inverse)),
-    )
 }

@@ -1,0 +1,227 @@
+//! End conditions: what is asked for at an end, its row of the flat-space matrix T, and its defect.
+
+use super::End;
+use super::chain::Chain;
+use super::condition::{NodeVectors, length2, stretch_by};
+use crate::scalar::{LANES, Lane, Scalar, lane, mask_from};
+use crate::space::{Erased, Origin};
+
+const ONE: Lane = Lane::ONE;
+const TWO: Lane = lane(2.0);
+const THIRD: Lane = lane(1.0 / 3.0);
+
+/// A condition at one end of an open curve, as it is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EndKind {
+    /// The velocity is prescribed (the paper's clamped ends, (19)).
+    Velocity,
+    /// The covariant acceleration is prescribed; natural ends (20) prescribe zero.
+    Acceleration,
+    /// Not-a-knot in normal coordinates at the neighbouring knot.
+    NotAKnot,
+}
+
+/// The ends of eight chains: closed, or the kind at either end of each lane.
+#[derive(Clone, Copy)]
+pub enum ChainEnds {
+    /// The last node is the first one again.
+    Periodic,
+    /// First and last node, lane by lane.
+    Open([[EndKind; LANES]; 2]),
+}
+
+impl ChainEnds {
+    /// The lanes in which the velocity at a node of n segments is given.
+    pub fn given(&self, n: usize, node: usize) -> Lane {
+        match self {
+            ChainEnds::Open(kinds) if node == 0 => of_kind(&kinds[0], EndKind::Velocity),
+            ChainEnds::Open(kinds) if node == n => of_kind(&kinds[1], EndKind::Velocity),
+            _ => Lane::ZERO,
+        }
+    }
+}
+
+/// The lanes whose end is of a kind.
+pub fn of_kind(kinds: &[EndKind; LANES], kind: EndKind) -> Lane {
+    mask_from(|l| kinds[l] == kind)
+}
+
+impl<'a> End<'a> {
+    /// Whether Theorem 3.1 is about such ends.
+    pub fn is_of_the_theorem(&self) -> bool {
+        matches!(self, End::Natural | End::Velocity(_))
+    }
+
+    /// As it is solved.
+    pub fn kind(&self) -> EndKind {
+        match self {
+            End::Natural | End::Acceleration(_) => EndKind::Acceleration,
+            End::Velocity(_) => EndKind::Velocity,
+            End::NotAKnot => EndKind::NotAKnot,
+        }
+    }
+
+    /// The vectors that it prescribes.
+    pub fn values(&self) -> Option<&'a [f64]> {
+        match self {
+            End::Velocity(v) | End::Acceleration(v) => Some(v),
+            End::Natural | End::NotAKnot => None,
+        }
+    }
+}
+
+/// One of the ends of a chain of n segments: its node and the neighbour, the segment between them, and the next one.
+struct Place {
+    node: usize,
+    next: usize,
+    near: usize,
+    far: usize,
+}
+
+impl Place {
+    fn of(which: usize, n: usize) -> Self {
+        if which == 0 {
+            Place { node: 0, next: 1, near: 0, far: 1.min(n - 1) }
+        } else {
+            Place { node: n, next: n - 1, near: n - 1, far: n.max(2) - 2 }
+        }
+    }
+}
+
+/// Diagonal and off-diagonal of an end row of T, lane by lane.
+pub fn row(chain: &Chain, which: usize, kinds: &[EndKind; LANES]) -> (Lane, Lane) {
+    let Place { near, far, .. } = Place::of(which, chain.n);
+    let (h0, h1) = (chain.h[near], chain.h[far]);
+    let velocity = of_kind(kinds, EndKind::Velocity);
+    let knot = of_kind(kinds, EndKind::NotAKnot);
+    let inverse = ONE / h0;
+    (
+        (velocity | knot).select(ONE, TWO * inverse),
+        velocity.select(Lane::ZERO, knot.select(ONE + h0 / h1, inverse)),
+    )
+}
+
+/// The defect at an open end; `all_r` holds the one side that is there. Returns its squared size.
+pub fn defect<S: Scalar>(
+    space: &Erased,
+    chain: &Chain,
+    all_u: &[S],
+    all_r: &mut [S],
+    work: &mut NodeVectors<S>,
+    which: usize,
+    kinds: &[EndKind; LANES],
+) -> Lane {
+    let (n, m) = (chain.n, chain.m);
+    let NodeVectors { a, b, .. } = work;
+    let Place { node, next, near, far } = Place::of(which, n);
+    let (h0, h1) = (chain.h[near], chain.h[far]);
+    let sign = if which == 0 { ONE } else { -ONE };
+    let u = &all_u[node * m..(node + 1) * m];
+    let value = &chain.end_values[which];
+    let r = &mut all_r[node * m..(node + 1) * m];
+
+    // Acceleration A: w − v = (h²/6) S(v) A.
+    for c in 0..m {
+        a[c] = S::constant(value[c]);
+    }
+    if value.iter().any(|x| x.simd_ne(Lane::ZERO).any()) {
+        stretch_by(space, h0 * THIRD, u, a);
+    }
+    for c in 0..m {
+        a[c] = (r[c] - a[c] * lane(1.0 / 6.0)) * sign;
+    }
+    let mut size = length2(a) * (h0 * h0);
+    let velocity = of_kind(kinds, EndKind::Velocity);
+    if velocity.any() {
+        for c in 0..m {
+            b[c] = -u[c] + value[c];
+        }
+        size = velocity.select(length2(b), size);
+        for c in 0..m {
+            a[c] = S::select(velocity, b[c] * THIRD, a[c]);
+        }
+    }
+    let knot = of_kind(kinds, EndKind::NotAKnot);
+    if knot.any() {
+        let weights = NotAKnot::of(h0, h1, n, false);
+        let chord = |i: usize| &chain.chord[i * m..(i + 1) * m];
+        weights.velocity(space, chord(near), chord(far), &all_u[next * m..(next + 1) * m], b);
+        for c in 0..m {
+            b[c] = b[c] - u[c];
+        }
+        let weight = h1 / (h0 + h1);
+        size = knot.select(length2(b) * (weight * weight), size);
+        for c in 0..m {
+            a[c] = S::select(knot, b[c] * THIRD, a[c]);
+        }
+    }
+    r.copy_from_slice(a);
+    size
+}
+
+/// The end velocity that not-a-knot asks for: with c the cubic in `T_{p₁}M` through `x₀ = log_{p₁}(p₀)`, 0 and
+/// `x₂ = log_{p₁}(p₂)` that has `c'(t₁) = u₁`, it is `D exp_{p₁}(x₀)[c'(t₀)]`, in the frame at p₀ `S(x₀) c'(t₀)`.
+///
+/// These are the weights of u₁, of the chord at the end and of the next one in c'(t₀). They are the same at the
+/// right end, where all vectors change sign.
+pub struct NotAKnot<S> {
+    /// Of u₁.
+    pub u: S,
+    /// Of the chord at the end.
+    pub near: S,
+    /// Of the next chord.
+    pub far: S,
+}
+
+impl<S: Scalar> NotAKnot<S> {
+    /// For a curve of n segments, the first two of lengths h₀ and h₁. Few points have a rule of their own, which is
+    /// SciPy's: two the geodesic, and three with not-a-knot at `both` ends one parabola.
+    pub fn of(h0: S, h1: S, n: usize, both: bool) -> Self {
+        let (i0, i1, i01) = (reciprocal(h0), reciprocal(h1), reciprocal(h0 + h1));
+        let zero = S::constant(Lane::ZERO);
+        if n == 1 {
+            NotAKnot { u: zero, near: i0, far: zero }
+        } else if n == 2 && both {
+            NotAKnot { u: zero, near: i0 * TWO - h1 * i0 * i01, far: -(h0 * i1 * i01) }
+        } else {
+            let q = h0 * i1;
+            NotAKnot { u: -(q + ONE), near: i0 * TWO + i01, far: q * q * i01 }
+        }
+    }
+}
+
+impl NotAKnot<Lane> {
+    /// `S(d₀) c'(t₀)`
+    fn velocity<S: Scalar>(&self, space: &Erased, d0: &[Lane], d1: &[Lane], u1: &[S], out: &mut [S]) {
+        for c in 0..u1.len() {
+            out[c] = u1[c] * self.u + (self.near * d0[c] + self.far * d1[c]);
+        }
+        let d0: Vec<S> = d0.iter().map(|&d| S::constant(d)).collect();
+        space.stretch(&d0, out);
+    }
+}
+
+fn reciprocal<S: Scalar>(x: S) -> S {
+    let i = ONE / x.value();
+    x.compose([i, -(i * i), TWO * i * i * i])
+}
+
+/// Not-a-knot ends of so few points that they give the velocity itself.
+pub fn few_points(space: &Erased, chain: &mut Chain, ends: ChainEnds) -> ChainEnds {
+    let ChainEnds::Open(mut kinds) = ends else { return ends };
+    let (n, m) = (chain.n, chain.m);
+    let knots = kinds.map(|k| k[0] == EndKind::NotAKnot);
+    if n > 2 || (n == 2 && knots != [true, true]) {
+        return ends;
+    }
+    for which in (0..2).filter(|&e| knots[e]) {
+        let Place { near, far, .. } = Place::of(which, n);
+        let weights = NotAKnot::of(chain.h[near], chain.h[far], n, true);
+        let chord = |i: usize| &chain.chord[i * m..(i + 1) * m];
+        let mut value = vec![Lane::ZERO; m];
+        weights.velocity(space, chord(near), chord(far), &vec![Lane::ZERO; m], &mut value);
+        chain.end_values[which] = value;
+        kinds[which] = [EndKind::Velocity; LANES];
+    }
+    ChainEnds::Open(kinds)
+}

@@ -1,0 +1,148 @@
+//! Eight curves, or pieces of curves, side by side in the lanes.
+
+use super::auto;
+use super::chain::{Chain, Run};
+use super::ends::{ChainEnds, EndKind, few_points, of_kind};
+use super::legs::noisy_legs;
+use super::pieces::Piece;
+use super::solve::Workspace;
+use super::{Ends, Options, Problem, Report, Status};
+use crate::monitor::Monitor;
+use crate::scalar::{LANES, Lane, dot, lane, mask_from, scatter};
+use crate::space::{Ambient, Erased};
+use std::cell::RefCell;
+
+#[derive(Default)]
+struct Thread {
+    chain: Chain,
+    work: Workspace,
+}
+
+thread_local! {
+    static THREAD: RefCell<Thread> = RefCell::default();
+}
+
+/// Fits up to eight pieces of one length.
+pub fn fit_lanes(
+    space: &Erased,
+    problem: &Problem,
+    options: &Options,
+    monitor: &Monitor,
+    group: &mut [Piece],
+) {
+    // Taken out and put back, because Python may call in again while we ask it whether to go on.
+    let mut memory = THREAD.take();
+    fit_in(space, problem, options, monitor, group, &mut memory);
+    THREAD.set(memory);
+}
+
+fn fit_in(
+    space: &Erased,
+    problem: &Problem,
+    options: &Options,
+    monitor: &Monitor,
+    group: &mut [Piece],
+    Thread { chain, work }: &mut Thread,
+) {
+    let nodes = group[0].nodes;
+    // Lanes that are left over repeat the first piece.
+    let piece = |l: usize| &group[if l < group.len() { l } else { 0 }];
+    let runs: [Run; LANES] = std::array::from_fn(|l| problem.run(piece(l), space.point_len()));
+    let is_end = |l: usize| {
+        let (p, last) = (piece(l), problem.segments(piece(l).curve));
+        [p.first == 0, p.first + nodes == last + 1]
+    };
+    let whole = |l: usize| is_end(l) == [true, true];
+    let (ends, values) = match problem.ends {
+        Ends::Periodic if whole(0) => (ChainEnds::Periodic, [None, None]),
+        // Pieces of a closed curve, all of whose ends are artificial.
+        Ends::Periodic => (ChainEnds::Open([[EndKind::Acceleration; LANES]; 2]), [None, None]),
+        Ends::Open(ends) => {
+            let mut kinds = [[EndKind::Acceleration; LANES]; 2];
+            let mut values = [None, None];
+            for (e, end) in ends.iter().enumerate() {
+                kinds[e] =
+                    std::array::from_fn(|l| if is_end(l)[e] { end.kind() } else { EndKind::Acceleration });
+                values[e] = end.values().map(|v| (v, space.point_len()));
+            }
+            (ChainEnds::Open(kinds), values)
+        }
+    };
+    let zeros = vec![0.0; space.point_len()];
+    let rows: [Option<[&[f64]; LANES]>; 2] = std::array::from_fn(|e| {
+        values[e].map(|(v, len)| {
+            std::array::from_fn(|l| {
+                let c = piece(l).curve;
+                if is_end(l)[e] { &v[c * len..(c + 1) * len] } else { &zeros[..] }
+            })
+        })
+    });
+    chain.unroll(space, &runs, nodes - 1, &ends, rows);
+    let ends = few_points(space, chain, ends);
+    let cut = chain.cut;
+    let idle = mask_from(|l| cut[l].is_some());
+    let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
+    let options = Options { tol: pieces_tol, ..*options };
+    let outcome = auto::run(space, chain, &ends, &options, idle, work, monitor);
+    let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
+    let noisy = noisy_legs(space, chain, &runs, outcome.leg);
+    let steps = chain.max_step.to_array();
+    let given = given_legs(chain, &ends);
+    for (l, p) in group.iter_mut().enumerate() {
+        let status = if let Some((index, angle)) = cut[l] {
+            Status::CutLocus { index, angle }
+        } else if monitor.cancelled() {
+            Status::Stopped
+        } else if let Some(fault) = outcome.fault[l] {
+            fault
+        } else if !outcome.converged[l] {
+            Status::Unconverged
+        } else {
+            noisy[l].unwrap_or(Status::Converged)
+        };
+        let status = status.counted(|index| p.first + index);
+        p.report = Report {
+            status,
+            iterations: outcome.iterations[l],
+            residual: residual[l],
+            max_step: steps[l],
+            rate: rate[l],
+            solver: outcome.solver[l],
+            invariant_radius: f64::NAN,
+        };
+        p.end_leg = given[l];
+    }
+    let runs: [Run; LANES] =
+        std::array::from_fn(|l| problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len()));
+    write_velocities(space, chain, &runs, group);
+}
+
+fn write_velocities(space: &Erased, chain: &mut Chain, runs: &[Run; LANES], group: &mut [Piece]) {
+    let len = space.point_len();
+    let mut rows = vec![0.0; LANES * len];
+    chain.roll_up(space, runs, |i, u| {
+        scatter(u, &mut rows);
+        for (p, row) in group.iter_mut().zip(rows.chunks_exact(len)) {
+            if p.core.contains(&i) {
+                let at = (i - p.core.start) * len;
+                p.velocities[at..at + len].copy_from_slice(row);
+                p.largest = row.iter().fold(p.largest, |x, u| x.max(u.abs()));
+            } else if i == p.core.end {
+                p.next_velocity.extend_from_slice(row);
+            }
+        }
+    });
+}
+
+/// The longer of the legs h|u|/3 at ends with a given velocity, lane by lane.
+fn given_legs(chain: &Chain, ends: &ChainEnds) -> [f64; LANES] {
+    let ChainEnds::Open(kinds) = ends else { return [0.0; LANES] };
+    let (n, m) = (chain.n, chain.m);
+    let mut longest = Lane::ZERO;
+    for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
+        let u = &chain.velocities()[node * m..(node + 1) * m];
+        let leg = dot(u, u).sqrt() * chain.h[segment] * lane(1.0 / 3.0);
+        longest = of_kind(kinds, EndKind::Velocity).select(longest.max(leg), longest);
+    }
+    longest.to_array()
+}
