@@ -304,7 +304,7 @@ def test_long_files_are_read_in_pieces(run, fails):
 # ---- every space ----
 
 SPACES = (
-    *("r:2", "s:2", "h:2", "rp:2", "cp:1", "gr:2,4", "cgr:1,2", "so:3", "o:3", "u:2", "su:2"),
+    *("r:2", "s:2", "h:2", "rp:2", "cp:1", "ch:2", "gr:2,4", "cgr:1,2", "so:3", "o:3", "u:2", "su:2"),
     *("spd:2", "hpd:2", "se:2", "se:3", "so:3 x r:3", "r:2 x su:2 x cp:1 x spd:2"),
 )
 TABLES = pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])

@@ -22,6 +22,7 @@ NAMES = [
     "rp:7",
     "cp:1",
     "cp:7",
+    "ch:2",
     "gr:1,3",
     "gr:2,5",
     "cgr:1,2",
@@ -496,6 +497,7 @@ DIMENSIONS = {
     "hyperbolic": lambda n: n,
     "rp": lambda n: n,
     "cp": lambda n: 2 * n,
+    "ch": lambda n: 2 * n,
     "gr": lambda k, n: k * (n - k),
     "cgr": lambda k, n: 2 * k * (n - k),
     "so": lambda n: n * (n - 1) // 2,
@@ -506,7 +508,7 @@ DIMENSIONS = {
     "hpd": lambda n: n * n,
     "se": lambda n: n * (n + 1) // 2,
 }
-COMPLEX_FAMILIES = {"cp", "cgr", "u", "su", "hpd"}
+COMPLEX_FAMILIES = {"cp", "ch", "cgr", "u", "su", "hpd"}
 
 
 @pytest.mark.parametrize("name", NAMES)

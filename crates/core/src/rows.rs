@@ -27,6 +27,8 @@ pub enum Operation {
     Transport,
     /// inner product: p, u, v
     Inner,
+    /// how much rounding counts: p
+    Rounding,
     /// a point beside x: x
     Project,
     /// the tangential part of v at p: p, v
@@ -40,7 +42,7 @@ pub enum Operation {
 impl Operation {
     /// Numbers in a row of the result, for points of `len` numbers.
     pub fn row_len(self, len: usize) -> usize {
-        if matches!(self, Operation::Distance | Operation::Inner) { 1 } else { len }
+        if matches!(self, Operation::Distance | Operation::Inner | Operation::Rounding) { 1 } else { len }
     }
 
     /// Whether points at or past each other's cut locus are an error.
@@ -102,6 +104,7 @@ pub fn apply(
                 Operation::Transvection => space.transvect(a, b, c, &mut result),
                 Operation::Transport => space.carry(a, b, &log, c, &mut result),
                 Operation::Inner => result[0] = space.inner(a, b, c),
+                Operation::Rounding => result[0] = space.rounding(a),
                 Operation::Project => {
                     space.project(a);
                     result.copy_from_slice(a);

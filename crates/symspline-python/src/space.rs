@@ -74,6 +74,7 @@ impl Handle {
             "transvection" => Operation::Transvection,
             "transport" => Operation::Transport,
             "inner" => Operation::Inner,
+            "rounding" => Operation::Rounding,
             "project" => Operation::Project,
             "project_tangent" => Operation::ProjectTangent,
             "scatter" => Operation::Scatter,

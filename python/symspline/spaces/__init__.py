@@ -6,7 +6,7 @@ from .named import space
 from .positive import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, together
 from .rounding import rounding
-from .subspaces import ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective
+from .subspaces import ComplexGrassmannian, ComplexHyperbolic, ComplexProjective, Grassmannian, RealProjective
 from .tolerance import POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
 
@@ -14,6 +14,7 @@ __all__ = [
     "POINT_TOL_FLOAT32",
     "Array",
     "ComplexGrassmannian",
+    "ComplexHyperbolic",
     "ComplexProjective",
     "Euclidean",
     "Grassmannian",
