@@ -49,6 +49,8 @@ CASES = [
     Case("cp:1", far=1.0, few=True, face=True),
     Case("cp:2", far=1.0),
     Case("cp:7", far=1.0, few=True, face=True),
+    Case("ch:1", far=1.0, few=True),
+    Case("ch:2", far=1.0, face=True),
     Case("gr:1,3", far=1.2, few=True, face=True),
     Case("gr:2,3", far=1.2, few=True),
     Case("gr:2,5", far=1.2, face=True),
@@ -102,14 +104,15 @@ LOOPS = [*CURVED, "se:3"]
 FAMILIES = Handle.names()
 
 POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite)
-QUOTIENTS = (ss.RealProjective, ss.ComplexProjective, ss.Grassmannian, ss.ComplexGrassmannian)
+HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
+QUOTIENTS = (ss.RealProjective, ss.ComplexProjective, ss.ComplexHyperbolic, ss.Grassmannian, ss.ComplexGrassmannian)
 
 
 def condition(space, points):
     """By how much rounding of points near these counts: |p|² on the hyperboloid, |p| cond(p) for positive
     definite matrices, |p| otherwise."""
-    if isinstance(space, ss.Hyperbolic):
-        return float(np.max(np.sum(np.square(points), axis=-1)))
+    if isinstance(space, HYPERBOLIC):
+        return float(np.max(np.sum(np.square(np.abs(points)), axis=-1)))
     if len(space.point_shape) == 2:
         largest = max(1.0, float(np.max(np.linalg.norm(points, axis=(-2, -1)))))
     else:
@@ -137,7 +140,7 @@ def base_point(space, rng):
     if compact(space):
         return p
     centre = np.zeros(space.point_shape)
-    if isinstance(space, ss.Hyperbolic):
+    if isinstance(space, HYPERBOLIC):
         centre[0] = 1.0
     if len(space.point_shape) == 2:
         centre = np.eye(space.point_shape[0])

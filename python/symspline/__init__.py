@@ -25,6 +25,7 @@ from .functions import evaluate, fit, fit_many  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .spaces import (  # noqa: E402
     ComplexGrassmannian,
+    ComplexHyperbolic,
     ComplexProjective,
     Euclidean,
     Grassmannian,
@@ -50,6 +51,7 @@ __all__ = [
     "BSpline",
     "BezierCurve",
     "ComplexGrassmannian",
+    "ComplexHyperbolic",
     "ComplexProjective",
     "ConvergenceError",
     "ConvergenceWarning",

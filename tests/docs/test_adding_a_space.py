@@ -41,4 +41,4 @@ def test_files_exist():
     paths = [*links, *(f"../{name}" for name in names)]
     missing = {path for path in paths if not (ROOT / "docs" / path).exists()}
     # The page that would be added.
-    assert missing == {"../crates/symspline/src/space/torus.rs"}
+    assert missing == {"../crates/vectors/src/torus.rs"}

@@ -42,6 +42,7 @@ KINDS = {
     "rp:4": subspaces.draw_principal_angles,
     "cp:1": bloch.draw_bloch,
     "cp:2": subspaces.draw_principal_angles,
+    "ch:2": subspaces.draw_ratios,
     "gr:1,2": angle.draw_slope,
     "gr:1,3": dome.draw_lines,
     "gr:2,3": dome.draw_normals,

@@ -107,6 +107,7 @@ DIMENSIONS = {
     "hyperbolic": lambda n: n,
     "rp": lambda n: n,
     "cp": lambda n: 2 * n,
+    "ch": lambda n: 2 * n,
     "gr": lambda k, n: k * (n - k),
     "cgr": lambda k, n: 2 * k * (n - k),
     "so": lambda n: n * (n - 1) // 2,
@@ -119,7 +120,7 @@ DIMENSIONS = {
 }
 
 
-COMPLEX_FAMILIES = {"cp", "cgr", "u", "su", "hpd"}
+COMPLEX_FAMILIES = {"cp", "ch", "cgr", "u", "su", "hpd"}
 
 
 @every_single

@@ -1,8 +1,10 @@
-//! Subspaces: Grassmannians and projective spaces.
+//! Lines and subspaces: Grassmannians, projective spaces and complex hyperbolic space.
 
+mod complex_hyperbolic;
 mod grassmannian;
 mod logarithm;
 
+pub use complex_hyperbolic::ComplexHyperbolic;
 pub use grassmannian::Subspaces;
 
 use symspline_core::matrix::Small;
@@ -10,6 +12,11 @@ use symspline_core::space::{Entry, Made, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
+    Entry {
+        names: &["ch", "complex-hyperbolic"],
+        parameters: &["n"],
+        make: |p| table(ComplexHyperbolic::new(p[0])),
+    },
     Entry { names: &["rp", "real-projective"], parameters: &["n"], make: |p| real(Subspaces::lines(p[0])) },
     Entry {
         names: &["cp", "complex-projective"],

@@ -5,7 +5,7 @@ use symspline_core::space::{Entry, Erased, Table};
 
 pub use symspline_forms::PositiveDefinite;
 pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
-pub use symspline_subspaces::Subspaces;
+pub use symspline_subspaces::{ComplexHyperbolic, Subspaces};
 pub use symspline_vectors::{Curved, Euclidean, Hyperbolic, Sphere};
 
 /// Every kind of space.

@@ -4,7 +4,7 @@
 // ---- the page begins ----
 use std::f64::consts::PI;
 use symspline::scalar::{Lane, Scalar, dot, lane, max_or_nan};
-use symspline::space::{Ambient, Frame, Origin, Space};
+use symspline::space::Model;
 use symspline::special::Trig;
 
 /// Tⁿ = S¹ × … × S¹: n unit vectors of R².
@@ -34,7 +34,7 @@ fn cross<S: Scalar>(p: [S; 2], q: [S; 2]) -> S {
 
 /// The tangent vector at p with coordinate x.
 #[inline(always)]
-fn along(p: [Lane; 2], x: Lane) -> [Lane; 2] {
+fn along<S: Scalar>(p: [S; 2], x: S) -> [S; 2] {
     [-(x * p[1]), x * p[0]]
 }
 
@@ -56,57 +56,50 @@ fn angle_between<S: Scalar>(p: [S; 2], q: [S; 2]) -> S {
     S::from_parts([sin.value().atan2(cos.value()), d, dd])
 }
 
-/// The largest |xᵢ|, NaN if any is.
-fn largest(x: &[Lane]) -> Lane {
-    x.iter().fold(Lane::ZERO, |most, x| max_or_nan(most, x.abs()))
-}
-
-impl Ambient for Torus {
-    fn point_len(&self) -> usize {
-        2 * self.n
-    }
+impl Model for Torus {
     fn point_shape(&self) -> Vec<usize> {
         vec![self.n, 2]
+    }
+    fn dim(&self) -> usize {
+        self.n
     }
     fn cut_angle(&self) -> f64 {
         PI
     }
-    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        for (j, out) in out.chunks_exact_mut(2).enumerate() {
-            let p = pair(p, j);
-            out.copy_from_slice(&turned(p.map(S::constant), t * cross(p, pair(v, j))));
+    fn curvature(&self) -> f64 {
+        0.0
+    }
+
+    fn exp<S: Scalar>(&self, p: &[S], v: &[S], q: &mut [S]) {
+        for (j, q) in q.chunks_exact_mut(2).enumerate() {
+            q.copy_from_slice(&turned(pair(p, j), cross(pair(p, j), pair(v, j))));
         }
     }
-    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
-        let mut angle = Lane::ZERO;
-        for (j, out) in out.chunks_exact_mut(2).enumerate() {
-            let x = angle_between(pair(p, j), pair(q, j));
-            out.copy_from_slice(&along(pair(p, j), x));
-            angle = max_or_nan(angle, x.abs());
+    fn log<S: Scalar>(&self, p: &[S], q: &[S], v: &mut [S]) -> Lane {
+        for (j, v) in v.chunks_exact_mut(2).enumerate() {
+            v.copy_from_slice(&along(pair(p, j), angle_between(pair(p, j), pair(q, j))));
         }
-        angle
+        let values: Vec<Lane> = v.iter().map(|v| v.value()).collect();
+        self.angle(&[], &values)
     }
-    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
-        for (j, out) in out.chunks_exact_mut(2).enumerate() {
-            out.copy_from_slice(&turned(pair(p, j), t * angle_between(pair(p, j), pair(q, j))));
-        }
-    }
-    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        for (j, out) in out.chunks_exact_mut(2).enumerate() {
-            out.copy_from_slice(&turned(pair(x, j), cross(pair(p, j), pair(v, j))));
+    fn transvect<S: Scalar>(&self, p: &[S], v: &[S], x: &mut [S]) {
+        for (j, x) in x.chunks_exact_mut(2).enumerate() {
+            let j = j % self.n;
+            x.copy_from_slice(&turned([x[0], x[1]], cross(pair(p, j), pair(v, j))));
         }
     }
+
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         for (j, d) in d.chunks_exact_mut(2).enumerate() {
             let p = pair(gamma, j);
             d.copy_from_slice(&along(p, cross(p, [d[0], d[1]])));
         }
     }
-    fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
-        self.velocity(gamma, dd);
-    }
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         dot(u, v)
+    }
+    fn angle(&self, _p: &[Lane], v: &[Lane]) -> Lane {
+        v.chunks_exact(2).fold(Lane::ZERO, |most, v| max_or_nan(most, dot(v, v).sqrt()))
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let mut off = Lane::ZERO;
@@ -120,72 +113,46 @@ impl Ambient for Torus {
         }
         off
     }
-    fn scatter(&self, noise: &mut [Lane]) {
-        self.project(noise);
-    }
     fn complaint(&self, x: &[f64]) -> String {
         let norms: Vec<f64> = x.chunks_exact(2).map(|x| x[0].hypot(x[1])).collect();
         format!("its rows have the norms {norms:?}, not 1")
     }
-}
 
-impl Frame for Torus {
-    fn frame_len(&self) -> usize {
-        0
+    fn origin(&self, o: &mut [Lane]) {
+        o.chunks_exact_mut(2).for_each(|o| o[0] = Lane::ONE);
     }
-    fn lift(&self, _p: &[Lane], _frame: &mut [Lane]) {}
-    fn step(&self, _frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
-        for (j, x) in chord.iter_mut().enumerate() {
-            *x = angle_between(pair(p, j), pair(q, j));
-        }
-        largest(chord)
+    fn vector<S: Scalar>(&self, x: &[S], v: &mut [S]) {
+        v.chunks_exact_mut(2).zip(x).for_each(|(v, x)| v[1] = *x);
     }
-    fn coordinates(&self, _frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
-        for (j, x) in x.iter_mut().enumerate() {
-            *x = cross(pair(p, j), pair(v, j));
-        }
+    fn coordinates<S: Scalar>(&self, v: &[S], x: &mut [S]) {
+        x.iter_mut().zip(v.chunks_exact(2)).for_each(|(x, v)| *x = v[1]);
     }
-    fn tangent(&self, _frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
-        for (j, v) in v.chunks_exact_mut(2).enumerate() {
-            v.copy_from_slice(&along(pair(p, j), x[j]));
-        }
-    }
-}
-
-impl Origin for Torus {
-    fn dim(&self) -> usize {
-        self.n
-    }
-    fn curvature(&self) -> f64 {
-        0.0
-    }
-    fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
-        for i in 0..self.n {
-            // Transvections add up, and the logarithm takes whole turns away.
-            let sum = -(a[i] + b[i]) + d[i];
-            let turns = (sum.value() / lane(2.0 * PI)).round();
-            w_plus[i] = sum - turns * lane(2.0 * PI);
-            w_minus[i] = -w_plus[i];
+    fn section(&self, p: &[Lane], x: &mut [Lane]) {
+        for (j, x) in x.chunks_exact_mut(2).enumerate() {
+            x.copy_from_slice(&along(pair(p, j % self.n), x[1]));
         }
     }
     fn triple<S: Scalar>(&self, _a: &[S], _b: &[S], _c: &[S], out: &mut [S]) {
         out.fill(S::constant(Lane::ZERO));
     }
-    fn stretch<S: Scalar>(&self, _v: &[S], _x: &mut [S]) {}
-    fn angle(&self, v: &[Lane]) -> Lane {
-        largest(v)
-    }
 }
-
-impl Space for Torus {}
 // ---- the page ends ----
 
 use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
 use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
+use symspline::laws::check;
 use symspline::monitor::Monitor;
 use symspline::rows::{Fault, Operation, apply, project_points};
 use symspline::space::Erased;
 use symspline::spaces::Euclidean;
+
+#[test]
+fn it_obeys_every_law() {
+    for n in 1..=3 {
+        let torus = Torus::new(n).unwrap();
+        assert_eq!(check(&Erased(&torus), 0), [""; 0], "n = {n}");
+    }
+}
 
 const ON: fn(usize) -> bool = |_| true;
 const QUANTITIES: [Quantity; 3] = [Quantity::Point, Quantity::Velocity, Quantity::Acceleration];

@@ -29,7 +29,7 @@ the values from both sides of a knot know nothing of each other. The table has
 Lengths are those of the space, so that it does not matter which array of a line or subspace stands for it; of
 poses those of the rates in the body, the angle and the way together. A jump of the k-th derivative may be
 1e-12 of the largest value, and 100 eps / h^k for rounding, where h is the shorter of the two segments; |p| as
-much where points p have large numbers, in hyperbolic space |p|^2 as much, for positive definite matrices
+much where points p have large numbers, in hyperbolic spaces |p|^2 as much, for positive definite matrices
 cond(p). With a larger one the check fails, and the exit code is 1."""
 EPILOG = """\
 example:

@@ -22,7 +22,7 @@ from .flat import draw_graph, draw_plane, draw_room
 from .frames import draw_quaternions, draw_rotations, draw_spins
 from .poses import draw_flat_poses, draw_poses
 from .sphere import draw_sphere
-from .subspaces import draw_principal_angles
+from .subspaces import draw_principal_angles, draw_ratios
 
 
 class Picture(NamedTuple):
@@ -66,6 +66,7 @@ _PICTURES = {
     "se:3": Picture(draw_poses, 6.2, 5.8),
 }
 _FAMILIES = dict.fromkeys(("rp", "cp", "gr", "cgr"), Picture(draw_principal_angles, 10.5, 3.8))
+_FAMILIES["ch"] = Picture(draw_ratios, 10.5, 3.8)
 _OTHERS = Picture(draw_components, 10.5, 3.8)
 
 

@@ -1,4 +1,4 @@
-"""Lines and subspaces of many dimensions: how far they turn away from the first one."""
+"""Lines and subspaces of many dimensions: how far they turn away from the first one, and ratios of coordinates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
-from .components import SUBSCRIPTS, draw_numbers
+from .components import SUBSCRIPTS, components, draw_numbers
 from .curves import Curve
 
 
@@ -19,6 +19,14 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
     label = "principal angles to\nfirst point, degrees"
     draw_numbers(panel, curves, label, names, [principal_angles(c.points)[:, : len(names)] for c in curves])
+
+
+def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Complex hyperbolic space: the ratios zᵢ/z₀, which fill the unit ball whatever the phases, against time."""
+    n = curves[0].points.shape[1] - 1
+    names = [f"{part} z{i + 1}/z0".translate(SUBSCRIPTS) for i in range(n) for part in ("Re", "Im")]
+    ratios = [components(c.points[:, 1:] / c.points[:, :1]) for c in curves]
+    draw_numbers(panel, curves, "coordinates\nin the unit ball", names, ratios)
 
 
 def principal_angles(points: NDArray[Any]) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnit
 from .named import space
 from .positive import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, together
-from .subspaces import ComplexGrassmannian, ComplexProjective, Grassmannian, RealProjective
+from .subspaces import ComplexGrassmannian, ComplexHyperbolic, ComplexProjective, Grassmannian, RealProjective
 from .tolerance import POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
 
@@ -13,6 +13,7 @@ __all__ = [
     "POINT_TOL_FLOAT32",
     "Array",
     "ComplexGrassmannian",
+    "ComplexHyperbolic",
     "ComplexProjective",
     "Euclidean",
     "Grassmannian",

@@ -16,6 +16,8 @@ Array = NDArray[Any]
 
 # From this ambient dimension on nothing is made that needs a frame of all tangent vectors.
 LARGE = 256
+# Operations that give one number a row, not a point.
+_NUMBERS = ("distance", "inner", "rounding")
 # So many numbers are 8 TB.
 _MOST = 2**40
 
@@ -304,7 +306,7 @@ class Space:
         rows = [self._rows(a, lead) for a in arrays.values()]
         times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
         result = self._handle.apply(operation, rows, times)
-        if operation in ("distance", "inner", "rounding"):
+        if operation in _NUMBERS:
             return result.reshape(lead)[()]
         return self._numbers(result.reshape(lead + self._doubles_shape))
 
@@ -312,7 +314,7 @@ class Space:
         """The same, but with an error where it is not finite."""
         result = self._apply(operation, t, **inputs)
         if not np.isfinite(result).all():
-            axes = () if operation in ("distance", "inner") else self._point_axes(result)
+            axes = () if operation in _NUMBERS else self._point_axes(result)
             bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()
             raise ValidationError(
                 f"{operation} of row {bad or 0} is not finite: its numbers are not finite, too large, or no point of "

@@ -1,4 +1,5 @@
-"""Lines and subspaces: projective spaces and Grassmannians, where many arrays are one point."""
+"""Lines and subspaces: projective and complex hyperbolic spaces and Grassmannians, where many arrays are one
+point."""
 
 from __future__ import annotations
 
@@ -34,6 +35,24 @@ class ComplexProjective(Space):
 
     _name = "cp"
     _linear = True
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
+class ComplexHyperbolic(Space):
+    """Complex hyperbolic space CHⁿ: points are complex arrays (z₀, z₁, …, zₙ) with
+    −|z₀|² + |z₁|² + … + |zₙ|² = −1 up to a phase, with the metric of curvature −4 along complex lines:
+    distance is arcosh |⟨p, q⟩|.
+
+    CH¹ is the hyperbolic plane with half its distances.
+
+    >>> import numpy as np, symspline as ss
+    >>> ss.ComplexHyperbolic(1).distance([1, 0], [np.cosh(2), 1j * np.sinh(2)]).round(8)
+    np.float64(2.0)
+    """
+
+    _name = "ch"
 
     def __init__(self, n: int) -> None:
         super().__init__(n)

@@ -80,7 +80,10 @@ impl Draw {
             q = exp(space, &q, &v);
         }
         let back = log(space, &q, p).0;
-        let other = exp(space, &q, &back);
+        let mut near = exp(space, &q, &back);
+        space.project(&mut near);
+        // Without what rounding did on the way, which leads far out where there is no end.
+        let other = exp(space, &near, &log(space, &near, p).0);
         if is_other(&other, p) { other } else { p.to_vec() }
     }
 }

@@ -11,13 +11,16 @@
 
 mod algebra;
 mod erased;
+mod model;
 mod registry;
 
 pub use algebra::{Algebra, stretch_series};
 pub use erased::{Erased, Table};
+pub use model::Model;
 pub use registry::{Entry, Made, table};
 
 use crate::curve::Job;
+use crate::matrix::Matrix;
 use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
 /// Vectors of this size and smaller, at points of size one, may be rounding errors as to direction: a
@@ -101,10 +104,8 @@ pub trait Ambient: Copy + Send + Sync {
     /// Replaces v by its tangential part at p; returns how far it was, relative to its size (or to
     /// [`ROUNDING_SIZE`]).
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        let before = v.to_vec();
-        self.velocity(p, v);
-        let off2 = v.iter().zip(&before).fold(Lane::ZERO, |sum, (v, b)| (*v - *b).mul_add(*v - *b, sum));
-        off2.sqrt() / (dot(&before, &before).sqrt() + ROUNDING_SIZE)
+        let [off, size] = make_tangent(self, p, v);
+        off / (size + ROUNDING_SIZE)
     }
     /// Turns independent standard normal numbers into a random point.
     fn scatter(&self, noise: &mut [Lane]);
@@ -167,8 +168,19 @@ pub trait Origin {
     /// `[a, [b, c]]`: the only algebra that 𝔪 has (its brackets lie outside). `ad_v²x` is `[v, [v, x]]`, the
     /// curvature R(a, b)c is `[c, [a, b]]`.
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]);
-    /// `S(v) x` with `S(v) = sinh(ad_v)/ad_v` of Lemma A.2.
-    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]);
+    /// `S(v) x` with `S(v) = sinh(ad_v)/ad_v` of Lemma A.2; by its series unless a space knows better.
+    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
+        let values: Vec<Lane> = v.iter().map(|v| v.value()).collect();
+        // By (22) ad_v is at most K|v|.
+        let size = dot(&values, &values).sqrt() * lane(self.curvature());
+        let start = Matrix::<S, 1>::read(x.len(), 1, x);
+        stretch_series(size, &start, |term| {
+            let mut twice = vec![S::constant(Lane::ZERO); v.len()];
+            self.triple(v, v, term.entries().as_flattened(), &mut twice);
+            Matrix::read(v.len(), 1, &twice)
+        })
+        .write(x);
+    }
     /// The deciding angle of `exp_o(v)`; grows in proportion to v.
     fn angle(&self, v: &[Lane]) -> Lane {
         dot(v, v).sqrt()
@@ -214,6 +226,14 @@ pub trait Covered: Space {
     /// Brings a point of the cover and, if given, a tangent vector there back: writes the point, or the
     /// vector.
     fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);
+}
+
+/// Replaces v by its tangential part at p; returns how far it was, and its size, as arrays.
+fn make_tangent<M: Ambient>(space: &M, p: &[Lane], v: &mut [Lane]) -> [Lane; 2] {
+    let before = v.to_vec();
+    space.velocity(p, v);
+    let off2 = v.iter().zip(&before).fold(Lane::ZERO, |sum, (v, b)| (*v - *b).mul_add(*v - *b, sum));
+    [off2.sqrt(), dot(&before, &before).sqrt()]
 }
 
 /// `angle` less what angles lose to rounding: what is within of the cut locus is on it.

@@ -1,0 +1,266 @@
+//! A space from few formulas: the first page of a new one.
+
+use super::{Ambient, Frame, Origin, ROUNDING_SIZE, Space, make_tangent};
+use crate::scalar::{Lane, Scalar, lane, max_or_nan};
+
+/// A space of which exponential, logarithm and transvection are known at any point and for any numbers. All
+/// three rooms follow: geodesics are exponentials of logarithms, a frame is a basis that transvections carry, and
+/// [`legs`](Origin::legs) is its own definition, in arrays at the origin.
+///
+/// That is right, and several times slower than formulas of its own for each operation. A page that is to be
+/// faster implements the rooms instead; the laws compare its formulas with the definitions that are used here.
+pub trait Model: Copy + Send + Sync {
+    /// See [`Ambient::point_shape`]; of complex numbers, counted as one each.
+    fn point_shape(&self) -> Vec<usize>;
+    /// See [`Ambient::is_complex`].
+    fn is_complex(&self) -> bool {
+        false
+    }
+    /// See [`Ambient::cut_angle`].
+    fn cut_angle(&self) -> f64;
+    /// See [`Ambient::longest_leg`].
+    fn longest_leg(&self) -> f64 {
+        self.cut_angle()
+    }
+    /// See [`Origin::dim`].
+    fn dim(&self) -> usize;
+    /// See [`Origin::curvature`].
+    fn curvature(&self) -> f64;
+
+    /// The array of the origin.
+    fn origin(&self, o: &mut [Lane]);
+    /// The tangent vector at the origin with given coordinates. Other numbers of its array are zero already.
+    fn vector<S: Scalar>(&self, x: &[S], v: &mut [S]);
+    /// Coordinates of a tangent vector at the origin.
+    fn coordinates<S: Scalar>(&self, v: &[S], x: &mut [S]);
+    /// See [`Origin::triple`].
+    fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]);
+    /// See [`Origin::condition`].
+    fn condition(&self, _chord: &[Lane]) -> Lane {
+        Lane::ONE
+    }
+
+    /// `exp_p(v)`.
+    fn exp<S: Scalar>(&self, p: &[S], v: &[S], q: &mut [S]);
+    /// `log_p(q)`, (11); returns the deciding angle.
+    fn log<S: Scalar>(&self, p: &[S], q: &[S], v: &mut [S]) -> Lane;
+    /// The transvection `E_p(v)` of (10) applied to points or tangent vectors, one array after the other, in place.
+    fn transvect<S: Scalar>(&self, p: &[S], v: &[S], x: &mut [S]);
+    /// Carries tangent vectors at the origin to p by any isometry that takes the origin there, in place. By default
+    /// the geodesic from the origin does, which a space without cut locus has everywhere.
+    fn section(&self, p: &[Lane], x: &mut [Lane]) {
+        assert!(self.cut_angle().is_infinite(), "a space with a cut locus needs a section of its own");
+        let (mut o, mut v) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; p.len()]);
+        self.origin(&mut o);
+        self.log(&o, p, &mut v);
+        carry(self, &o, p, &v, x);
+    }
+    /// Turns tangent vectors at a point into those at another array of the same point, q, in place.
+    fn turn(&self, _p: &[Lane], _q: &[Lane], _x: &mut [Lane]) {}
+    /// See [`Ambient::velocity`].
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]);
+    /// See [`Ambient::acceleration`]; by default that of a surface with the metric of its array.
+    fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
+        self.velocity(gamma, dd);
+    }
+    /// See [`Ambient::inner`].
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
+    /// The deciding angle of `exp_p(v)`; grows in proportion to v.
+    fn angle(&self, p: &[Lane], v: &[Lane]) -> Lane {
+        max_or_nan(self.inner(p, v, v), Lane::ZERO).sqrt()
+    }
+    /// See [`Ambient::project`].
+    fn project(&self, x: &mut [Lane]) -> Lane;
+    /// See [`Ambient::scatter`].
+    fn scatter(&self, noise: &mut [Lane]) {
+        self.project(noise);
+    }
+    /// See [`Ambient::complaint`].
+    fn complaint(&self, x: &[f64]) -> String;
+    /// See [`Ambient::rounding`].
+    fn rounding(&self, _p: &[Lane]) -> Lane {
+        Lane::ONE
+    }
+}
+
+/// Numbers that do not move.
+fn constant<S: Scalar>(x: &[Lane]) -> Vec<S> {
+    x.iter().map(|x| S::constant(*x)).collect()
+}
+
+fn zeros<S: Scalar>(len: usize) -> Vec<S> {
+    vec![S::constant(Lane::ZERO); len]
+}
+
+/// Every number times a factor.
+fn scaled<S: Scalar>(x: &[S], scale: S) -> Vec<S> {
+    x.iter().map(|x| *x * scale).collect()
+}
+
+/// Parallel transport of vectors from p to the array q of `exp_p(v)`.
+fn carry<M: Model>(space: &M, p: &[Lane], q: &[Lane], v: &[Lane], x: &mut [Lane]) {
+    let mut there = zeros(p.len());
+    space.transvect(p, v, x);
+    space.exp(p, v, &mut there);
+    space.turn(&there, q, x);
+}
+
+impl<M: Model> Ambient for M {
+    fn point_len(&self) -> usize {
+        Model::point_shape(self).iter().product::<usize>() * if Model::is_complex(self) { 2 } else { 1 }
+    }
+    fn point_shape(&self) -> Vec<usize> {
+        Model::point_shape(self)
+    }
+    fn is_complex(&self) -> bool {
+        Model::is_complex(self)
+    }
+    fn cut_angle(&self) -> f64 {
+        Model::cut_angle(self)
+    }
+    fn longest_leg(&self) -> f64 {
+        Model::longest_leg(self)
+    }
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        self.exp(&constant(p), &scaled(&constant(v), t), out);
+    }
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        Model::log(self, p, q, out)
+    }
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        let mut v = zeros(p.len());
+        Model::log(self, p, q, &mut v);
+        self.exp(p, &scaled(&v, t), out);
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        out.copy_from_slice(x);
+        Model::transvect(self, p, v, out);
+    }
+    fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        out.copy_from_slice(x);
+        carry(self, p, q, v, out);
+    }
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        Model::velocity(self, gamma, d);
+    }
+    fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
+        Model::acceleration(self, gamma, d, dd);
+    }
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        Model::inner(self, p, u, v)
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        Model::project(self, x)
+    }
+    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
+        let [off, size] = make_tangent(self, p, v);
+        // Rounding of v may be as much.
+        off / (size * Model::rounding(self, p) + ROUNDING_SIZE)
+    }
+    fn scatter(&self, noise: &mut [Lane]) {
+        Model::scatter(self, noise);
+    }
+    fn complaint(&self, x: &[f64]) -> String {
+        Model::complaint(self, x)
+    }
+    fn rounding(&self, p: &[Lane]) -> Lane {
+        Model::rounding(self, p)
+    }
+}
+
+// A frame is the images of the basis vectors at the origin, one array after the other.
+impl<M: Model> Frame for M {
+    fn frame_len(&self) -> usize {
+        Model::dim(self) * self.point_len()
+    }
+    fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
+        frame.fill(Lane::ZERO);
+        let mut x = zeros(Model::dim(self));
+        for (i, e) in frame.chunks_exact_mut(p.len()).enumerate() {
+            x[i] = Lane::ONE;
+            self.vector(&x, e);
+            x[i] = Lane::ZERO;
+        }
+        self.section(p, frame);
+    }
+    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        let mut v = zeros(p.len());
+        let angle = Model::log(self, p, q, &mut v);
+        Frame::coordinates(self, frame, p, &v, chord);
+        carry(self, p, q, &v, frame);
+        for e in frame.chunks_exact_mut(p.len()) {
+            Model::velocity(self, q, e);
+        }
+        // One step of Newton's method for orthonormal vectors: an error of their lengths would go into the
+        // velocity, and from there eightfold into a jump of the acceleration.
+        let before = frame.to_vec();
+        for (i, e) in frame.chunks_exact_mut(p.len()).enumerate() {
+            for (j, f) in before.chunks_exact(p.len()).enumerate() {
+                let same = if i == j { Lane::ONE } else { Lane::ZERO };
+                let wrong = (Model::inner(self, q, &before[i * p.len()..][..p.len()], f) - same) * lane(-0.5);
+                e.iter_mut().zip(f).for_each(|(e, f)| *e = wrong.mul_add(*f, *e));
+            }
+        }
+        angle
+    }
+    fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        for (x, e) in x.iter_mut().zip(frame.chunks_exact(p.len())) {
+            *x = Model::inner(self, p, e, v);
+        }
+    }
+    fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        v.fill(Lane::ZERO);
+        for (x, e) in x.iter().zip(frame.chunks_exact(p.len())) {
+            v.iter_mut().zip(e).for_each(|(v, e)| *v = x.mul_add(*e, *v));
+        }
+    }
+}
+
+impl<M: Model> Origin for M {
+    fn dim(&self) -> usize {
+        Model::dim(self)
+    }
+    fn curvature(&self) -> f64 {
+        Model::curvature(self)
+    }
+    fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+        let mut o = zeros(self.point_len());
+        self.origin(&mut o);
+        let o: Vec<S> = constant(&o);
+        let at = |x: &[S], sign: f64| {
+            let mut v = zeros(o.len());
+            self.vector(&scaled(x, S::constant(lane(sign))), &mut v);
+            v
+        };
+        // E(−last) E(d) E(−first)·o and its logarithm.
+        let d: Vec<S> = constant(d);
+        let leg = |first: &[S], last: &[S], sign: f64, w: &mut [S]| {
+            let (mut x, mut log) = (zeros(o.len()), zeros(o.len()));
+            self.exp(&o, &at(first, -sign), &mut x);
+            Model::transvect(self, &o, &at(&d, sign), &mut x);
+            Model::transvect(self, &o, &at(last, -sign), &mut x);
+            Model::log(self, &o, &x, &mut log);
+            Model::coordinates(self, &log, w);
+        };
+        leg(b, a, 1.0, w_plus);
+        leg(a, b, -1.0, w_minus);
+    }
+    fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
+        Model::triple(self, a, b, c, out);
+    }
+    fn angle(&self, v: &[Lane]) -> Lane {
+        let (mut o, mut at) = (zeros(self.point_len()), zeros(self.point_len()));
+        self.origin(&mut o);
+        self.vector(v, &mut at);
+        Model::angle(self, &o, &at)
+    }
+    fn condition(&self, chord: &[Lane]) -> Lane {
+        Model::condition(self, chord)
+    }
+}
+
+impl<M: Model> Space for M {
+    fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
+        Model::angle(self, p, v)
+    }
+}
