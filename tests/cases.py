@@ -105,7 +105,13 @@ FAMILIES = Handle.names()
 
 POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite)
 HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
-QUOTIENTS = (ss.RealProjective, ss.ComplexProjective, ss.ComplexHyperbolic, ss.Grassmannian, ss.ComplexGrassmannian)
+QUOTIENTS = (
+    ss.RealProjective,
+    ss.ComplexProjective,
+    ss.ComplexHyperbolic,
+    ss.Grassmannian,
+    ss.ComplexGrassmannian,
+)
 
 
 def condition(space, points):

@@ -1,7 +1,7 @@
 """Spaces, and points on them, near each other and far apart, at the cut locus and past it."""
 
 import numpy as np
-from cases import CASES, base_point, steep_tangent, unit_tangent
+from cases import CASES, HYPERBOLIC, POSITIVE, base_point, steep_tangent, unit_tangent
 from hypothesis import strategies as st
 
 import symspline as ss
@@ -29,7 +29,7 @@ def parts(value):
 
 def bent(space):
     """Whether rounding grows with the exponential of distances."""
-    return isinstance(space, (ss.Hyperbolic, ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite))
+    return isinstance(space, (*HYPERBOLIC, *POSITIVE))
 
 
 def joined(space, arrays):
