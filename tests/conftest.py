@@ -1,3 +1,20 @@
+"""A map of the tests.
+
+    spaces       operations, laws of geometry, names; points that are off a space
+    fit          the spline is C² and obeys its laws; solvers
+    spline       the interface of `CubicSpline`, promise by promise, with what it refuses
+    derivatives  with respect to the data; JAX
+    free         `BSpline` and `BezierCurve`
+    files, convert, cli, plotting, demo
+    host         the program around: threads, memory, interruptions
+    docs, bench  what they show runs
+    fuzz         random input; `make fuzz` runs it at length
+    oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
+
+Beside this file lies what they share: `cases` is the list of spaces and data on them, `curves` has arrays and
+comparisons, `refused` what must be an error.
+"""
+
 import pytest
 
 import symspline as ss

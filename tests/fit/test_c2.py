@@ -59,7 +59,7 @@ def test_the_curve_is_c2(case, method, ends, spacing, rng):
             # far apart need more iterations than the default, or do not converge.
             continue
         make = closed_walk if ends == "periodic" else walk
-        p = make(space, step, 12, rng)
+        p = make(space, step, 9 if case.few else 12, rng)
         t = knots(spacing, len(p), rng)
         # To the rounding floor: the law is about the solution, not about where an iteration stops.
         options = {"bc_type": end_conditions(ends, space, p), "method": method, "tol": 0.0}

@@ -150,7 +150,7 @@ def test_a_batch_is_its_curves_bit_for_bit(case, rng):
     t = knots("random", 11, rng)
     # In any order, in one segment (from curve to curve too), and dense over all.
     times = rng.uniform(t[0], t[-1], 37), np.linspace(t[2], t[3], 40)[1:-1], np.linspace(t[0], t[-1], 331)
-    for ends in ("natural", "not-a-knot"):
+    for ends in ("not-a-knot",) if case.few else ("natural", "not-a-knot"):
         batch = ss.CubicSpline(t, p, space, bc_type=ends)
         values = [(x, nu, batch(x, nu)) for x in times for nu in range(3)]
         for i, points in enumerate(p):
