@@ -1,6 +1,6 @@
-//! The C² condition (13) on any knots.
+//! The C² condition (13) of Theorem 2.2, on any knots.
 //!
-//! With `v⁺ = hᵢuᵢ/3`, `v⁻ = −hᵢ₋₁uᵢ/3`, `w⁺ = log_{pᵢ}(E(−v⁺)·q⁻ᵢ₊₁)`, `w⁻ = log_{pᵢ}(E(−v⁻)·q⁺ᵢ₋₁)`, the curve is C² at
+//! Velocities uᵢ rather than control points are the unknowns, so that (12), the C¹ condition, holds by itself. With `v⁺ = hᵢuᵢ/3`, `v⁻ = −hᵢ₋₁uᵢ/3`, `w⁺ = log_{pᵢ}(E(−v⁺)·q⁻ᵢ₊₁)`, `w⁻ = log_{pᵢ}(E(−v⁻)·q⁺ᵢ₋₁)`, the curve is C² at
 //! knot i iff
 //!
 //! ```text
@@ -9,7 +9,7 @@
 //!
 //! because the covariant acceleration beside the knot is `(6/h²) S(v)⁻¹(w − v)` (Popiel & Noakes 2007
 //! with Lemmas A.1–A.3), and S of multiples of one vector commute. On equal spacing S cancels and
-//! this is (13).
+//! this is (13), whose logarithms are the w of (16) and, at all knots together, of (18).
 
 use super::chain::Chain;
 use super::ends::{self, ChainEnds};

@@ -1,6 +1,6 @@
 //! Algorithm 1 of the paper, on any knots.
 //!
-//! The paper's update is `vᵢ ← vᵢ + δᵢ/4` with `δᵢ = w⁺ − w⁻ − 2vᵢ` on unit knots. With the C² defect r of
+//! The paper's update (17) is `vᵢ ← vᵢ + δᵢ/4` with `δᵢ = w⁺ − w⁻ − 2vᵢ` on unit knots. With the C² defect r of
 //! `condition.rs` and `vᵢ = hᵢuᵢ/3` that is one step of Jacobi's iteration on the matrix T,
 //! `uᵢ ← uᵢ + 3rᵢ/(2/hᵢ₋₁ + 2/hᵢ)`, which is a contraction of about ½ on any knots; at natural ends it
 //! is (20).
