@@ -49,8 +49,8 @@ CASES = [
     Case("cp:1", far=1.0, few=True, face=True),
     Case("cp:2", far=1.0),
     Case("cp:7", far=1.0, few=True, face=True),
-    Case("ch:1", far=1.0, few=True),
-    Case("ch:2", far=1.0, face=True),
+    Case("ch:1", far=0.75, few=True),
+    Case("ch:2", far=0.75, face=True),
     Case("gr:1,3", far=1.2, few=True, face=True),
     Case("gr:2,3", far=1.2, few=True),
     Case("gr:2,5", far=1.2, face=True),
@@ -178,7 +178,7 @@ def walk(space, step, n, rng, turn=0.5):
     """Points with equal steps whose direction changes by about `turn` radians a step.
 
     On spaces without a cut locus the walk turns back when it has gone far: rounding grows with the
-    distance there.
+    distance there, in units of the curvature.
     """
     p = [base_point(space, rng)]
     direction = unit_tangent(space, p[0], rng)
@@ -186,7 +186,7 @@ def walk(space, step, n, rng, turn=0.5):
         q = space.project(space.exp(p[-1], step * direction))
         direction = space.project_tangent(q, space.transport(p[-1], q, direction))
         direction = direction + turn * unit_tangent(space, q, rng)
-        if not compact(space) and space.distance(p[0], q) > 2.0:
+        if not compact(space) and space.distance(p[0], q) * max(1.0, space.curvature) > 2.0:
             direction = space.log(q, p[0]) + 0.5 * direction
         size = space.norm(q, direction)
         direction = direction / size if size > 0.1 else unit_tangent(space, q, rng)

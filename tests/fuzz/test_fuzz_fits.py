@@ -81,13 +81,17 @@ def batch_of(spline):
     return points.shape[: points.ndim - 1 - len(space.point_shape)]
 
 
+SECONDS = {"W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0}
+SECONDS |= {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12, "fs": 1e-15, "as": 1e-18}
+
+
 def seconds(steps):
     """Differences of numbers or dates."""
     if steps.dtype.kind != "m":
         return steps.astype(float)
     unit, count = np.datetime_data(steps.dtype)
-    # Of all units a second is a whole number, or the other way round.
-    return steps.astype(np.int64) * (np.timedelta64(count, unit) / np.timedelta64(1, "s"))
+    # NumPy's own quotients of units overflow for attoseconds.
+    return steps.astype(np.int64) * (count * SECONDS[unit])
 
 
 def holds(spline):
