@@ -55,7 +55,10 @@ impl<S: Scalar> Segment<S> {
         space.ray(p1, b, lane(-1.0), q1);
         choose(q0, [q1, p1, b]);
         let angle = space.log(q0, q1, &mut self.middle[..len]);
-        self.long = angle.simd_gt(lane(space.longest_ray()));
+        // Most spaces have no such limit, and the compiler knows it.
+        if space.longest_ray().is_finite() {
+            self.long = angle.simd_gt(lane(space.longest_ray()));
+        }
     }
 
     /// γ(t), for t in units of the segment.
@@ -70,7 +73,7 @@ impl<S: Scalar> Segment<S> {
         let gamma = &mut gamma[..len];
         space.ray(p0, a, t, x);
         space.ray(&self.controls[0][..len], &self.middle[..len], t, y);
-        if self.long.any() {
+        if space.longest_ray().is_finite() && self.long.any() {
             between(space, &self.controls, self.long, t, y);
         }
         space.ray(p1, b, t - Lane::ONE, z);
