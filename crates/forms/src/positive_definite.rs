@@ -38,20 +38,18 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
     }
 
     /// L e^{tw} L* with p = L L* and v = L w L*, and its derivatives in t, as many as are asked for.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Vec<Matrix<Lane, D, A>> {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> [Matrix<Lane, D, A>; 3] {
         let p = self.read(p);
         let l = cholesky(&p);
         let w = whiten(&l, &self.read(v));
         let e = exp_minus_one(&w.scaled(t));
-        let mut parts = vec![&congruent(&l, &e) + &p];
-        if order > 0 {
-            let d = &w.times(&e) + &w;
-            parts.push(congruent(&l, &d));
-            if order > 1 {
-                parts.push(congruent(&l, &w.times(&d)));
-            }
+        let x = &congruent(&l, &e) + &p;
+        if order == 0 {
+            return [x.clone(), x.clone(), x];
         }
-        parts
+        let d = &w.times(&e) + &w;
+        let dd = if order > 1 { congruent(&l, &w.times(&d)) } else { x.clone() };
+        [x, congruent(&l, &d), dd]
     }
 
     fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
@@ -143,7 +141,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         let parts = self.moved(p, v, t.value(), S::ORDER);
         for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose(few(|k| parts[k.min(S::ORDER)].entries()[i / D][i % D]));
+            *out = t.compose(few(|k| parts[k].entries()[i / D][i % D]));
         }
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {

@@ -94,14 +94,13 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
     }
 
     /// p e^{tΩ} and its derivatives in t, as many as are asked for.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Vec<Matrix<Lane, D, A>> {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> [Matrix<Lane, D, A>; 3] {
         let p = self.read(p);
         let omega = self.generator(&p, v);
-        let mut parts = vec![&p.times(&exp_skew_minus_one(&omega.scaled(t))) + &p];
-        for k in 0..order {
-            parts.push(parts[k].times(&omega));
-        }
-        parts
+        let x = &p.times(&exp_skew_minus_one(&omega.scaled(t))) + &p;
+        let d = if order > 0 { x.times(&omega) } else { x.clone() };
+        let dd = if order > 1 { d.times(&omega) } else { x.clone() };
+        [x, d, dd]
     }
 
     /// `log(p⁻¹q)` and its deciding angle.
@@ -142,7 +141,7 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         let parts = self.moved(p, v, t.value(), S::ORDER);
         for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose(few(|k| parts[k.min(S::ORDER)].entries()[i / D][i % D]));
+            *out = t.compose(few(|k| parts[k].entries()[i / D][i % D]));
         }
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {

@@ -107,21 +107,21 @@ impl<const D: usize, A: Storage> Subspaces<D, A> {
     }
 
     /// X c(t²G) + Δ t s(t²G) with G = Δ*Δ, and its derivatives in t, as many as are asked for.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Vec<Matrix<Lane, D, A>> {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> [Matrix<Lane, D, A>; 3] {
         let (x, delta) = (self.read(p), self.read(v));
         let g = delta.adjoint_times(&delta);
         let Rotation { s, versed, .. } = Rotation::of(&g.scaled(t * t));
         let c = versed.clone().plus_identity(Lane::ONE);
         let ts = s.scaled(t);
-        let mut parts = vec![&(&x + &x.times(&versed)) + &delta.times(&ts)];
+        let gamma = &(&x + &x.times(&versed)) + &delta.times(&ts);
         let minus_x = -x;
-        if order > 0 {
-            parts.push(&minus_x.times(&g.times(&ts)) + &delta.times(&c));
-        }
-        if order > 1 {
-            parts.push(&minus_x.times(&g.times(&c)) - &delta.times(&g.times(&ts)));
-        }
-        parts
+        let d = if order > 0 { &minus_x.times(&g.times(&ts)) + &delta.times(&c) } else { gamma.clone() };
+        let dd = if order > 1 {
+            &minus_x.times(&g.times(&c)) - &delta.times(&g.times(&ts))
+        } else {
+            gamma.clone()
+        };
+        [gamma, d, dd]
     }
 
     /// `log_X(Y)` in the ambient space.
@@ -158,7 +158,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         let parts = self.moved(p, v, t.value(), S::ORDER);
         for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose(few(|k| parts[k.min(S::ORDER)].entries()[i / D][i % D]));
+            *out = t.compose(few(|k| parts[k].entries()[i / D][i % D]));
         }
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
