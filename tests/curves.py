@@ -144,3 +144,10 @@ def failing(kind):
 def scattered(n, seed=0):
     """Points on S³ that are far apart: hard work for Algorithm 1."""
     return S3.random_point(np.random.default_rng(seed), n)
+
+
+def pair_of_curves(space):
+    """A batch of two curves through the axes, in every factor."""
+    axes = np.eye(3)
+    points = np.stack([axes, axes[[1, 0, 2]]])
+    return ss.CubicSpline(None, (points, points) if isinstance(space, ss.Product) else points, space)

@@ -13,6 +13,7 @@ from cases import (
     walk,
 )
 from changes import ENDS, by_differences, data, inside, motion, moved
+from curves import S2, pair_of_curves
 
 import symspline as ss
 
@@ -277,3 +278,23 @@ def test_derivatives_of_a_loop_that_ends_in_another_array(name, rng):
     for nu in (0, 1):
         here, there = one.jvp(x, vectors, knots, nu=nu), two.jvp(x, other(vectors), knots, nu=nu)
         assert np.abs(space.transport(two(x), one(x), there) - here).max() <= 1e-12 * np.abs(here).max()
+
+
+@pytest.mark.parametrize("own_knots", [False, True])
+def test_derivatives_of_no_curves(own_knots):
+    t = np.tile(np.arange(3.0), (2, 1)) if own_knots else None
+    none = ss.CubicSpline(
+        t, np.stack([np.eye(3), np.eye(3)[[1, 0, 2]]]), S2, bc_type=((1, np.zeros(3)), "natural")
+    )[:0]
+    assert none.jvp([0.5, 1.0], points=none.points).shape == (0, 2, 3)
+    gradient = none.vjp([0.5, 1.0], np.zeros((0, 2, 3)))
+    assert gradient.points.shape == (0, 3, 3)
+    # What all curves share has the gradient of a sum over none.
+    assert np.array_equal(gradient.t, np.zeros((0, 3) if own_knots else 3))
+    assert np.array_equal(gradient.ends[0], np.zeros(3))
+
+
+def test_derivatives_of_no_curves_in_a_product():
+    none = pair_of_curves(ss.space("sphere:2 x r:3"))[:0]
+    assert [a.shape for a in none.jvp(0.5, points=none.points)] == [(0, 3), (0, 3)]
+    assert none.vjp(0.5, (np.zeros((0, 3)), np.zeros((0, 3)))).t.shape == (3,)

@@ -114,3 +114,36 @@ def test_an_optimiser_finds_the_points_of_a_curve():
         guess = space.exp(guess, -0.05 * np.asarray(gradient))
     assert space.distance(guess, points).max() < 1e-3
     assert base_point(space, rng).shape == (3,)
+
+
+FAR = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0.5]]) / np.sqrt([[1.0], [1], [1.25]])
+
+
+def test_a_curve_that_did_not_converge_has_no_derivatives_in_jax():
+    stopped = {"method": "fixed-point", "max_iter": 6, "on_failure": "ignore"}
+    with jax.enable_x64(True):
+        spline = ss.CubicSpline(None, FAR, ss.Sphere(2), **stopped)
+        assert not spline.report.converged
+
+        def function(points, t, x):
+            return curve(x, t, points, ss.Sphere(2), **stopped)
+
+        arguments = (jnp.array(FAR), jnp.arange(3.0), jnp.array([0.5, 1.7]))
+        np.testing.assert_allclose(function(*arguments), spline([0.5, 1.7]), atol=1e-15)
+        for derivatives in (jax.jacfwd, jax.jacrev):
+            for change in derivatives(function, argnums=(0, 1))(*arguments):
+                assert np.isnan(change).all()
+
+
+def test_curves_of_a_batch_that_converged_keep_their_derivatives_in_jax():
+    options = {"method": "fixed-point", "max_iter": 6, "on_failure": "ignore", "tol": 0.02}
+    both = np.stack([np.eye(3), FAR])
+    assert ss.CubicSpline(None, both, ss.Sphere(2), **options).report.converged.tolist() == [True, False]
+
+    def function(points):
+        return curve(0.5, jnp.arange(3.0), points, ss.Sphere(2), **options).sum()
+
+    with jax.enable_x64(True):
+        gradient, alone = (jax.grad(function)(jnp.array(points)) for points in (both, np.eye(3)))
+    np.testing.assert_array_equal(gradient[0], alone)
+    assert np.isfinite(alone).all() and np.isnan(gradient[1]).all()

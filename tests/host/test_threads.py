@@ -13,6 +13,7 @@ from cases import COMMON
 from curves import S3, each, every_common, points_on, run_python, same, same_curve, scattered
 
 import symspline as ss
+from symspline import _core
 
 
 def test_set_num_threads(threads):
@@ -252,3 +253,17 @@ for thread in threads:
 def test_threads_do_not_wait_for_each_other():
     """Some ask Python whether to go on while others hold its lock and wait for the same cores."""
     run_python(CROWD, timeout=60)
+
+
+def test_a_panic_in_a_worker_is_an_error_within_a_second(threads):
+    """No call of the interface panics: this one lies to the core about the velocities it brings."""
+    curves, samples = 4000, np.linspace(0, 2, 50)
+    points = np.tile(np.eye(3), (curves, 1, 1))
+    short = np.zeros((curves // 2, 3, 3))
+    arguments = (ss.Sphere(2)._handle, np.arange(3.0), points, short, samples, "point", "raise", False)
+    for n in (1, 2):
+        ss.set_num_threads(n)
+        begun = time.monotonic()
+        with pytest.raises(RuntimeError, match="out of range"):
+            _core.evaluate(*arguments)
+        assert time.monotonic() - begun < 1

@@ -216,3 +216,12 @@ def test_sizes_that_are_no_whole_numbers(kind, value):
     cls = getattr(ss, kind)
     with pytest.raises(ss.ValidationError, match=rf"{kind} takes whole numbers, not {value!r}"):
         cls(value, 5) if kind == "Grassmannian" else cls(value)
+
+
+def test_a_product_has_types():
+    assert ss.space("sphere:2 x cp:1").dtype == (np.dtype(float), np.dtype(complex))
+
+
+def test_digits_of_other_scripts_name_no_space():
+    with pytest.raises(ss.ValidationError, match="behind the colon come whole numbers"):
+        ss.space("sphere:٢")

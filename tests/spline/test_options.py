@@ -1,5 +1,7 @@
 """Options of a fit: methods and limits, and what is none."""
 
+import inspect
+
 import numpy as np
 import pytest
 from curves import KNOTS, S2, every_common, largest_difference, points_on
@@ -104,3 +106,10 @@ def test_messages_quote_no_large_arrays():
     wrong = np.zeros((2,) * 20)
     with pytest.raises(ss.ValidationError, match=r"not an array of shape \(2, 2, 2, .*\)$"):
         ss.CubicSpline(None, P, S2, on_failure=wrong)
+
+
+def test_the_signature_names_the_parameters():
+    assert list(inspect.signature(ss.CubicSpline).parameters) == [
+        "t", "points", "space", "bc_type", "method", "tol", "max_iter", "extrapolate", "on_failure", "check",
+        "progress",
+    ]  # fmt: skip

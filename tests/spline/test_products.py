@@ -6,6 +6,7 @@ from curves import KNOTS, S2, found, points_on, same, shaped
 from refused import TWO, P, changed, fit_error
 
 import symspline as ss
+from symspline import _core, spaces
 
 
 def test_a_product_speaks_in_tuples():
@@ -91,3 +92,18 @@ def test_the_bad_factor_of_a_product_is_named():
 
 def test_a_product_is_checked_before_any_work():
     fit_error("off the space", None, (np.zeros((3, 1)), changed(2, [0, 0, 2])), "r:1 x sphere:2")
+
+
+@pytest.mark.parametrize("space, checks", [("sphere:2", 0), ("sphere:2 x r:3", 2), ("r:3 x sphere:299", 2)])
+def test_every_factor_is_checked_once(space, checks, monkeypatch):
+    space, fit, calls = ss.space(space), _core.fit, []
+
+    def counted(handle, *arguments):
+        calls.append((arguments[6], arguments[10]))
+        return fit(handle, *arguments)
+
+    monkeypatch.setattr(_core, "fit", counted)
+    points = tuple(np.eye(3, *factor.point_shape) for factor in spaces.factors_of(space))
+    ss.CubicSpline(None, points if checks else points[0], space)
+    # Whether the core checks, and whether it only checks.
+    assert calls == ([(True, True)] * checks + [(False, False)] * checks if checks else [(True, False)])

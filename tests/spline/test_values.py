@@ -13,6 +13,7 @@ from curves import (
     every_batch,
     every_space,
     found,
+    pair_of_curves,
     pick,
     points_on,
     same,
@@ -104,3 +105,13 @@ def test_curves_print(space, batch):
     assert line.startswith("<CubicSpline") and repr(space) in line and "6 points, natural" in line
     assert "\n" not in line
     assert not batch or " x ".join(map(str, batch)) in line
+
+
+@pytest.mark.parametrize("space", ["sphere:2", "sphere:2 x r:3"])
+def test_pickles_and_parts_of_a_batch_are_splines(space):
+    batch = pair_of_curves(ss.space(space))
+    for spline in (batch, batch[1], batch[:1], pickle.loads(pickle.dumps(batch))):
+        assert type(spline) is ss.CubicSpline
+        assert type(spline.report) is ss.Report
+    assert pickle.loads(pickle.dumps(batch)) == batch
+    assert pickle.loads(pickle.dumps(batch[1])).report == batch[1].report == batch.report.map(lambda c: c[1])
