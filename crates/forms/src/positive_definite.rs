@@ -6,10 +6,10 @@
 
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Storage, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus,
+    Dynamic, Matrix, Moved, Storage, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus,
     log_one_plus_alike, orthogonalise, solve_lower,
 };
-use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, dot, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 
 /// Hermitian positive definite n × n matrices, real for D = 1, complex for D = 2.
@@ -38,18 +38,18 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
     }
 
     /// L e^{tw} L* with p = L L* and v = L w L*, and its derivatives in t, as many as are asked for.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> [Matrix<Lane, D, A>; 3] {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let p = self.read(p);
         let l = cholesky(&p);
         let w = whiten(&l, &self.read(v));
         let e = exp_minus_one(&w.scaled(t));
         let x = &congruent(&l, &e) + &p;
         if order == 0 {
-            return [x.clone(), x.clone(), x];
+            return Moved(x, None);
         }
         let d = &w.times(&e) + &w;
-        let dd = if order > 1 { congruent(&l, &w.times(&d)) } else { x.clone() };
-        [x, congruent(&l, &d), dd]
+        let dd = if order > 1 { congruent(&l, &w.times(&d)) } else { d.clone() };
+        Moved(x, Some([congruent(&l, &d), dd]))
     }
 
     fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
@@ -139,10 +139,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         17.0
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let parts = self.moved(p, v, t.value(), S::ORDER);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose(few(|k| parts[k].entries()[i / D][i % D]));
-        }
+        self.moved(p, v, t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let (p, q) = (self.read(p), self.read(q));

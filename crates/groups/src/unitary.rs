@@ -8,10 +8,10 @@ use crate::logarithm::{SERIES, complex, numbers, principal, su_limit, times_minu
 use std::f64::consts::{PI, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Storage, arc, by_size, determinant, diagonalise, exp_skew_minus_one, from_parts,
+    Dynamic, Matrix, Moved, Storage, arc, by_size, determinant, diagonalise, exp_skew_minus_one, from_parts,
     orthonormalise, parts_of, polar, reorthonormalise,
 };
-use symspline_core::scalar::{Each, Lane, Scalar, few, lane, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 
 /// Matrices with p*p = 1: real for D = 1, complex for D = 2.
@@ -94,13 +94,16 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
     }
 
     /// p e^{tΩ} and its derivatives in t, as many as are asked for.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> [Matrix<Lane, D, A>; 3] {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let p = self.read(p);
         let omega = self.generator(&p, v);
         let x = &p.times(&exp_skew_minus_one(&omega.scaled(t))) + &p;
-        let d = if order > 0 { x.times(&omega) } else { x.clone() };
-        let dd = if order > 1 { d.times(&omega) } else { x.clone() };
-        [x, d, dd]
+        if order == 0 {
+            return Moved(x, None);
+        }
+        let d = x.times(&omega);
+        let dd = if order > 1 { d.times(&omega) } else { d.clone() };
+        Moved(x, Some([d, dd]))
     }
 
     /// `log(p⁻¹q)` and its deciding angle.
@@ -139,10 +142,7 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         if self.is_su() { SQRT_2 * PI } else { PI }
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let parts = self.moved(p, v, t.value(), S::ORDER);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose(few(|k| parts[k].entries()[i / D][i % D]));
-        }
+        self.moved(p, v, t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let p = self.read(p);

@@ -9,9 +9,9 @@ use crate::logarithm::log_from;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Storage, diagonalise, orthonormalise, polar, reorthonormalise, trig,
+    Dynamic, Matrix, Moved, Storage, diagonalise, orthonormalise, polar, reorthonormalise, trig,
 };
-use symspline_core::scalar::{Each, Lane, Scalar, few, lane, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Ambient, Frame, Origin, Space, stretch_series};
 
 /// Subspaces of dimension k, real for D = 1, complex for D = 2.
@@ -107,21 +107,21 @@ impl<const D: usize, A: Storage> Subspaces<D, A> {
     }
 
     /// X c(t²G) + Δ t s(t²G) with G = Δ*Δ, and its derivatives in t, as many as are asked for.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> [Matrix<Lane, D, A>; 3] {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let (x, delta) = (self.read(p), self.read(v));
         let g = delta.adjoint_times(&delta);
         let Rotation { s, versed, .. } = Rotation::of(&g.scaled(t * t));
         let c = versed.clone().plus_identity(Lane::ONE);
         let ts = s.scaled(t);
         let gamma = &(&x + &x.times(&versed)) + &delta.times(&ts);
+        if order == 0 {
+            return Moved(gamma, None);
+        }
         let minus_x = -x;
-        let d = if order > 0 { &minus_x.times(&g.times(&ts)) + &delta.times(&c) } else { gamma.clone() };
-        let dd = if order > 1 {
-            &minus_x.times(&g.times(&c)) - &delta.times(&g.times(&ts))
-        } else {
-            gamma.clone()
-        };
-        [gamma, d, dd]
+        let d = &minus_x.times(&g.times(&ts)) + &delta.times(&c);
+        let dd =
+            if order > 1 { &minus_x.times(&g.times(&c)) - &delta.times(&g.times(&ts)) } else { d.clone() };
+        Moved(gamma, Some([d, dd]))
     }
 
     /// `log_X(Y)` in the ambient space.
@@ -156,10 +156,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         FRAC_PI_2
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let parts = self.moved(p, v, t.value(), S::ORDER);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose(few(|k| parts[k].entries()[i / D][i % D]));
-        }
+        self.moved(p, v, t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let (log, angle) = self.log_between(&self.read(p), &self.read(q));

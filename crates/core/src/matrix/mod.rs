@@ -71,6 +71,23 @@ pub struct Matrix<S: Scalar, const D: usize, A: Storage = Dynamic> {
     data: A::Of<Entry<S, D>>,
 }
 
+/// A point on a curve of matrices, and where they are asked for its first and second derivative.
+pub struct Moved<const D: usize, A: Storage>(pub Matrix<Lane, D, A>, pub Option<[Matrix<Lane, D, A>; 2]>);
+
+impl<const D: usize, A: Storage> Moved<D, A> {
+    /// Writes the curve at the parameter t, with the derivatives that t carries.
+    pub fn write<S: Scalar>(&self, t: S, out: &mut [S]) {
+        let Moved(x, rates) = self;
+        let Some([d, dd]) = rates else {
+            let entries = x.entries().as_flattened();
+            return out.iter_mut().zip(entries).for_each(|(out, &x)| *out = S::constant(x));
+        };
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = t.compose([x, d, dd].map(|m| m.entries()[i / D][i % D]));
+        }
+    }
+}
+
 impl<S: Scalar, const D: usize, A: Storage> Clone for Matrix<S, D, A> {
     #[inline(always)]
     fn clone(&self) -> Self {
@@ -108,6 +125,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// From numbers row by row, imaginary parts behind real ones.
+    #[inline]
     pub fn read(rows: usize, cols: usize, numbers: &[S]) -> Self {
         let entries = &numbers.as_chunks::<D>().0[..rows * cols];
         Self::collected(A::shape(rows, cols), |i| entries[i])
