@@ -90,7 +90,9 @@ def _measured(space, t, p, u, controls, residual, closed):
         before, behind = before[:-1], behind[:-1]
     shorter = np.minimum(h[:, before], h[:, behind])
     rounding = 100 * EPS * np.maximum(inner[:, before], inner[:, behind])
-    speed = space.norm(p, u).max(axis=1)
+    # What the residual is relative to, see `symspline.Report`.
+    pace = space.distance(ends[:, :, 0], ends[:, :, 1]) / h
+    speed = np.maximum(space.norm(p, u).max(axis=1), 1e-3 * pace.max(axis=1))
     velocity = np.zeros(len(t))
     for at, vectors in ((ends, legs), (place, rate)):
         jump = jumps(space, at, vectors, before, behind)

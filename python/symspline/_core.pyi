@@ -25,6 +25,7 @@ class Handle:
     def names() -> list[list[str]]: ...
     def point_shape(self) -> list[int]: ...
     def is_complex(self) -> bool: ...
+    def fibre(self) -> int: ...
     def dim(self) -> int: ...
     def injectivity_radius(self) -> float: ...
     def curvature(self) -> float: ...
@@ -57,6 +58,29 @@ def evaluate(
     per_curve: bool,
     progress: _Progress | None = None,
 ) -> _Doubles: ...
+def lift(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    velocities: _Doubles,
+    x: _Doubles,
+    quantity: str,
+    outside: str,
+    per_curve: bool,
+    knots: _Doubles,
+    start: _Doubles,
+    progress: _Progress | None = None,
+) -> _Doubles: ...
+def transport(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    velocities: _Doubles,
+    times: tuple[float, float],
+    outside: str,
+    vectors: _Doubles,
+) -> _Doubles: ...
+def lift_knots(handle: Handle, t: _Doubles, points: _Doubles, velocities: _Doubles) -> _Doubles: ...
 def evaluate_bspline(
     handle: Handle,
     knots: _Doubles,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Self
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import archive
 from ._core import ValidationError
 from .arrays import read_only, shown
-from .curves.curve import Curve, quantity_of
+from .curves.curve import Curve, Doubles, quantity_of
 from .curves.derivatives import Gradient, Places, places
 from .curves.ends import ends_in_factors, kept, picked
 from .curves.fit import curve_of, fit, read, read_ends
@@ -22,7 +22,7 @@ from .curves.together import longest_step
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report, combined
-from .spaces import Array, Space
+from .spaces import Array, Product, Space, parts_of
 from .spaces import space as space_named
 from .times import Clock, knots_of
 
@@ -161,6 +161,92 @@ class CubicSpline:
             check_progress(progress)
         return self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
 
+    def lift(
+        self,
+        x: ArrayLike,
+        start: Any = None,
+        nu: int = 0,
+        *,
+        extrapolate: bool | str | None = None,
+        per_curve: bool = False,
+        progress: Progress | None = None,
+    ) -> Any:
+        """The curve at times x by arrays that move continuously: the horizontal lift.
+
+        A point of a projective space or a Grassmannian is an array up to a unitary factor on its right, a phase, a
+        sign or a change of the basis. A call picks one by itself, which jumps at knots. The horizontal lift X is
+        continuous, and turns no more than its subspace does: X*X' = 0. It depends neither on the representatives of
+        the data nor on the other times that are asked for. Where points have one array only it is the curve itself.
+
+        Args:
+            x: times, any shape and order, as in a call.
+            start: a representative of the first point, at which the lift starts, shape point_shape or batch axes +
+                point_shape; None for the first point as it was given. For a product a tuple with one or None for
+                every factor.
+            nu: 0 for representatives, 1 for the velocity γ', 2 for the covariant acceleration ∇γ' there. With ``nu=1``
+                these are the derivatives of the arrays.
+            extrapolate, per_curve, progress: as in a call. A closed curve may come back as another representative,
+                by its *holonomy* (on CP¹ the phase of half the enclosed area, Berry's phase); beyond the knots the
+                lift goes on with that.
+
+        Returns:
+            Shape batch axes + x.shape + point_shape.
+
+        Raises:
+            ValidationError: as in a call, and where ``start`` does not represent the first point.
+
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> spline = ss.CubicSpline(None, [[1, 0], [0.6, 0.8], [-0.28, -0.96]], "rp:1")
+        >>> spline.lift(2.0).round(12)  # the data have the other sign
+        array([-0.28,  0.96])
+        """
+        if progress is not None:
+            check_progress(progress)
+        quantity, where = quantity_of(nu), self._beyond(extrapolate)
+        return timed(
+            self._curve,
+            self._clock,
+            x,
+            per_curve,
+            lambda curve, x, per_curve: curve.lift(x, quantity, where, per_curve, start, progress),
+        )
+
+    def transport(self, x0: Any, x1: Any, v: Any) -> Any:
+        """Parallel transport of tangent vectors along the curve, (26a) of the paper.
+
+        Args:
+            x0, x1: from when to when, two times between the first and the last knot, in any order. A closed curve is
+                gone round as often as times beyond its knots say.
+            v: a tangent vector at ``spline(x0)``, shape point_shape, or one for every curve, batch axes + point_shape;
+                for a product a tuple.
+
+        Returns:
+            Tangent vectors at ``spline(x1)``, shape batch axes + point_shape. On quotient spaces vectors belong to the
+            representatives that the two calls give.
+
+        Raises:
+            ValidationError: a time is outside the knots, or v is not tangent at ``spline(x0)``.
+
+        >>> import symspline as ss
+        >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
+        >>> quarter.transport(0, 1, [0.0, 1.0, 2.0]).round(12)  # a vector ahead, and one across
+        array([-1.,  0.,  2.])
+        """
+        times, _ = self._clock.at(np.asarray([x0, x1]), self._batch, False)
+        where = "periodic" if self._outside == "periodic" else "raise"
+        # Times outside the knots are refused here.
+        at = self(np.asarray([x0, x1]), extrapolate=where if where == "periodic" else None)
+        vectors = []
+        for points, part, one in zip(
+            parts_of(at, self.space, "points"), self._curve.parts, parts_of(v, self.space, "v"), strict=True
+        ):
+            first = np.take(points, 0, axis=len(self._batch))
+            part.space.check_tangent(first, one)
+            vectors.append(np.broadcast_to(np.asarray(one), first.shape))
+        moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
+        return self._curve.transport((float(times[0]), float(times[1])), where, moved)
+
     def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
         """|γ'| at times x, shape batch axes + x.shape."""
         return self._at(x, "speed", extrapolate, per_curve)[()]
@@ -168,8 +254,13 @@ class CubicSpline:
     def _at(
         self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        where = self._outside if extrapolate is None else outside(checked_policy(extrapolate), self._bc_type)
-        return evaluated(self._curve, self._clock, x, quantity, where, per_curve, progress)
+        return evaluated(
+            self._curve, self._clock, x, quantity, self._beyond(extrapolate), per_curve, progress
+        )
+
+    def _beyond(self, extrapolate: Any) -> str:
+        """What happens outside the knots, where the caller says so or as the spline was made."""
+        return self._outside if extrapolate is None else outside(checked_policy(extrapolate), self._bc_type)
 
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
@@ -450,12 +541,25 @@ def evaluated(
     progress: Progress | None,
 ) -> Any:
     """A quantity at times as the user gives them."""
+    return timed(
+        curve,
+        clock,
+        x,
+        per_curve,
+        lambda curve, x, per_curve: curve.evaluate(x, quantity, outside, per_curve, progress),
+    )
+
+
+def timed(
+    curve: Curve, clock: Clock, x: ArrayLike, per_curve: bool, call: Callable[[Curve, Doubles, bool], Any]
+) -> Any:
+    """What a curve has at times as the user gives them."""
     if clock.plain and type(x) is float:
         # A single time is worth a short way.
         times = np.array(x)
     else:
         times, per_curve = clock.at(x, curve.batch, per_curve)
     try:
-        return curve.evaluate(times, quantity, outside, per_curve, progress)
+        return call(curve, times, per_curve)
     except ValidationError as error:
         raise clock.explain(error) from None

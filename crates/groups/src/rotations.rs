@@ -274,13 +274,21 @@ impl Covered for Rotations {
             out.copy_from_slice(&p);
             return;
         };
-        // ω/2 = vector part of q⁻¹w
-        let [qw, qv @ ..] = q;
-        let wv = [w[1], w[2], w[3]];
-        let turn = cross(qv, wv);
-        let omega = few(|i| TWO * (qw * wv[i] - w[0] * qv[i] - turn[i]));
-        out.copy_from_slice(&times(&p, &skew(omega)));
+        out.copy_from_slice(&times(&p, &skew(angular(q, w))));
     }
+    #[inline(always)]
+    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane] {
+        out[..3].copy_from_slice(&angular(few(|i| y[i]), w));
+        &out[..3]
+    }
+}
+
+/// The angular velocity ω of a quaternion q that moves with w: ω/2 is the vector part of q⁻¹w.
+#[inline(always)]
+fn angular([qw, qv @ ..]: Quaternion<Lane>, w: &[Lane]) -> [Lane; 3] {
+    let wv = [w[1], w[2], w[3]];
+    let turn = cross(qv, wv);
+    few(|i| TWO * (qw * wv[i] - w[0] * qv[i] - turn[i]))
 }
 
 #[inline(always)]

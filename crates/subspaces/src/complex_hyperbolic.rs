@@ -50,6 +50,9 @@ impl Model for ComplexHyperbolic {
     fn is_complex(&self) -> bool {
         true
     }
+    fn fibre(&self) -> usize {
+        1
+    }
     fn cut_angle(&self) -> f64 {
         f64::INFINITY
     }

@@ -152,6 +152,9 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
     fn is_complex(&self) -> bool {
         D == 2
     }
+    fn fibre(&self) -> usize {
+        self.k
+    }
     fn cut_angle(&self) -> f64 {
         FRAC_PI_2
     }

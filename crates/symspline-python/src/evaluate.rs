@@ -9,7 +9,10 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethod
 use pyo3::prelude::*;
 use symspline::curve::{
     BSpline, Curves, Outside, Quantity, Times, evaluate as run, evaluate_bspline as run_bspline,
+    lift as run_lift, lift_knots as find_knots, transport as run_transport,
 };
+use symspline::monitor::Monitor;
+use symspline::space::{Ambient, Erased};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
@@ -28,37 +31,147 @@ pub fn evaluate<'py>(
     per_curve: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let at = (x, outside, per_curve);
+    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, |space, job, monitor, out| {
+        run(space, job.curves, job.times, job.quantity, job.outside, monitor, out);
+    })
+}
+
+/// Evaluates the horizontal lift of curves on a quotient space, and its derivatives, like [`evaluate`]. `knots` are
+/// the factors that [`lift_knots`] finds, `start` those of the representatives to start at, (curves, k, k, 2).
+#[pyfunction]
+#[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, knots, start, progress=None))]
+pub fn lift<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    velocities: Array<'py>,
+    x: Array<'py>,
+    quantity: &str,
+    outside: &str,
+    per_curve: bool,
+    knots: Array<'py>,
+    start: Array<'py>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let at = (x, outside, per_curve);
+    let factors = [knots.as_slice()?, start.as_slice()?];
+    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, |space, job, monitor, out| {
+        run_lift(space, job.curves, job.times, job.quantity, job.outside, factors, monitor, out);
+    })
+}
+
+/// The factors of the horizontal lift at the knots, (curves, knots, k, k, 2).
+#[pyfunction]
+pub fn lift_knots<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    velocities: Array<'py>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let space = handle.space.get();
+    let curves = curves_of([&t, &points, &velocities])?;
+    let (nodes, k) = (curves.nodes, space.fibre());
+    let count = curves.points.len() / (nodes * space.point_len()).max(1);
+    let out = zeros(py, &[count, nodes, k, k, 2])?;
+    let mut write = out.readwrite();
+    let result = write.as_slice_mut()?;
+    watched(py, None, count * nodes, |monitor| find_knots(&space, &curves, monitor, result))?;
+    drop(write);
+    Ok(out)
+}
+
+/// Carries one tangent vector of every curve in parallel from its point at one time to that at another.
+#[pyfunction]
+pub fn transport<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    velocities: Array<'py>,
+    times: [f64; 2],
+    outside: &str,
+    vectors: Array<'py>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let curves = curves_of([&t, &points, &velocities])?;
+    let (policy, _) = policy_named(outside)?;
+    let out = zeros(py, vectors.shape())?;
+    let mut write = out.readwrite();
+    let result = write.as_slice_mut()?;
+    result.copy_from_slice(vectors.as_slice()?);
+    let count = result.len() / handle.space.get().point_len().max(1);
+    watched(py, None, count, |monitor| {
+        run_transport(&handle.space.get(), &curves, times, policy, monitor, result);
+    })?;
+    drop(write);
+    Ok(out)
+}
+
+/// What is computed where.
+struct Asked<'a> {
+    curves: &'a Curves<'a>,
+    times: &'a Times<'a>,
+    quantity: Quantity,
+    outside: Outside,
+}
+
+fn curves_of<'a>([t, points, velocities]: [&'a Array; 3]) -> PyResult<Curves<'a>> {
+    Ok(Curves {
+        t: t.as_slice()?,
+        nodes: t.shape()[t.ndim() - 1],
+        points: points.as_slice()?,
+        velocities: velocities.as_slice()?,
+    })
+}
+
+/// Reads curves and times, and has a quantity computed for every sample.
+fn sampled<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    curve: [&Array<'py>; 3],
+    (x, outside, per_curve): (Array<'py>, &str, bool),
+    quantity: &str,
+    progress: Option<Py<PyAny>>,
+    compute: impl FnOnce(&Erased, &Asked, &Monitor, &mut [f64]) + Send,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let quantity = quantity_named(quantity)?;
-    let (policy, strict) = match outside {
-        "raise" => (Outside::Continue, true),
-        "continue" => (Outside::Continue, false),
-        "geodesic" => (Outside::Geodesic, false),
-        "periodic" => (Outside::Wrap, false),
-        _ => return Err(invalid(format!("unknown extrapolation {outside:?}"))),
-    };
-    let point_axes = handle.point_axes();
-    let nodes = t.shape()[t.ndim() - 1];
+    let (policy, strict) = policy_named(outside)?;
+    let (point_axes, points) = (handle.point_axes(), curve[1]);
     let batch = &points.shape()[..points.ndim() - point_axes - 1];
     let count_axes = if per_curve { &x.shape()[batch.len()..] } else { x.shape() };
-    let curves =
-        Curves { t: t.as_slice()?, nodes, points: points.as_slice()?, velocities: velocities.as_slice()? };
+    let curves = curves_of(curve)?;
     let count = count_axes.iter().product();
     let times = Times { x: x.as_slice()?, count };
     check_times(&curves, &times, batch, x.shape(), strict)?;
 
+    let space = handle.space.get();
     let mut shape = [batch, count_axes].concat();
     let samples = shape.iter().product();
-    if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
+    if quantity.is_of_body() {
+        shape.push(quantity.len(&space));
+    } else if !quantity.is_length() {
         shape.extend_from_slice(&points.shape()[points.ndim() - point_axes..]);
     }
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    watched(py, progress, samples, |monitor| {
-        run(&handle.space.get(), &curves, &times, quantity, policy, monitor, result);
-    })?;
+    let asked = Asked { curves: &curves, times: &times, quantity, outside: policy };
+    watched(py, progress, samples, |monitor| compute(&space, &asked, monitor, result))?;
     drop(write);
     Ok(out)
+}
+
+/// What happens outside the knots, and whether it is an error.
+fn policy_named(name: &str) -> PyResult<(Outside, bool)> {
+    Ok(match name {
+        "raise" => (Outside::Continue, true),
+        "continue" => (Outside::Continue, false),
+        "geodesic" => (Outside::Geodesic, false),
+        "periodic" => (Outside::Wrap, false),
+        _ => return Err(invalid(format!("unknown extrapolation {name:?}"))),
+    })
 }
 
 fn quantity_named(name: &str) -> PyResult<Quantity> {
@@ -68,6 +181,8 @@ fn quantity_named(name: &str) -> PyResult<Quantity> {
         "acceleration" => Quantity::Acceleration,
         "speed" => Quantity::Speed,
         "bend" => Quantity::Bend,
+        "body velocity" => Quantity::BodyVelocity,
+        "body acceleration" => Quantity::BodyAcceleration,
         _ => return Err(invalid(format!("unknown quantity {name:?}"))),
     })
 }
@@ -87,7 +202,7 @@ pub fn evaluate_bspline<'py>(
     let quantity = quantity_named(quantity)?;
     let axes = control.ndim() - handle.point_axes();
     let mut shape = [&control.shape()[..axes - 1], x.shape()].concat();
-    if !matches!(quantity, Quantity::Speed | Quantity::Bend) {
+    if !quantity.is_length() {
         shape.extend_from_slice(&control.shape()[axes..]);
     }
     let curve = BSpline { knots: knots.as_slice()?, control: control.as_slice()?, degree };

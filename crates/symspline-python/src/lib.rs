@@ -39,6 +39,9 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(derivative::pull, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate_bspline, m)?)?;
+    m.add_function(wrap_pyfunction!(evaluate::lift, m)?)?;
+    m.add_function(wrap_pyfunction!(evaluate::transport, m)?)?;
+    m.add_function(wrap_pyfunction!(evaluate::lift_knots, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
     m.add_function(wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)

@@ -47,6 +47,10 @@ impl Handle {
     fn is_complex(&self) -> bool {
         self.space.get().is_complex()
     }
+    /// See `Ambient::fibre`.
+    fn fibre(&self) -> usize {
+        self.space.get().fibre()
+    }
     fn dim(&self) -> usize {
         self.space.get().dim()
     }

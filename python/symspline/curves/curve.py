@@ -17,6 +17,8 @@ from .solve import Progress
 Doubles = NDArray[np.float64]
 
 NORMS = ("speed", "bend")
+# What is no point or vector of the space.
+REAL = (*NORMS, "body velocity", "body acceleration")
 _QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
 
 
@@ -56,8 +58,26 @@ class Curve(ABC):
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        """A quantity (``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|) at
-        times x; ``outside`` the knots ``"raise"``, ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+        """A quantity at times x: ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|; of
+        rotations also ``"body velocity"`` and ``"body acceleration"``. ``outside`` the knots ``"raise"``,
+        ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+
+    @abstractmethod
+    def lift(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Any,
+        progress: Progress | None = None,
+    ) -> Any:
+        """The same of the horizontal lift that starts at ``start``, see `symspline.CubicSpline.lift`."""
+
+    @abstractmethod
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+        """Parallel transport of a tangent vector of each curve from one time to another, see
+        `symspline.CubicSpline.transport`."""
 
     @abstractmethod
     def control_points(self) -> Any:

@@ -77,6 +77,28 @@ class InSpan(Plain):
         values = small.evaluate(x, quantity, outside, per_curve, progress)
         return values if quantity in NORMS else span.lifted(values, self.batch)
 
+    def _lifted(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Doubles,
+        progress: Progress | None,
+    ) -> Array:
+        # The span has the same factors.
+        span, small = self.small
+        return span.lifted(small._lifted(x, quantity, outside, per_curve, start, progress), self.batch)
+
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Array:
+        # What the vector has outside the span of the curve is carried, too.
+        knots = len(self.batch)
+        rows = np.expand_dims(np.asarray(v, self.space.dtype), knots)
+        span = span_of(self.space, self.points, self.velocities, rows)
+        small = Plain(span.space, self.times, span.down(self.points), span.down(self.velocities))
+        found = small.transport(times, outside, np.squeeze(span.down(rows), knots))
+        return np.squeeze(span.up(np.expand_dims(found, knots)), knots)
+
     def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
         self._refuse_derivatives()
 

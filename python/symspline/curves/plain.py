@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -10,8 +11,9 @@ from .. import _core
 from .._core import ValidationError
 from ..spaces import Array, Space
 from . import derivatives
-from .curve import NORMS, Curve, Doubles
+from .curve import REAL, Curve, Doubles
 from .derivatives import Gradient, Places
+from .lift import check_reach, check_start, factors, is_quotient
 from .solve import Options, Progress, Solved, Task, solve
 
 
@@ -41,23 +43,64 @@ class Plain(Curve):
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
+        self._check_times(x, per_curve)
+        values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress)
+        return values if quantity in REAL else self.space._numbers(values)
+
+    def lift(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Any,
+        progress: Progress | None = None,
+    ) -> Array:
+        first = np.take(self.points, 0, axis=len(self.batch))
+        if not is_quotient(self.space):
+            if start is not None:
+                check_start(self.space, first, start)
+            values: Array = self.evaluate(x, quantity, outside, per_curve, progress)
+            return values
+        self._check_times(x, per_curve)
+        if outside == "continue":
+            check_reach(self.times, x)
+        return self._lifted(x, quantity, outside, per_curve, factors(self.space, first, start), progress)
+
+    def _lifted(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Doubles,
+        progress: Progress | None,
+    ) -> Array:
+        curve, knots = self._core_curve, self._lift_knots
+        values = _core.lift(*curve, x, quantity, outside, per_curve, knots, start, progress)
+        return self.space._numbers(values)
+
+    @cached_property
+    def _lift_knots(self) -> Doubles:
+        """The factors of the horizontal lift at the knots; kept from the first use on."""
+        return _core.lift_knots(*self._core_curve)
+
+    @property
+    def _core_curve(self) -> tuple[_core.Handle, Doubles, Doubles, Doubles]:
+        space = self.space
+        points, velocities = space._as_doubles(self.points), space._as_doubles(self.velocities)
+        return space._handle, self.times, points, velocities
+
+    def _check_times(self, x: Doubles, per_curve: bool) -> None:
         if per_curve and x.shape[: len(self.batch)] != self.batch:
             raise ValidationError(
                 f"with per_curve=True the shape of x must begin with the batch axes {self.batch}; got {x.shape}"
             )
+
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Array:
         space = self.space
-        values = _core.evaluate(
-            space._handle,
-            self.times,
-            space._as_doubles(self.points),
-            space._as_doubles(self.velocities),
-            x,
-            quantity,
-            outside,
-            per_curve,
-            progress,
-        )
-        return values if quantity in NORMS else space._numbers(values)
+        vectors = np.ascontiguousarray(space._as_doubles(np.asarray(v, space.dtype)))
+        return space._numbers(_core.transport(*self._core_curve, times, outside, vectors))
 
     def control_points(self) -> Array:
         axis = len(self.batch)

@@ -45,6 +45,26 @@ class Together(Curve):
         )
         return together(values) if quantity in NORMS else values
 
+    def lift(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Any,
+        progress: Progress | None = None,
+    ) -> Tuple:
+        count = len(self._parts)
+        starts = (None,) * count if start is None else parts_of(start, self.space, "start")
+        return tuple(
+            part.lift(x, quantity, outside, per_curve, one, share(progress, i, count))
+            for i, (part, one) in enumerate(zip(self._parts, starts, strict=True))
+        )
+
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Tuple:
+        each = zip(self._parts, parts_of(v, self.space, "v"), strict=True)
+        return tuple(part.transport(times, outside, one) for part, one in each)
+
     def control_points(self) -> Tuple:
         return tuple(part.control_points() for part in self._parts)
 

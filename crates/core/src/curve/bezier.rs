@@ -1,5 +1,6 @@
 //! De Casteljau's algorithm with geodesics, (8).
 
+use super::evaluate::Curves;
 use crate::scalar::{Lane, Scalar, lane};
 use crate::space::Space;
 
@@ -30,6 +31,19 @@ impl<S: Scalar> Segment<S> {
             middle: lanes(),
             long: Lane::ZERO,
             level: [points(), points(), points()],
+        }
+    }
+
+    /// Reads a segment of a curve into all lanes.
+    pub fn read(&mut self, curves: &Curves, curve: usize, segment: usize, len: usize) {
+        let t = curves.knots(curve);
+        let third = (t[segment + 1] - t[segment]) / 3.0;
+        for e in 0..2 {
+            let row = (curve * curves.nodes + segment + e) * len;
+            for j in 0..len {
+                self.ends[e][j] = lane(curves.points[row + j]);
+                self.legs[e][j] = lane(curves.velocities[row + j] * third);
+            }
         }
     }
 

@@ -57,10 +57,10 @@ pub fn evaluate_bspline(
             let first = block * length + group * LANES;
             let samples = out.len() / size;
             let at = std::array::from_fn(|l| first + l.min(samples - 1));
-            match quantity {
-                Quantity::Point => eight::<Lane>(space, curve, x, at, quantity, out),
-                Quantity::Velocity | Quantity::Speed => eight::<Dual>(space, curve, x, at, quantity, out),
-                Quantity::Acceleration | Quantity::Bend => eight::<Jet>(space, curve, x, at, quantity, out),
+            match quantity.order() {
+                0 => eight::<Lane>(space, curve, x, at, quantity, out),
+                1 => eight::<Dual>(space, curve, x, at, quantity, out),
+                _ => eight::<Jet>(space, curve, x, at, quantity, out),
             }
         }
         monitor.advance(out.len() / size);
@@ -106,13 +106,13 @@ fn eight<S: Scalar>(
         [parts[0][i], parts[1][i], parts[2][i]] = x.parts();
     }
     let [p, d, dd] = &mut parts;
-    let vector = match quantity {
-        Quantity::Point => return scatter(p, out),
-        Quantity::Velocity | Quantity::Speed => {
+    let vector = match quantity.order() {
+        0 => return scatter(p, out),
+        1 => {
             space.velocity(p, d);
             d
         }
-        Quantity::Acceleration | Quantity::Bend => {
+        _ => {
             space.acceleration(p, d, dd);
             dd
         }

@@ -6,7 +6,7 @@ use super::places::Places;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
-use crate::space::{Ambient, Covered, Erased, Space};
+use crate::space::{Ambient, Covered, Erased, Origin, Space};
 use crate::with_size;
 use std::ops::DerefMut;
 
@@ -43,6 +43,10 @@ pub enum Quantity {
     Speed,
     /// |∇γ'|
     Bend,
+    /// γ' as the body that moves along the curve has it, where a space knows ([`Covered::body`]): angular velocity.
+    BodyVelocity,
+    /// ∇γ' in the same way: angular acceleration.
+    BodyAcceleration,
 }
 
 /// What happens at times outside the knots.
@@ -82,10 +86,33 @@ impl Quantity {
     pub fn is_length(self) -> bool {
         matches!(self, Quantity::Speed | Quantity::Bend)
     }
+
+    /// Whether the result is a vector as the moving body has it.
+    pub fn is_of_body(self) -> bool {
+        matches!(self, Quantity::BodyVelocity | Quantity::BodyAcceleration)
+    }
+
+    /// Derivatives of the curve that are asked for.
+    pub fn order(self) -> usize {
+        match self {
+            Quantity::Point => 0,
+            Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity => 1,
+            Quantity::Acceleration | Quantity::Bend | Quantity::BodyAcceleration => 2,
+        }
+    }
+
+    /// Numbers of a result, for a space of points of `len` numbers.
+    pub fn len(self, space: &Erased) -> usize {
+        match self {
+            _ if self.is_length() => 1,
+            _ if self.is_of_body() => space.dim(),
+            _ => space.point_len(),
+        }
+    }
 }
 
 /// Evaluates every curve at its times: `out` holds, curve by curve and time by time, a point or
-/// vector, or one number for [`Quantity::Speed`] and [`Quantity::Bend`].
+/// vector, or what [`Quantity::len`] counts.
 pub fn evaluate(
     space: &Erased,
     curves: &Curves,
@@ -96,7 +123,7 @@ pub fn evaluate(
     out: &mut [f64],
 ) {
     let len = space.point_len();
-    let size = if quantity.is_length() { 1 } else { len };
+    let size = quantity.len(space);
     let samples = out.len() / size;
     if samples == 0 {
         return;
@@ -133,10 +160,10 @@ pub struct Job<'a> {
 impl Job<'_> {
     /// Evaluates the block, eight samples at a time, whatever segments they fall in.
     pub fn run<M: Space>(&self, space: &M, out: &mut [f64]) {
-        match self.quantity {
-            Quantity::Point => self.run_with::<Lane, M>(space, out),
-            Quantity::Velocity | Quantity::Speed => self.run_with::<Dual, M>(space, out),
-            Quantity::Acceleration | Quantity::Bend => self.run_with::<Jet, M>(space, out),
+        match self.quantity.order() {
+            0 => self.run_with::<Lane, M>(space, out),
+            1 => self.run_with::<Dual, M>(space, out),
+            _ => self.run_with::<Jet, M>(space, out),
         }
     }
 
@@ -170,10 +197,10 @@ impl Job<'_> {
 
     /// The same in a space that covers this one.
     pub fn run_covered<C: Covered>(&self, space: &C, out: &mut [f64]) {
-        match self.quantity {
-            Quantity::Point => self.run_covered_with::<Lane, C>(space, out),
-            Quantity::Velocity | Quantity::Speed => self.run_covered_with::<Dual, C>(space, out),
-            Quantity::Acceleration | Quantity::Bend => self.run_covered_with::<Jet, C>(space, out),
+        match self.quantity.order() {
+            0 => self.run_covered_with::<Lane, C>(space, out),
+            1 => self.run_covered_with::<Dual, C>(space, out),
+            _ => self.run_covered_with::<Jet, C>(space, out),
         }
     }
 
@@ -197,6 +224,9 @@ impl Job<'_> {
             |places, segment, gamma, vectors, out| {
                 let (p, vector) = self.sample(&cover, places, segment, gamma, vectors, len);
                 let [point, result] = two(&mut result, ambient);
+                if let (true, Some(w)) = (self.quantity.is_of_body(), vector) {
+                    return scatter(space.body(p, w, result), out);
+                }
                 space.leave(p, vector, result);
                 if self.quantity.is_length() {
                     space.leave(p, None, point);
@@ -252,13 +282,13 @@ impl Job<'_> {
         for (i, g) in gamma[..len].iter().enumerate() {
             [p[i], d[i], dd[i]] = g.parts();
         }
-        match self.quantity {
-            Quantity::Point => (p, None),
-            Quantity::Velocity | Quantity::Speed => {
+        match self.quantity.order() {
+            0 => (p, None),
+            1 => {
                 space.velocity(p, d);
                 (p, Some(d))
             }
-            Quantity::Acceleration | Quantity::Bend => {
+            _ => {
                 space.acceleration(p, d, dd);
                 (p, Some(dd))
             }

@@ -84,18 +84,7 @@ impl<'a> Places<'a> {
         for l in 0..LANES {
             let mut x = if x.len() == count { x[self.i] } else { x[self.curve * count + self.i] };
             let t = curves.knots(self.curve);
-            let (start, end) = (t[0], t[t.len() - 1]);
-            self.beyond[l] = 0.0;
-            if x < start || x > end {
-                match outside {
-                    Outside::Continue => {}
-                    Outside::Geodesic => {
-                        self.beyond[l] = if x < start { x - start } else { x - end };
-                        x = x.max(start).min(end);
-                    }
-                    Outside::Wrap => x = (start + (x - start).rem_euclid(end - start)).max(start).min(end),
-                }
-            }
+            (x, self.beyond[l]) = inside(x, t, *outside);
             let k = match locator {
                 Some(locator) => locator.find(x, self.segment),
                 None => Locator::new(t, false).find(x, self.segment),
@@ -117,5 +106,20 @@ impl<'a> Places<'a> {
         let alike = at == [at[0]; LANES] && self.beyond == [0.0; LANES] && self.i >= LANES;
         self.shared = alike.then(|| [self.knot, Lane::new(ends)]);
         changed
+    }
+}
+
+/// A time as it is meant: between the knots where it is wrapped or the curve goes on straight from an end, and how far
+/// it is beyond that.
+#[inline(always)]
+pub fn inside(x: f64, t: &[f64], outside: Outside) -> (f64, f64) {
+    let (start, end) = (t[0], t[t.len() - 1]);
+    if x >= start && x <= end {
+        return (x, 0.0);
+    }
+    match outside {
+        Outside::Continue => (x, 0.0),
+        Outside::Geodesic => (x.max(start).min(end), if x < start { x - start } else { x - end }),
+        Outside::Wrap => ((start + (x - start).rem_euclid(end - start)).max(start).min(end), 0.0),
     }
 }

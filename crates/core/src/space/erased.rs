@@ -152,6 +152,7 @@ table! {
         fn point_len(&self) -> usize;
         fn point_shape(&self) -> Vec<usize>;
         fn is_complex(&self) -> bool;
+        fn fibre(&self) -> usize;
         fn is_connected(&self) -> bool;
         fn component(&self, p: &[f64]) -> bool;
         fn scales(&self) -> bool;

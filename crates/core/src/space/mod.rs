@@ -44,6 +44,11 @@ pub trait Ambient: Copy + Send + Sync {
     fn is_complex(&self) -> bool {
         false
     }
+    /// The size k of the unitary factor up to which an array is a point: the k × k matrices on its right. 0 where a
+    /// point has one array only.
+    fn fibre(&self) -> usize {
+        0
+    }
     /// Whether any two points are joined by a curve.
     fn is_connected(&self) -> bool {
         true
@@ -223,6 +228,9 @@ pub trait Covered: Space {
     /// Of the points of the cover over a control point q takes the one nearest to the other control point, and with
     /// it the end y of the segment and the tangent vector w there.
     fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
+    /// A tangent vector w at y of the cover as the moving body has it, in the first numbers of `out`: the element ω
+    /// of the Lie algebra with p' = pω.
+    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane];
     /// Brings a point of the cover and, if given, a tangent vector there back: writes the point, or the
     /// vector.
     fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);

@@ -16,6 +16,10 @@ pub trait Model: Copy + Send + Sync {
     fn is_complex(&self) -> bool {
         false
     }
+    /// See [`Ambient::fibre`].
+    fn fibre(&self) -> usize {
+        0
+    }
     /// See [`Ambient::cut_angle`].
     fn cut_angle(&self) -> f64;
     /// See [`Ambient::longest_leg`].
@@ -114,6 +118,9 @@ impl<M: Model> Ambient for M {
     }
     fn is_complex(&self) -> bool {
         Model::is_complex(self)
+    }
+    fn fibre(&self) -> usize {
+        Model::fibre(self)
     }
     fn cut_angle(&self) -> f64 {
         Model::cut_angle(self)

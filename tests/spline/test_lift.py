@@ -1,0 +1,249 @@
+"""Horizontal lifts: representatives that are continuous, and turn no more than their subspaces do."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from cases import EPS, walk
+from curves import same
+from scipy.integrate import solve_ivp
+
+import symspline as ss
+
+NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "ch:2"]
+ORTHONORMAL = NAMES[:-1]
+KNOTS = np.array([0.0, 0.4, 1.9, 2.3, 3.6, 4.0, 5.1])
+
+
+def wide(space, x):
+    """As matrices."""
+    return x.reshape(*x.shape[: x.ndim - len(space.point_shape)], space.point_shape[0], -1)
+
+
+def turned(space, points, rng):
+    """The same points with random unitary factors on their right."""
+    matrices = wide(space, points)
+    k = matrices.shape[-1]
+    noise = rng.normal(size=(*matrices.shape[:-2], k, k))
+    if np.iscomplexobj(points):
+        noise = noise + 1j * rng.normal(size=noise.shape)
+    q, r = np.linalg.qr(noise)
+    # With the phases that QR takes away.
+    phases = np.diagonal(r, axis1=-2, axis2=-1)
+    return (matrices @ (q * (phases / np.abs(phases))[..., None, :])).reshape(points.shape)
+
+
+def points_of(name, rng, step=0.8):
+    """Points that are `step` apart, with representatives in disorder."""
+    space = ss.space(name)
+    return space, turned(space, walk(space, step, len(KNOTS), rng), rng)
+
+
+def inner(space, x, y):
+    """X*Y, with the form of complex hyperbolic space there."""
+    x, y = wide(space, x), wide(space, y)
+    if isinstance(space, ss.ComplexHyperbolic):
+        x = x * np.array([[-1.0], *[[1.0]] * (x.shape[-2] - 1)])
+    return np.swapaxes(x.conj(), -1, -2) @ y
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(11)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_horizontal_and_represents_the_curve(name, rng):
+    space, points = points_of(name, rng)
+    spline = ss.CubicSpline(KNOTS, points, space)
+    x = np.sort(np.append(rng.uniform(0, KNOTS[-1], 200), KNOTS))
+    lifted, moving = spline.lift(x), spline.lift(x, nu=1)
+    assert np.max(space.distance(lifted, spline(x))) < 100 * EPS * np.max(space.rounding(lifted))
+    assert np.abs(inner(space, lifted, moving)).max() < 100 * EPS * np.max(space.rounding(lifted))
+    # nu = 1 is the derivative of the arrays, nu = 2 its horizontal part, by central differences of order four.
+    h, x = 1e-3, x[(np.abs(x[:, None] - KNOTS) > 3e-3).all(axis=1)]
+    around = [spline.lift(x + i * h, nu=0) for i in (-2, -1, 1, 2)]
+    slope = (around[0] - 8 * around[1] + 8 * around[2] - around[3]) / (12 * h)
+    np.testing.assert_allclose(slope, spline.lift(x, nu=1), rtol=0, atol=3e-9 * np.abs(slope).max() + 1e-9)
+    around = [spline.lift(x + i * h, nu=1) for i in (-2, -1, 1, 2)]
+    slope = (around[0] - 8 * around[1] + 8 * around[2] - around[3]) / (12 * h)
+    bend = space.project_tangent(spline.lift(x), slope)
+    np.testing.assert_allclose(bend, spline.lift(x, nu=2), rtol=0, atol=1e-7 * np.abs(bend).max())
+
+
+@pytest.mark.parametrize("name", ORTHONORMAL)
+def test_it_solves_its_equation(name, rng):
+    """X' = P'X for the projector P = YY*, in which representatives cancel; P' = DY* + YD* for a velocity D at Y."""
+    space, points = points_of(name, rng)
+    spline = ss.CubicSpline(KNOTS, points, space)
+    shape = wide(space, points[0]).shape
+
+    def rate(t, x):
+        y, d = (wide(space, spline(t, nu=nu)) for nu in (0, 1))
+        return ((d @ y.conj().T + y @ d.conj().T) @ x.reshape(shape)).ravel()
+
+    x = wide(space, points[0]).ravel()
+    for a, b in pairwise(KNOTS):
+        x = solve_ivp(rate, (a, b), x, method="DOP853", rtol=3e-14, atol=1e-15, max_step=0.02).y[:, -1]
+        # What is left is the integrator's.
+        np.testing.assert_allclose(wide(space, spline.lift(b)).ravel(), x, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("nu", [0, 1, 2])
+def test_it_is_continuous_at_knots(name, nu, rng):
+    space, points = points_of(name, rng)
+    spline = ss.CubicSpline(KNOTS, points, space, bc_type="not-a-knot")
+    inner_knots = KNOTS[1:-1]
+    left, right = spline.lift(inner_knots - 1e-13, nu=nu), spline.lift(inner_knots, nu=nu)
+    # The jump of a curve within 1e-13 is that times its next derivative.
+    size = np.abs(spline.lift(KNOTS, nu=min(nu + 1, 2))).max() + np.abs(spline.lift(KNOTS, nu=2)).max() / 0.4
+    assert np.abs(left - right).max() < 1e-12 * np.max(space.rounding(points)) * size
+    # The call itself jumps there, or this test shows nothing.
+    if nu == 0:
+        assert np.abs(spline(inner_knots - 1e-13) - spline(inner_knots)).max() > 0.1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_does_not_depend_on_representatives(name, rng):
+    space, points = points_of(name, rng)
+    other = turned(space, points, rng)
+    x = rng.uniform(-0.5, KNOTS[-1] + 0.5, 50)
+    for outside in (True, "geodesic"):
+        a, b = (ss.CubicSpline(KNOTS, p, space, extrapolate=outside) for p in (points, other))
+        for nu in range(3):
+            expected = a.lift(x, nu=nu)
+            size = np.abs(expected).max() * np.max(space.rounding(expected if nu == 0 else points))
+            np.testing.assert_allclose(b.lift(x, points[0], nu), expected, rtol=0, atol=3e-13 * size)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_time_is_as_among_many(name, rng):
+    space, points = points_of(name, rng)
+    spline = ss.CubicSpline(KNOTS, points, space)
+    x = rng.uniform(0, KNOTS[-1], 3000)
+    many = spline.lift(x)
+    for i in (0, 17, 2047, 2048, 2999):
+        assert same(spline.lift(x[i]), many[i])
+    assert same(spline.lift(x.reshape(30, 100)), many.reshape(30, 100, *space.point_shape))
+
+
+@pytest.mark.parametrize("step", [0.9, 0.99, 0.999])
+@pytest.mark.parametrize("name", ["cp:1", "gr:2,5", "cgr:2,4"])
+def test_near_the_cut_locus(name, step, rng):
+    """Neighbours nearly π/2 apart: representatives turn fast between them."""
+    space, points = points_of(name, rng, step * np.pi / 2)
+    spline = ss.CubicSpline(None, points, space)
+    x = np.linspace(0, len(points) - 1, 400)
+    lifted, moving = spline.lift(x), spline.lift(x, nu=1)
+    assert np.abs(inner(space, lifted, lifted) - np.eye(wide(space, lifted).shape[-1])).max() < 1e-13
+    other = ss.CubicSpline(None, turned(space, points, rng), space)
+    # Rounding near the cut locus is larger by one over the distance to it.
+    np.testing.assert_allclose(other.lift(x, points[0]), lifted, rtol=0, atol=1e-12 / (1 - step))
+    assert np.abs(inner(space, lifted, moving)).max() < 1e-12 * np.abs(moving).max()
+
+
+def test_the_holonomy_of_a_closed_curve_is_half_the_enclosed_area():
+    """Berry's phase on CP¹, −Ω/2, of a curve along a circle of latitude; then round again."""
+    t = np.linspace(0, 1, 41)
+    polar = 1.1
+    kets = np.stack([np.full(41, np.cos(polar / 2)), np.sin(polar / 2) * np.exp(2j * np.pi * t)], axis=-1)
+    spline = ss.CubicSpline(t, kets, "cp:1", bc_type="periodic")
+    # The area inside the curve itself, which is a circle but for 1e-6: ∫ (1 − z) dφ over its Bloch vectors.
+    x = (np.arange(4000) + 0.5) / 4000
+    ket, rate = spline(x), spline(x, nu=1)
+    vector, moving = bloch(ket, ket), 2 * bloch(ket, rate)
+    area = np.mean((1 - vector[2]) * (vector[0] * moving[1] - vector[1] * moving[0]) / (1 - vector[2] ** 2))
+    assert area == pytest.approx(2 * np.pi * (1 - np.cos(polar)), abs=1e-5)
+    for turns in (1, 2, -1, 7):
+        phase = np.vdot(kets[0], spline.lift(float(turns)))
+        assert phase == pytest.approx(np.exp(-0.5j * turns * area), abs=1e-12)
+        assert np.vdot(kets[0], spline.lift(turns + 1e-9)) == pytest.approx(phase, abs=1e-8)
+
+
+def bloch(a, b):
+    """Re ⟨a|σ|b⟩"""
+    a = a.conj()
+    return np.real(
+        [
+            a[..., 0] * b[..., 1] + a[..., 1] * b[..., 0],
+            -1j * a[..., 0] * b[..., 1] + 1j * a[..., 1] * b[..., 0],
+            a[..., 0] * b[..., 0] - a[..., 1] * b[..., 1],
+        ]
+    )
+
+
+def test_a_line_field_of_half_turns_comes_back_with_the_other_sign():
+    angle = np.linspace(0, np.pi, 9)
+    spline = ss.CubicSpline(
+        None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "rp:1", bc_type="periodic"
+    )
+    np.testing.assert_allclose(spline.lift([8.0, 16.0, -8.0])[:, 0], [-1, 1, -1], atol=1e-14)
+
+
+def test_spaces_with_unique_arrays_are_evaluated():
+    rng = np.random.default_rng(2)
+    for name in ("sphere:2", "so:3", "spd:2", "se:3", "u:2", "h:2", "r:3"):
+        space = ss.space(name)
+        points = walk(space, 0.5, 4, rng)
+        spline = ss.CubicSpline(None, points, space)
+        x = np.linspace(0, 3, 7)
+        for nu in range(3):
+            assert same(spline.lift(x, nu=nu), spline(x, nu))
+        assert same(spline.lift(x, points[0]), spline(x))
+        with pytest.raises(ss.ValidationError, match="away from the nearest"):
+            spline.lift(x, points[1])
+
+
+def test_batches_products_and_large_spaces(rng):
+    space, points = points_of("cp:2", rng)
+    both = np.stack([points, turned(space, points, rng)])
+    knots = np.stack([KNOTS, 2 * KNOTS])
+    batch = ss.CubicSpline(knots, both, space)
+    x = np.stack([np.linspace(0, 5, 9), np.linspace(0, 10, 9)])
+    found = batch.lift(x, points[0], per_curve=True)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-14)
+    assert same(found[0], ss.CubicSpline(KNOTS, points, space).lift(x[0]))
+    assert same(batch[1].lift(x[1], points[0]), found[1])
+    pair = ss.CubicSpline(KNOTS, (points, points.real.cumsum(axis=0)), "cp:2 x r:3")
+    lifted, plain = pair.lift(x[0], (points[0] * 1j, None))
+    assert same(plain, pair(x[0])[1])
+    np.testing.assert_allclose(lifted, 1j * found[0], atol=1e-15)
+    # The same curve in a subspace of many dimensions.
+    rotation = np.linalg.qr(rng.normal(size=(300, 3)))[0]
+    large = ss.CubicSpline(KNOTS, points @ rotation.T, "cp:299")
+    np.testing.assert_allclose(
+        large.lift(x[0], nu=1), ss.CubicSpline(KNOTS, points, space).lift(x[0], nu=1) @ rotation.T, atol=1e-13
+    )
+
+
+@pytest.mark.parametrize(
+    "start, what",
+    [
+        ([0.8, 0.6, 0.0], r"start is 6\.325e-01 away from the nearest representative of the first point"),
+        ([-2.0, 0.0, 0.0], r"start is 1\.000e\+00 away"),
+        ([1.0, 0.0], r"start must have the shape of a point \(3,\)"),
+        ([np.nan, 0.0, 0.0], r"start is nan away"),
+    ],
+)
+def test_what_is_no_representative_is_refused(start, what):
+    spline = ss.CubicSpline(None, [[1, 0, 0], [0.6, 0.8, 0]], "rp:2")
+    with pytest.raises(ss.ValidationError, match=what):
+        spline.lift(0.5, start)
+
+
+def test_a_lift_is_followed_so_far_and_no_further():
+    spline = ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1", extrapolate=True)
+    assert np.isfinite(spline.lift([-99.0, 99.0])).all()
+    with pytest.raises(
+        ss.ValidationError, match=r"x\[1\] = 102.0 is more than 100 lengths of the last segment"
+    ):
+        spline.lift([0.5, 102.0])
+    with pytest.raises(ss.ValidationError, match="outside the knots"):
+        ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1").lift(1.5)
+
+
+def test_curves_that_were_not_found_are_nan():
+    spline = ss.CubicSpline(None, [[[1, 0], [0, 1]], [[1, 0], [0.6, 0.8]]], "cp:1", on_failure="ignore")
+    found = spline.lift([0.0, 0.5])
+    assert np.isnan(found[0]).all() and np.isfinite(found[1]).all()
