@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from ..arrays import as_array
 from ..report import Report, shaped
 from ..spaces import Array, Product, Space, factors_of, parts_of, point_tol
 from .curve import Curve
@@ -63,7 +62,7 @@ def read(points: Any, space: Space) -> list[Points]:
 
 
 def _read(space: Space, points: Any) -> Points:
-    array = as_array(points, "points")
+    array = space._array(points, "points")
     if array.ndim == 0 or array.size == 0:
         raise ValidationError("no points given; a curve needs at least two")
     doubles = space._doubles(array, "points")
