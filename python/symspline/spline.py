@@ -168,8 +168,11 @@ class CubicSpline:
     def _at(
         self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        where = self._outside if extrapolate is None else outside(checked_policy(extrapolate), self._bc_type)
-        return evaluated(self._curve, self._clock, x, quantity, where, per_curve, progress)
+        return evaluated(self._curve, self._clock, x, quantity, self._where(extrapolate), per_curve, progress)
+
+    def _where(self, extrapolate: Any) -> str:
+        """What happens outside the knots, as the core calls it."""
+        return self._outside if extrapolate is None else outside(checked_policy(extrapolate), self._bc_type)
 
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
