@@ -17,6 +17,7 @@ from .curves.solve import Progress
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report
+from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline, evaluated
@@ -157,4 +158,5 @@ def fit_many(
     ]
     if faults:
         fail(faults, on_failure, fitted)
+    warn_of_signs(space, points)
     return fitted

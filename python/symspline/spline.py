@@ -22,6 +22,7 @@ from .curves.together import longest_step
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report, combined
+from .signs import warn_of_signs
 from .spaces import Array, Space
 from .spaces import space as space_named
 from .times import Clock, knots_of
@@ -107,6 +108,7 @@ class CubicSpline:
         self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
         if faults:
             fail(faults, on_failure, self)
+        warn_of_signs(space, [data])
 
     def _fill(
         self,

@@ -121,7 +121,7 @@ def fit(
     solved = _solve(space, tasks, options, progress)
     batch = points[0].batch
     reports = [
-        shaped(found.columns, batch, task.space.curvature, options.method)
+        shaped(found.columns, times, batch, task.space.curvature, options.method)
         for task, found in zip(tasks, solved, strict=True)
     ]
     return Fit(curve_of(space, times, [found[:2] for found in solved]), reports, _first(solved))
@@ -151,7 +151,9 @@ def fit_many(
     def one(i: int, start: int, stop: int) -> Fit:
         own = slice(start, stop)
         reports = [
-            shaped(tuple(c[i : i + 1] for c in found.columns), (), task.space.curvature, options.method)
+            shaped(
+                tuple(c[i : i + 1] for c in found.columns), times[i], (), task.space.curvature, options.method
+            )
             for task, found in zip(tasks, solved, strict=True)
         ]
         arrays = [(found.points[own], found.velocities[own]) for found in solved]

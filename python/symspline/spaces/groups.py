@@ -113,6 +113,10 @@ class SpecialEuclidean(Space):
     (ω, v) = g⁻¹u, the rates in the body, and serve for reporting only. For positions that move
     independently of the rotation use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
 
+    The covariant acceleration of a curve (``nu=2``) is that of the group's connection: its last column is ẍ − ω × ẋ
+    with the angular velocity ω in the world, and not ẍ. A body that turns with its path along a circle has 0 there.
+    `symspline.poses.linear_acceleration` gives ẍ.
+
     >>> import symspline as ss
     >>> ss.SpecialEuclidean(3).point_shape
     (4, 4)
