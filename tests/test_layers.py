@@ -16,7 +16,7 @@ LAYERS = [
     ["archive", "failures", "options", "plotting", "signs"],
     ["spline", "free"],
     ["functions"],
-    ["adapters", "convert", "files", "jax", "pieces", "segments", "torch"],
+    ["adapters", "convert", "files", "hermite", "jax", "pieces", "segments", "torch"],
     ["hurdat", "pose_files", "poses", "rotations", "tracks"],
     ["cli", "demo"],
     ["__init__", "__main__"],

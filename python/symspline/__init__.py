@@ -22,6 +22,7 @@ from .curves.derivatives import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
 from .functions import evaluate, fit, fit_many  # noqa: E402
+from .hermite import HermiteSpline  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .segments import fit_segments  # noqa: E402
 from .spaces import (  # noqa: E402
@@ -61,6 +62,7 @@ __all__ = [
     "Euclidean",
     "Gradient",
     "Grassmannian",
+    "HermiteSpline",
     "HermitianPositiveDefinite",
     "Hyperbolic",
     "Orthogonal",

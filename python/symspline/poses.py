@@ -23,9 +23,9 @@ from numpy.typing import ArrayLike
 from ._core import ValidationError
 from .curves.curve import Curve
 from .pose_files import join, read_euroc, read_kitti, read_tum, split, write_euroc, write_kitti, write_tum
-from .rotations import angular_velocity, attitude, check_frame, turned
+from .rotations import Spline, angular_velocity, attitude, check_frame, turned
 from .spaces import Array, Euclidean, SpecialEuclidean
-from .spline import CubicSpline, evaluated
+from .spline import evaluated
 
 __all__ = [
     "Imu",
@@ -59,7 +59,7 @@ class Imu(NamedTuple):
 
 
 def imu(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     *,
@@ -94,7 +94,7 @@ def imu(
 
 
 def twist(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     frame: str = "body",
     *,
@@ -124,7 +124,7 @@ def twist(
 
 
 def linear_velocity(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     frame: str = "world",
     *,
@@ -147,7 +147,7 @@ def linear_velocity(
 
 
 def linear_acceleration(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     frame: str = "world",
     *,
@@ -174,21 +174,21 @@ def linear_acceleration(
     return a if frame == "world" else _in_body(spline, x, a, extrapolate, per_curve)
 
 
-def _in_body(spline: CubicSpline, x: ArrayLike, v: Array, extrapolate: Any, per_curve: bool) -> Array:
+def _in_body(spline: Spline, x: ArrayLike, v: Array, extrapolate: Any, per_curve: bool) -> Array:
     """Rᵀv for vectors in the world at times x."""
     where = spline._where(extrapolate)
     r = evaluated(attitude(spline), spline._clock, x, "point", where, per_curve, None)
     return turned(np.swapaxes(r, -1, -2), v)
 
 
-def _place(spline: CubicSpline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
+def _place(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     """The position at times x, its velocity, or the acceleration of the space's connection there."""
     curve, where = _position(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._clock, x, quantity, where, per_curve, None)
     return values[..., :3, 3] if curve.space == _SE3 else values
 
 
-def _position(spline: CubicSpline) -> Curve:
+def _position(spline: Spline) -> Curve:
     """The curve that has the positions: of poses, or the one on R³.
 
     Raises:

@@ -27,6 +27,7 @@ from .convert.quaternions import checked_order
 from .convert.reading import length, real_numbers, refuse
 from .curves.curve import Curve, Doubles
 from .curves.fit import curve_of
+from .hermite import HermiteSpline
 from .spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
 from .spline import CubicSpline, evaluated
 
@@ -44,7 +45,10 @@ __all__ = [
     "from_six_numbers",
     "quaternion",
     "rotation",
+    "velocities",
 ]
+
+Spline = CubicSpline | HermiteSpline
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _FRAMES = ("body", "world")
@@ -57,7 +61,7 @@ _PARALLEL = 1e-6
 
 
 def rotation(
-    spline: CubicSpline, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
+    spline: Spline, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
 ) -> Rotation:
     """The rotations at times x as SciPy's ``Rotation``.
 
@@ -82,7 +86,7 @@ def rotation(
 
 
 def angular_velocity(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     frame: str = "body",
     *,
@@ -106,7 +110,7 @@ def angular_velocity(
 
 
 def angular_acceleration(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     frame: str = "body",
     *,
@@ -124,7 +128,7 @@ def angular_acceleration(
 
 
 def quaternion(
-    spline: CubicSpline,
+    spline: Spline,
     x: ArrayLike,
     *,
     scalar_first: bool | None = None,
@@ -165,7 +169,30 @@ def quaternion(
     return q if first else np.roll(q, -1, axis=-1)
 
 
-def attitude(spline: CubicSpline) -> Curve:
+def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: str = "body") -> Array:
+    """The velocities R ω̂ of rotations that turn with angular velocities, as a `symspline.HermiteSpline` or an end takes
+    them; what `angular_velocity` makes of a curve, backwards.
+
+    Args:
+        rotations: points of ``so:3``, shape (..., 3, 3), or a SciPy ``Rotation``.
+        rates: angular velocities, radians per unit of time, shape (..., 3).
+        frame: ``"body"`` for rates as a gyroscope measures them, or ``"world"``.
+
+    Returns:
+        Tangent vectors at the rotations, shape (..., 3, 3).
+
+    >>> velocities(np.eye(3), [0, 0, 2])
+    array([[ 0., -2.,  0.],
+           [ 2.,  0.,  0.],
+           [ 0.,  0.,  0.]])
+    """
+    check_frame(frame)
+    r, hat = _given(rotations), _hat(real_numbers(rates, "rates", (3,))[0])
+    _SO3.check_point(r)
+    return (r @ hat if frame == "body" else hat @ r) + 0.0
+
+
+def attitude(spline: Spline) -> Curve:
     """The curve of the rotations alone, on SO(3).
 
     Raises:
@@ -193,14 +220,14 @@ def check_frame(frame: Any) -> None:
         raise ValidationError(f"frame must be 'body' or 'world', not {shown(frame)}")
 
 
-def _at(spline: CubicSpline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
+def _at(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._clock, x, quantity, where, per_curve, None)
     return values
 
 
 def _rate(
-    spline: CubicSpline, x: ArrayLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
+    spline: Spline, x: ArrayLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
 ) -> Array:
     """vee(RᵀD) for a velocity or an acceleration D of the rotations R, turned into the frame."""
     check_frame(frame)
@@ -325,11 +352,7 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
            [ 1.,  0.,  0.],
            [ 0.,  0.,  1.]])
     """
-    v, _ = real_numbers(vectors, "vectors", (3,))
-    hat = np.zeros((*v.shape[:-1], 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        hat[..., k, j], hat[..., j, k] = v[..., i], -v[..., i]
-    return _SO3.exp(np.eye(3), hat)
+    return _SO3.exp(np.eye(3), _hat(real_numbers(vectors, "vectors", (3,))[0]))
 
 
 def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None) -> Array:
@@ -393,6 +416,14 @@ def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
         second = second / sine[..., None]
     rows = np.stack([first, second, np.cross(first, second)], axis=-2)
     return _SO3.project(rows if order == "rows" else _swapped(rows))
+
+
+def _hat(v: Array) -> Array:
+    """The matrix of the cross product with a vector."""
+    hat = np.zeros((*v.shape[:-1], 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        hat[..., k, j], hat[..., j, k] = v[..., i], -v[..., i]
+    return hat
 
 
 def _given(rotations: Any) -> Array:

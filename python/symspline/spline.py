@@ -410,6 +410,17 @@ class CubicSpline:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
         archive.write(file, archive.arrays_of(self))
 
+    # What a plot says of it.
+    _kind = "C² spline"
+
+    @property
+    def _ends(self) -> str:
+        return f"{self._bc_type} ends" if isinstance(self._bc_type, str) else "own end conditions"
+
+    @property
+    def _unconverged(self) -> int:
+        return int(np.size(self._report.converged) - np.sum(self._report.converged))
+
     def plot(self, file: Any = None) -> Figure:
         """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.
 
