@@ -3,6 +3,7 @@
     spaces       operations, laws of geometry, names; points that are off a space
     fit          the spline is C² and obeys its laws; solvers
     spline       the interface of `CubicSpline`, promise by promise, with what it refuses
+    motion       what curves of rotations and poses are asked: rates, quaternions, recordings
     derivatives  with respect to the data; JAX
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo

@@ -16,13 +16,15 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
-from . import convert  # noqa: E402
+from . import convert, poses, rotations  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .curves.derivatives import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
 from .functions import evaluate, fit, fit_many  # noqa: E402
+from .hermite import HermiteSpline  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
+from .segments import fit_segments  # noqa: E402
 from .spaces import (  # noqa: E402
     ComplexGrassmannian,
     ComplexHyperbolic,
@@ -60,6 +62,7 @@ __all__ = [
     "Euclidean",
     "Gradient",
     "Grassmannian",
+    "HermiteSpline",
     "HermitianPositiveDefinite",
     "Hyperbolic",
     "Orthogonal",
@@ -78,9 +81,12 @@ __all__ = [
     "evaluate",
     "fit",
     "fit_many",
+    "fit_segments",
     "load",
     "load_many",
     "num_threads",
+    "poses",
+    "rotations",
     "save_many",
     "set_num_threads",
     "space",

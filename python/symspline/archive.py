@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .report import Report
 from .spaces import Product, Space
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def arrays_of(spline: CubicSpline) -> dict[str, Any]:
         "t_unit": unit,
         "bc_type": json.dumps(plain(spline.bc_type)),
         "extrapolate": json.dumps(spline.extrapolate),
-        "report": json.dumps([plain(vars(report)) for report in spline._reports]),
+        "report": json.dumps([_plain_report(report) for report in spline._reports]),
     }
     for i, part in enumerate(spline._curve.parts):
         suffix = f"_{i}" if isinstance(spline.space, Product) else ""
@@ -78,6 +79,11 @@ def _unit(dtype: np.dtype[Any]) -> str:
     """The unit of dates: "ns", or "10m" if they count in tens of minutes."""
     unit, step = np.datetime_data(dtype)
     return unit if step == 1 else f"{step}{unit}"
+
+
+def _plain_report(report: Report) -> dict[str, Any]:
+    """All but the longest gap, which the knots show."""
+    return {key: plain(value) for key, value in vars(report).items() if key != "max_gap"}
 
 
 def plain(value: Any) -> Any:

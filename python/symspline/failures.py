@@ -23,14 +23,14 @@ def fail(faults: list[Fault], on_failure: str, spline: Any) -> None:
     if len(faults) > 1:
         message += f" (and {len(faults) - 1} more curves failed)"
     if on_failure == "warn":
-        warnings.warn(message, ConvergenceWarning, stacklevel=_callers_level())
+        warnings.warn(message, ConvergenceWarning, stacklevel=callers_level())
         return
     error: Any = _FAULTS[kind](message)
     error.spline = spline
     raise error
 
 
-def _callers_level() -> int:
+def callers_level() -> int:
     """How many frames up the code is that called this package."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):

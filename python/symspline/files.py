@@ -15,7 +15,7 @@ from .archive import FORMAT, LISTS, MANY, VERSION, arrays_of, rich, write
 from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
 from .options import checked_policy
-from .report import Report
+from .report import Report, longest_gap
 from .spaces import Product, Space, factors_of
 from .spaces import space as space_named
 from .spline import CubicSpline
@@ -176,7 +176,7 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
         if nodes[-1] < 2:
             raise ValidationError("a curve needs at least two points")
         factor.check_point(points)
-        report = _report(json.loads(str(arrays["report"]))[i], nodes[:-1])
+        report = _report(json.loads(str(arrays["report"]))[i], times, nodes[:-1])
         _check_velocities(factor, points, velocities, report)
         found.append((points, velocities))
         reports.append(report)
@@ -196,7 +196,7 @@ def _check_velocities(space: Space, points: Any, velocities: Any, report: Report
         raise ValidationError("velocities are not tangent")
 
 
-def _report(plain: dict[str, Any], batch: tuple[int, ...]) -> Report:
+def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int, ...]) -> Report:
     numbers = dict.fromkeys(("residual", "max_step", "curvature", "invariant_radius", "rate"), "f")
     kinds = {"converged": "b", "iterations": "i"} | numbers
 
@@ -211,4 +211,5 @@ def _report(plain: dict[str, Any], batch: tuple[int, ...]) -> Report:
 
     if not isinstance(plain["method"], str):
         raise ValidationError(f"the report's method is {shown(plain['method'])}")
-    return Report(**{key: column(key, value) for key, value in plain.items()})
+    columns = {key: column(key, value) for key, value in plain.items()}
+    return Report(max_gap=longest_gap(times, batch), **columns)

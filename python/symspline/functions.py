@@ -17,6 +17,7 @@ from .curves.solve import Progress
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report
+from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline, evaluated
@@ -71,7 +72,7 @@ def evaluate(
     check_progress(progress)
     data = fitting.read(points, space)
     velocities = [
-        _velocities(factor, part.doubles, own)
+        velocities_of(factor, part.doubles, own)
         for factor, part, own in zip(factors_of(space), data, parts_of(u, space, "u"), strict=True)
     ]
     batch, nodes = data[0].batch, data[0].nodes
@@ -85,15 +86,17 @@ def evaluate(
     return evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
 
 
-def _velocities(space: Space, points: Array, u: Any) -> Array:
+def velocities_of(space: Space, points: Array, u: Any, name: str = "u") -> Array:
     """Velocities for points in doubles, not in a product, as an array that has flags of its own."""
-    doubles = space._doubles(u, "u")
+    doubles = space._doubles(u, name)
     velocities = read_only(space._numbers(doubles))
     if doubles.shape != points.shape:
-        raise ValidationError(f"u has shape {velocities.shape}, but points {space._numbers(points).shape}")
+        raise ValidationError(
+            f"{name} has shape {velocities.shape}, but points {space._numbers(points).shape}"
+        )
     if not np.isfinite(velocities).all():
         index = np.argwhere(~np.isfinite(velocities))[0].tolist()
-        raise ValidationError(f"u{index} is not finite")
+        raise ValidationError(f"{name}{index} is not finite")
     return velocities
 
 
@@ -157,4 +160,5 @@ def fit_many(
     ]
     if faults:
         fail(faults, on_failure, fitted)
+    warn_of_signs(space, points)
     return fitted

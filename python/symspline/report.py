@@ -34,6 +34,7 @@ class Report:
             the largest of all knots. At an end with not-a-knot it is the error of the velocity there, divided by
             1 + h₀/h₁.
         max_step: D of (21), the longest distance between neighbouring points.
+        max_gap: the longest time between neighbouring points, in seconds for dates.
         curvature: K of (22).
         invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so
             (Theorem 3.1). None where the theorem says nothing, which is normal for points far apart, for
@@ -47,6 +48,7 @@ class Report:
     iterations: int | NDArray[np.int64]
     residual: Number
     max_step: Number
+    max_gap: Number
     curvature: float
     invariant_radius: Number | None
     rate: Number
@@ -91,6 +93,7 @@ class Report:
             function(self.iterations),
             function(self.residual),
             function(self.max_step),
+            function(self.max_gap),
             self.curvature,
             radius,
             function(self.rate),
@@ -121,6 +124,7 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
         iterations=largest("iterations"),
         residual=largest("residual"),
         max_step=max_step,
+        max_gap=largest("max_gap"),
         curvature=curvature,
         # The theorem is about each factor by itself.
         invariant_radius=None,
@@ -128,10 +132,21 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
     )
 
 
+def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
+    """The longest time between neighbouring knots, shape of the batch axes."""
+    longest = np.diff(times).max(axis=-1)
+    return np.broadcast_to(longest, batch).copy() if batch else float(longest)
+
+
 def shaped(
-    columns: tuple[NDArray[Any], ...], batch: tuple[int, ...], curvature: float, method: str
+    columns: tuple[NDArray[Any], ...],
+    times: NDArray[np.float64],
+    batch: tuple[int, ...],
+    curvature: float,
+    method: str,
 ) -> Report:
-    """A report from the compiled core's columns; ``method`` is what was asked for."""
+    """A report from the compiled core's columns, of curves with these knots; ``method`` is what was asked for."""
+    gap = longest_gap(times, batch)
     if batch == ():
         converged, iterations, residual, max_step, rate, last, radius = [c.item() for c in columns]
         return Report(
@@ -140,6 +155,7 @@ def shaped(
             iterations,
             residual,
             max_step,
+            gap,
             curvature,
             None if math.isnan(radius) else radius,
             rate,
@@ -147,4 +163,4 @@ def shaped(
     converged, iterations, residual, max_step, rate, solvers, radius = [c.reshape(batch) for c in columns]
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
     known = None if np.isnan(radius).all() else radius
-    return Report(used, converged, iterations, residual, max_step, curvature, known, rate)
+    return Report(used, converged, iterations, residual, max_step, gap, curvature, known, rate)

@@ -22,6 +22,7 @@ from .curves.together import longest_step
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside
 from .report import Report, combined
+from .signs import warn_of_signs
 from .spaces import Array, Product, Space, parts_of
 from .spaces import space as space_named
 from .times import Clock, knots_of
@@ -107,6 +108,7 @@ class CubicSpline:
         self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
         if faults:
             fail(faults, on_failure, self)
+        warn_of_signs(space, [data])
 
     def _fill(
         self,
@@ -203,7 +205,7 @@ class CubicSpline:
         """
         if progress is not None:
             check_progress(progress)
-        quantity, where = quantity_of(nu), self._beyond(extrapolate)
+        quantity, where = quantity_of(nu), self._where(extrapolate)
         return timed(
             self._curve,
             self._clock,
@@ -254,12 +256,10 @@ class CubicSpline:
     def _at(
         self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        return evaluated(
-            self._curve, self._clock, x, quantity, self._beyond(extrapolate), per_curve, progress
-        )
+        return evaluated(self._curve, self._clock, x, quantity, self._where(extrapolate), per_curve, progress)
 
-    def _beyond(self, extrapolate: Any) -> str:
-        """What happens outside the knots, where the caller says so or as the spline was made."""
+    def _where(self, extrapolate: Any) -> str:
+        """What happens outside the knots, as the core calls it."""
         return self._outside if extrapolate is None else outside(checked_policy(extrapolate), self._bc_type)
 
     def length(self) -> Any:
@@ -495,6 +495,17 @@ class CubicSpline:
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
         archive.write(file, archive.arrays_of(self))
+
+    # What a plot says of it.
+    _kind = "C² spline"
+
+    @property
+    def _ends(self) -> str:
+        return f"{self._bc_type} ends" if isinstance(self._bc_type, str) else "own end conditions"
+
+    @property
+    def _unconverged(self) -> int:
+        return int(np.size(self._report.converged) - np.sum(self._report.converged))
 
     def plot(self, file: Any = None) -> Figure:
         """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.

@@ -245,3 +245,23 @@ assert settings() == before
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+
+
+@pytest.mark.parametrize("dates", [False, True])
+def test_gaps_far_longer_than_the_rest_are_marked(dates):
+    t = np.concatenate([np.arange(5.0), 18 + np.arange(5.0), [33.0]])
+    if dates:
+        t = np.datetime64("2024-05-01") + t.astype("m8[D]")
+    figure = rendered(spline_on("r:2", (11,), t=t).plot())
+    assert any(text.endswith("natural ends, 2 long gaps") for text in texts_of(figure))
+    for label in ("speed", "acceleration"):
+        (bands,) = [c for c in axes_named(figure, label).collections if c.get_label() == "gaps"]
+        edges = [sorted(set(path.vertices[:, 0])) for path in bands.get_paths()]
+        since = date2num(t[0]) if dates else 0.0
+        assert np.allclose(edges, since + np.array([[4, 18], [22, 33]]))
+
+
+def test_even_times_have_no_gaps():
+    figure = rendered(spline_on("r:2").plot())
+    assert not any("gap" in text for text in texts_of(figure))
+    assert not [c for axes in figure.axes for c in axes.collections if c.get_label() == "gaps"]

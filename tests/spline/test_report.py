@@ -24,6 +24,7 @@ FIELDS = [
     "iterations",
     "residual",
     "max_step",
+    "max_gap",
     "curvature",
     "invariant_radius",
     "rate",
@@ -65,6 +66,20 @@ def test_report_of_a_batch(space, batch):
         assert getattr(report, name).shape == batch
     assert report.converged.dtype == bool and report.iterations.dtype.kind == "i"
     assert isinstance(report.method, str) and report.curvature == space.curvature
+
+
+@every_common
+@every_batch
+def test_max_gap_is_the_longest_time_between_points(space, batch):
+    p = points_on(space, 6, batch)
+    assert np.array_equal(ss.CubicSpline(KNOTS, p, space).report.max_gap, np.full(batch, 1.5))
+    own = np.cumsum(np.random.default_rng(0).uniform(1, 2, (*batch, 6)), axis=-1)
+    report = ss.CubicSpline(own, p, space).report
+    assert np.array_equal(report.max_gap, np.diff(own).max(axis=-1))
+    dates = np.datetime64("2020-01-01") + (1e3 * KNOTS).astype("m8[ms]")
+    assert np.array_equal(ss.CubicSpline(dates, p, space).report.max_gap, np.full(batch, 1.5))
+    if batch == ():
+        assert [s.report.max_gap for s in ss.fit_many([(KNOTS, p), (None, p)], space)] == [1.5, 1.0]
 
 
 @every_space

@@ -30,7 +30,7 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
     >>> matrix_to_quaternion([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=True).round(8)
     array([0.70710678, 0.        , 0.        , 0.70710678])
     """
-    first = _order(scalar_first)
+    first = checked_order(scalar_first)
     r, tol = real_numbers(matrix, "matrix", (3, 3))
     _check_rotations(r, tol)
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(r, (-2, -1), (0, 1))
@@ -68,7 +68,7 @@ def quaternion_to_matrix(quaternion: ArrayLike, *, scalar_first: bool | None = N
            [ 0.96, -0.28,  0.  ],
            [ 0.  ,  0.  ,  1.  ]])
     """
-    first = _order(scalar_first)
+    first = checked_order(scalar_first)
     q, tol = real_numbers(quaternion, "quaternion", (4,))
     q = unit_vectors(q, tol, "quaternion", "a unit quaternion")
     w, x, y, z = np.moveaxis(q if first else np.roll(q, 1, axis=-1), -1, 0)
@@ -86,7 +86,8 @@ def _matrices(rows: list[list[Array]]) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _order(scalar_first: bool | None) -> bool:
+def checked_order(scalar_first: bool | None) -> bool:
+    """Whether the scalar part is the first of the four numbers, which must have been said."""
     if scalar_first is True or scalar_first is False:
         return scalar_first
     raise ValidationError(

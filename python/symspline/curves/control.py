@@ -14,7 +14,7 @@ from .fit import Points, validated
 
 def control_array(value: ArrayLike, space: Space, least: int) -> tuple[NDArray[np.float64], float]:
     """Control points as doubles, and how far off the space they may be."""
-    array = as_array(value, "control_points")
+    array = space._array(value, "control_points")
     doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
     if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
         shape = ", ".join(map(str, space.point_shape))

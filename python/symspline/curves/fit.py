@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from ..arrays import as_array
 from ..report import Report, shaped
 from ..spaces import Array, Product, Space, factors_of, parts_of, point_tol
 from .curve import Curve
@@ -63,7 +62,7 @@ def read(points: Any, space: Space) -> list[Points]:
 
 
 def _read(space: Space, points: Any) -> Points:
-    array = as_array(points, "points")
+    array = space._array(points, "points")
     if array.ndim == 0 or array.size == 0:
         raise ValidationError("no points given; a curve needs at least two")
     doubles = space._doubles(array, "points")
@@ -122,7 +121,7 @@ def fit(
     solved = _solve(space, tasks, options, progress)
     batch = points[0].batch
     reports = [
-        shaped(found.columns, batch, task.space.curvature, options.method)
+        shaped(found.columns, times, batch, task.space.curvature, options.method)
         for task, found in zip(tasks, solved, strict=True)
     ]
     return Fit(curve_of(space, times, [found[:2] for found in solved]), reports, _first(solved))
@@ -152,7 +151,9 @@ def fit_many(
     def one(i: int, start: int, stop: int) -> Fit:
         own = slice(start, stop)
         reports = [
-            shaped(tuple(c[i : i + 1] for c in found.columns), (), task.space.curvature, options.method)
+            shaped(
+                tuple(c[i : i + 1] for c in found.columns), times[i], (), task.space.curvature, options.method
+            )
             for task, found in zip(tasks, solved, strict=True)
         ]
         arrays = [(found.points[own], found.velocities[own]) for found in solved]

@@ -13,21 +13,34 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from ..curves.curve import Curve as Data
-from ..report import Report
 from ..spaces import Space
 from .style import DATES, INK, colors
 
 Doubles = NDArray[np.float64]
 
 _SECOND = np.timedelta64(1, "s")
+_LONG = 10
+"""So many times the median is a long gap between points."""
 MOST = 50
 """The largest number of curves of a batch that are drawn."""
 
 
 class Spline(Protocol):
-    """What is asked of a spline that is to be drawn: that is a `symspline.CubicSpline`."""
+    """What is asked of a spline that is to be drawn: a `symspline.CubicSpline` or `symspline.HermiteSpline`."""
 
     _curve: Data
+
+    @property
+    def _kind(self) -> str:
+        """What it is called."""
+
+    @property
+    def _ends(self) -> str:
+        """What its velocities follow from."""
+
+    @property
+    def _unconverged(self) -> int:
+        """How many curves have not converged."""
 
     @property
     def t(self) -> NDArray[Any]:
@@ -36,14 +49,6 @@ class Spline(Protocol):
     @property
     def space(self) -> Space:
         """The space."""
-
-    @property
-    def bc_type(self) -> Any:
-        """The end conditions."""
-
-    @property
-    def report(self) -> Report:
-        """How the fit went."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,14 @@ class Curve:
     def knots(self) -> slice:
         """Where the knots are among the times x."""
         return slice(None, None, (len(self.x) - 1) // (self.data.times.size - 1))
+
+    @cached_property
+    def gaps(self) -> Doubles:
+        """Starts and ends on a time axis of the gaps between points that are far longer than most, shape (m, 2)."""
+        knots = self.times[self.knots]
+        gaps = np.diff(knots)
+        long = gaps > _LONG * np.median(gaps)
+        return np.stack([knots[:-1][long], knots[1:][long]], axis=1)
 
     def picked(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Which of the times x to draw something large at: at most ``number`` knots, and times in between."""

@@ -40,8 +40,8 @@ def plot(spline: Spline, file: Any = None) -> Figure:
         widths, heights = [picture.width, _RATES_WIDTH], [_HEAD, picture.height]
     figure = CurveFigure(figsize=(sum(widths), sum(heights)), dpi=DPI, facecolor="white")
     grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
-    title = shorten(f"C² spline on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
-    heading(figure, title, words + _description(spline), 1 - 0.5 / sum(heights))
+    title = shorten(f"{spline._kind} on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
+    heading(figure, title, words + _description(spline) + _gaps(curves), 1 - 0.5 / sum(heights))
     picture.draw(figure.add_subfigure(grid[1, 0]), curves)
     _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
     if file is not None:
@@ -51,19 +51,20 @@ def plot(spline: Spline, file: Any = None) -> Figure:
 
 def _description(spline: Spline) -> str:
     """Points, end conditions and whether the solver got there."""
-    ends = f"{spline.bc_type} ends" if isinstance(spline.bc_type, str) else "own end conditions"
-    words = f"{spline.t.shape[-1]} points{' each' if spline._curve.batch else ''}, {ends}"
+    words = f"{spline.t.shape[-1]} points{' each' if spline._curve.batch else ''}, {spline._ends}"
     factors = len(factors_of(spline.space))
     if factors > _FACTORS:
         words += f", {_FACTORS} of {factors} factors"
-    if np.all(spline.report.converged):
+    if not spline._unconverged:
         return words
-    number = (
-        f"{np.size(spline.report.converged) - np.sum(spline.report.converged)} "
-        if spline._curve.batch
-        else ""
-    )
+    number = f"{spline._unconverged} " if spline._curve.batch else ""
     return f"{words}, {number}not converged"
+
+
+def _gaps(curves: Sequence[Curve]) -> str:
+    """How many bands mark missing points."""
+    number = sum(len(curve.gaps) for curve in curves)
+    return f", {number} long gap{'s' if number > 1 else ''}" if number else ""
 
 
 def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
 from .curves import Curve
-from .style import DATES, EDGE, inside, plain, size
+from .style import DATES, EDGE, GAP, inside, plain, size
 
 LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
 """Margins in inches: panels above one another have their time axes aligned."""
@@ -33,6 +34,7 @@ def timelines(
         axes.set_ylabel(label)
         _set_times(axes, curves, width - LEFT - RIGHT, lowest=i == len(labels) - 1)
         _mark_knots(axes, curves)
+        _mark_gaps(axes, curves)
         made.append(axes)
     return made
 
@@ -62,6 +64,15 @@ def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) 
     axes.set_xlabel(curves[0].time_name if lowest else "")
     axes.tick_params(labelbottom=lowest)
     axes.xaxis.offsetText.set_visible(lowest)
+
+
+def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
+    """Bands where points are missing: what is drawn there is a guess."""
+    gaps = np.unique(np.concatenate([curve.gaps for curve in curves]), axis=0)
+    if len(gaps):
+        spans = np.stack([gaps[:, 0], gaps[:, 1] - gaps[:, 0]], axis=1)
+        look: Any = {"transform": axes.get_xaxis_transform(), "facecolor": GAP, "linewidth": 0, "zorder": 0.5}
+        axes.broken_barh([tuple(span) for span in spans.tolist()], (0, 1), label="gaps", **look)
 
 
 def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:

@@ -181,7 +181,7 @@ class Space:
             ValidationError: no point is close to x (a zero vector, or not finite).
         """
         result = self._apply("project", x=x)
-        good = np.isfinite(result) & np.isfinite(cast(np.asarray(x), self.dtype))
+        good = np.isfinite(result) & np.isfinite(cast(self._array(x, "x"), self.dtype))
         if not good.all():
             bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
             raise ValidationError(
@@ -212,7 +212,7 @@ class Space:
         """Raise ValidationError unless p (or every one of an array of points) is a point."""
         array = self._doubles(p, "p")
         lead = self._lead(array)
-        self._handle.check_points(self._rows(array, lead), lead, point_tol(np.asarray(p).dtype))
+        self._handle.check_points(self._rows(array, lead), lead, point_tol(self._array(p, "p").dtype))
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
         """Raise ValidationError unless v is a tangent vector at the point p."""
@@ -223,7 +223,7 @@ class Space:
         except ValueError:
             raise ValidationError(f"p {np.shape(p)} and v {np.shape(v)} do not broadcast") from None
         defects = self._handle.tangent_defects(self._rows(points, lead), self._rows(vectors, lead))
-        tol = max(point_tol(np.asarray(p).dtype), point_tol(np.asarray(v).dtype))
+        tol = max(point_tol(self._array(value, name).dtype) for value, name in ((p, "p"), (v, "v")))
         bad = np.flatnonzero(~(defects <= tol))
         if bad.size:
             index = ",".join(map(str, np.unravel_index(bad[0], lead)))
@@ -269,13 +269,17 @@ class Space:
         """The inverse: numbers of points, in contiguous memory, as doubles."""
         return numbers.view(np.float64) if self._complex else numbers
 
+    def _array(self, value: Any, name: str) -> Array:
+        """Points as they are given, as an array: where objects that are no arrays are taken, too."""
+        return as_array(value, name)
+
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
 
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
         """The value as contiguous doubles whose last axes are those of a point; of complex numbers the
         last axis holds real and imaginary parts side by side."""
-        array = as_array(value, name)
+        array = self._array(value, name)
         if array.dtype.kind not in ("biufc" if self._complex else "biuf"):
             numbers = "numbers" if self._complex else "real numbers"
             complex_twin = COMPLEX_TWINS.get(self._name) if array.dtype.kind == "c" else None

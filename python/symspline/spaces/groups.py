@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,8 @@ from .base import Array, Space
 
 class SpecialOrthogonal(Space):
     """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
-    In SO(3) distance is the angle of the rotation from one to the other.
+    In SO(3) distance is the angle of the rotation from one to the other, and a SciPy ``Rotation`` of any shape,
+    or a list of them, is taken wherever points are.
 
     >>> import numpy as np, symspline as ss
     >>> quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
@@ -25,6 +27,19 @@ class SpecialOrthogonal(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+    def _array(self, value: Any, name: str) -> Array:
+        return super()._array(_matrices(value) if self.point_shape == (3, 3) else value, name)
+
+
+def _matrices(value: Any) -> Any:
+    """The matrices of a `scipy.spatial.transform.Rotation` or of a list of them, known by their method ``as_matrix``,
+    so that SciPy need not be there; any other value as it is."""
+    if hasattr(value, "as_matrix"):
+        return value.as_matrix()
+    if isinstance(value, (list, tuple)) and any(hasattr(part, "as_matrix") for part in value):
+        return [_matrices(part) for part in value]
+    return value
 
 
 class Orthogonal(Space):
@@ -97,6 +112,10 @@ class SpecialEuclidean(Space):
     Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of
     (ω, v) = g⁻¹u, the rates in the body, and serve for reporting only. For positions that move
     independently of the rotation use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
+
+    The covariant acceleration of a curve (``nu=2``) is that of the group's connection: its last column is ẍ − ω × ẋ
+    with the angular velocity ω in the world, and not ẍ. A body that turns with its path along a circle has 0 there.
+    `symspline.poses.linear_acceleration` gives ẍ.
 
     >>> import symspline as ss
     >>> ss.SpecialEuclidean(3).point_shape

@@ -1,0 +1,289 @@
+"""Files of poses: TUM, KITTI, EuRoC."""
+
+from __future__ import annotations
+
+import gzip
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import ValidationError
+from .archive import replacing
+from .arrays import as_array, brief
+from .convert import matrix_to_quaternion, quaternion_to_matrix
+from .convert.reading import length, off_one, refuse
+from .spaces import Array, SpecialEuclidean, SpecialOrthogonal
+
+Doubles = NDArray[np.float64]
+
+_SO3, _SE3 = SpecialOrthogonal(3), SpecialEuclidean(3)
+# Files have rounded numbers, some with three decimals.
+_ROUNDED = 5e-3
+_EUROC = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []"
+
+
+# ---- TUM: time x y z qx qy qz qw ----
+
+
+def read_tum(file: Any) -> tuple[Doubles, Array]:
+    """Poses from a file in the format of TUM's RGB-D benchmark: lines of ``time x y z qx qy qz qw``.
+
+    Source: Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM Systems (IROS 2012). Comments begin with #.
+
+    Args:
+        file: its name, or an open file of text; names that end with .gz are decompressed.
+
+    Returns:
+        Times in seconds, shape (n,), and poses, points of ``se:3``, shape (n, 4, 4). Rounded quaternions are made unit
+        vectors; times are as in the file, repeated ones too (see `symspline.fit_segments`).
+
+    Raises:
+        ValidationError: a line has not eight numbers, or the four of a quaternion are none.
+        OSError: the file cannot be read.
+    """
+    rows = _numbers(file, 8, "a TUM trajectory has lines of 'time x y z qx qy qz qw'")
+    return rows[:, 0].copy(), join(_rotations(rows[:, [7, 4, 5, 6]], file), rows[:, 1:4])
+
+
+def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
+    """Write poses as lines of ``time x y z qx qy qz qw``, so that `read_tum` gets every number back.
+
+    Args:
+        file: its name, or an open file of text.
+        t: times in seconds, shape (n,); dates become seconds since 1970.
+        poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
+
+    Raises:
+        ValidationError: the arrays are not what is described above.
+    """
+    r, x = split(_checked(poses))
+    seconds = _seconds(t, len(x))
+    _write(
+        file, np.concatenate([seconds[:, None], x, _quaternions(r, scalar_first=False)], axis=1).tolist(), " "
+    )
+
+
+# ---- KITTI: r11 r12 r13 x r21 ... ----
+
+
+def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
+    """Poses from a file in the format of KITTI's odometry benchmark: lines with the twelve numbers of [R | x].
+
+    Source: Geiger, Lenz & Urtasun, Are we ready for Autonomous Driving? (CVPR 2012).
+
+    Args:
+        file: its name, or an open file of text.
+        times: the file of their times, ``times.txt``, one a line; None for 0, 1, 2, …
+
+    Returns:
+        Times, shape (n,), and poses, points of ``se:3``, shape (n, 4, 4), with the nearest rotations to the rounded
+        ones.
+
+    Raises:
+        ValidationError: a line has not twelve numbers, nine of them are no rotation, or the times are not as many.
+        OSError: a file cannot be read.
+    """
+    rows = _numbers(file, 12, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
+    r = rows[:, :, :3]
+    off = off_one(r)
+    refuse(
+        ~((off <= _ROUNDED) & (np.linalg.det(r) > 0)),
+        f"{_name(file)}: pose ",
+        lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}",
+    )
+    t = np.arange(len(rows), dtype=float)
+    if times is not None:
+        t = _numbers(times, 1, "times of KITTI are one number a line")[:, 0].copy()
+    if len(t) != len(rows):
+        raise ValidationError(f"{_name(times)} has {len(t)} times, but {_name(file)} {len(rows)} poses")
+    return t, join(_SO3.project(r), rows[:, :, 3])
+
+
+def write_kitti(file: Any, poses: Any) -> None:
+    """Write poses as lines with the twelve numbers of [R | x]; KITTI has times in a file of their own.
+
+    Args:
+        file: its name, or an open file of text.
+        poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
+    """
+    _write(file, _checked(poses)[:, :3].reshape(-1, 12).tolist(), " ")
+
+
+# ---- EuRoC: nanoseconds, x, y, z, qw, qx, qy, qz ----
+
+
+def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
+    """Poses from a file in the format of the EuRoC data sets: ``nanoseconds,x,y,z,qw,qx,qy,qz``, and more columns that
+    are not read.
+
+    Source: Burri et al., The EuRoC micro aerial vehicle datasets (IJRR 2016).
+
+    Args:
+        file: its name, or an open file of text.
+
+    Returns:
+        Times as ``datetime64[ns]``, exact, with which rates are per second, shape (n,), and poses, points of ``se:3``,
+        shape (n, 4, 4).
+
+    Raises:
+        ValidationError: a line has fewer numbers, a time is no whole number, or the four of a quaternion are none.
+        OSError: the file cannot be read.
+    """
+    form = "EuRoC poses are lines of 'nanoseconds,x,y,z,qw,qx,qy,qz'"
+    lines = _lines(file)
+    # Doubles do not hold nanoseconds since 1970.
+    ns = _parsed(lines, file, form, delimiter=",", usecols=0, dtype=np.int64, ndmin=1)
+    rows = _parsed(lines, file, form, delimiter=",", usecols=range(1, 8), ndmin=2)
+    _check_rows(rows, file, form)
+    return ns.astype("datetime64[ns]"), join(_rotations(rows[:, 3:], file), rows[:, :3])
+
+
+def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
+    """Write poses as lines of ``nanoseconds,x,y,z,qw,qx,qy,qz``.
+
+    Args:
+        file: its name, or an open file of text.
+        t: ``datetime64``, or seconds since 1970 as numbers, which are rounded to nanoseconds; shape (n,).
+        poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
+    """
+    r, x = split(_checked(poses))
+    times = as_array(t, "t")
+    if times.dtype.kind != "M":
+        times = np.rint(1e9 * _seconds(times, len(x))).astype(np.int64)
+    ns = times.astype("datetime64[ns]").astype(np.int64).tolist()
+    if np.shape(ns) != (len(x),):
+        raise ValidationError(f"t has shape {times.shape}, but there are {len(x)} poses")
+    values = np.concatenate([x, _quaternions(r, scalar_first=True)], axis=1).tolist()
+    _write(file, ([time, *row] for time, row in zip(ns, values, strict=True)), ",", _EUROC)
+
+
+# ---- poses of two parts ----
+
+
+def join(rotations: Any, positions: ArrayLike) -> Array:
+    """Poses [[R, x], [0, 1]] of rotations and positions.
+
+    Args:
+        rotations: points of ``so:3``, shape (..., 3, 3), or a SciPy ``Rotation``.
+        positions: shape (..., 3).
+
+    Returns:
+        Points of ``se:3``, shape (..., 4, 4).
+    """
+    r, x = _SO3._array(rotations, "rotations"), as_array(positions, "positions")
+    if r.shape[-2:] != (3, 3) or x.shape != (*r.shape[:-2], 3):
+        raise ValidationError(
+            f"rotations of shape (..., 3, 3) and positions of shape (..., 3) are needed, not {r.shape} and {x.shape}"
+        )
+    poses = np.zeros((*x.shape[:-1], 4, 4))
+    poses[..., :3, :3], poses[..., :3, 3], poses[..., 3, 3] = r, x, 1.0
+    return poses
+
+
+def split(poses: ArrayLike) -> tuple[Array, Array]:
+    """Rotations and positions of poses: points of ``so:3 x r:3``.
+
+    Args:
+        poses: points of ``se:3``, shape (..., 4, 4).
+
+    Returns:
+        Shapes (..., 3, 3) and (..., 3).
+    """
+    g = as_array(poses, "poses")
+    if g.shape[-2:] != (4, 4):
+        raise ValidationError(f"poses must have shape (..., 4, 4), not {g.shape}")
+    return g[..., :3, :3].copy(), g[..., :3, 3].copy()
+
+
+def _checked(poses: Any) -> Array:
+    """Poses to write, shape (n, 4, 4)."""
+    g = join(*poses) if isinstance(poses, tuple) and len(poses) == 2 else as_array(poses, "poses")
+    _SE3.check_point(g)
+    if g.ndim != 3:
+        raise ValidationError(f"a file holds poses of shape (n, 4, 4), not {g.shape}")
+    return g
+
+
+def _quaternions(r: Array, scalar_first: bool) -> Array:
+    return matrix_to_quaternion(r, scalar_first=scalar_first)
+
+
+def _seconds(t: ArrayLike, count: int) -> Doubles:
+    times = as_array(t, "t")
+    if times.shape != (count,):
+        raise ValidationError(f"t has shape {times.shape}, but there are {count} poses")
+    if times.dtype.kind == "M":
+        return (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+    if times.dtype.kind not in "iuf":
+        raise ValidationError(f"t must be numbers or datetime64, not {times.dtype}")
+    return times.astype(np.float64)
+
+
+# ---- lines ----
+
+
+def _rotations(q: Doubles, file: Any) -> Array:
+    """The rotations of quaternions, scalar first, as they stand rounded in a file."""
+    sizes = length(q)
+    refuse(
+        ~(np.abs(sizes - 1) <= _ROUNDED),
+        f"{_name(file)}: quaternion ",
+        lambda i: f"has length {sizes[i]:.6g}, not 1: are the columns in another order?",
+    )
+    return quaternion_to_matrix(q / sizes[:, None], scalar_first=True)
+
+
+def _numbers(file: Any, columns: int, form: str) -> Doubles:
+    rows: Doubles = _parsed(_lines(file), file, form, ndmin=2)
+    if rows.size and rows.shape[1] != columns:
+        raise ValidationError(f"{_name(file)}: {form}, not of {rows.shape[1]} numbers")
+    _check_rows(rows, file, form)
+    return rows
+
+
+def _check_rows(rows: Doubles, file: Any, form: str) -> None:
+    if not rows.size:
+        raise ValidationError(f"{_name(file)} has no numbers; {form}")
+    bad = np.asarray(~np.isfinite(rows).all(axis=1))
+    refuse(bad, f"{_name(file)}: row ", lambda i: f"is not finite: {rows[i]}")
+
+
+def _lines(file: Any) -> list[str]:
+    """The lines that are no comments."""
+    if hasattr(file, "read"):
+        text = file.read()
+    else:
+        opener: Any = gzip.open if str(file).endswith(".gz") else open
+        with opener(file, "rt", encoding="utf-8") as opened:
+            text = opened.read()
+    lines = (line.strip() for line in text.splitlines())
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+def _parsed(lines: list[str], file: Any, form: str, **options: Any) -> Any:
+    if not lines:
+        return np.zeros((0, 0))
+    try:
+        return np.loadtxt(lines, **options)
+    except ValueError as error:
+        raise ValidationError(f"{_name(file)}: {form}; {brief(error)}") from None
+
+
+def _name(file: Any) -> str:
+    name = getattr(file, "name", file if isinstance(file, (str, os.PathLike)) else "the file")
+    return str(name)
+
+
+def _write(file: Any, rows: Iterable[list[Any]], separator: str, head: str = "") -> None:
+    # The shortest text that reads back as the same double.
+    text = "".join(f"{separator.join(map(repr, row))}\n" for row in rows)
+    text = f"{head}\n{text}" if head else text
+    if hasattr(file, "write"):
+        file.write(text)
+        return
+    with replacing(Path(file)) as temporary:
+        temporary.write_text(text, encoding="utf-8")

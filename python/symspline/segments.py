@@ -1,0 +1,162 @@
+"""Recordings with pauses: one curve for each stretch between them."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import ValidationError
+from .arrays import shown, whole_number
+from .curves.fit import read
+from .functions import fit_many
+from .spaces import Array, Product, Space, factors_of, parts_of
+from .spaces import space as space_named
+from .spline import CubicSpline
+from .times import clock_of
+
+_DUPLICATES = ("raise", "first", "mean")
+# The mean of points near each other is found by a few steps, each of which leaves the third power of their distance.
+_STEPS = 50
+
+
+def fit_segments(
+    t: ArrayLike,
+    points: Any,
+    space: Space | str,
+    *,
+    max_gap: Any,
+    min_points: int = 2,
+    duplicates: str = "raise",
+    **options: Any,
+) -> list[CubicSpline]:
+    """Fit a recording that pauses: cut where neighbouring times are more than ``max_gap`` apart, one curve a piece.
+
+    A curve drawn across a pause swings out far and looks plausible. What lies between the curves is not known.
+
+    Args:
+        t: times of the points, not falling, shape (n,): numbers or ``datetime64``.
+        points: shape (n, *space.point_shape), for a `Product` a tuple of arrays; a SciPy ``Rotation`` on ``so:3``.
+        space: a space or its name.
+        max_gap: the longest time between neighbours of one curve, in the unit of t, seconds for dates; or a
+            ``timedelta64``.
+        min_points: pieces of fewer points are left out; 2 or more.
+        duplicates: what happens where a time comes several times: ``"raise"`` an error, keep the ``"first"`` point, or
+            take their ``"mean"``, the point from which the directions to them add up to zero.
+        options: those of `CubicSpline`, for all pieces alike.
+
+    Returns:
+        The curves in the order of time: ``curve.t[0]`` and ``curve.t[-1]`` are where each begins and ends.
+
+    Raises:
+        ValidationError: the input is not what is described above, times fall or repeat, or no piece has ``min_points``.
+        CutLocusError, ConvergenceError: as for `fit_many`; the exception's ``.spline`` is the list of all curves.
+
+    >>> import symspline as ss
+    >>> t = [0, 1, 1, 2, 14, 15]
+    >>> here, there = ss.fit_segments(t, [[0], [1], [2], [4], [0], [3]], "r:1", max_gap=5, duplicates="mean")
+    >>> here.t, here.points[:, 0], there.t
+    (array([0., 1., 2.]), array([0. , 1.5, 4. ]), array([14., 15.]))
+    """
+    space = space_named(space)
+    least = whole_number(min_points, "min_points", 2)
+    if not isinstance(duplicates, str) or duplicates not in _DUPLICATES:
+        raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {shown(duplicates)}")
+    data = read(points, space)
+    if data[0].batch:
+        raise ValidationError(f"points has batch axes {data[0].batch}; a recording is a single curve")
+    clock, times = clock_of(t)
+    if times.shape != (data[0].nodes,):
+        raise ValidationError(f"t has shape {times.shape}, but there are {data[0].nodes} points")
+    seconds = clock.knots(times)
+    _check_order(times, seconds, duplicates)
+    arrays = [
+        factor._array(part, "points")
+        for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True)
+    ]
+    starts = np.flatnonzero(np.diff(seconds, prepend=-np.inf) > 0)
+    if len(starts) < len(seconds):
+        arrays = [_at_once(f, a, starts, duplicates) for f, a in zip(factors_of(space), arrays, strict=True)]
+        times, seconds = times[starts], seconds[starts]
+    gap = _seconds(max_gap, clock.dates)
+    cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
+    pieces = [slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True) if b - a >= least]
+    if not pieces:
+        raise ValidationError(
+            f"no piece has {least} points: {len(cuts)} of {len(seconds) - 1} steps are longer than max_gap={max_gap}, "
+            f"the median step is {np.median(np.diff(seconds)) if len(seconds) > 1 else 0:.3g}"
+        )
+    curves = [
+        (times[own], tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own])
+        for own in pieces
+    ]
+    return fit_many(curves, space, **options)
+
+
+def _seconds(max_gap: Any, dates: bool) -> float:
+    """The longest gap as the core counts times."""
+    if dates and isinstance(max_gap, (np.timedelta64, timedelta)):
+        max_gap = np.timedelta64(max_gap) / np.timedelta64(1, "s")
+    if isinstance(max_gap, (bool, np.timedelta64)) or not isinstance(
+        max_gap, (int, float, np.integer, np.floating)
+    ):
+        kind = "a number of seconds or a timedelta64" if dates else "a number"
+        raise ValidationError(f"max_gap must be {kind}, not {shown(max_gap)}")
+    if not max_gap > 0:
+        raise ValidationError(f"max_gap must be more than 0, not {max_gap}")
+    return float(max_gap)
+
+
+def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(seconds))
+    if len(bad):
+        raise ValidationError(f"t[{bad[0]}] = {times[bad[0]]} is not finite")
+    steps = np.diff(seconds)
+    falls = np.flatnonzero(steps < 0)
+    if len(falls):
+        i = falls[0]
+        raise ValidationError(
+            f"t[{i + 1}] = {times[i + 1]} is before t[{i}] = {times[i]}; sort times and points, for instance by "
+            "numpy.argsort(t, kind='stable')"
+        )
+    same = np.flatnonzero(steps == 0)
+    if len(same) and duplicates == "raise":
+        i = same[0]
+        more = f" (and {len(same) - 1} more such pairs)" if len(same) > 1 else ""
+        raise ValidationError(
+            f"t[{i}] and t[{i + 1}] are both {times[i]}{more}; duplicates='first' keeps the first point of each time, "
+            "duplicates='mean' takes their mean"
+        )
+
+
+def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: str) -> Array:
+    """One point for every time, of those from its start to the next; single points stay as they are."""
+    kept = points[starts]
+    if duplicates == "first":
+        return kept
+    counts = np.diff(np.append(starts, len(points)))
+    several = np.flatnonzero(counts > 1)
+    rows = np.repeat(counts > 1, counts)
+    group = np.repeat(np.arange(len(several)), counts[several])
+    kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
+    kept[several] = _means(space, space.project(points[rows]), group)
+    return kept
+
+
+def _means(space: Space, points: Array, group: NDArray[np.intp]) -> Array:
+    """The mean of every group of points that follow each other: where the logarithms add up to zero.
+
+    Source: Karcher, Riemannian center of mass and mollifier smoothing (1977).
+    """
+    starts = np.flatnonzero(np.diff(group, prepend=-1))
+    counts = np.diff(np.append(starts, len(points))).reshape(-1, *[1] * len(space.point_shape))
+    means: Array = points[starts]
+    floor = 8 * np.finfo(np.float64).eps * space.rounding(means)
+    for _ in range(_STEPS):
+        step = np.add.reduceat(space.log(means[group], points), starts, axis=0) / counts
+        means = space.exp(means, step)
+        if (space.norm(means, step) <= floor).all():
+            break
+    return means

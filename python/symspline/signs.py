@@ -1,0 +1,54 @@
+"""Unit quaternions of opposite sign: one rotation, but two points of S³."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .curves.fit import Points
+from .failures import callers_level
+from .spaces import Array, Space, Sphere, factors_of
+
+_S3 = Sphere(3)
+
+
+def warn_of_signs(space: Space, curves: Sequence[list[Points]]) -> None:
+    """Warn once if neighbours on S³ are more than a quarter turn apart: as quaternions they are closer with the other
+    sign, and the curve between them turns the long way round.
+
+    Args:
+        curves: the points of each curve in every factor; of a batch they are one.
+    """
+    if _S3 not in factors_of(space):
+        return
+    found = [
+        (number, index, part.doubles)
+        for number, parts in enumerate(curves)
+        for factor, part in zip(factors_of(space), parts, strict=True)
+        if factor == _S3
+        for index in _opposite(part.doubles)
+    ]
+    if not found:
+        return
+    number, index, points = found[0]
+    *batch, i = index.tolist()
+    curve = [number] * (len(curves) > 1) + batch
+    of = f" of curve {','.join(map(str, curve))}" if curve else ""
+    more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
+    product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
+    warnings.warn(
+        f"neighbours of opposite sign on sphere:3: points {i} and {i + 1}{of} have inner product {product:.3g}{more}. "
+        "As quaternions q and -q are one rotation, but here the curve turns the long way round. Curves of rotations "
+        "are on so:3 (symspline.rotations.from_quaternions makes its points) or on rp:3, where signs do not count. If "
+        "these are no rotations: warnings.filterwarnings('ignore', message='neighbours of opposite sign')",
+        UserWarning,
+        stacklevel=callers_level(),
+    )
+
+
+def _opposite(points: Array) -> NDArray[np.intp]:
+    """Indices of points with a negative product with the next one."""
+    return np.argwhere(np.einsum("...i,...i", points[..., :-1, :], points[..., 1:, :]) < 0)

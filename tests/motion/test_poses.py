@@ -1,0 +1,265 @@
+"""Velocities and accelerations of poses beside closed forms and finite differences; files of poses."""
+
+import gzip
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from curves import points_on
+from scipy.spatial.transform import Rotation
+
+import symspline as ss
+from symspline import poses, rotations
+
+KNOTS = np.array([0.0, 0.7, 1.5, 3.0, 4.0, 4.5])
+INNER = (KNOTS[:-1, None] + np.diff(KNOTS)[:, None] * [0.1, 0.6]).ravel()
+RECORDING = Path(__file__).parents[2] / "docs" / "comparisons" / "data" / "freiburg1_xyz-groundtruth.txt.gz"
+
+every_space = pytest.mark.parametrize("name", ["se:3", "so:3 x r:3", "r:3 x sphere:2 x so:3"])
+
+
+def curve(name, batch=()):
+    return ss.CubicSpline(KNOTS, points_on(ss.space(name), 6, batch, step=0.7), name)
+
+
+def pose(spline, x, nu=0):
+    """Rotation and position, or their derivatives, as 4 × 4 matrices."""
+    value = spline(x, nu=nu)
+    if not isinstance(value, tuple):
+        return value
+    r, p = (
+        next(v for v, f in zip(value, spline.space.factors, strict=True) if str(f) == n)
+        for n in ("so:3", "euclidean:3")
+    )
+    return poses.join(r, p)
+
+
+# ---- kinematics ----
+
+
+@every_space
+@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
+def test_velocity_and_acceleration_are_derivatives(name, batch):
+    spline, h = curve(name, batch), 1e-4
+    before, here, after = (pose(spline, INNER + k * h)[..., :3, 3] for k in (-1, 0, 1))
+    r = pose(spline, INNER)[..., :3, :3]
+    v, a = poses.linear_velocity(spline, INNER), poses.linear_acceleration(spline, INNER)
+    assert v.shape == a.shape == (*batch, len(INNER), 3)
+    assert np.abs(v - (after - before) / (2 * h)).max() < 3e-7
+    assert np.abs(a - (after - 2 * here + before) / h**2).max() < 3e-6
+    for world, call in ((v, poses.linear_velocity), (a, poses.linear_acceleration)):
+        assert np.abs(call(spline, INNER, "body") - np.einsum("...ji,...j", r, world)).max() < 1e-13
+
+
+@every_space
+def test_acceleration_is_continuous_at_knots(name):
+    spline, h = curve(name), 1e-9
+    before, after = (poses.linear_acceleration(spline, KNOTS[1:-1] + k * h) for k in (-1, 1))
+    assert np.abs(before - after).max() < 1e-6
+
+
+@every_space
+def test_twist_is_that_of_the_matrices(name):
+    spline = curve(name)
+    g, inverse = pose(spline, INNER), np.linalg.inv(pose(spline, INNER))
+    change = np.zeros_like(g)
+    h = 1e-5
+    change = (pose(spline, INNER + h) - pose(spline, INNER - h)) / (2 * h)
+    for frame, hat in (("body", inverse @ change), ("world", change @ inverse)):
+        expected = np.stack([hat[:, 2, 1], hat[:, 0, 2], hat[:, 1, 0], *hat[:, :3, 3].T], axis=-1)
+        assert np.abs(poses.twist(spline, INNER, frame) - expected).max() < 1e-8
+    assert np.array_equal(poses.twist(spline, INNER)[:, :3], rotations.angular_velocity(spline, INNER))
+
+
+def circle(n=40):
+    """A body that drives round a circle of radius 2 at 0.5 rad/s, and looks ahead."""
+    t = np.linspace(0, 10, n)
+    angle = 0.5 * t
+    r = Rotation.from_rotvec(angle[:, None] * [0, 0, 1]).as_matrix()
+    return t, poses.join(r, 2 * np.stack([np.sin(angle), 1 - np.cos(angle), 0 * t], axis=-1))
+
+
+def test_a_drive_round_a_circle():
+    # In SE(3) it is a geodesic, so that nu=2 is zero, and ẍ is not.
+    spline = ss.CubicSpline(*circle(), "se:3")
+    x = np.linspace(0, 10, 101)
+    assert np.abs(spline(x, nu=2)).max() < 1e-12
+    assert np.abs(poses.linear_acceleration(spline, x, "body") - [0, 0.5, 0]).max() < 1e-12
+    assert np.abs(poses.twist(spline, x) - [0, 0, 0.5, 1, 0, 0]).max() < 1e-13
+    # The axis of the screw is at (0, 2, 0): the point of the body at the origin moves with −ω × (0, 2, 0).
+    assert np.abs(poses.twist(spline, x, "world") - [0, 0, 0.5, 1, 0, 0]).max() < 1e-13
+    gyro, force = poses.imu(spline, x)
+    assert np.abs(gyro - [0, 0, 0.5]).max() < 1e-13
+    assert np.abs(force - [0, 0.5, 9.81]).max() < 1e-12
+
+
+def test_a_sensor_that_falls_measures_nothing():
+    t = np.linspace(0, 1, 5)
+    r = Rotation.from_rotvec(np.outer(t, [0.3, -0.2, 0.5])).as_matrix()
+    fall = np.array([1.0, 2, 3]) * t[:, None] + 0.5 * np.array([1.0, 0, -9]) * t[:, None] ** 2
+    ends = ((2, (np.zeros((3, 3)), [1.0, 0, -9])),) * 2
+    spline = ss.CubicSpline(t, (r, fall), "so:3 x r:3", bc_type=ends)
+    x = np.linspace(0, 1, 33)
+    assert np.abs(poses.imu(spline, x, gravity=(1, 0, -9)).specific_force).max() < 1e-12
+
+
+@every_space
+def test_calls_are_those_of_a_spline(name):
+    spline = curve(name, (2,))
+    for call in (poses.twist, poses.linear_acceleration, lambda *a, **k: poses.imu(*a, **k).specific_force):
+        both = call(spline, INNER)
+        assert np.array_equal(call(spline, np.stack([INNER, INNER]), per_curve=True), both)
+        assert np.array_equal(call(spline[1], INNER), both[1])
+        with pytest.raises(ss.ValidationError, match="outside"):
+            call(spline, 5.0)
+        assert np.isfinite(call(spline, 5.0, extrapolate=True)).all()
+
+
+@pytest.mark.parametrize("name", ["so:3", "r:3", "so:3 x r:2", "so:3 x r:3 x r:3", "se:3 x r:3"])
+def test_spaces_without_poses_are_refused(name):
+    spline = ss.CubicSpline(KNOTS, points_on(ss.space(name)), name)
+    for call in (poses.twist, poses.linear_velocity, poses.linear_acceleration, poses.imu):
+        with pytest.raises(ss.ValidationError, match="so:3"):
+            call(spline, 0.5)
+
+
+@pytest.mark.parametrize("gravity", [9.81, (0, 0), (0, 0, np.nan), ("a", "b", "c")])
+def test_gravity_is_a_vector(gravity):
+    with pytest.raises(ss.ValidationError, match="gravity must be three numbers"):
+        poses.imu(curve("se:3"), 0.5, gravity=gravity)
+
+
+def test_frames_have_two_names():
+    for call in (poses.twist, poses.linear_velocity, poses.linear_acceleration):
+        with pytest.raises(ss.ValidationError, match="'body' or 'world'"):
+            call(curve("se:3"), 0.5, "camera")
+
+
+def test_lists_of_matrices_are_points():
+    # As evo keeps them, in poses_se3.
+    t, given = circle()
+    assert ss.CubicSpline(t, list(given), "se:3") == ss.CubicSpline(t, given, "se:3")
+
+
+# ---- files ----
+
+
+def recording(n=50, seed=4):
+    rng = np.random.default_rng(seed)
+    t = 1305031102.1758 + np.cumsum(rng.uniform(0.005, 0.02, n))
+    return t, poses.join(Rotation.random(n, rng=rng), 10 * rng.standard_normal((n, 3)))
+
+
+def absolute_pose_error(a, b):
+    """As evo_ape with pose_relation full: |A⁻¹B − 1| of every pose."""
+    return np.linalg.norm(np.linalg.inv(a) @ b - np.eye(4), axis=(-2, -1))
+
+
+@pytest.mark.parametrize("form", ["path", "text", "open"])
+def test_a_tum_file_goes_in_and_comes_out(tmp_path, form):
+    t, given = recording()
+    file = {"path": tmp_path / "a.txt", "text": str(tmp_path / "a.txt"), "open": io.StringIO()}[form]
+    poses.write_tum(file, t, given)
+    if form == "open":
+        file.seek(0)
+    times, found = poses.read_tum(file)
+    assert np.array_equal(times, t)
+    assert np.array_equal(found[:, :3, 3], given[:, :3, 3])
+    assert absolute_pose_error(given, found).max() < 1e-14
+
+
+def test_a_tum_file_as_numpy_and_scipy_read_it(tmp_path):
+    t, given = recording()
+    poses.write_tum(tmp_path / "a.txt", t, poses.split(given))
+    table = np.loadtxt(tmp_path / "a.txt")
+    assert np.array_equal(table[:, :4], np.column_stack([t, given[:, :3, 3]]))
+    assert np.abs(Rotation.from_quat(table[:, 4:]).as_matrix() - given[:, :3, :3]).max() < 2e-15
+
+
+def test_a_recording_of_the_benchmark():
+    t, found = poses.read_tum(RECORDING)
+    table = np.loadtxt(gzip.decompress(RECORDING.read_bytes()).decode().splitlines())
+    assert found.shape == (3000, 4, 4) and np.array_equal(t, table[:, 0])
+    assert np.abs(Rotation.from_quat(table[:, 4:]).as_matrix() - found[:, :3, :3]).max() < 2e-15
+    ss.SpecialEuclidean(3).check_point(found)
+
+
+def test_kitti_files(tmp_path):
+    t, given = recording()
+    poses.write_kitti(tmp_path / "a.txt", given)
+    (tmp_path / "times.txt").write_text("".join(f"{x!r}\n" for x in t.tolist()))
+    times, found = poses.read_kitti(tmp_path / "a.txt", tmp_path / "times.txt")
+    assert np.array_equal(times, t) and absolute_pose_error(given, found).max() < 1e-14
+    assert np.array_equal(poses.read_kitti(tmp_path / "a.txt")[0], np.arange(50))
+    # As in the benchmark's files, with seven digits.
+    np.savetxt(tmp_path / "b.txt", given[:, :3].reshape(-1, 12), fmt="%.6e")
+    _, rounded = poses.read_kitti(tmp_path / "b.txt")
+    ss.SpecialEuclidean(3).check_point(rounded)
+    assert absolute_pose_error(given, rounded).max() < 1e-4
+
+
+def test_euroc_files(tmp_path):
+    _, given = recording()
+    t = np.datetime64(1403636579758555392, "ns") + np.arange(50) * np.timedelta64(5_000_001, "ns")
+    poses.write_euroc(tmp_path / "a.csv", t, given)
+    times, found = poses.read_euroc(tmp_path / "a.csv")
+    assert np.array_equal(times, t) and times.dtype == "M8[ns]"
+    assert absolute_pose_error(given, found).max() < 1e-14
+    # The data sets' ground truth has velocities and biases besides.
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    wide = "\n".join([lines[0] + ", v", *(line + ",0.1,0.2,0.3" for line in lines[1:])])
+    assert np.array_equal(poses.read_euroc(io.StringIO(wide))[1], found)
+    seconds = (t - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+    poses.write_euroc(tmp_path / "b.csv", seconds, given)
+    assert np.abs(poses.read_euroc(tmp_path / "b.csv")[0] - t).max() < np.timedelta64(300, "ns")
+
+
+def test_dates_in_tum_files():
+    file = io.StringIO()
+    poses.write_tum(
+        file, np.array(["1970-01-01T00:00:01.5", "1970-01-02"], "M8[ms]"), np.stack([np.eye(4)] * 2)
+    )
+    assert file.getvalue().splitlines()[1].startswith("86400.0 0.0 0.0 0.0 0.0 0.0 0.0 1.0")
+
+
+@pytest.mark.parametrize(
+    ("read", "text", "match"),
+    [
+        (poses.read_tum, "", "no numbers"),
+        (poses.read_tum, "# nothing\n", "no numbers"),
+        (poses.read_tum, "0 0 0 0 0 0 1\n", "x y z qx qy qz qw', not of 7 numbers"),
+        (poses.read_tum, "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n", "number of columns changed"),
+        (poses.read_tum, "0 0 0 0 0 0 0 one\n", "could not convert"),
+        (poses.read_tum, "0 0 0 0 0 0 0 1\n1 0 0 nan 0 0 0 1\n", r"row \[1\] is not finite"),
+        (poses.read_tum, "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1 1\n", r"quaternion \[1\] has length 1.41421, not 1"),
+        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1\n", "not of 11 numbers"),
+        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 2 0\n", r"pose \[0\] has no rotation"),
+        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 -1 0\n", r"pose \[0\] has no rotation"),
+        (poses.read_euroc, "1.5,0,0,0,1,0,0,0\n", "nanoseconds"),
+        (poses.read_euroc, "1,0,0,0,1\n", "nanoseconds"),
+    ],
+)
+def test_bad_files(read, text, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        read(io.StringIO(text))
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (
+            lambda f: poses.write_tum(f, [0.0], np.stack([np.eye(4)] * 2)),
+            r"t has shape \(1,\), but there are 2 poses",
+        ),
+        (lambda f: poses.write_tum(f, ["a", "b"], np.stack([np.eye(4)] * 2)), "numbers or datetime64"),
+        (lambda f: poses.write_tum(f, [0.0], 2 * np.eye(4)[None]), "off the space"),
+        (lambda f: poses.write_kitti(f, np.eye(4)), r"\(n, 4, 4\)"),
+        (lambda f: poses.join(np.eye(3), np.zeros((2, 3))), r"\(3, 3\) and \(2, 3\)"),
+        (lambda f: poses.split(np.eye(3)), r"\(\.\.\., 4, 4\)"),
+    ],
+)
+def test_bad_poses(tmp_path, call, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        call(tmp_path / "a.txt")
+    assert not list(tmp_path.iterdir())

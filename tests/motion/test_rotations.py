@@ -1,0 +1,263 @@
+"""Rotations in the words of those who turn things, beside SciPy and finite differences."""
+
+import numpy as np
+import pytest
+from curves import points_on
+from scipy.spatial.transform import Rotation, RotationSpline
+
+import symspline as ss
+from symspline import rotations
+
+SO3, SE3, BOTH = ss.SpecialOrthogonal(3), ss.SpecialEuclidean(3), ss.space("r:2 x so:3")
+KNOTS = np.array([0.0, 0.7, 1.5, 3.0, 4.0, 4.5])
+X = np.linspace(0.0, 4.5, 301)
+
+
+def curve(space, batch=(), step=0.9, **options):
+    return ss.CubicSpline(KNOTS, points_on(space, 6, batch, step=step), space, **options)
+
+
+def turns(spline, x, **options):
+    """The rotation matrices of a curve."""
+    value = spline(x, **options)
+    value = value[1] if isinstance(value, tuple) else value
+    return value[..., :3, :3]
+
+
+every_curve = pytest.mark.parametrize("space", [SO3, SE3, BOTH], ids=str)
+
+
+# ---- SciPy's Rotation as points ----
+
+
+def test_a_rotation_is_taken_wherever_points_are():
+    r = Rotation.from_matrix(points_on(SO3))
+    m = r.as_matrix()
+    spline = ss.CubicSpline(KNOTS, m, SO3)
+    assert ss.CubicSpline(KNOTS, r, "so:3") == spline
+    assert ss.CubicSpline(KNOTS, list(r), "so:3") == spline
+    assert ss.fit_many([(KNOTS, r)], "so:3") == [spline]
+    assert np.array_equal(ss.fit(KNOTS, r, "so:3")[0], spline.velocities)
+    assert np.array_equal(ss.evaluate(X, KNOTS, r, spline.velocities, SO3), spline(X))
+    assert ss.BezierCurve(r, "so:3") == ss.BezierCurve(m, "so:3")
+    flat = np.zeros((6, 2))
+    assert ss.CubicSpline(KNOTS, (flat, r), BOTH) == ss.CubicSpline(KNOTS, (flat, m), BOTH)
+    SO3.check_point(r)
+    assert np.array_equal(SO3.project(r), SO3.project(m))
+    assert np.array_equal(SO3.distance(r[0], r), SO3.distance(m[0], m))
+    assert np.array_equal(SO3.log(r[0], list(r)), SO3.log(m[0], m))
+
+
+def test_a_rotation_of_many_axes_is_a_batch():
+    class Turn:
+        """As SciPy has it since 1.17."""
+
+        def __init__(self, m):
+            self.m = m
+
+        def as_matrix(self):
+            return self.m
+
+    m = points_on(SO3, batch=(2, 3))
+    assert ss.CubicSpline(KNOTS, Turn(m), "so:3") == ss.CubicSpline(KNOTS, m, "so:3")
+
+
+def test_elsewhere_a_rotation_is_refused():
+    r = Rotation.from_matrix(points_on(SO3))
+    for space in ("so:2", "sphere:3", "se:3"):
+        with pytest.raises(ss.ValidationError):
+            ss.CubicSpline(KNOTS, r, space)
+
+
+# ---- along a curve ----
+
+
+def test_rates_are_those_of_scipy_on_a_dense_motion():
+    t = np.linspace(0, 10, 2000)
+    r = Rotation.from_rotvec(np.stack([np.sin(t), 0.7 * np.cos(1.3 * t), 0.4 * t], axis=-1))
+    spline, scipy = ss.CubicSpline(t, r, "so:3", bc_type="not-a-knot"), RotationSpline(t, r)
+    x = np.linspace(1, 9, 5001)
+    assert np.abs(rotations.angular_velocity(spline, x) - scipy(x, 1)).max() < 1e-9
+    assert np.abs(rotations.angular_acceleration(spline, x) - scipy(x, 2)).max() < 2e-6
+
+
+@every_curve
+@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
+def test_rates_are_derivatives_of_the_rotations(space, batch):
+    spline, h = curve(space, batch), 1e-5
+    x = (KNOTS[:-1, None] + np.diff(KNOTS)[:, None] * [0.1, 0.6]).ravel()
+    r = turns(spline, x)
+    change = r.swapaxes(-1, -2) @ (turns(spline, x + h) - turns(spline, x - h)) / (2 * h)
+    omega = rotations.angular_velocity(spline, x)
+    assert omega.shape == (*batch, 10, 3)
+    assert (
+        np.abs(omega - np.stack([change[..., 2, 1], change[..., 0, 2], change[..., 1, 0]], -1)).max() < 1e-8
+    )
+    for frame in ("body", "world"):
+        ahead, behind = (rotations.angular_velocity(spline, y, frame) for y in (x + h, x - h))
+        found = rotations.angular_acceleration(spline, x, frame)
+        assert np.abs(found - (ahead - behind) / (2 * h)).max() < 1e-7
+    world = rotations.angular_velocity(spline, x, "world")
+    assert np.abs(np.einsum("...ij,...j", r, omega) - world).max() < 1e-13
+
+
+@every_curve
+def test_rotation_gives_back_what_scipy_has(space):
+    spline = curve(space)
+    assert np.abs(rotations.rotation(spline, X).as_matrix() - turns(spline, X)).max() < 1e-14
+    assert rotations.rotation(spline, 1.0).as_matrix().shape == (3, 3)
+
+
+@every_curve
+@pytest.mark.parametrize("scalar_first", [True, False])
+@pytest.mark.parametrize("step", [0.9, 2.6])
+def test_quaternions_do_not_jump(space, scalar_first, step):
+    spline = curve(space, step=step)
+    x = np.linspace(0, 4.5, 20_001)
+    q = rotations.quaternion(spline, x, scalar_first=scalar_first)
+    assert np.abs(np.linalg.norm(q, axis=-1) - 1).max() < 1e-15
+    assert ((q[1:] * q[:-1]).sum(axis=-1) > 0.999).all()
+    assert q[0, 0 if scalar_first else 3] >= 0
+    found = rotations.from_quaternions(q, scalar_first=scalar_first)
+    assert np.abs(found - turns(spline, x)).max() < 2e-14
+
+
+def test_quaternions_of_a_whole_turn_change_sign():
+    # Twelve steps of 60 degrees: two turns.
+    t = np.arange(13.0)
+    spline = ss.CubicSpline(t, Rotation.from_rotvec([[0, 0, i * np.pi / 3] for i in t]), "so:3")
+    q = rotations.quaternion(spline, t, scalar_first=True)
+    expected = np.stack([np.cos(t * np.pi / 6), 0 * t, 0 * t, np.sin(t * np.pi / 6)], axis=-1)
+    assert np.abs(q - expected).max() < 1e-14
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
+def test_quaternions_of_a_closed_curve_go_on(rounds, batch):
+    n = 6 * rounds
+    angles = 2 * np.pi * rounds * np.arange(n + 1) / n
+    wobble = 0.2 * np.sin(angles / rounds)
+    points = Rotation.from_euler("ZX", np.stack([angles, wobble], axis=-1)).as_matrix()
+    points[-1] = points[0]
+    t = np.arange(n + 1.0) if not batch else np.stack([np.arange(n + 1.0), 2 * np.arange(n + 1.0) + 1])
+    points = np.broadcast_to(points, (*batch, n + 1, 3, 3))
+    spline = ss.CubicSpline(t, points, "so:3", bc_type="periodic")
+    x = np.linspace(-2.5 * n, 3.5 * n, 20_001)
+    q = rotations.quaternion(spline, x, scalar_first=True)
+    assert q.shape == (*batch, len(x), 4)
+    assert ((q[..., 1:, :] * q[..., :-1, :]).sum(axis=-1) > 0.99).all()
+    assert np.abs(rotations.from_quaternions(q, scalar_first=True) - spline(x)).max() < 1e-13
+    own = np.broadcast_to(x, (*batch, len(x)))
+    assert np.array_equal(rotations.quaternion(spline, own, scalar_first=True, per_curve=True), q)
+    # After an odd number of turns the sign is the other one.
+    start, end = (
+        rotations.quaternion(spline, t.T[i].T[..., None], scalar_first=True, per_curve=True) for i in (0, -1)
+    )
+    assert np.abs(end - (-1) ** rounds * start).max() < 1e-14
+
+
+@every_curve
+def test_calls_are_those_of_a_spline(space):
+    spline = curve(space, (2,))
+    for call in (
+        rotations.angular_velocity,
+        lambda *a, **k: rotations.quaternion(*a, scalar_first=True, **k),
+    ):
+        both = call(spline, X)
+        assert np.array_equal(call(spline, np.stack([X, X]), per_curve=True), both)
+        assert np.array_equal(call(spline[1], X), both[1])
+        assert np.array_equal(call(spline, X[7]), both[:, 7])
+        with pytest.raises(ss.ValidationError, match="outside"):
+            call(spline, 5.0)
+        assert np.isfinite(call(spline, 5.0, extrapolate="geodesic")).all()
+
+
+def test_dates():
+    dates = np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:02"], "M8[s]")
+    spline = ss.CubicSpline(dates, rotations.from_rotation_vectors([[0, 0, 0], [0, 0, 1]]), "so:3")
+    assert np.allclose(rotations.angular_velocity(spline, dates), [0, 0, 0.5], rtol=1e-14)
+
+
+# ---- other forms ----
+
+
+def test_forms_of_rotations():
+    r = Rotation.random(1000, rng=5)
+    m = r.as_matrix()
+    assert np.abs(rotations.as_quaternions(r, scalar_first=False) - r.as_quat(canonical=True)).max() < 1e-15
+    assert np.array_equal(
+        rotations.as_quaternions(m, scalar_first=True), ss.convert.matrix_to_quaternion(m, scalar_first=True)
+    )
+    v = rotations.as_rotation_vectors(m)
+    assert np.abs(v - r.as_rotvec()).max() < 1e-14
+    assert np.abs(rotations.from_rotation_vectors(v) - m).max() < 2e-15
+    small = np.array([[0.0, 0, 0], [1e-9, 2e-12, 0], [3e-160, 0, 0], [0, np.pi, 0]])
+    back = rotations.as_rotation_vectors(rotations.from_rotation_vectors(small))
+    assert np.allclose(back, small, rtol=1e-15, atol=0)
+    assert (
+        np.abs(
+            rotations.from_rotation_vectors([0, 0, 100.0]) - Rotation.from_rotvec([0, 0, 100.0]).as_matrix()
+        ).max()
+        < 1e-13
+    )
+
+
+@pytest.mark.parametrize(
+    ("order", "entries"),
+    [
+        ("columns", [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]),
+        ("rows", [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]),
+        ("interleaved", [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)]),
+    ],
+)
+def test_six_numbers(order, entries):
+    m = Rotation.random(100, rng=6).as_matrix().reshape(4, 25, 3, 3)
+    six = rotations.as_six_numbers(m, order=order)
+    assert np.array_equal(six, np.stack([m[..., i, j] for i, j in entries], axis=-1))
+    assert np.abs(rotations.from_six_numbers(six, order=order) - m).max() < 2e-15
+    # Any two vectors: the first keeps its direction, the second its half plane.
+    raw = np.random.default_rng(0).standard_normal((50, 6))
+    found = rotations.from_six_numbers(raw, order=order)
+    SO3.check_point(found)
+    a, b = (
+        np.moveaxis(raw.reshape(50, 3, 2), -1, 0)
+        if order == "interleaved"
+        else np.moveaxis(raw.reshape(50, 2, 3), 1, 0)
+    )
+    first, second, third = np.moveaxis(found, -2 if order == "rows" else -1, 0)
+    assert np.allclose(first, a / np.linalg.norm(a, axis=-1, keepdims=True), rtol=0, atol=1e-15)
+    assert ((second * b).sum(-1) > 0).all() and np.abs((third * b).sum(-1)).max() < 1e-14
+
+
+# ---- what is refused ----
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda s: rotations.angular_velocity(s, 0.5, "inertial"), "'body' or 'world', not 'inertial'"),
+        (lambda s: rotations.quaternion(s, 0.5), "scalar_first"),
+        (lambda s: rotations.as_quaternions(np.eye(3)), "scalar_first"),
+        (lambda s: rotations.as_six_numbers(np.eye(3)), "order='columns'"),
+        (lambda s: rotations.as_six_numbers(2 * np.eye(3), order="rows"), "off the space"),
+        (
+            lambda s: rotations.from_six_numbers(np.ones((2, 6)), order="rows"),
+            r"numbers\[0\] are .* not parallel",
+        ),
+        (lambda s: rotations.from_six_numbers(np.zeros(6), order="rows"), "not zero"),
+        (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
+        (lambda s: rotations.from_rotation_vectors([1, 2, np.nan]), "nan"),
+    ],
+)
+def test_refused(call, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        call(curve(SO3))
+
+
+def test_other_spaces_are_refused():
+    for name in ("sphere:3", "so:2", "so:3 x so:3"):
+        spline = ss.CubicSpline(KNOTS, points_on(ss.space(name)), name)
+        with pytest.raises(ss.ValidationError, match="so:3"):
+            rotations.angular_velocity(spline, 0.5)
+    with pytest.raises(TypeError, match="a spline is needed"):
+        rotations.angular_velocity(Rotation.identity(3), 0.5)

@@ -1,0 +1,138 @@
+"""Recordings cut where they pause, and times that come twice."""
+
+import numpy as np
+import pytest
+from curves import each, every_space, factors, largest_difference, parts, points_on
+from scipy.spatial.transform import Rotation
+
+import symspline as ss
+from symspline import poses
+
+T = np.array([0.0, 1, 2, 3, 15, 16, 17, 40, 60, 61])
+
+
+@every_space
+def test_pieces_are_fitted_alone(space):
+    p = points_on(space, len(T), step=0.3)
+    first, second, third = ss.fit_segments(T, p, space, max_gap=2, bc_type="not-a-knot")
+    for piece, own in ((first, slice(0, 4)), (second, slice(4, 7)), (third, slice(8, 10))):
+        alone = ss.CubicSpline(T[own], each(lambda a, own=own: a[own], p), space, bc_type="not-a-knot")
+        assert piece == alone and piece.report == alone.report
+    (first,) = ss.fit_segments(T, p, space, max_gap=2, min_points=4)
+    assert len(first.t) == 4
+    # Across the pauses some do not converge.
+    (whole,) = ss.fit_segments(T, p, space, max_gap=23, on_failure="ignore")
+    assert whole == ss.CubicSpline(T, p, space, on_failure="ignore")
+
+
+@every_space
+def test_of_points_at_one_time_the_first_is_kept(space):
+    p = points_on(space, 8, step=0.3)
+    t = [0, 1, 1, 1, 2, 3, 3, 4]
+    (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="first")
+    kept = [0, 1, 4, 5, 7]
+    assert found == ss.CubicSpline(np.arange(5.0), each(lambda a: a[kept], p), space)
+
+
+@every_space
+def test_the_mean_is_where_directions_add_up_to_zero(space):
+    p = points_on(space, 8, step=0.3)
+    t = [0, 1, 1, 1, 2, 3, 3, 4]
+    (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="mean")
+    for factor, given, means in zip(factors(space), parts(p), parts(found.points), strict=True):
+        for i, own in ((1, slice(1, 4)), (3, slice(5, 7))):
+            assert np.abs(factor.log(means[i], given[own]).sum(axis=0)).max() < 1e-14
+        # The mean of two points is half way.
+        middle = factor.geodesic(given[5], given[6], 0.5)
+        assert factor.norm(middle, factor.log(middle, means[3])) < 5e-15
+    alone = [0, 4, 7]
+    assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), each(lambda a: a[alone], p)) < 1e-15
+
+
+@pytest.mark.parametrize("dtype", ["f4", "i8"])
+def test_means_in_other_numbers(dtype):
+    points = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0]], dtype)
+    (found,) = ss.fit_segments([0, 1, 1, 2], points, "sphere:2", max_gap=2, duplicates="mean")
+    assert np.abs(found.points - [[1, 0, 0], [0, 0.5**0.5, 0.5**0.5], [0, 1, 0]]).max() < (
+        1e-7 if dtype == "f4" else 1e-15
+    )
+
+
+def test_dates():
+    t = np.datetime64("2024-01-01T00:00:00.000000001") + (1e9 * T).astype("m8[ns]")
+    p = points_on(ss.Sphere(2), len(T))
+    longest = [np.timedelta64(2, "s"), np.timedelta64(2000, "ms").item(), 2, 2.0, np.float32(2)]
+    for gap in longest:
+        pieces = ss.fit_segments(t, p, "sphere:2", max_gap=gap)
+        assert [len(piece.t) for piece in pieces] == [4, 3, 2] and pieces[1].t[0] == t[4]
+
+
+def test_what_scipy_and_lists_hold():
+    r = Rotation.from_matrix(points_on(ss.SpecialOrthogonal(3), len(T)))
+    x = points_on(ss.Euclidean(3), len(T))
+    for points, space in ((r, "so:3"), (list(r), "so:3"), ((r, x.tolist()), "so:3 x r:3")):
+        pieces = ss.fit_segments(T, points, space, max_gap=2, duplicates="mean")
+        plain = (r.as_matrix(), x) if space != "so:3" else r.as_matrix()
+        assert pieces == ss.fit_segments(T, plain, space, max_gap=2)
+
+
+@pytest.mark.parametrize(
+    ("match", "changes"),
+    [
+        (
+            r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\); duplicates='first'",
+            {"t": [0, 1, 1, 1, 2]},
+        ),
+        (r"t\[2\] = 0.5 is before t\[1\] = 1.0; sort", {"t": [0, 1, 0.5, 2, 3]}),
+        (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
+        (r"t has shape \(4,\), but there are 5 points", {"t": range(4)}),
+        (
+            "no piece has 3 points: 4 of 4 steps are longer than max_gap=0.5, the median step is 1",
+            {"max_gap": 0.5, "min_points": 3},
+        ),
+        ("max_gap must be more than 0, not 0", {"max_gap": 0}),
+        ("max_gap must be more than 0, not nan", {"max_gap": np.nan}),
+        ("max_gap must be a number, not True", {"max_gap": True}),
+        ("max_gap must be a number, not", {"max_gap": np.timedelta64(1, "s")}),
+        (
+            "max_gap must be a number of seconds or a timedelta64, not '1s'",
+            {"max_gap": "1s", "t": np.arange(5).astype("M8[s]")},
+        ),
+        ("min_points must be at least 2", {"min_points": 1}),
+        ("'raise', 'first' or 'mean', not 'last'", {"duplicates": "last"}),
+        ("batch axes", {"points": np.ones((2, 5, 1))}),
+        ("needs shape", {"points": np.ones((5, 2))}),
+        ("bc_type", {"bc_type": "loose"}),
+    ],
+)
+def test_refused(match, changes):
+    arguments = {"t": np.arange(5.0), "points": np.ones((5, 1)), "space": "r:1", "max_gap": 1.0} | changes
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.fit_segments(**arguments)
+
+
+def test_a_long_recording_becomes_an_imu_signal(tmp_path):
+    """20 000 poses with a pause of 12 s and repeated stamps."""
+    rng = np.random.default_rng(0)
+    t = np.concatenate([np.arange(10_000) * 0.005, 62 + np.arange(10_000) * 0.005])
+    t = np.sort(np.concatenate([t, rng.choice(t, 50, replace=False)]))
+    turn = np.stack([0.3 * np.sin(0.7 * t), 0.2 * np.cos(0.5 * t), 0.4 * t], axis=-1)
+    place = np.stack([2 * np.cos(0.4 * t), np.sin(0.8 * t), 0.1 * t], axis=-1)
+    poses.write_tum(tmp_path / "recording.txt", t, (Rotation.from_rotvec(turn), place))
+
+    t, given = poses.read_tum(tmp_path / "recording.txt")
+    pieces = ss.fit_segments(t, given, "se:3", max_gap=0.5, duplicates="mean", bc_type="not-a-knot")
+    for piece in pieces:
+        x = np.arange(piece.t[0], piece.t[-1], 0.0025)
+        gyro, force = poses.imu(piece, x)
+
+        # Derivatives of the motion in closed form, and of its rotations by differences.
+        h = 1e-4
+        at = [
+            Rotation.from_rotvec(np.stack([0.3 * np.sin(0.7 * y), 0.2 * np.cos(0.5 * y), 0.4 * y], -1))
+            for y in (x - h, x, x + h)
+        ]
+        assert np.abs(gyro - (at[0].inv() * at[2]).as_rotvec() / (2 * h)).max() < 1e-7
+        a = np.stack([-0.32 * np.cos(0.4 * x), -0.64 * np.sin(0.8 * x), 0 * x + 9.81], axis=-1)
+        assert np.abs(force - at[1].inv().apply(a)).max() < 2e-5
+    assert [len(piece.t) for piece in pieces] == [10_000, 10_000]

@@ -1,0 +1,232 @@
+"""Curves with given velocities, promise by promise."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from curves import (
+    KNOTS,
+    S2,
+    THREE,
+    at_node,
+    bezier,
+    each,
+    every_batch,
+    every_common,
+    every_space,
+    factors,
+    largest_difference,
+    off,
+    parts,
+    points_on,
+    same,
+    tangents_at,
+    vectors_off,
+)
+from scipy.interpolate import CubicHermiteSpline
+
+import symspline as ss
+
+X = np.linspace(0, 4.5, 41)
+
+
+def curve(space, batch=(), **options):
+    p = points_on(space, 6, batch, step=0.4)
+    return ss.HermiteSpline(KNOTS, p, tangents_at(space, p), space, **options)
+
+
+def test_flat_space_is_scipys():
+    rng = np.random.default_rng(0)
+    p, v = rng.standard_normal((2, 6, 3))
+    ours, scipy = ss.HermiteSpline(KNOTS, p, v, "r:3"), CubicHermiteSpline(KNOTS, p, v)
+    # At knots, too, where the acceleration jumps.
+    x = np.concatenate([X, KNOTS])
+    for nu in range(3):
+        assert np.abs(ours(x, nu=nu) - scipy(x, nu)).max() < 1e-13
+
+
+@every_space
+@every_batch
+def test_with_the_velocities_of_the_spline_it_is_the_spline(space, batch):
+    p = points_on(space, 6, batch, step=0.4)
+    spline = ss.CubicSpline(KNOTS, p, space)
+    found = ss.HermiteSpline(KNOTS, p, spline.velocities, space)
+    for nu in range(2):
+        assert largest_difference(found(X, nu=nu), spline(X, nu=nu)) < 1e-13
+    assert np.allclose(found.speed(X), spline.speed(X), rtol=1e-12)
+    assert np.allclose(found.length(), spline.length(), rtol=1e-12)
+    assert found.speed(X).shape == (*batch, 41)
+
+
+@every_space
+def test_segments_are_bezier_curves(space):
+    found = curve(space)
+    for i, tau in ((0, 0.3), (2, 0.8), (4, 0.5)):
+        control = each(lambda c, i=i: c[i], found.control_points)
+        x = KNOTS[i] + tau * (KNOTS[i + 1] - KNOTS[i])
+        assert off(space, bezier(space, control, tau), found(x)) < 1e-14
+
+
+@every_space
+def test_it_has_the_given_points_and_velocities(space):
+    p = points_on(space, 6, step=0.4)
+    v = tangents_at(space, p)
+    found = ss.HermiteSpline(KNOTS, p, v, space)
+    assert off(space, found(KNOTS), p) < 1e-14
+    # From both sides of every knot.
+    for x, own in ((KNOTS[:-1], slice(0, -1)), (np.nextafter(KNOTS[1:], 0), slice(1, None))):
+        here, there = (each(lambda a, own=own: a[own], value) for value in (p, v))
+        assert vectors_off(space, found(x), found(x, nu=1), here, there) < 1e-13
+    assert largest_difference(found.velocities, v) < 1e-14
+    assert largest_difference(found.points, p) < 1e-14
+
+
+def test_exact_velocities_give_fourth_order():
+    def error(n):
+        t = np.linspace(0, 3, n)
+
+        def motion(t):
+            lon, lat = 0.7 * t, 0.5 * np.sin(t)
+            p = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
+            east = np.stack([-np.sin(lon), np.cos(lon), 0 * lon], -1)
+            north = np.stack([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)], -1)
+            return p, (0.7 * np.cos(lat))[:, None] * east + (0.5 * np.cos(t))[:, None] * north
+
+        x = np.linspace(0, 3, 1001)
+        return S2.distance(ss.HermiteSpline(t, *motion(t), S2)(x), motion(x)[0]).max()
+
+    assert error(41) < 1e-6
+    assert 14 < error(21) / error(41) < 18
+
+
+def test_rotations_with_measured_rates():
+    rng = np.random.default_rng(3)
+    r = points_on(ss.SpecialOrthogonal(3), 6, step=0.4)
+    rates = rng.standard_normal((6, 3))
+    for frame in ("body", "world"):
+        v = ss.rotations.velocities(r, rates, frame)
+        spline = ss.HermiteSpline(KNOTS, r, v, "so:3")
+        assert np.abs(ss.rotations.angular_velocity(spline, KNOTS, frame) - rates).max() < 1e-13
+    x = rng.standard_normal((6, 3))
+    pose = ss.HermiteSpline(KNOTS, (r, x), (v, 2 * x), "so:3 x r:3")
+    assert np.abs(ss.poses.linear_velocity(pose, KNOTS) - 2 * x).max() < 1e-13
+    q = ss.rotations.quaternion(pose, np.linspace(0, 4.5, 2001), scalar_first=True)
+    assert ((q[1:] * q[:-1]).sum(-1) > 0.99).all()
+
+
+# ---- the interface ----
+
+
+@every_common
+def test_batches(space):
+    both = curve(space, (2,))
+    assert len(both) == 2 and [c == both[i] for i, c in enumerate(both)] == [True, True]
+    assert same(both[1](X), at_node_of_batch(both(X), 1))
+    assert same(both(np.stack([X, X]), per_curve=True), both(X))
+    assert both[:1]._curve.batch == (1,)
+    own = ss.HermiteSpline(np.stack([KNOTS, KNOTS + 1]), both.points, both.velocities, space)
+    assert same(own[1](X + 1), both[1](X)) or largest_difference(own[1](X + 1), both[1](X)) < 1e-12
+
+
+def at_node_of_batch(value, i):
+    return each(lambda a: a[i], value)
+
+
+@every_common
+def test_as_a_value(space):
+    found = curve(space, extrapolate="geodesic")
+    assert found == curve(space) and found != curve(space, (2,))
+    for other in (copy.deepcopy(found), pickle.loads(pickle.dumps(found))):
+        assert other == found and other.extrapolate == "geodesic" and same(other(5.0), found(5.0))
+    assert repr(found) == f"<HermiteSpline on {space!r}: 6 points>"
+    assert found != 5
+    for array in (found.t, *parts(found.points), *parts(found.velocities)):
+        assert not array.flags.writeable
+
+
+def test_outside_the_knots():
+    found = curve(S2)
+    with pytest.raises(ss.ValidationError, match="outside"):
+        found(5.0)
+    assert (
+        np.abs(
+            found(4.5 + 0.3, extrapolate="geodesic") - S2.exp(found.points[-1], 0.3 * found.velocities[-1])
+        ).max()
+        < 1e-14
+    )
+    assert np.array_equal(
+        curve(S2, extrapolate="geodesic").speed(4.8), found.speed(4.8, extrapolate="geodesic")
+    )
+
+
+def test_dates():
+    dates = np.datetime64("2024-05-01") + (1e3 * KNOTS).astype("m8[ms]")
+    plain = curve(S2)
+    dated = ss.HermiteSpline(dates, plain.points, plain.velocities, S2)
+    assert np.array_equal(dated(dates[0] + np.timedelta64(100, "ms"), nu=1), plain(0.1, nu=1))
+    assert np.array_equal(dated.t, dates)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "se:3", "so:3 x r:3"])
+def test_plots(name, tmp_path):
+    figure = curve(ss.space(name)).plot(tmp_path / "a.png")
+    texts = [text.get_text() for text in figure.texts]
+    assert f"C¹ Hermite spline on {ss.space(name)!r}"[:30] in texts[0][:30]
+    assert "6 points, given velocities" in texts[1]
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+# ---- what is refused ----
+
+
+@pytest.mark.parametrize(
+    ("match", "changes"),
+    [
+        (r"velocities has shape \(2, 3\), but points \(3, 3\)", {"velocities": np.zeros((2, 3))}),
+        (r"velocities\[1, 2\] is not finite", {"velocities": [[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]}),
+        (
+            "vector 1 is not tangent .* use space.project_tangent",
+            {"velocities": np.eye(3)[[1, 1, 1]] * [1, 1, 0]},
+        ),
+        ("the space by", {"points": 2 * np.eye(3)}),
+        (r"t\[1\]", {"t": [0, 0, 1]}),
+        ("extrapolate must be", {"extrapolate": "linear"}),
+        ("unknown space", {"space": "round:2"}),
+    ],
+)
+def test_refused(match, changes):
+    arguments = {"t": None, "points": THREE, "velocities": np.zeros((3, 3)), "space": S2} | changes
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.HermiteSpline(**arguments)
+
+
+@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
+def test_control_points_beyond_reach_are_refused(batch):
+    points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], (*batch, 3, 3))
+    velocities = np.zeros(points.shape)
+    # The second segment's inner points are (1, 0, 0) and its antipode.
+    velocities[..., 2, 0] = 1.5 * np.pi
+    with pytest.raises(
+        ss.CutLocusError, match=r"segment 1.*between t\[1\] and t\[2\].*velocities are too large"
+    ):
+        ss.HermiteSpline(None, points, velocities, S2)
+
+
+def test_only_batches_are_sequences():
+    found = curve(S2)
+    with pytest.raises(TypeError, match="one curve"):
+        len(found)
+    with pytest.raises(TypeError, match="one curve"):
+        found[0]
+    with pytest.raises(TypeError, match="whole number or a slice"):
+        curve(S2, (2,))["a"]
+    assert found
+
+
+def test_all_factors_are_checked():
+    space = ss.space("sphere:2 x r:1")
+    assert len(factors(space)) == 2
+    with pytest.raises(ss.ValidationError, match="velocities must be a tuple of 2 arrays"):
+        ss.HermiteSpline(None, (THREE, np.zeros((3, 1))), np.zeros((3, 4)), space)
+    assert at_node(space, curve(space).points, 0)[1].shape == (1,)

@@ -1,0 +1,89 @@
+"""Unit quaternions of opposite sign warn on S³, and only there."""
+
+import warnings
+
+import numpy as np
+import pytest
+from curves import S3, points_on
+
+import symspline as ss
+
+
+def motion():
+    """A turn by 180 degrees in steps of 20, as quaternions."""
+    half = np.radians(10) * np.arange(10)
+    return np.stack([np.cos(half), np.sin(half), 0 * half, 0 * half], axis=-1)
+
+
+def flipped(*samples):
+    q = motion()
+    q[list(samples)] *= -1
+    return q
+
+
+def silent(call):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return call()
+
+
+def test_a_flipped_sample_warns_once_and_says_what_to_do():
+    with pytest.warns(UserWarning) as caught:
+        ss.CubicSpline(None, flipped(4), "sphere:3", method="newton")
+    (warning,) = caught
+    message = str(warning.message)
+    assert message.startswith(
+        "neighbours of opposite sign on sphere:3: points 3 and 4 have inner product -0.985"
+    )
+    assert "(and 1 more pairs)" in message and "so:3" in message and "rp:3" in message
+    assert "warnings.filterwarnings('ignore', message='neighbours of opposite sign')" in message
+    # It points to the line above, not into the package.
+    assert warning.filename == __file__
+    assert warning.category is UserWarning
+
+
+def test_which_curve_it_was():
+    batch = np.stack([motion(), flipped(9)])
+    with pytest.warns(UserWarning, match="points 8 and 9 of curve 1 have"):
+        ss.CubicSpline(None, batch, "sphere:3")
+    with pytest.warns(UserWarning, match="points 8 and 9 of curve 1 have"):
+        ss.fit_many([(None, motion()), (None, flipped(9))], "sphere:3")
+    with pytest.warns(UserWarning, match="points 8 and 9 have"):
+        ss.CubicSpline(None, (np.zeros((10, 2)), flipped(9)), "r:2 x sphere:3")
+
+
+@pytest.mark.filterwarnings("error")
+def test_it_can_be_silenced_as_it_says():
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="neighbours of opposite sign")
+        ss.CubicSpline(None, flipped(9), "sphere:3")
+
+
+@pytest.mark.parametrize("q", [motion(), -motion(), motion()[::-1]], ids=["plus", "minus", "back"])
+def test_motions_of_one_sign_do_not_warn(q):
+    silent(lambda: ss.CubicSpline(None, q, S3))
+
+
+def test_other_spaces_do_not_warn():
+    silent(lambda: ss.CubicSpline(None, flipped(4), "rp:3"))
+    silent(lambda: ss.CubicSpline(None, points_on(ss.Sphere(2), step=2.0), "sphere:2", on_failure="ignore"))
+    turns = ss.rotations.from_quaternions(flipped(4), scalar_first=True)
+    silent(lambda: ss.CubicSpline(None, turns, "so:3"))
+
+
+def test_what_it_warns_of():
+    # One sample with the other sign makes two and a half turns of half a one.
+    def turned(space, points):
+        return ss.CubicSpline(None, points, space).length()
+
+    assert turned("rp:3", flipped(4)) == pytest.approx(np.pi / 2, rel=1e-12)
+    with pytest.warns(UserWarning):
+        spline = ss.CubicSpline(None, flipped(4), "sphere:3", method="newton")
+    assert spline.length() > 5
+
+
+def test_errors_come_before_it():
+    far = motion()
+    far[3] = -far[2]
+    with pytest.raises(ss.CutLocusError):
+        silent(lambda: ss.CubicSpline(None, far, "sphere:3"))
