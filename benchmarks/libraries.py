@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 import symspline as ss
+from symspline import rotations
 
 from .data import SPHERE, Array, product
 
@@ -51,6 +53,13 @@ def body_rate(curve: ss.CubicSpline, x: Array, nu: int) -> Array:
     """Angular velocity (nu = 1) or acceleration (2) in the frame of the body, 2 q̄ γ' and 2 q̄ ∇γ'."""
     conjugate = curve(x) * [1.0, -1.0, -1.0, -1.0]
     return 2 * product(conjugate, curve(x, nu))[..., 1:]
+
+
+def angular(t: Array, points: Array, x: Array, nu: int) -> Callable[[], Array]:
+    """Angular velocity (nu = 1) or acceleration (2) of the rotations of quaternions."""
+    curve = ss.CubicSpline(t, rotations.from_quaternions(points, scalar_first=True), "so:3")
+    rate = (rotations.angular_velocity, rotations.angular_acceleration)[nu - 1]
+    return partial(rate, curve, x)
 
 
 def scipy() -> Library:

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import data
 from .data import Array, Sizes
-from .libraries import Library, all_libraries, body_rate, symspline
+from .libraries import Library, all_libraries, angular, symspline
 from .tables import count, table, versus
 from .timing import Contestant, Effort, Result, Work, failure, measure
 
@@ -99,8 +99,9 @@ def _evaluation(points: Array, sizes: Sizes, effort: Effort) -> list[Row]:
             results = _measure(_evaluate(t, points, at, nu), all_libraries(), None, effort)
             made.append(Row(f"{samples} {order}: {quantity}", results, goal if order == "sorted" else None))
     for nu in (1, 2):
-        results = _measure(_evaluate(t, points, x, nu, as_body_rate=True), all_libraries(), None, effort)
-        made.append(Row(f"{samples} sorted: angular {('velocity', 'acceleration')[nu - 1]}", results))
+        results = _measure(_angular(t, points, x, nu), all_libraries(), None, effort)
+        goal = (6.0, 7.0)[nu - 1] if sizes.goals else None
+        made.append(Row(f"{samples} sorted: angular {('velocity', 'acceleration')[nu - 1]}", results, goal))
     middle = 0.3712 * float(t[-1])
     single = _measure(_evaluate(t, points, middle, 0), all_libraries(), None, effort)
     return [*made, Row("one sample: value", single, 15.0 if sizes.goals else None)]
@@ -127,12 +128,17 @@ def _construct(t: Array, points: Array) -> Use:
     return lambda library: partial(library.curve, *library.arguments(t, points))
 
 
-def _evaluate(t: Array, points: Array, x: Any, nu: int, as_body_rate: bool = False) -> Use:
+def _evaluate(t: Array, points: Array, x: Any, nu: int) -> Use:
+    return lambda library: partial(library.at(library.curve(*library.arguments(t, points))), x, nu)
+
+
+def _angular(t: Array, points: Array, x: Array, nu: int) -> Use:
+    """What the others give as derivatives; symspline from a curve of matrices."""
+
     def use(library: Library) -> Work:
-        curve = library.curve(*library.arguments(t, points))
-        if as_body_rate and library.name == "symspline":
-            return partial(body_rate, curve, x, nu)
-        return partial(library.at(curve), x, nu)
+        return (
+            angular(t, points, x, nu) if library.name == "symspline" else _evaluate(t, points, x, nu)(library)
+        )
 
     return use
 
