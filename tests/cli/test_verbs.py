@@ -199,3 +199,19 @@ def test_lists_of_names_that_are_none(fails, names):
     Path("points.csv").write_text("t,x\n0,1\n1,2\n")
     line = shlex.join(["fit", "points.csv", "--space", "r:1", "--columns", names, "-o", "curve.npz"])
     assert "list of names" in fails(line) or "no column" in fails(line)
+
+
+def test_the_version(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0 and capsys.readouterr().out == f"symspline {ss.__version__}\n"
+    cargo = (README.parent / "Cargo.toml").read_text(encoding="utf-8")
+    assert f'version = "{ss.__version__}"' in cargo
+
+
+def test_the_help_names_every_method(run, capsys):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 --method newton -o axes.npz")
+    with pytest.raises(SystemExit):
+        main(["fit", "--help"])
+    assert "quasi-newton, newton or fixed-point" in " ".join(capsys.readouterr().out.split())

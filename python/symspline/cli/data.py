@@ -22,9 +22,9 @@ Groups = Mapping[str, NDArray[np.int64]]
 # What helps in Python only.
 _ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter| \(np\.[^()]*\)")
 
-# Longitudes may count on where a track goes round the globe, but ten times is more than one does; what is beyond
-# stands for a place that is not known, such as 1e15 or 9999.
-_FARTHEST = 3600
+# From -180, from 0, or counted on where a track goes round the globe; what is beyond is a slip, such as 400, or
+# stands for a place that is not known, such as 999.
+_FARTHEST = 360
 
 
 class Data:
