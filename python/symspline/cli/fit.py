@@ -21,8 +21,10 @@ from .formats import open_table
 from .numbers import real
 from .points import GLOBE, require_globe
 from .progress import Progress
-from .roles import named_columns, point_entries, split_names, time_column
+from .recording import Repair
+from .roles import named_columns, point_entries, split_names
 from .tables import ending
+from .time_columns import check_days, time_column
 
 SUMMARY = "fit C2 splines to the points in a table"
 DESCRIPTION = """\
@@ -54,7 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("input", type=Path, metavar="IN", help="table to read: .csv, .npz or .parquet")
     add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
-    add("--time", metavar="COL", help="column of times (default: t or time; if there is none, 0, 1, 2, ...)")
+    add(
+        "--time",
+        metavar="COL",
+        help="column of times (default: t, time, or dates in a column called like timestamp, date, ISO_TIME; if there "
+        "is none, 0, 1, 2, ..., as with none)",
+    )
     add(
         "--columns",
         metavar="A,B,...",
@@ -66,6 +73,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="points are longitude and latitude in degrees, in columns lon and lat, or longitude and "
         "latitude, or the two --columns; the space is sphere:2",
+    )
+    add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
+    add(
+        "--dedup",
+        choices=("first", "mean"),
+        help="of points with one time keep the first, or their mean (default: they are an error)",
+    )
+    add(
+        "--max-gap",
+        metavar="DT",
+        help="cut curves where neighbouring times are farther apart than a number or, for dates, a duration such "
+        "as 12h; pieces are curves named 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are left out",
     )
     add(
         "--bc-type",
@@ -102,12 +121,14 @@ def run(options: argparse.Namespace) -> int:
     entries = point_entries(table, given, [time, curve], space, options.lonlat)
     with Progress("reading") as progress:
         rows = table.read([name for entry in entries for name in entry.columns], time, curve, progress)
+    check_days(table, time, rows)
     if not options.lonlat:
         rows = replace(rows, numbers=completed(rows.numbers, entries, space))
-    splines = _fit(Data(table.path, rows), space, options)
+    data = Data(table.path, rows, Repair(options.sort, options.dedup, options.max_gap))
+    splines = _fit(data, space, options)
     columns = replace(named_columns(entries, time, curve, options.lonlat), utc=rows.utc)
-    write_curves(options.output, Curves(splines, curve is not None, columns))
-    print(f"{options.output}: {_summary(list(splines.values()))}")
+    write_curves(options.output, Curves(splines, data.named, columns))
+    print(f"{options.output}: {_summary(list(splines.values()))}{_repaired(data)}")
     return 0
 
 
@@ -148,6 +169,19 @@ def _bc_type(text: str) -> str | tuple[str, ...]:
     raise Problem(
         f"--bc-type {text}: give natural, not-a-knot, clamped or periodic, or two of the first three with a comma"
     )
+
+
+def _repaired(data: Data) -> str:
+    """What was put right, of which nothing is seen in the curves."""
+    said = [
+        f"{count} row{'s' if count > 1 else ''} {what}"
+        for count, what in (
+            (data.joined, "with a time that another had"),
+            (data.alone, "alone between gaps left out"),
+        )
+        if count
+    ]
+    return "".join(f"; {part}" for part in said)
 
 
 def _summary(splines: Sequence[CubicSpline]) -> str:

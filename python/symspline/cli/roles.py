@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
 
 from .. import spaces
 from ..spaces import Product, Space
@@ -23,14 +22,6 @@ def split_names(text: str | None) -> list[str]:
     except (csv.Error, ValueError):
         raise Problem(f"{text!r} is no list of names with commas between them") from None
     return [name.strip() for name in names]
-
-
-def time_column(table: Table, given: str | None, others: Sequence[str | None]) -> str | None:
-    """The column of times: the one that was named, or one called t or time."""
-    if given is not None:
-        return table.require(given)
-    found = table.find("t", "time")
-    return None if found in others else found
 
 
 def point_entries(

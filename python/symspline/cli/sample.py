@@ -20,8 +20,8 @@ from .layout import column_names, flatten
 from .numbers import whole
 from .points import motion_degrees, motion_labels, to_degrees
 from .progress import Progress
-from .roles import time_column
 from .tables import ENDINGS, Rows, Table, ending
+from .time_columns import time_column
 from .times import Times, every, spread
 
 SUMMARY = "make a table of points along curves"

@@ -48,11 +48,13 @@ class Table(ABC):
         path: the file.
         names: of all columns, in the order of the file.
         numeric: names of the columns that hold numbers.
+        dates: names of the columns that hold dates, or what looks like them.
     """
 
     path: Path
     names: list[str]
     numeric: list[str]
+    dates: list[str]
 
     def require(self, name: str) -> str:
         """The name, if there is such a column."""
