@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from .._core import CutLocusError, ValidationError
 from ..spaces import Product, Space
+from .curves import Columns
 from .errors import Problem, with_names
 from .layout import matrix, unflatten
 from .points import from_degrees, onto
+from .quaternions import points_of
 from .recording import Repair, means
 from .tables import Rows
 
@@ -56,10 +58,10 @@ class Data:
                 f"{path}: with --max-gap {repair.max_gap} every point stands alone; a curve needs two"
             )
 
-    def curves(self, space: Space, lonlat: bool) -> list[tuple[Any, Any]]:
+    def curves(self, space: Space, columns: Columns) -> list[tuple[Any, Any]]:
         """Times and points of every curve."""
         times = self._rows.times
-        points = self._places() if lonlat else self._points(space)
+        points = self._places() if columns.lonlat else self._points(space, columns.quaternion)
         if self._repair.dedup == "mean":
             points = self._with_means(space, points)
         return [(times[own] if times.size else None, _picked(points, own)) for own in self.groups.values()]
@@ -77,12 +79,18 @@ class Data:
         of_file = f"{self._path}: " if text != message else ""
         return of_file + _ADVICE.sub("", text)
 
-    def _points(self, space: Space) -> Any:
-        parts = unflatten(space, self._rows.numbers)
+    def _points(self, space: Space, quaternion: list[int] | None) -> Any:
+        if quaternion is None:
+            parts = unflatten(space, self._rows.numbers)
+        else:
+            parts = points_of(space, self._rows.numbers, quaternion, self._place)
         if not isinstance(space, Product):
             return self._onto(space, parts[0])
         pairs = zip(space.factors, parts, strict=True)
         return tuple(self._onto(factor, part, f"the part in {factor} of ") for factor, part in pairs)
+
+    def _place(self, row: int) -> str:
+        return f"{self._path}, {self._rows.place(row)}"
 
     def _onto(self, space: Space, points: NDArray[Any], of: str = "") -> NDArray[Any]:
         try:

@@ -19,7 +19,7 @@ from .times import Fail, parse_times
 Array = NDArray[Any]
 Place = Callable[[int], str]
 
-ENDINGS = (".csv", ".npz", ".parquet")
+ENDINGS = (".csv", ".npz", ".parquet", ".tum", ".txt")
 
 
 @dataclass(frozen=True)
