@@ -47,8 +47,9 @@ from .spaces import (  # noqa: E402
 )
 from .spline import CubicSpline  # noqa: E402
 from .threads import set_num_threads  # noqa: E402
+from .version import VERSION  # noqa: E402
 
-__version__ = "0.1.0"
+__version__ = VERSION
 __all__ = [
     "BSpline",
     "BezierCurve",

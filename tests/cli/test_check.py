@@ -9,6 +9,7 @@ from curves import points_on
 
 import symspline as ss
 from symspline.cli import main
+from symspline.pieces import spline_pieces
 
 
 @pytest.mark.parametrize("name", [*map(str, SPACES), "s:1", "h:5"])
@@ -105,3 +106,28 @@ def test_check_sees_the_seam(fails):
     arrays["velocities"][0] /= 1.01
     np.savez("ring.npz", **arrays)
     assert main(["check", "ring.npz"]) == 0
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(
+    "name, p",
+    [
+        ("s:2", [[np.cos(x), np.sin(x), 0] for x in (0, 0.3, 0.7, 1.2)]),
+        ("r:2", [[0.1, 0.7]] * 4),
+        ("spd:2", [np.diag([np.exp(x), np.exp(-x)]) for x in (0, 0.3, 0.7, 1.2)]),
+    ],
+)
+def test_check_of_a_geodesic_compares_no_rounding_with_rounding(run, name, p, unit):
+    """What is zero but for rounding jumps by as much as it is: 0/0 is no measure."""
+    ss.CubicSpline(unit * np.array([0, 0.3, 0.7, 1.2]), p, name).save("a.npz")
+    assert all(float(cell) < 1e-13 for cell in run("check a.npz").splitlines()[1].split()[1:])
+
+
+def test_check_of_a_slight_bend_is_relative(run):
+    """A small acceleration that is no rounding is measured as before."""
+    p = [[np.cos(x), np.sin(x), 0] for x in (0, 0.3, 0.7, 1.2)]
+    bent = ss.CubicSpline(None, ss.Sphere(2).project(np.add(p, [[0], [0], [0], [1e-9]]) * 1.0), "s:2")
+    bent.save("a.npz")
+    acceleration = float(run("check a.npz").splitlines()[1].split()[-1])
+    pieces = spline_pieces(bent).jumps(2)
+    assert acceleration == pytest.approx(pieces.relative, rel=0.1) and pieces.largest > 1e-10

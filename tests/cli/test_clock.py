@@ -101,8 +101,8 @@ def test_times_along_a_curve():
     "step, found",
     [
         ("0", "larger than zero"),
-        ("-1", "a step is a number"),
-        ("ten", "a step is a number"),
+        ("-1", "a duration is a number"),
+        ("ten", "a duration is a number"),
         ("1y", "units are ns, us, ms, s, min, h, d"),
         ("0.5ns", "whole number of nanoseconds"),
         ("1e-12d", "whole number of nanoseconds"),

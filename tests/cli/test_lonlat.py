@@ -65,3 +65,12 @@ def test_longitudes_of_other_spaces(fails):
     ss.CubicSpline(None, [[0.0, 0], [1, 2]], "r:2").save("a.npz")
     np.savez("b.npz", **dict(np.load("a.npz")), columns='{"points": ["lon", "lat"], "lonlat": true}')
     assert fails("check b.npz") == "b.npz is damaged: its names of columns do not suit euclidean:2"
+
+
+def test_longitudes_go_once_around_at_most(run, fails):
+    for lon in (-360, 360, 0):
+        write("a.csv", f"t,lon,lat\n0,{lon},1\n1,{lon / 1.1},2\n")
+        run("fit a.csv --lonlat -o a.npz")
+    for lon in (400, -361, 3600):
+        write("a.csv", f"t,lon,lat\n0,5,1\n1,{lon},2\n")
+        assert f"a.csv, line 3: longitude {lon} is not between" in fails("fit a.csv --lonlat -o b.npz")

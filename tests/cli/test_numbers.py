@@ -35,6 +35,6 @@ def test_numbers_are_written_as_usual(said, cell):
 @pytest.mark.parametrize("lon", ["1e15", "9999", "-9999"])
 def test_longitudes_that_are_none(said, lon):
     code, err = said("t,lon,lat", ["0,10,20", f"1,{lon},21"], ["--lonlat"])
-    assert code == 2 and "line 3: longitude" in err and "not between -3600 and 3600 degrees" in err
-    # Round the globe and further.
-    assert said("t,lon,lat", ["0,350,20", "1,370,21"], ["--lonlat"]) == (0, "")
+    assert code == 2 and "line 3: longitude" in err and "not between -360 and 360 degrees" in err
+    # From zero, and from -180 counted on.
+    assert said("t,lon,lat", ["0,350,20", "1,360,21", "2,-350,20"], ["--lonlat"]) == (0, "")

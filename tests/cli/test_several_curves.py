@@ -54,10 +54,10 @@ def test_problems_of_one_curve_name_it(run, fails):
     assert fails("plot pair.npz --curve c -o a.png") == "pair.npz has no curve 'c'; there are a, b"
     write("bad.csv", PAIR + "c,3,1,0,0\n")
     problem = "bad.csv, line 7: this is the only point of curve 'c'; a curve needs two"
-    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == problem
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz").startswith(problem)
     write("bad.csv", PAIR + "b,1.5,1,0,0\n")
     problem = "bad.csv, line 7: time 1.5 of curve 'b' does not come after 2.0 in line 5; times must increase"
-    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == problem
+    assert fails("fit bad.csv --space s:2 --curve id -o bad.npz").startswith(problem)
     write("bad.csv", PAIR + "b,4,0,0,-1\n")
     problem = fails("fit bad.csv --space s:2 --curve id -o bad.npz")
     assert problem.startswith(

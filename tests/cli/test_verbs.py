@@ -165,10 +165,10 @@ def test_bad_usage(run, fails):
     assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
     assert fails("sample a.npz -n 3 --nu 0,3 -o b.csv").startswith("--nu 0,3: give one or more of 0, 1 and 2")
     assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
-    ending = "b.txt: the name of a table must end in .csv or .npz or .parquet"
-    assert fails("sample a.npz -n 3 -o b.txt") == ending
+    ending = "b.xls: the name of a table must end in .csv or .npz or .parquet or .tum or .txt"
+    assert fails("sample a.npz -n 3 -o b.xls") == ending
     assert fails("plot a.npz -o b.txt").startswith("b.txt: the name of a picture must end in .")
-    assert "must end in .csv" in fails("fit a.txt --space s:2 -o b.npz")
+    assert "must end in .csv" in fails("fit a.xls --space s:2 -o b.npz")
 
 
 def test_a_fit_that_does_not_converge(fails, monkeypatch):
@@ -199,3 +199,19 @@ def test_lists_of_names_that_are_none(fails, names):
     Path("points.csv").write_text("t,x\n0,1\n1,2\n")
     line = shlex.join(["fit", "points.csv", "--space", "r:1", "--columns", names, "-o", "curve.npz"])
     assert "list of names" in fails(line) or "no column" in fails(line)
+
+
+def test_the_version(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0 and capsys.readouterr().out == f"symspline {ss.__version__}\n"
+    cargo = (README.parent / "Cargo.toml").read_text(encoding="utf-8")
+    assert f'version = "{ss.__version__}"' in cargo
+
+
+def test_the_help_names_every_method(run, capsys):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 --method newton -o axes.npz")
+    with pytest.raises(SystemExit):
+        main(["fit", "--help"])
+    assert "quasi-newton, newton or fixed-point" in " ".join(capsys.readouterr().out.split())

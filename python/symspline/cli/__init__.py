@@ -11,6 +11,7 @@ from typing import NoReturn
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from ..arrays import brief
+from ..version import VERSION
 from . import check, demo, fit, plot, sample
 from .errors import Problem, with_names
 
@@ -84,6 +85,7 @@ def _parser() -> _Parser:
     parser = _Parser(
         "symspline", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=style, allow_abbrev=False
     )
+    parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     for verb in (fit, sample, plot, check, demo):
         name = verb.__name__.rpartition(".")[2]

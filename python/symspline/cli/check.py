@@ -26,11 +26,14 @@ the values from both sides of a knot know nothing of each other. The table has
   velocity      the largest jump of the velocity, relative to the largest velocity
   acceleration  the largest jump of the covariant acceleration, relative to the largest one
 
+Of values that are rounding themselves, as the acceleration of a geodesic is, a jump of the k-th derivative is
+multiplied by h^k instead, where h is the shorter of the two segments.
+
 Lengths are those of the space, so that it does not matter which array of a line or subspace stands for it; of
 poses those of the rates in the body, the angle and the way together. A jump of the k-th derivative may be
-1e-12 of the largest value, and 100 eps / h^k for rounding, where h is the shorter of the two segments; |p| as
-much where points p have large numbers, in hyperbolic spaces |p|^2 as much, for positive definite matrices
-cond(p). With a larger one the check fails, and the exit code is 1."""
+1e-12 of the largest value, and 100 eps / h^k for rounding; |p| as much where points p have large numbers, in
+hyperbolic spaces |p|^2 as much, for positive definite matrices cond(p). With a larger one the check fails, and
+the exit code is 1."""
 EPILOG = """\
 example:
   symspline check storms.npz"""
@@ -108,7 +111,10 @@ def _measure(spline: CubicSpline) -> Found:
         jumps = pieces.jumps(nu, closed)
         if nu == 0 and isinstance(spline.space, _POSITIVE):
             jumps = replace(jumps, largest=1.0)
-        allowed = _RELATIVE * jumps.largest + floor / shorter**nu
-        values.append(jumps.relative)
+        rounding = floor / shorter**nu
+        allowed = _RELATIVE * jumps.largest + rounding
+        # Zero is no measure of zero.
+        is_rounding = jumps.largest <= rounding.max(initial=0.0)
+        values.append(float((jumps.size * shorter**nu).max(initial=0.0)) if is_rounding else jumps.relative)
         excess.append(float((jumps.size / allowed).max(initial=0.0)))
     return Found(tuple(values), max(excess))

@@ -18,6 +18,7 @@ from ..spline import CubicSpline
 from .errors import Problem, reading, writing
 from .layout import labels
 from .points import GLOBE, LONLAT, require_globe
+from .quaternions import count_of
 
 ENDING = (".npz",)
 _COLUMNS = "columns"
@@ -33,6 +34,7 @@ class Columns:
         time, curve: of times and of names of curves.
         lonlat: whether points are longitude and latitude in degrees.
         utc: whether times are written with a Z.
+        quaternion: of rotations as quaternions, which column holds which number, see `quaternions.places_of`.
     """
 
     points: list[str]
@@ -40,6 +42,7 @@ class Columns:
     curve: str = "curve"
     lonlat: bool = False
     utc: bool = False
+    quaternion: list[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -117,17 +120,31 @@ def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
             columns = Columns(**json.loads(str(archive[_COLUMNS])))
         except (ValueError, TypeError, RecursionError) as error:
             raise Problem(f"{path} is damaged: {brief(error)}") from None
-    names, wanted = columns.points, LONLAT if columns.lonlat else labels(space)
+    names = columns.points
+    if columns.quaternion is None:
+        wanted: int | None = len(LONLAT if columns.lonlat else labels(space))
+    else:
+        wanted = count_of(space) if _are_places(columns.quaternion) else None
+        wanted = wanted if wanted == len(columns.quaternion) else None
     good = (
         isinstance(names, list)
-        and len(names) == len(wanted)
+        and len(names) == wanted
         and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
         and isinstance(columns.lonlat, bool)
         and isinstance(columns.utc, bool)
     )
-    if not good or (columns.lonlat and space != GLOBE):
+    if not good or (columns.lonlat and (space != GLOBE or columns.quaternion is not None)):
         raise Problem(f"{path} is damaged: its names of columns do not suit {space}")
     return columns
+
+
+def _are_places(values: object) -> bool:
+    """Whether they are 0, 1, 2, … in any order."""
+    return (
+        isinstance(values, list)
+        and all(type(value) is int for value in values)
+        and sorted(values) == list(range(len(values)))
+    )
 
 
 def _singles(spline: CubicSpline, name: str = "") -> Iterator[tuple[str, CubicSpline]]:

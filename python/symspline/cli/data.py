@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import ValidationError
+from .._core import CutLocusError, ValidationError
 from ..spaces import Product, Space
+from .curves import Columns
 from .errors import Problem, with_names
 from .layout import matrix, unflatten
 from .points import from_degrees, onto
+from .quaternions import points_of
+from .recording import Repair, means
 from .tables import Rows
 
 Groups = Mapping[str, NDArray[np.int64]]
@@ -22,9 +25,11 @@ Groups = Mapping[str, NDArray[np.int64]]
 # What helps in Python only.
 _ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter| \(np\.[^()]*\)")
 
-# Longitudes may count on where a track goes round the globe, but ten times is more than one does; what is beyond
-# stands for a place that is not known, such as 1e15 or 9999.
-_FARTHEST = 3600
+# From -180, from 0, or counted on where a track goes round the globe; what is beyond is a slip, such as 400, or
+# stands for a place that is not known, such as 999.
+_FARTHEST = 360
+
+_NOTHING = Repair()
 
 
 class Data:
@@ -32,19 +37,33 @@ class Data:
 
     Attributes:
         groups: names of the curves, in the order in which they begin, and the rows of each.
+        named: whether these names mean something.
+        joined, alone: how many rows had the time of another one, and how many points stood alone between gaps.
     """
 
-    def __init__(self, path: Path, rows: Rows) -> None:
+    def __init__(self, path: Path, rows: Rows, repair: Repair = _NOTHING) -> None:
         self._path = path
         self._rows = rows
-        self.groups = group(rows)
-        for name, own in self.groups.items():
+        self._repair = repair
+        repair.check(bool(rows.times.size))
+        self._runs = {name: repair.ordered(own, rows.times) for name, own in group(rows).items()}
+        firsts = {name: own[starts] for name, (own, starts) in self._runs.items()}
+        self.joined = sum(len(own) - len(starts) for own, starts in self._runs.values())
+        for name, own in firsts.items():
             self._check_curve(name, own)
+        self.groups, self.alone = repair.cut(firsts, rows.times, rows.labels is not None)
+        self.named = rows.labels is not None or repair.max_gap is not None
+        if not self.groups:
+            raise Problem(
+                f"{path}: with --max-gap {repair.max_gap} every point stands alone; a curve needs two"
+            )
 
-    def curves(self, space: Space, lonlat: bool) -> list[tuple[Any, Any]]:
+    def curves(self, space: Space, columns: Columns) -> list[tuple[Any, Any]]:
         """Times and points of every curve."""
         times = self._rows.times
-        points = self._places() if lonlat else self._points(space)
+        points = self._places() if columns.lonlat else self._points(space, columns.quaternion)
+        if self._repair.dedup == "mean":
+            points = self._with_means(space, points)
         return [(times[own] if times.size else None, _picked(points, own)) for own in self.groups.values()]
 
     def located(self, message: str) -> str:
@@ -55,17 +74,23 @@ class Data:
         text = re.sub(
             r"points\[(\d+)\]", lambda m: f"the point in {self._rows.place(own[int(m[1])])}", message
         )
-        called = f"curve {name!r}" if self._rows.labels is not None else "the curve"
+        called = f"curve {name!r}" if self.named else "the curve"
         text = text.replace(found[0], called) if found else text
         of_file = f"{self._path}: " if text != message else ""
         return of_file + _ADVICE.sub("", text)
 
-    def _points(self, space: Space) -> Any:
-        parts = unflatten(space, self._rows.numbers)
+    def _points(self, space: Space, quaternion: list[int] | None) -> Any:
+        if quaternion is None:
+            parts = unflatten(space, self._rows.numbers)
+        else:
+            parts = points_of(space, self._rows.numbers, quaternion, self._place)
         if not isinstance(space, Product):
             return self._onto(space, parts[0])
         pairs = zip(space.factors, parts, strict=True)
         return tuple(self._onto(factor, part, f"the part in {factor} of ") for factor, part in pairs)
+
+    def _place(self, row: int) -> str:
+        return f"{self._path}, {self._rows.place(row)}"
 
     def _onto(self, space: Space, points: NDArray[Any], of: str = "") -> NDArray[Any]:
         try:
@@ -95,6 +120,23 @@ class Data:
             )
         return from_degrees(degrees)
 
+    def _with_means(self, space: Space, points: Any) -> Any:
+        """The points, where the first of those with one time is their mean."""
+        for name, (own, starts) in self._runs.items():
+            if len(starts) == len(own):
+                continue
+            try:
+                found = means(space, _picked(points, own), starts)
+            except CutLocusError:
+                of = f" of curve {name!r}" if self._rows.labels is not None else ""
+                raise Problem(
+                    f"{self._path}: points{of} with one time are too far apart to have a mean; --dedup first takes "
+                    "the first of them"
+                ) from None
+            for all_points, mean in zip(*map(_as_tuple, (points, found)), strict=True):
+                all_points[own[starts]] = mean
+        return points
+
     def _check_curve(self, name: str, own: NDArray[np.int64]) -> None:
         """Raise `Problem` unless there are two points, and their times increase."""
         of = f" of curve {name!r}" if self._rows.labels is not None else ""
@@ -107,9 +149,11 @@ class Data:
         bad = np.flatnonzero(~(times[1:] > times[:-1]))
         if bad.size:
             before, here = (self._rows.place(own[i]) for i in (bad[0], bad[0] + 1))
+            same = times[bad[0] + 1] == times[bad[0]]
+            advice = "--dedup first or mean makes one point of them" if same else "--sort puts rows in order"
             raise Problem(
                 f"{self._path}, {here}: time {times[bad[0] + 1]}{of} does not come after {times[bad[0]]} in {before}; "
-                "times must increase"
+                f"times must increase; {advice}"
             )
 
 
@@ -121,6 +165,10 @@ def group(rows: Rows) -> Groups:
     of_row = np.array([codes.setdefault(label, len(codes)) for label in rows.labels], dtype=np.int64)
     order = np.argsort(of_row, kind="stable")
     return dict(zip(codes, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True))
+
+
+def _as_tuple(points: Any) -> tuple[Any, ...]:
+    return points if isinstance(points, tuple) else (points,)
 
 
 def _picked(points: Any, own: NDArray[np.int64]) -> Any:

@@ -13,7 +13,7 @@ from ..functions import fit_many
 from ..spaces import Space
 from ..spaces import space as space_named
 from ..spline import CubicSpline
-from .curves import ENDING, Curves, write_curves
+from .curves import ENDING, Columns, Curves, write_curves
 from .data import Data
 from .entries import completed
 from .errors import Problem, check_target
@@ -21,8 +21,11 @@ from .formats import open_table
 from .numbers import real
 from .points import GLOBE, require_globe
 from .progress import Progress
-from .roles import named_columns, point_entries, split_names, time_column
+from .quaternions import ORDERS
+from .recording import Repair
+from .roles import named_columns, point_entries, split_names
 from .tables import ending
+from .time_columns import check_days, time_column
 
 SUMMARY = "fit C2 splines to the points in a table"
 DESCRIPTION = """\
@@ -35,8 +38,12 @@ written in the same way; those with Z or an offset become UTC, and rates are per
 The numbers of a point stand in columns in the order of its array, and --columns names them in that order: a
 matrix row by row, in a product one factor after the other. A complex number A has the columns A_re and A_im,
 which --columns calls A, or one column A if it is real. Points that are off the space by no more than 1e-4, as
-rounding in a file makes them, are moved onto it. In an NPZ file columns are arrays with one entry a row, which
-may be complex, or vectors or matrices; an array `points` may hold all numbers of the points."""
+rounding in a file makes them, are moved onto it. A rotation of so:3 may also be a unit quaternion in columns whose
+names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a place, such as tx, ty, tz, and a
+quaternion. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw.
+
+In an NPZ file columns are arrays with one entry a row, which may be complex, or vectors or matrices; an array
+`points` may hold all numbers of the points."""
 EPILOG = """\
 examples:
   symspline fit track.csv --lonlat -o track.npz
@@ -52,9 +59,14 @@ _EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "perio
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``symspline fit``."""
     add = parser.add_argument
-    add("input", type=Path, metavar="IN", help="table to read: .csv, .npz or .parquet")
+    add("input", type=Path, metavar="IN", help="table to read: .csv, .npz, .parquet, .tum or .txt")
     add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
-    add("--time", metavar="COL", help="column of times (default: t or time; if there is none, 0, 1, 2, ...)")
+    add(
+        "--time",
+        metavar="COL",
+        help="column of times (default: t, time, or dates in a column called like timestamp, date, ISO_TIME; if there "
+        "is none, 0, 1, 2, ..., as with none)",
+    )
     add(
         "--columns",
         metavar="A,B,...",
@@ -68,13 +80,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "latitude, or the two --columns; the space is sphere:2",
     )
     add(
+        "--quaternion",
+        choices=ORDERS,
+        help="order of the four numbers of a quaternion in the columns of so:3 or se:3, if their names do not end in "
+        "w, x, y and z",
+    )
+    add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
+    add(
+        "--dedup",
+        choices=("first", "mean"),
+        help="of points with one time keep the first, or their mean (default: they are an error)",
+    )
+    add(
+        "--max-gap",
+        metavar="DT",
+        help="cut curves where neighbouring times are farther apart than a number or, for dates, a duration such "
+        "as 12h; pieces are curves named 1, 2, ... or, with --curve, NAME/1, NAME/2, ...; single points are left out",
+    )
+    add(
         "--bc-type",
         default="natural",
         metavar="END",
         help="natural (default), not-a-knot, clamped, periodic; "
         "or two of the first three with a comma, for start and end",
     )
-    add("--method", default="auto", metavar="M", help="auto (default), quasi-newton or fixed-point")
+    add("--method", default="auto", metavar="M", help="auto (default), quasi-newton, newton or fixed-point")
     add(
         "--tol",
         type=real,
@@ -99,15 +129,20 @@ def run(options: argparse.Namespace) -> int:
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
     time = time_column(table, options.time, [curve, *given])
-    entries = point_entries(table, given, [time, curve], space, options.lonlat)
+    entries, quaternion = point_entries(
+        table, given, [time, curve], space, options.lonlat, options.quaternion
+    )
     with Progress("reading") as progress:
         rows = table.read([name for entry in entries for name in entry.columns], time, curve, progress)
-    if not options.lonlat:
+    check_days(table, time, rows)
+    if not options.lonlat and quaternion is None:
         rows = replace(rows, numbers=completed(rows.numbers, entries, space))
-    splines = _fit(Data(table.path, rows), space, options)
-    columns = replace(named_columns(entries, time, curve, options.lonlat), utc=rows.utc)
-    write_curves(options.output, Curves(splines, curve is not None, columns))
-    print(f"{options.output}: {_summary(list(splines.values()))}")
+    data = Data(table.path, rows, Repair(options.sort, options.dedup, options.max_gap))
+    columns = named_columns(entries, time, curve, options.lonlat)
+    columns = replace(columns, utc=rows.utc, quaternion=quaternion)
+    splines = _fit(data, space, columns, options)
+    write_curves(options.output, Curves(splines, data.named, columns))
+    print(f"{options.output}: {_summary(list(splines.values()))}{_repaired(data)}")
     return 0
 
 
@@ -120,13 +155,13 @@ def _space(name: str | None, lonlat: bool) -> Space:
     return space
 
 
-def _fit(data: Data, space: Space, options: argparse.Namespace) -> dict[str, CubicSpline]:
+def _fit(data: Data, space: Space, columns: Columns, options: argparse.Namespace) -> dict[str, CubicSpline]:
     """All curves in one call."""
     bc_type = _bc_type(options.bc_type)
     try:
         with Progress("fitting") as progress:
             fitted = fit_many(
-                data.curves(space, options.lonlat),
+                data.curves(space, columns),
                 space,
                 bc_type=bc_type,
                 method=options.method,
@@ -148,6 +183,19 @@ def _bc_type(text: str) -> str | tuple[str, ...]:
     raise Problem(
         f"--bc-type {text}: give natural, not-a-knot, clamped or periodic, or two of the first three with a comma"
     )
+
+
+def _repaired(data: Data) -> str:
+    """What was put right, of which nothing is seen in the curves."""
+    said = [
+        f"{count} row{'s' if count > 1 else ''} {what}"
+        for count, what in (
+            (data.joined, "with a time that another had"),
+            (data.alone, "alone between gaps left out"),
+        )
+        if count
+    ]
+    return "".join(f"; {part}" for part in said)
 
 
 def _summary(splines: Sequence[CubicSpline]) -> str:

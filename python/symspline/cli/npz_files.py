@@ -13,6 +13,7 @@ from ..arrays import brief
 from .errors import Problem, did_you_mean, reading
 from .layout import IM, RE
 from .tables import Array, ArrayTable
+from .times import is_date_like
 
 
 class NpzTable(ArrayTable):
@@ -24,11 +25,12 @@ class NpzTable(ArrayTable):
         self._groups = {
             key: _split(key, array)
             for key, array in _arrays(path).items()
-            if array.ndim and array.dtype.kind in "biufcMU"
+            if array.ndim and array.dtype.kind in "biufcMmSU"
         }
         self._columns = {name: column for group in self._groups.values() for name, column in group.items()}
         self.names = list(self._columns)
         self.numeric = [name for name, column in self._columns.items() if column.dtype.kind in "biuf"]
+        self.dates = [name for name, column in self._columns.items() if _holds_dates(column)]
 
     def require(self, name: str) -> str:
         if name not in self.names:
@@ -61,6 +63,12 @@ def _arrays(path: Path) -> dict[str, Array]:
     if "format" in arrays:
         raise Problem(f"{path} is a curve that was fitted already, not a table")
     return arrays
+
+
+def _holds_dates(column: Array) -> bool:
+    return column.dtype.kind in "Mm" or (
+        column.dtype.kind == "U" and len(column) > 0 and is_date_like(str(column[0]))
+    )
 
 
 def _split(key: str, array: Array) -> dict[str, Array]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .errors import Problem, reading
 from .tables import Array, ArrayTable
+from .times import is_date_like
 
 
 class ParquetTable(ArrayTable):
@@ -26,6 +27,9 @@ class ParquetTable(ArrayTable):
         self.names = self._table.column_names
         tests = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
         self.numeric = [f.name for f in self._table.schema if any(test(f.type) for test in tests)]
+        self.dates = [
+            f.name for f in self._table.schema if pa.types.is_temporal(f.type) or self._is_text_date(f)
+        ]
 
     def _column(self, name: str) -> Array:
         pa, _ = _pyarrow()
@@ -37,6 +41,13 @@ class ParquetTable(ArrayTable):
             column = column.cast(pa.float64())
         values: Array = column.to_numpy()
         return values
+
+    def _is_text_date(self, field: Any) -> bool:
+        """Whether the first text of a column is a date."""
+        if str(field.type) not in ("string", "large_string", "string_view"):
+            return False
+        first = next((cell.as_py() for cell in self._table.column(field.name)[:50] if cell.is_valid), "")
+        return is_date_like(first)
 
     def _is_utc(self, name: str) -> bool:
         return getattr(self._table.schema.field(name).type, "tz", None) is not None

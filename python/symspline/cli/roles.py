@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
 
 from .. import spaces
 from ..spaces import Product, Space
@@ -13,6 +12,7 @@ from .entries import Entry, paired
 from .errors import Problem, first_twice, listed
 from .layout import complex_numbers, described
 from .points import LONLAT
+from .quaternions import count_of, places_of
 from .tables import Table
 
 
@@ -25,18 +25,11 @@ def split_names(text: str | None) -> list[str]:
     return [name.strip() for name in names]
 
 
-def time_column(table: Table, given: str | None, others: Sequence[str | None]) -> str | None:
-    """The column of times: the one that was named, or one called t or time."""
-    if given is not None:
-        return table.require(given)
-    found = table.find("t", "time")
-    return None if found in others else found
-
-
 def point_entries(
-    table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool
-) -> list[Entry]:
-    """The numbers of a point: in columns that were named, or in all that are left."""
+    table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool, order: str | None
+) -> tuple[list[Entry], list[int] | None]:
+    """The numbers of a point: in columns that were named, or in all that are left; and, if a rotation is a quaternion,
+    which of its numbers is where."""
     if given:
         groups = [table.expand(name) for name in given]
     elif lonlat:
@@ -52,10 +45,20 @@ def point_entries(
         twice = first_twice([*filter(None, others), *names])
         if twice is not None:
             raise Problem(f"column {twice!r} of {table.path} cannot have two meanings")
+    names = [entry.name for entry in entries]
+    if len(names) == count_of(space):
+        return entries, places_of(names, space, order)
+    if order is not None:
+        raise Problem(
+            f"--quaternion {order}: {listed(names) or 'no columns'} are not the {count_of(space) or 4} numbers of a "
+            f"quaternion in {space}"
+            if count_of(space)
+            else f"--quaternion is for so:3, se:3 and products with one of them, not for {space}"
+        )
     if not lonlat:
         _check_halves(table, entries, space, bool(given))
     _check_count(table, entries, others, space, lonlat, bool(given))
-    return entries
+    return entries, None
 
 
 def named_columns(entries: list[Entry], time: str | None, curve: str | None, lonlat: bool) -> Columns:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..curves.ends import is_closed
 from ..spline import CubicSpline
-from .curves import Curves, read_curves
+from .curves import Columns, Curves, read_curves
 from .data import Groups, group
 from .errors import Problem, check_target, did_you_mean, first_twice
 from .formats import open_table, write_table
@@ -20,18 +20,22 @@ from .layout import column_names, flatten
 from .numbers import whole
 from .points import motion_degrees, motion_labels, to_degrees
 from .progress import Progress
-from .roles import time_column
+from .quaternions import Signs, columns_of
 from .tables import ENDINGS, Rows, Table, ending
+from .time_columns import time_column
 from .times import Times, every, spread
+from .tum_files import ENDINGS as TUM
+from .tum_files import as_tum
 
 SUMMARY = "make a table of points along curves"
 DESCRIPTION = """\
-Make a table of points along curves: CSV, NPZ or Parquet, by the ending of its name. Columns are the time, the
-name of the curve if there are several, and the numbers of the point, named as in the table that was
+Make a table of points along curves: CSV, NPZ, Parquet or a TUM trajectory, by the ending of its name. Columns
+are the time, the name of the curve if there are several, and the numbers of the point, named as in the table that was
 fitted, or x0, x1, ... in the order of its array, and m11, m12, ... for a matrix, row by row; of a complex
 number x0_re and x0_im. With --nu 1 there is the velocity, x0_d1, ... or x0_d1_re, ..., and with --nu 2 the
 covariant acceleration, x0_d2, ..., per unit of time, which is a second for dates. For longitude and latitude
-these are east_d1, north_d1, ..., in degrees of arc. A line or a subspace has many arrays: which one stands for
+these are east_d1, north_d1, ..., in degrees of arc; for unit quaternions, whose sign
+does not jump along a curve, the derivatives on their sphere. A line or a subspace has many arrays: which one stands for
 it may change from one segment of a curve to the next, and vectors go with the one in their row."""
 EPILOG = """\
 examples:
@@ -80,6 +84,8 @@ def run(options: argparse.Namespace) -> int:
     check_target(options.output)
     orders = _orders(options.nu)
     curves = read_curves(options.curves, options.lonlat)
+    if options.output.suffix.lower() in TUM:
+        curves = as_tum(curves, orders)
     if options.at is not None:
         times, rows = _given(options.at, curves)
     else:
@@ -170,7 +176,9 @@ def _names(curves: Curves, orders: list[int]) -> list[str]:
     columns, space = curves.columns, next(iter(curves.splines.values())).space
     names = [columns.time, *([columns.curve] if curves.named else [])]
     for nu in orders:
-        if columns.lonlat:
+        if columns.quaternion is not None:
+            names += [f"{name}_d{nu}" if nu else name for name in columns.points]
+        elif columns.lonlat:
             names += motion_labels(nu) if nu else columns.points
         else:
             names += column_names(space, columns.points, nu)
@@ -188,17 +196,24 @@ def _values(
     blocks: list[NDArray[np.float64]] = []
     done = 0
     for name, all_times in times.items():
+        signs = [Signs() for _ in orders]
         for start in range(0, len(all_times), _CHUNK):
             x = all_times[start : start + _CHUNK]
-            parts = [_quantity(curves.splines[name], x, nu, curves.columns.lonlat) for nu in orders]
+            parts = [
+                _quantity(curves.splines[name], x, nu, curves.columns, sign)
+                for nu, sign in zip(orders, signs, strict=True)
+            ]
             blocks.append(np.concatenate(parts, axis=1))
             done += len(x)
             progress(done, total)
     return np.concatenate(blocks)
 
 
-def _quantity(spline: CubicSpline, x: Times, nu: int, lonlat: bool) -> NDArray[np.float64]:
+def _quantity(spline: CubicSpline, x: Times, nu: int, columns: Columns, signs: Signs) -> NDArray[np.float64]:
     values = spline(x, nu)
-    if not lonlat:
+    if columns.quaternion is not None:
+        points = spline(x) if nu else values
+        return columns_of(spline.space, points, values, nu, columns.quaternion, signs)
+    if not columns.lonlat:
         return flatten(spline.space, values)
     return motion_degrees(spline(x), values) if nu else to_degrees(values)

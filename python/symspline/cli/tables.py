@@ -19,7 +19,7 @@ from .times import Fail, parse_times
 Array = NDArray[Any]
 Place = Callable[[int], str]
 
-ENDINGS = (".csv", ".npz", ".parquet")
+ENDINGS = (".csv", ".npz", ".parquet", ".tum", ".txt")
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,13 @@ class Table(ABC):
         path: the file.
         names: of all columns, in the order of the file.
         numeric: names of the columns that hold numbers.
+        dates: names of the columns that hold dates, or what looks like them.
     """
 
     path: Path
     names: list[str]
     numeric: list[str]
+    dates: list[str]
 
     def require(self, name: str) -> str:
         """The name, if there is such a column."""

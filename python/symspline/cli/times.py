@@ -23,6 +23,13 @@ _SHAPE = re.compile(
     r"0000-00-00"
     r"(?:(?P<mark>[T ])00:00(?P<seconds>:00(?:\.0{1,9})?)? ?(?P<zone>Z|[+-]00(?::?00)?)?)?"
 )
+# 2021-08-29, 29.8.2021, 8/29/21, 20210829T1655, 16:55, 29 Aug 2021, Aug 29, 2021
+_MONTH = r"(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*"
+_DATE_LIKE = re.compile(
+    r"\d{4}([-/.])\d{1,2}\1\d{1,2}(?!\d)|\d{1,2}([-/.])\d{1,2}\2(?:\d{4}|\d{2})(?!\d|\.\d)|\d{8}T\d{4}|\d{1,2}:\d{2}(?!\d)"
+    rf"|\d{{1,2}}[-. ]*{_MONTH}[-. ,]*\d{{2}}|{_MONTH}[-. ]*\d{{1,2}}\b",
+    re.IGNORECASE | re.ASCII,
+)
 _ZEROS = str.maketrans("123456789", "000000000")
 # Whole numbers up to here are exact as doubles.
 _EXACT = 2**53
@@ -118,6 +125,11 @@ def _minutes(offset: str) -> int:
     return -minutes if offset[0] == "-" else minutes
 
 
+def is_date_like(text: str) -> bool:
+    """Whether a text seems to be a date or a time of day, in any of the usual ways to write them."""
+    return _DATE_LIKE.match(text.strip()) is not None
+
+
 def _is_date(text: str) -> bool:
     try:
         np.datetime64(text)
@@ -129,9 +141,20 @@ def _is_date(text: str) -> bool:
 # ---- times along a curve ----
 
 
+def gap_of(longest: str, knots: Times) -> NDArray[np.bool_]:
+    """Whether the steps between knots are longer than a duration such as ``"12h"``."""
+    number, unit = _duration(longest, "--max-gap")
+    if knots.dtype.kind == "M":
+        seconds = number * _NANOSECONDS[unit or "s"] / _NANOSECONDS["s"]
+        return np.diff(knots) / np.timedelta64(1, "s") > float(seconds)
+    if unit:
+        raise Problem(f"--max-gap {longest}: the times are numbers; give a gap without a unit")
+    return np.diff(knots) > float(number)
+
+
 def every(step: str, knots: Times) -> Times:
     """Times from the first to at most the last knot, one a step."""
-    number, unit = _duration(step)
+    number, unit = _duration(step, "--every")
     if knots.dtype.kind == "M":
         delta = _timedelta(number * _NANOSECONDS[unit or "s"], step)
         start, stop = _ends_in(delta, knots)
@@ -212,20 +235,20 @@ def _count(steps: float, option: str) -> int:
     return int(steps) + 1
 
 
-def _duration(text: str) -> tuple[Decimal, str]:
+def _duration(text: str, option: str) -> tuple[Decimal, str]:
     """``"10min"`` is 10 and ``"min"``."""
     match = _DURATION.fullmatch(text.strip())
     if match is None or match[2].lower() not in ("", *_NANOSECONDS):
         raise Problem(
-            f"--every {text}: a step is a number such as 0.5, or a duration such as 10min; "
+            f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
             f"units are {', '.join(_NANOSECONDS)}"
         )
     try:
         number = Decimal(match[1])
     except InvalidOperation:
-        raise Problem(f"--every {text}: that is no number of any use") from None
+        raise Problem(f"{option} {text}: that is no number of any use") from None
     if number == 0:
-        raise Problem(f"--every {text}: a step must be larger than zero")
+        raise Problem(f"{option} {text}: it must be larger than zero")
     if abs(number.adjusted()) > _EXPONENT:
-        raise Problem(f"--every {text}: that is too {'long' if number > 1 else 'short'}")
+        raise Problem(f"{option} {text}: that is too {'long' if number > 1 else 'short'}")
     return number, match[2].lower()

@@ -1,0 +1,198 @@
+"""Rotations as quaternions in columns, poses, and TUM trajectories."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from curves import points_on
+from scipy.spatial.transform import Rotation
+from tabular import TIMES, numbers, read_table, table, write, write_table
+
+import symspline as ss
+from symspline.convert import quaternion_to_matrix
+
+WXYZ = ["qw", "qx", "qy", "qz"]
+# More than a whole turn, so that signs of quaternions with w >= 0 jump.
+TURNS = Rotation.from_rotvec(
+    np.add(np.outer([0, 1.4, 2.7, 3.8, 5.5, 7.2], [0.36, 0.48, 0.8]), [0.1, 0, 0.02])
+)
+Q = TURNS.as_quat(scalar_first=True)
+PLACES = np.random.default_rng(0).normal(size=(6, 3)).cumsum(0)
+
+
+def poses():
+    p = np.zeros((6, 4, 4))
+    p[:, :3, :3], p[:, :3, 3], p[:, 3, 3] = quaternion_to_matrix(Q, scalar_first=True), PLACES, 1
+    return p
+
+
+def columns(**more):
+    return {"t": TIMES, **dict(zip(WXYZ, Q.T, strict=True)), **more}
+
+
+@pytest.mark.parametrize(
+    "names", [WXYZ, ["rot_W", "rot_X", "rot_Y", "rot_Z"], [*"wxyz"], ["q.w []", "q.x []", "q.y []", "q.z []"]]
+)
+@pytest.mark.parametrize("order", [[0, 1, 2, 3], [1, 2, 3, 0], [2, 0, 3, 1]])
+def test_quaternions_by_their_names_in_any_order(run, names, order):
+    write_table("a.csv", {"t": TIMES, **{names[i]: Q[:, i] for i in order}})
+    run("fit a.csv --space so:3 -o a.npz")
+    spline = ss.load("a.npz")
+    np.testing.assert_allclose(spline.points, TURNS.as_matrix(), atol=1e-15)
+    run("check a.npz")
+    run("sample a.npz -n 200 -o b.csv")
+    assert list(table("b.csv")) == ["t", *(names[i] for i in order)]
+    q = numbers(table("b.csv"), *names)
+    x = np.linspace(0, 5, 200)
+    np.testing.assert_allclose(Rotation.from_quat(q, scalar_first=True).as_matrix(), spline(x), atol=1e-14)
+    assert ((q[1:] * q[:-1]).sum(1) > 0.99).all() and q[0, 0] >= 0 > q[:, 0].min()
+
+
+def test_derivatives_of_quaternions_are_those_on_their_sphere(run, monkeypatch):
+    """The sphere covers the rotations: the same curve there, with derivatives of its own."""
+    monkeypatch.setattr("symspline.cli.sample._CHUNK", 7)
+    signs = np.where(np.cumsum(np.append(False, (Q[1:] * Q[:-1]).sum(1) < 0)) % 2, -1, 1)
+    start = np.sign(Q[0, 0])
+    on_sphere = ss.CubicSpline(TIMES, start * signs[:, None] * Q, "sphere:3")
+    write_table("a.npz", columns())
+    run("fit a.npz --space so:3 --columns qw,qx,qy,qz -o b.npz")
+    run("sample b.npz -n 100 --nu 0,1,2 -o c.npz")
+    found, x = read_table("c.npz"), np.linspace(0, 5, 100)
+    for nu, mark in enumerate(("", "_d1", "_d2")):
+        expected = on_sphere(x, nu)
+        np.testing.assert_allclose(
+            np.stack([found[name + mark] for name in WXYZ], 1), expected, atol=1e-12 * np.abs(expected).max()
+        )
+
+
+@pytest.mark.parametrize("space", ["se:3", "so:3 x r:3", "r:3 x so:3"])
+def test_poses(run, space):
+    write_table("a.csv", columns(ty=PLACES[:, 1], tx=PLACES[:, 0], tz=PLACES[:, 2]))
+    run(f"fit a.csv --space '{space}' -o a.npz")
+    spline = ss.load("a.npz")
+    p = poses()
+    given = {"se:3": p, "so:3 x r:3": (p[:, :3, :3], PLACES), "r:3 x so:3": (PLACES, p[:, :3, :3])}[space]
+    expected = ss.CubicSpline(TIMES, given, space)
+    x = np.linspace(0, 5, 40)
+    run("sample a.npz -n 40 --nu 0,1,2 -o b.csv")
+    found = table("b.csv")
+    for nu, mark in enumerate(("", "_d1", "_d2")):
+        values = expected(x, nu)
+        way = values[:, :3, 3] if space == "se:3" else values[space.split(" x ").index("r:3")]
+        np.testing.assert_allclose(numbers(found, *(f"t{i}{mark}" for i in "xyz")), way, atol=1e-12)
+    turn = Rotation.from_quat(numbers(found, *WXYZ), scalar_first=True).as_matrix()
+    own = spline(x)[:, :3, :3] if space == "se:3" else spline(x)[space.split(" x ").index("so:3")]
+    np.testing.assert_allclose(turn, own, atol=1e-14)
+
+
+def test_orders_that_names_do_not_tell(run, fails):
+    write_table("a.csv", {"t": TIMES, **{f"q{i}": Q[:, i] for i in range(4)}})
+    problem = fails("fit a.csv --space so:3 -o a.npz")
+    assert problem.startswith(
+        "q0, q1, q2, q3 may be a quaternion, but the names do not say which number is which"
+    )
+    run("fit a.csv --space so:3 --quaternion wxyz -o a.npz")
+    np.testing.assert_allclose(ss.load("a.npz").points, TURNS.as_matrix(), atol=1e-15)
+    run("fit a.csv --space so:3 --quaternion xyzw --columns q1,q2,q3,q0 -o b.npz")
+    assert ss.load("b.npz") == ss.load("a.npz")
+    write_table("a.csv", columns())
+    problem = fails("fit a.csv --space so:3 --quaternion xyzw -o c.npz")
+    assert problem.startswith("--quaternion xyzw makes other numbers of qw, qx, qy, qz than their names")
+    run("fit a.csv --space so:3 --quaternion wxyz -o a.npz")
+    assert "--quaternion is for so:3, se:3" in fails("fit a.csv --space s:3 --quaternion wxyz -o c.npz")
+    assert "are not the 4 numbers of a quaternion" in fails(
+        "fit a.csv --space so:3 --quaternion wxyz --columns qw,qx -o c.npz"
+    )
+    # On the sphere of quaternions they are what they were.
+    run("fit a.csv --space sphere:3 -o a.npz")
+
+
+def test_quaternions_that_are_rounded_or_none(run, fails):
+    write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, Q.round(6).T, strict=True))})
+    run("fit a.csv --space so:3 -o a.npz")
+    np.testing.assert_allclose(ss.load("a.npz").points, TURNS.as_matrix(), atol=5e-6)
+    off = Q.copy()
+    off[3] *= 1.001
+    write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, off.T, strict=True))})
+    problem = fails("fit a.csv --space so:3 -o b.npz")
+    assert problem.startswith("a.csv, line 5: the quaternion has length 1.001, not 1 (allowed: 1 ± 1e-04)")
+
+
+# ---- TUM ----
+
+TUM = "# a comment\n" + "".join(
+    f"{1305031102.1758 + t:.4f} {' '.join(f'{v:.4f}' for v in (*p, *np.roll(q, -1)))}\n"
+    for t, p, q in zip(TIMES, PLACES, Q, strict=True)
+)
+
+
+@pytest.mark.parametrize("ending", ["tum", "txt"])
+@pytest.mark.parametrize("space", ["se:3", "so:3 x r:3", "r:3 x so:3"])
+def test_tum_trajectories_in_and_out(run, ending, space):
+    write(f"a.{ending}", TUM)
+    run(f"fit a.{ending} --space '{space}' -o a.npz")
+    spline = ss.load("a.npz")
+    np.testing.assert_allclose(spline.t, 1305031102.1758 + TIMES, atol=1e-6)
+    run(f"sample a.npz --at a.{ending} -o b.{ending}")
+    first, *lines = Path(f"b.{ending}").read_text().splitlines()
+    assert first == "# timestamp tx ty tz qx qy qz qw"
+    found = np.array([line.split() for line in lines], float)
+    given = np.loadtxt(f"a.{ending}")
+    np.testing.assert_array_equal(found[:, 0], given[:, 0])
+    np.testing.assert_allclose(found[:, 1:4], given[:, 1:4], atol=1e-12)
+    turned = [Rotation.from_quat(rows[:, 4:]) for rows in (found, given)]
+    assert (turned[0].inv() * turned[1]).magnitude().max() < 1e-12
+    run(f"fit b.{ending} --space '{space}' -o c.npz")
+
+
+def test_tum_of_curves_from_matrices_and_dates(run):
+    t = np.array("2021-08-29", "datetime64[ns]") + np.array([0, 1_000_000_007])
+    ss.CubicSpline(t, poses()[:2], "se:3").save("a.npz")
+    write("t.csv", "t\n" + "".join(f"{time}\n" for time in t))
+    run("sample a.npz --at t.csv -o a.tum")
+    lines = Path("a.tum").read_text().splitlines()
+    assert lines[1].split()[0] == "1630195200.000000000" and lines[2].split()[0] == "1630195201.000000007"
+
+
+@pytest.mark.parametrize(
+    "text, problem",
+    [
+        ("", "a.tum is empty"),
+        ("# x\n", "a.tum is empty"),
+        (
+            "# x\n0 1 2 3\n",
+            "a.tum, line 2: 4 numbers, but a line of a TUM trajectory has 8: time tx ty tz qx",
+        ),
+        ("0 0 0 0 0 0 0 1\n1 0 0 x 0 0 0 1\n", "a.tum, line 2: column 'tz' holds 'x', which is not a number"),
+        ("0 0 0 0 0 0 0 1\n1 0 nan 0 0 0 0 1\n", "a.tum, line 2: column 'ty' holds nan"),
+        ("0 0 0 0 0 0 0 1\n1 0 0 0 1 0 0 1\n", "a.tum, line 2: the quaternion has length 1.41421"),
+        ("0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "a.tum, line 2: time 0.0 does not come after 0.0 in line 1"),
+    ],
+)
+def test_bad_tum_trajectories(fails, text, problem):
+    write("a.tum", text)
+    assert fails("fit a.tum --space se:3 -o a.npz").startswith(problem)
+
+
+def test_what_a_tum_trajectory_cannot_hold(run, fails):
+    ss.CubicSpline(None, np.eye(3), "s:2").save("a.npz")
+    assert "has poses, points of se:3" in fails("sample a.npz -n 3 -o b.tum")
+    p = points_on(ss.space("se:3"), 6, step=0.4)
+    ss.CubicSpline(None, p, "se:3").save("a.npz")
+    assert "no derivatives" in fails("sample a.npz -n 3 --nu 0,1 -o b.tum")
+    ss.CubicSpline(None, np.stack([p, p]), "se:3").save("a.npz")
+    assert "is one curve" in fails("sample a.npz -n 3 -o b.tum")
+    t = np.array(["1960-01-01", "2020-01-01"], "datetime64[s]")
+    ss.CubicSpline(t, p[:2], "se:3").save("a.npz")
+    assert "counted from 1970 on" in fails("sample a.npz -n 3 -o b.tum")
+
+
+@pytest.mark.parametrize("places", ["[0, 1, 2]", "[0, 1, 2, 2]", '"wxyz"', "[0, 1, 2, true]", "{}"])
+def test_places_of_quaternions_that_are_damaged(fails, places):
+    ss.CubicSpline(None, TURNS.as_matrix(), "so:3").save("a.npz")
+    np.savez(
+        "b.npz",
+        **dict(np.load("a.npz")),
+        columns=f'{{"points": ["a", "b", "c", "d"], "quaternion": {places}}}',
+    )
+    assert fails("sample b.npz -n 3 -o c.csv").startswith("b.npz is damaged: ")

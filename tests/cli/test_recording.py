@@ -1,0 +1,132 @@
+"""Recordings put right: rows out of order, times that come twice, pauses."""
+
+import numpy as np
+import pytest
+from cases import COMMON
+from curves import each, parts, points_on, same
+from tabular import numbered, table, write, write_table
+
+import symspline as ss
+from symspline.cli.recording import means
+
+
+def line(t, x=None, name="a.csv", **more):
+    columns = {"t": t, **more, "x": list(range(len(t))) if x is None else x}
+    rows = zip(*columns.values(), strict=True)
+    write(name, "\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
+
+
+def test_sort(run, fails):
+    line([0, 3, 1, 2])
+    problem = fails("fit a.csv --space r:1 -o a.npz")
+    assert problem.startswith("a.csv, line 4: time 1.0 does not come after 3.0 in line 3")
+    assert problem.endswith("times must increase; --sort puts rows in order")
+    run("fit a.csv --space r:1 --sort -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2, 3], [[0], [2], [3], [1]], "r:1")
+    line([0, 3, 1, 1])
+    problem = fails("fit a.csv --space r:1 --sort -o b.npz")
+    assert problem.startswith("a.csv, line 5: time 1.0 does not come after 1.0 in line 4")
+    assert problem.endswith("--dedup first or mean makes one point of them")
+
+
+def test_sort_within_every_curve(run):
+    line([5, 0, 1, 4], id=[*"abba"])
+    run("fit a.csv --space r:1 --curve id --sort -o a.npz")
+    found = ss.load_many("a.npz")
+    assert found["a"] == ss.CubicSpline([4, 5], [[3], [0]], "r:1")
+    assert found["b"] == ss.CubicSpline([0, 1], [[1], [2]], "r:1")
+
+
+def test_dedup(run, fails):
+    line([0, 0, 1, 2, 2, 2], [1, 3, 5, 1, 2, 6])
+    out = run("fit a.csv --space r:1 --dedup first -o a.npz")
+    assert out.endswith("; 3 rows with a time that another had\n")
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[1], [5], [1]], "r:1")
+    run("fit a.csv --space r:1 --dedup mean -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[2], [5], [3]], "r:1")
+    line([0, 1, 0, 2], [1, 3, 5, 7])
+    assert "line 4: time 0.0 does not come after 1.0" in fails("fit a.csv --space r:1 --dedup first -o b.npz")
+    run("fit a.csv --space r:1 --dedup mean --sort -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[3], [3], [7]], "r:1")
+    assert "--dedup" in fails("fit a.csv --space r:1 --dedup last -o b.npz")
+
+
+@pytest.mark.parametrize("name", [*map(str, COMMON), "s:2 x so:3", "rp:2", "cp:2"])
+def test_means_of_two_points_lie_halfway(run, name):
+    space, p = ss.space(name), points_on(ss.space(name), n=6, step=0.4)
+    write_table("a.npz", {"t": np.array([0, 1, 1, 2, 3, 3.0]), **numbered(p)})
+    run(f"fit a.npz --space '{name}' --dedup mean -o b.npz")
+    found = ss.load("b.npz").points
+    left, right = (each(lambda part, i=i: part[i], p) for i in ([1, 4], [2, 5]))
+    halfway = space.geodesic(left, right, 0.5)
+    middle = each(lambda part: part[[1, 3]], found)
+    assert np.max(space.distance(middle, halfway)) < 1e-14 * np.max(space.rounding(halfway))
+    assert same(
+        parts(each(lambda part: part[[0, 2]], found))[0], parts(each(lambda part: part[[0, 3]], p))[0]
+    )
+
+
+@pytest.mark.parametrize("name", ["s:2", "so:3", "spd:3", "h:2", "gr:2,4"])
+def test_a_mean_is_where_all_ways_to_it_add_up_to_nothing(name):
+    space = ss.space(name)
+    p = points_on(space, n=9, step=0.4)
+    found = means(space, p, np.array([0, 1, 5]))
+    np.testing.assert_array_equal(found[0], p[0])
+    for centre, own in ((found[1], p[1:5]), (found[2], p[5:])):
+        sums = space.log(centre, own).sum(axis=0)
+        assert space.norm(centre, sums) < 1e-13 * space.rounding(centre)
+
+
+def test_points_that_have_no_mean(fails):
+    write("a.csv", "t,x,y,z\n0,1,0,0\n1,0,1,0\n1,0,-1,0\n")
+    problem = fails("fit a.csv --space s:2 --dedup mean -o a.npz")
+    assert problem.startswith("a.csv: points with one time are too far apart to have a mean; --dedup first")
+
+
+def test_max_gap(run, fails):
+    line([0, 1, 2, 12, 13, 40, 60, 61])
+    out = run("fit a.csv --space r:1 --max-gap 5 -o a.npz")
+    assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith(
+        "; 1 row alone between gaps left out\n"
+    )
+    found = ss.load_many("a.npz")
+    assert {name: spline.t.tolist() for name, spline in found.items()} == {
+        "1": [0, 1, 2],
+        "2": [12, 13],
+        "3": [60, 61],
+    }
+    assert found["2"] == ss.CubicSpline([12, 13], [[3], [4]], "r:1")
+    run("sample a.npz --every 1 -o b.csv")
+    assert table("b.csv")["curve"] == [*"1112233"]
+    # As long as the limit is no gap.
+    run("fit a.csv --space r:1 --max-gap 27 -o a.npz")
+    assert list(ss.load_many("a.npz")) == ["1"]
+    assert "every point stands alone" in fails("fit a.csv --space r:1 --max-gap 0.5 -o c.npz")
+    assert "give a gap without a unit" in fails("fit a.csv --space r:1 --max-gap 5s -o c.npz")
+    assert "--max-gap soon: a duration is a number" in fails("fit a.csv --space r:1 --max-gap soon -o c.npz")
+
+
+def test_max_gap_of_dates_and_of_named_curves(run, fails):
+    days = [f"2021-08-{day:02}" for day in (1, 2, 9, 10, 1, 2)]
+    line(days, id=[*"aaaabb"])
+    run("fit a.csv --space r:1 --curve id --max-gap 36h -o a.npz")
+    assert list(ss.load_many("a.npz")) == ["a/1", "a/2", "b"]
+    run("fit a.csv --space r:1 --curve id --max-gap 604800 -o a.npz")
+    assert list(ss.load_many("a.npz")) == ["a", "b"]
+    line(days, id=["a", "a", "a", "a", "a/1", "a/1"])
+    assert "two curves would have the name 'a/1'" in fails(
+        "fit a.csv --space r:1 --curve id --max-gap 36h -o b.npz"
+    )
+
+
+@pytest.mark.parametrize("option", ["--sort", "--dedup first", "--max-gap 3"])
+def test_without_times_there_is_nothing_to_go_by(fails, option):
+    write("a.csv", "x\n1\n2\n")
+    problem = fails(f"fit a.csv --space r:1 {option} -o a.npz")
+    assert problem.startswith(f"{option.split()[0]} goes by times, and there is no column of times")
+
+
+def test_problems_after_repairs_name_the_row(fails):
+    write("a.csv", "t,x,y,z\n5,0,-1,0\n0,1,0,0\n0,1,0,0\n1,0,1,0\n")
+    problem = fails("fit a.csv --space s:2 --sort --dedup first -o a.npz")
+    assert "the point in line 5 and the point in line 2 of the curve" in problem
