@@ -6,6 +6,7 @@
     derivatives  with respect to the data; JAX
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo
+    quantum      Hamiltonians, propagators, pulses, the Bloch sphere
     host         the program around: threads, memory, interruptions
     docs, bench  what they show runs
     fuzz         random input; `make fuzz` runs it at length

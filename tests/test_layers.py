@@ -17,7 +17,7 @@ LAYERS = [
     ["spline", "free"],
     ["functions"],
     ["adapters", "convert", "files", "jax", "pieces", "torch"],
-    ["hurdat", "tracks"],
+    ["hurdat", "quantum", "tracks"],
     ["cli", "demo"],
     ["__init__", "__main__"],
 ]
