@@ -10,14 +10,14 @@ ROOT = Path(symspline.__file__).parent
 # From below. A folder stands for all that is in it.
 LAYERS = [
     ["_core", "_cpu"],
-    ["arrays", "lonlat", "report", "threads", "times"],
+    ["arrays", "geo", "report", "threads", "times"],
     ["spaces"],
     ["curves"],
     ["archive", "failures", "options", "plotting"],
     ["spline", "free"],
     ["functions"],
-    ["adapters", "convert", "files", "jax", "pieces", "torch"],
-    ["hurdat", "quantum", "tracks"],
+    ["adapters", "convert", "files", "jax", "lonlat", "pieces", "torch"],
+    ["hurdat", "quantum", "tensors", "tracks"],
     ["cli", "demo"],
     ["__init__", "__main__"],
 ]

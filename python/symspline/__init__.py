@@ -16,7 +16,7 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
-from . import convert, quantum  # noqa: E402
+from . import convert, geo, quantum, tensors  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .curves.derivatives import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
@@ -78,6 +78,7 @@ __all__ = [
     "evaluate",
     "fit",
     "fit_many",
+    "geo",
     "load",
     "load_many",
     "num_threads",
@@ -85,6 +86,7 @@ __all__ = [
     "save_many",
     "set_num_threads",
     "space",
+    "tensors",
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):
