@@ -7,6 +7,10 @@
     derivatives  with respect to the data; JAX
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo
+    geo          places, speed and course on a globe
+    quantum      Hamiltonians, propagators, pulses, the Bloch sphere
+    tensors      diffusion tensors in the order of each program, NIfTI files
+    shapes       affine shapes of landmarks, morphs and their pictures
     host         the program around: threads, memory, interruptions
     docs, bench  what they show runs
     fuzz         random input; `make fuzz` runs it at length

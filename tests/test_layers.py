@@ -10,14 +10,14 @@ ROOT = Path(symspline.__file__).parent
 # From below. A folder stands for all that is in it.
 LAYERS = [
     ["_core", "_cpu"],
-    ["arrays", "lonlat", "report", "threads", "times", "version"],
+    ["arrays", "geo", "report", "threads", "times", "version"],
     ["spaces"],
     ["curves"],
     ["archive", "failures", "options", "plotting", "signs"],
     ["spline", "free"],
     ["functions"],
-    ["adapters", "convert", "files", "hermite", "jax", "pieces", "segments", "torch"],
-    ["hurdat", "pose_files", "poses", "rotations", "tracks"],
+    ["adapters", "convert", "files", "hermite", "jax", "lonlat", "pieces", "segments", "torch"],
+    ["hurdat", "pose_files", "poses", "quantum", "rotations", "shapes", "tensors", "tracks"],
     ["cli", "demo"],
     ["__init__", "__main__"],
 ]

@@ -16,7 +16,7 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
-from . import convert, poses, rotations  # noqa: E402
+from . import convert, geo, poses, quantum, rotations, shapes, tensors  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .curves.derivatives import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
@@ -83,14 +83,18 @@ __all__ = [
     "fit",
     "fit_many",
     "fit_segments",
+    "geo",
     "load",
     "load_many",
     "num_threads",
     "poses",
+    "quantum",
     "rotations",
     "save_many",
     "set_num_threads",
+    "shapes",
     "space",
+    "tensors",
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .functions import fit_many
+from .geo import compass, from_lonlat, to_lonlat
 from .hurdat import Storm
-from .lonlat import compass, from_lonlat, to_lonlat
 from .pieces import Pieces, pairs, spline_pieces
 from .spaces import Sphere
 from .spline import CubicSpline

@@ -4,7 +4,7 @@ import numpy as np
 from tabular import FIXES, TRACK, numbers, table, write
 
 import symspline as ss
-from symspline.lonlat import from_lonlat, to_lonlat
+from symspline.geo import from_lonlat, to_lonlat
 
 
 def test_a_track_across_the_date_line(run):

@@ -9,7 +9,7 @@ import pytest
 import symspline as ss
 from symspline import demo, hurdat, tracks
 from symspline.cli import main
-from symspline.lonlat import from_lonlat, to_lonlat
+from symspline.geo import from_lonlat, to_lonlat
 from symspline.pieces import Pieces, pairs
 
 HOUR = np.timedelta64(1, "h")

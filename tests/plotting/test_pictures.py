@@ -5,7 +5,7 @@ import pytest
 from drawn import axes_named, dots_of, lines_of, rendered, texts_of
 
 import symspline as ss
-from symspline.lonlat import from_lonlat
+from symspline.geo import from_lonlat
 from symspline.plotting import bloch, disk, dome, globe, sphere
 
 # ---- maps and globes ----

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import symspline as ss
-from symspline.lonlat import from_lonlat, to_lonlat
+from symspline.geo import from_lonlat, to_lonlat
 
 S2 = ss.Sphere(2)
 AXES = np.eye(3)

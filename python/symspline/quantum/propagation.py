@@ -1,0 +1,155 @@
+"""The propagator of a curve's Hamiltonian."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._core import ValidationError
+from ..convert.reading import Array, adjoint, refuse
+from ..spaces import ComplexGrassmannian, ComplexProjective
+from ..spline import CubicSpline
+from .generators import generator, quantum_space
+
+Doubles = NDArray[np.float64]
+
+STAGES = 8
+# On legs of this length eight stages reach rounding.
+_LEG = 0.4
+# Bytes of the linear systems that are solved at once.
+_BLOCK = 2**26
+
+
+def propagator(spline: CubicSpline, x: ArrayLike) -> Array:
+    """The unitary U(x) that brings states from the first knot to time x: iU' = HU, U = 1 at the first knot.
+
+    U(x) moves the first point along the curve, and all that is orthogonal to it without turning. Its error is
+    rounding: Gauss's collocation of order 16 inside every segment, where the curve is analytic. It does not
+    depend on what other times are asked for.
+
+    Source: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), §II.1.3 and §IV.2.1: Gauss's methods
+    keep U*U.
+
+    Args:
+        spline: as for `hamiltonian`.
+        x: times between the first and the last knot, any shape.
+
+    Returns:
+        Unitary matrices, shape batch axes + x.shape + (n, n).
+
+    Raises:
+        ValidationError: the curve is in another space, or a time is outside the knots.
+
+    >>> import symspline as ss
+    >>> from_up_to_down = ss.CubicSpline([0, 1, 2], [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    >>> propagator(from_up_to_down, 2).round(8).real + 0.0
+    array([[ 0., -1.],
+           [ 1.,  0.]])
+    """
+    space = quantum_space(spline)
+    times, curves = _times(spline, x), int(np.prod(spline._batch))
+    if not isinstance(space, (ComplexProjective, ComplexGrassmannian)):
+        first = spline.points.reshape(curves, -1, *space.point_shape)[:, :1]
+        gates = spline._curve.evaluate(times.ravel(), "point", "raise", False)
+        moved: Array = gates.reshape(curves, times.size, *space.point_shape) @ adjoint(first)
+        return moved.reshape(*spline._batch, *times.shape, *space.point_shape)
+    edges = _edges(spline).reshape(curves, -1)
+    at_edges = _products(_steps(spline, edges[:, :-1], np.diff(edges)))
+    flat = np.broadcast_to(times.ravel(), (curves, times.size))
+    place = np.stack([np.searchsorted(own, times.ravel(), "right") for own in edges[:, :-1]]) - 1
+    start = np.take_along_axis(edges, place, axis=1)
+    result = _steps(spline, start, flat - start) @ np.take_along_axis(
+        at_edges, place[..., None, None], axis=1
+    )
+    return _unitary(result).reshape(*spline._batch, *times.shape, *result.shape[-2:])
+
+
+def _times(spline: CubicSpline, x: ArrayLike) -> Doubles:
+    """The times as the core counts them, the same for all curves."""
+    times, per_curve = spline._clock.at(x, spline._batch, False)
+    if per_curve:
+        raise ValidationError(
+            "the curves count time from first knots of their own; ask for the propagator of one at a time: "
+            "propagator(spline[i], x)"
+        )
+    first, last = spline._times[..., 0].max(), spline._times[..., -1].min()
+    refuse(
+        ~((times >= first) & (times <= last)),
+        "x",
+        lambda i: (
+            f"is {times[i]}, outside the knots, which go from {first} to {last}; the propagator is known between them"
+        ),
+    )
+    return times
+
+
+def _edges(spline: CubicSpline) -> Doubles:
+    """The knots with as many times between them as make legs short enough, shape batch axes + (m,)."""
+    knots = np.broadcast_to(spline._times, (*spline._batch, spline._times.shape[-1]))
+    lengths = np.diff(knots)
+    inner = knots[..., :-1, None] + lengths[..., None] * np.linspace(0, 1, 9)
+    speed = spline._curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
+    legs = speed.reshape(inner.shape).max(axis=-1) * lengths
+    # The same number in all curves, so that they are one array.
+    number = np.maximum(1, np.ceil(legs.reshape(-1, legs.shape[-1]).max(axis=0) / _LEG)).astype(int)
+    share = np.concatenate([np.arange(n) / n for n in number])
+    starts = np.repeat(knots[..., :-1], number, axis=-1) + np.repeat(lengths, number, axis=-1) * share
+    return np.concatenate([starts, knots[..., -1:]], axis=-1)
+
+
+def _products(steps: Array) -> Array:
+    """The products of the first 0, 1, 2, … of m steps, shape (curves, m + 1, n, n)."""
+    products = [np.broadcast_to(np.eye(steps.shape[-1], dtype=complex), steps[:, 0].shape)]
+    for i in range(steps.shape[1]):
+        products.append(_unitary(steps[:, i] @ products[-1]))
+    return np.stack(products, axis=1)
+
+
+def _steps(spline: CubicSpline, start: Doubles, length: Doubles) -> Array:
+    """The propagators from times to times a little later in the same segment, shape (curves, m, n, n)."""
+    n = spline.space.point_shape[0]
+    block = max(1, _BLOCK // (start.shape[0] * (STAGES * n) ** 2 * 16))
+    pieces = [
+        _step(spline, start[:, i : i + block], length[:, i : i + block])
+        for i in range(0, start.shape[1], block)
+    ]
+    return np.concatenate(pieces, axis=1) if pieces else np.zeros((*start.shape, n, n), complex)
+
+
+def _step(spline: CubicSpline, start: Doubles, length: Doubles) -> Array:
+    nodes, weights, matrix = gauss()
+    times = start[..., None] + length[..., None] * nodes
+    point, velocity = (
+        spline._curve.evaluate(times.reshape(*spline._batch, -1), quantity, "raise", True)
+        for quantity in ("point", "velocity")
+    )
+    h = generator(spline.space, point, velocity)
+    n = h.shape[-1]
+    rates = -1j * length[..., None, None, None] * h.reshape(*times.shape, n, n)
+    # Kᵢ = rateᵢ (1 + Σ aᵢⱼ Kⱼ), for all stages at once.
+    system = np.eye(STAGES * n) - np.einsum("ij,cmiab->cmiajb", matrix, rates).reshape(
+        *start.shape, STAGES * n, STAGES * n
+    )
+    stages = np.linalg.solve(system, rates.reshape(*start.shape, STAGES * n, n))
+    step = np.eye(n) + np.einsum("i,cmiab->cmab", weights, stages.reshape(rates.shape))
+    return _unitary(step)
+
+
+def _unitary(u: Array) -> Array:
+    """The unitary matrices next to some that are so but for rounding: one step of Newton and Schulz."""
+    polished: Array = u @ (3 * np.eye(u.shape[-1]) - adjoint(u) @ u) / 2
+    return polished
+
+
+@cache
+def gauss() -> tuple[Doubles, Doubles, Doubles]:
+    """Nodes c, weights b and the matrix a of Gauss's collocation on [0, 1]: aᵢⱼ is the integral of the j-th Lagrange
+    polynomial from 0 to cᵢ."""
+    y, w = np.polynomial.legendre.leggauss(STAGES)
+    # In Legendre's polynomials nothing cancels; the integral of Pₖ is (Pₖ₊₁ − Pₖ₋₁) / (2k + 1), of P₀ it is P₁ + P₀.
+    p = np.polynomial.legendre.legvander(y, STAGES)
+    odd = 2 * np.arange(STAGES) + 1
+    integrals = (p[:, 1:] - np.c_[-p[:, 0], p[:, : STAGES - 1]]) / odd
+    return (1 + y) / 2, w / 2, integrals @ (p[:, :STAGES] * odd * w[:, None] / 4).T

@@ -1,0 +1,121 @@
+"""Volumes of diffusion tensors in NIfTI files, through nibabel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._core import ValidationError
+from ..arrays import as_array
+from .orders import Array, from_vectors, to_vectors
+
+File = str | PathLike[str]
+
+# nifti1.h: the lower triangle row by row along the fifth axis.
+_SYMMATRIX = 1005
+
+
+@dataclass(frozen=True)
+class Volume:
+    """The tensors of the voxels inside a mask.
+
+    Attributes:
+        tensors: shape (V, 3, 3), voxels in the order of the mask's True entries.
+        mask: shape (X, Y, Z).
+        affine: from voxels to millimetres, shape (4, 4).
+    """
+
+    tensors: Array
+    mask: NDArray[np.bool_]
+    affine: NDArray[np.float64]
+
+
+def read_nifti(file: File, order: str | None = None, mask: ArrayLike | File | None = None) -> Volume:
+    """The tensors of a NIfTI file with six volumes.
+
+    The curves through V voxels of several files with one mask are a batch: stack their ``tensors`` along axis 1 to
+    shape (V, N+1, 3, 3).
+
+    Args:
+        file: shape (X, Y, Z, 6), or (X, Y, Z, 1, 6) with the intent of symmetric matrices, as ITK and ANTs write it.
+        order: as for `from_vectors`; not needed where the file says that it holds symmetric matrices, whose order is
+            a part of NIfTI.
+        mask: which voxels to take, shape (X, Y, Z), or a file with such a volume; None for those whose six numbers
+            are finite and not all zero.
+
+    Returns:
+        The tensors, the mask and the affine map. Single precision stays single.
+
+    Raises:
+        ImportError: nibabel is not installed.
+        ValidationError: the file or the mask is of another shape, or the order is not given.
+    """
+    image = _nibabel().load(fspath(file))
+    numbers = np.asanyarray(image.dataobj)
+    if int(image.header["intent_code"]) == _SYMMATRIX:
+        order = "dipy"
+    elif order is None:
+        raise ValidationError(
+            f"{fspath(file)} does not say in which order its six volumes are; say order='dipy', 'fsl' or 'mrtrix', "
+            "after the program that wrote it"
+        )
+    if numbers.ndim == 5 and numbers.shape[3] == 1:
+        numbers = numbers[:, :, :, 0]
+    if numbers.ndim != 4 or numbers.shape[3] != 6:
+        raise ValidationError(
+            f"{fspath(file)} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)"
+        )
+    inside = _mask(mask, numbers)
+    return Volume(from_vectors(numbers[inside], order), inside, np.asarray(image.affine, float))
+
+
+def write_nifti(file: File, volume: Volume, order: str) -> None:
+    """Write tensors to a NIfTI file; outside the mask its six numbers are zero.
+
+    Args:
+        file: its name ends in .nii or .nii.gz.
+        volume: tensors of the voxels in a mask, and the affine map.
+        order: as for `from_vectors`: the program that will read the file. For ``"itk"`` the file has five axes, the
+            intent of symmetric matrices, and their order.
+
+    Raises:
+        ImportError: nibabel is not installed.
+        ValidationError: the tensors are not as many as the mask has voxels, or not symmetric.
+    """
+    nibabel = _nibabel()
+    mask = np.asarray(volume.mask, bool)
+    if np.shape(volume.tensors) != (np.count_nonzero(mask), 3, 3):
+        raise ValidationError(
+            f"tensors have shape {np.shape(volume.tensors)}, but the mask has {np.count_nonzero(mask)} voxels, which "
+            f"need shape ({np.count_nonzero(mask)}, 3, 3)"
+        )
+    inside = to_vectors(volume.tensors, "dipy" if order == "itk" else order)
+    numbers = np.zeros((*mask.shape, 6), inside.dtype)
+    numbers[mask] = inside
+    image = nibabel.Nifti1Image(numbers[:, :, :, None] if order == "itk" else numbers, volume.affine)
+    if order == "itk":
+        image.header["intent_code"], image.header["intent_p1"] = _SYMMATRIX, 3
+    nibabel.save(image, fspath(file))
+
+
+def _mask(mask: Any, numbers: Array) -> NDArray[np.bool_]:
+    if mask is None:
+        return np.asarray(np.isfinite(numbers).all(axis=-1) & numbers.any(axis=-1))
+    if isinstance(mask, (str, PathLike)):
+        mask = np.asanyarray(_nibabel().load(fspath(mask)).dataobj)
+    inside: NDArray[np.bool_] = as_array(mask, "mask").astype(bool)
+    if inside.shape != numbers.shape[:3]:
+        raise ValidationError(f"the mask has shape {inside.shape}, but the volume {numbers.shape[:3]}")
+    return inside
+
+
+def _nibabel() -> Any:
+    try:
+        import nibabel
+    except ImportError:
+        raise ImportError("NIfTI files need nibabel; install it with: pip install nibabel") from None
+    return nibabel

@@ -1,0 +1,169 @@
+"""The Hamiltonian of a curve: it drives the states, no smaller one does, and it is as smooth as the velocity."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from curves import points_on
+from scipy.integrate import quad_vec, solve_ivp
+
+import symspline as ss
+from symspline.quantum import hamiltonian
+
+STATES = ["cp:1", "cp:3", "cgr:2,4", "cgr:2,5"]
+GATES = ["u:1", "u:3", "su:2", "su:4"]
+KNOTS = np.array([0.0, 0.8, 2.0, 2.7, 4.0, 5.0])
+X = np.linspace(0, 5, 37)
+
+
+def curve(name, seed=1, batch=(), **options):
+    return ss.CubicSpline(KNOTS, points_on(ss.space(name), len(KNOTS), batch, seed=seed), name, **options)
+
+
+def columns(spline, points):
+    """Points as matrices."""
+    return points[..., None] if spline.space.point_shape[1:] == () else points
+
+
+def adjoint(m):
+    return np.swapaxes(m, -1, -2).conj()
+
+
+def random_unitary(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.linalg.qr(rng.standard_normal((n, n)) + 1j * rng.standard_normal((n, n)))[0]
+
+
+@pytest.mark.parametrize("name", [*STATES, *GATES])
+def test_the_schroedinger_equation_goes_through_every_point(name):
+    spline = curve(name)
+    start = columns(spline, spline.points[0])
+
+    def rate(t, psi):
+        return (-1j * hamiltonian(spline, t) @ psi.reshape(start.shape)).ravel()
+
+    # Piece by piece: H is not smooth at the knots.
+    psi = start.astype(complex).ravel()
+    for i in range(len(KNOTS) - 1):
+        psi = solve_ivp(rate, KNOTS[i : i + 2], psi, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+        reached = spline.space.project(psi.reshape(spline.space.point_shape))
+        assert spline.space.distance(reached, spline.points[i + 1]) < 1e-11
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_norms_are_the_speed(name):
+    spline = curve(name)
+    h, speed = hamiltonian(spline, X), spline.speed(X)
+    assert np.array_equal(h, adjoint(h))
+    assert np.abs(np.linalg.norm(h, axis=(-2, -1)) - np.sqrt(2) * speed).max() < 1e-14 * np.sqrt(
+        speed.max() + 9
+    )
+    if spline.space.point_shape[-1] == 2 and "cgr" in name:
+        return
+    assert np.abs(np.linalg.norm(h, 2, axis=(-2, -1)) - speed).max() < 1e-14
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_nothing_is_spent_on_what_does_not_move_the_path(name):
+    """H is orthogonal to every Hermitian W that leaves the subspace alone: W = PWP + (1 − P)W(1 − P)."""
+    spline = curve(name)
+    x = columns(spline, spline(X))
+    p = x @ adjoint(x)
+    rng = np.random.default_rng(3)
+    n = p.shape[-1]
+    w = rng.standard_normal((20, 1, n, n)) + 1j * rng.standard_normal((20, 1, n, n))
+    w = w + adjoint(w)
+    w = p @ w @ p + (np.eye(n) - p) @ w @ (np.eye(n) - p)
+    inner = np.sum((hamiltonian(spline, X) * w.conj()).real, axis=(-2, -1))
+    assert np.abs(inner).max() < 1e-13
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_it_is_the_commutator_of_the_projector(name):
+    """H = i[P', P], with the derivative of P as a difference of complex order."""
+    spline = curve(name, bc_type="not-a-knot")
+
+    def projector(t):
+        x = columns(spline, spline(t))
+        return x @ adjoint(x)
+
+    x, d = np.array([0.4, 1.3, 2.2, 4.6]), 1e-3
+    weights = np.array([1, -9, 45, -45, 9, -1]) / 60
+    slope = sum(w * projector(x + k * d) for w, k in zip(weights, (3, 2, 1, -1, -2, -3), strict=True)) / d
+    p = projector(x)
+    assert np.abs(hamiltonian(spline, x) - 1j * (slope @ p - p @ slope)).max() < 1e-11
+
+
+@pytest.mark.parametrize("name", ["cp:3", "cgr:2,4"])
+def test_phases_and_bases_do_not_matter(name):
+    spline = curve(name)
+    turned = np.array(spline.points)
+    for i in range(len(turned)):
+        turned[i] = turned[i] * np.exp(1j * i) if name == "cp:3" else turned[i] @ random_unitary(2, i)
+    other = ss.CubicSpline(KNOTS, turned, name)
+    for nu in (0, 1):
+        # The solver's tolerance is 1e-12 of the legs.
+        assert np.abs(hamiltonian(other, X, nu) - hamiltonian(spline, X, nu)).max() < 1e-11
+
+
+@pytest.mark.parametrize("name", [*STATES, *GATES])
+def test_the_derivative(name):
+    spline = curve(name)
+    x, d = np.array([0.4, 1.3, 2.2, 4.6]), 1e-3
+    weights = np.array([1, -9, 45, -45, 9, -1]) / 60
+    slope = (
+        sum(w * hamiltonian(spline, x + k * d) for w, k in zip(weights, (3, 2, 1, -1, -2, -3), strict=True))
+        / d
+    )
+    assert np.abs(hamiltonian(spline, x, nu=1) - slope).max() < 1e-10
+    # Continuous at the knots.
+    inner = KNOTS[1:-1]
+    jump = hamiltonian(spline, np.nextafter(inner, 9), nu=1) - hamiltonian(
+        spline, np.nextafter(inner, -9), nu=1
+    )
+    assert np.abs(jump).max() < 1e-11
+    # And no smoother than that.
+    bend = [
+        hamiltonian(spline, inner + s * d, nu=1) - hamiltonian(spline, inner + s * 2 * d, nu=1)
+        for s in (1, -1)
+    ]
+    assert np.abs(bend[0] + bend[1]).max() > 0.01 * d
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_changes_cost_twice_the_bending_energy(name):
+    spline = curve(name)
+
+    def power(t):
+        return np.sum(np.abs(hamiltonian(spline, t, nu=1)) ** 2)
+
+    total = sum(quad_vec(power, a, b, epsrel=1e-12)[0] for a, b in pairwise(KNOTS))
+    assert total == pytest.approx(2 * spline.bending_energy(), rel=1e-11)
+
+
+@pytest.mark.parametrize("name", ["cp:2", "u:2"])
+def test_batches_and_shapes(name):
+    spline = curve(name, batch=(2, 3))
+    h = hamiltonian(spline, X.reshape(1, 37))
+    n = spline.space.point_shape[0]
+    assert h.shape == (2, 3, 1, 37, n, n)
+    assert np.array_equal(h[1, 2, 0], hamiltonian(spline[1][2], X))
+
+
+def test_beyond_the_end_it_goes_on_as_it_was():
+    spline = curve("cp:2")
+    end = hamiltonian(spline, 5.0)
+    assert np.abs(hamiltonian(spline, [5.5, 7.0], extrapolate="geodesic") - end).max() < 1e-13
+    with pytest.raises(ss.ValidationError, match="outside"):
+        hamiltonian(spline, 5.5)
+
+
+def test_what_has_no_hamiltonian():
+    sphere = ss.CubicSpline(None, np.eye(3), "sphere:2")
+    with pytest.raises(
+        ss.ValidationError, match=r"Sphere\(2\) has no Hamiltonian; states are points of Compl"
+    ):
+        hamiltonian(sphere, 0.5)
+    for nu in (2, True, -1, "1", None):
+        with pytest.raises(ss.ValidationError, match="nu must be 0 for H or 1"):
+            hamiltonian(curve("cp:1"), 0.5, nu=nu)

@@ -1,0 +1,198 @@
+"""Propagators and pulses: where they bring the states."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from test_hamiltonian import GATES, KNOTS, STATES, X, adjoint, columns, curve
+
+import symspline as ss
+from symspline.quantum import hamiltonian, propagation, propagator, pulses
+
+PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
+
+
+def off_one(u):
+    return np.abs(adjoint(u) @ u - np.eye(u.shape[-1])).max()
+
+
+def reaches(spline, u, x):
+    """How far U moves the first point from the curve."""
+    moved = u @ columns(spline, spline.points[0])
+    return spline.space.distance(
+        spline.space.project(moved.reshape(-1, *spline.space.point_shape)), spline(x)
+    ).max()
+
+
+# ---- propagators ----
+
+
+@pytest.mark.parametrize("name", [*STATES, *GATES])
+def test_it_is_unitary_and_follows_the_curve(name):
+    spline = curve(name)
+    u = propagator(spline, X)
+    assert u.shape == (*X.shape, spline.space.point_shape[0], spline.space.point_shape[0])
+    assert off_one(u) < 4e-15
+    assert np.abs(u[0] - np.eye(u.shape[-1])).max() < 4e-15
+    assert reaches(spline, u, X) < 1e-13
+
+
+@pytest.mark.parametrize("name", ["cp:3", "cgr:2,5", "su:4"])
+def test_it_solves_its_equation(name):
+    spline = curve(name, seed=5)
+    n = spline.space.point_shape[0]
+
+    def rate(t, u):
+        return (-1j * hamiltonian(spline, t) @ u.reshape(n, n)).ravel()
+
+    u = np.eye(n, dtype=complex).ravel()
+    for i in range(len(KNOTS) - 1):
+        u = solve_ivp(rate, KNOTS[i : i + 2], u, "DOP853", rtol=3e-14, atol=1e-14).y[:, -1]
+        assert np.abs(propagator(spline, KNOTS[i + 1]) - u.reshape(n, n)).max() < 3e-12
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_smaller_steps_change_nothing(name, monkeypatch):
+    spline = curve(name, seed=2)
+    u = propagator(spline, X)
+    monkeypatch.setattr(propagation, "_LEG", 0.1)
+    assert np.abs(propagator(spline, X) - u).max() < 1e-13
+
+
+def test_gauss_integrates_polynomials():
+    nodes, weights, matrix = propagation.gauss()
+    for k in range(2 * propagation.STAGES):
+        assert weights @ nodes**k == pytest.approx(1 / (k + 1), abs=4e-16)
+    for k in range(propagation.STAGES):
+        assert np.abs(matrix @ nodes**k - nodes ** (k + 1) / (k + 1)).max() < 1e-15
+
+
+@pytest.mark.parametrize("name", ["cp:2", "cgr:2,4", "u:2"])
+def test_one_time_alone_is_as_among_many(name, monkeypatch):
+    spline = curve(name)
+    u = propagator(spline, X)
+    assert np.array_equal(propagator(spline, X[::-1].reshape(1, -1))[0], u[::-1])
+    assert np.array_equal(propagator(spline, X[20]), u[20])
+    monkeypatch.setattr(propagation, "_BLOCK", 1)
+    assert np.array_equal(propagator(spline, X), u)
+    assert propagator(spline, []).shape == (0, *u.shape[1:])
+
+
+@pytest.mark.parametrize("name", ["cp:2", "su:2"])
+def test_batches(name):
+    spline = curve(name, batch=(2, 3))
+    u = propagator(spline, X)
+    for i, j in np.ndindex(2, 3):
+        assert np.abs(u[i, j] - propagator(spline[i][j], X)).max() < 1e-13
+    # With knots of their own.
+    t = np.stack([KNOTS, np.linspace(0, 5, 6)])
+    own = ss.CubicSpline(t, spline.points[0, :2], spline.space)
+    assert np.abs(propagator(own, X)[1] - propagator(own[1], X)).max() < 1e-13
+
+
+def test_the_adiabatic_phase_of_a_circle_of_latitude():
+    """States carried once round a circle of the Bloch sphere come back with half the solid angle as their phase."""
+    angle, n = np.radians(50), 60
+    turn = np.linspace(0, 2 * np.pi, n + 1)
+    states = np.stack([np.cos(angle / 2) * np.ones(n + 1), np.sin(angle / 2) * np.exp(1j * turn)], axis=-1)
+    spline = ss.CubicSpline(turn, states, "cp:1", bc_type="periodic")
+    phase = np.angle(states[0].conj() @ propagator(spline, turn[-1]) @ states[0])
+    # Of the circle, from which the spline is off by the fourth power of the spacing.
+    assert phase == pytest.approx(-np.pi * (1 - np.cos(angle)), abs=1e-5)
+
+
+def test_times_outside_the_knots():
+    spline = curve("cp:1", extrapolate=True)
+    for x in (-0.1, 5.1, np.nan):
+        with pytest.raises(
+            ss.ValidationError, match=r"x\[1\] is .*outside the knots, which go from 0.0 to 5.0"
+        ):
+            propagator(spline, [1.0, x])
+    dates = np.datetime64("2024-01-01") + np.array([[0, 1, 2], [1, 2, 4]])
+    own = ss.CubicSpline(dates, spline.points[:6].reshape(2, 3, 2), "cp:1")
+    with pytest.raises(ss.ValidationError, match=r"one at a time: propagator\(spline\[i\], x\)"):
+        propagator(own, dates[0])
+
+
+# ---- pulses ----
+
+
+def edge_states(spline, edges, h):
+    """The product of the pulses' propagators, from the first edge to every one."""
+    values, vectors = np.linalg.eigh(h)
+    phases = np.exp(-1j * values * np.diff(edges)[:, None])
+    u = [np.eye(h.shape[-1])]
+    for step in vectors * phases[:, None] @ adjoint(vectors):
+        u.append(step @ u[-1])
+    return np.array(u)
+
+
+@pytest.mark.parametrize("name", [*STATES, *GATES])
+def test_exact_pulses_meet_the_curve_at_every_edge(name):
+    spline = curve(name)
+    edges = np.sort(np.r_[0, np.random.default_rng(4).uniform(0, 5, 22), 5])
+    h = pulses(spline, edges)
+    assert np.array_equal(h, adjoint(h))
+    assert reaches(spline, edge_states(spline, edges, h), edges) < 3e-14
+
+
+@pytest.mark.parametrize("name", ["cp:1", "cgr:2,4", "su:2"])
+def test_midpoint_pulses_are_of_second_order(name):
+    spline = curve(name)
+    off = []
+    for number in (50, 200, 800):
+        edges = np.linspace(0, 5, number + 1)
+        off.append(reaches(spline, edge_states(spline, edges, pulses(spline, edges, "midpoint")), edges))
+    assert off[0] < 5e-3
+    assert np.allclose(np.divide(off[:-1], off[1:]), 16, rtol=0.15)
+
+
+def test_in_paulis_operators():
+    spline = curve("cp:1")
+    edges = np.linspace(0, 5, 41)
+    for kind in ("exact", "midpoint"):
+        h, c = pulses(spline, edges, kind), pulses(spline, edges, kind, operators=PAULI)
+        assert c.shape == (40, 3) and c.dtype == float
+        assert np.abs(np.einsum("mq,qab->mab", c, PAULI) - h).max() < 1e-14
+        # tr σᵢσⱼ = 2δᵢⱼ.
+        assert np.abs(np.einsum("mab,qba->mq", h, PAULI).real / 2 - c).max() < 1e-14
+
+
+def test_in_operators_that_are_not_orthogonal():
+    spline = curve("su:4", batch=(2,))
+    rng = np.random.default_rng(0)
+    operators = rng.standard_normal((16, 4, 4)) + 1j * rng.standard_normal((16, 4, 4))
+    operators += adjoint(operators)
+    edges = np.linspace(0, 5, 9)
+    c = pulses(spline, edges, operators=operators)
+    assert c.shape == (2, 8, 16)
+    assert np.abs(np.einsum("...q,qab->...ab", c, operators) - pulses(spline, edges)).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("match", "options"),
+    [
+        ("kind must be 'exact' or 'midpoint', not 'exakt'", {"kind": "exakt"}),
+        ("edges must be two or more times in a row", {"edges": 1.0}),
+        ("edges must be two or more times in a row", {"edges": [1.0]}),
+        (r"edges\[1\] is 1.0, and 1.0 comes next; put them in increasing order", {"edges": [0, 1.0, 1.0, 2]}),
+        (r"operators must be of shape \(q, 2, 2\), not \(3, 3\)", {"operators": np.eye(3)}),
+        (r"operators\[1\] is not Hermitian", {"operators": [PAULI[0], [[0, 1], [0, 0]]]}),
+        (
+            r"operators\[2\] is a combination of those before",
+            {"operators": [*PAULI[:2], PAULI[0] - PAULI[1]]},
+        ),
+        (r"operators\[4\] is a combination", {"operators": [*PAULI, np.eye(2), PAULI[0] + PAULI[1]]}),
+        (r"pulse\[0\] cannot be expressed .* entries \[0, 1\] and \[1, 0\]", {"operators": PAULI[[0, 2]]}),
+    ],
+)
+def test_what_is_no_pulse_train(match, options):
+    with pytest.raises(ss.ValidationError, match=match):
+        pulses(curve("cp:1"), **{"edges": [0, 1, 2]} | options)
+
+
+def test_edges_too_far_apart():
+    there = ss.CubicSpline(None, [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    with pytest.raises(ss.CutLocusError):
+        pulses(there, [0, 2])
+    # The generator at the middle does not mind.
+    assert np.abs(pulses(there, [0, 2], "midpoint", operators=PAULI) - [0, np.pi / 4, 0]).max() < 1e-14

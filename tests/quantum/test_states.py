@@ -1,0 +1,124 @@
+"""Kets, the Bloch sphere, and Hamiltonians for QuTiP."""
+
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+from scipy.integrate import ode
+from test_hamiltonian import curve
+from test_propagator import PAULI
+
+import symspline as ss
+from symspline.quantum import bloch_vector, from_bloch_vector, from_kets, hamiltonian, propagator, qobjevo
+
+CP1 = ss.ComplexProjective(1)
+
+
+class Ket:
+    """What QuTiP's ``Qobj`` shows of itself."""
+
+    def __init__(self, numbers):
+        self.numbers = numbers
+
+    def full(self):
+        return np.array(self.numbers, complex).reshape(-1, 1)
+
+
+def test_expectations_of_paulis_matrices():
+    psi = CP1.random_point(np.random.default_rng(0), (4, 50))
+    expected = np.einsum("...a,qab,...b->...q", psi.conj(), PAULI, psi).real
+    assert np.abs(bloch_vector(psi) - expected).max() < 1e-15
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-12, 1e-4, 1.0])
+def test_there_and_back_also_near_the_poles(size):
+    rng = np.random.default_rng(1)
+    v = rng.standard_normal((200, 3)) * [size, size, 1]
+    v /= np.linalg.norm(v, axis=-1, keepdims=True)
+    v[:3] = [[0, 0, 1], [0, 0, -1], [1, 0, 0]]
+    psi = from_bloch_vector(v)
+    assert np.abs(np.linalg.norm(psi, axis=-1) - 1).max() < 4e-16
+    back = bloch_vector(psi)
+    assert (np.abs(back - v)[:, :2] <= 1e-15 * np.abs(v[:, :2]).max(initial=size)).all()
+    assert np.abs(back - v)[:, 2].max() < 1e-15
+    largest = np.take_along_axis(psi, np.abs(psi).argmax(axis=-1)[:, None], axis=-1)
+    assert (largest.imag == 0).all() and (largest.real > 0.7).all()
+
+
+def test_distances_are_halved():
+    rng = np.random.default_rng(2)
+    v, w = ss.Sphere(2).random_point(rng, (2, 100))
+    halved = CP1.distance(from_bloch_vector(v), from_bloch_vector(w))
+    assert np.abs(2 * halved - ss.Sphere(2).distance(v, w)).max() < 1e-14
+
+
+def test_kets_are_columns():
+    kets = [Ket([1, 0]), Ket([0.6, 0.8j])]
+    assert np.array_equal(from_kets(kets), [[1, 0], [0.6, 0.8j]])
+    assert from_kets(kets[1]).shape == (2,) and from_kets([kets, kets]).shape == (2, 2, 2)
+    assert np.array_equal(from_kets(np.array(kets, dtype=object)), from_kets(kets))
+    ss.CubicSpline(None, from_kets(kets), "cp:1")
+
+
+@pytest.mark.parametrize(
+    ("match", "call"),
+    [
+        (r"state must be of shape \(..., 2\)", lambda: bloch_vector([1, 0, 0])),
+        (r"state\[1\] is not a state: its length is 2.0", lambda: bloch_vector([[1, 0], [2, 0]])),
+        (r"vector is not a pure state: its length is 0.5", lambda: from_bloch_vector([0, 0, 0.5])),
+        ("kets must be columns, of shape", lambda: from_kets([[1, 0], [0, 1]])),
+        (r"kets\[1\] is not a state", lambda: from_kets([Ket([1, 0]), Ket([1, 1])])),
+    ],
+)
+def test_what_is_no_state(match, call):
+    with pytest.raises(ss.ValidationError, match=match):
+        call()
+
+
+# ---- QuTiP ----
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    """A module in QuTiP's place, whose objects are arrays and functions."""
+    module = ModuleType("qutip")
+    module.Qobj, module.QobjEvo = np.asarray, lambda function: function
+    monkeypatch.setitem(sys.modules, "qutip", module)
+
+
+def test_solvers_may_step_over_the_end(stand_in):
+    spline = curve("cp:2")
+    h = qobjevo(spline)
+    assert np.array_equal(h(1.3), hamiltonian(spline, 1.3))
+    assert np.abs(h(5.7) - hamiltonian(spline, 5.0)).max() < 1e-13
+    # The integrator behind QuTiP's default.
+    solver = ode(lambda t, y: -1j * h(t) @ y).set_integrator(
+        "zvode", method="adams", rtol=1e-10, atol=1e-12, nsteps=9999
+    )
+    psi = solver.set_initial_value(spline.points[0], 0).integrate(5)
+    assert spline.space.distance(spline.space.project(psi), spline.points[-1]) < 1e-7
+    closed = ss.CubicSpline(None, spline.points[[0, 1, 2, 0]], "cp:2", bc_type="periodic")
+    assert np.abs(qobjevo(closed)(3.5) - hamiltonian(closed, 0.5)).max() < 1e-13
+
+
+def test_curves_that_are_no_qobjevo(stand_in):
+    with pytest.raises(ss.ValidationError, match=r"is a batch; .* qobjevo\(spline\[0\]\)"):
+        qobjevo(curve("cp:2", batch=(2,)))
+    dates = ss.CubicSpline(np.arange("2024-01-01", "2024-01-07", dtype="M8[D]"), curve("cp:2").points, "cp:2")
+    with pytest.raises(ss.ValidationError, match="are dates"):
+        qobjevo(dates)
+
+
+def test_without_qutip(monkeypatch):
+    monkeypatch.setitem(sys.modules, "qutip", None)
+    with pytest.raises(ImportError, match="pip install qutip"):
+        qobjevo(curve("cp:1"))
+
+
+def test_with_qutip_itself():
+    qutip = pytest.importorskip("qutip")
+    spline = curve("cp:2")
+    options = {"atol": 1e-11, "rtol": 1e-9, "nsteps": 10_000}
+    end = qutip.sesolve(qobjevo(spline), qutip.Qobj(spline.points[0]), [0, 5], options=options).states[-1]
+    assert np.abs(from_kets(end / end.norm()) - propagator(spline, 5) @ spline.points[0]).max() < 1e-6

@@ -1,0 +1,111 @@
+"""Pictures of films, and the page about shapes."""
+
+import re
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes_figures as figures
+from matplotlib.patches import Polygon
+from matplotlib.text import Text
+from test_landmarks import drawings
+from test_morph import KNOTS, turned
+
+import symspline as ss
+from symspline.shapes import AffineMorph
+
+PAGE = Path(__file__).parents[2] / "docs/shapes.md"
+
+
+def rendered(figure):
+    """The figure, drawn: any warning would be an error."""
+    figure.savefig(BytesIO(), dpi=40)
+    return figure
+
+
+def texts_of(figure):
+    return [text.get_text() for text in figure.findobj(Text)]
+
+
+def outlines(axes):
+    return [patch.get_xy()[:-1] for patch in axes.patches if isinstance(patch, Polygon)]
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_small_multiples_are_the_film(n):
+    x = turned(n, 5)
+    morph = AffineMorph(KNOTS, x)
+    figure = rendered(morph.plot())
+    strip, *multiples = figure.axes
+    assert len(outlines(strip)) == 25 + 5 and len(multiples) == 12
+    assert "5 drawings of 6 landmarks" in texts_of(figure)
+    film = morph(np.linspace(0, 4, 12))
+    for axes, drawing in zip(multiples, film, strict=True):
+        (outline,) = outlines(axes)
+        if n == 2:
+            assert np.abs(outline - drawing).max() < 1e-12
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        assert (outline > [left, low]).all() and (outline < [right, high]).all()
+        assert sum(text.get_text() in set("012345") for text in axes.texts) == 6
+    assert {"t = 0", "t = 4"} <= set(texts_of(figure))
+
+
+def test_the_strip_is_undistorted_and_inside():
+    x = turned(2, 5)
+    strip = rendered(AffineMorph(KNOTS, x).plot()).axes[0]
+    *_, last = outlines(strip)
+    paper = strip.transData.transform(last)
+    sides, wanted = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (paper, x[-1]))
+    assert np.abs(sides / sides[0] - wanted / wanted[0]).max() < 1e-9
+    everything = np.concatenate(outlines(strip))
+    assert everything[:, 0].min() > strip.get_xlim()[0] and everything[:, 0].max() < strip.get_xlim()[1]
+    assert np.abs(everything[:, 1]).max() < 1
+
+
+def test_dates_of_whole_days():
+    dates = np.datetime64("2024-01-01") + (10 * KNOTS).astype("m8[D]")
+    figure = rendered(AffineMorph(dates, turned(2, 5)).plot())
+    labels = [axes.texts[-1].get_text() for axes in figure.axes[1:]]
+    assert (
+        labels[0] == "2024-01-01 00:00"
+        and labels[1] == "2024-01-04 15:16"
+        and labels[-1] == "2024-02-10 00:00"
+    )
+
+
+def test_saved(tmp_path):
+    AffineMorph(KNOTS, turned(2, 5)).plot(tmp_path / "film.svg")
+    assert (tmp_path / "film.svg").read_text("utf-8").startswith("<?xml")
+
+
+def test_four_dimensions_have_no_picture():
+    x = drawings(3, landmarks=8, n=4, spread=0.1)
+    with pytest.raises(ss.ValidationError, match="in 2 or 3 dimensions, not in 4"):
+        AffineMorph(None, x).plot()
+
+
+def test_the_page():
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.S):
+        exec(compile(block, PAGE.name, "exec"), names)
+    assert names["film"].shape == (100, 4, 2)
+    assert np.abs(names["morph"](2.0) - names["C"]).max() < 1e-10
+
+
+def test_the_figures_of_the_page(tmp_path, monkeypatch):
+    monkeypatch.setattr(figures, "__file__", str(tmp_path / "figures.py"))
+    figures.main()
+    made = {path.name for path in tmp_path.iterdir()}
+    assert made == set(re.findall(r"\((shapes_\w+\.png)\)", PAGE.read_text("utf-8")))
+
+
+def test_local_coordinates_are_infinite_at_one_shape():
+    spline = figures.shape_spline()
+    near = np.array([1.9, 1.99, 1.999, 2.001, 2.01, 2.1])
+    b = np.abs(figures.coordinates(spline(near))[:, 1])
+    assert (np.diff(b[:3]) > 9 * b[:2] * 0.5).all() and (b[3] > 50 and b[2] > 50)
+    # They are coordinates of the shape: any basis gives the same.
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    off = figures.coordinates(spline(near) @ turn) - figures.coordinates(spline(near))
+    assert np.abs(off).max() < 1e-8

@@ -1,0 +1,107 @@
+"""Volumes of tensors in NIfTI files; where nibabel is not installed, with a stand-in that keeps images in memory."""
+
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline.tensors import Volume, read_nifti, to_vectors, write_nifti
+
+AFFINE = np.diag([2.0, 2.0, 2.5, 1.0])
+
+
+@pytest.fixture(params=["nibabel", "stand-in"])
+def nibabel(request, monkeypatch):
+    if request.param == "nibabel":
+        return pytest.importorskip("nibabel")
+    images = {}
+
+    class Image:
+        def __init__(self, data, affine):
+            self.dataobj, self.affine = np.array(data), np.array(affine)
+            self.header = {"intent_code": 0, "intent_p1": 0.0}
+
+    module = ModuleType("nibabel")
+    module.Nifti1Image = Image
+    module.save = lambda image, name: images.__setitem__(name, image)
+    module.load = lambda name: images[name]
+    monkeypatch.setitem(sys.modules, "nibabel", module)
+    return module
+
+
+def volume(dtype=np.float32):
+    mask = np.zeros((4, 3, 2), bool)
+    mask[1:3, 1:, 0] = True
+    tensors = ss.SymmetricPositiveDefinite(3).random_point(np.random.default_rng(0), 4).astype(dtype)
+    return Volume((tensors + tensors.swapaxes(1, 2)) / 2, mask, AFFINE)
+
+
+def raw(nibabel, name):
+    image = nibabel.load(name)
+    return image, np.asanyarray(image.dataobj)
+
+
+@pytest.mark.parametrize("order", ["dipy", "fsl", "mrtrix", "itk"])
+def test_there_and_back(order, nibabel, tmp_path):
+    name, given = str(tmp_path / "tensors.nii.gz"), volume()
+    write_nifti(name, given, order)
+    back = read_nifti(name, None if order == "itk" else order)
+    assert np.array_equal(back.tensors, given.tensors) and back.tensors.dtype == np.float32
+    assert np.array_equal(back.mask, given.mask) and np.array_equal(back.affine, AFFINE)
+    image, numbers = raw(nibabel, name)
+    assert int(image.header["intent_code"]) == (1005 if order == "itk" else 0)
+    # ITK's files hold the lower triangle row by row, along the fifth axis.
+    assert numbers.shape == ((4, 3, 2, 1, 6) if order == "itk" else (4, 3, 2, 6))
+    expected = to_vectors(given.tensors, "dipy" if order == "itk" else order)
+    assert np.array_equal(numbers.reshape(4, 3, 2, 6)[given.mask], expected)
+    assert not numbers.reshape(4, 3, 2, 6)[~given.mask].any()
+
+
+def test_masks(nibabel, tmp_path):
+    name, given = str(tmp_path / "tensors.nii"), volume()
+    write_nifti(name, given, "fsl")
+    some = given.mask.copy()
+    some[1] = False
+    nibabel.save(nibabel.Nifti1Image(some.astype(np.uint8), AFFINE), str(tmp_path / "mask.nii"))
+    for mask in (some, some.astype(int).tolist(), str(tmp_path / "mask.nii")):
+        picked = read_nifti(name, "fsl", mask)
+        assert np.array_equal(picked.mask, some) and np.array_equal(picked.tensors, given.tensors[2:])
+    _, numbers = raw(nibabel, name)
+    numbers = np.array(numbers)
+    numbers[1, 1, 0, 3] = np.nan
+    nibabel.save(nibabel.Nifti1Image(numbers, AFFINE), name)
+    assert np.array_equal(read_nifti(name, "fsl").tensors, given.tensors[1:])
+
+
+def test_what_is_no_volume(nibabel, tmp_path):
+    name, given = str(tmp_path / "tensors.nii"), volume()
+    write_nifti(name, given, "fsl")
+    for match, call in [
+        ("does not say in which order its six volumes are", lambda: read_nifti(name)),
+        (
+            r"mask has shape \(4, 3\), but the volume \(4, 3, 2\)",
+            lambda: read_nifti(name, "fsl", np.ones((4, 3))),
+        ),
+        (
+            r"the mask has 24 voxels, which need shape \(24, 3, 3\)",
+            lambda: write_nifti(name, all_of(given), "fsl"),
+        ),
+        ("order must be", lambda: write_nifti(name, given, "ants")),
+    ]:
+        with pytest.raises(ss.ValidationError, match=match):
+            call()
+    nibabel.save(nibabel.Nifti1Image(np.zeros((4, 3, 2, 7), np.float32), AFFINE), name)
+    with pytest.raises(ss.ValidationError, match=r"has shape \(4, 3, 2, 7\), but tensors need"):
+        read_nifti(name, "fsl")
+
+
+def all_of(given):
+    return Volume(given.tensors, np.ones_like(given.mask), AFFINE)
+
+
+def test_without_nibabel(monkeypatch):
+    monkeypatch.setitem(sys.modules, "nibabel", None)
+    with pytest.raises(ImportError, match="pip install nibabel"):
+        read_nifti("tensors.nii", "fsl")
