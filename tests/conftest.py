@@ -8,7 +8,7 @@
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo
     host         the program around: threads, memory, interruptions
-    docs, bench  what they show runs
+    docs, bench  what they show runs, and the recipes in `examples`
     fuzz         random input; `make fuzz` runs it at length
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
