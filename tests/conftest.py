@@ -12,7 +12,7 @@
     tensors      diffusion tensors in the order of each program, NIfTI files
     shapes       affine shapes of landmarks, morphs and their pictures
     host         the program around: threads, memory, interruptions
-    docs, bench  what they show runs
+    docs, bench  what they show runs, and the recipes in `examples`
     fuzz         random input; `make fuzz` runs it at length
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 

@@ -154,6 +154,7 @@ def test_quaternions_of_a_closed_curve_go_on(rounds, batch):
         rotations.quaternion(spline, t.T[i].T[..., None], scalar_first=True, per_curve=True) for i in (0, -1)
     )
     assert np.abs(end - (-1) ** rounds * start).max() < 1e-14
+    assert (start[..., 0] > 0.9).all()
 
 
 @every_curve
