@@ -10,7 +10,7 @@ ROOT = Path(symspline.__file__).parent
 # From below. A folder stands for all that is in it.
 LAYERS = [
     ["_core", "_cpu"],
-    ["arrays", "geo", "report", "threads", "times", "version"],
+    ["arrays", "geo", "handed", "report", "threads", "times", "version"],
     ["spaces"],
     ["curves"],
     ["archive", "failures", "options", "plotting", "signs"],

@@ -8,21 +8,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
+from .handed import refuse_objects, unwrapped
 
 
 def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
-    """The value as an array; ragged nested lists and masked numbers are an error of the caller's."""
-    if type(value) is np.ndarray:
+    """The value as an array; ragged nested lists, masked numbers and objects are an error of the caller's."""
+    if type(value) is np.ndarray and value.dtype.kind != "O":
         return value
+    value = unwrapped(value, name)
     masked = _first_masked(value)
     if masked is not None:
         raise ValidationError(
             f"{name}{list(masked) or ''} is masked: what stands below a mask is no number; leave out what is missing"
         )
     try:
-        return np.asarray(value)
+        array = np.asarray(value)
     except ValueError as error:
         raise ValidationError(f"{name} is not an array of equally long rows: {error}") from None
+    if array.dtype.kind == "O":
+        refuse_objects(array, name)
+    return array
 
 
 def _first_masked(value: Any) -> tuple[int, ...] | None:

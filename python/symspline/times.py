@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
 from .arrays import as_array, cast
+from .handed import NO_ZONE, UTC_ZONE, times_of
 
 Doubles = NDArray[np.float64]
 
@@ -29,11 +30,13 @@ class Clock:
 
     Numbers are taken as they are. Dates become seconds, and integers too large for a double
     differences, since the first knot of each curve: ``origin``, of shape batch + (1,) where curves
-    have their own knots.
+    have their own knots. Durations are seconds. ``zone`` is that of dates, see `handed.times_of`.
     """
 
     origin: Any = None
     dates: bool = False
+    durations: bool = False
+    zone: str | None = None
 
     @cached_property
     def plain(self) -> bool:
@@ -46,7 +49,15 @@ class Clock:
 
     def at(self, x: ArrayLike, batch: tuple[int, ...], per_curve: bool) -> tuple[Doubles, bool]:
         """Times to evaluate at, and whether every curve now has its own."""
-        array = as_array(x, "x")
+        given, zone = times_of(x, "x")
+        array = as_array(given, "x")
+        if {zone, self.zone} == {UTC_ZONE, NO_ZONE}:
+            here, there = ("a time zone", "none") if zone == UTC_ZONE else ("no time zone", "one")
+            raise ValidationError(
+                f"x has {here}, but the knots have {there}: which time is meant is in doubt"
+            )
+        if self.durations and array.dtype.kind == "m":
+            array = _durations(array, "x")
         if array.dtype.kind not in ("M" if self.dates else "iufb"):
             wanted = "dates, so x must be datetime64" if self.dates else "numbers, so x must be numbers"
             raise ValidationError(f"the knots are {wanted}, not {array.dtype}")
@@ -59,7 +70,7 @@ class Clock:
 
     def picked(self, index: Any) -> Clock:
         """The clock of part of a batch."""
-        return Clock(self.origin[index][()], self.dates) if np.ndim(self.origin) else self
+        return replace(self, origin=self.origin[index][()]) if np.ndim(self.origin) else self
 
     def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
         if self.dates:
@@ -80,7 +91,8 @@ class Clock:
 
 def clock_of(knots: ArrayLike) -> tuple[Clock, NDArray[Any]]:
     """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
-    array = as_array(knots, "t")
+    given, zone = times_of(knots, "t")
+    array = as_array(given, "t")
     if array.size == 0:
         raise ValidationError("t is empty; a curve needs at least two points")
     first = array[..., :1] if array.ndim > 1 else array.flat[0]
@@ -88,7 +100,9 @@ def clock_of(knots: ArrayLike) -> tuple[Clock, NDArray[Any]]:
         if np.datetime_data(array.dtype)[0] in ("Y", "M", "generic"):
             array = array.astype("datetime64[D]")
             first = first.astype("datetime64[D]")
-        return Clock(np.array(first)[()], dates=True), array.copy()
+        return Clock(np.array(first)[()], dates=True, zone=zone), array.copy()
+    if array.dtype.kind == "m":
+        return Clock(durations=True), _durations(array, "t")
     if array.dtype.kind in "iu" and (int(array.max()) > _EXACT or int(array.min()) < -_EXACT):
         return Clock(np.array(first)[()]), array.copy()
     if array.dtype.kind not in "iufb":
@@ -132,6 +146,13 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
     days = [x.astype("datetime64[D]") for x in (array, origin)]
     rest = [_in_seconds(x - d) for x, d in zip((array, origin), days, strict=True)]
     return np.asarray(_in_seconds(days[0] - days[1]) + (rest[0] - rest[1]), order="C")
+
+
+def _durations(array: NDArray[Any], name: str) -> Doubles:
+    if np.isnat(array).any():
+        index = np.argwhere(np.isnat(array))[0].tolist()
+        raise ValidationError(f"{name}{index or ''} is NaT (not a time)")
+    return _in_seconds(array)
 
 
 def _in_seconds(difference: Any) -> Doubles:

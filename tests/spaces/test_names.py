@@ -144,17 +144,20 @@ def test_poses_have_no_curvature_in_products():
 @pytest.mark.parametrize(
     "space, match",
     [
-        ("spere:2", r"unknown space 'spere:2'; known are .*sphere.*, e\.g\. 'sphere:2'"),
+        (
+            "spere:2",
+            r"unknown space 'spere:2'; did you mean 'sphere:2'\? known are .*sphere.*, e\.g\. 'sphere:2'",
+        ),
         ("", r"unknown space ''"),
         ("sphere:2 x klein:2", r"unknown space 'klein:2'"),
-        ("sphere", r"'sphere': behind the colon come whole numbers"),
-        ("sphere:", r"'sphere:': behind the colon come whole numbers"),
+        ("sphere", r"'sphere' is a family of spaces; give its dimension, such as Sphere\(2\) or 'sphere:2'"),
+        ("sphere:", r"'sphere:' is a family of spaces; give its dimension"),
         ("sphere:-1", r"'sphere:-1': behind the colon come whole numbers"),
         ("sphere:2.0", r"behind the colon come whole numbers"),
         ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 numbers"),
         ("sphere:0", r"Sphere\(n\) needs n >= 1"),
         (None, r"a space or its name is needed, not None"),
-        (ss.Sphere, r"a space or its name is needed, not <class"),
+        (ss.Sphere, r"Sphere is a family of spaces; give its dimension"),
         (2, r"a space or its name is needed, not 2"),
     ],
     ids=str,
@@ -225,3 +228,34 @@ def test_a_product_has_types():
 def test_digits_of_other_scripts_name_no_space():
     with pytest.raises(ss.ValidationError, match="behind the colon come whole numbers"):
         ss.space("sphere:٢")
+
+
+@pytest.mark.parametrize(
+    "name, meant",
+    [
+        ("spher:2", "sphere:2"),
+        ("SpecialOrthogonal:3", "so:3"),
+        ("special_orthogonal:3", "so:3"),
+        ("SO3", "so:3"),
+        ("SPD(3)", "spd:3"),
+        ("grasmannian:2,4", "grassmannian:2,4"),
+        ("sphere:2 x euclid:3", "euclidean:3"),
+        ("Spheres", "sphere"),
+    ],
+)
+def test_misspelt_names_get_a_guess(name, meant):
+    with pytest.raises(ss.ValidationError, match=f"did you mean '{meant}'\\?"):
+        ss.space(name)
+
+
+@pytest.mark.parametrize("given", [ss.Sphere, "Sphere", "sphere"])
+def test_a_class_is_no_space(given):
+    for call in (lambda: ss.space(given), lambda: ss.CubicSpline(None, np.eye(3), given)):
+        with pytest.raises(
+            ss.ValidationError, match=r"give its dimension, such as Sphere\(2\) or 'sphere:2'"
+        ):
+            call()
+    with pytest.raises(ss.ValidationError, match=r"Grassmannian\(2, 4\) or 'gr:2,4'"):
+        ss.space(ss.Grassmannian)
+    with pytest.raises(ss.ValidationError, match="Product is a family of spaces"):
+        ss.space(ss.Product)

@@ -181,7 +181,10 @@ TANGENT, ACROSS = [0, 0.5, 0], [0.5, 0, 0]
             ((1, [0, 1j, 0]), "natural"),
             r"the start velocity must be an array of real numbers, not of complex128",
         ),
-        (((1, None), "natural"), r"the start velocity must be an array of real numbers, not of object"),
+        (
+            ((1, None), "natural"),
+            r"the start velocity must be an array of numbers, not of object: it is a NoneType",
+        ),
         (("natural", (1, ["a", "b", "c"])), r"the end velocity must be an array of real numbers, not of <U1"),
         (((1, [0, NAN, 0]), "natural"), r"the start velocity holds NaN; it must be finite"),
         (("natural", (2, [0, INF, 0])), r"the end acceleration holds inf; it must be finite"),

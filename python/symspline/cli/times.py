@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..handed import minutes_of
 from .errors import Problem
 from .numbers import is_number, numbers
 
@@ -96,7 +97,7 @@ def _dates(cells: list[str], fail: Fail) -> tuple[Times, bool]:
     if not zones[shapes[0]]:
         return times, False
     offsets = [cell[length:] for cell, length in zip(cells, lengths, strict=True)]
-    minutes = {offset: _minutes(offset) for offset in set(offsets)}
+    minutes = {offset: minutes_of(offset) for offset in set(offsets)}
     return times - np.array([minutes[offset] for offset in offsets], dtype="timedelta64[m]"), True
 
 
@@ -114,15 +115,6 @@ def _zone(shape: str, shapes: list[str], cells: list[str], fail: Fail) -> int:
 def _style(match: re.Match[str]) -> tuple[Any, ...]:
     """What the dates of a column have in common; fractions and offsets may differ."""
     return match["mark"], match["seconds"] is None, match["zone"] is None
-
-
-def _minutes(offset: str) -> int:
-    """``"+02:30"`` is 150."""
-    if offset == "Z":
-        return 0
-    digits = offset[1:].replace(":", "").ljust(4, "0")
-    minutes = 60 * int(digits[:2]) + int(digits[2:])
-    return -minutes if offset[0] == "-" else minutes
 
 
 def is_date_like(text: str) -> bool:

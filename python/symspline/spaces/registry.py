@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
 from typing import Any
 
 from .._core import Handle, ValidationError
@@ -18,9 +20,31 @@ def spaces_named(name: Any) -> list[Space]:
     >>> spaces_named("sphere:3 x r:3")
     [Sphere(3), Euclidean(3)]
     """
+    if isinstance(name, type) and issubclass(name, Space):
+        raise ValidationError(f"{name.__name__} is a family of spaces; {_whole(name)}")
     if not isinstance(name, str):
         raise ValidationError(f"a space or its name is needed, not {shown(name)}")
     return [_named(factor) for factor in name.split(" x ")]
+
+
+def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
+    """What a name that is none may have been, "SO3" and "SpecialOrthogonal(3)" too; or nothing."""
+    glued = re.fullmatch(r"([a-z_ -]+)\(?(\d[\d, ]*)\)?", word)
+    if glued is not None and not parameters:
+        word, parameters = glued[1], glued[2]
+    meant = {cls.__name__.lower(): own for own, cls in CLASSES.items()} | {name: name for name in names}
+    close = get_close_matches(re.sub("[-_ ]", "", word), meant, 1, 0.7)
+    colon = ":" if parameters else ""
+    return f"did you mean {shown(meant[close[0]] + colon + parameters.strip())}? " if close else ""
+
+
+def _whole(cls: Any) -> str:
+    """How to name one of a family."""
+    if not hasattr(cls, "_name"):
+        return "a space or its name is needed, such as Sphere(2) or 'sphere:2'"
+    numbers = [2, 4] if cls._name in ("gr", "cgr") else [2]
+    given = ", ".join(map(str, numbers))
+    return f"give its dimension, such as {cls.__name__}({given}) or '{cls._name}:{given.replace(' ', '')}'"
 
 
 def _named(name: str) -> Space:
@@ -29,7 +53,10 @@ def _named(name: str) -> Space:
     names = {alias: row[0] for row in Handle.names() for alias in row}
     if word not in names:
         known = ", ".join(" or ".join(row) for row in Handle.names())
-        raise ValidationError(f"unknown space {shown(name)}; known are {known}, e.g. 'sphere:2'")
+        guess = _guess(word, parameters, names)
+        raise ValidationError(f"unknown space {shown(name)}; {guess}known are {known}, e.g. 'sphere:2'")
+    if not parameters.strip():
+        raise ValidationError(f"{shown(name)} is a family of spaces; {_whole(CLASSES[names[word]])}")
     values = [part.strip() for part in parameters.split(",")]
     if not all(value.isdecimal() and value.isascii() and len(value) <= _DIGITS for value in values):
         raise ValidationError(f"{shown(name)}: behind the colon come whole numbers, e.g. 'sphere:2'")

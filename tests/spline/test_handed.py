@@ -1,0 +1,196 @@
+"""What people hand over: dates, durations, tensors, quantum objects, tables; and what would be wrong in silence.
+
+pandas, PyTorch and QuTiP need not be there: stand-ins do what the library looks at, as those do it.
+"""
+
+from datetime import UTC, date, datetime, timedelta, timezone
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from curves import S2, run_python
+from scipy.spatial.transform import Rotation
+
+import symspline as ss
+
+P = np.eye(3)
+HOURS = np.array(["2021-08-29T00", "2021-08-29T06", "2021-08-29T18"], "datetime64[h]")
+SPLINE = ss.CubicSpline(HOURS, P, S2)
+EAST = timezone(timedelta(hours=2))
+NAIVE = [datetime(2021, 8, 29, hour) for hour in (0, 6, 18)]
+
+
+class Tensor:
+    """As torch.Tensor."""
+
+    def __init__(self, numbers, requires_grad=False):
+        self._numbers, self.requires_grad = np.asarray(numbers, float), requires_grad
+
+    def detach(self):
+        return Tensor(self._numbers)
+
+    def cpu(self):
+        return self
+
+    def numpy(self):
+        return self._numbers
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad.")
+
+
+class Qobj:
+    """As qutip.Qobj."""
+
+    def __init__(self, array):
+        self._array = np.asarray(array, complex)
+        self.isket, self.isbra = self._array.shape[1] == 1, self._array.shape[0] == 1
+
+    def full(self):
+        return self._array
+
+
+class Zoned:
+    """As pandas.DatetimeIndex with a time zone: np.asarray alone gives objects."""
+
+    class dtype:
+        kind, tz, unit = "M", "Europe/Berlin", "s"
+
+    def __init__(self, utc):
+        self._utc = utc
+
+    def __array__(self, dtype=None, copy=None):
+        return self._utc.astype(dtype or object)
+
+
+class Quantity:
+    """As pint.Quantity."""
+
+    units, magnitude = "km", 3.0
+
+
+@pytest.mark.parametrize(
+    "t",
+    [
+        NAIVE,
+        tuple(NAIVE),
+        np.array(NAIVE, object),
+        [moment.replace(tzinfo=UTC) for moment in NAIVE],
+        [(moment + timedelta(hours=2)).replace(tzinfo=EAST) for moment in NAIVE],
+        ["2021-08-29T00:00", "2021-08-29T06:00", "2021-08-29T18:00"],
+        ["2021-08-29 00:00:00Z", "2021-08-29T08:00+02:00", "2021-08-29T15:30-0230"],
+        np.array(["2021-08-29T00:00:00.000", "2021-08-29T06:00", "2021-08-29T18:00"]),
+        Zoned(HOURS),
+    ],
+)
+def test_dates_of_any_kind(t):
+    spline = ss.CubicSpline(t, P, S2)
+    assert np.array_equal(spline.t, HOURS) and np.array_equal(spline.velocities, SPLINE.velocities)
+    assert np.array_equal(spline(t), SPLINE(HOURS))
+    if not isinstance(t, Zoned):
+        assert np.array_equal(spline(t[1]), SPLINE(HOURS[1]))
+    assert np.array_equal(spline(spline.t), SPLINE(HOURS))
+
+
+def test_days_and_nanoseconds():
+    days = [date(2021, 8, 28), date(2021, 8, 29), date(2021, 8, 31)]
+    assert ss.CubicSpline(days, P, S2) == ss.CubicSpline(np.array(days, "M8[D]"), P, S2)
+    fine = ["2021-08-29T00:00:00.000000001", "2021-08-29T00:00:00.000000003"]
+    assert ss.CubicSpline(fine, P[:2], S2).t.tolist() == np.array(fine, "M8[ns]").tolist()
+
+
+def test_times_with_and_without_a_zone_do_not_mix():
+    aware = [moment.replace(tzinfo=UTC) for moment in NAIVE]
+    with pytest.raises(ss.ValidationError, match="x has no time zone, but the knots have one"):
+        ss.CubicSpline(aware, P, S2)(NAIVE[1])
+    with pytest.raises(ss.ValidationError, match="x has a time zone, but the knots have none"):
+        ss.CubicSpline(NAIVE, P, S2)("2021-08-29T06:00Z")
+    with pytest.raises(
+        ss.ValidationError, match=r"t\[1\] is 2021-08-29 06:00:00, but .* before has a time zone"
+    ):
+        ss.CubicSpline([aware[0], *NAIVE[1:]], P, S2)
+    with pytest.raises(ss.ValidationError, match=r"t\[2\] is '7'"):
+        ss.CubicSpline(["2021-08-29", "2021-08-30", "7"], P, S2)
+    with pytest.raises(ss.ValidationError, match=r"t\[1\] is 3, but"):
+        ss.CubicSpline([NAIVE[0], 3, NAIVE[2]], P, S2)
+    for word in ("now", "today", "NaT", "2021", "2021-02-30", "29.8.2021", "20210829", ""):
+        with pytest.raises(ss.ValidationError, match=r"t\[1\] is '.*', no date such as"):
+            ss.CubicSpline(["2021-08-29", word, "2021-08-31"], P, S2)
+
+
+@pytest.mark.parametrize(
+    "t",
+    [[timedelta(0), timedelta(milliseconds=500), timedelta(seconds=2)], np.array([0, 500, 2000], "m8[ms]")],
+)
+def test_durations_are_seconds(t):
+    spline = ss.CubicSpline(t, P, S2)
+    assert spline == ss.CubicSpline([0, 0.5, 2], P, S2) and spline.t.dtype == np.float64
+    assert np.array_equal(spline(t), spline([0, 0.5, 2]))
+    assert np.array_equal(spline(np.timedelta64(500, "ms")), spline(0.5))
+    for x in (timedelta(seconds=1), np.timedelta64(1, "s")):
+        with pytest.raises(ss.ValidationError, match="x must be numbers, not timedelta64"):
+            SPLINE_OF_NUMBERS(x)
+    with pytest.raises(ss.ValidationError, match="units of 'Y' have no fixed length"):
+        ss.CubicSpline(np.array([0, 1, 2], "m8[Y]"), P, S2)
+
+
+SPLINE_OF_NUMBERS = ss.CubicSpline(None, P, S2)
+
+
+def test_tensors():
+    assert ss.CubicSpline(Tensor([0, 1, 2]), Tensor(P), S2) == SPLINE_OF_NUMBERS
+    assert ss.CubicSpline(None, [Tensor(row) for row in P], S2) == SPLINE_OF_NUMBERS
+    assert np.array_equal(SPLINE_OF_NUMBERS(Tensor([0.5])), SPLINE_OF_NUMBERS([0.5]))
+    for points in (Tensor(P, True), [Tensor(row, i == 1) for i, row in enumerate(P)]):
+        with pytest.raises(
+            ss.ValidationError, match=r"points(\[1\])? requires a gradient.*symspline\.torch\.curve"
+        ):
+            ss.CubicSpline(None, points, S2)
+
+
+def test_quantum_objects():
+    kets = np.array([[1, 0], [0.8, 0.6j], [0.6, 0.8]])
+    states = [Qobj(ket[:, None]) for ket in kets]
+    assert ss.CubicSpline(None, states, "cp:1") == ss.CubicSpline(None, kets, "cp:1")
+    assert ss.CubicSpline(None, [states, states], "cp:1") == ss.CubicSpline(None, [kets, kets], "cp:1")
+    unitary = ss.SpecialUnitary(2).random_point(np.random.default_rng(0), 3)
+    assert ss.CubicSpline(None, list(map(Qobj, unitary)), "su:2") == ss.CubicSpline(None, unitary, "su:2")
+    assert ss.ComplexProjective(1).distance(states[0], states[1]) == ss.ComplexProjective(1).distance(
+        *kets[:2]
+    )
+    with pytest.raises(ss.ValidationError, match=r"points\[1\] is a bra; pass the ket"):
+        ss.CubicSpline(None, [states[0], Qobj(kets[1][None]), states[2]], "cp:1")
+
+
+@pytest.mark.parametrize(
+    "points, match",
+    [
+        (Rotation.identity(3), r"points.*Rotation; pass its \.as_matrix\(\)"),
+        ([[1, 0, 0], [0, 1, None]], r"points is not an array|points\[1, 2\]"),
+        (
+            [[1, 0, 0], [0, 1, None], [0, 0, 1]],
+            r"points\[1, 2\] must be an array of numbers, not of object: it is a NoneType",
+        ),
+        (
+            [[1, 0, 0], [0, Decimal(1), 0]],
+            r"points\[1, 1\] .* it is a decimal\.Decimal; leave it out, or convert",
+        ),
+        (
+            [[1, 0, 0], [0, Quantity(), 0]],
+            r"points\[1\]\[1\] has the unit km, which would be lost; .*magnitude",
+        ),
+        (Quantity(), r"points has the unit km"),
+        (object(), r"points must be an array of numbers, not of object: it is a object; leave it out"),
+    ],
+)
+def test_objects_that_are_not_taken(points, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.CubicSpline(None, points, S2)
+
+
+def test_no_library_is_imported_to_find_out():
+    code = (
+        "import sys, symspline as ss; ss.CubicSpline(['2021-08-29', '2021-08-30'], [[1, 0], [0, 1]], 's:1');"
+        "print([name for name in ('pandas', 'torch', 'qutip', 'scipy', 'matplotlib') if name in sys.modules])"
+    )
+    assert run_python(code).strip() == "[]"
