@@ -17,7 +17,7 @@ LAYERS = [
     ["spline", "free"],
     ["functions"],
     ["adapters", "convert", "files", "jax", "lonlat", "pieces", "torch"],
-    ["hurdat", "quantum", "shapes", "tensors", "tracks"],
+    ["hurdat", "quantum", "shapes", "subspaces", "tensors", "tracks"],
     ["cli", "demo"],
     ["__init__", "__main__"],
 ]
