@@ -13,6 +13,7 @@
     shapes       affine shapes of landmarks, morphs and their pictures
     host         the program around: threads, memory, interruptions
     docs, bench  what they show runs
+    examples     the recipes run
     fuzz         random input; `make fuzz` runs it at length
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
