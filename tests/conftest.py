@@ -9,15 +9,17 @@
     files, convert, cli, plotting, demo
     geo          places, speed and course on a globe
     quantum      Hamiltonians, propagators, pulses, the Bloch sphere
+    subspaces    reduced bases over a parameter
     tensors      diffusion tensors in the order of each program, NIfTI files
     shapes       affine shapes of landmarks, morphs and their pictures
     host         the program around: threads, memory, interruptions
-    docs, bench  what they show runs, and the recipes in `examples`
+    docs, bench  what they show runs
+    examples     the recipes run
     fuzz         random input; `make fuzz` runs it at length
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Beside this file lies what they share: `cases` is the list of spaces and data on them, `curves` has arrays and
-comparisons, `refused` what must be an error.
+comparisons, `refused` what must be an error, `lifting` the horizontal lift by a general solver.
 """
 
 import pytest

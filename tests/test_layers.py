@@ -17,7 +17,7 @@ LAYERS = [
     ["spline", "free"],
     ["functions"],
     ["adapters", "convert", "files", "hermite", "jax", "lonlat", "pieces", "segments", "torch"],
-    ["hurdat", "pose_files", "poses", "quantum", "rotations", "shapes", "tensors", "tracks"],
+    ["hurdat", "pose_files", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "tracks"],
     ["cli", "demo"],
     ["__init__", "__main__"],
 ]

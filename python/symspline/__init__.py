@@ -16,7 +16,7 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
-from . import convert, geo, poses, quantum, rotations, shapes, tensors  # noqa: E402
+from . import convert, geo, poses, quantum, rotations, shapes, subspaces, tensors  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .curves.derivatives import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
@@ -94,6 +94,7 @@ __all__ = [
     "set_num_threads",
     "shapes",
     "space",
+    "subspaces",
     "tensors",
 ]
 

@@ -1,0 +1,33 @@
+"""The recipes run, draw their pictures, and do what they say."""
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+from matplotlib.image import imread
+
+FOLDER = Path(__file__).parents[2] / "examples"
+SAYS = {
+    "attitude": r"at 6.5 minutes: \[",
+    "imu_from_a_recording": "",
+    "qubit_control": r"missed by (\d\.\de-1[4-7]|0\.0e\+00), strongest field",
+    "tensor_volume": r"280 voxels, mean diffusivity 8.\d\de-04 mm²/s, all positive: True",
+    "pod_over_a_parameter": r"4 numbers in place of 80: off by 0.\d%",
+    "morph": "100 frames of 12 landmarks",
+}
+
+
+@pytest.mark.parametrize("name", SAYS)
+def test_a_recipe_draws_a_picture(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(FOLDER / f"{name}.py"))
+    said = capsys.readouterr().out
+    assert re.match(SAYS[name], said), said
+    pictures = list(tmp_path.glob("*.png"))
+    # Neither white nor of one colour.
+    assert pictures and all(imread(picture)[..., :3].std() > 0.02 for picture in pictures)
+
+
+def test_every_recipe_is_here():
+    assert sorted(path.stem for path in FOLDER.glob("*.py")) == sorted(SAYS)
