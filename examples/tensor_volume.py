@@ -1,6 +1,8 @@
-"""Diffusion tensors of a volume at four times: all voxels at any time between, as MRtrix reads them."""
+"""Diffusion tensors of a volume at four times: all voxels at any time between, as MRtrix reads them, and a picture of
+one slice, tensors.png."""
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import symspline as ss
 
@@ -20,3 +22,11 @@ print(
 volume = np.zeros((*mask.shape, 6))
 volume[mask] = ss.tensors.to_vectors(tensors, order="mrtrix")
 np.save("day30.npy", volume)
+
+figure = Figure(figsize=(5, 4), layout="constrained")
+axes = figure.subplots()
+diffusivity = np.full(mask.shape, np.nan)
+diffusivity[mask] = values.mean(axis=-1)
+figure.colorbar(axes.imshow(diffusivity[5], origin="lower"), label="mean diffusivity, mm²/s")
+axes.set(title="day 30, slice 5", xticks=[], yticks=[])
+figure.savefig("tensors.png")

@@ -108,7 +108,7 @@ def reduced_operator(
     if not callable(operator) or hasattr(operator, "shape"):
         _check_operator(operator, n)
     parameters = as_array(x, "x")
-    bases: Array = spline.lift(parameters, start=start)  # type: ignore[attr-defined]
+    bases: Array = spline.lift(parameters, start=start)
     flat = bases.reshape(-1, n, k)
     if callable(operator) and not hasattr(operator, "shape"):
         made = map(operator, parameters.ravel())
