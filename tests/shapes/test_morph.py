@@ -10,7 +10,6 @@ from symspline.shapes import AffineMorph, from_landmarks
 
 KNOTS = np.array([0.0, 1.0, 1.7, 3.0, 4.0])
 X = np.linspace(0, 4, 41)
-# The solver that stands in for the compiled lift has a tolerance of 1e-13 a step.
 NEAR = 2e-11
 
 
