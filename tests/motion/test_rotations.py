@@ -1,7 +1,10 @@
 """Rotations in the words of those who turn things, beside SciPy and finite differences."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import recordings
 from curves import points_on
 from scipy.spatial.transform import Rotation, RotationSpline
 
@@ -79,6 +82,19 @@ def test_rates_are_those_of_scipy_on_a_dense_motion():
     x = np.linspace(1, 9, 5001)
     assert np.abs(rotations.angular_velocity(spline, x) - scipy(x, 1)).max() < 1e-9
     assert np.abs(rotations.angular_acceleration(spline, x) - scipy(x, 2)).max() < 2e-6
+
+
+def test_rates_are_those_of_a_gyroscope():
+    file = Path(__file__).parents[2] / "docs" / "comparisons" / "data" / "data_xsens.txt.gz"
+    sensor = recordings.read(file)
+    spline = ss.CubicSpline(sensor.t, SO3.project(sensor.rotations), "so:3")
+    x, measured = sensor.rate_times[1:], sensor.rates[1:]
+    off = {
+        frame: np.median(np.abs(rotations.angular_velocity(spline, x, frame) - measured))
+        for frame in ("body", "world")
+    }
+    # The sensor corrects its attitude by gravity and the magnetic field, too. Rates are about 0.7 rad/s.
+    assert off["body"] < 0.02 and off["world"] > 0.3
 
 
 @every_curve

@@ -25,7 +25,8 @@ class Euclidean(Space):
 class Sphere(Space):
     """The unit sphere Sⁿ: points are unit vectors of n + 1 numbers.
 
-    S² are directions or places on a globe, S³ unit quaternions. Distance is the angle.
+    S² are directions or places on a globe, S³ unit quaternions: q and −q are two points here, and for curves of
+    rotations there is `SpecialOrthogonal`. Distance is the angle.
 
     >>> import symspline as ss
     >>> ss.Sphere(2).distance([1, 0, 0], [0, 1, 0]).round(8)
