@@ -20,7 +20,7 @@ from .curves.integrals import integrate
 from .curves.solve import Progress
 from .curves.together import longest_step
 from .failures import fail
-from .options import check_on_failure, check_progress, checked_policy, options_of, outside
+from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .report import Report, combined
 from .spaces import Array, Space
 from .spaces import space as space_named
@@ -61,6 +61,8 @@ class CubicSpline:
             ``"warn"`` or ``"ignore"``. The exception's ``.spline`` holds all good curves; an unconverged
             curve keeps its best iterate, a curve with a cut-locus fault is NaN.
         check: whether to validate the input.
+        atol: how far off the space points may be, for numbers that were rounded in a file, such as 1e-5 for unit
+            quaternions of six decimals; None for what ``points`` says.
         progress: called from time to time with the finished and the total number of points.
 
     Raises:
@@ -89,6 +91,7 @@ class CubicSpline:
         extrapolate: bool | str | None = None,
         on_failure: str = "raise",
         check: bool = True,
+        atol: float | None = None,
         progress: Progress | None = None,
     ) -> None:
         space = space_named(space)
@@ -96,7 +99,7 @@ class CubicSpline:
         check_on_failure(on_failure)
         options = options_of(method, tol, max_iter)
         check_progress(progress)
-        data = read(points, space)
+        data = within(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         clock, shown_times, times = knots_of(t, batch, nodes)
         ends = read_ends(bc_type, space, batch)
