@@ -15,7 +15,7 @@ from .curves.curve import quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
 from .failures import fail
-from .options import check_on_failure, check_progress, checked_policy, options_of, outside
+from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .report import Report
 from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
@@ -111,6 +111,7 @@ def fit_many(
     extrapolate: bool | str | None = None,
     on_failure: str = "raise",
     check: bool = True,
+    atol: float | None = None,
     progress: Progress | None = None,
 ) -> list[CubicSpline]:
     """Fit curves of different lengths in one parallel call.
@@ -118,7 +119,7 @@ def fit_many(
     Args:
         curves: pairs (t, points), one a curve; see `CubicSpline`.
         space: the space of all curves, or its name.
-        bc_type, method, tol, max_iter, extrapolate, on_failure, check, progress: as for `CubicSpline`, for all
+        bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol, progress: as for `CubicSpline`, for all
             curves alike.
 
     Returns:
@@ -143,7 +144,7 @@ def fit_many(
     points, knots = [], []
     for number, (t, p) in enumerate(pairs):
         try:
-            data = fitting.read(p, space)
+            data = within(fitting.read(p, space), atol)
             if data[0].batch:
                 raise ValidationError(f"points has shape {np.shape(p)}; each curve here is a single one")
             points.append(data)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ._core import ValidationError
 from .arrays import shown, whole_number
 from .curves.ends import is_closed
+from .curves.fit import Points
 from .curves.solve import Options
 
 _OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
@@ -15,6 +18,15 @@ _OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic":
 def options_of(method: str, tol: float, max_iter: int | None) -> Options:
     """How to solve; the core checks method and tol."""
     return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
+
+
+def within(data: list[Points], atol: float | None) -> list[Points]:
+    """Points that may be off the space by ``atol``; None leaves what their type allows."""
+    if atol is None:
+        return data
+    if isinstance(atol, bool) or not isinstance(atol, (int, float, np.number)) or not 0 <= atol < 1:
+        raise ValidationError(f"atol must be a number from 0 to 1, not {shown(atol)}")
+    return [part._replace(tol=float(atol)) for part in data]
 
 
 def checked_policy(extrapolate: Any) -> Any:

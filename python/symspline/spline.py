@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Self
@@ -12,15 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from . import archive
 from ._core import ValidationError
 from .arrays import read_only, shown
+from .curves.chosen import fit_chosen, invalid, mask_of
 from .curves.curve import Curve, Doubles, quantity_of
 from .curves.derivatives import Gradient, Places, places
 from .curves.ends import ends_in_factors, kept, picked
 from .curves.fit import curve_of, fit, read, read_ends
 from .curves.integrals import integrate
-from .curves.solve import Progress
+from .curves.solve import Fault, Progress
 from .curves.together import longest_step
 from .failures import fail
-from .options import check_on_failure, check_progress, checked_policy, options_of, outside
+from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .report import Report, combined
 from .signs import warn_of_signs
 from .spaces import Array, Product, Space, parts_of
@@ -60,8 +62,13 @@ class CubicSpline:
             continues the last segment, ``"geodesic"`` goes on with constant velocity, ``"periodic"`` wraps.
         on_failure: what happens when a curve does not converge or meets a cut locus: ``"raise"``,
             ``"warn"`` or ``"ignore"``. The exception's ``.spline`` holds all good curves; an unconverged
-            curve keeps its best iterate, a curve with a cut-locus fault is NaN.
+            curve keeps its best iterate, a curve with a cut-locus fault is NaN. With the last two a curve of a batch
+            with an invalid point (NaN, not positive definite, off the space) is NaN, too, and the others are fitted.
+        where: True for the curves of a batch that are wanted, shape of the batch axes: the others are NaN, whatever
+            their points are, and no work is done for them.
         check: whether to validate the input.
+        atol: how far off the space points may be, for numbers that were rounded in a file, such as 1e-5 for unit
+            quaternions of six decimals; None for what ``points`` says.
         progress: called from time to time with the finished and the total number of points.
 
     Raises:
@@ -90,6 +97,8 @@ class CubicSpline:
         extrapolate: bool | str | None = None,
         on_failure: str = "raise",
         check: bool = True,
+        atol: float | None = None,
+        where: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> None:
         space = space_named(space)
@@ -97,17 +106,31 @@ class CubicSpline:
         check_on_failure(on_failure)
         options = options_of(method, tol, max_iter)
         check_progress(progress)
-        data = read(points, space)
+        data = within(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         clock, shown_times, times = knots_of(t, batch, nodes)
         ends = read_ends(bc_type, space, batch)
+        mask = None if where is None else mask_of(where, batch)
+        bad: list[Fault] = []
+        if batch and check and on_failure != "raise":
+            wanted = np.arange(math.prod(batch)) if mask is None else np.flatnonzero(mask)
+            bad = invalid(space, data, wanted)
+            if bad:
+                mask = np.ones(batch, bool) if mask is None else mask.copy()
+                mask.flat[[number for number, *_ in bad]] = False
         try:
-            curve, reports, faults = fit(space, times, data, ends, options, check, progress)
+            if mask is None or mask.all():
+                curve, reports, faults = fit(space, times, data, ends, options, check, progress)
+            else:
+                chosen = np.flatnonzero(mask)
+                curve, reports, faults = fit_chosen(
+                    space, times, data, ends, options, check, progress, chosen
+                )
         except ValidationError as error:
             raise clock.explain(error) from None
         self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
-        if faults:
-            fail(faults, on_failure, self)
+        if bad or faults:
+            fail(sorted(bad + faults), on_failure, self)
         warn_of_signs(space, [data])
 
     def _fill(

@@ -111,5 +111,5 @@ def test_messages_quote_no_large_arrays():
 def test_the_signature_names_the_parameters():
     assert list(inspect.signature(ss.CubicSpline).parameters) == [
         "t", "points", "space", "bc_type", "method", "tol", "max_iter", "extrapolate", "on_failure", "check",
-        "progress",
+        "atol", "where", "progress",
     ]  # fmt: skip

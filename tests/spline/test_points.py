@@ -246,3 +246,23 @@ def test_complex_points_of_a_real_space(name, meant):
 def test_complex_points_where_nothing_else_is_meant(name):
     with pytest.raises(ss.ValidationError, match=r"real numbers, not of complex128$"):
         ss.CubicSpline(None, points(name) + 0j, name)
+
+
+@pytest.mark.parametrize("name", ["sphere:3", "so:3", "sphere:3 x r:1", "cp:2"])
+def test_rounded_points_are_taken_within_atol(name):
+    space = ss.space(name)
+    exact = points_on(space, 5)
+    rounded = tuple(part.round(6) for part in exact) if isinstance(exact, tuple) else exact.round(6)
+    with pytest.raises(ss.ValidationError, match="off the space"):
+        ss.CubicSpline(None, rounded, space)
+    spline = ss.CubicSpline(None, rounded, space, atol=1e-5)
+    space.check_point(spline.points)
+    assert np.max(space.distance(spline.points, exact)) < 1e-5
+    assert ss.fit_many([(None, rounded)], space, atol=1e-5) == [spline]
+    with pytest.raises(ss.ValidationError, match=r"off the space.*within 1e-7 are"):
+        ss.CubicSpline(None, rounded, space, atol=1e-7)
+
+
+@pytest.mark.parametrize("atol", [-1, 1, np.nan, "1e-5", True, [1e-5]])
+def test_bad_atol(atol):
+    fit_error("atol must be a number from 0 to 1, not", atol=atol)

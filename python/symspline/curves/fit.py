@@ -114,15 +114,34 @@ def fit(
     progress: Progress | None,
 ) -> Fit:
     """Curves of equal length."""
+    solved = solve_factors(space, times, points, ends, options, check, progress)
+    return finished(space, times, points[0].batch, solved, options)
+
+
+def solve_factors(
+    space: Space,
+    times: NDArray[np.float64],
+    points: list[Points],
+    ends: list[list[End] | None],
+    options: Options,
+    check: bool,
+    progress: Progress | None,
+) -> list[Solved]:
+    """What comes of curves of equal length in every factor."""
     tasks = [
         Task(factor, times, part.doubles, end, part.tol if check else None)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
-    solved = _solve(space, tasks, options, progress)
-    batch = points[0].batch
+    return _solve(space, tasks, options, progress)
+
+
+def finished(
+    space: Space, times: NDArray[np.float64], batch: tuple[int, ...], solved: list[Solved], options: Options
+) -> Fit:
+    """Curves and reports of what was solved."""
     reports = [
-        shaped(found.columns, times, batch, task.space.curvature, options.method)
-        for task, found in zip(tasks, solved, strict=True)
+        shaped(found.columns, times, batch, factor.curvature, options.method)
+        for factor, found in zip(factors_of(space), solved, strict=True)
     ]
     return Fit(curve_of(space, times, [found[:2] for found in solved]), reports, _first(solved))
 

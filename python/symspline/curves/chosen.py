@@ -1,0 +1,120 @@
+"""Some curves of a batch fitted, the others left out: NaN, and no work done for them."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from ..arrays import as_array
+from ..spaces import Array, Space, factors_of
+from .ends import End
+from .fit import Fit, Points, finished, solve_factors
+from .solve import Fault, Options, Progress, Solved
+
+Numbers = NDArray[np.int64]
+
+
+def mask_of(where: Any, batch: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Which curves are wanted."""
+    mask = as_array(where, "where")
+    if mask.dtype != bool or mask.shape != batch:
+        raise ValidationError(
+            f"where must be True or False for every curve, of shape {batch}, not {mask.dtype} of shape {mask.shape}"
+        )
+    return mask
+
+
+def invalid(space: Space, points: list[Points], wanted: Numbers) -> list[Fault]:
+    """Curves with points that are none, found by halves: the few bad ones of many cost little."""
+    found: dict[int, str] = {}
+    for factor, part in zip(factors_of(space), points, strict=True):
+        rows = part.doubles.reshape(-1, part.nodes, *factor._doubles_shape)
+        width = rows[0].size // part.nodes
+
+        def search(
+            own: Numbers, factor: Space = factor, part: Points = part, rows: Any = rows, n: int = width
+        ) -> None:
+            count = len(own) * part.nodes
+            try:
+                factor._handle.check_points(
+                    np.ascontiguousarray(rows[own]).reshape(count, n), [count], part.tol
+                )
+            except ValidationError as error:
+                if len(own) > 1:
+                    search(own[: len(own) // 2])
+                    search(own[len(own) // 2 :])
+                    return
+                of = f" of curve {_place(int(own[0]), part.batch)}"
+                found.setdefault(int(own[0]), re.sub(r"^point (\d+)", rf"points[\1]{of}", str(error)))
+
+        if len(wanted):
+            search(wanted)
+    return [(number, "invalid", found[number]) for number in sorted(found)]
+
+
+def fit_chosen(
+    space: Space,
+    times: NDArray[np.float64],
+    points: list[Points],
+    ends: list[list[End] | None],
+    options: Options,
+    check: bool,
+    progress: Progress | None,
+    chosen: Numbers,
+) -> Fit:
+    """The curves with these numbers; the others are NaN."""
+    batch = points[0].batch
+
+    def picked(rows: Array, axes: int) -> Array:
+        """The chosen rows of an array that has the batch axes, then some more."""
+        return np.ascontiguousarray(rows.reshape(-1, *rows.shape[rows.ndim - axes :])[chosen])
+
+    few = [
+        part._replace(doubles=picked(part.doubles, 1 + len(factor.point_shape)), batch=(len(chosen),))
+        for factor, part in zip(factors_of(space), points, strict=True)
+    ]
+    some = [
+        own and [(kind, None if v is None else picked(v, len(factor.point_shape))) for kind, v in own]
+        for factor, own in zip(factors_of(space), ends, strict=True)
+    ]
+    own_times = picked(times, 1) if times.ndim > 1 else times
+    try:
+        solved = solve_factors(space, own_times, few, some, options, check, progress) if len(chosen) else []
+    except ValidationError as error:
+        raise ValidationError(_renamed(str(error), chosen, batch)) from None
+    each_found: list[Solved | None] = [*solved] if solved else [None] * len(points)
+    each = zip(factors_of(space), points, each_found, strict=True)
+    spread = [_spread(factor, part, found, chosen) for factor, part, found in each]
+    done = finished(space, times, batch, spread, options)
+    faults = [(int(chosen[i]), kind, _renamed(why, chosen, batch)) for i, kind, why in done.faults]
+    return done._replace(faults=faults)
+
+
+def _spread(space: Space, points: Points, found: Solved | None, chosen: Numbers) -> Solved:
+    """Curves at their places in the whole batch."""
+    count = math.prod(points.batch)
+    shape = (*points.batch, points.nodes, *space.point_shape)
+    places, velocities = (np.full(shape, np.nan, space.dtype) for _ in range(2))
+    # As the core writes them: converged, iterations, residual, longest step, rate, solver, radius.
+    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(7)]
+    columns[0], columns[1], columns[5] = (np.zeros(count, kind) for kind in (bool, np.int64, np.int64))
+    if found is None:
+        return Solved(places, velocities, tuple(columns), [])
+    for whole, part in ((places, found.points), (velocities, found.velocities)):
+        whole.reshape(count, points.nodes, *space.point_shape)[chosen] = part
+    for column, own in zip(columns, found.columns, strict=True):
+        column[chosen] = own
+    return Solved(places, velocities, tuple(columns), found.faults)
+
+
+def _renamed(message: str, chosen: Numbers, batch: tuple[int, ...]) -> str:
+    return re.sub(r"of curve (\d+)", lambda m: f"of curve {_place(int(chosen[int(m[1])]), batch)}", message)
+
+
+def _place(number: int, batch: tuple[int, ...]) -> str:
+    return ",".join(map(str, np.unravel_index(number, batch)))
