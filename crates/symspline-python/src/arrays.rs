@@ -1,12 +1,21 @@
 //! New arrays, and memory that may not be there.
 
-use numpy::PyArrayDyn;
-use pyo3::exceptions::PyMemoryError;
+use numpy::{PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
 /// Numbers up to which memory is taken to be there.
 const SMALL: usize = 1 << 16;
+
+/// The numbers of an array that lie in the order of its axes. Others would be read in the order of the memory.
+pub fn in_order<'a>(array: &'a PyReadonlyArrayDyn<f64>) -> PyResult<&'a [f64]> {
+    if array.is_c_contiguous() {
+        Ok(array.as_slice()?)
+    } else {
+        Err(PyTypeError::new_err("an array whose numbers do not lie in the order of its axes"))
+    }
+}
 
 /// Zeros for a result.
 pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {

@@ -1,6 +1,6 @@
 //! Derivatives with respect to the data, called from Python.
 
-use crate::arrays::{room, zeros};
+use crate::arrays::{in_order, room, zeros};
 use crate::errors::invalid;
 use crate::fit::{EndOf, end};
 use crate::space::Handle;
@@ -46,14 +46,14 @@ fn part<T>(array: &[T], curve: usize, curves: usize) -> &[T] {
 impl<'py> Curves<'py> {
     fn slices(&self) -> PyResult<Slices<'_>> {
         Ok(Slices {
-            t: self.t.as_slice()?,
-            points: self.points.as_slice()?,
-            velocities: self.velocities.as_slice()?,
+            t: in_order(&self.t)?,
+            points: in_order(&self.points)?,
+            velocities: in_order(&self.velocities)?,
             ends: match &self.ends {
                 None => Ends::Periodic,
                 Some([a, b]) => Ends::Open([end(a)?, end(b)?]),
             },
-            x: self.x.as_slice()?,
+            x: in_order(&self.x)?,
             curves: self.curves,
             of: match self.nu {
                 0 => Of::Point,
@@ -113,8 +113,8 @@ pub fn push<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let slices = curves.slices()?;
     let len = handle.space.get().point_len();
-    let (points, knots) = (points.as_slice()?, knots.as_slice()?);
-    let ends = [ends[0].as_slice()?, ends[1].as_slice()?];
+    let (points, knots) = (in_order(&points)?, in_order(&knots)?);
+    let ends = [in_order(&ends[0])?, in_order(&ends[1])?];
     slices.room(handle.space.get().dim())?;
     let out = zeros(py, &[slices.x.len() * len])?;
     let mut write = out.readwrite();
@@ -143,7 +143,7 @@ pub fn pull<'py>(
     cotangent: Array<'py>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
     let slices = curves.slices()?;
-    let cotangent = cotangent.as_slice()?;
+    let cotangent = in_order(&cotangent)?;
     slices.room(handle.space.get().dim())?;
     let mut gradients = vec![Data::default(); slices.curves];
     let items = gradients.iter_mut().enumerate().collect();

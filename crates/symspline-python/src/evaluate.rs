@@ -1,6 +1,6 @@
 //! Evaluation, called from Python.
 
-use crate::arrays::zeros;
+use crate::arrays::{in_order, zeros};
 use crate::errors::{invalid, number, place};
 use crate::space::Handle;
 use crate::validate::of_curve;
@@ -56,7 +56,7 @@ pub fn lift<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let at = (x, outside, per_curve);
-    let factors = [knots.as_slice()?, start.as_slice()?];
+    let factors = [in_order(&knots)?, in_order(&start)?];
     sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, |space, job, monitor, out| {
         run_lift(space, job.curves, job.times, job.quantity, job.outside, factors, monitor, out);
     })
@@ -100,7 +100,7 @@ pub fn transport<'py>(
     let out = zeros(py, vectors.shape())?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    result.copy_from_slice(vectors.as_slice()?);
+    result.copy_from_slice(in_order(&vectors)?);
     let count = result.len() / handle.space.get().point_len().max(1);
     watched(py, None, count, |monitor| {
         run_transport(&handle.space.get(), &curves, times, policy, monitor, result);
@@ -119,10 +119,10 @@ struct Asked<'a> {
 
 fn curves_of<'a>([t, points, velocities]: [&'a Array; 3]) -> PyResult<Curves<'a>> {
     Ok(Curves {
-        t: t.as_slice()?,
+        t: in_order(t)?,
         nodes: t.shape()[t.ndim() - 1],
-        points: points.as_slice()?,
-        velocities: velocities.as_slice()?,
+        points: in_order(points)?,
+        velocities: in_order(velocities)?,
     })
 }
 
@@ -143,7 +143,7 @@ fn sampled<'py>(
     let count_axes = if per_curve { &x.shape()[batch.len()..] } else { x.shape() };
     let curves = curves_of(curve)?;
     let count = count_axes.iter().product();
-    let times = Times { x: x.as_slice()?, count };
+    let times = Times { x: in_order(&x)?, count };
     check_times(&curves, &times, batch, x.shape(), strict)?;
 
     let space = handle.space.get();
@@ -205,10 +205,10 @@ pub fn evaluate_bspline<'py>(
     if !quantity.is_length() {
         shape.extend_from_slice(&control.shape()[axes..]);
     }
-    let curve = BSpline { knots: knots.as_slice()?, control: control.as_slice()?, degree };
+    let curve = BSpline { knots: in_order(&knots)?, control: in_order(&control)?, degree };
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
-    let (x, result) = (x.as_slice()?, write.as_slice_mut()?);
+    let (x, result) = (in_order(&x)?, write.as_slice_mut()?);
     watched(py, None, result.len(), |monitor| {
         run_bspline(&handle.space.get(), &curve, x, quantity, monitor, result);
     })?;

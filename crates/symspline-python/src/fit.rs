@@ -1,6 +1,6 @@
 //! Fitting, called from Python.
 
-use crate::arrays::{room, zeros};
+use crate::arrays::{in_order, room, zeros};
 use crate::errors::invalid;
 use crate::space::Handle;
 use crate::validate;
@@ -64,7 +64,7 @@ pub fn fit<'py>(
     let options = Options { method, tol, max_iter };
     let len = handle.space.get().point_len();
     let nodes = points.len() / len;
-    let t_slice = t.as_slice()?;
+    let t_slice = in_order(&t)?;
     let different = offsets.is_some();
     let (offsets, shared) = match offsets {
         Some(offsets) => (offsets, false),
@@ -83,7 +83,7 @@ pub fn fit<'py>(
     let velocities = zeros(py, points.shape())?;
     let (mut out_write, mut velocities_write) = (out.readwrite(), velocities.readwrite());
     let (p, u) = (out_write.as_slice_mut()?, velocities_write.as_slice_mut()?);
-    p.copy_from_slice(points.as_slice()?);
+    p.copy_from_slice(in_order(&points)?);
 
     if check {
         let count = if shared { 1 } else { curves };
@@ -119,8 +119,8 @@ pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
     Ok(match (kind.as_str(), value) {
         ("natural", _) => End::Natural,
         ("not-a-knot", _) => End::NotAKnot,
-        ("velocity", Some(v)) => End::Velocity(v.as_slice()?),
-        ("acceleration", Some(v)) => End::Acceleration(v.as_slice()?),
+        ("velocity", Some(v)) => End::Velocity(in_order(v)?),
+        ("acceleration", Some(v)) => End::Acceleration(in_order(v)?),
         _ => return Err(invalid(format!("unknown end condition {kind:?}"))),
     })
 }

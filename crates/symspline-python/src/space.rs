@@ -1,6 +1,6 @@
 //! The compiled side of a space.
 
-use crate::arrays::{room, zeros};
+use crate::arrays::{in_order, room, zeros};
 use crate::errors::{CutLocusError, invalid, place};
 use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -85,8 +85,8 @@ impl Handle {
             "random_tangent" => Operation::RandomTangent,
             _ => return Err(invalid(format!("unknown operation {operation:?}"))),
         };
-        let slices = inputs.iter().map(|a| a.as_slice()).collect::<Result<Vec<_>, _>>()?;
-        let t = t.as_ref().map_or(Ok(&[][..]), |t| t.as_slice())?;
+        let slices = inputs.iter().map(in_order).collect::<PyResult<Vec<_>>>()?;
+        let t = t.as_ref().map_or(Ok(&[][..]), in_order)?;
         let len = self.space.get().point_len();
         let rows = slices[0].len() / len;
         let out = zeros(py, &[rows * operation.row_len(len)])?;
@@ -119,7 +119,7 @@ impl Handle {
         shape: Vec<usize>,
         tol: f64,
     ) -> PyResult<()> {
-        let points = points.as_slice()?;
+        let points = in_order(&points)?;
         let mut copy = room(points.len())?;
         copy.extend_from_slice(points);
         let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
@@ -137,7 +137,7 @@ impl Handle {
         vectors: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         drop(room::<f64>(2 * points.shape()[0])?);
-        let defects = tangent_defects(&self.space.get(), points.as_slice()?, vectors.as_slice()?);
+        let defects = tangent_defects(&self.space.get(), in_order(&points)?, in_order(&vectors)?);
         let shape = [points.shape()[0]];
         PyArray1::from_vec(py, defects).reshape(shape).map(|a| a.to_dyn().clone())
     }
