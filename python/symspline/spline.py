@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import archive
 from ._core import ValidationError
-from .arrays import read_only, shown
+from .arrays import in_single, is_single, read_only, shown
 from .curves.chosen import fit_chosen, invalid, mask_of
 from .curves.curve import Curve, quantity_of
 from .curves.derivatives import Gradient, Places, places
@@ -163,6 +163,7 @@ class CubicSpline:
         *,
         extrapolate: bool | str | None = None,
         per_curve: bool = False,
+        dtype: Any = None,
         progress: Progress | None = None,
     ) -> Any:
         """The curve at times x.
@@ -172,6 +173,8 @@ class CubicSpline:
             nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
             extrapolate: as for the constructor, whose choice holds if None.
             per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
+            dtype: ``"float32"`` for results in single precision, of complex points in complex64; they are computed in
+                double precision.
             progress: called from time to time with the finished and the total number of points to compute.
 
         Returns:
@@ -182,7 +185,9 @@ class CubicSpline:
         """
         if progress is not None:
             check_progress(progress)
-        return self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
+        single = dtype is not None and is_single(dtype)
+        values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
+        return in_single(values) if single else values
 
     def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
         """|γ'| at times x, shape batch axes + x.shape."""
