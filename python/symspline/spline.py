@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from base64 import b64encode
 from collections.abc import Iterator
+from html import escape
 from importlib.util import find_spec
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -30,6 +33,9 @@ from .times import Clock, knots_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+# Per inch, in notebooks.
+_DOTS = 60
 
 
 class CubicSpline:
@@ -428,6 +434,20 @@ class CubicSpline:
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
         return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
+
+    def _repr_html_(self) -> str:
+        """What notebooks show: a small picture, where matplotlib is there to draw it."""
+        text = f"<pre>{escape(repr(self))}</pre>"
+        if find_spec("matplotlib") is None:
+            return text
+        picture = BytesIO()
+        try:
+            self.plot().savefig(picture, format="png", dpi=_DOTS)
+        except ValidationError:
+            # There is nothing to plot of curves that failed.
+            return text
+        data = b64encode(picture.getvalue()).decode()
+        return f'{text}<img src="data:image/png;base64,{data}" alt="{escape(repr(self))}">'
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
