@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -83,3 +84,20 @@ def whole_number(value: Any, name: str, least: int) -> int:
     if not least <= int(value) < 2**62:
         raise ValidationError(f"{name} must be at least {least} and not beyond 2**62, not {value}")
     return int(value)
+
+
+def is_single(dtype: Any) -> bool:
+    """Whether a type of results is single precision; it may be double precision, too."""
+    with suppress(TypeError):
+        if np.dtype(dtype) in (np.float32, np.complex64):
+            return True
+        if np.dtype(dtype) in (np.float64, np.complex128):
+            return False
+    raise ValidationError(f"dtype must be 'float32' or 'float64', not {shown(dtype)}")
+
+
+def in_single(values: Any) -> Any:
+    """Numbers in single precision; those too large for it are infinite."""
+    if isinstance(values, tuple):
+        return tuple(map(in_single, values))
+    return cast(values, np.complex64 if values.dtype.kind == "c" else np.float32)

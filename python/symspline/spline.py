@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from base64 import b64encode
 from collections.abc import Callable, Iterator
+from html import escape
 from importlib.util import find_spec
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import archive
 from ._core import ValidationError
-from .arrays import read_only, shown
+from .arrays import in_single, is_single, read_only, shown
 from .curves.chosen import fit_chosen, invalid, mask_of
 from .curves.curve import Curve, Doubles, quantity_of
 from .curves.derivatives import Gradient, Places, places
@@ -31,6 +34,9 @@ from .times import Clock, knots_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+# Per inch, in notebooks.
+_DOTS = 60
 
 
 class CubicSpline:
@@ -165,6 +171,7 @@ class CubicSpline:
         *,
         extrapolate: bool | str | None = None,
         per_curve: bool = False,
+        dtype: Any = None,
         progress: Progress | None = None,
     ) -> Any:
         """The curve at times x.
@@ -174,6 +181,8 @@ class CubicSpline:
             nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
             extrapolate: as for the constructor, whose choice holds if None.
             per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
+            dtype: ``"float32"`` for results in single precision, of complex points in complex64; they are computed in
+                double precision.
             progress: called from time to time with the finished and the total number of points to compute.
 
         Returns:
@@ -184,7 +193,9 @@ class CubicSpline:
         """
         if progress is not None:
             check_progress(progress)
-        return self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
+        single = dtype is not None and is_single(dtype)
+        values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
+        return in_single(values) if single else values
 
     def lift(
         self,
@@ -261,7 +272,7 @@ class CubicSpline:
         times, _ = self._clock.at(np.asarray([x0, x1]), self._batch, False)
         where = "periodic" if self._outside == "periodic" else "raise"
         # Times outside the knots are refused here.
-        at = self(np.asarray([x0, x1]), extrapolate=where if where == "periodic" else None)
+        at = evaluated(self._curve, self._clock, np.asarray([x0, x1]), "point", where, False, None)
         vectors = []
         for points, part, one in zip(
             parts_of(at, self.space, "points"), self._curve.parts, parts_of(v, self.space, "v"), strict=True
@@ -514,6 +525,20 @@ class CubicSpline:
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
         return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
+
+    def _repr_html_(self) -> str:
+        """What notebooks show: a small picture, where matplotlib is there to draw it."""
+        text = f"<pre>{escape(repr(self))}</pre>"
+        if find_spec("matplotlib") is None:
+            return text
+        picture = BytesIO()
+        try:
+            self.plot().savefig(picture, format="png", dpi=_DOTS)
+        except ValidationError:
+            # There is nothing to plot of curves that failed.
+            return text
+        data = b64encode(picture.getvalue()).decode()
+        return f'{text}<img src="data:image/png;base64,{data}" alt="{escape(repr(self))}">'
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""

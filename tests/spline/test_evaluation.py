@@ -196,3 +196,21 @@ def test_bad_derivatives(nu):
 def test_bad_policies_of_a_call():
     with pytest.raises(ss.ValidationError, match=r"extrapolate must be .*not 'foo'"):
         ss.CubicSpline(None, P, S2)(0.5, extrapolate="foo")
+
+
+@pytest.mark.parametrize("name, kind", [("sphere:2", np.float32), ("cp:1", np.complex64)])
+@pytest.mark.parametrize("dtype", ["float32", np.float32, np.dtype("c8")])
+def test_results_in_single_precision(name, kind, dtype):
+    spline, x = ss.CubicSpline(None, points_on(ss.space(name), 4), name), np.linspace(0, 3, 9)
+    for nu in (0, 1, 2):
+        found = spline(x, nu, dtype=dtype)
+        assert found.dtype == kind and np.array_equal(found, spline(x, nu).astype(kind))
+        assert np.array_equal(spline(x, nu, dtype="float64"), spline(x, nu))
+
+
+def test_single_precision_in_a_product_and_of_one_time():
+    spline = ss.CubicSpline(None, points_on(ss.space("cp:1 x r:2"), 4), "cp:1 x r:2")
+    assert [part.dtype.name for part in spline(0.5, dtype="float32")] == ["complex64", "float32"]
+    for dtype in ("int", "f2", "nonsense", 3):
+        with pytest.raises(ss.ValidationError, match="dtype must be 'float32' or 'float64', not"):
+            spline(0.5, dtype=dtype)
