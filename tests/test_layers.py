@@ -14,7 +14,8 @@ LAYERS = [
     ["spaces"],
     ["curves"],
     ["archive", "failures", "options", "plotting", "signs"],
-    ["spline", "free"],
+    ["piecewise", "free"],
+    ["spline"],
     ["functions"],
     ["adapters", "convert", "files", "hermite", "jax", "lonlat", "pieces", "segments", "torch"],
     ["hurdat", "pose_files", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "tracks"],
@@ -72,7 +73,7 @@ def test_the_graph_is_that_of_the_package():
         "times"
     ]
     # An import inside a function, and one for type checkers only.
-    assert "plotting" in GRAPH["spline"] and "spline" not in GRAPH["archive"]
+    assert "plotting" in GRAPH["piecewise"] and "spline" not in GRAPH["archive"]
 
 
 def test_every_module_imports_from_layers_below():

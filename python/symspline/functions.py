@@ -16,11 +16,12 @@ from .curves.ends import kept, picked
 from .curves.solve import Progress
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
+from .piecewise import evaluated
 from .report import Report
 from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
-from .spline import CubicSpline, evaluated
+from .spline import CubicSpline
 from .times import knots_of
 
 

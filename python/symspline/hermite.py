@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ._core import CutLocusError, ValidationError
-from .arrays import read_only, shown
-from .curves.curve import Curve, quantity_of
+from .curves.curve import Curve
 from .curves.fit import curve_of, read, read_ends, validated
-from .curves.integrals import integrate
-from .curves.solve import Progress
 from .functions import velocities_of
-from .options import check_progress, checked_policy, outside
+from .options import checked_policy, outside
+from .piecewise import Piecewise
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
-from .spline import evaluated
 from .times import Clock, knots_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
-class HermiteSpline:
+class HermiteSpline(Piecewise):
     """The cubic curve through points with given velocities there, such as measured ones.
 
     Between two points it is the same Bézier curve as that of a `CubicSpline`, whose control points follow from the
@@ -56,6 +51,7 @@ class HermiteSpline:
     _kind = "C¹ Hermite spline"
     _ends = "given velocities"
     _unconverged = 0
+    _bc_type = "natural"  # such curves are not closed
 
     def __init__(
         self,
@@ -88,6 +84,7 @@ class HermiteSpline:
 
     def _fill(self, clock: Clock, t: Array, curve: Curve, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate
+        self._outside = outside(extrapolate, self._bc_type)
 
     @classmethod
     def _of(cls, *parts: Any) -> Self:
@@ -95,111 +92,6 @@ class HermiteSpline:
         self = cls.__new__(cls)
         self._fill(*parts)
         return self
-
-    # ---- the curve ----
-
-    def __call__(
-        self,
-        x: ArrayLike,
-        nu: int = 0,
-        *,
-        extrapolate: bool | str | None = None,
-        per_curve: bool = False,
-        progress: Progress | None = None,
-    ) -> Any:
-        """The curve at times x, as calling a `CubicSpline`; at knots ``nu=2`` is that of the segment that begins there,
-        at the last knot of the one that ends."""
-        if progress is not None:
-            check_progress(progress)
-        where = self._where(extrapolate)
-        return evaluated(self._curve, self._clock, x, quantity_of(nu), where, per_curve, progress)
-
-    def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
-        """|γ'| at times x, shape batch axes + x.shape."""
-        where = self._where(extrapolate)
-        return evaluated(self._curve, self._clock, x, "speed", where, per_curve, None)[()]
-
-    def length(self) -> Any:
-        """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
-        curve = self._curve
-        return integrate(curve.times, lambda x: curve.evaluate(x, "speed", "raise", True), curve.batch)
-
-    def _where(self, extrapolate: Any) -> str:
-        """What happens outside the knots, as the core calls it."""
-        policy = self._extrapolate if extrapolate is None else checked_policy(extrapolate)
-        return outside(policy, "natural")
-
-    # ---- what it is made of ----
-
-    @property
-    def t(self) -> Array:
-        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given."""
-        return read_only(self._t)
-
-    @property
-    def points(self) -> Any:
-        """The points, shape (..., N+1, *point_shape)."""
-        return self._curve.points
-
-    @property
-    def velocities(self) -> Any:
-        """The velocities at the knots, the shape of the points."""
-        return self._curve.velocities
-
-    @property
-    def control_points(self) -> Any:
-        """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
-        return self._curve.control_points()
-
-    @property
-    def space(self) -> Space:
-        """The space."""
-        return self._curve.space
-
-    @property
-    def extrapolate(self) -> Any:
-        """What happens outside the knots, as it was given."""
-        return self._extrapolate
-
-    # ---- a batch as a sequence ----
-
-    def __len__(self) -> int:
-        if not self._curve.batch:
-            raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
-        return self._curve.batch[0]
-
-    def __getitem__(self, index: Any) -> HermiteSpline:
-        """A curve, or a slice of curves, of a batch."""
-        if not self._curve.batch:
-            raise TypeError("this is one curve; only a batch of curves can be indexed")
-        if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(f"a curve is picked by a whole number or a slice, not {shown(index)}")
-        t = self._t[index] if self._curve.times.ndim > 1 else self._t
-        return HermiteSpline._of(self._clock.picked(index), t, self._curve.picked(index), self._extrapolate)
-
-    def __bool__(self) -> bool:
-        return True
-
-    def __iter__(self) -> Iterator[HermiteSpline]:
-        return (self[i] for i in range(len(self)))
-
-    # ---- as a value ----
-
-    def __eq__(self, other: object) -> bool:
-        """Equal space, knots, points and velocities, to the last bit."""
-        if not isinstance(other, HermiteSpline):
-            return NotImplemented
-        return (
-            self.space == other.space
-            and self._t.dtype == other._t.dtype
-            and np.array_equal(self._t, other._t)
-            and all(
-                np.array_equal(a.points, b.points) and np.array_equal(a.velocities, b.velocities)
-                for a, b in zip(self._curve.parts, other._curve.parts, strict=True)
-            )
-        )
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return HermiteSpline._of, (self._clock, self._t, self._curve, self._extrapolate)
@@ -209,17 +101,8 @@ class HermiteSpline:
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
 
-    def plot(self, file: Any = None) -> Figure:
-        """A figure as that of `CubicSpline.plot`.
-
-        Raises:
-            ImportError: matplotlib is not installed.
-        """
-        if find_spec("matplotlib") is None:
-            raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")
-        from .plotting import plot
-
-        return plot(self, file)
+    def _with(self, clock: Clock, t: Array, curve: Curve, index: Any) -> HermiteSpline:
+        return HermiteSpline._of(clock, t, curve, self._extrapolate)
 
 
 def _check_legs(curve: Curve) -> None:

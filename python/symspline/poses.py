@@ -22,10 +22,10 @@ from numpy.typing import ArrayLike
 
 from ._core import ValidationError
 from .curves.curve import Curve
+from .piecewise import evaluated
 from .pose_files import join, read_euroc, read_kitti, read_tum, split, write_euroc, write_kitti, write_tum
 from .rotations import Spline, angular_velocity, attitude, check_frame, turned
 from .spaces import Array, Euclidean, SpecialEuclidean
-from .spline import evaluated
 
 __all__ = [
     "Imu",

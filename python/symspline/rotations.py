@@ -28,8 +28,9 @@ from .convert.reading import length, real_numbers, refuse
 from .curves.curve import Curve, Doubles
 from .curves.fit import curve_of
 from .hermite import HermiteSpline
+from .piecewise import evaluated
 from .spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
-from .spline import CubicSpline, evaluated
+from .spline import CubicSpline
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
