@@ -10,16 +10,27 @@ ROOT = Path(symspline.__file__).parent
 # From below. A folder stands for all that is in it.
 LAYERS = [
     ["_core", "_cpu"],
-    ["arrays", "geo", "handed", "report", "threads", "times", "version"],
+    ["arrays", "handed", "places", "report", "threads", "times", "version"],
     ["spaces"],
     ["curves"],
     ["archive", "failures", "options", "plotting", "signs"],
     ["piecewise", "free"],
     ["spline"],
     ["functions"],
-    ["adapters", "convert", "files", "hermite", "jax", "lonlat", "pieces", "segments", "torch"],
-    ["hurdat", "pose_files", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "tracks"],
-    ["cli", "demo"],
+    ["adapters", "convert", "files", "hermite", "jax", "pieces", "segments", "torch"],
+    [
+        "geo",
+        "hurdat",
+        "pose_files",
+        "poses",
+        "quantum",
+        "rotations",
+        "shapes",
+        "subspaces",
+        "tensors",
+        "tracks",
+    ],
+    ["cli", "demo", "lonlat"],
     ["__init__", "__main__"],
 ]
 

@@ -11,62 +11,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ._core import ValidationError
-from .arrays import as_array
+from .arrays import shown
+from .functions import fit_many
+from .places import compass, from_lonlat, to_lonlat
+from .segments import cut
+from .spline import CubicSpline
 
 if TYPE_CHECKING:
-    from .spline import CubicSpline
+    import pandas as pd
 
-Array = NDArray[np.float64]
+__all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "resample", "sog", "to_lonlat"]
 
 EARTH_RADIUS = 6_371_008.8
 """Metres: the mean radius R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
-
-
-def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
-    """The unit vectors of places on a globe.
-
-    Args:
-        lon, lat: degrees east and north, shape (...).
-
-    Returns:
-        Shape (..., 3): x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
-
-    >>> from_lonlat(90, 0).round(15)
-    array([0., 1., 0.])
-    """
-    east, north = np.radians(_floats(lon, "lon")), np.radians(_floats(lat, "lat"))
-    x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
-    return np.stack([x, y, z], axis=-1)
-
-
-def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
-    """Longitude in (-180, 180] and latitude, in degrees, of unit vectors of shape (..., 3).
-
-    >>> lon, lat = to_lonlat([0, 1, 0])
-    >>> float(lon), float(lat)
-    (90.0, 0.0)
-    """
-    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
-    return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
-
-
-def compass(points: ArrayLike) -> tuple[Array, Array]:
-    """Unit vectors to the east and to the north at unit vectors of shape (..., 3); at a pole, those of
-    0° E.
-
-    >>> east, north = compass([1, 0, 0])
-    >>> east + 0.0, north + 0.0
-    (array([0., 1., 0.]), array([0., 0., 1.]))
-    """
-    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
-    horizontal = np.hypot(x, y)
-    pole = horizontal == 0
-    cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
-    zero = np.zeros_like(x)
-    return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)
 
 
 def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> Any:
@@ -122,10 +82,89 @@ def cog(spline: CubicSpline, x: ArrayLike) -> Any:
     return np.where((eastward == 0) & (northward == 0), np.nan, degrees)[()]
 
 
+def resample(
+    frame: pd.DataFrame,
+    every: Any = "1min",
+    *,
+    by: str | None = None,
+    time: str | None = None,
+    columns: tuple[str, str] = ("lon", "lat"),
+    max_gap: Any,
+    min_points: int = 2,
+    duplicates: str = "raise",
+    radius: float = EARTH_RADIUS,
+    **options: Any,
+) -> pd.DataFrame:
+    """Places of a pandas table at regular times, with speed and course over ground: one C² curve a vessel, animal or
+    storm, and a new one behind every pause.
+
+    Args:
+        frame: a table with times and places; its rows may be in any order.
+        every: the step, as pandas writes it: ``"1min"``, a ``Timedelta``. Times are whole multiples of it.
+        by: the column that tells tracks apart, such as ``"mmsi"``; None for one track.
+        time: the column of times; None for the index.
+        columns: those of longitude and latitude, in degrees.
+        max_gap, min_points, duplicates: as for `symspline.fit_segments`, a pause in seconds or as a ``timedelta64``.
+            Between pieces there are no rows; a track without a piece of ``min_points`` has none.
+        radius: of the globe, in metres.
+        options: those of `CubicSpline`.
+
+    Returns:
+        A table with the column ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog``
+        in degrees clockwise from north; times keep their time zone.
+
+    Raises:
+        ValidationError: a column is not there, or the places or times are not what `symspline.fit_segments` takes.
+    """
+    import pandas as pd
+
+    if not isinstance(frame, pd.DataFrame):
+        raise ValidationError(f"frame must be a table of pandas, not {shown(frame)}")
+    for name in (by, time, *columns):
+        if name is not None and name not in frame.columns:
+            raise ValidationError(
+                f"there is no column {name!r}; the columns are {', '.join(map(str, frame.columns))}"
+            )
+    name = time or frame.index.name or "time"
+    stamps = (
+        frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
+    )
+    if stamps.dtype.kind != "M":
+        raise ValidationError(f"the times {name!r} are no dates; make them of texts by pandas.to_datetime")
+    step = pd.Timedelta(every)
+    zone = stamps.dt.tz
+    utc = (stamps.dt.tz_convert("UTC").dt.tz_localize(None) if zone is not None else stamps).to_numpy()
+    tracks = {None: np.arange(len(frame))} if by is None else frame.groupby(by, sort=False).indices
+    vectors = from_lonlat(*(frame[column].to_numpy() for column in columns))
+    curves, owners = [], []
+    for label, rows in tracks.items():
+        # One place is no track.
+        if len(rows) < 2:
+            continue
+        own = rows[np.argsort(utc[rows], kind="stable")]
+        try:
+            pieces, *_ = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates)
+        except ValidationError as error:
+            of = "" if by is None else f"{by} {label}, rows in the order of time: "
+            raise ValidationError(f"{of}{error}") from None
+        curves += pieces
+        owners += [label] * len(pieces)
+    tables = []
+    for spline, label in zip(fit_many(curves, "sphere:2", **options) if curves else [], owners, strict=True):
+        x = pd.date_range(
+            pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step
+        )
+        at = x.to_numpy()
+        lon, lat = to_lonlat(spline(at))
+        shown_times = x if zone is None else x.tz_localize("UTC").tz_convert(zone)
+        values = {name: shown_times, columns[0]: lon, columns[1]: lat}
+        values |= {"sog": sog(spline, at, radius=radius), "cog": cog(spline, at)}
+        tables.append(pd.DataFrame(values if by is None else {by: label, **values}))
+    if not tables:
+        return pd.DataFrame(columns=[*([] if by is None else [by]), name, *columns, "sog", "cog"])
+    return pd.concat(tables, ignore_index=True)
+
+
 def _check_globe(spline: CubicSpline) -> None:
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"places on a globe are points of Sphere(2), not of {spline.space!r}")
-
-
-def _floats(value: ArrayLike, name: str) -> Array:
-    return np.asarray(as_array(value, name), dtype=float)

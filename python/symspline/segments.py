@@ -61,6 +61,21 @@ def fit_segments(
     (array([0., 1., 2.]), array([0. , 1.5, 4. ]), array([14., 15.]))
     """
     space = space_named(space)
+    curves, steps, gap = cut(t, points, space, max_gap, min_points, duplicates)
+    if not curves:
+        raise ValidationError(
+            f"no piece has {min_points} points: {np.sum(steps > gap)} of {len(steps)} steps are longer than "
+            f"max_gap={max_gap}, the median step is {np.median(steps) if len(steps) else 0:.3g}"
+        )
+    return fit_many(curves, space, **options)
+
+
+def cut(
+    t: ArrayLike, points: Any, space: Space | str, max_gap: Any, min_points: int, duplicates: str
+) -> tuple[list[tuple[NDArray[Any], Any]], NDArray[np.float64], float]:
+    """Times and points of the pieces, as `fit_segments` says, none where all are too short; all steps, and the longest
+    of a piece, as the core counts times."""
+    space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
     if not isinstance(duplicates, str) or duplicates not in _DUPLICATES:
         raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {shown(duplicates)}")
@@ -83,16 +98,11 @@ def fit_segments(
     gap = _seconds(max_gap, clock.dates)
     cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
     pieces = [slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True) if b - a >= least]
-    if not pieces:
-        raise ValidationError(
-            f"no piece has {least} points: {len(cuts)} of {len(seconds) - 1} steps are longer than max_gap={max_gap}, "
-            f"the median step is {np.median(np.diff(seconds)) if len(seconds) > 1 else 0:.3g}"
-        )
     curves = [
         (times[own], tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own])
         for own in pieces
     ]
-    return fit_many(curves, space, **options)
+    return curves, np.diff(seconds), gap
 
 
 def _seconds(max_gap: Any, dates: bool) -> float:

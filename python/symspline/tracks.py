@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .functions import fit_many
-from .geo import compass, from_lonlat, to_lonlat
 from .hurdat import Storm
 from .pieces import Pieces, pairs, spline_pieces
+from .places import compass, from_lonlat, to_lonlat
 from .spaces import Sphere
 from .spline import CubicSpline
 

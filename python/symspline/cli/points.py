@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geo import compass, from_lonlat, to_lonlat
+from ..places import compass, from_lonlat, to_lonlat
 from ..spaces import POINT_TOL_FLOAT32, Space, Sphere
 from .errors import Problem
 from .layout import Doubles

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ..geo import from_lonlat, to_lonlat
 from ..hurdat import Storm
+from ..places import from_lonlat, to_lonlat
 from ..plotting.globe import View, degrees, draw_frame, draw_globe
 from ..plotting.style import DPI, EDGE, GRID, HALO, INK, SPLINE, heading, window
 from ..spline import CubicSpline

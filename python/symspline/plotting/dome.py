@@ -15,7 +15,7 @@ from matplotlib.figure import SubFigure
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from ..geo import from_lonlat
+from ..places import from_lonlat
 from .curves import Curve
 from .globe import View, label_directions, middle_of, shade
 from .sphere import draw_on_globe, part_of_globe

@@ -11,7 +11,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Circle, Patch
 from numpy.typing import NDArray
 
-from ..geo import from_lonlat, to_lonlat
+from ..places import from_lonlat, to_lonlat
 from .style import EDGE, GRID, HALO, INK, PAPER
 
 Array = NDArray[np.float64]

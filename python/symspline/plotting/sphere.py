@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
-from ..geo import to_lonlat
+from ..places import to_lonlat
 from .curves import Curve
 from .globe import View, degrees, draw_frame, draw_globe, middle_of
 from .style import GRID, PAPER, inside, plain, size, window

@@ -1,0 +1,58 @@
+"""Places on a globe: longitude and latitude in degrees, and unit vectors of S²."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import as_array
+
+Array = NDArray[np.float64]
+
+
+def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
+    """The unit vectors of places on a globe.
+
+    Args:
+        lon, lat: degrees east and north, shape (...).
+
+    Returns:
+        Shape (..., 3): x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
+
+    >>> from_lonlat(90, 0).round(15)
+    array([0., 1., 0.])
+    """
+    east, north = np.radians(_floats(lon, "lon")), np.radians(_floats(lat, "lat"))
+    x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
+    return np.stack([x, y, z], axis=-1)
+
+
+def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
+    """Longitude in (-180, 180] and latitude, in degrees, of unit vectors of shape (..., 3).
+
+    >>> lon, lat = to_lonlat([0, 1, 0])
+    >>> float(lon), float(lat)
+    (90.0, 0.0)
+    """
+    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
+    return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
+
+
+def compass(points: ArrayLike) -> tuple[Array, Array]:
+    """Unit vectors to the east and to the north at unit vectors of shape (..., 3); at a pole, those of
+    0° E.
+
+    >>> east, north = compass([1, 0, 0])
+    >>> east + 0.0, north + 0.0
+    (array([0., 1., 0.]), array([0., 0., 1.]))
+    """
+    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
+    horizontal = np.hypot(x, y)
+    pole = horizontal == 0
+    cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
+    zero = np.zeros_like(x)
+    return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)
+
+
+def _floats(value: ArrayLike, name: str) -> Array:
+    return np.asarray(as_array(value, name), dtype=float)

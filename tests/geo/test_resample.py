@@ -1,0 +1,84 @@
+"""Tables of places at regular times."""
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline import geo
+
+pd = pytest.importorskip("pandas")
+
+
+def ais(zone=None):
+    """Messages of ships in disorder: one goes east, with a pause and a message twice, one north; one is lone."""
+    east = np.array([0, 61, 119, 119, 185, 3900, 3960, 4021])
+    north = np.array([30, 90, 151])
+    rows = pd.DataFrame(
+        {
+            "mmsi": [211] * len(east) + [244] * len(north) + [999],
+            "when": pd.Timestamp("2026-03-01 06:00", tz=zone) + pd.to_timedelta([*east, *north, 7], unit="s"),
+            "lon": [*(1e-4 * east), *(0 * north + 5.0), 1.0],
+            "lat": [*(0.0 * east), *(50 + 1e-4 * north), 1.0],
+        }
+    )
+    return rows.sample(frac=1, random_state=3)
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_tracks_at_full_minutes(zone):
+    found = geo.resample(ais(zone), "1min", by="mmsi", time="when", max_gap=600, duplicates="first")
+    assert list(found.columns) == ["mmsi", "when", "lon", "lat", "sog", "cog"]
+    minutes = (found["when"] - pd.Timestamp("2026-03-01 06:00", tz=zone)) / pd.Timedelta("1min")
+    east = found["mmsi"] == 211
+    assert sorted(minutes[east]) == [0, 1, 2, 3, 65, 66, 67]
+    assert sorted(minutes[found["mmsi"] == 244]) == [1, 2]
+    assert set(found["mmsi"]) == {211, 244}
+    np.testing.assert_allclose(found["lon"][east], 1e-4 * 60 * minutes[east], atol=1e-9)
+    off = found["cog"] - np.where(east, 90, 0)
+    np.testing.assert_allclose((off + 180) % 360, 180, atol=1e-6)
+    np.testing.assert_allclose(found["sog"], np.radians(1e-4) * geo.EARTH_RADIUS, rtol=1e-6)
+
+
+def test_it_is_the_curve_itself():
+    rng = np.random.default_rng(0)
+    table = pd.DataFrame(
+        {"lon": 10 + rng.uniform(0, 1, 8).cumsum(), "lat": 40 + rng.uniform(-1, 1, 8).cumsum()},
+        index=pd.date_range("2026-01-01", periods=8, freq="7h"),
+    )
+    found = geo.resample(table, "90min", max_gap=np.timedelta64(1, "D"), bc_type="not-a-knot")
+    spline = ss.CubicSpline(
+        table.index, geo.from_lonlat(table["lon"], table["lat"]), "sphere:2", bc_type="not-a-knot"
+    )
+    lon, lat = geo.to_lonlat(spline(found["time"].to_numpy()))
+    np.testing.assert_array_equal(found["lon"], lon)
+    np.testing.assert_array_equal(found["lat"], lat)
+    assert len(found) == 49 * 60 // 90 + 1
+    none = geo.resample(table, "90min", max_gap=60)
+    assert list(none.columns) == ["time", "lon", "lat", "sog", "cog"] and len(none) == 0
+
+
+@pytest.mark.parametrize(
+    "change, what",
+    [
+        (lambda t: {"by": "ship"}, "there is no column 'ship'; the columns are mmsi, when, lon, lat"),
+        (lambda t: {"columns": ("x", "lat")}, "there is no column 'x'"),
+        (lambda t: {"time": "lon"}, "the times 'lon' are no dates"),
+        (
+            lambda t: {"duplicates": "raise"},
+            r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both",
+        ),
+        (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
+        (lambda t: {"frame": t.to_numpy()}, "frame must be a table of pandas"),
+    ],
+)
+def test_what_cannot_be_resampled_is_refused(change, what):
+    table = ais()
+    arguments = {
+        "frame": table,
+        "by": "mmsi",
+        "time": "when",
+        "max_gap": 600,
+        "duplicates": "first",
+    } | change(table)
+    with pytest.raises(ss.ValidationError, match=what):
+        geo.resample(**arguments)
