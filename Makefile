@@ -53,7 +53,7 @@ bench: .venv/tools
 	$(INSTALL) --editable '.[plot]'
 	touch $@
 
-# What tests and benchmarks need besides: 1.1 GB with JAX.
+# What tests and benchmarks need besides: 1.3 GB with JAX.
 .venv/tools: .venv/built
 	$(BIN)/python -c 'import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
 		print(*extras["bench"], *extras["test"], sep="\n")' > .venv/requirements.txt

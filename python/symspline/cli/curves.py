@@ -124,8 +124,8 @@ def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
     if columns.quaternion is None:
         wanted: int | None = len(LONLAT if columns.lonlat else labels(space))
     else:
-        wanted = count_of(space) if _are_places(columns.quaternion) else None
-        wanted = wanted if wanted == len(columns.quaternion) else None
+        fits = _are_places(columns.quaternion) and len(columns.quaternion) == count_of(space)
+        wanted = count_of(space) if fits else None
     good = (
         isinstance(names, list)
         and len(names) == wanted
