@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from .fit import Fit, Points, finished, solve_factors
 from .solve import Fault, Options, Progress, Solved
 
 Numbers = NDArray[np.int64]
+
+# Numbers of points that are worked on at a time.
+_AT_ONCE = 1 << 18
 
 
 def mask_of(where: Any, batch: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -67,9 +71,39 @@ def fit_chosen(
     progress: Progress | None,
     chosen: Numbers,
 ) -> Fit:
-    """The curves with these numbers; the others are NaN."""
-    batch = points[0].batch
+    """The curves with these numbers; the others are NaN. They are made some at a time, so that little memory is needed
+    beside the results."""
+    batch, factors = points[0].batch, factors_of(space)
+    spread = [_left_out(factor, part) for factor, part in zip(factors, points, strict=True)]
+    numbers = max(part.doubles.size for part in points) // max(1, math.prod(batch))
+    parts = np.array_split(chosen, max(1, math.ceil(len(chosen) * numbers / _AT_ONCE))) if len(chosen) else []
+    each = len(factors) * points[0].nodes
+    faults: list[Fault] = []
+    before = 0
+    for own in parts:
+        advance = progress and partial(_advance, progress, before * each, len(chosen) * each)
+        try:
+            solved = _solve_some(space, times, points, ends, options, check, advance, own)
+        except ValidationError as error:
+            raise ValidationError(_renamed(str(error), own, batch)) from None
+        before += len(own)
+        for whole, found in zip(spread, solved, strict=True):
+            _place_some(whole, found, own)
+        done = next((found.faults for found in solved if found.faults), [])
+        faults += [(int(own[i]), kind, _renamed(why, own, batch)) for i, kind, why in done]
+    return finished(space, times, batch, spread, options)._replace(faults=faults)
 
+
+def _solve_some(
+    space: Space,
+    times: NDArray[np.float64],
+    points: list[Points],
+    ends: list[list[End] | None],
+    options: Options,
+    check: bool,
+    progress: Progress | None,
+    chosen: Numbers,
+) -> list[Solved]:
     def picked(rows: Array, axes: int) -> Array:
         """The chosen rows of an array that has the batch axes, then some more."""
         return np.ascontiguousarray(rows.reshape(-1, *rows.shape[rows.ndim - axes :])[chosen])
@@ -83,33 +117,30 @@ def fit_chosen(
         for factor, own in zip(factors_of(space), ends, strict=True)
     ]
     own_times = picked(times, 1) if times.ndim > 1 else times
-    try:
-        solved = solve_factors(space, own_times, few, some, options, check, progress) if len(chosen) else []
-    except ValidationError as error:
-        raise ValidationError(_renamed(str(error), chosen, batch)) from None
-    each_found: list[Solved | None] = [*solved] if solved else [None] * len(points)
-    each = zip(factors_of(space), points, each_found, strict=True)
-    spread = [_spread(factor, part, found, chosen) for factor, part, found in each]
-    done = finished(space, times, batch, spread, options)
-    faults = [(int(chosen[i]), kind, _renamed(why, chosen, batch)) for i, kind, why in done.faults]
-    return done._replace(faults=faults)
+    return solve_factors(space, own_times, few, some, options, check, progress)
 
 
-def _spread(space: Space, points: Points, found: Solved | None, chosen: Numbers) -> Solved:
-    """Curves at their places in the whole batch."""
+def _left_out(space: Space, points: Points) -> Solved:
+    """No curve at any place of the batch."""
     count = math.prod(points.batch)
     shape = (*points.batch, points.nodes, *space.point_shape)
     places, velocities = (np.full(shape, np.nan, space.dtype) for _ in range(2))
     # As the core writes them: converged, iterations, residual, longest step, rate, solver, radius.
     columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(7)]
     columns[0], columns[1], columns[5] = (np.zeros(count, kind) for kind in (bool, np.int64, np.int64))
-    if found is None:
-        return Solved(places, velocities, tuple(columns), [])
-    for whole, part in ((places, found.points), (velocities, found.velocities)):
-        whole.reshape(count, points.nodes, *space.point_shape)[chosen] = part
-    for column, own in zip(columns, found.columns, strict=True):
+    return Solved(places, velocities, tuple(columns), [])
+
+
+def _place_some(whole: Solved, found: Solved, chosen: Numbers) -> None:
+    """Curves at their places in the whole batch."""
+    for all_rows, rows in ((whole.points, found.points), (whole.velocities, found.velocities)):
+        all_rows.reshape(-1, *rows.shape[1:])[chosen] = rows
+    for column, own in zip(whole.columns, found.columns, strict=True):
         column[chosen] = own
-    return Solved(places, velocities, tuple(columns), found.faults)
+
+
+def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:
+    return progress(before + finished, total)
 
 
 def _renamed(message: str, chosen: Numbers, batch: tuple[int, ...]) -> str:
