@@ -18,7 +18,7 @@ _cpu.check(_Path(__file__).parent)
 
 from . import convert, geo, poses, quantum, rotations, shapes, subspaces, tensors  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
-from .curves.derivatives import Gradient  # noqa: E402
+from .curves.gradient import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
 from .functions import evaluate, fit, fit_many  # noqa: E402

@@ -7,16 +7,14 @@ import os
 import secrets
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .piecewise import Piecewise
 from .report import Report
 from .spaces import Product, Space
-
-if TYPE_CHECKING:
-    from .spline import CubicSpline
 
 FORMAT = "symspline-curve"
 MANY = "symspline-curves"
@@ -24,8 +22,8 @@ LISTS = ("bc_type", "extrapolate", "report")
 VERSION = 1
 
 
-def arrays_of(spline: CubicSpline) -> dict[str, Any]:
-    """The arrays of one curve, or of a batch."""
+def arrays_of(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
+    """The arrays of one curve, or of a batch, and how it was fitted in every factor."""
     unit = _unit(spline._t.dtype) if spline._clock.dates else ""
     arrays: dict[str, Any] = {
         "format": FORMAT,
@@ -33,9 +31,9 @@ def arrays_of(spline: CubicSpline) -> dict[str, Any]:
         "space": str(spline.space),
         "t": spline._t.astype(np.int64) if unit else spline._t,
         "t_unit": unit,
-        "bc_type": json.dumps(plain(spline.bc_type)),
+        "bc_type": json.dumps(plain(spline._bc_type)),
         "extrapolate": json.dumps(spline.extrapolate),
-        "report": json.dumps([_plain_report(report) for report in spline._reports]),
+        "report": json.dumps([_plain_report(report) for report in reports]),
     }
     for i, part in enumerate(spline._curve.parts):
         suffix = f"_{i}" if isinstance(spline.space, Product) else ""

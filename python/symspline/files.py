@@ -51,7 +51,7 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
         raise ValidationError("save_many takes single curves; a batch has a method save of its own")
     if len({(spline.space, spline._t.dtype) for spline in curves.values()}) != 1:
         raise ValidationError("save_many needs curves, all of one space and with knots of one type")
-    each = [arrays_of(spline) for spline in curves.values()]
+    each = [arrays_of(spline, spline._reports) for spline in curves.values()]
     arrays: dict[str, Any] = {
         "format": MANY,
         "names": json.dumps(list(curves)),

@@ -165,17 +165,28 @@ class Piecewise(ABC):
         >>> quarter.transport(0, 1, [0.0, 1.0, 2.0]).round(12) + 0.0  # a vector ahead, and one across
         array([-1.,  0.,  2.])
         """
-        times, _ = self._clock.at(np.asarray([x0, x1]), self._batch, False)
+        if np.ndim(x0) or np.ndim(x1):
+            raise ValidationError("x0 and x1 must be single times, from when to when")
+        pair = np.asarray([x0, x1])
+        times, _ = self._clock.at(pair, self._batch, False)
         where = "periodic" if self._outside == "periodic" else "raise"
-        # Times outside the knots are refused here.
-        at = evaluated(self._curve, self._clock, np.asarray([x0, x1]), "point", where, False, None)
+        try:
+            at = evaluated(self._curve, self._clock, pair, "point", where, False, None)
+        except ValidationError as error:
+            what = str(error).partition("; pass extrapolate")[0]
+            raise ValidationError(f"{what}; vectors are carried between the knots, x is (x0, x1)") from None
         vectors = []
         for points, part, one in zip(
             parts_of(at, self.space, "points"), self._curve.parts, parts_of(v, self.space, "v"), strict=True
         ):
             first = np.take(points, 0, axis=len(self._batch))
-            part.space.check_tangent(first, one)
-            vectors.append(np.broadcast_to(np.asarray(one), first.shape))
+            # Of curves that were not found there is nothing to check.
+            good = np.isfinite(first).all(axis=tuple(range(-len(part.space.point_shape), 0)))
+            given = part.space._array(one, "v")
+            part.space._doubles(given, "v")
+            given = np.broadcast_to(given, first.shape)
+            part.space.check_tangent(first[good], given[good])
+            vectors.append(given)
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
         return self._curve.transport((float(times[0]), float(times[1])), where, moved)
 

@@ -12,9 +12,10 @@ from . import archive
 from ._core import ValidationError
 from .curves.chosen import fit_chosen, invalid, mask_of
 from .curves.curve import Curve
-from .curves.derivatives import Gradient, Places, places
+from .curves.derivatives import places
 from .curves.ends import ends_in_factors, kept, picked
-from .curves.fit import curve_of, fit, read, read_ends
+from .curves.fit import Asked, curve_of, fit, read, read_ends
+from .curves.gradient import Gradient, Places
 from .curves.solve import Fault, Progress
 from .curves.together import longest_step
 from .failures import fail
@@ -112,14 +113,12 @@ class CubicSpline(Piecewise):
             if bad:
                 mask = np.ones(batch, bool) if mask is None else mask.copy()
                 mask.flat[[number for number, *_ in bad]] = False
+        asked = Asked(space, times, data, ends, options, check)
         try:
             if mask is None or mask.all():
-                curve, reports, faults = fit(space, times, data, ends, options, check, progress)
+                curve, reports, faults = fit(asked, progress)
             else:
-                chosen = np.flatnonzero(mask)
-                curve, reports, faults = fit_chosen(
-                    space, times, data, ends, options, check, progress, chosen
-                )
+                curve, reports, faults = fit_chosen(asked, progress, np.flatnonzero(mask))
         except ValidationError as error:
             raise clock.explain(error) from None
         self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
@@ -290,7 +289,7 @@ class CubicSpline(Piecewise):
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        archive.write(file, archive.arrays_of(self))
+        archive.write(file, archive.arrays_of(self, self._reports))
 
     # What a plot says of it.
     _kind = "C² spline"

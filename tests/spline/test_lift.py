@@ -222,8 +222,12 @@ def test_batches_products_and_large_spaces(rng):
     [
         ([0.8, 0.6, 0.0], r"start is 6\.325e-01 away from the nearest representative of the first point"),
         ([-2.0, 0.0, 0.0], r"start is 1\.000e\+00 away"),
-        ([1.0, 0.0], r"start must have the shape of a point \(3,\)"),
+        ([1.0, 0.0], r"start has shape \(2,\), but RealProjective\(2\) needs shape"),
         ([np.nan, 0.0, 0.0], r"start is nan away"),
+        (["1", "0", "0"], r"start must be an array of real numbers, not of <U1"),
+        ([None, 0.0, 0.0], r"start.* must be an array of numbers, not of object"),
+        ([[1.0], [0.0, 0.0]], r"start is not an array of equally long rows"),
+        ([1j, 0.0, 0.0], r"start must be .*complex128"),
     ],
 )
 def test_what_is_no_representative_is_refused(start, what):

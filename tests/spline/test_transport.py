@@ -135,7 +135,21 @@ def test_what_cannot_be_carried_is_refused():
     spline = ss.CubicSpline(None, np.eye(3), "sphere:2", extrapolate="geodesic")
     with pytest.raises(ss.ValidationError, match=r"x\[1\] = 2.5 is outside the knots"):
         spline.transport(0, 2.5, [0, 1.0, 0])
+    with pytest.raises(ss.ValidationError, match="vectors are carried between the knots"):
+        spline.transport(-1, 1, [0, 1.0, 0])
+    with pytest.raises(ss.ValidationError, match="x0 and x1 must be single times"):
+        spline.transport(0, [1, 2], [0, 1.0, 0])
+    with pytest.raises(ss.ValidationError, match="v must be an array of real numbers"):
+        spline.transport(0, 1, ["a", "b", "c"])
     with pytest.raises(ss.ValidationError, match="not tangent"):
         spline.transport(0, 1, [1.0, 1.0, 0])
     with pytest.raises(ss.ValidationError):
         spline.transport(0, 1, [1.0, 1.0])
+
+
+def test_curves_that_were_not_found_stop_no_other():
+    points = [[[1, 0, 0], [-1, 0, 0]], [[1, 0, 0], [0, 1, 0]]]
+    spline = ss.CubicSpline(None, points, "sphere:2", on_failure="ignore")
+    found = spline.transport(0, 1, [0, 1.0, 2.0])
+    assert np.isnan(found[0]).all()
+    np.testing.assert_allclose(found[1], [-1, 0, 2], atol=1e-15)

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from ..arrays import as_array
 from ..spaces import Array, Space, factors_of
-from .ends import End
-from .fit import Fit, Points, finished, solve_factors
-from .solve import Fault, Options, Progress, Solved
+from .fit import Asked, Fit, Points, finished, first_faults, solve_factors
+from .solve import Fault, Progress, Solved
 
 Numbers = NDArray[np.int64]
 
@@ -61,63 +60,48 @@ def invalid(space: Space, points: list[Points], wanted: Numbers) -> list[Fault]:
     return [(number, "invalid", found[number]) for number in sorted(found)]
 
 
-def fit_chosen(
-    space: Space,
-    times: NDArray[np.float64],
-    points: list[Points],
-    ends: list[list[End] | None],
-    options: Options,
-    check: bool,
-    progress: Progress | None,
-    chosen: Numbers,
-) -> Fit:
+def fit_chosen(asked: Asked, progress: Progress | None, chosen: Numbers) -> Fit:
     """The curves with these numbers; the others are NaN. They are made some at a time, so that little memory is needed
     beside the results."""
-    batch, factors = points[0].batch, factors_of(space)
+    points, factors = asked.points, factors_of(asked.space)
+    batch, nodes = points[0].batch, points[0].nodes
     spread = [_left_out(factor, part) for factor, part in zip(factors, points, strict=True)]
     numbers = max(part.doubles.size for part in points) // max(1, math.prod(batch))
     parts = np.array_split(chosen, max(1, math.ceil(len(chosen) * numbers / _AT_ONCE))) if len(chosen) else []
-    each = len(factors) * points[0].nodes
     faults: list[Fault] = []
-    before = 0
+    done, each = 0, len(factors) * nodes
     for own in parts:
-        advance = progress and partial(_advance, progress, before * each, len(chosen) * each)
+        advance = progress and partial(_advance, progress, done * each, len(chosen) * each)
         try:
-            solved = _solve_some(space, times, points, ends, options, check, advance, own)
+            solved = solve_factors(_some(asked, own), advance)
         except ValidationError as error:
             raise ValidationError(_renamed(str(error), own, batch)) from None
-        before += len(own)
+        done += len(own)
         for whole, found in zip(spread, solved, strict=True):
             _place_some(whole, found, own)
-        done = next((found.faults for found in solved if found.faults), [])
-        faults += [(int(own[i]), kind, _renamed(why, own, batch)) for i, kind, why in done]
-    return finished(space, times, batch, spread, options)._replace(faults=faults)
+        faults += [(int(own[i]), kind, _renamed(why, own, batch)) for i, kind, why in first_faults(solved)]
+    return finished(asked, spread)._replace(faults=faults)
 
 
-def _solve_some(
-    space: Space,
-    times: NDArray[np.float64],
-    points: list[Points],
-    ends: list[list[End] | None],
-    options: Options,
-    check: bool,
-    progress: Progress | None,
-    chosen: Numbers,
-) -> list[Solved]:
+def _some(asked: Asked, chosen: Numbers) -> Asked:
+    """These curves alone."""
+
     def picked(rows: Array, axes: int) -> Array:
         """The chosen rows of an array that has the batch axes, then some more."""
         return np.ascontiguousarray(rows.reshape(-1, *rows.shape[rows.ndim - axes :])[chosen])
 
-    few = [
-        part._replace(doubles=picked(part.doubles, 1 + len(factor.point_shape)), batch=(len(chosen),))
-        for factor, part in zip(factors_of(space), points, strict=True)
-    ]
-    some = [
-        own and [(kind, None if v is None else picked(v, len(factor.point_shape))) for kind, v in own]
-        for factor, own in zip(factors_of(space), ends, strict=True)
-    ]
-    own_times = picked(times, 1) if times.ndim > 1 else times
-    return solve_factors(space, own_times, few, some, options, check, progress)
+    factors = factors_of(asked.space)
+    return asked._replace(
+        times=picked(asked.times, 1) if asked.times.ndim > 1 else asked.times,
+        points=[
+            part._replace(doubles=picked(part.doubles, 1 + len(factor.point_shape)), batch=(len(chosen),))
+            for factor, part in zip(factors, asked.points, strict=True)
+        ],
+        ends=[
+            own and [(kind, None if v is None else picked(v, len(factor.point_shape))) for kind, v in own]
+            for factor, own in zip(factors, asked.ends, strict=True)
+        ],
+    )
 
 
 def _left_out(space: Space, points: Points) -> Solved:

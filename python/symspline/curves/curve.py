@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from ..arrays import shown
 from ..spaces import Space
-from .derivatives import Gradient, Places
+from .gradient import Gradient, Places
 from .solve import Progress
 
 Doubles = NDArray[np.float64]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,40 +12,9 @@ from .. import _core
 from .._core import ValidationError
 from ..arrays import as_array, shown
 from ..spaces import Array
+from .curve import Curve
 from .ends import End, ends_of
-
-if TYPE_CHECKING:
-    from .plain import Plain
-
-
-@dataclass(frozen=True)
-class Gradient:
-    """The gradient of a number with respect to what a spline is made of, see `symspline.CubicSpline.vjp`.
-
-    Attributes:
-        points: tangent vectors at the points, of their shape.
-        t: one number a knot, of the shape of the knots.
-        ends: tangent vectors for the velocity or acceleration that was given at either end, of its shape; None
-            where none was given.
-    """
-
-    points: Any
-    t: Array
-    ends: tuple[Any, Any]
-
-
-class Places(NamedTuple):
-    """Where on the curves of a batch derivatives are wanted.
-
-    Attributes:
-        x: times, shape (curves, times of each).
-        shape: of a result, but for the axes of a point.
-        nu: of γ, γ' or ∇γ'.
-    """
-
-    x: NDArray[np.float64]
-    shape: tuple[int, ...]
-    nu: int
+from .gradient import Gradient, Places
 
 
 def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> Places:
@@ -82,7 +50,7 @@ class _Curves(NamedTuple):
     nu: int
 
 
-def push(curve: Plain, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
+def push(curve: Curve, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
     """How the curve moves, see `symspline.CubicSpline.jvp`."""
     space, times = curve.space, curve.times
     if points is None:
@@ -107,7 +75,7 @@ def push(curve: Plain, at: Places, bc_type: Any, points: Any, t: Any, ends: Any)
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 
-def pull(curve: Plain, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+def pull(curve: Curve, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
     """The transpose, see `symspline.CubicSpline.vjp`."""
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
@@ -134,7 +102,7 @@ def pair_of(ends: Any) -> tuple[Any, Any]:
     return ends[0], ends[1]
 
 
-def _curves(curve: Plain, at: Places, bc_type: Any) -> _Curves:
+def _curves(curve: Curve, at: Places, bc_type: Any) -> _Curves:
     space, batch = curve.space, curve.batch
     points, velocities = (
         space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities)
@@ -167,7 +135,7 @@ def _given(bc_type: Any, which: int) -> Array | None:
     return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
 
 
-def _end_motion(curve: Plain, bc_type: Any, value: Any, name: str, which: int) -> NDArray[np.float64]:
+def _end_motion(curve: Curve, bc_type: Any, value: Any, name: str, which: int) -> NDArray[np.float64]:
     space, batch = curve.space, curve.batch
     shape = batch + space._doubles_shape
     if value is None:
@@ -180,7 +148,7 @@ def _end_motion(curve: Plain, bc_type: Any, value: Any, name: str, which: int) -
     return space._as_doubles(np.ascontiguousarray(space.project_tangent(at, vectors))).reshape(shape)
 
 
-def _end_gradient(curve: Plain, bc_type: Any, gradient: NDArray[np.float64], which: int) -> Any:
+def _end_gradient(curve: Curve, bc_type: Any, gradient: NDArray[np.float64], which: int) -> Any:
     given = _given(bc_type, which)
     if given is None:
         return None

@@ -42,6 +42,23 @@ class Points(NamedTuple):
     nodes: int
 
 
+class Asked(NamedTuple):
+    """Curves of equal length that are asked for.
+
+    Attributes:
+        times: knots, shape (N+1,), or (..., N+1) with one row per curve.
+        points, ends: in every factor.
+        check: whether points and ends are to be checked.
+    """
+
+    space: Space
+    times: NDArray[np.float64]
+    points: list[Points]
+    ends: list[list[End] | None]
+    options: Options
+    check: bool
+
+
 class Fit(NamedTuple):
     """What came of a fit: the curves, a report a factor, and what failed."""
 
@@ -104,30 +121,14 @@ def _part(space: Space, times: NDArray[np.float64], points: Array, velocities: A
     return Plain(space, times, points, velocities)
 
 
-def fit(
-    space: Space,
-    times: NDArray[np.float64],
-    points: list[Points],
-    ends: list[list[End] | None],
-    options: Options,
-    check: bool,
-    progress: Progress | None,
-) -> Fit:
+def fit(asked: Asked, progress: Progress | None) -> Fit:
     """Curves of equal length."""
-    solved = solve_factors(space, times, points, ends, options, check, progress)
-    return finished(space, times, points[0].batch, solved, options)
+    return finished(asked, solve_factors(asked, progress))
 
 
-def solve_factors(
-    space: Space,
-    times: NDArray[np.float64],
-    points: list[Points],
-    ends: list[list[End] | None],
-    options: Options,
-    check: bool,
-    progress: Progress | None,
-) -> list[Solved]:
+def solve_factors(asked: Asked, progress: Progress | None) -> list[Solved]:
     """What comes of curves of equal length in every factor."""
+    space, times, points, ends, options, check = asked
     tasks = [
         Task(factor, times, part.doubles, end, part.tol if check else None)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
@@ -135,15 +136,14 @@ def solve_factors(
     return _solve(space, tasks, options, progress)
 
 
-def finished(
-    space: Space, times: NDArray[np.float64], batch: tuple[int, ...], solved: list[Solved], options: Options
-) -> Fit:
+def finished(asked: Asked, solved: list[Solved]) -> Fit:
     """Curves and reports of what was solved."""
+    space, times, batch = asked.space, asked.times, asked.points[0].batch
     reports = [
-        shaped(found.columns, times, batch, factor.curvature, options.method)
+        shaped(found.columns, times, batch, factor.curvature, asked.options.method)
         for factor, found in zip(factors_of(space), solved, strict=True)
     ]
-    return Fit(curve_of(space, times, [found[:2] for found in solved]), reports, _first(solved))
+    return Fit(curve_of(space, times, [found[:2] for found in solved]), reports, first_faults(solved))
 
 
 def fit_many(
@@ -178,7 +178,7 @@ def fit_many(
         arrays = [(found.points[own], found.velocities[own]) for found in solved]
         return Fit(curve_of(space, times[i], arrays), reports, [])
 
-    return [one(i, *pair) for i, pair in enumerate(pairwise(offsets))], _first(solved)
+    return [one(i, *pair) for i, pair in enumerate(pairwise(offsets))], first_faults(solved)
 
 
 def validated(
@@ -207,7 +207,7 @@ def _checked(space: Space, tasks: list[Task], options: Options) -> list[Task]:
     return _in_factors(space, lambda _, task: checked(task, options), tasks)
 
 
-def _first(solved: list[Solved]) -> list[Fault]:
+def first_faults(solved: list[Solved]) -> list[Fault]:
     """The faults in the first factor that has some."""
     return next((found.faults for found in solved if found.faults), [])
 

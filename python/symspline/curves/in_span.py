@@ -17,7 +17,7 @@ from .._core import ValidationError
 from ..spaces import Array, Space
 from ..spaces.base import LARGE as _LARGE
 from .curve import NORMS, Doubles
-from .derivatives import Places
+from .gradient import Places
 from .plain import Plain
 from .solve import Options, Progress, Solved, Task, solve
 from .span import Span, span_of

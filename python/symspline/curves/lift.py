@@ -43,7 +43,9 @@ def check_start(space: Space, first: Array, start: Any) -> None:
 
 
 def _given(space: Space, first: Array, start: Any) -> Array:
-    given = np.asarray(start)
+    given = space._array(start, "start")
+    # Numbers, and none that would lose an imaginary part.
+    space._doubles(given, "start")
     if given.shape[-len(space.point_shape) :] != space.point_shape or not _fits(given.shape, first.shape):
         raise ValidationError(
             f"start must have the shape of a point {space.point_shape}, behind the batch axes if any, "

@@ -12,7 +12,7 @@ from .._core import ValidationError
 from ..spaces import Array, Space
 from . import derivatives
 from .curve import REAL, Curve, Doubles
-from .derivatives import Gradient, Places
+from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
 from .solve import Options, Progress, Solved, Task, solve
 

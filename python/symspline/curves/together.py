@@ -9,8 +9,9 @@ import numpy as np
 
 from ..spaces import Product, parts_of, together
 from .curve import NORMS, Curve, Doubles
-from .derivatives import Gradient, Places, pair_of
+from .derivatives import pair_of
 from .ends import ends_in_factors
+from .gradient import Gradient, Places
 from .plain import Plain
 from .solve import Progress
 
