@@ -25,6 +25,12 @@ from .functions import evaluate, fit, fit_many  # noqa: E402
 from .hermite import HermiteSpline  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .segments import fit_segments  # noqa: E402
+from .smoothing import (  # noqa: E402
+    SmoothingReport,
+    SmoothingSpline,
+    make_lsq_spline,
+    make_smoothing_spline,
+)
 from .spaces import (  # noqa: E402
     ComplexGrassmannian,
     ComplexHyperbolic,
@@ -70,6 +76,8 @@ __all__ = [
     "Product",
     "RealProjective",
     "Report",
+    "SmoothingReport",
+    "SmoothingSpline",
     "Space",
     "SpecialEuclidean",
     "SpecialOrthogonal",
@@ -86,6 +94,8 @@ __all__ = [
     "geo",
     "load",
     "load_many",
+    "make_lsq_spline",
+    "make_smoothing_spline",
     "num_threads",
     "poses",
     "quantum",

@@ -95,5 +95,22 @@ def push(
 def pull(
     handle: Handle, curves: object, cotangent: _Doubles
 ) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
+def smooth(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    weights: _Doubles,
+    knots: _Doubles,
+    lam: _Doubles,
+    sigma: _Doubles,
+    criterion: str,
+    loss: str,
+    method: str,
+    tol: float,
+    max_iter: int,
+    progress: _Progress | None,
+) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...]]: ...
+def smoothing_variance(knots: _Doubles, band: _Doubles, lam: float, x: _Doubles, nu: int) -> _Doubles: ...
+def chi_squared(m: int, probability: float) -> float: ...
 def set_num_threads(n: int) -> None: ...
 def num_threads() -> int: ...

@@ -5,6 +5,7 @@ mod derivative;
 mod errors;
 mod evaluate;
 mod fit;
+mod smoothing;
 mod space;
 mod validate;
 mod watch;
@@ -42,6 +43,9 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(evaluate::lift, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::transport, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::lift_knots, m)?)?;
+    m.add_function(wrap_pyfunction!(smoothing::smooth, m)?)?;
+    m.add_function(wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
+    m.add_function(wrap_pyfunction!(smoothing::chi_squared, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
     m.add_function(wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)

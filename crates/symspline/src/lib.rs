@@ -8,6 +8,8 @@
 
 pub mod spaces;
 
+pub use symspline_smoothing as smoothing;
+
 pub use symspline_core::{
     curve, derivative, fit, laws, matrix, monitor, parallel, rows, scalar, space, special,
 };

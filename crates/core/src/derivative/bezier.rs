@@ -59,6 +59,11 @@ impl Bezier {
         std::mem::take(&mut points[0])
     }
 
+    /// γ(τ).
+    pub fn gamma(&self, space: &Erased, tau: f64) -> Vec<f64> {
+        Self::at(space, self.points.clone(), lane(tau)).iter().map(|x| x.as_array()[0]).collect()
+    }
+
     /// The motions of the k-th control point in eight columns from `first` on.
     fn motion(&self, k: usize, row: usize, first: usize) -> Lane {
         let m = self.bases[k].ncols();

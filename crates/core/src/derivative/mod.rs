@@ -12,9 +12,11 @@ mod system;
 use crate::fit::{End, EndKind, Ends};
 use crate::space::{Ambient, Erased, Origin};
 use bezier::Bezier;
-use operators::{Matrix, Vector};
+pub use operators::{Matrix, Vector};
 use polygon::Polygon;
+use segment::Segment;
 use std::collections::BTreeMap;
+pub use system::Row;
 use system::{Change, System};
 
 /// What a curve is made of, or small changes of it, or a gradient with respect to it.
@@ -81,34 +83,35 @@ impl<'a> Derivative<'a> {
         self.t.len() - 1
     }
 
-    fn place(&mut self, x: f64) -> Place {
+    fn place(&self, x: f64) -> Place {
         let segment = self.t[1..self.segments()].partition_point(|&t| t <= x);
-        let (space, nodes) = (self.space, &self.polygon.nodes[segment..segment + 2]);
-        self.beziers
-            .entry(segment)
-            .or_insert_with(|| Bezier::new(space, nodes, &self.system.segments[segment]));
         Place { segment, tau: (x - self.t[segment]) / (self.t[segment + 1] - self.t[segment]) }
     }
 
+    fn bezier(&mut self, segment: usize) -> &Bezier {
+        let (space, nodes) = (self.space, &self.polygon.nodes[segment..segment + 2]);
+        self.beziers
+            .entry(segment)
+            .or_insert_with(|| Bezier::new(space, nodes, &self.system.segments[segment]))
+    }
+
     /// The columns by which a sample follows the four control points, τ and (behind a factor) h.
-    fn columns(&mut self, x: f64, of: Of) -> (Place, Matrix, Vector) {
-        let place = self.place(x);
-        let bezier = &self.beziers[&place.segment];
-        let inverse = 1.0 / self.system.segments[place.segment].h;
-        let tau = place.tau;
+    fn columns(&mut self, &Place { segment, tau }: &Place, of: Of) -> (Matrix, Vector) {
+        let (space, inverse) = (self.space, 1.0 / self.system.segments[segment].h);
+        let bezier = self.bezier(segment);
         // Behind the control points the last column is the derivative in τ.
         let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
         match of {
-            Of::Point => (place, bezier.point(self.space, tau), Vector::zeros(self.space.point_len())),
+            Of::Point => (bezier.point(space, tau), Vector::zeros(space.point_len())),
             // γ' = γ_τ/h
             Of::Velocity => {
-                let by_h = along(bezier.point(self.space, tau), -inverse * inverse);
-                (place, bezier.velocity(self.space, tau) * inverse, by_h)
+                let by_h = along(bezier.point(space, tau), -inverse * inverse);
+                (bezier.velocity(space, tau) * inverse, by_h)
             }
             // ∇γ' = ∇γ_τ/h²
             Of::Acceleration => {
-                let by_h = along(bezier.velocity(self.space, tau), -2.0 * inverse * inverse * inverse);
-                (place, bezier.acceleration(self.space, tau) * (inverse * inverse), by_h)
+                let by_h = along(bezier.velocity(space, tau), -2.0 * inverse * inverse * inverse);
+                (bezier.acceleration(space, tau) * (inverse * inverse), by_h)
             }
         }
     }
@@ -120,7 +123,8 @@ impl<'a> Derivative<'a> {
         self.close(&mut u);
         let m = self.space.dim();
         for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
-            let (Place { segment: i, tau }, columns, by_h) = self.columns(x, of);
+            let place = self.place(x);
+            let ((columns, by_h), Place { segment: i, tau }) = (self.columns(&place, of), place);
             let segment = &self.system.segments[i];
             let (dh, dt) = (change.lengths[i], change.knots[i]);
             let mut z = Vector::zeros(4 * m + 1);
@@ -150,7 +154,8 @@ impl<'a> Derivative<'a> {
         };
         let mut u = zero();
         for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
-            let (Place { segment: i, tau }, columns, by_h) = self.columns(x, of);
+            let place = self.place(x);
+            let ((columns, by_h), Place { segment: i, tau }) = (self.columns(&place, of), place);
             let segment = &self.system.segments[i];
             let cotangent = Vector::from_column_slice(cotangent);
             let z = columns.tr_mul(&cotangent);
@@ -170,6 +175,40 @@ impl<'a> Derivative<'a> {
         self.system.pull_back(u, &mut gradient);
         self.fold(&mut gradient.points);
         self.ambient(&gradient)
+    }
+
+    /// How a sample at a place of a segment follows the points and velocities of the two knots beside it, in their
+    /// frames: columns for ξ, υ of the first and ξ, υ of the last.
+    pub fn motion(&mut self, segment: usize, tau: f64, of: Of) -> Matrix {
+        let m = self.space.dim();
+        let (columns, _) = self.columns(&Place { segment, tau }, of);
+        let Segment { h, functions, .. } = &self.system.segments[segment];
+        let mut out = Matrix::zeros(columns.nrows(), 4 * m);
+        for e in 0..2 {
+            let f = &functions[e];
+            let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
+            let inner = columns.columns((1 + e) * m, m);
+            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * &f.cosh));
+            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * &f.stretch * third));
+        }
+        out
+    }
+
+    /// The point to which such motions belong: of its arrays the one that they are made at.
+    pub fn point(&mut self, segment: usize, tau: f64) -> Vec<f64> {
+        let space = self.space;
+        self.bezier(segment).gamma(space, tau)
+    }
+
+    /// The C² condition at a knot, linearised.
+    pub fn condition(&self, node: usize) -> &Row {
+        &self.system.rows[node]
+    }
+
+    /// The tangent vector at a knot with given coordinates in its frame.
+    pub fn tangent(&self, node: usize, x: &[f64], v: &mut [f64]) {
+        let v_at = self.polygon.nodes[node].basis(self.space) * Vector::from_column_slice(x);
+        v.copy_from_slice(v_at.as_slice());
     }
 
     /// Changes as the system has them.

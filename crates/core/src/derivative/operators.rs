@@ -8,7 +8,9 @@ use crate::space::{Erased, Origin};
 use nalgebra::{DMatrix, DVector};
 use smallvec::{SmallVec, smallvec};
 
+/// A matrix of any size.
 pub type Matrix = DMatrix<f64>;
+/// A vector of any size.
 pub type Vector = DVector<f64>;
 /// A few numbers on the stack: lanes on the heap are aligned, which costs more than the work done here.
 pub type Few<S> = SmallVec<[S; 12]>;

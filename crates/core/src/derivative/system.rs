@@ -10,9 +10,11 @@ use crate::space::{Erased, Origin};
 /// How the condition at one knot changes: with velocities and points of knots, lengths of segments, and
 /// the vector that is prescribed at an end.
 #[derive(Default)]
-struct Row {
-    u: Vec<(usize, Matrix)>,
-    points: Vec<(usize, Matrix)>,
+pub struct Row {
+    /// With the velocities of knots.
+    pub u: Vec<(usize, Matrix)>,
+    /// With their points.
+    pub points: Vec<(usize, Matrix)>,
     lengths: Vec<(usize, Vector)>,
     end: Option<(usize, Matrix)>,
 }
@@ -33,7 +35,7 @@ pub struct Change {
 /// The linearised conditions of one curve.
 pub struct System {
     pub segments: Vec<Segment>,
-    rows: Vec<Row>,
+    pub rows: Vec<Row>,
     m: usize,
     closed: bool,
     both_not_a_knot: bool,

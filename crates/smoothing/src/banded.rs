@@ -1,0 +1,157 @@
+//! Symmetric banded matrices, eight side by side.
+
+use symspline_core::scalar::Lane;
+
+/// Entries on the diagonal and `width` places left of it, row by row; after [`factor`](Banded::factor) those of L and
+/// D with A = L D Lᵀ.
+#[derive(Clone, Default)]
+pub struct Banded {
+    /// Rows and columns.
+    pub size: usize,
+    /// Places beside the diagonal that are not zero.
+    pub width: usize,
+    entries: Vec<Lane>,
+}
+
+impl Banded {
+    /// All zero.
+    pub fn zeros(size: usize, width: usize) -> Self {
+        Banded { size, width, entries: vec![Lane::ZERO; size * (width + 1)] }
+    }
+
+    /// The matrix whose entries (i, i − d) are `entry(i (width + 1) + d)`.
+    pub fn of(size: usize, width: usize, entry: impl Fn(usize) -> Lane) -> Self {
+        Banded { size, width, entries: (0..size * (width + 1)).map(entry).collect() }
+    }
+
+    fn place(&self, i: usize, j: usize) -> usize {
+        let (row, column) = if i >= j { (i, j) } else { (j, i) };
+        row * (self.width + 1) + row - column
+    }
+
+    /// An entry inside the band.
+    pub fn at(&self, i: usize, j: usize) -> Lane {
+        self.entries[self.place(i, j)]
+    }
+
+    /// Factors in place; positive definite matrices need no exchange of rows.
+    pub fn factor(&mut self) {
+        let (w, stride) = (self.width, self.width + 1);
+        let mut scaled = vec![Lane::ZERO; stride];
+        for i in 0..self.size {
+            let most = w.min(i);
+            // L_ij D_j = A_ij − Σ_k L_ik D_k L_jk, from the farthest column on.
+            for d in (1..=most).rev() {
+                let j = i - d;
+                let mut sum = self.entries[i * stride + d];
+                for k in (d + 1)..=most.min(w + d) {
+                    if k - d <= w {
+                        sum -= scaled[k] * self.entries[j * stride + k - d];
+                    }
+                }
+                scaled[d] = sum;
+            }
+            let mut pivot = self.entries[i * stride];
+            for d in 1..=most {
+                let l = scaled[d] / self.entries[(i - d) * stride];
+                pivot -= l * scaled[d];
+                self.entries[i * stride + d] = l;
+            }
+            self.entries[i * stride] = pivot;
+        }
+    }
+
+    /// The smallest pivot of a factored matrix.
+    pub fn least_pivot(&self) -> Lane {
+        (0..self.size)
+            .map(|i| self.entries[i * (self.width + 1)])
+            .fold(Lane::splat(f64::INFINITY), |least, d| d.simd_lt(least).select(d, least))
+    }
+
+    /// Of a factored matrix: ln det A.
+    pub fn log_det(&self) -> Lane {
+        (0..self.size).fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
+    }
+
+    /// Of a factored matrix: A⁻¹x in place, for rows of several numbers.
+    pub fn solve(&self, columns: usize, x: &mut [Lane]) {
+        let (w, stride) = (self.width, self.width + 1);
+        for i in 0..self.size {
+            let (before, here) = x.split_at_mut(i * columns);
+            for d in 1..=w.min(i) {
+                let l = self.entries[i * stride + d];
+                let row = &before[(i - d) * columns..][..columns];
+                here[..columns].iter_mut().zip(row).for_each(|(x, y)| *x = (-l).mul_add(*y, *x));
+            }
+        }
+        for i in (0..self.size).rev() {
+            let (here, behind) = x[i * columns..].split_at_mut(columns);
+            let inverse = Lane::ONE / self.entries[i * stride];
+            here.iter_mut().for_each(|x| *x *= inverse);
+            for d in 1..=w.min(self.size - 1 - i) {
+                let l = self.entries[(i + d) * stride + d];
+                let row = &behind[(d - 1) * columns..][..columns];
+                here.iter_mut().zip(row).for_each(|(x, y)| *x = (-l).mul_add(*y, *x));
+            }
+        }
+    }
+
+    /// Of a factored matrix: the entries of A⁻¹ inside the band, by Takahashi's recursion (Erisman & Tinney 1975)
+    /// `Z = D⁻¹L⁻¹ + (1 − Lᵀ)Z`.
+    pub fn inverse_band(&self) -> Banded {
+        let (n, w, stride) = (self.size, self.width, self.width + 1);
+        let mut z = Banded::zeros(n, w);
+        for i in (0..n).rev() {
+            let most = w.min(n - 1 - i);
+            for d in (0..=most).rev() {
+                let j = i + d;
+                let mut sum = if d == 0 { Lane::ONE / self.entries[i * stride] } else { Lane::ZERO };
+                for k in 1..=most {
+                    sum -= self.entries[(i + k) * stride + k] * z.at(i + k, j);
+                }
+                let place = z.place(i, j);
+                z.entries[place] = sum;
+            }
+        }
+        z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A diagonally dominant matrix, another one on each lane.
+    fn example(n: usize, w: usize) -> Banded {
+        Banded::of(n, w, |at| {
+            let (i, d) = (at / (w + 1), at % (w + 1));
+            let x = ((i * 7 + d * 3) as f64).sin();
+            Lane::new(std::array::from_fn(|l| if d == 0 { 4.0 + w as f64 + l as f64 } else { x }))
+        })
+    }
+
+    #[test]
+    fn solves_and_inverts() {
+        for (n, w) in [(1, 3), (2, 3), (3, 3), (9, 3), (20, 6), (5, 6)] {
+            let a = example(n, w);
+            let mut factors = a.clone();
+            factors.factor();
+            let band = factors.inverse_band();
+            for column in 0..n {
+                let mut x = vec![Lane::ZERO; n];
+                x[column] = Lane::ONE;
+                factors.solve(1, &mut x);
+                for i in 0..n {
+                    let near = |j: usize| i.abs_diff(j) <= w;
+                    let product =
+                        (0..n).filter(|&j| near(j)).fold(Lane::ZERO, |sum, j| sum + a.at(i, j) * x[j]);
+                    let wanted = if i == column { Lane::ONE } else { Lane::ZERO };
+                    assert!((product - wanted).abs().simd_lt(Lane::splat(1e-14)).all());
+                    if near(column) {
+                        assert!((band.at(i, column) - x[i]).abs().simd_lt(Lane::splat(1e-15)).all());
+                    }
+                }
+            }
+        }
+    }
+}

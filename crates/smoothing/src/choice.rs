@@ -1,0 +1,231 @@
+//! How smooth: λ from the data.
+//!
+//! At a curve with residuals r and accelerations a the smoothing problem in frames is one of numbers, whose solution
+//! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`. Its residuals and degrees of freedom for eight λ at
+//! a time cost one banded solve.
+
+use crate::banded::Banded;
+use crate::flat::{Flat, Row, times_mass};
+use symspline_core::scalar::{LANES, Lane, lane};
+
+/// How λ is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Criterion {
+    /// Generalised cross-validation (Craven & Wahba 1979); degrees of freedom count `penalty` times.
+    Gcv {
+        /// 1, or 1.4 against too rough curves (Gu 2013, §3.2).
+        penalty: f64,
+    },
+    /// Restricted maximum likelihood (Wahba 1985).
+    Reml,
+    /// Mallows' C_p (1973), for noise of known size.
+    Cp,
+}
+
+/// A curve as the flat problem sees it: coordinates of m numbers, in units of the mean knot spacing.
+pub struct Linear<'a> {
+    /// B, Ω and the like.
+    pub flat: &'a Flat,
+    /// Dimension of the space.
+    pub m: usize,
+    /// Weights of the data.
+    pub weights: &'a [f64],
+    /// Residuals at the data.
+    pub residuals: &'a [f64],
+    /// Accelerations at the knots.
+    pub bends: &'a [f64],
+    /// The standard deviation of the noise, for [`Criterion::Cp`].
+    pub sigma: f64,
+    /// BᵀWr.
+    pub pull: Vec<f64>,
+    /// SᵀMa + PᵀMρ: the gradient of half the energy.
+    pub stiffness: Vec<f64>,
+}
+
+impl<'a> Linear<'a> {
+    /// `curvature` is ρ, the part of the energy's gradient that curvature makes.
+    pub fn new(
+        flat: &'a Flat,
+        m: usize,
+        weights: &'a [f64],
+        residuals: &'a [f64],
+        bends: &'a [f64],
+        curvature: &[f64],
+        sigma: f64,
+    ) -> Self {
+        let mut pull = vec![0.0; flat.basis.count() * m];
+        let mut weighted = vec![0.0; m];
+        for ((row, w), r) in flat.data.iter().zip(weights).zip(residuals.chunks_exact(m)) {
+            weighted.iter_mut().zip(r).for_each(|(x, r)| *x = w * r);
+            row.spread(&weighted, &mut pull);
+        }
+        let mut stiffness = vec![0.0; pull.len()];
+        for (rows, vectors) in [(&flat.bends, bends), (&flat.values, curvature)] {
+            let mass = times_mass(&flat.basis, vectors, m);
+            for (row, x) in rows.iter().zip(mass.chunks_exact(m)) {
+                row.spread(x, &mut stiffness);
+            }
+        }
+        Linear { flat, m, weights, residuals, bends, sigma, pull, stiffness }
+    }
+
+    /// The step of the coefficients for one λ, given the factors of A.
+    pub fn step(&self, lam: f64, factors: &Banded) -> Vec<f64> {
+        let (m, count) = (self.m, self.flat.basis.count());
+        // Coordinates in the lanes.
+        let columns = m.div_ceil(LANES);
+        let mut x = vec![Lane::ZERO; count * columns];
+        let entry = |i: usize, c: usize| self.pull[i * m + c] - lam * self.stiffness[i * m + c];
+        for (i, x) in x.chunks_exact_mut(columns).enumerate() {
+            for (k, x) in x.iter_mut().enumerate() {
+                *x = Lane::new(std::array::from_fn(|l| {
+                    if k * LANES + l < m { entry(i, k * LANES + l) } else { 0.0 }
+                }));
+            }
+        }
+        factors.solve(columns, &mut x);
+        let number = |i: usize, c: usize| x[i * columns + c / LANES].as_array()[c % LANES];
+        (0..count * m).map(|at| number(at / m, at % m)).collect()
+    }
+
+    /// What eight λ come to.
+    pub fn look(&self, lam: Lane) -> Look {
+        let (m, flat) = (self.m, self.flat);
+        let factors = flat.factored(lam);
+        let mut x: Vec<Lane> = self
+            .pull
+            .iter()
+            .zip(&self.stiffness)
+            .map(|(pull, stiffness)| (-lam).mul_add(lane(*stiffness), lane(*pull)))
+            .collect();
+        factors.solve(m, &mut x);
+        let freedom = flat.freedom(&factors.inverse_band());
+        let mut rss = Lane::ZERO;
+        for ((row, w), r) in flat.data.iter().zip(self.weights).zip(self.residuals.chunks_exact(m)) {
+            for (c, r) in r.iter().enumerate() {
+                let moved = lane(*r) - row_times(row, &x, m, c);
+                rss = (moved * lane(*w)).mul_add(moved, rss);
+            }
+        }
+        // (a + Sδ)ᵀM(a + Sδ)
+        let mut energy = Lane::ZERO;
+        let bend = |i: usize, c: usize| lane(self.bends[i * m + c]) + row_times(&flat.bends[i], &x, m, c);
+        for c in 0..m {
+            let mut left = bend(0, c);
+            for i in 0..flat.basis.count() - 1 {
+                let right = bend(i + 1, c);
+                energy += (left * left + left * right + right * right) * lane(flat.basis.h(i) / 3.0);
+                left = right;
+            }
+        }
+        Look { freedom, rss, energy, log_det: factors.log_det() }
+    }
+
+    /// The λ that a criterion likes best, from a guess or from everywhere, and whether it lies at a bound.
+    pub fn choose(&self, criterion: Criterion, guess: Option<f64>) -> (f64, bool) {
+        /// Decades of λ over the balance of data and energy, and how far a guess may be off.
+        const RANGE: (f64, f64) = (-9.0, 12.5);
+        const NEAR: f64 = 0.6;
+        /// Fewer degrees of freedom than this are a geodesic, for which every larger λ is as good.
+        const STRAIGHT: f64 = 2.01;
+        let start = self.flat.balance().log10();
+        let (mut from, mut to) = (start + RANGE.0, start + RANGE.1);
+        let bounds = (from, to);
+        if let Some(guess) = guess {
+            (from, to) = ((guess.log10() - NEAR).max(from), (guess.log10() + NEAR).min(to));
+        }
+        let passes = if guess.is_some() { 1 } else { 3 };
+        let mut seen: Vec<(f64, f64, f64)> = Vec::new();
+        let look = |seen: &mut Vec<(f64, f64, f64)>, from: f64, to: f64, part: usize, parts: usize| {
+            let at: [f64; LANES] = std::array::from_fn(|l| {
+                from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64
+            });
+            let found = self.look(Lane::new(at.map(|x| 10f64.powf(x))));
+            let scores = self.score(criterion, Lane::new(at.map(|x| 10f64.powf(x))), &found).to_array();
+            let freedom = found.freedom.to_array();
+            (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
+        };
+        (0..passes).for_each(|part| look(&mut seen, from, to, part, passes));
+        for _ in 0..4 {
+            seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let Some(best) = least(&seen, STRAIGHT) else { return (10f64.powf(from), true) };
+            let (left, right) = (best.saturating_sub(1), (best + 1).min(seen.len() - 1));
+            (from, to) = (seen[left].0, seen[right].0);
+            // At the end of a guess's neighbourhood the search goes on outside it.
+            if best == 0 && from > bounds.0 {
+                (from, to) = ((from - 4.0 * NEAR).max(bounds.0), from);
+            } else if best == seen.len() - 1 && to < bounds.1 {
+                (from, to) = (to, (to + 4.0 * NEAR).min(bounds.1));
+            } else if to - from < 0.12 {
+                break;
+            }
+            look(&mut seen, from, to, 0, 1);
+        }
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        seen.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
+        let Some(best) = least(&seen, STRAIGHT) else { return (10f64.powf(from), true) };
+        let straight = seen.get(best + 1).is_none_or(|next| next.2 <= STRAIGHT);
+        if best == 0 || straight {
+            return (10f64.powf(seen[best].0), true);
+        }
+        (10f64.powf(lowest([seen[best - 1], seen[best], seen[best + 1]].map(|(x, y, _)| (x, y)))), false)
+    }
+
+    fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
+        let (n, m) = (self.weights.len() as f64, self.m as f64);
+        let per = look.rss / lane(m);
+        match criterion {
+            Criterion::Gcv { penalty } => {
+                let left = lane(n) - look.freedom * lane(penalty);
+                // With 1.4 the denominator passes through zero: rougher curves than that are out of the question.
+                left.simd_gt(Lane::ZERO).select((per / (left * left)).ln(), lane(f64::INFINITY))
+            }
+            Criterion::Cp => per + look.freedom * lane(2.0 * self.sigma * self.sigma),
+            Criterion::Reml => {
+                let count = self.flat.basis.count() as f64;
+                lane(n - 2.0) * (per + lam * look.energy / lane(m)).ln() + look.log_det
+                    - lane(count - 2.0) * lam.ln()
+            }
+        }
+    }
+}
+
+/// What a λ comes to.
+pub struct Look {
+    /// Degrees of freedom of a coordinate: tr A⁻¹BᵀWB.
+    pub freedom: Lane,
+    /// Σ w|r − Bδ|².
+    pub rss: Lane,
+    /// ∫ of the squared acceleration.
+    pub energy: Lane,
+    /// ln det A.
+    pub log_det: Lane,
+}
+
+fn row_times(row: &Row, x: &[Lane], m: usize, c: usize) -> Lane {
+    let mut sum = Lane::ZERO;
+    for (k, factor) in row.factors.iter().enumerate() {
+        if let Some(x) = x.get((row.first + k) * m + c) {
+            sum = x.mul_add(lane(*factor), sum);
+        }
+    }
+    sum
+}
+
+/// The place of the least score among curves that are no geodesics, or the first geodesic if that is better.
+fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
+    let end = seen.iter().position(|look| look.2 <= straight).map_or(seen.len(), |first| first + 1);
+    (0..end).filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
+}
+
+/// Where the parabola through three points is lowest; the middle one is.
+fn lowest([(x0, y0), (x1, y1), (x2, y2)]: [(f64, f64); 3]) -> f64 {
+    let (a, b) = (x1 - x0, x2 - x1);
+    let (down, up) = ((y1 - y0) / a, (y2 - y1) / b);
+    let bend = (up - down) / (a + b);
+    if !(bend > 0.0) {
+        return x1;
+    }
+    let at = 0.5 * (x0 + x1) - 0.5 * down / bend;
+    at.clamp(x0, x2)
+}

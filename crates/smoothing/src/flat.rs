@@ -1,0 +1,331 @@
+//! Smoothing splines of numbers: natural cubic B-splines, their values at data and knots, and their energy.
+//!
+//! A spline with coefficients c has the values Bc at the data, Pc at the knots and second derivatives Sc there; its
+//! energy ∫ x''² is cᵀΩc with Ω = SᵀMS, M being the mass matrix of hat functions. Times are divided by the mean knot
+//! spacing.
+
+use crate::banded::Banded;
+use symspline_core::scalar::{Lane, lane};
+
+/// Places beside the diagonal in BᵀWB and Ω.
+pub const WIDTH: usize = 3;
+const BAND: usize = WIDTH + 1;
+
+/// What happens at an end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlatEnd {
+    /// The second derivative vanishes.
+    Natural,
+    /// The first derivative is given.
+    Velocity,
+}
+
+/// A row of B, P or S: four neighbouring entries.
+#[derive(Clone, Copy, Default)]
+pub struct Row {
+    /// The first coefficient.
+    pub first: usize,
+    /// Its factor and the next ones.
+    pub factors: [f64; 4],
+}
+
+impl Row {
+    /// The row times coefficients of `m` numbers each, added to `out`.
+    pub fn apply(&self, c: &[f64], out: &mut [f64]) {
+        let m = out.len();
+        for (factor, c) in self.factors.iter().zip(c[self.first * m..].chunks_exact(m)) {
+            out.iter_mut().zip(c).for_each(|(out, c)| *out = factor.mul_add(*c, *out));
+        }
+    }
+
+    /// Adds the transposed row times x to coefficients.
+    pub fn spread(&self, x: &[f64], c: &mut [f64]) {
+        let m = x.len();
+        for (factor, c) in self.factors.iter().zip(c[self.first * m..].chunks_exact_mut(m)) {
+            c.iter_mut().zip(x).for_each(|(c, x)| *c = factor.mul_add(*x, *c));
+        }
+    }
+
+    /// row · Z · rowᵀ for a matrix known within its band.
+    pub fn square(&self, z: &Banded) -> Lane {
+        let mut sum = Lane::ZERO;
+        let count = 4.min(z.size);
+        for a in 0..count {
+            for b in 0..count {
+                let factor = self.factors[a] * self.factors[b];
+                if factor != 0.0 {
+                    sum += z.at(self.first + a, self.first + b) * lane(factor);
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// The splines on some knots.
+pub struct Basis {
+    /// Knots, divided by their mean spacing.
+    tau: Vec<f64>,
+    /// The mean knot spacing.
+    pub spacing: f64,
+    ends: [FlatEnd; 2],
+}
+
+impl Basis {
+    /// On increasing knots, two or more.
+    pub fn new(knots: &[f64], ends: [FlatEnd; 2]) -> Self {
+        let last = knots.len() - 1;
+        let spacing = (knots[last] - knots[0]) / last as f64;
+        Basis { tau: knots.iter().map(|t| (t - knots[0]) / spacing).collect(), spacing, ends }
+    }
+
+    /// Number of coefficients, which is that of knots.
+    pub fn count(&self) -> usize {
+        self.tau.len()
+    }
+
+    /// Length of a segment, divided by the mean.
+    pub fn h(&self, segment: usize) -> f64 {
+        self.tau[segment + 1] - self.tau[segment]
+    }
+
+    /// Knots with the first and the last one three times more: the support of the i-th B-spline begins at the i-th.
+    fn extended(&self, i: usize) -> f64 {
+        self.tau[i.saturating_sub(3).min(self.tau.len() - 1)]
+    }
+
+    /// Value (`nu` = 0) or derivative of a spline at a place between 0 and 1 of a segment.
+    pub fn row(&self, segment: usize, place: f64, nu: usize) -> Row {
+        let t = |k: usize| self.extended(segment + k);
+        let x = t(3) + place * (t(4) - t(3));
+        // B-splines of growing degree that do not vanish on the segment: the j-th begins at t(3 − degree + j).
+        let mut b = [1.0, 0.0, 0.0, 0.0];
+        for degree in 1..=3 - nu {
+            let mut next = [0.0; 4];
+            for j in 0..degree {
+                let (from, to) = (t(4 - degree + j), t(4 + j));
+                let part = b[j] / (to - from);
+                next[j] += (to - x) * part;
+                next[j + 1] += (x - from) * part;
+            }
+            b = next;
+        }
+        // Derivatives: B'_j = degree (b_j/(…) − b_{j+1}/(…)).
+        for degree in 4 - nu..=3 {
+            let mut next = [0.0; 4];
+            for j in 0..degree {
+                let part = degree as f64 * b[j] / (t(4 + j) - t(4 - degree + j));
+                next[j] -= part;
+                next[j + 1] += part;
+            }
+            b = next;
+        }
+        self.folded(segment, b)
+    }
+
+    /// Without the outermost coefficients, which the conditions at the ends give.
+    fn folded(&self, segment: usize, factors: [f64; 4]) -> Row {
+        let n = self.tau.len() - 1;
+        // Coefficients from 1 to n + 1 are kept, and counted from zero.
+        let first = segment.saturating_sub(1).min((n + 1).saturating_sub(4));
+        let mut row = Row { first, factors: [0.0; 4] };
+        for (j, factor) in factors.into_iter().enumerate() {
+            let full = segment + j;
+            if full == 0 || full == n + 2 {
+                let (end, near, far) = if full == 0 { (0, 0, 1) } else { (1, n, n - 1) };
+                let [at_near, at_far] = self.outermost(end);
+                row.factors[near - first] += factor * at_near;
+                row.factors[far - first] += factor * at_far;
+            } else {
+                row.factors[full - 1 - first] += factor;
+            }
+        }
+        row
+    }
+
+    /// What the outermost coefficient is made of: the next one and the one behind that. A given velocity adds a
+    /// constant, which is no part of changes.
+    fn outermost(&self, end: usize) -> [f64; 2] {
+        let n = self.tau.len() - 1;
+        match self.ends[end] {
+            FlatEnd::Velocity => [1.0, 0.0],
+            FlatEnd::Natural => {
+                let (h, next) = if end == 0 { (0, 1) } else { (n - 1, n.saturating_sub(2)) };
+                let both = self.h(h) + if n > 1 { self.h(next) } else { 0.0 };
+                let ratio = self.h(h) / both;
+                [1.0 + ratio, -ratio]
+            }
+        }
+    }
+
+    /// A derivative at every knot.
+    pub fn at_knots(&self, nu: usize) -> Vec<Row> {
+        let n = self.tau.len() - 1;
+        (0..=n).map(|i| if i < n { self.row(i, 0.0, nu) } else { self.row(n - 1, 1.0, nu) }).collect()
+    }
+}
+
+/// M times vectors at the knots, M being the mass matrix of hats: `∫ a b` of functions that are linear between knots.
+pub fn times_mass(basis: &Basis, a: &[f64], m: usize) -> Vec<f64> {
+    let mut out = vec![0.0; a.len()];
+    for i in 0..basis.count() - 1 {
+        let sixth = basis.h(i) / 6.0;
+        for c in 0..m {
+            let (left, right) = (a[i * m + c], a[(i + 1) * m + c]);
+            out[i * m + c] += sixth * (2.0 * left + right);
+            out[(i + 1) * m + c] += sixth * (left + 2.0 * right);
+        }
+    }
+    out
+}
+
+/// Σ factor · rowᵀ row, as the entries (i, i − d) at i · 4 + d.
+fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
+    let mut out = vec![0.0; count * BAND];
+    for (left, right, factor) in rows {
+        for (a, x) in left.factors.iter().enumerate() {
+            for (b, y) in right.factors.iter().enumerate() {
+                let (i, j) = (left.first + a, right.first + b);
+                let value = factor * x * y;
+                if i >= j && value != 0.0 {
+                    out[i * BAND + i - j] += value;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The smoothing problem of numbers: A = BᵀWB + λΩ.
+pub struct Flat {
+    /// The splines.
+    pub basis: Basis,
+    /// B: values at the data.
+    pub data: Vec<Row>,
+    /// P: values at the knots.
+    pub values: Vec<Row>,
+    /// S: second derivatives at the knots.
+    pub bends: Vec<Row>,
+    /// BᵀWB.
+    gram: Vec<f64>,
+    /// Ω.
+    penalty: Vec<f64>,
+}
+
+impl Flat {
+    /// For data that lie at places of segments, with their weights.
+    pub fn new(basis: Basis, places: &[(usize, f64)], weights: &[f64]) -> Self {
+        let count = basis.count();
+        let data: Vec<Row> = places.iter().map(|&(segment, place)| basis.row(segment, place, 0)).collect();
+        let (values, bends) = (basis.at_knots(0), basis.at_knots(2));
+        let hats = (0..count - 1).flat_map(|i| {
+            let (s, sixth) = (&bends, basis.h(i) / 6.0);
+            let (l, r) = (s[i], s[i + 1]);
+            [(l, l, 2.0 * sixth), (r, r, 2.0 * sixth), (l, r, sixth), (r, l, sixth)]
+        });
+        let penalty = gram(count, hats);
+        let gram = gram(count, data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)));
+        Flat { data, values, bends, gram, penalty, basis }
+    }
+
+    /// A, factored, for another λ on each lane.
+    pub fn factored(&self, lam: Lane) -> Banded {
+        let mut a = Banded::of(self.basis.count(), WIDTH, |at| {
+            lam.mul_add(lane(self.penalty[at]), lane(self.gram[at]))
+        });
+        a.factor();
+        a
+    }
+
+    /// The trace of A⁻¹BᵀWB, given the band of A⁻¹: the degrees of freedom of one coordinate.
+    pub fn freedom(&self, inverse: &Banded) -> Lane {
+        let mut sum = Lane::ZERO;
+        for i in 0..self.basis.count() {
+            for d in 0..=WIDTH.min(i) {
+                let twice = if d > 0 { 2.0 } else { 1.0 };
+                sum += inverse.at(i, i - d) * lane(twice * self.gram[i * BAND + d]);
+            }
+        }
+        sum
+    }
+
+    /// tr BᵀWB/tr Ω: the λ at which data and energy weigh about the same for the roughest splines.
+    pub fn balance(&self) -> f64 {
+        let trace = |x: &[f64]| x.chunks(BAND).map(|row| row[0]).sum::<f64>();
+        trace(&self.gram) / trace(&self.penalty)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KNOTS: [f64; 6] = [0.0, 0.5, 2.0, 2.25, 4.0, 5.0];
+
+    /// The spline with some coefficients, at a time.
+    fn value(basis: &Basis, c: &[f64], segment: usize, place: f64, nu: usize) -> f64 {
+        let mut out = [0.0];
+        basis.row(segment, place, nu).apply(c, &mut out);
+        out[0]
+    }
+
+    #[test]
+    fn is_a_natural_cubic_spline() {
+        for count in 2..=6 {
+            let basis = Basis::new(&KNOTS[..count], [FlatEnd::Natural; 2]);
+            let c: Vec<f64> = (0..count).map(|i| (3.0 * i as f64).cos()).collect();
+            let last = count - 2;
+            for (segment, place) in [(0, 0.0), (last, 1.0)] {
+                assert!(value(&basis, &c, segment, place, 2).abs() < 1e-13);
+            }
+            for i in 0..last {
+                for nu in 0..3 {
+                    let [left, right] = [(i, 1.0), (i + 1, 0.0)].map(|(s, p)| value(&basis, &c, s, p, nu));
+                    assert!((left - right).abs() < 1e-13, "{count} {i} {nu}: {left} {right}");
+                }
+            }
+            // Derivatives against differences.
+            let h = 1e-4;
+            for segment in 0..=last {
+                for nu in 0..2 {
+                    let step = 2.0 * h * basis.h(segment);
+                    let [a, b] = [0.4 - h, 0.4 + h].map(|p| value(&basis, &c, segment, p, nu));
+                    assert!(((b - a) / step - value(&basis, &c, segment, 0.4, nu + 1)).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn reproduces_straight_lines() {
+        for ends in [FlatEnd::Natural, FlatEnd::Velocity] {
+            let basis = Basis::new(&KNOTS, [ends; 2]);
+            for segment in 0..5 {
+                let ones = value(&basis, &[1.0; 6], segment, 0.3, 0);
+                assert!((ones - 1.0).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn energy_is_that_of_the_second_derivative() {
+        let basis = Basis::new(&KNOTS, [FlatEnd::Natural; 2]);
+        let flat = Flat::new(basis, &[(0, 0.0)], &[0.0]);
+        let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
+        let mut bends = vec![0.0; 6];
+        flat.bends.iter().zip(&mut bends).for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));
+        let mass = times_mass(&flat.basis, &bends, 1);
+        let energy: f64 = bends.iter().zip(&mass).map(|(a, b)| a * b).sum();
+        let form: f64 = (0..6)
+            .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
+            .map(|(i, d)| flat.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
+            .sum();
+        let simpson: f64 = (0..5)
+            .map(|s| {
+                let [a, b, d] = [0.0, 0.5, 1.0].map(|p| value(&flat.basis, &c, s, p, 2).powi(2));
+                flat.basis.h(s) * (a + 4.0 * b + d) / 6.0
+            })
+            .sum();
+        assert!((energy / simpson - 1.0).abs() < 1e-13 && (form / simpson - 1.0).abs() < 1e-13);
+    }
+}

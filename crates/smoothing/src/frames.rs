@@ -1,0 +1,172 @@
+//! One frame at every knot of a curve, carried along the polygon of its points.
+//!
+//! The polygon is cut into eight runs that go side by side in the lanes; what turns the frame with which a run begins
+//! into the one that comes out of the run before is kept, so that coordinates are those in one frame carried along the
+//! whole polygon.
+
+use symspline_core::scalar::{LANES, Lane, gather, scatter};
+use symspline_core::space::{Ambient, Erased, Frame, Origin};
+
+/// Steps after which the rounding errors of a frame are removed.
+const TIDY: usize = 8;
+
+/// Frames along a polygon.
+pub struct Frames<'a> {
+    space: &'a Erased<'a>,
+    points: &'a [f64],
+    frames: Vec<f64>,
+    /// Knots of a run.
+    run: usize,
+    /// Matrices that bring coordinates in the frames of a run to those in the frame carried from the first knot, and
+    /// back; row by row. The first run has none.
+    turns: Vec<[Vec<f64>; 2]>,
+}
+
+impl<'a> Frames<'a> {
+    /// Along the polygon of some points.
+    pub fn new(space: &'a Erased<'a>, points: &'a [f64]) -> Self {
+        let (len, size, m) = (space.point_len(), space.frame_len(), space.dim());
+        let count = points.len() / len;
+        let run = count.div_ceil(LANES).max(4);
+        let runs = count.div_ceil(run);
+        let last = count - 1;
+        let point = |knot: usize| &points[knot.min(last) * len..][..len];
+        let begin: [usize; LANES] = std::array::from_fn(|l| l.min(runs - 1) * run);
+
+        let mut frames = vec![0.0; count * size];
+        let [mut p, mut q] = [(); 2].map(|_| vec![Lane::ZERO; len]);
+        let (mut frame, mut chord) = (vec![Lane::ZERO; size], vec![Lane::ZERO; m]);
+        let mut rows = vec![0.0; LANES * size];
+        gather(begin.map(point), &mut p);
+        space.lift(&p, &mut frame);
+        for i in 0..=run {
+            if i > 0 {
+                gather(begin.map(|k| point(k + i)), &mut q);
+                space.step(&mut frame, &p, &q, &mut chord);
+                std::mem::swap(&mut p, &mut q);
+                if i % TIDY == 0 {
+                    space.tidy(&mut frame, &p);
+                }
+            }
+            if i < run {
+                scatter(&frame, &mut rows);
+                for (l, row) in rows.chunks_exact(size.max(1)).enumerate().take(runs) {
+                    if let Some(own) = frames.get_mut((begin[l] + i) * size..(begin[l] + i + 1) * size) {
+                        own.copy_from_slice(row);
+                    }
+                }
+            }
+        }
+        let mut found = Frames { space, points, frames, run, turns: Vec::new() };
+        found.join(runs, &frame, &p);
+        found
+    }
+
+    /// Compares the frames with which runs end, `frame` at `p`, with those with which the next ones begin.
+    fn join(&mut self, runs: usize, frame: &[Lane], p: &[Lane]) {
+        let (space, m, len) = (self.space, self.space.dim(), self.space.point_len());
+        let next: [usize; LANES] = std::array::from_fn(|l| (l + 1).min(runs - 1) * self.run);
+        let mut fresh = vec![Lane::ZERO; frame.len()];
+        gather(next.map(|k| &self.frames[k * frame.len()..][..frame.len()]), &mut fresh);
+        // Where frames are not orthonormal the way back is no transpose.
+        let mut steps = vec![[(); 2].map(|_| vec![0.0; m * m]); runs - 1];
+        let (mut x, mut v) = (vec![Lane::ZERO; m], vec![Lane::ZERO; len]);
+        for column in 0..m {
+            for (way, (from, to)) in [(&fresh[..], frame), (frame, &fresh[..])].into_iter().enumerate() {
+                x.fill(Lane::ZERO);
+                x[column] = Lane::ONE;
+                space.tangent(from, p, &x, &mut v);
+                space.coordinates(to, p, &v, &mut x);
+                for (l, step) in steps.iter_mut().enumerate() {
+                    (0..m).for_each(|row| step[way][row * m + column] = x[row].as_array()[l]);
+                }
+            }
+        }
+        for [forth, back] in steps {
+            let turn = match self.turns.last() {
+                None => [forth, back],
+                Some(before) => [product(&before[0], &forth, m), product(&back, &before[1], m)],
+            };
+            self.turns.push(turn);
+        }
+    }
+
+    /// Numbers of a point.
+    fn len(&self) -> usize {
+        self.space.point_len()
+    }
+
+    fn frame_rows(&self, knots: [usize; LANES], frame: &mut [Lane], p: &mut [Lane]) {
+        let (size, len) = (frame.len(), p.len());
+        gather(knots.map(|k| &self.frames[k * size..][..size]), frame);
+        gather(knots.map(|k| &self.points[k * len..][..len]), p);
+    }
+
+    /// Coordinates of vectors, of which the i-th is tangent at the knot `knots(i)`.
+    pub fn coordinates(&self, vectors: &[f64], knots: impl Fn(usize) -> usize) -> Vec<f64> {
+        let (len, m) = (self.len(), self.space.dim());
+        let count = vectors.len() / len;
+        let mut out = vec![0.0; count * m];
+        let (mut frame, mut p) = (vec![Lane::ZERO; self.space.frame_len()], vec![Lane::ZERO; len]);
+        let (mut v, mut x) = (vec![Lane::ZERO; len], vec![Lane::ZERO; m]);
+        for (group, out) in out.chunks_mut(LANES * m).enumerate() {
+            let at = lanes_of(group, count);
+            self.frame_rows(at.map(&knots), &mut frame, &mut p);
+            gather(at.map(|i| &vectors[i * len..][..len]), &mut v);
+            self.space.coordinates(&frame, &p, &v, &mut x);
+            scatter(&x, out);
+            for (l, x) in out.chunks_exact_mut(m).enumerate() {
+                if let Some(turn) = self.turn(knots(at[l])) {
+                    multiply(&turn[0], x);
+                }
+            }
+        }
+        out
+    }
+
+    /// The tangent vectors at all knots with given coordinates.
+    pub fn tangents(&self, coordinates: &[f64]) -> Vec<f64> {
+        let (len, m) = (self.len(), self.space.dim());
+        let count = coordinates.len() / m;
+        let mut own = coordinates.to_vec();
+        for (knot, x) in own.chunks_exact_mut(m).enumerate() {
+            if let Some(turn) = self.turn(knot) {
+                multiply(&turn[1], x);
+            }
+        }
+        let mut out = vec![0.0; count * len];
+        let (mut frame, mut p) = (vec![Lane::ZERO; self.space.frame_len()], vec![Lane::ZERO; len]);
+        let (mut v, mut x) = (vec![Lane::ZERO; len], vec![Lane::ZERO; m]);
+        for (group, out) in out.chunks_mut(LANES * len).enumerate() {
+            let at = lanes_of(group, count);
+            self.frame_rows(at, &mut frame, &mut p);
+            gather(at.map(|i| &own[i * m..][..m]), &mut x);
+            self.space.tangent(&frame, &p, &x, &mut v);
+            scatter(&v, out);
+        }
+        out
+    }
+
+    fn turn(&self, knot: usize) -> Option<&[Vec<f64>; 2]> {
+        (knot / self.run).checked_sub(1).map(|l| &self.turns[l])
+    }
+}
+
+/// The members of a group of eight; those that are missing are the last one again.
+pub fn lanes_of(group: usize, count: usize) -> [usize; LANES] {
+    std::array::from_fn(|l| (group * LANES + l).min(count - 1))
+}
+
+/// a b for m × m matrices.
+fn product(a: &[f64], b: &[f64], m: usize) -> Vec<f64> {
+    let entry = |at: usize| (0..m).map(|k| a[at / m * m + k] * b[k * m + at % m]).sum();
+    (0..m * m).map(entry).collect()
+}
+
+/// Replaces x by a x.
+fn multiply(a: &[f64], x: &mut [f64]) {
+    let (m, before) = (x.len(), x.to_vec());
+    for (i, x) in x.iter_mut().enumerate() {
+        *x = a[i * m..][..m].iter().zip(&before).map(|(a, b)| a * b).sum();
+    }
+}

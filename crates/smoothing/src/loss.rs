@@ -1,0 +1,204 @@
+//! How much a residual counts: least squares, Huber, Cauchy.
+//!
+//! A robust fit is one of least squares to pseudo-data (Cox 1983): residuals r become `ψ(r)/ψ̄'`, ψ̄' being the mean
+//! slope of ψ. Cross-validation of pseudo-data keeps its sense; that of data that are weighted anew does not.
+
+use crate::Data;
+use crate::chi;
+use crate::frames::lanes_of;
+use symspline_core::scalar::{LANES, Lane, gather};
+use symspline_core::space::{Ambient, Erased, Origin};
+
+/// A loss ρ with ρ(r) ≈ |r|² for small residuals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// |r|².
+    Linear,
+    /// |r|² up to c, and linear beyond.
+    Huber,
+    /// c² ln(1 + |r|²/c²).
+    Cauchy,
+}
+
+impl Loss {
+    /// The residual at which the loss begins to count less, over the standard deviation of a coordinate.
+    pub fn corner(self, m: usize) -> f64 {
+        match self {
+            Loss::Linear => f64::INFINITY,
+            Loss::Huber => chi::quantile(m, 0.82).sqrt(),
+            Loss::Cauchy => chi::quantile(m, 0.95).sqrt(),
+        }
+    }
+
+    /// ψ(r)/r and the mean of ψ' over all directions, for q = |r|²/c².
+    fn slopes(self, q: f64, m: usize) -> (f64, f64) {
+        let m = m as f64;
+        match self {
+            Loss::Huber if q > 1.0 => (1.0 / q.sqrt(), (m - 1.0) / (m * q.sqrt())),
+            Loss::Linear | Loss::Huber => (1.0, 1.0),
+            Loss::Cauchy => {
+                let factor = 1.0 / (1.0 + q);
+                (factor, factor - 2.0 * q * factor * factor / m)
+            }
+        }
+    }
+
+    /// ρ of a squared residual, for a corner c.
+    pub fn value(self, square: f64, corner: f64) -> f64 {
+        let q = square / (corner * corner);
+        match self {
+            Loss::Huber if q > 1.0 => corner * corner * (2.0 * q.sqrt() - 1.0),
+            Loss::Linear | Loss::Huber => square,
+            Loss::Cauchy => corner * corner * q.ln_1p(),
+        }
+    }
+
+    /// Turns residuals, vectors of `len` numbers in m dimensions, into ψ(r)/ψ̄'; returns ψ̄'.
+    pub fn pseudo(
+        self,
+        corner: f64,
+        squares: &[f64],
+        weights: &[f64],
+        [len, m]: [usize; 2],
+        residuals: &mut [f64],
+    ) -> f64 {
+        if self == Loss::Linear {
+            return 1.0;
+        }
+        let slopes: Vec<(f64, f64)> =
+            squares.iter().zip(weights).map(|(d, w)| self.slopes(w * d / (corner * corner), m)).collect();
+        let mean = slopes.iter().map(|s| s.1).sum::<f64>() / slopes.len() as f64;
+        // Were most data outliers, the slope would say nothing.
+        let mean = mean.max(0.05);
+        for (r, (factor, _)) in residuals.chunks_exact_mut(len).zip(&slopes) {
+            r.iter_mut().for_each(|x| *x *= factor / mean);
+        }
+        mean
+    }
+}
+
+/// The standard deviation of the noise in a coordinate, whatever outliers do: from the median squared distance of data
+/// from the geodesics between their neighbours. NaN for fewer than three data.
+pub fn noise(space: &Erased, data: &Data) -> f64 {
+    let [times, points, weights] = [data.times, data.points, data.weights];
+    let median = median(&deviations(space, times, points, weights));
+    (median / chi::quantile(space.dim(), 0.5)).sqrt()
+}
+
+/// Squared distances of all data but the first and the last from the geodesic between their neighbours, in units of
+/// what noise of variance one would make of them.
+fn deviations(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) -> Vec<f64> {
+    let len = space.point_len();
+    let inner = times.len().saturating_sub(2);
+    let share = |i: usize| {
+        let (a, b) = (times[i + 1] - times[i], times[i + 2] - times[i + 1]);
+        if a + b > 0.0 { a / (a + b) } else { 0.5 }
+    };
+    let [mut p, mut q, mut y, mut v, mut between] = [(); 5].map(|_| vec![Lane::ZERO; len]);
+    let mut squares = Vec::with_capacity(inner);
+    for group in 0..inner.div_ceil(LANES) {
+        let at = lanes_of(group, inner);
+        gather(at.map(|i| &points[i * len..][..len]), &mut p);
+        gather(at.map(|i| &points[(i + 1) * len..][..len]), &mut y);
+        gather(at.map(|i| &points[(i + 2) * len..][..len]), &mut q);
+        space.log(&p, &q, &mut v);
+        space.ray(&p, &v, Lane::new(at.map(share)), &mut between);
+        let angle = space.log(&between, &y, &mut v);
+        let apart = space.distance(&between, &y, &v, angle);
+        let found = (apart * apart).to_array();
+        for (l, &i) in at.iter().enumerate().take(inner - group * LANES) {
+            let s = share(i);
+            let [before, own, behind] = [i, i + 1, i + 2].map(|i| 1.0 / weights[i]);
+            squares.push(found[l] / (own + (1.0 - s) * (1.0 - s) * before + s * s * behind));
+        }
+    }
+    squares
+}
+
+/// The same from the squared residuals of a curve with so many degrees of freedom a coordinate. Fewer outliers spoil it:
+/// each is in one residual, but in three of the deviations of neighbours.
+pub fn noise_beside(squares: &[f64], weights: &[f64], freedom: f64, m: usize) -> f64 {
+    let weighted: Vec<f64> = squares.iter().zip(weights).map(|(s, w)| s * w).collect();
+    let left = (1.0 - freedom / weights.len() as f64).max(0.1);
+    (median(&weighted) / chi::quantile(m, 0.5) / left).sqrt()
+}
+
+fn median(x: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Data without those that surely are outliers: times, points and weights to begin with.
+pub fn plausible(space: &Erased, data: &Data) -> [Vec<f64>; 3] {
+    /// Rounds in which data are left out, and the squared deviation from which they are, in medians.
+    const ROUNDS: usize = 4;
+    const FAR: f64 = 12.0;
+    let len = space.point_len();
+    let pick = |chosen: &[usize]| {
+        [
+            chosen.iter().map(|&i| data.times[i]).collect::<Vec<f64>>(),
+            chosen.iter().flat_map(|&i| data.points[i * len..][..len].to_vec()).collect(),
+            chosen.iter().map(|&i| data.weights[i]).collect(),
+        ]
+    };
+    let mut chosen = medoids(space, data);
+    for _ in 0..ROUNDS {
+        let [times, points, weights] = pick(&chosen);
+        let found = deviations(space, &times, &points, &weights);
+        let limit = FAR * median(&found);
+        // An outlier spoils the geodesics of its neighbours, too: only the worst one in a place goes.
+        let worst = |k: usize| {
+            let near = &found[k.saturating_sub(1)..(k + 2).min(found.len())];
+            found[k] > limit && near.iter().all(|x| *x <= found[k])
+        };
+        let before = chosen.len();
+        let mut k = 0;
+        chosen.retain(|_| {
+            k += 1;
+            k == 1 || k == before || !worst(k - 2)
+        });
+        if chosen.len() == before {
+            break;
+        }
+    }
+    pick(&chosen)
+}
+
+/// Of every few data in a row the one nearest to the others, by its number. Two good ones among five
+/// outvote outliers that do not agree.
+fn medoids(space: &Erased, data: &Data) -> Vec<usize> {
+    const WINDOW: usize = 5;
+    const STRIDE: usize = 2;
+    let len = space.point_len();
+    let count = data.times.len();
+    let window = WINDOW.min(count);
+    let mut chosen = Vec::new();
+    let [mut p, mut q, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+    let starts: Vec<usize> = (0..=count - window).step_by(STRIDE).collect();
+    for group in 0..starts.len().div_ceil(LANES) {
+        let at = lanes_of(group, starts.len()).map(|k| starts[k]);
+        // Sums of the distances of each member from the others.
+        let mut sums = [Lane::ZERO; WINDOW];
+        for a in 0..window {
+            gather(at.map(|i| &data.points[(i + a) * len..][..len]), &mut p);
+            for b in 0..a {
+                gather(at.map(|i| &data.points[(i + b) * len..][..len]), &mut q);
+                let angle = space.log(&p, &q, &mut v);
+                let apart = space.distance(&p, &q, &v, angle);
+                (sums[a], sums[b]) = (sums[a] + apart, sums[b] + apart);
+            }
+        }
+        for (l, i) in at.iter().enumerate().take(starts.len() - group * LANES) {
+            let sum = |j: &usize| sums[*j].as_array()[l];
+            chosen.extend((0..window).min_by(|a, b| sum(a).total_cmp(&sum(b))).map(|j| i + j));
+        }
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    // All windows may have chosen one.
+    if chosen.len() < 2 || data.times[chosen[0]] == data.times[chosen[chosen.len() - 1]] {
+        chosen = (0..count).collect();
+    }
+    chosen
+}

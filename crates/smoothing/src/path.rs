@@ -1,0 +1,160 @@
+//! A curve and data beside it: places, points, accelerations, residuals.
+
+use crate::frames::{Frames, lanes_of};
+use symspline_core::curve::Segment;
+use symspline_core::scalar::{Jet, LANES, Lane, Scalar, gather, lane, scatter};
+use symspline_core::space::{Ambient, Erased};
+
+/// A place on a curve: the segment, and how much of it lies before.
+pub type Place = (usize, f64);
+
+/// A natural spline by its knots, points and velocities.
+#[derive(Clone, Copy)]
+pub struct Path<'a> {
+    /// Knots.
+    pub t: &'a [f64],
+    /// Points at the knots.
+    pub points: &'a [f64],
+    /// Velocities there.
+    pub velocities: &'a [f64],
+}
+
+/// The places of times between the first and the last knot. What is nearer to a knot than rounding is at it.
+pub fn places(t: &[f64], times: &[f64]) -> Vec<Place> {
+    let last = t.len() - 2;
+    let place = |x: &f64| {
+        let segment = t[1..=last].partition_point(|t| t <= x);
+        (segment, (x - t[segment]) / (t[segment + 1] - t[segment]))
+    };
+    times.iter().map(place).collect()
+}
+
+/// The nearest knot of a place.
+pub fn nearest((segment, place): Place) -> usize {
+    if place < 0.5 { segment } else { segment + 1 }
+}
+
+/// The knot that a place is at.
+fn at_knot((segment, place): Place) -> Option<usize> {
+    (place == 0.0 || place == 1.0).then_some(segment + place as usize)
+}
+
+impl Path<'_> {
+    /// Goes through places eight at a time: `visit` gets the group, and the point with derivatives in units of the
+    /// segment.
+    fn each<S: Scalar>(&self, space: &Erased, places: &[Place], mut visit: impl FnMut(usize, Lane, &[S])) {
+        let len = space.point_len();
+        let mut segment = Segment::<S>::new(len);
+        let mut gamma = vec![S::constant(Lane::ZERO); len];
+        for group in 0..places.len().div_ceil(LANES) {
+            let at = lanes_of(group, places.len()).map(|i| places[i]);
+            let h = Lane::new(at.map(|(s, _)| self.t[s + 1] - self.t[s]));
+            for e in 0..2 {
+                gather(at.map(|(s, _)| &self.points[(s + e) * len..][..len]), &mut segment.ends[e]);
+                gather(at.map(|(s, _)| &self.velocities[(s + e) * len..][..len]), &mut segment.legs[e]);
+                segment.legs[e].iter_mut().for_each(|x| *x *= h * lane(1.0 / 3.0));
+            }
+            segment.prepare(space, len);
+            let tau = Lane::new(at.map(|(_, place)| place));
+            segment.at(space, len, S::from_parts([tau, Lane::ONE, Lane::ZERO]), &mut gamma);
+            visit(group, h, &gamma);
+        }
+    }
+
+    /// The points at some places.
+    pub fn at(&self, space: &Erased, places: &[Place]) -> Vec<f64> {
+        let len = space.point_len();
+        if let Some(knots) = places.iter().map(|&place| at_knot(place)).collect::<Option<Vec<usize>>>() {
+            return knots.iter().flat_map(|i| &self.points[i * len..][..len]).copied().collect();
+        }
+        let mut out = vec![0.0; places.len() * len];
+        self.each::<Lane>(space, places, |group, _, gamma| {
+            let rows = &mut out[group * LANES * len..];
+            let count = rows.len().min(LANES * len);
+            scatter(gamma, &mut rows[..count]);
+        });
+        out
+    }
+
+    /// The covariant accelerations at some places.
+    pub fn bends(&self, space: &Erased, places: &[Place]) -> Vec<f64> {
+        let len = space.point_len();
+        let mut out = vec![0.0; places.len() * len];
+        let [mut p, mut d, mut dd] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+        self.each::<Jet>(space, places, |group, h, gamma| {
+            for (i, g) in gamma.iter().enumerate() {
+                [p[i], d[i], dd[i]] = g.parts();
+            }
+            space.acceleration(&p, &d, &mut dd);
+            dd.iter_mut().for_each(|x| *x /= h * h);
+            let rows = &mut out[group * LANES * len..];
+            let count = rows.len().min(LANES * len);
+            scatter(&dd, &mut rows[..count]);
+        });
+        out
+    }
+
+    /// The places of all knots.
+    pub fn knots(&self) -> Vec<Place> {
+        let n = self.t.len() - 1;
+        (0..=n).map(|i| if i < n { (i, 0.0) } else { (n - 1, 1.0) }).collect()
+    }
+
+    /// `log_γ y` at the places of data y, and the squared distances.
+    pub fn pulls(&self, space: &Erased, places: &[Place], data: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let len = space.point_len();
+        let gammas = self.at(space, places);
+        let (mut vectors, mut squares) = (vec![0.0; data.len()], vec![0.0; places.len()]);
+        let [mut p, mut y, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+        let rows = vectors.chunks_mut(LANES * len).zip(squares.chunks_mut(LANES));
+        for (group, (vectors, squares)) in rows.enumerate() {
+            let at = lanes_of(group, places.len());
+            gather(at.map(|i| &gammas[i * len..][..len]), &mut p);
+            gather(at.map(|i| &data[i * len..][..len]), &mut y);
+            let angle = space.log(&p, &y, &mut v);
+            let distance = space.distance(&p, &y, &v, angle);
+            scatter(&v, vectors);
+            squares.copy_from_slice(&(distance * distance).to_array()[..squares.len()]);
+        }
+        (vectors, squares)
+    }
+
+    /// Vectors at places, carried to the nearest knots: coordinates in the frames there.
+    pub fn at_knots(&self, space: &Erased, frames: &Frames, places: &[Place], vectors: &[f64]) -> Vec<f64> {
+        let len = space.point_len();
+        let nearest = |i: usize| nearest(places[i]);
+        if places.iter().all(|&place| at_knot(place).is_some()) {
+            return frames.coordinates(vectors, nearest);
+        }
+        let gammas = self.at(space, places);
+        let mut carried = vec![0.0; vectors.len()];
+        let [mut p, mut q, mut v, mut way, mut out] = [(); 5].map(|_| vec![Lane::ZERO; len]);
+        for (group, carried) in carried.chunks_mut(LANES * len).enumerate() {
+            let at = lanes_of(group, places.len());
+            gather(at.map(|i| &gammas[i * len..][..len]), &mut p);
+            gather(at.map(|i| &self.points[nearest(i) * len..][..len]), &mut q);
+            gather(at.map(|i| &vectors[i * len..][..len]), &mut v);
+            space.log(&p, &q, &mut way);
+            space.carry(&p, &q, &way, &v, &mut out);
+            scatter(&out, carried);
+        }
+        frames.coordinates(&carried, nearest)
+    }
+}
+
+/// Points moved along tangent vectors there.
+pub fn moved(space: &Erased, points: &[f64], vectors: &[f64]) -> Vec<f64> {
+    let len = space.point_len();
+    let count = points.len() / len;
+    let mut out = vec![0.0; points.len()];
+    let [mut p, mut v, mut q] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+    for (group, out) in out.chunks_mut(LANES * len).enumerate() {
+        let at = lanes_of(group, count);
+        gather(at.map(|i| &points[i * len..][..len]), &mut p);
+        gather(at.map(|i| &vectors[i * len..][..len]), &mut v);
+        space.ray(&p, &v, Lane::ONE, &mut q);
+        space.project(&mut q);
+        scatter(&q, out);
+    }
+    out
+}

@@ -1,0 +1,317 @@
+//! One curve on its way to the smoothing spline.
+
+use crate::banded::Banded;
+use crate::choice::Linear;
+use crate::exact::{self, Pull};
+use crate::flat::{Basis, Flat, FlatEnd};
+use crate::frames::{Frames, lanes_of};
+use crate::loss;
+use crate::path::{Path, Place, moved, places};
+use crate::smooth::NATURAL;
+use crate::{Data, Options, Report, State, Tier};
+use std::f64::consts::PI;
+use symspline_core::scalar::{LANES, Lane, gather, lane, scatter};
+use symspline_core::space::{Ambient, Erased, Origin};
+
+/// Contraction of the flat tier, known or expected, from which the exact one takes over.
+const SLOW: f64 = 0.5;
+/// The same while λ and the curve are still rough guesses.
+const HOPELESS: f64 = 2.0;
+/// λ moves by less than this between rounds when it is settled, in natural logarithms.
+const SETTLED: f64 = 3e-3;
+/// Rounds of choosing λ, at most.
+const ROUNDS: usize = 12;
+/// Steps are taken back and halved at most so often where no spline goes through the points they lead to.
+const RETREATS: usize = 6;
+
+/// J is known to this part of it.
+const ROUNDING: f64 = 1e-12;
+
+/// A curve, its data, and how far it has come.
+pub struct Track<'a> {
+    data: Data<'a>,
+    /// Knots.
+    pub knots: Vec<f64>,
+    places: Vec<Place>,
+    flat: Flat,
+    /// The residual from which a robust loss counts less.
+    corner: f64,
+    /// Whether that has its final size.
+    rescaled: bool,
+    /// Points at the knots.
+    pub points: Vec<f64>,
+    /// Velocities of the spline through them.
+    pub velocities: Vec<f64>,
+    /// Where the last step began, and the step.
+    before: Option<(Vec<f64>, Vec<f64>)>,
+    retreats: usize,
+    /// J on the exact way, at the last λ.
+    objective: f64,
+    /// The band of A⁻¹ at the end.
+    pub inverse: Option<Banded>,
+    progress: Progress,
+}
+
+/// λ, and how the search goes.
+struct Progress {
+    /// λ, with times divided by the mean knot spacing; known once it was given or chosen.
+    lam: Option<f64>,
+    settled: bool,
+    last_step: f64,
+    /// Iterations in a row in which the step hardly shrank.
+    slow: usize,
+    report: Report,
+}
+
+impl<'a> Track<'a> {
+    /// A curve with given knots through first points.
+    ///
+    /// `corner` is the residual from which a robust loss counts less.
+    pub fn new(
+        data: Data<'a>,
+        knots: Vec<f64>,
+        points: Vec<f64>,
+        ends: [FlatEnd; 2],
+        lam: Option<f64>,
+        corner: f64,
+    ) -> Self {
+        let places = places(&knots, data.times);
+        let basis = Basis::new(&knots, ends);
+        let unit = basis.spacing.powi(3);
+        let flat = Flat::new(basis, &places, data.weights);
+        let balance = flat.balance();
+        // From here on curves are geodesics; with larger λ rounding would make A forget the data.
+        let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
+        Track {
+            data,
+            places,
+            flat,
+            corner,
+            rescaled: corner.is_infinite() || data.sigma.is_some(),
+            velocities: vec![0.0; points.len()],
+            points,
+            knots,
+            before: None,
+            retreats: 0,
+            objective: f64::INFINITY,
+            inverse: None,
+            progress: Progress {
+                lam: lam.map(|lam| (lam / unit).min(stiffest)),
+                settled: lam.is_some(),
+                last_step: f64::INFINITY,
+                slow: 0,
+                report: Report {
+                    at_bound: lam.is_some_and(|lam| lam / unit > stiffest),
+                    ..Report::default()
+                },
+            },
+        }
+    }
+
+    /// How it goes.
+    pub fn report(&self) -> Report {
+        self.progress.report
+    }
+
+    /// Whether nothing is left to do.
+    pub fn done(&self) -> bool {
+        self.progress.report.state != State::Running
+    }
+
+    /// No spline goes through the points: back by half of the step.
+    pub fn retreat(&mut self, space: &Erased) {
+        self.retreats += 1;
+        let Some((points, step)) = self.before.as_mut().filter(|_| self.retreats <= RETREATS) else {
+            self.progress.report.state = State::NoCurve;
+            return;
+        };
+        step.iter_mut().for_each(|x| *x *= 0.5);
+        self.points = moved(space, points, step);
+    }
+
+    /// One step from the spline through the points, or the end.
+    pub fn advance(&mut self, space: &Erased, options: &Options) {
+        let Track { data, flat, progress, .. } = self;
+        let (m, spacing, weights) = (space.dim(), flat.basis.spacing, data.weights);
+        progress.report.iterations += 1;
+        let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
+        let frames = Frames::new(space, &self.points);
+        let (mut vectors, squares) = path.pulls(space, &self.places, data.points);
+        let softness =
+            options.loss.pseudo(self.corner, &squares, weights, [space.point_len(), m], &mut vectors);
+        if progress.report.exact && progress.settled {
+            let lam = progress.lam.unwrap_or(0.0) * spacing.powi(3);
+            let terms = squares.iter().zip(weights).map(|(s, w)| options.loss.value(w * s, self.corner));
+            let objective = terms.sum::<f64>() + lam * exact::energy(space, &path);
+            if objective > self.objective * (1.0 + ROUNDING) && self.retreats < RETREATS {
+                return self.retreat(space);
+            }
+            self.objective = objective;
+        }
+        self.retreats = 0;
+        let residuals = path.at_knots(space, &frames, &self.places, &vectors);
+        let mut bends = frames.coordinates(&path.bends(space, &path.knots()), |i| i);
+        let mut speeds = frames.coordinates(&self.velocities, |i| i);
+        bends.iter_mut().for_each(|x| *x *= spacing * spacing);
+        speeds.iter_mut().for_each(|x| *x *= spacing);
+        let curvature = curvature_terms(space, &speeds, &bends);
+        let linear =
+            Linear::new(flat, m, weights, &residuals, &bends, &curvature, data.sigma.unwrap_or(f64::NAN));
+
+        progress.choose(&linear, options, softness);
+        // The pseudo-data have the original weights, and their λ is softer by their slope.
+        let lam = progress.lam.unwrap_or(0.0) / softness;
+        let factors = flat.factored(lane(lam));
+        if !(factors.least_pivot().as_array()[0] > 0.0) {
+            progress.report.state = State::Undetermined;
+            return;
+        }
+        let inverse = factors.inverse_band();
+        progress.note(&linear, &inverse, lam, softness);
+        progress.report.misfit = squares.iter().zip(weights).map(|(s, w)| s * w).sum();
+        progress.expect(space, &speeds, weights, lam);
+
+        let exact = match options.tier {
+            Tier::Flat => false,
+            Tier::Newton => true,
+            Tier::Auto => {
+                let limit = if progress.settled { SLOW } else { HOPELESS };
+                let known = progress.settled && progress.report.exact;
+                known || progress.report.kappa > limit || progress.slow > 1
+            }
+        };
+        if exact && !progress.report.exact {
+            // What is known of steps is of the other way.
+            (progress.last_step, progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
+        }
+        progress.report.exact = exact;
+        let (step, ambient) = if exact {
+            let unit = spacing.powi(3);
+            let pull = Pull { places: &self.places, vectors: &vectors, weights };
+            let ambient = exact::step(space, &path, NATURAL, &pull, lam * unit);
+            (frames.coordinates(&ambient, |i| i), Some(ambient))
+        } else {
+            let change = linear.step(lam, &factors);
+            let mut step = vec![0.0; change.len()];
+            flat.values.iter().zip(step.chunks_exact_mut(m)).for_each(|(row, x)| row.apply(&change, x));
+            (step, None)
+        };
+        let deviations: Vec<f64> =
+            flat.values.iter().map(|row| (row.square(&inverse).as_array()[0] * m as f64).sqrt()).collect();
+        let reach = speeds.chunks_exact(m).map(length).sum::<f64>();
+        let small = progress.judge(&step, &deviations, reach, options);
+        self.inverse = Some(inverse);
+        if progress.settled && small {
+            if !self.rescaled {
+                // Once more with the noise beside the curve, which is never taken to be larger, nor much smaller.
+                let noise = loss::noise_beside(&squares, weights, progress.report.freedom, m);
+                let corner = noise * options.loss.corner(m);
+                self.corner = corner.clamp(0.5 * self.corner, self.corner);
+                (self.rescaled, self.objective) = (true, f64::INFINITY);
+                (progress.settled, progress.report.rounds) = (data.lam.is_some(), 0);
+                return;
+            }
+            progress.report.state = State::Converged;
+            return;
+        }
+        if progress.report.iterations >= options.max_iter {
+            progress.report.state = State::Unconverged;
+            return;
+        }
+        let mut ambient = ambient.unwrap_or_else(|| frames.tangents(&step));
+        // Farther than the data are nothing is known.
+        let farthest = squares.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
+        let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
+        if longest > farthest {
+            ambient.iter_mut().for_each(|x| *x *= farthest / longest);
+        }
+        let next = moved(space, &self.points, &ambient);
+        self.before = Some((std::mem::replace(&mut self.points, next), ambient));
+    }
+}
+
+impl Progress {
+    /// A better λ, unless it is given or settled.
+    fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
+        if self.settled {
+            return;
+        }
+        let (lam, at_bound) = linear.choose(options.criterion, self.lam.map(|lam| lam / softness));
+        let lam = lam * softness;
+        self.report.rounds += 1;
+        let moved = self.lam.map_or(f64::INFINITY, |before| (lam / before).ln().abs());
+        self.settled = moved < SETTLED || self.report.rounds >= ROUNDS;
+        self.report.at_bound = at_bound;
+        self.lam = Some(lam);
+    }
+
+    /// λ, degrees of freedom and noise of the curve as it is.
+    fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
+        let Linear { flat, m, weights, residuals, .. } = linear;
+        let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
+        let rss: f64 = residuals.chunks_exact(*m).zip(*weights).map(|(r, w)| w * square(r)).sum();
+        let unit = flat.basis.spacing.powi(3);
+        let freedom = flat.freedom(inverse).as_array()[0];
+        self.report.freedom = freedom;
+        self.report.lam = lam * softness * unit;
+        self.report.band_lam = lam * unit;
+        self.report.sigma = (rss / (*m as f64 * (weights.len() as f64 - freedom).max(0.0))).sqrt();
+    }
+
+    /// The contraction that the flat way is expected to have: `K²|γ'|²√(λ/w)`, with the mean
+    /// squared speed and w the weight per time.
+    fn expect(&mut self, space: &Erased, speeds: &[f64], weights: &[f64], lam: f64) {
+        let m = space.dim();
+        let knots = speeds.len() / m;
+        let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
+        let density = weights.iter().sum::<f64>() / (knots - 1) as f64;
+        self.report.kappa = space.curvature().powi(2) * square * (lam / density).sqrt();
+    }
+
+    /// Whether a step is small beside the standard deviations of the points.
+    fn judge(&mut self, step: &[f64], deviations: &[f64], reach: f64, options: &Options) -> bool {
+        /// Steps that are this part of the path, and no longer shrink, are rounding.
+        const FLOOR: f64 = 1e-8;
+        const STILL: f64 = 1e-13;
+        let lengths: Vec<f64> = step.chunks_exact(step.len() / deviations.len()).map(length).collect();
+        let longest = lengths.iter().copied().fold(0.0, larger);
+        let relative =
+            lengths.iter().zip(deviations).map(|(x, d)| x / (d * self.report.sigma)).fold(0.0, larger);
+        let rate = longest / self.last_step;
+        if self.last_step.is_finite() {
+            self.report.rate = rate;
+            // Steps of new λ are no contraction; but they do not grow.
+            let slow = rate > if self.settled { SLOW } else { 1.0 };
+            self.slow = if slow { self.slow + 1 } else { 0 };
+        }
+        self.last_step = longest;
+        self.report.step = relative;
+        relative <= options.tol || longest <= STILL * reach || (longest <= FLOOR * reach && rate > SLOW)
+    }
+}
+
+/// ρ = −[u, [u, a]]: what curvature adds to the gradient of the energy.
+fn curvature_terms(space: &Erased, speeds: &[f64], bends: &[f64]) -> Vec<f64> {
+    let m = space.dim();
+    let count = bends.len() / m;
+    let mut out = vec![0.0; bends.len()];
+    let [mut u, mut a, mut rho] = [(); 3].map(|_| vec![Lane::ZERO; m]);
+    for (group, out) in out.chunks_mut(LANES * m).enumerate() {
+        let at = lanes_of(group, count);
+        gather(at.map(|i| &speeds[i * m..][..m]), &mut u);
+        gather(at.map(|i| &bends[i * m..][..m]), &mut a);
+        space.triple(&u, &u, &a, &mut rho);
+        rho.iter_mut().for_each(|x| *x = -*x);
+        scatter(&rho, out);
+    }
+    out
+}
+
+fn length(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The larger of two numbers, or NaN.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}

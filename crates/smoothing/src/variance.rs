@@ -1,0 +1,87 @@
+//! How uncertain a smoothed curve is: the posterior of an integrated Wiener process (Wahba 1983), in frames along it.
+
+use crate::banded::Banded;
+use crate::flat::{Basis, FlatEnd, WIDTH};
+use crate::path::places;
+use symspline_core::scalar::lane;
+
+const BAND: usize = WIDTH + 1;
+
+/// The rows of the band of A⁻¹ as plain numbers, four a knot.
+pub fn rows_of(inverse: &Banded) -> Vec<f64> {
+    let entry = |at: usize| {
+        let (i, d) = (at / BAND, at % BAND);
+        if d <= i { inverse.at(i, i - d).as_array()[0] } else { 0.0 }
+    };
+    (0..inverse.size * BAND).map(entry).collect()
+}
+
+/// The variance of a coordinate at some times, at noise of variance one: of the point (`nu` = 0) or of the velocity
+/// (1). Beyond the ends the curve goes on straight.
+///
+/// The points at the knots have the covariance PA⁻¹Pᵀ. An integrated Wiener process through given points has velocities
+/// there with the inverse covariance λT, `vᵀTv` being the part of ∫ x''² in them; and between two knots whose points and
+/// velocities are given it has the variance `h³s³(1 − s)³/(3λ)`, and its velocity `h s(1 − s)(1 − 3s(1 − s))/λ`.
+pub fn variance(
+    knots: &[f64],
+    rows: &[f64],
+    lam: f64,
+    ends: [FlatEnd; 2],
+    times: &[f64],
+    nu: usize,
+) -> Vec<f64> {
+    let inverse = Banded::of(knots.len(), WIDTH, |at| lane(rows[at]));
+    let velocities = velocities_given_points(knots, ends);
+    let basis = Basis::new(knots, ends);
+    let last = knots.len() - 1;
+    let one = |t: &f64| {
+        let near = t.clamp(knots[0], knots[last]);
+        let (segment, s) = places(knots, &[near])[0];
+        let (h, beyond) = (knots[segment + 1] - knots[segment], t - near);
+        let mut row = basis.row(segment, s, nu);
+        // What the velocities at the two knots do: cubic Hermite functions.
+        let mut hermite = match nu {
+            0 => [h * s * (1.0 - s) * (1.0 - s), h * s * s * (s - 1.0)],
+            _ => [(1.0 - s) * (1.0 - 3.0 * s), s * (3.0 * s - 2.0)],
+        };
+        if nu == 0 && beyond != 0.0 {
+            let slope = basis.row(segment, s, 1);
+            row.factors.iter_mut().zip(slope.factors).for_each(|(b, d)| *b += beyond / basis.spacing * d);
+            hermite[s as usize] += beyond;
+        }
+        let unit = if nu == 0 { 1.0 } else { basis.spacing * basis.spacing };
+        let known = row.square(&inverse).as_array()[0] / unit;
+        if lam == 0.0 {
+            return known;
+        }
+        let both = s * (1.0 - s);
+        let between = match nu {
+            0 => h.powi(3) * both.powi(3) / 3.0,
+            _ => h * both * (1.0 - 3.0 * both),
+        };
+        let v = |a: usize, b: usize| velocities.at(segment + a, segment + b).as_array()[0];
+        let [a, b] = hermite;
+        known + (a * a * v(0, 0) + 2.0 * a * b * v(0, 1) + b * b * v(1, 1) + between) / lam
+    };
+    times.iter().map(one).collect()
+}
+
+/// The band of T⁻¹, where vᵀTv is the part of ∫ x''² in the velocities at knots: `4(v₀² + v₀v₁ + v₁²)/h` a segment. Given
+/// velocities vary as little as makes no difference.
+fn velocities_given_points(knots: &[f64], ends: [FlatEnd; 2]) -> Banded {
+    const FIXED: f64 = 1e12;
+    let last = knots.len() - 1;
+    let stiffness = |i: usize| 1.0 / (knots[i + 1] - knots[i]);
+    let mut t = Banded::of(last + 1, 1, |at| {
+        let (i, beside) = (at / 2, at % 2 == 1);
+        let [left, right] = [(i > 0).then(|| stiffness(i - 1)), (i < last).then(|| stiffness(i))];
+        if beside {
+            return lane(2.0 * left.unwrap_or(0.0));
+        }
+        let end = if i == 0 { Some(ends[0]) } else { (i == last).then_some(ends[1]) };
+        let fixed = if end == Some(FlatEnd::Velocity) { FIXED } else { 1.0 };
+        lane(4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0)))
+    });
+    t.factor();
+    t.inverse_band()
+}

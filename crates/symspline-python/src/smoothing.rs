@@ -1,0 +1,165 @@
+//! Smoothing, called from Python.
+
+use crate::arrays::{in_order, room, zeros};
+use crate::errors::invalid;
+use crate::space::Handle;
+use crate::watch::watched;
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
+use symspline::smoothing::{
+    Criterion, Data, FlatEnd, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
+    variance as variance_at,
+};
+use symspline::space::Ambient;
+
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+
+/// Points at the knots, the band of A⁻¹, and the columns of the report.
+type Smoothed<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>);
+
+/// Smooths curves. `t` and `weights` are of all data, (N,) or (..., N); `knots` (K,) or (..., K); `lam` and `sigma` one
+/// a curve, NaN where λ is to be chosen.
+#[pyfunction]
+pub fn smooth<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    weights: Array<'py>,
+    knots: Array<'py>,
+    lam: Array<'py>,
+    sigma: Array<'py>,
+    criterion: &str,
+    loss: &str,
+    method: &str,
+    tol: f64,
+    max_iter: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Smoothed<'py>> {
+    let options = Options {
+        criterion: criterion_named(criterion)?,
+        loss: match loss {
+            "linear" => Loss::Linear,
+            "huber" => Loss::Huber,
+            "cauchy" => Loss::Cauchy,
+            _ => return Err(invalid(format!("loss must be 'linear', 'huber' or 'cauchy', not {loss:?}"))),
+        },
+        tier: match method {
+            "auto" => Tier::Auto,
+            "flat" => Tier::Flat,
+            "newton" => Tier::Newton,
+            _ => return Err(invalid(format!("method must be 'auto', 'flat' or 'newton', not {method:?}"))),
+        },
+        tol,
+        max_iter,
+    };
+    let space = handle.space.get();
+    let len = space.point_len();
+    let lead = points.ndim() - handle.point_axes() - 1;
+    let (n, count) = (points.shape()[lead], knots.shape()[knots.ndim() - 1]);
+    let batch = &points.shape()[..lead];
+    let curves: usize = batch.iter().product();
+    // Of all curves, or of each.
+    let own = |row: &[f64], size: usize, curve: usize| if row.len() == size { 0 } else { curve * size };
+    let (t, p, w, k) = (in_order(&t)?, in_order(&points)?, in_order(&weights)?, in_order(&knots)?);
+    let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
+    drop(room::<f64>(curves * count * (8 * len + 64))?);
+    // Data without weight are left out.
+    let rows: Vec<[Vec<f64>; 3]> = (0..curves)
+        .map(|c| {
+            let weights = &w[own(w, n, c)..][..n];
+            let used = || (0..n).filter(|&i| weights[i] > 0.0);
+            [
+                used().map(|i| t[own(t, n, c) + i]).collect(),
+                used().flat_map(|i| p[(c * n + i) * len..][..len].iter().copied()).collect(),
+                used().map(|i| weights[i]).collect(),
+            ]
+        })
+        .collect();
+    let data: Vec<Data> = (0..curves)
+        .map(|c| Data {
+            times: &rows[c][0],
+            points: &rows[c][1],
+            weights: &rows[c][2],
+            knots: &k[own(k, count, c)..][..count],
+            lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
+            sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),
+        })
+        .collect();
+    let found = watched(py, progress, curves * count, |monitor| run(&space, &data, &options, monitor))?;
+
+    let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
+    let (out, bands) = (zeros(py, &shape)?, zeros(py, &[batch, &[count, 4]].concat())?);
+    let (mut out_write, mut bands_write) = (out.readwrite(), bands.readwrite());
+    copy(&found, |smooth| &smooth.points, out_write.as_slice_mut()?);
+    copy(&found, |smooth| &smooth.inverse, bands_write.as_slice_mut()?);
+    drop((out_write, bands_write));
+    Ok((out, bands, columns(py, &found)?))
+}
+
+fn criterion_named(name: &str) -> PyResult<Criterion> {
+    Ok(match name {
+        "gcv" => Criterion::Gcv { penalty: 1.0 },
+        "gcv1.4" => Criterion::Gcv { penalty: 1.4 },
+        "reml" => Criterion::Reml,
+        "cp" => Criterion::Cp,
+        _ => {
+            return Err(invalid(format!("criterion must be 'gcv', 'gcv1.4', 'reml' or 'cp', not {name:?}")));
+        }
+    })
+}
+
+fn copy(found: &[Smooth], part: impl Fn(&Smooth) -> &Vec<f64>, out: &mut [f64]) {
+    let mut at = 0;
+    for smooth in found {
+        let rows = part(smooth);
+        out[at..at + rows.len()].copy_from_slice(rows);
+        at += rows.len();
+    }
+}
+
+/// state, iterations, lam, band_lam, at_bound, freedom, sigma, step, rate, kappa, exact.
+fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTuple>> {
+    let reports: Vec<Report> = found.iter().map(|smooth| smooth.report).collect();
+    let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
+    let flag = |f: fn(&Report) -> bool| PyArray1::from_iter(py, reports.iter().map(f));
+    let state = reports.iter().map(|r| match r.state {
+        State::Converged => 0,
+        State::Running | State::Unconverged => 1,
+        State::NoCurve => 2,
+        State::Undetermined => 3_i64,
+    });
+    let iterations = PyArray1::from_iter(py, reports.iter().map(|r| r.iterations as i64));
+    let [lam, band_lam, freedom] = [column(|r| r.lam), column(|r| r.band_lam), column(|r| r.freedom)];
+    let [sigma, step, rate, kappa] =
+        [column(|r| r.sigma), column(|r| r.step), column(|r| r.rate), column(|r| r.kappa)];
+    let (at_bound, exact) = (flag(|r| r.at_bound), flag(|r| r.exact));
+    let first = (PyArray1::from_iter(py, state), iterations, lam, band_lam, at_bound, freedom);
+    let all = first.into_pyobject(py)?.to_list();
+    for item in (sigma, step, rate, kappa, exact).into_pyobject(py)?.iter() {
+        all.append(item)?;
+    }
+    Ok(all.to_tuple())
+}
+
+/// Variances of a coordinate of one smoothed curve at times, at noise of variance one; see the core.
+#[pyfunction]
+pub fn smoothing_variance<'py>(
+    py: Python<'py>,
+    knots: Array<'py>,
+    band: Array<'py>,
+    lam: f64,
+    x: Array<'py>,
+    nu: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let ends = [FlatEnd::Natural; 2];
+    let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);
+    Ok(PyArray1::from_vec(py, variance_at(knots, band, lam, ends, x, nu)))
+}
+
+/// The quantile of χ² with m degrees of freedom.
+#[pyfunction]
+pub fn chi_squared(m: usize, probability: f64) -> f64 {
+    chi::quantile(m, probability)
+}

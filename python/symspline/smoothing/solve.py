@@ -1,0 +1,147 @@
+"""From noisy data to points of the smooth curve, in the compiled core."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._core import ValidationError
+from ..arrays import shown
+from ..curves.in_span import reduced
+from ..curves.solve import Fault, Progress
+from ..spaces import Array, Space
+from .data import Knots, Noisy
+from .report import SmoothingReport
+
+Doubles = NDArray[np.float64]
+
+_STATES = ("converged", "unconverged", "no curve", "undetermined")
+
+
+class Smoothed(NamedTuple):
+    """What is kept of the smoothing in one factor.
+
+    Attributes:
+        band: the band of A⁻¹, shape (..., K, 4): variances of the curve, at noise of variance one.
+        band_lam: the λ that goes with it, that of the pseudo-data of a robust loss.
+        sigma: the standard deviation of a coordinate by which bands are scaled, estimated or known.
+    """
+
+    report: SmoothingReport
+    band: Doubles
+    band_lam: Any
+    sigma: Any
+
+    def map(self, function: Any) -> Smoothed:
+        """The same for a part of a batch."""
+        return Smoothed(
+            self.report.map(function), function(self.band), function(self.band_lam), function(self.sigma)
+        )
+
+
+class Asked(NamedTuple):
+    """How to smooth; the core checks the words."""
+
+    criterion: str
+    loss: str
+    method: str
+    tol: float
+    max_iter: int
+
+
+def smoothed(
+    space: Space,
+    noisy: Noisy,
+    points: Array,
+    knots: Knots,
+    lam: Doubles,
+    sigma: Doubles,
+    asked: Asked,
+    progress: Progress | None,
+) -> tuple[Array, Smoothed, list[Fault]]:
+    """The points of smooth curves at the knots, in a space that is no product."""
+    small, inside, span = reduced(space, points)
+    batch = noisy.batch
+    found, band, columns = _core.smooth(
+        small._handle,
+        np.ascontiguousarray(noisy.times),
+        np.ascontiguousarray(small._as_doubles(inside)),
+        noisy.weights,
+        np.ascontiguousarray(knots.times),
+        lam,
+        sigma,
+        *asked,
+        progress,
+    )
+    state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact = (
+        column.reshape(batch) if batch else column[0].item() for column in columns
+    )
+    report = SmoothingReport(
+        "newton" if np.any(exact) else "flat",
+        np.asarray(state) == 0 if batch else state == 0,
+        iterations,
+        step,
+        rate,
+        lams,
+        at_bound,
+        df,
+        noise,
+    )
+    known = sigma.reshape(batch) if batch else sigma[0].item()
+    scale = np.where(np.isnan(known), noise, known) if batch else noise if np.isnan(known) else known
+    numbers = small._numbers(found)
+    faults = [
+        (number, "unconverged", _reason(_STATES[kind], batch, number, report, asked))
+        for number, kind in enumerate(np.ravel(state).tolist())
+        if kind
+    ]
+    return numbers if span is None else span.up(numbers), Smoothed(report, band, band_lam, scale), faults
+
+
+def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingReport, asked: Asked) -> str:
+    of = f" of curve {','.join(map(str, np.unravel_index(number, batch)))}" if batch else ""
+    if state == "no curve":
+        return (
+            f"smoothing{of} led to points that no spline joins: neighbouring data are too far apart for their noise; "
+            "give a larger lam, fewer knots, or check units and signs of the data"
+        )
+    if state == "undetermined":
+        return f"the data{of} do not determine the curve: with lam = 0 there are knots without data; give fewer knots"
+    step = np.ravel(report.step)[number]
+    return (
+        f"no convergence of the smoothing{of}: a last step of {step:.1e} standard deviations after "
+        f"{np.ravel(report.iterations)[number]} iterations (tol {asked.tol:.1e}); raise max_iter, give a smaller lam "
+        "or method='newton'"
+    )
+
+
+def stiffness(knots: Knots, noisy: Noisy, lam: Any) -> float:
+    """λ over the mean weight of a knot, in units of their spacing: rounding errors grow by it. The least of a batch."""
+    times = knots.times
+    count = times.shape[-1]
+    spacing = (times[..., -1] - times[..., 0]) / (count - 1)
+    ratio = np.asarray(lam / spacing**3 / (np.sum(noisy.weights, axis=-1) / count))
+    return float(np.min(ratio, initial=np.inf))
+
+
+def enough(df: Any) -> int:
+    """How many knots are enough for so many degrees of freedom: with three times as many nothing is lost."""
+    return 4 * int(np.ceil(np.nanmax(df, initial=2.0))) + 8
+
+
+def one_a_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
+    """A number >= 0 of each curve; NaN for None."""
+    if value is None:
+        return np.full(int(np.prod(batch)), np.nan)
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
+        own = f" or an array of shape {batch}" if batch else ""
+        raise ValidationError(f"{name} must be a number{own}, not {shown(value)}")
+    bad = ~(np.isfinite(array) & (array >= 0))
+    if bad.any():
+        index = np.argwhere(bad)[0].tolist() if array.ndim else ""
+        raise ValidationError(f"{name}{index} must be finite and >= 0, not {array[bad].flat[0]}")
+    return np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel()

@@ -1,0 +1,207 @@
+"""Smoothing splines."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import _core
+from .._core import ValidationError
+from ..curves.curve import Curve
+from ..report import Report
+from ..spaces import Array, Product, factors_of
+from ..spline import CubicSpline
+from ..times import Clock
+from .data import Noisy
+from .solve import Smoothed
+
+
+class SmoothingSpline(CubicSpline):
+    """A C² cubic spline near noisy data, made by `make_smoothing_spline` or `make_lsq_spline`.
+
+    It has all that a `CubicSpline` has; its points are those of the smooth curve at its knots, and derivatives by
+    `jvp` and `vjp` are with respect to them, not to the data. Numbers that belong to the noise are tuples with one
+    entry a factor in a `Product`, and arrays with the batch axes for a batch of curves.
+    """
+
+    _kind = "Smoothing spline"
+
+    def __init__(self) -> None:
+        raise TypeError("smoothing splines are made by symspline.make_smoothing_spline")
+
+    def _fill(  # type: ignore[override]
+        self,
+        clock: Clock,
+        t: Array,
+        curve: Curve,
+        bc_type: Any,
+        extrapolate: Any,
+        reports: list[Report],
+        noisy: Noisy,
+        smoothed: list[Smoothed],
+    ) -> None:
+        super()._fill(clock, t, curve, bc_type, extrapolate, reports)
+        self._noisy, self._smoothed = noisy, smoothed
+
+    def _each(self, values: list[Any]) -> Any:
+        """One value, or one of every factor."""
+        return tuple(values) if isinstance(self.space, Product) else values[0]
+
+    @property
+    def report(self) -> Any:
+        """How the smoothing went: a `SmoothingReport`, in a product one of every factor."""
+        return self._each([found.report for found in self._smoothed])
+
+    @property
+    def lam(self) -> Any:
+        """λ."""
+        return self._each([found.report.lam for found in self._smoothed])
+
+    @property
+    def df(self) -> Any:
+        """Degrees of freedom for each coordinate: 2 for a geodesic, the number of data for interpolation."""
+        return self._each([found.report.df for found in self._smoothed])
+
+    @property
+    def sigma(self) -> Any:
+        """Standard deviation of the noise in a coordinate of an orthonormal frame, for weight one: the one that was
+        given, or estimated as the root of ``sum(weights * distance**2)/(dim * (N - df))``."""
+        return self._each([found.sigma for found in self._smoothed])
+
+    @property
+    def data(self) -> tuple[Array, Any]:
+        """The times and the points that were smoothed."""
+        return self._noisy.t, self._each(self._noisy.points)
+
+    @property
+    def residuals(self) -> Any:
+        """Vectors from the curve to the data, shape (..., N, *point_shape): the logarithm of a point at the curve,
+        whose length is the distance. Data of weight zero have no residual, NaN."""
+        noisy = self._noisy
+        at = self._curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)
+        found = []
+        gammas = at if isinstance(self.space, Product) else (at,)
+        for space, gamma, points in zip(factors_of(self.space), gammas, noisy.points, strict=True):
+            used = np.broadcast_to(noisy.weights > 0, (*noisy.batch, points.shape[len(noisy.batch)]))
+            used = used & np.isfinite(gamma).all(axis=tuple(range(len(noisy.batch) + 1, gamma.ndim)))
+            vectors = np.full(points.shape, np.nan, points.dtype)
+            vectors[used] = space._apply("log", p=gamma[used], q=points[used])
+            found.append(vectors)
+        return self._each(found)
+
+    def std(self, x: ArrayLike, nu: int = 0) -> Any:
+        """Standard deviation of the curve at times x, for one coordinate of an orthonormal frame.
+
+        It is the root of σ² b(t)ᵀA⁻¹b(t), and of what a curve of this roughness does between two knots: the posterior
+        of a spline (Wahba 1983) in frames along the curve.
+
+        Args:
+            x: times, any shape; beyond the knots the curve goes on straight.
+            nu: 0 for the point, 1 for the velocity.
+
+        Returns:
+            Shape batch axes + x.shape.
+
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 1, 50)
+        >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
+        >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1")
+        >>> bool(0.02 < s.std(0.5) < s.std(0.0) < 0.1)
+        True
+        """
+        if nu not in (0, 1):
+            raise ValidationError(f"nu must be 0 or 1 here, not {nu!r}")
+        times, per_curve = self._clock.at(x, self._batch, False)
+        if not np.isfinite(times).all():
+            raise ValidationError("x must be finite")
+        batch = self._batch
+        own = times.shape[len(batch) :] if per_curve else times.shape
+        found = []
+        for part in self._smoothed:
+            out = np.empty((*batch, *own))
+            for index in np.ndindex(batch):
+                knots = self._times[index] if self._times.ndim > 1 else self._times
+                at = times[index] if per_curve else times
+                lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
+                rows = np.ascontiguousarray(np.ravel(at))
+                variance = _core.smoothing_variance(
+                    np.ascontiguousarray(knots), np.ascontiguousarray(part.band[index]), lam, rows, nu
+                )
+                out[index] = sigma * np.sqrt(variance).reshape(own)
+            found.append(out[()])
+        return self._each(found)
+
+    def band(self, x: ArrayLike, level: float = 0.95) -> Any:
+        """Radius of the ball about the curve at times x that holds the true point with probability ``level``.
+
+        The mean coverage over all times is what it says; at the two end points it is less where the truth bends
+        there, since natural ends do not.
+
+        Args:
+            x: times, any shape.
+            level: between 0 and 1.
+
+        Returns:
+            Shape batch axes + x.shape: a distance in the space.
+        """
+        if not 0 < level < 1:
+            raise ValidationError(f"level must lie between 0 and 1, not {level!r}")
+        spreads = self.std(x)
+        each = spreads if isinstance(self.space, Product) else (spreads,)
+        return self._each(
+            [
+                np.sqrt(_core.chi_squared(factor.dim, level)) * spread
+                for factor, spread in zip(factors_of(self.space), each, strict=True)
+            ]
+        )
+
+    @property
+    def _unconverged(self) -> int:
+        good = np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)
+        return int(np.size(good) - np.sum(good))
+
+    def _with(self, clock: Clock, t: Array, curve: Curve, index: Any) -> SmoothingSpline:
+        part = super()._with(clock, t, curve, index)
+        noisy = self._noisy
+        own = noisy._replace(
+            clock=clock,
+            t=noisy.t[index] if noisy.t.ndim > 1 else noisy.t,
+            times=noisy.times[index] if noisy.times.ndim > 1 else noisy.times,
+            points=[points[index] for points in noisy.points],
+            weights=noisy.weights[index] if noisy.weights.ndim > 1 else noisy.weights,
+            batch=curve.batch,
+        )
+        return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
+
+    @property
+    def _parts(self) -> tuple[SmoothingSpline, ...]:
+        """The splines in the factors of a product."""
+        each = zip(super()._parts, self._noisy.points, self._smoothed, strict=True)
+        return tuple(
+            self._like(part, self._noisy._replace(points=[points]), [found]) for part, points, found in each
+        )
+
+    @classmethod
+    def _like(cls, spline: CubicSpline, noisy: Noisy, smoothed: list[Smoothed]) -> Self:
+        """A spline through smooth points with what is known of the noise."""
+        parts = (
+            spline._clock,
+            spline._t,
+            spline._curve,
+            spline._bc_type,
+            spline._extrapolate,
+            spline._reports,
+        )
+        return cls._of(*parts, noisy, smoothed)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        _, parts = super().__reduce__()
+        return SmoothingSpline._of, (*parts, self._noisy, self._smoothed)
+
+    def __repr__(self) -> str:
+        batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
+        data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
+        return f"<SmoothingSpline on {self.space!r}: {batch}{data} data, {knots} knots>"

@@ -1,0 +1,101 @@
+"""How good the choice of λ, the bands and the robust losses are, on fixed random data."""
+
+import numpy as np
+import pytest
+from noisy import beside, rms, truth
+
+import symspline as ss
+
+SEEDS = 12
+T = np.linspace(0, 10, 100)
+
+
+def batch(name, sigma):
+    space = ss.space(name)
+    points = np.array([truth(space, seed)(T) for seed in range(SEEDS)])
+    noisy = np.array([beside(space, points[seed], sigma, seed) for seed in range(SEEDS)])
+    return space, points, noisy
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.4])
+@pytest.mark.parametrize("name", ["sphere:2", "so:3", "hyperbolic:2", "spd:3"])
+def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
+    space, points, noisy = batch(name, sigma)
+    chosen = ss.make_smoothing_spline(T, noisy, space)
+    known = ss.make_smoothing_spline(T, noisy, space, criterion="cp", sigma=sigma)
+    lam = np.median(chosen.lam) * 2.0 ** np.arange(-5, 6)
+    tried = [ss.make_smoothing_spline(T, noisy, space, value, on_failure="ignore")(T) for value in lam]
+    best = np.min([rms(space, curve, points) for curve in tried], axis=0).mean()
+    assert rms(space, chosen(T), points).mean() < 1.12 * best
+    assert rms(space, known(T), points).mean() < (1.05 if sigma < 0.2 else 1.12) * best
+    assert np.all(chosen.report.iterations <= (8 if sigma < 0.2 else 12))
+    covered = space.distance(chosen(T), points) <= chosen.band(T)
+    # Where the noise is a large part of the curvature's radius the bands are a little narrow.
+    assert (0.92 if sigma < 0.2 else 0.87) < covered.mean() < 0.995
+    assert chosen.sigma.mean() == pytest.approx(sigma, rel=0.05)
+
+
+@pytest.mark.parametrize(("name", "limit"), [("sphere:2", 1.35), ("so:3", 1.2), ("spd:3", 1.2)])
+def test_outliers_do_little_harm(name, limit):
+    space, points, noisy = batch(name, 0.1)
+    rng = np.random.default_rng(0)
+    bad = rng.random(noisy.shape[:2]) < 0.15
+    dirty = noisy.copy()
+    dirty[bad] = space.exp(points[bad], 1.2 * space.random_tangent(rng, points[bad]))
+    clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
+    errors = {
+        loss: rms(
+            space, ss.make_smoothing_spline(T, dirty, space, loss=loss, on_failure="ignore")(T), points
+        ).mean()
+        for loss in ("linear", "huber", "cauchy")
+    }
+    assert errors["cauchy"] < limit * clean
+    assert errors["cauchy"] < errors["huber"] < 0.75 * errors["linear"]
+
+
+def test_robust_losses_change_little_where_nothing_is_wrong():
+    space, points, noisy = batch("so:3", 0.1)
+    clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
+    for loss in ("huber", "cauchy"):
+        robust = ss.make_smoothing_spline(T, noisy, space, loss=loss)
+        assert rms(space, robust(T), points).mean() < 1.1 * clean
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_robust_curves_of_numbers_are_where_their_loss_is_least(loss):
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 1, 30)
+    y = np.sin(5 * t) + 0.1 * rng.standard_normal(30)
+    y[[4, 17]] += 3
+    spline = ss.make_smoothing_spline(
+        t, y[:, None], "r:1", 1e-3, loss=loss, sigma=0.1, tol=1e-9, max_iter=400
+    )
+    # χ²₁ is below these with probability .82 and .95.
+    corner = 0.1 * {"huber": 1.3407550336902165, "cauchy": 1.959963984540054}[loss]
+
+    def value(points):
+        q = (points - y) ** 2 / corner**2
+        rho = np.where(q > 1, 2 * np.sqrt(q) - 1, q) if loss == "huber" else np.log1p(q)
+        energy = ss.CubicSpline(t, points[:, None], "r:1").bending_energy()
+        return corner**2 * rho.sum() + 1e-3 * energy
+
+    points = spline.points[:, 0]
+    here = value(points)
+    for direction in rng.standard_normal((5, 30)):
+        up, down = value(points + 1e-5 * direction), value(points - 1e-5 * direction)
+        slope, bend = (up - down) / 2e-5, (up + down - 2 * here) / 1e-10
+        assert bend > 0 and abs(slope / bend) < 1e-6
+
+
+def test_nearly_geodesic_motion_goes_the_exact_way():
+    """Two turns of a great circle."""
+    sphere = ss.Sphere(2)
+    t = np.linspace(0, 4 * np.pi, 200)
+    circle = np.stack([np.cos(t), np.sin(t), 0 * t], -1)
+    noisy = beside(sphere, circle, 0.1)
+    spline = ss.make_smoothing_spline(t, noisy, sphere)
+    assert spline.report.converged and spline.report.method == "newton"
+    assert rms(sphere, spline(t), circle) < 0.03
+    assert spline.df < 6
+    straight = ss.make_smoothing_spline(t, noisy, sphere, 1e5, method="newton")
+    assert straight.report.converged and straight.report.iterations <= 12

@@ -1,0 +1,187 @@
+"""Laws of smoothing on every space."""
+
+import numpy as np
+import pytest
+from noisy import beside, example, rms, truth
+
+import symspline as ss
+
+NAMES = [
+    "r:3", "sphere:1", "sphere:2", "sphere:4", "hyperbolic:2", "so:3", "so:4", "o:3", "u:2", "su:3", "spd:2",
+    "spd:3", "hpd:2", "gr:2,5", "cgr:1,3", "rp:2", "cp:2", "ch:2", "se:2", "se:3",
+]  # fmt: skip
+every = pytest.mark.parametrize("name", NAMES)
+# Steps of the search that end it, in standard deviations; the flat way stagnates at rounding.
+TIGHT = {"tol": 1e-8, "max_iter": 200}
+
+
+@every
+def test_is_nearer_to_the_truth_than_the_data(name):
+    space, t, noisy, points = example(name, 0.05)
+    spline = ss.make_smoothing_spline(t, noisy, space)
+    assert spline.report.converged and not spline.report.at_bound
+    assert rms(space, spline(t), points) < 0.65 * rms(space, noisy, points)
+    assert spline.sigma == pytest.approx(0.05, rel=0.25)
+    assert np.all(np.isfinite(spline.residuals))
+    misfit = space.distance(spline(t), noisy)
+    wanted = np.sqrt(np.sum(misfit**2) / (space.dim * (60 - spline.df)))
+    # SE(n) has no metric: distances are those of coordinates, which frames turn.
+    assert spline.sigma == pytest.approx(wanted, rel=1e-9 if not name.startswith("se") else 0.1)
+
+
+@every
+def test_moves_with_its_data(name):
+    """A transvection of all data is one of the curve."""
+    space, t, noisy, _ = example(name, 0.05)
+    spline = ss.make_smoothing_spline(t, noisy, space, **TIGHT)
+    rng = np.random.default_rng(1)
+    p = noisy[0]
+    v = 0.7 * space.random_tangent(rng, p)
+
+    def moved(x):
+        if name.startswith("se"):
+            # Their transvections are no isometries.
+            return space.exp(p, v) @ x
+        return space.transvection(np.broadcast_to(p, x.shape), np.broadcast_to(v, x.shape), x)
+
+    other = ss.make_smoothing_spline(t, moved(noisy), space, **TIGHT)
+    assert other.lam == pytest.approx(spline.lam, rel=1e-6)
+    # Both were stopped at 1e-8 of their deviations, and λ at a parabola's lowest point.
+    assert space.distance(other.points, moved(spline.points)).max() < 1e-6
+
+
+@every
+def test_goes_back_as_it_came(name):
+    space, t, noisy, _ = example(name, 0.05)
+    spline = ss.make_smoothing_spline(t, noisy, space, 0.1, **TIGHT)
+    back = ss.make_smoothing_spline(10 - t[::-1], noisy[::-1], space, 0.1, **TIGHT)
+    # In SE(n) the frames at the first point say what is measured.
+    far = 1e-3 if name.startswith("se") else 1e-7
+    assert space.distance(back.points[::-1], spline.points).max() < far
+
+
+@every
+@pytest.mark.parametrize("unit", [1e-9, 86400.0])
+def test_knows_no_unit_of_time(name, unit):
+    space, t, noisy, _ = example(name, 0.05, n=30)
+    spline = ss.make_smoothing_spline(t, noisy, space, **TIGHT)
+    other = ss.make_smoothing_spline(unit * t, noisy, space, **TIGHT)
+    assert other.lam / unit**3 == pytest.approx(spline.lam, rel=1e-6)
+    assert space.distance(other.points, spline.points).max() < 1e-7
+    assert other.std(3.3 * unit, 1) * unit == pytest.approx(spline.std(3.3, 1), rel=1e-5)
+
+
+@every
+def test_small_lam_goes_through_the_data_and_large_lam_straight_on(name):
+    space, t, noisy, _ = example(name, 0.02, n=25, segments=3, step=0.4)
+    through = ss.make_smoothing_spline(t, noisy, space, 1e-11)
+    assert space.distance(through.points, noisy).max() < 1e-7
+    exact = ss.make_smoothing_spline(t, noisy, space, 0.0)
+    assert space.distance(exact.points, noisy).max() < 1e-12
+    assert exact.df == pytest.approx(25) and through.df == pytest.approx(25, abs=1e-5)
+    straight = ss.make_smoothing_spline(t, noisy, space, 1e9, tol=1e-3, max_iter=100)
+    assert straight.report.converged and straight.df == pytest.approx(2, abs=1e-3)
+    x = np.linspace(0, 10, 50)
+    speed = straight.speed(x)
+    # The largest λ leaves about this.
+    assert np.ptp(speed) < 1e-4 * speed.max()
+
+
+def objective(space, t, noisy, points, lam, weights):
+    """J of the natural spline through points, with two Gauss points a segment."""
+    spline = ss.CubicSpline(t, points, space)
+    h = np.diff(t)
+    places = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3)
+    x = t[:-1, None] + h[:, None] * places
+    at, bends = spline(x), spline(x, nu=2)
+    squares = space.inner(at, bends, bends)
+    return weights @ space.distance(points, noisy) ** 2 + lam * np.sum(0.5 * h[:, None] * squares)
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("se")])
+def test_the_exact_way_leads_to_the_minimum(name):
+    space, t, noisy, points = example(name, 0.1, n=12, segments=3)
+    rng = np.random.default_rng(2)
+    weights, lam = rng.uniform(0.5, 2, 12), 0.3
+    exact = ss.make_smoothing_spline(t, noisy, space, lam, weights=weights, method="newton", **TIGHT)
+    assert exact.report.converged and exact.report.method == "newton"
+    here = objective(space, t, noisy, exact.points, lam, weights)
+    for _ in range(3):
+        v = space.random_tangent(rng, exact.points)
+        step = 1e-4
+        up, down = (
+            objective(space, t, noisy, space.exp(exact.points, s * step * v), lam, weights) for s in (1, -1)
+        )
+        # The slope of a quadratic with the curvature that the two show: the distance to its minimum.
+        slope, bend = (up - down) / (2 * step), (up + down - 2 * here) / step**2
+        assert bend > 0 and abs(slope / bend) < 1e-6
+    # The flat way solves an estimating equation beside it.
+    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=weights, method="flat", **TIGHT)
+    error = rms(space, exact.points, points)
+    assert rms(space, flat.points, exact.points) < 5e-3 * error
+
+
+@every
+def test_a_batch_is_its_curves(name):
+    space, t, noisy, _ = example(name, 0.05, n=20)
+    other = beside(space, truth(space, 9)(t), 0.05, 9)
+    batch = ss.make_smoothing_spline(t, np.stack([noisy, other, noisy]), space)
+    assert len(batch) == 3 and batch.lam.shape == (3,) and batch.std([1.0, 2.0]).shape == (3, 2)
+    for i, data in enumerate([noisy, other, noisy]):
+        alone = ss.make_smoothing_spline(t, data, space)
+        assert alone == batch[i]
+        assert alone.report == batch[i].report
+        assert np.array_equal(alone.std(3.3), batch[i].std(3.3))
+        assert np.array_equal(alone.residuals, batch[i].residuals)
+    assert np.array_equal(batch.band(2.0), [spline.band(2.0) for spline in batch])
+
+
+@every
+def test_weights_of_zero_leave_out(name):
+    space, t, noisy, _ = example(name, 0.05, n=20)
+    keep = np.arange(20) % 5 != 2
+    missing = noisy.copy()
+    missing[~keep] = np.nan
+    spline = ss.make_smoothing_spline(t, missing, space, 0.1, weights=1.0 * keep)
+    alone = ss.make_smoothing_spline(t[keep], noisy[keep], space, 0.1, knots=t)
+    assert spline == alone
+    assert np.array_equal(np.isnan(spline.residuals).reshape(20, -1).any(1), ~keep)
+
+
+@every
+def test_two_data_at_one_time_are_one_of_twice_the_weight(name):
+    space, t, noisy, _ = example(name, 0.05, n=20)
+    twice = ss.make_smoothing_spline(np.repeat(t, 2), np.repeat(noisy, 2, axis=0), space, 0.1, **TIGHT)
+    heavy = ss.make_smoothing_spline(t, noisy, space, 0.1, weights=np.full(20, 2.0), **TIGHT)
+    assert np.array_equal(twice.t, t)
+    assert space.distance(twice.points, heavy.points).max() < 1e-9
+
+
+@every
+def test_few_knots_are_enough(name):
+    space, t, noisy, points = example(name, 0.05, n=200)
+    whole = ss.make_smoothing_spline(t, noisy, space)
+    few = ss.make_smoothing_spline(t, noisy, space, knots=5 * int(np.ceil(whole.df)))
+    assert few.points.shape[0] == 5 * int(np.ceil(whole.df))
+    assert few.df == pytest.approx(whole.df, rel=0.02)
+    assert rms(space, few(t), whole(t)) < 0.05 * rms(space, whole(t), points)
+
+
+def test_factors_of_a_product_have_a_lam_each():
+    (r3, t, a, _), (so3, _, b, _) = example("r:3", 0.3), example("so:3", 0.02)
+    both = ss.make_smoothing_spline(t, (a, b), ss.Product(r3, so3))
+    alone = [ss.make_smoothing_spline(t, x, s) for x, s in ((a, r3), (b, so3))]
+    assert both.lam == tuple(s.lam for s in alone)
+    assert both.df == tuple(s.df for s in alone) and both.sigma == tuple(s.sigma for s in alone)
+    assert all(np.array_equal(x, s(3.3)) for x, s in zip(both(3.3), alone, strict=True))
+    assert both.std(1.0) == tuple(s.std(1.0) for s in alone)
+    given = ss.make_smoothing_spline(t, (a, b), ss.Product(r3, so3), (0.1, 0.2))
+    assert given.lam == pytest.approx((0.1, 0.2))
+
+
+def test_a_large_space_is_smoothed_in_the_span_of_its_data():
+    small, t, noisy, _ = example("gr:2,5", 0.05, n=12)
+    basis = np.linalg.qr(np.random.default_rng(0).standard_normal((300, 5)))[0]
+    spline = ss.make_smoothing_spline(t, basis @ noisy, "gr:2,300", 0.1)
+    inside = ss.make_smoothing_spline(t, noisy, small, 0.1)
+    assert spline.space.distance(spline(t), basis @ inside(t)).max() < 1e-6

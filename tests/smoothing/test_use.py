@@ -1,0 +1,126 @@
+"""What people hand over, and what they get back."""
+
+import pickle
+
+import numpy as np
+import pytest
+from noisy import example
+
+import symspline as ss
+
+S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
+
+
+def test_dates():
+    dates = np.datetime64("2024-03-01") + (T * 60).astype("timedelta64[s]")
+    spline = ss.make_smoothing_spline(dates, NOISY, S2)
+    seconds = (dates - dates[0]) / np.timedelta64(1, "s")
+    plain = ss.make_smoothing_spline(seconds, NOISY, S2)
+    assert np.array_equal(spline.t, dates) and np.array_equal(spline(dates), plain(seconds))
+    assert spline.std(dates[3]) == plain.std(seconds[3]) and spline.lam == plain.lam
+    knots = ss.make_smoothing_spline(dates, NOISY, S2, knots=dates[::3])
+    assert np.array_equal(knots.t, dates[::3])
+
+
+def test_is_a_cubic_spline():
+    spline = ss.make_smoothing_spline(T, NOISY, S2)
+    assert isinstance(spline, ss.CubicSpline)
+    through = ss.CubicSpline(spline.t, spline.points, S2)
+    x = np.linspace(0, 10, 33)
+    for nu in range(3):
+        assert np.array_equal(spline(x, nu), through(x, nu))
+    assert spline.length() == through.length() and spline.bc_type == "natural"
+    assert np.array_equal(spline.lift(x), through.lift(x))
+    t, points = spline.data
+    assert np.array_equal(t, T) and np.allclose(points, NOISY)
+    assert "40 data" in repr(spline) and "degrees of freedom" in str(spline.report)
+
+
+def test_comes_back_from_a_pickle():
+    for spline in (
+        ss.make_smoothing_spline(T, NOISY, S2),
+        ss.make_smoothing_spline(T, (NOISY, NOISY), ss.Product(S2, S2)),
+        ss.make_smoothing_spline(T, np.stack([NOISY, NOISY]), S2),
+    ):
+        back = pickle.loads(pickle.dumps(spline))
+        assert back == spline and np.array_equal(back.std(T), spline.std(T))
+
+
+def test_progress_is_shown():
+    seen = []
+    ss.make_smoothing_spline(T, NOISY, S2, progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (40, 40)
+
+
+def test_curves_of_a_batch_may_have_times_of_their_own():
+    own = np.stack([T, 2 * T])
+    batch = ss.make_smoothing_spline(own, np.stack([NOISY, NOISY]), S2, [0.1, 0.8])
+    assert np.array_equal(batch.t, own)
+    assert S2.distance(batch[0].points, batch[1].points).max() < 1e-12
+    assert batch.std(own, 0).shape == (2, 2, 40)
+
+
+def test_what_failed_is_told_and_kept():
+    with pytest.raises(ss.ConvergenceError, match="raise max_iter") as caught:
+        ss.make_smoothing_spline(T, NOISY, S2, max_iter=1)
+    assert not caught.value.spline.report.converged
+    with pytest.warns(ss.ConvergenceWarning):
+        spline = ss.make_smoothing_spline(T, NOISY, S2, max_iter=1, on_failure="warn")
+    assert "NOT converged" in str(spline.report)
+    with pytest.raises(ss.ConvergenceError, match="knots without data"):
+        ss.make_lsq_spline(T[:6], NOISY[:6], np.linspace(0, T[5], 30), S2)
+
+
+def test_a_bound_is_told():
+    line = S2.exp(np.broadcast_to([1.0, 0, 0], (40, 3)), T[:, None] * [0, 0.1, 0])
+    straight = ss.make_smoothing_spline(T, line, S2, on_failure="ignore")
+    assert straight.report.at_bound or straight.df > 30
+    rng = np.random.default_rng(0)
+    noisy = ss.make_smoothing_spline(
+        T, 0.3 * T[:, None] + rng.standard_normal((40, 1)), "r:1", criterion="reml"
+    )
+    if noisy.report.at_bound:
+        assert "at its bound: a geodesic" in str(noisy.report)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"t": T[::-1]}, r"t\[1\] is before t\[0\]"),
+        ({"t": T[:-1]}, "40 points need"),
+        ({"t": np.where(T > 5, np.nan, T)}, "is nan"),
+        ({"t": np.zeros(40)}, "lie at one time"),
+        ({"lam": -1.0}, "lam must be finite and >= 0"),
+        ({"lam": [1.0, 2.0]}, "lam must be a number"),
+        ({"weights": -np.ones(40)}, r"weights\[0\] is -1.0"),
+        ({"weights": np.ones(39)}, "weights has shape"),
+        ({"weights": np.eye(1, 40)[0]}, "lie at one time"),
+        ({"knots": 1}, "knots must be at least 2"),
+        ({"knots": "many"}, "knots must be None, a number"),
+        ({"knots": [0.0, 5.0]}, "from the first to the last time"),
+        ({"knots": [0.0, 5.0, 5.0, 10.0]}, r"knots\[2\] is not behind knots\[1\]"),
+        ({"criterion": "aic"}, "criterion must be"),
+        ({"criterion": "cp"}, "needs sigma"),
+        ({"loss": "l1"}, "loss must be"),
+        ({"method": "fast"}, "method must be"),
+        ({"tol": 0.0}, "tol must be"),
+        ({"max_iter": 0}, "max_iter must be at least 1"),
+        ({"points": np.where(T[:, None] > 5, np.nan, NOISY)}, r"points\[20\]"),
+        ({"points": 2 * NOISY}, r"points\[0\]"),
+    ],
+)
+def test_bad_input_is_named(change, message):
+    arguments = {"t": T, "points": NOISY, "space": S2, **change}
+    with pytest.raises(ss.ValidationError, match=message):
+        ss.make_smoothing_spline(**arguments)
+
+
+def test_band_and_deviation_check_their_arguments():
+    spline = ss.make_smoothing_spline(T, NOISY, S2)
+    assert spline.band(2.0, 0.5) < spline.band(2.0) == pytest.approx(np.sqrt(5.991464547) * spline.std(2.0))
+    with pytest.raises(ss.ValidationError, match="nu must be 0 or 1"):
+        spline.std(2.0, 2)
+    with pytest.raises(ss.ValidationError, match="level must lie"):
+        spline.band(2.0, 95)
+    with pytest.raises(TypeError, match="make_smoothing_spline"):
+        ss.SmoothingSpline()
