@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import archive
 from ._core import CutLocusError, ValidationError
 from .curves.curve import Curve
 from .curves.fit import curve_of, read, read_ends, validated
@@ -16,9 +17,6 @@ from .piecewise import Piecewise
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .times import Clock, knots_of
-
-if TYPE_CHECKING:
-    pass
 
 
 class HermiteSpline(Piecewise):
@@ -100,6 +98,10 @@ class HermiteSpline(Piecewise):
         batch = self._curve.batch
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
+
+    def save(self, file: Any) -> None:
+        """Write the curve to an NPZ file, which `symspline.load` reads back."""
+        archive.write(file, archive.arrays_of(self, archive.HERMITE))
 
     def _with(self, clock: Clock, t: Array, curve: Curve, index: Any) -> HermiteSpline:
         return HermiteSpline._of(clock, t, curve, self._extrapolate)

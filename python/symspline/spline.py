@@ -289,7 +289,7 @@ class CubicSpline(Piecewise):
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        archive.write(file, archive.arrays_of(self, self._reports))
+        archive.write(file, archive.fitted_arrays(self, self._reports))
 
     # What a plot says of it.
     _kind = "C² spline"
