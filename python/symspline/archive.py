@@ -33,7 +33,7 @@ def fitted_arrays(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
 
 def arrays_of(spline: Piecewise, format: str) -> dict[str, Any]:
     """The arrays of one curve, or of a batch; the format says which kind of curve it is."""
-    unit = _unit(spline._t.dtype) if spline._clock.dates else ""
+    unit = _unit(spline._t.dtype, spline._clock.zone) if spline._clock.dates else ""
     arrays: dict[str, Any] = {
         "format": format,
         "version": VERSION,
@@ -80,10 +80,11 @@ class replacing:
                 self.temporary.unlink()
 
 
-def _unit(dtype: np.dtype[Any]) -> str:
-    """The unit of dates: "ns", or "10m" if they count in tens of minutes."""
+def _unit(dtype: np.dtype[Any], zone: str | None) -> str:
+    """The unit of dates: "ns", or "10m" if they count in tens of minutes; and what is known of their zone: "ns UTC"."""
     unit, step = np.datetime_data(dtype)
-    return unit if step == 1 else f"{step}{unit}"
+    counted = unit if step == 1 else f"{step}{unit}"
+    return counted if zone is None else f"{counted} {zone}"
 
 
 def _plain_report(report: Report) -> dict[str, Any]:

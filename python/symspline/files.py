@@ -14,13 +14,14 @@ from ._core import ValidationError
 from .archive import FORMAT, HERMITE, LISTS, MANY, VERSION, fitted_arrays, rich, write
 from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
+from .handed import NO_ZONE, UTC_ZONE
 from .hermite import HermiteSpline
 from .options import checked_policy
 from .report import Report, longest_gap
 from .spaces import Array, Product, Space, factors_of
 from .spaces import space as space_named
 from .spline import CubicSpline
-from .times import Clock, clock_of
+from .times import Clock, Moments, clock_of
 
 _T = TypeVar("_T")
 
@@ -50,8 +51,10 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
         raise ValidationError("names of curves must be text")
     if any(spline._batch for spline in curves.values()):
         raise ValidationError("save_many takes single curves; a batch has a method save of its own")
-    if len({(spline.space, spline._t.dtype) for spline in curves.values()}) != 1:
-        raise ValidationError("save_many needs curves, all of one space and with knots of one type")
+    if len({(spline.space, spline._t.dtype, spline._clock.zone) for spline in curves.values()}) != 1:
+        raise ValidationError(
+            "save_many needs curves, all of one space and with knots of one type, dates all with a time zone or without"
+        )
     each = [fitted_arrays(spline, spline._reports) for spline in curves.values()]
     arrays: dict[str, Any] = {
         "format": MANY,
@@ -156,23 +159,23 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
 
 
 def _cubic(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
-    space, clock, shown, found, extrapolate = _piecewise(arrays)
-    times = clock.knots(shown)
+    space, clock, knots, found, extrapolate = _piecewise(arrays)
+    times = clock.knots(knots)
     curve = curve_of(space, times, found)
     bc_type = rich(json.loads(str(arrays["bc_type"])), space)
     read_ends(bc_type, space, curve.batch)
     reports = [_report(plain, times, curve.batch) for plain in json.loads(str(arrays["report"]))]
     for factor, pair, report in zip(factors_of(space), found, reports, strict=True):
         _check_velocities(factor, *pair, report.converged)
-    return CubicSpline._of(clock, shown, curve, bc_type, extrapolate, reports)
+    return CubicSpline._of(clock, knots, curve, bc_type, extrapolate, reports)
 
 
 def _hermite(arrays: dict[str, NDArray[Any]]) -> HermiteSpline:
-    space, clock, shown, found, extrapolate = _piecewise(arrays)
+    space, clock, knots, found, extrapolate = _piecewise(arrays)
     for factor, pair in zip(factors_of(space), found, strict=True):
         _check_velocities(factor, *pair, True)
-    curve = curve_of(space, clock.knots(shown), found, fitted=False)
-    return HermiteSpline._of(clock, shown, curve, extrapolate)
+    curve = curve_of(space, clock.knots(knots), found, fitted=False)
+    return HermiteSpline._of(clock, knots, curve, extrapolate)
 
 
 def _piecewise(
@@ -187,16 +190,20 @@ def _piecewise(
         )
     space = space_named(str(arrays["space"]))
     extrapolate = checked_policy(json.loads(str(arrays["extrapolate"])))
-    unit = str(arrays["t_unit"])
-    clock, shown = clock_of(arrays["t"].astype(f"datetime64[{unit}]") if unit else arrays["t"])
-    times = clock.knots(shown)
+    unit, _, zone = str(arrays["t_unit"]).partition(" ")
+    if zone not in ("", UTC_ZONE, NO_ZONE):
+        raise ValidationError(f"the zone of the times is {shown(zone)}")
+    clock, knots = clock_of(
+        Moments(arrays["t"].astype(f"datetime64[{unit}]") if unit else arrays["t"], zone or None)
+    )
+    times = clock.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("the knots do not increase")
     found = [
         _arrays_in(factor, arrays, f"_{i}" if isinstance(space, Product) else "", times)
         for i, factor in enumerate(factors_of(space))
     ]
-    return space, clock, shown, found, extrapolate
+    return space, clock, knots, found, extrapolate
 
 
 def _arrays_in(

@@ -27,7 +27,7 @@ class HermiteSpline(Piecewise):
 
     Args:
         t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one row per curve.
-            Numbers or ``datetime64``; for dates velocities are per second.
+            Numbers or dates; for dates velocities are per second. Those with a time zone become UTC.
         points: shape (..., N+1, *space.point_shape), N >= 1; leading axes are independent curves. For a `Product` a
             tuple of arrays.
         velocities: γ' at the points, tangent vectors of the shape of the points. Those of rotations are made of

@@ -73,7 +73,8 @@ class Piecewise(ABC):
         """The curve at times x.
 
         Args:
-            x: times, any shape and order; ``datetime64`` if the knots are.
+            x: times, any shape and order; dates if the knots are. If those had a time zone, dates here have one, any,
+                or are ``datetime64`` in UTC; if they had none, neither have these.
             nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
             extrapolate: as for the constructor, whose choice holds if None.
             per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
@@ -225,7 +226,8 @@ class Piecewise(ABC):
 
     @property
     def t(self) -> Array:
-        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given."""
+        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given. Times with a time zone
+        are in UTC here, as ``datetime64`` has no zone."""
         return read_only(self._t)
 
     @property
