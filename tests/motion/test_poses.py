@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline import poses, rotations
+from symspline.curves.plain import Plain
 
 KNOTS = np.array([0.0, 0.7, 1.5, 3.0, 4.0, 4.5])
 INNER = (KNOTS[:-1, None] + np.diff(KNOTS)[:, None] * [0.1, 0.6]).ravel()
@@ -128,6 +129,22 @@ def test_spaces_without_poses_are_refused(name):
 def test_gravity_is_a_vector(gravity):
     with pytest.raises(ss.ValidationError, match="gravity must be three numbers"):
         poses.imu(curve("se:3"), 0.5, gravity=gravity)
+
+
+@pytest.mark.parametrize(
+    ("name", "call", "most"),
+    [
+        ("se:3", poses.imu, 4),
+        ("so:3 x r:3", poses.imu, 3),
+        ("se:3", poses.twist, 3),
+        ("so:3 x r:3", poses.linear_velocity, 1),
+    ],
+)
+def test_nothing_is_evaluated_twice(monkeypatch, name, call, most):
+    spline, evaluate, asked = curve(name), Plain.evaluate, []
+    monkeypatch.setattr(Plain, "evaluate", lambda self, *a: asked.append((self, a[1])) or evaluate(self, *a))
+    call(spline, INNER)
+    assert len(asked) == len(set(asked)) <= most
 
 
 def test_frames_have_two_names():
