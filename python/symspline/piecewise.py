@@ -191,9 +191,18 @@ class Piecewise(ABC):
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
         return self._curve.transport((float(times[0]), float(times[1])), where, moved)
 
-    def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
-        """|γ'| at times x, shape batch axes + x.shape."""
-        return self._at(x, "speed", extrapolate, per_curve)[()]
+    def speed(
+        self,
+        x: ArrayLike,
+        *,
+        extrapolate: bool | str | None = None,
+        per_curve: bool = False,
+        dtype: Any = None,
+    ) -> Any:
+        """|γ'| at times x, shape batch axes + x.shape; options are those of a call."""
+        single = dtype is not None and is_single(dtype)
+        values = self._at(x, "speed", extrapolate, per_curve)
+        return (in_single(values) if single else values)[()]
 
     def _at(
         self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
