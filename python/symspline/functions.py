@@ -163,7 +163,6 @@ def fit_many(
     else:
         wanted = np.flatnonzero(mask)
         fits, faults = fit_many_chosen(space, times, points, ends, options, check, progress, wanted)
-        points = [points[i] for i in wanted]
     ends_kept = kept(bc_type)
     fitted = [
         CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)
@@ -171,5 +170,5 @@ def fit_many(
     ]
     if faults:
         fail(faults, on_failure, fitted)
-    warn_of_signs(space, points)
+    warn_of_signs(space, [own if mask is None or mask[i] else None for i, own in enumerate(points)])
     return fitted
