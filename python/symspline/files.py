@@ -166,14 +166,14 @@ def _cubic(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
     read_ends(bc_type, space, curve.batch)
     reports = [_report(plain, times, curve.batch) for plain in json.loads(str(arrays["report"]))]
     for factor, pair, report in zip(factors_of(space), found, reports, strict=True):
-        _check_velocities(factor, *pair, report.converged)
+        _check(factor, *pair, report.converged)
     return CubicSpline._of(clock, knots, curve, bc_type, extrapolate, reports)
 
 
 def _hermite(arrays: dict[str, NDArray[Any]]) -> HermiteSpline:
     space, clock, knots, found, extrapolate = _piecewise(arrays)
     for factor, pair in zip(factors_of(space), found, strict=True):
-        _check_velocities(factor, *pair, True)
+        _check(factor, *pair, True)
     curve = curve_of(space, clock.knots(knots), found, fitted=False)
     return HermiteSpline._of(clock, knots, curve, extrapolate)
 
@@ -221,15 +221,17 @@ def _arrays_in(
         )
     if nodes[-1] < 2:
         raise ValidationError("a curve needs at least two points")
-    factor.check_point(points)
     return points, velocities
 
 
-def _check_velocities(space: Space, points: Array, velocities: Array, converged: Any) -> None:
-    """They are tangent; only curves that failed may be NaN."""
-    finite = np.isfinite(velocities).all(axis=tuple(range(-1 - len(space.point_shape), 0)))
+def _check(space: Space, points: Array, velocities: Array, converged: Any) -> None:
+    """Points are on the space, velocities tangent; only curves that failed, or were left out, may be NaN."""
+    axes = tuple(range(-1 - len(space.point_shape), 0))
+    there, finite = (np.isfinite(array).all(axis=axes) for array in (points, velocities))
+    space.check_point(points[there])
+    finite &= there
     if not (finite | ~np.asarray(converged)).all():
-        raise ValidationError("velocities are not finite")
+        raise ValidationError("points or velocities are not finite")
     off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
     allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max())
     if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):

@@ -53,6 +53,8 @@ def saved_curves():
         "product batch": ss.CubicSpline(KNOTS, points_on(product, 6, (2,)), product),
         "flat": ss.CubicSpline(KNOTS, points_on(ss.Euclidean(1), 6), "r:1"),
         "hyperbolic": ss.CubicSpline(KNOTS, points_on(ss.Hyperbolic(3), 6), "h:3"),
+        "left out": ss.CubicSpline(None, [THREE, THREE], S2, where=[True, False]),
+        "a bad sensor": ss.CubicSpline(None, [THREE, np.nan * np.array(THREE)], S2, on_failure="ignore"),
         "one bad curve": ss.CubicSpline(None, cut, S2, on_failure="ignore", **options),
     }
 
@@ -218,6 +220,9 @@ def test_collections_in_python(tmp_path):
         ss.save_many({"p": both, "q": one}, tmp_path / "d.npz")
     with pytest.raises(ss.ValidationError, match="of one space"):
         ss.save_many({}, tmp_path / "d.npz")
+    pair = ss.fit_many([(None, np.eye(3)), (None, np.eye(3))], "s:2", where=[True, False])
+    ss.save_many(dict(zip("ab", pair, strict=True)), tmp_path / "some.npz")
+    assert ss.load_many(tmp_path / "some.npz") == dict(zip("ab", pair, strict=True))
     with pytest.raises(TypeError, match="objects of CubicSpline"):
         ss.save_many({"a": HERMITES["one"]}, tmp_path / "d.npz")
     with pytest.raises(ss.ValidationError, match="single curves"):
