@@ -95,24 +95,25 @@ def fit_many_chosen(
     chosen: Numbers,
 ) -> tuple[list[Fit], list[Fault]]:
     """The same of single curves of different lengths."""
-    fits = [
-        finished(
-            Asked(space, t, own, [], options, check),
-            [_left_out(factor, part) for factor, part in zip(factors_of(space), own, strict=True)],
+    found: list[Fit] = []
+    faults: list[Fault] = []
+    if len(chosen):
+        some = [times[i] for i in chosen], [points[i] for i in chosen], _some_ends(space, ends, chosen)
+        try:
+            found, faults = fit_many(space, *some, options, check, progress)
+        except ValidationError as error:
+            raise ValidationError(_renamed(str(error), chosen, (len(times),))) from None
+    fitted = dict(zip(chosen.tolist(), found, strict=True))
+
+    def left_out(i: int) -> Fit:
+        parts = zip(factors_of(space), points[i], strict=True)
+        return finished(
+            Asked(space, times[i], points[i], [], options, check),
+            [_left_out(factor, part) for factor, part in parts],
         )
-        for t, own in zip(times, points, strict=True)
-    ]
-    if not len(chosen):
-        return fits, []
-    some = [times[i] for i in chosen], [points[i] for i in chosen], _some_ends(space, ends, chosen)
-    count = (len(times),)
-    try:
-        found, faults = fit_many(space, *some, options, check, progress)
-    except ValidationError as error:
-        raise ValidationError(_renamed(str(error), chosen, count)) from None
-    for i, one in zip(chosen, found, strict=True):
-        fits[i] = one
-    return fits, [(int(chosen[i]), kind, _renamed(why, chosen, count)) for i, kind, why in faults]
+
+    fits = [fitted[i] if i in fitted else left_out(i) for i in range(len(times))]
+    return fits, [(int(chosen[i]), kind, _renamed(why, chosen, (len(times),))) for i, kind, why in faults]
 
 
 def _some(asked: Asked, chosen: Numbers) -> Asked:
