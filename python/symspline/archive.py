@@ -17,23 +17,30 @@ from .report import Report
 from .spaces import Product, Space
 
 FORMAT = "symspline-curve"
+HERMITE = "symspline-hermite"
 MANY = "symspline-curves"
 LISTS = ("bc_type", "extrapolate", "report")
 VERSION = 1
 
 
-def arrays_of(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
-    """The arrays of one curve, or of a batch, and how it was fitted in every factor."""
-    unit = _unit(spline._t.dtype) if spline._clock.dates else ""
+def fitted_arrays(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
+    """The arrays of one fitted curve, or of a batch, and how the fit went in every factor."""
+    return arrays_of(spline, FORMAT) | {
+        "bc_type": json.dumps(plain(spline._bc_type)),
+        "report": json.dumps([_plain_report(report) for report in reports]),
+    }
+
+
+def arrays_of(spline: Piecewise, format: str) -> dict[str, Any]:
+    """The arrays of one curve, or of a batch; the format says which kind of curve it is."""
+    unit = _unit(spline._t.dtype, spline._clock.zone) if spline._clock.dates else ""
     arrays: dict[str, Any] = {
-        "format": FORMAT,
+        "format": format,
         "version": VERSION,
         "space": str(spline.space),
         "t": spline._t.astype(np.int64) if unit else spline._t,
         "t_unit": unit,
-        "bc_type": json.dumps(plain(spline._bc_type)),
         "extrapolate": json.dumps(spline.extrapolate),
-        "report": json.dumps([_plain_report(report) for report in reports]),
     }
     for i, part in enumerate(spline._curve.parts):
         suffix = f"_{i}" if isinstance(spline.space, Product) else ""
@@ -73,10 +80,11 @@ class replacing:
                 self.temporary.unlink()
 
 
-def _unit(dtype: np.dtype[Any]) -> str:
-    """The unit of dates: "ns", or "10m" if they count in tens of minutes."""
+def _unit(dtype: np.dtype[Any], zone: str | None) -> str:
+    """The unit of dates: "ns", or "10m" if they count in tens of minutes; and what is known of their zone: "ns UTC"."""
     unit, step = np.datetime_data(dtype)
-    return unit if step == 1 else f"{step}{unit}"
+    counted = unit if step == 1 else f"{step}{unit}"
+    return counted if zone is None else f"{counted} {zone}"
 
 
 def _plain_report(report: Report) -> dict[str, Any]:

@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import ValidationError
-from .archive import FORMAT, LISTS, MANY, VERSION, arrays_of, rich, write
+from .archive import FORMAT, HERMITE, LISTS, MANY, VERSION, fitted_arrays, rich, write
 from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
+from .handed import NO_ZONE, UTC_ZONE
+from .hermite import HermiteSpline
 from .options import checked_policy
 from .report import Report, longest_gap
-from .spaces import Product, Space, factors_of
+from .spaces import Array, Product, Space, factors_of
 from .spaces import space as space_named
 from .spline import CubicSpline
-from .times import clock_of
+from .times import Clock, Moments, clock_of
 
 _T = TypeVar("_T")
 
@@ -44,14 +46,16 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
     True
     """
     if not isinstance(curves, Mapping) or not all(isinstance(c, CubicSpline) for c in curves.values()):
-        raise TypeError("curves must be a dictionary of names and splines")
+        raise TypeError("curves must be a dictionary of names and objects of CubicSpline")
     if not all(isinstance(name, str) for name in curves):
         raise ValidationError("names of curves must be text")
     if any(spline._batch for spline in curves.values()):
         raise ValidationError("save_many takes single curves; a batch has a method save of its own")
-    if len({(spline.space, spline._t.dtype) for spline in curves.values()}) != 1:
-        raise ValidationError("save_many needs curves, all of one space and with knots of one type")
-    each = [arrays_of(spline, spline._reports) for spline in curves.values()]
+    if len({(spline.space, spline._t.dtype, spline._clock.zone) for spline in curves.values()}) != 1:
+        raise ValidationError(
+            "save_many needs curves, all of one space and with knots of one type, dates all with a time zone or without"
+        )
+    each = [fitted_arrays(spline, spline._reports) for spline in curves.values()]
     arrays: dict[str, Any] = {
         "format": MANY,
         "names": json.dumps(list(curves)),
@@ -68,8 +72,8 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
     write(file, arrays)
 
 
-def load(file: Any) -> CubicSpline:
-    """Read a curve that `CubicSpline.save` wrote.
+def load(file: Any) -> CubicSpline | HermiteSpline:
+    """Read a curve that `CubicSpline.save` or `HermiteSpline.save` wrote, as the kind of curve that it was.
 
     Raises:
         ValidationError: the file is damaged, or not a symspline curve.
@@ -139,57 +143,95 @@ def _read_many(arrays: dict[str, NDArray[Any]]) -> dict[str, CubicSpline]:
         own = slice(end - arrays["knots"][i], end)
         one = {key: array[own] if array.ndim else array for key, array in arrays.items()}
         one |= {key: np.array(json.dumps(values[i])) for key, values in lists.items()}
-        curves[str(name)] = _read(one | {"format": np.array(FORMAT)})
+        curves[str(name)] = _cubic(one)
     return curves
 
 
-def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
-    if str(arrays["format"]) == MANY:
+def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
+    kind = str(arrays["format"])
+    if kind == MANY:
         raise ValidationError("this file holds several curves; read them with symspline.load_many")
-    if str(arrays["format"]) != FORMAT:
-        raise ValidationError(f"format {str(arrays['format'])!r}, expected {FORMAT!r}")
+    if kind == FORMAT:
+        return _cubic(arrays)
+    if kind == HERMITE:
+        return _hermite(arrays)
+    raise ValidationError(f"format {kind!r}, expected {FORMAT!r} or {HERMITE!r}")
+
+
+def _cubic(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
+    space, clock, knots, found, extrapolate = _piecewise(arrays)
+    times = clock.knots(knots)
+    curve = curve_of(space, times, found)
+    bc_type = rich(json.loads(str(arrays["bc_type"])), space)
+    read_ends(bc_type, space, curve.batch)
+    reports = [_report(plain, times, curve.batch) for plain in json.loads(str(arrays["report"]))]
+    for factor, pair, report in zip(factors_of(space), found, reports, strict=True):
+        _check(factor, *pair, report.converged)
+    return CubicSpline._of(clock, knots, curve, bc_type, extrapolate, reports)
+
+
+def _hermite(arrays: dict[str, NDArray[Any]]) -> HermiteSpline:
+    space, clock, knots, found, extrapolate = _piecewise(arrays)
+    for factor, pair in zip(factors_of(space), found, strict=True):
+        _check(factor, *pair, True)
+    curve = curve_of(space, clock.knots(knots), found, fitted=False)
+    return HermiteSpline._of(clock, knots, curve, extrapolate)
+
+
+def _piecewise(
+    arrays: dict[str, NDArray[Any]],
+) -> tuple[Space, Clock, NDArray[Any], list[tuple[Array, Array]], Any]:
+    """What curves of every kind have: space, clock, knots as shown, points and velocities in every factor, and what
+    happens outside the knots."""
     version = int(arrays["version"])
     if version != VERSION:
         raise ValidationError(
             f"version {version}; this symspline reads version {VERSION}, a newer one may read it"
         )
     space = space_named(str(arrays["space"]))
-    bc_type = rich(json.loads(str(arrays["bc_type"])), space)
     extrapolate = checked_policy(json.loads(str(arrays["extrapolate"])))
-    unit = str(arrays["t_unit"])
-    clock, shown = clock_of(arrays["t"].astype(f"datetime64[{unit}]") if unit else arrays["t"])
-    times = clock.knots(shown)
+    unit, _, zone = str(arrays["t_unit"]).partition(" ")
+    if zone not in ("", UTC_ZONE, NO_ZONE):
+        raise ValidationError(f"the zone of the times is {shown(zone)}")
+    clock, knots = clock_of(
+        Moments(arrays["t"].astype(f"datetime64[{unit}]") if unit else arrays["t"], zone or None)
+    )
+    times = clock.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("the knots do not increase")
-    found, reports = [], []
-    for i, factor in enumerate(factors_of(space)):
-        suffix = f"_{i}" if isinstance(space, Product) else ""
-        points, velocities = (
-            factor._numbers(factor._doubles(arrays[key + suffix], key + suffix))
-            for key in ("points", "velocities")
+    found = [
+        _arrays_in(factor, arrays, f"_{i}" if isinstance(space, Product) else "", times)
+        for i, factor in enumerate(factors_of(space))
+    ]
+    return space, clock, knots, found, extrapolate
+
+
+def _arrays_in(
+    factor: Space, arrays: dict[str, NDArray[Any]], suffix: str, times: NDArray[np.float64]
+) -> tuple[Array, Array]:
+    """Points and velocities in a factor."""
+    points, velocities = (
+        factor._numbers(factor._doubles(arrays[key + suffix], key + suffix))
+        for key in ("points", "velocities")
+    )
+    nodes = points.shape[: points.ndim - len(factor.point_shape)]
+    if points.shape != velocities.shape or not nodes or times.shape not in ((nodes[-1],), nodes):
+        raise ValidationError(
+            f"shapes do not fit: t {times.shape}, points {points.shape}, velocities {velocities.shape}"
         )
-        nodes = points.shape[: points.ndim - len(factor.point_shape)]
-        if points.shape != velocities.shape or not nodes or times.shape not in ((nodes[-1],), nodes):
-            raise ValidationError(
-                f"shapes do not fit: t {times.shape}, points {points.shape}, velocities {velocities.shape}"
-            )
-        if nodes[-1] < 2:
-            raise ValidationError("a curve needs at least two points")
-        factor.check_point(points)
-        report = _report(json.loads(str(arrays["report"]))[i], times, nodes[:-1])
-        _check_velocities(factor, points, velocities, report)
-        found.append((points, velocities))
-        reports.append(report)
-    curve = curve_of(space, times, found)
-    read_ends(bc_type, space, curve.batch)
-    return CubicSpline._of(clock, shown, curve, bc_type, extrapolate, reports)
+    if nodes[-1] < 2:
+        raise ValidationError("a curve needs at least two points")
+    return points, velocities
 
 
-def _check_velocities(space: Space, points: Any, velocities: Any, report: Report) -> None:
-    """They are tangent; only curves that failed may be NaN."""
-    finite = np.isfinite(velocities).all(axis=tuple(range(-1 - len(space.point_shape), 0)))
-    if not (finite | ~np.asarray(report.converged)).all():
-        raise ValidationError("velocities are not finite")
+def _check(space: Space, points: Array, velocities: Array, converged: Any) -> None:
+    """Points are on the space, velocities tangent; only curves that failed, or were left out, may be NaN."""
+    axes = tuple(range(-1 - len(space.point_shape), 0))
+    there, finite = (np.isfinite(array).all(axis=axes) for array in (points, velocities))
+    space.check_point(points[there])
+    finite &= there
+    if not (finite | ~np.asarray(converged)).all():
+        raise ValidationError("points or velocities are not finite")
     off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
     allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max())
     if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):

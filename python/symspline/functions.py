@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ._core import ValidationError
 from .arrays import read_only
 from .curves import fit as fitting
+from .curves.chosen import fit_many_chosen, mask_of
 from .curves.curve import quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
@@ -113,6 +114,7 @@ def fit_many(
     on_failure: str = "raise",
     check: bool = True,
     atol: float | None = None,
+    where: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> list[CubicSpline]:
     """Fit curves of different lengths in one parallel call.
@@ -122,6 +124,7 @@ def fit_many(
         space: the space of all curves, or its name.
         bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol, progress: as for `CubicSpline`, for all
             curves alike.
+        where: True for the curves that are wanted, one a curve: the others are NaN, whatever their points are.
 
     Returns:
         One `CubicSpline` a curve. If curves fail and ``on_failure="raise"``, the exception's ``.spline``
@@ -142,6 +145,7 @@ def fit_many(
             raise ValidationError(f"curve {number} must be a pair (t, points)")
     if not pairs:
         return []
+    mask = None if where is None else mask_of(where, (len(pairs),))
     points, knots = [], []
     for number, (t, p) in enumerate(pairs):
         try:
@@ -154,7 +158,11 @@ def fit_many(
             raise ValidationError(f"curve {number}: {error}") from None
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
-    fits, faults = fitting.fit_many(space, times, points, ends, options, check, progress)
+    if mask is None:
+        fits, faults = fitting.fit_many(space, times, points, ends, options, check, progress)
+    else:
+        wanted = np.flatnonzero(mask)
+        fits, faults = fit_many_chosen(space, times, points, ends, options, check, progress, wanted)
     ends_kept = kept(bc_type)
     fitted = [
         CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)
@@ -162,5 +170,5 @@ def fit_many(
     ]
     if faults:
         fail(faults, on_failure, fitted)
-    warn_of_signs(space, points)
+    warn_of_signs(space, [own if mask is None or mask[i] else None for i, own in enumerate(points)])
     return fitted

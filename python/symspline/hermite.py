@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import archive
 from ._core import CutLocusError, ValidationError
 from .curves.curve import Curve
 from .curves.fit import curve_of, read, read_ends, validated
@@ -17,9 +18,6 @@ from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .times import Clock, knots_of
 
-if TYPE_CHECKING:
-    pass
-
 
 class HermiteSpline(Piecewise):
     """The cubic curve through points with given velocities there, such as measured ones.
@@ -29,7 +27,7 @@ class HermiteSpline(Piecewise):
 
     Args:
         t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one row per curve.
-            Numbers or ``datetime64``; for dates velocities are per second.
+            Numbers or dates; for dates velocities are per second. Those with a time zone become UTC.
         points: shape (..., N+1, *space.point_shape), N >= 1; leading axes are independent curves. For a `Product` a
             tuple of arrays.
         velocities: γ' at the points, tangent vectors of the shape of the points. Those of rotations are made of
@@ -100,6 +98,10 @@ class HermiteSpline(Piecewise):
         batch = self._curve.batch
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
+
+    def save(self, file: Any) -> None:
+        """Write the curve to an NPZ file, which `symspline.load` reads back."""
+        archive.write(file, archive.arrays_of(self, archive.HERMITE))
 
     def _with(self, clock: Clock, t: Array, curve: Curve, index: Any) -> HermiteSpline:
         return HermiteSpline._of(clock, t, curve, self._extrapolate)

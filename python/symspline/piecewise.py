@@ -73,7 +73,8 @@ class Piecewise(ABC):
         """The curve at times x.
 
         Args:
-            x: times, any shape and order; ``datetime64`` if the knots are.
+            x: times, any shape and order; dates if the knots are. If those had a time zone, dates here have one, any,
+                or are ``datetime64`` in UTC; if they had none, neither have these.
             nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
             extrapolate: as for the constructor, whose choice holds if None.
             per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
@@ -190,9 +191,18 @@ class Piecewise(ABC):
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
         return self._curve.transport((float(times[0]), float(times[1])), where, moved)
 
-    def speed(self, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False) -> Any:
-        """|γ'| at times x, shape batch axes + x.shape."""
-        return self._at(x, "speed", extrapolate, per_curve)[()]
+    def speed(
+        self,
+        x: ArrayLike,
+        *,
+        extrapolate: bool | str | None = None,
+        per_curve: bool = False,
+        dtype: Any = None,
+    ) -> Any:
+        """|γ'| at times x, shape batch axes + x.shape; options are those of a call."""
+        single = dtype is not None and is_single(dtype)
+        values = self._at(x, "speed", extrapolate, per_curve)
+        return (in_single(values) if single else values)[()]
 
     def _at(
         self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
@@ -225,7 +235,8 @@ class Piecewise(ABC):
 
     @property
     def t(self) -> Array:
-        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given."""
+        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given. Times with a time zone
+        are in UTC here, as ``datetime64`` has no zone."""
         return read_only(self._t)
 
     @property

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import gzip
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,8 @@ from .spaces import Array, SpecialEuclidean, SpecialOrthogonal
 
 Doubles = NDArray[np.float64]
 
+# What stands in a line of a TUM trajectory.
+TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 _SO3, _SE3 = SpecialOrthogonal(3), SpecialEuclidean(3)
 # Files have rounded numbers, some with three decimals.
 _ROUNDED = 5e-3
@@ -42,11 +44,52 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
         vectors; times are as in the file, repeated ones too (see `symspline.fit_segments`).
 
     Raises:
-        ValidationError: a line has not eight numbers, or the four of a quaternion are none.
+        ValidationError: a line has not eight numbers, or the four of a quaternion are none; it is named.
         OSError: the file cannot be read.
     """
-    rows = _numbers(file, 8, "a TUM trajectory has lines of 'time x y z qx qy qz qw'")
-    return rows[:, 0].copy(), join(_rotations(rows[:, [7, 4, 5, 6]], file), rows[:, 1:4])
+    rows, place = tum_rows(file)
+    r = _rotations(rows[:, [7, 4, 5, 6]], lambda i: f"{_name(file)}, {place(i)}")
+    return rows[:, 0].copy(), join(r, rows[:, 1:4])
+
+
+def tum_rows(file: Any) -> tuple[Doubles, Callable[[int], str]]:
+    """The numbers of a TUM trajectory as they stand there, shape (n, 8), and where a row is: "line 7".
+
+    Raises:
+        ValidationError: a line has not eight numbers that are finite.
+        OSError: the file cannot be read.
+    """
+    name, lines = _name(file), _lines(file)
+    form = f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"
+    if not lines:
+        raise ValidationError(f"{name} is empty, it has no numbers; {form}")
+    try:
+        rows = np.loadtxt([line.text for line in lines], ndmin=2)
+    except ValueError as error:
+        raise ValidationError(_bad_line(lines, name, form) or f"{name}: {form}; {brief(error)}") from None
+    if rows.shape[1] != len(TUM):
+        raise ValidationError(f"{name}, line {lines[0].number}: {rows.shape[1]} numbers, but {form}")
+    bad = np.argwhere(~np.isfinite(rows))
+    if len(bad):
+        i, j = bad[0]
+        raise ValidationError(
+            f"{name}, line {lines[i].number}: column {TUM[j]!r} holds {rows[i, j]}, which is not a finite number"
+        )
+    return rows, lambda i: f"line {lines[i].number}"
+
+
+def _bad_line(lines: list[Line], name: str, form: str) -> str | None:
+    """What is wrong with the first line that is no pose."""
+    for number, text in lines:
+        cells = text.partition("#")[0].split()
+        if len(cells) != len(TUM):
+            return f"{name}, line {number}: {len(cells)} numbers, but {form}"
+        for column, cell in zip(TUM, cells, strict=True):
+            try:
+                np.loadtxt([cell])
+            except ValueError:
+                return f"{name}, line {number}: column {column!r} holds {cell!r}, which is not a number"
+    return None
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
@@ -139,7 +182,8 @@ def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
     ns = _parsed(lines, file, form, delimiter=",", usecols=0, dtype=np.int64, ndmin=1)
     rows = _parsed(lines, file, form, delimiter=",", usecols=range(1, 8), ndmin=2)
     _check_rows(rows, file, form)
-    return ns.astype("datetime64[ns]"), join(_rotations(rows[:, 3:], file), rows[:, :3])
+    r = _rotations(rows[:, 3:], lambda i: f"{_name(file)}, line {lines[i].number}")
+    return ns.astype("datetime64[ns]"), join(r, rows[:, :3])
 
 
 def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
@@ -226,14 +270,14 @@ def _seconds(t: ArrayLike, count: int) -> Doubles:
 # ---- lines ----
 
 
-def _rotations(q: Doubles, file: Any) -> Array:
-    """The rotations of quaternions, scalar first, as they stand rounded in a file."""
+def _rotations(q: Doubles, place: Callable[[int], str]) -> Array:
+    """The rotations of quaternions, scalar first, as they stand rounded in a file, each at its place."""
     sizes = length(q)
-    refuse(
-        ~(np.abs(sizes - 1) <= _ROUNDED),
-        f"{_name(file)}: quaternion ",
-        lambda i: f"has length {sizes[i]:.6g}, not 1: are the columns in another order?",
-    )
+    bad = np.flatnonzero(~(np.abs(sizes - 1) <= _ROUNDED))
+    if len(bad):
+        raise ValidationError(
+            f"{place(bad[0])}: the quaternion has length {sizes[bad[0]]:.6g}, not 1: are the columns in another order?"
+        )
     return quaternion_to_matrix(q / sizes[:, None], scalar_first=True)
 
 
@@ -252,23 +296,33 @@ def _check_rows(rows: Doubles, file: Any, form: str) -> None:
     refuse(bad, f"{_name(file)}: row ", lambda i: f"is not finite: {rows[i]}")
 
 
-def _lines(file: Any) -> list[str]:
+class Line(NamedTuple):
+    """A line of a file: its number, counted from 1, and what stands there."""
+
+    number: int
+    text: str
+
+
+def _lines(file: Any) -> list[Line]:
     """The lines that are no comments."""
     if hasattr(file, "read"):
         text = file.read()
     else:
         opener: Any = gzip.open if str(file).endswith(".gz") else open
-        with opener(file, "rt", encoding="utf-8") as opened:
-            text = opened.read()
-    lines = (line.strip() for line in text.splitlines())
-    return [line for line in lines if line and not line.startswith("#")]
+        try:
+            with opener(file, "rt", encoding="utf-8-sig") as opened:
+                text = opened.read()
+        except UnicodeDecodeError:
+            raise ValidationError(f"{_name(file)} is not text in UTF-8") from None
+    lines = (Line(number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
+    return [line for line in lines if line.text and not line.text.startswith("#")]
 
 
-def _parsed(lines: list[str], file: Any, form: str, **options: Any) -> Any:
+def _parsed(lines: list[Line], file: Any, form: str, **options: Any) -> Any:
     if not lines:
         return np.zeros((0, 0))
     try:
-        return np.loadtxt(lines, **options)
+        return np.loadtxt([line.text for line in lines], **options)
     except ValueError as error:
         raise ValidationError(f"{_name(file)}: {form}; {brief(error)}") from None
 

@@ -15,6 +15,7 @@ array([0.        , 0.        , 1.28700222])
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from ._core import ValidationError
 from .curves.curve import Curve
 from .piecewise import evaluated
 from .pose_files import join, read_euroc, read_kitti, read_tum, split, write_euroc, write_kitti, write_tum
-from .rotations import Spline, angular_velocity, attitude, check_frame, turned
+from .rotations import Spline, attitude, check_frame, turned
 from .spaces import Array, Euclidean, SpecialEuclidean
 
 __all__ = [
@@ -88,9 +89,8 @@ def imu(
     g = np.asarray(gravity)
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {gravity!r}")
-    options: Any = {"extrapolate": extrapolate, "per_curve": per_curve}
-    force = linear_acceleration(spline, x, **options) - g
-    return Imu(angular_velocity(spline, x, **options), _in_body(spline, x, force, extrapolate, per_curve))
+    motion = _Motion(spline, x, extrapolate, per_curve)
+    return Imu(motion.turning, motion.in_body(motion.acceleration - g))
 
 
 def twist(
@@ -115,12 +115,11 @@ def twist(
         Shape batch axes + x.shape + (6,).
     """
     check_frame(frame)
-    options: Any = {"extrapolate": extrapolate, "per_curve": per_curve}
-    omega = angular_velocity(spline, x, frame, **options)
-    v = linear_velocity(spline, x, frame, **options)
-    if frame == "world":
-        v = v - np.cross(omega, _place(spline, x, "point", extrapolate, per_curve))
-    return np.concatenate([omega, v], axis=-1)
+    motion = _Motion(spline, x, extrapolate, per_curve)
+    if frame == "body":
+        return np.concatenate([motion.turning, motion.in_body(motion.velocity)], axis=-1)
+    omega = motion.turning_in_world
+    return np.concatenate([omega, motion.velocity - np.cross(omega, motion.place)], axis=-1)
 
 
 def linear_velocity(
@@ -142,8 +141,8 @@ def linear_velocity(
         Shape batch axes + x.shape + (3,).
     """
     check_frame(frame)
-    v = _place(spline, x, "velocity", extrapolate, per_curve)
-    return v if frame == "world" else _in_body(spline, x, v, extrapolate, per_curve)
+    motion = _Motion(spline, x, extrapolate, per_curve)
+    return motion.velocity if frame == "world" else motion.in_body(motion.velocity)
 
 
 def linear_acceleration(
@@ -167,25 +166,56 @@ def linear_acceleration(
         Shape batch axes + x.shape + (3,).
     """
     check_frame(frame)
-    a = _place(spline, x, "acceleration", extrapolate, per_curve)
-    if _position(spline).space == _SE3:
-        omega = angular_velocity(spline, x, "world", extrapolate=extrapolate, per_curve=per_curve)
-        a = a + np.cross(omega, _place(spline, x, "velocity", extrapolate, per_curve))
-    return a if frame == "world" else _in_body(spline, x, a, extrapolate, per_curve)
+    motion = _Motion(spline, x, extrapolate, per_curve)
+    return motion.acceleration if frame == "world" else motion.in_body(motion.acceleration)
 
 
-def _in_body(spline: Spline, x: ArrayLike, v: Array, extrapolate: Any, per_curve: bool) -> Array:
-    """Rᵀv for vectors in the world at times x."""
-    where = spline._where(extrapolate)
-    r = evaluated(attitude(spline), spline._clock, x, "point", where, per_curve, None)
-    return turned(np.swapaxes(r, -1, -2), v)
+class _Motion:
+    """A moving body at times x. Each quantity is evaluated when it is first asked for, and then kept."""
 
+    def __init__(self, spline: Spline, x: ArrayLike, extrapolate: Any, per_curve: bool) -> None:
+        self._attitude, self._position = attitude(spline), _position(spline)
+        self._clock, self._x = spline._clock, x
+        self._where, self._per_curve = spline._where(extrapolate), per_curve
 
-def _place(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
-    """The position at times x, its velocity, or the acceleration of the space's connection there."""
-    curve, where = _position(spline), spline._where(extrapolate)
-    values: Array = evaluated(curve, spline._clock, x, quantity, where, per_curve, None)
-    return values[..., :3, 3] if curve.space == _SE3 else values
+    @cached_property
+    def rotation(self) -> Array:
+        return self._at(self._attitude, "point")
+
+    @cached_property
+    def turning(self) -> Array:
+        """The angular velocity in the frame of the body."""
+        return self._at(self._attitude, "body velocity")
+
+    @cached_property
+    def turning_in_world(self) -> Array:
+        return turned(self.rotation, self.turning)
+
+    @cached_property
+    def place(self) -> Array:
+        return self._of_position("point")
+
+    @cached_property
+    def velocity(self) -> Array:
+        return self._of_position("velocity")
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """ẍ, which on SE(3) is not the acceleration of the connection."""
+        a = self._of_position("acceleration")
+        return a + np.cross(self.turning_in_world, self.velocity) if self._position.space == _SE3 else a
+
+    def in_body(self, v: Array) -> Array:
+        """Rᵀv for vectors in the world."""
+        return turned(np.swapaxes(self.rotation, -1, -2), v)
+
+    def _of_position(self, quantity: str) -> Array:
+        values = self._at(self._position, quantity)
+        return values[..., :3, 3] if self._position.space == _SE3 else values
+
+    def _at(self, curve: Curve, quantity: str) -> Array:
+        values: Array = evaluated(curve, self._clock, self._x, quantity, self._where, self._per_curve, None)
+        return values
 
 
 def _position(spline: Spline) -> Curve:

@@ -16,6 +16,7 @@ array([0., 0., 1.])
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +57,10 @@ _FRAMES = ("body", "world")
 _SIX = ("columns", "rows", "interleaved")
 # Two of the six numbers' vectors that are closer to parallel than this have no third in single precision.
 _PARALLEL = 1e-6
+# Curves made of others, whose making goes over all knots: the rotations of poses, and the curves on S³ above curves
+# on SO(3).
+_ATTITUDES: WeakKeyDictionary[Curve, Curve] = WeakKeyDictionary()
+_LIFTS: WeakKeyDictionary[Curve, Curve] = WeakKeyDictionary()
 
 
 # ---- along a curve ----
@@ -147,7 +152,7 @@ def quaternion(
         scalar_first: True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS. It must be given.
 
     Returns:
-        Shape batch axes + x.shape + (4,). The work before the first time is proportional to the number of knots.
+        Shape batch axes + x.shape + (4,). The first call also goes over all knots.
 
     >>> import numpy as np, symspline as ss
     >>> turns = ss.CubicSpline(None, from_rotation_vectors([[0, 0, i] for i in range(8)]), "so:3")
@@ -210,9 +215,11 @@ def attitude(spline: Spline) -> Curve:
     curve = found[0]
     if curve.space == _SO3:
         return curve
-    # The rotation of a screw motion is a geodesic of SO(3), and so the control points are those of its curve.
-    parts = [np.ascontiguousarray(array[..., :3, :3]) for array in (curve.points, curve.velocities)]
-    return curve_of(_SO3, curve.times, [(parts[0], parts[1])], fitted=False)
+    if curve not in _ATTITUDES:
+        # The rotation of a screw motion is a geodesic of SO(3), and so the control points are those of its curve.
+        parts = [np.ascontiguousarray(array[..., :3, :3]) for array in (curve.points, curve.velocities)]
+        _ATTITUDES[curve] = curve_of(_SO3, curve.times, [(parts[0], parts[1])], fitted=False)
+    return _ATTITUDES[curve]
 
 
 def check_frame(frame: Any) -> None:
@@ -245,7 +252,7 @@ def _vee(r: Array, d: Array) -> Array:
 
 def turned(r: Array, v: Array) -> Array:
     """Rv for matrices and vectors."""
-    result: Array = (r @ v[..., None])[..., 0]
+    result: Array = np.einsum("...ij,...j->...i", r, v)
     return result
 
 
@@ -260,6 +267,12 @@ def _lift(curve: Curve) -> Curve:
     The Bézier segments of the one are above those of the other, where neighbouring control points are less than
     half a turn apart: from those quaternions follow the signs at the knots.
     """
+    if curve not in _LIFTS:
+        _LIFTS[curve] = _lifted(curve)
+    return _LIFTS[curve]
+
+
+def _lifted(curve: Curve) -> Curve:
     q = matrix_to_quaternion(curve.points, scalar_first=True)
     # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
     rate = _velocity_above(q, curve)

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
-from .arrays import shown, whole_number
+from .arrays import as_array, shown, whole_number
 from .curves.fit import read
 from .functions import fit_many
+from .handed import times_of
 from .spaces import Array, Product, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline
-from .times import clock_of
+from .times import Moments, clock_of
 
 _DUPLICATES = ("raise", "first", "mean")
 # The mean of points near each other is found by a few steps, each of which leaves the third power of their distance.
@@ -72,7 +73,7 @@ def fit_segments(
 
 def cut(
     t: ArrayLike, points: Any, space: Space | str, max_gap: Any, min_points: int, duplicates: str
-) -> tuple[list[tuple[NDArray[Any], Any]], NDArray[np.float64], float]:
+) -> tuple[list[tuple[Any, Any]], NDArray[np.float64], float]:
     """Times and points of the pieces, as `fit_segments` says, none where all are too short; all steps, and the longest
     of a piece, as the core counts times."""
     space = space_named(space)
@@ -82,7 +83,8 @@ def cut(
     data = read(points, space)
     if data[0].batch:
         raise ValidationError(f"points has batch axes {data[0].batch}; a recording is a single curve")
-    clock, times = clock_of(t)
+    given, zone = times_of(t, "t")
+    clock, times = clock_of(Moments(given, zone))
     if times.shape != (data[0].nodes,):
         raise ValidationError(f"t has shape {times.shape}, but there are {data[0].nodes} points")
     seconds = clock.knots(times)
@@ -91,15 +93,20 @@ def cut(
         factor._array(part, "points")
         for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True)
     ]
+    # As they were given, so that curves know of a zone, and of durations.
+    moments = as_array(given, "t")
     starts = np.flatnonzero(np.diff(seconds, prepend=-np.inf) > 0)
     if len(starts) < len(seconds):
         arrays = [_at_once(f, a, starts, duplicates) for f, a in zip(factors_of(space), arrays, strict=True)]
-        times, seconds = times[starts], seconds[starts]
+        moments, seconds = moments[starts], seconds[starts]
     gap = _seconds(max_gap, clock.dates)
     cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
     pieces = [slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True) if b - a >= least]
     curves = [
-        (times[own], tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own])
+        (
+            Moments(moments[own], zone),
+            tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own],
+        )
         for own in pieces
     ]
     return curves, np.diff(seconds), gap

@@ -13,20 +13,27 @@ from .failures import callers_level
 from .spaces import Array, Space, Sphere, factors_of
 
 _S3 = Sphere(3)
+# What a program may do about it.
+IN_PYTHON = (
+    "Curves of rotations are on so:3 (symspline.rotations.from_quaternions makes its points) or on rp:3, where signs "
+    "do not count. If these are no rotations: "
+    "warnings.filterwarnings('ignore', message='neighbours of opposite sign')"
+)
 
 
-def warn_of_signs(space: Space, curves: Sequence[list[Points]]) -> None:
+def warn_of_signs(space: Space, curves: Sequence[list[Points] | None]) -> None:
     """Warn once if neighbours on S³ are more than a quarter turn apart: as quaternions they are closer with the other
     sign, and the curve between them turns the long way round.
 
     Args:
-        curves: the points of each curve in every factor; of a batch they are one.
+        curves: the points of each curve in every factor; of a batch they are one; None for those left out.
     """
     if _S3 not in factors_of(space):
         return
     found = [
         (number, index, part.doubles)
         for number, parts in enumerate(curves)
+        if parts is not None
         for factor, part in zip(factors_of(space), parts, strict=True)
         if factor == _S3
         for index in _opposite(part.doubles)
@@ -40,10 +47,9 @@ def warn_of_signs(space: Space, curves: Sequence[list[Points]]) -> None:
     more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
     warnings.warn(
-        f"neighbours of opposite sign on sphere:3: points {i} and {i + 1}{of} have inner product {product:.3g}{more}. "
-        "As quaternions q and -q are one rotation, but here the curve turns the long way round. Curves of rotations "
-        "are on so:3 (symspline.rotations.from_quaternions makes its points) or on rp:3, where signs do not count. If "
-        "these are no rotations: warnings.filterwarnings('ignore', message='neighbours of opposite sign')",
+        f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
+        f"{product:.3g}{more}. As quaternions q and -q are one rotation, but here the curve turns the long way round. "
+        f"{IN_PYTHON}",
         UserWarning,
         stacklevel=callers_level(),
     )

@@ -37,7 +37,8 @@ class CubicSpline(Piecewise):
 
     Args:
         t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one
-            row per curve. Numbers or ``datetime64``; for dates rates are per second.
+            row per curve. Numbers, ``datetime64`` or other dates; for dates rates are per second. Those with a
+            time zone become UTC.
         points: shape (..., N+1, *space.point_shape), N >= 1, real, or complex on complex spaces; leading axes
             are independent curves. Points within 1e-8 of the space (1e-4 for single precision) are projected.
             For a `Product` a tuple of arrays.
@@ -289,7 +290,7 @@ class CubicSpline(Piecewise):
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        archive.write(file, archive.arrays_of(self, self._reports))
+        archive.write(file, archive.fitted_arrays(self, self._reports))
 
     # What a plot says of it.
     _kind = "C² spline"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,18 @@ _SECONDS = {
     "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "fs": 1e15, "as": 1e18,
 }  # fmt: skip
 _MULTIPLES = ("W", "D", "h", "m", "s")
+
+
+class Moments(NamedTuple):
+    """Times of a user that were read before.
+
+    Attributes:
+        times: as NumPy has them.
+        zone: what was known of their zone, see `handed.times_of`.
+    """
+
+    times: Any
+    zone: str | None
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,8 @@ class Clock:
         if {zone, self.zone} == {UTC_ZONE, NO_ZONE}:
             here, there = ("a time zone", "none") if zone == UTC_ZONE else ("no time zone", "one")
             raise ValidationError(
-                f"x has {here}, but the knots have {there}: which time is meant is in doubt"
+                f"x has {here}, but the knots have {there}: which time is meant is in doubt; pass both with a zone, or "
+                "both without"
             )
         if self.durations and array.dtype.kind == "m":
             array = _durations(array, "x")
@@ -89,9 +102,9 @@ class Clock:
         return ValidationError(f"{error}; times are {what} since {since}{more}")
 
 
-def clock_of(knots: ArrayLike) -> tuple[Clock, NDArray[Any]]:
+def clock_of(knots: ArrayLike | Moments) -> tuple[Clock, NDArray[Any]]:
     """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
-    given, zone = times_of(knots, "t")
+    given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
     array = as_array(given, "t")
     if array.size == 0:
         raise ValidationError("t is empty; a curve needs at least two points")

@@ -131,3 +131,9 @@ def test_check_of_a_slight_bend_is_relative(run):
     acceleration = float(run("check a.npz").splitlines()[1].split()[-1])
     pieces = spline_pieces(bent).jumps(2)
     assert acceleration == pytest.approx(pieces.relative, rel=0.1) and pieces.largest > 1e-10
+
+
+def test_curves_with_given_velocities_are_named(fails):
+    ss.HermiteSpline(None, np.eye(3), np.roll(np.eye(3), 1, axis=1), "s:2").save("hermite.npz")
+    for command in ("check hermite.npz", "sample hermite.npz -n 3 -o a.csv", "plot hermite.npz -o a.png"):
+        assert "hermite.npz is a HermiteSpline, whose acceleration jumps" in fails(command)

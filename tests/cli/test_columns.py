@@ -9,6 +9,7 @@ from curves import each, parts, points_on, same_curve
 from tabular import TIMES, assert_same_columns, numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss
+from symspline.cli import main
 
 TABLES = pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
 
@@ -228,3 +229,23 @@ def test_bad_points_in_matrix_spaces(fails, name, change, problem):
     for line, row in (("line 4", "row 2 (counted from 0)"), ("line 5", "row 3 (counted from 0)")):
         problem = problem.replace(line, row)
     assert problem in fails(f"fit a.npz --space '{name}' --curve id -o b.npz")
+
+
+@pytest.mark.filterwarnings("default:neighbours of opposite sign")
+def test_quaternions_of_opposite_sign_are_noted(capsys):
+    write("q.csv", "t,w,x,y,z\n0,1,0,0,0\n1,-0.8,-0.6,0,0\n2,0.6,0.8,0,0\n")
+    write("named.csv", "name,w,x,y,z\na,1,0,0,0\na,.8,.6,0,0\nb,1,0,0,0\nb,-.8,-.6,0,0\n")
+    for line, where, of in (
+        ("fit q.csv --space sphere:3 -o q.npz", "q.csv: neighbours of opposite sign on sphere:3: ", ""),
+        ("fit named.csv --space sphere:3 --curve name -o n.npz", "named.csv: ", " of curve 'b'"),
+    ):
+        assert main(line.split()) == 0
+        note = capsys.readouterr().err
+        assert note.startswith(f"symspline: {where}") and note.count("\n") == 1, note
+        lines = (4, 5) if of else (2, 3)
+        assert (
+            f"the point in line {lines[0]} and the point in line {lines[1]}{of} have inner product -0.8"
+            in note
+        )
+        assert note.endswith("For rotations give --space so:3, or rp:3, where signs do not count\n")
+        assert "UserWarning" not in note and "symspline.rotations" not in note

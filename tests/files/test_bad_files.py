@@ -171,6 +171,7 @@ def report_with(**changes):
         {"t": [0, 1j, 2]},
         {"t": []},
         {"t_unit": "parsec", "t": [0, 1, 2]},
+        {"t_unit": "s CET", "t": [0, 1, 2]},
         {"t_unit": "s", "t": [0, 1, np.iinfo(np.int64).min]},
         {"points": 2 * P},
         {"points": NAN * P},

@@ -53,6 +53,8 @@ def saved_curves():
         "product batch": ss.CubicSpline(KNOTS, points_on(product, 6, (2,)), product),
         "flat": ss.CubicSpline(KNOTS, points_on(ss.Euclidean(1), 6), "r:1"),
         "hyperbolic": ss.CubicSpline(KNOTS, points_on(ss.Hyperbolic(3), 6), "h:3"),
+        "left out": ss.CubicSpline(None, [THREE, THREE], S2, where=[True, False]),
+        "a bad sensor": ss.CubicSpline(None, [THREE, np.nan * np.array(THREE)], S2, on_failure="ignore"),
         "one bad curve": ss.CubicSpline(None, cut, S2, on_failure="ignore", **options),
     }
 
@@ -140,6 +142,55 @@ def test_saved_files_have_the_rights_of_new_files(tmp_path):
     assert (tmp_path / "curve.npz").stat().st_mode == (tmp_path / "other").stat().st_mode
 
 
+# ---- curves with given velocities ----
+
+
+def saved_hermites():
+    product = ss.Product("so:3", "r:3")
+    poses, dates = points_on(product, 4), np.array(["2024-01-01", "2024-01-02", "2024-01-05"], "M8[h]")
+    chosen = tangents_at(S2, np.array(THREE, float))
+    return {
+        "one": ss.HermiteSpline([0, 1, 3], THREE, chosen, S2, extrapolate="geodesic"),
+        "batch": ss.HermiteSpline(None, [THREE, THREE], [chosen, 0 * chosen], S2),
+        "dates": ss.HermiteSpline(dates, THREE, 1e-5 * chosen, S2),
+        "product": ss.HermiteSpline(None, poses, tangents_at(product, poses), product),
+        "span": ss.HermiteSpline(None, np.eye(400)[:3], 0.1 * np.eye(400)[10:13], "sphere:399"),
+    }
+
+
+HERMITES = saved_hermites()
+
+
+@pytest.mark.parametrize("name", HERMITES)
+def test_files_keep_given_velocities(name):
+    spline = HERMITES[name]
+    read = round_trip(spline)
+    assert type(read) is ss.HermiteSpline and read == spline and repr(read) == repr(spline)
+    assert read.t.dtype == spline.t.dtype and read.extrapolate == spline.extrapolate
+    x = spline.t.ravel()[:1] + (spline.t.ravel()[1] - spline.t.ravel()[0]) // 2
+    for nu in range(3):
+        assert same(read(x, nu=nu), spline(x, nu=nu))
+
+
+def test_files_of_given_velocities_that_are_damaged():
+    file = io.BytesIO()
+    HERMITES["one"].save(file)
+    file.seek(0)
+    arrays = dict(np.load(file))
+    bad = {
+        "velocities": np.array(THREE, float),
+        "points": 2.0 * np.array(THREE),
+        "t": [0, 2, 1],
+        "version": 9,
+    }
+    for key, value in [*bad.items(), ("velocities", np.full((3, 3), np.nan))]:
+        file = io.BytesIO()
+        np.savez(file, **arrays | {key: value})
+        file.seek(0)
+        with pytest.raises(ss.ValidationError, match="the file"):
+            ss.load(file)
+
+
 # ---- many curves in one file ----
 
 
@@ -169,6 +220,11 @@ def test_collections_in_python(tmp_path):
         ss.save_many({"p": both, "q": one}, tmp_path / "d.npz")
     with pytest.raises(ss.ValidationError, match="of one space"):
         ss.save_many({}, tmp_path / "d.npz")
+    pair = ss.fit_many([(None, np.eye(3)), (None, np.eye(3))], "s:2", where=[True, False])
+    ss.save_many(dict(zip("ab", pair, strict=True)), tmp_path / "some.npz")
+    assert ss.load_many(tmp_path / "some.npz") == dict(zip("ab", pair, strict=True))
+    with pytest.raises(TypeError, match="objects of CubicSpline"):
+        ss.save_many({"a": HERMITES["one"]}, tmp_path / "d.npz")
     with pytest.raises(ss.ValidationError, match="single curves"):
         ss.save_many({"a": ss.CubicSpline(None, [np.eye(3)] * 2, "s:2")}, tmp_path / "d.npz")
     with pytest.raises(ss.ValidationError, match=r"read them with symspline\.load_many"):

@@ -1,5 +1,7 @@
 """Rotations in the words of those who turn things, beside SciPy and finite differences."""
 
+import gc
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +138,20 @@ def test_quaternions_do_not_jump(space, scalar_first, step):
     assert q[0, 0 if scalar_first else 3] >= 0
     found = rotations.from_quaternions(q, scalar_first=scalar_first)
     assert np.abs(found - turns(spline, x)).max() < 2e-14
+
+
+@pytest.mark.parametrize("space", [SO3, SE3], ids=str)
+def test_knots_are_gone_through_once(monkeypatch, space):
+    spline, above, gone = curve(space), rotations.matrix_to_quaternion, []
+    expected = rotations.quaternion(curve(space), X, scalar_first=True)
+    monkeypatch.setattr(rotations, "matrix_to_quaternion", lambda *a, **k: gone.append(1) or above(*a, **k))
+    found = [rotations.quaternion(spline, x, scalar_first=True) for x in X]
+    assert np.array_equal(found, expected) and len(gone) == 1
+    # What is kept goes with the curve.
+    kept = weakref.ref(spline._curve)
+    del spline
+    gc.collect()
+    assert kept() is None
 
 
 def test_quaternions_of_a_whole_turn_change_sign():

@@ -46,6 +46,47 @@ def test_there_and_back_also_near_the_poles(size):
     assert (largest.imag == 0).all() and (largest.real > 0.7).all()
 
 
+# The second by a finite temperature.
+PURE = ss.convert.state_to_density(CP1.random_point(np.random.default_rng(5), 4))
+MIXED = 0.9 * PURE + 0.05 * np.eye(2)
+
+
+class Operator(Ket):
+    isket = False
+
+    def full(self):
+        return np.array(self.numbers)
+
+
+@pytest.mark.parametrize(
+    "points", [PURE, [PURE, PURE], PURE.astype("c8"), list(PURE), list(map(Operator, PURE)), np.diag([1, 0])]
+)
+@pytest.mark.parametrize("space", ["cp:1", "cp:3"])
+def test_density_matrices_of_pure_states_are_named(points, space):
+    with pytest.raises(ss.ValidationError, match=r"density matrices.*symspline\.convert\.density_to_state"):
+        ss.CubicSpline(None, points, space)
+    with pytest.raises(ss.ValidationError, match="looks like density matrices"):
+        ss.space(space).check_point(points)
+    ss.CubicSpline(None, ss.convert.density_to_state(PURE), "cp:1")
+
+
+@pytest.mark.parametrize("space, points", [("cp:1", MIXED), ("rp:1", MIXED.real)])
+def test_there_is_no_space_of_mixed_states(space, points):
+    with pytest.raises(ss.ValidationError, match=r"density matrices.*mixed.*PositiveDefinite\(2\)") as caught:
+        ss.CubicSpline(None, points, space)
+    name = str(caught.value).split("points of ")[-1].split(",")[0]
+    ss.CubicSpline(None, points, getattr(ss, name.split("(")[0])(2))
+
+
+def test_states_are_not_taken_for_density_matrices():
+    # Hermitian, of trace 1, and of unit rows: of purity 3.
+    ss.CubicSpline(None, np.diag([1.0, 1, -1]), "cp:2", on_failure="ignore")
+    with pytest.raises(ss.ValidationError, match="off the space"):
+        ss.CubicSpline(None, [[1, 0], [0, np.nan]], "cp:1")
+    with pytest.raises(ss.ValidationError, match=r"its norm is 0\.5, not 1"):
+        ss.CubicSpline(None, np.eye(2) / 2 + [[0, 0], [1, 0]], "cp:1")
+
+
 def test_distances_are_halved():
     rng = np.random.default_rng(2)
     v, w = ss.Sphere(2).random_point(rng, (2, 100))

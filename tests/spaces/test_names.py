@@ -1,7 +1,9 @@
 """Spaces as values: their names, what they say of themselves, and spaces that there are not."""
 
 import copy
+import inspect
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from curves import S2, every_single, every_space, points_on
 from refused import INF, fit_error
 
 import symspline as ss
+from symspline.spaces.base import CLASSES
 
 # ---- names ----
 
@@ -219,6 +222,21 @@ def test_sizes_that_are_no_whole_numbers(kind, value):
     cls = getattr(ss, kind)
     with pytest.raises(ss.ValidationError, match=rf"{kind} takes whole numbers, not {value!r}"):
         cls(value, 5) if kind == "Grassmannian" else cls(value)
+
+
+@pytest.mark.parametrize("cls", CLASSES.values(), ids=lambda cls: cls.__name__)
+def test_sizes_that_are_not_given(cls):
+    names = [*inspect.signature(cls).parameters]
+    for numbers in ((), (2, 4, 5)):
+        with pytest.raises(
+            TypeError, match=rf"^{cls.__name__} takes {' and '.join(names)}, such as "
+        ) as caught:
+            cls(*numbers)
+    call, name = re.search(r"such as (.*) or '(.*)': \w.* \S", str(caught.value)).groups()
+    made = ss.space(name)
+    assert type(made) is cls and repr(made) == call
+    # Names of numbers are taken, as before.
+    assert cls(**dict(zip(names, made._parameters, strict=True))) == made
 
 
 def test_a_product_has_types():

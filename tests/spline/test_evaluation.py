@@ -210,6 +210,8 @@ def test_results_in_single_precision(name, kind, dtype):
 
 def test_single_precision_in_a_product_and_of_one_time():
     spline = ss.CubicSpline(None, points_on(ss.space("cp:1 x r:2"), 4), "cp:1 x r:2")
+    assert spline.speed([0.5], dtype="float32").dtype == spline.speed(0.5, dtype="f4").dtype == np.float32
+    assert spline.speed(0.5, dtype="f4") == np.float32(spline.speed(0.5))
     assert [part.dtype.name for part in spline(0.5, dtype="float32")] == ["complex64", "float32"]
     for dtype in ("int", "f2", "nonsense", 3):
         with pytest.raises(ss.ValidationError, match="dtype must be 'float32' or 'float64', not"):

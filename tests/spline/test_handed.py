@@ -3,6 +3,8 @@
 pandas, PyTorch and QuTiP need not be there: stand-ins do what the library looks at, as those do it.
 """
 
+import io
+import pickle
 from datetime import UTC, date, datetime, timedelta, timezone
 from decimal import Decimal
 
@@ -17,6 +19,7 @@ P = np.eye(3)
 HOURS = np.array(["2021-08-29T00", "2021-08-29T06", "2021-08-29T18"], "datetime64[h]")
 SPLINE = ss.CubicSpline(HOURS, P, S2)
 EAST = timezone(timedelta(hours=2))
+BERLIN, KOLKATA = (timezone(timedelta(hours=h), name) for h, name in ((1, "Berlin"), (5.5, "Kolkata")))
 NAIVE = [datetime(2021, 8, 29, hour) for hour in (0, 6, 18)]
 
 
@@ -116,6 +119,57 @@ def test_times_with_and_without_a_zone_do_not_mix():
     for word in ("now", "today", "NaT", "2021", "2021-02-30", "29.8.2021", "20210829", ""):
         with pytest.raises(ss.ValidationError, match=r"t\[1\] is '.*', no date such as"):
             ss.CubicSpline(["2021-08-29", word, "2021-08-31"], P, S2)
+
+
+KINDS = {
+    "fitted": lambda t: ss.CubicSpline(t, P, S2),
+    "given velocities": lambda t: ss.HermiteSpline(t, P, 1e-5 * np.roll(P, 1, axis=1), S2),
+    "many": lambda t: ss.fit_many([(t, P)], S2)[0],
+    "a piece": lambda t: ss.fit_segments(t, P, S2, max_gap=timedelta(hours=7))[0],
+    "of a batch": lambda t: ss.CubicSpline([t, t], [P, P], S2)[1],
+}
+
+
+@pytest.mark.parametrize("zone", [BERLIN, KOLKATA, None])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_curve_knows_whether_its_times_have_a_zone(zone, kind):
+    spline = KINDS[kind]([datetime(2026, 1, 1, hour, tzinfo=zone) for hour in (0, 6, 12)])
+    file = io.BytesIO()
+    spline.save(file)
+    file.seek(0)
+    for curve in (spline, ss.load(file), pickle.loads(pickle.dumps(spline))):
+        middle = datetime(2026, 1, 1, 6, tzinfo=zone)
+        utc = middle.astimezone(UTC).replace(tzinfo=None) if zone else middle
+        # NumPy's dates have no zone: they are those of ``t``, UTC.
+        assert curve.t[1] == np.datetime64(utc) and np.array_equal(curve(curve.t[1]), P[1])
+        if zone:
+            for x in (middle, middle.astimezone(EAST), middle.astimezone(KOLKATA).isoformat()):
+                assert np.array_equal(curve(x), P[1]) and np.array_equal(curve([x])[0], P[1])
+            for x in (middle.replace(tzinfo=None), "2026-01-01T06:00"):
+                with pytest.raises(
+                    ss.ValidationError, match=r"no time zone, but the knots have one.*both with"
+                ):
+                    curve(x)
+        else:
+            for x in (middle.replace(tzinfo=KOLKATA), "2026-01-01T06:00Z"):
+                with pytest.raises(ss.ValidationError, match="a time zone, but the knots have none"):
+                    curve(x)
+
+
+def test_many_curves_in_a_file_are_of_one_kind_of_time(tmp_path):
+    aware = [moment.replace(tzinfo=BERLIN) for moment in NAIVE]
+    one, other = (ss.CubicSpline(t, P, S2) for t in (aware, NAIVE))
+    with pytest.raises(ss.ValidationError, match="all with a time zone or without"):
+        ss.save_many({"one": one, "other": other}, tmp_path / "c.npz")
+    ss.save_many({"one": one}, tmp_path / "c.npz")
+    with pytest.raises(ss.ValidationError, match="x has no time zone"):
+        ss.load_many(tmp_path / "c.npz")["one"](NAIVE[1])
+
+
+def test_pieces_of_a_recording_take_durations():
+    t = [timedelta(0), timedelta(seconds=1), timedelta(seconds=3)]
+    (piece,) = ss.fit_segments(t, P, S2, max_gap=5)
+    assert np.array_equal(piece(t[1]), P[1]) and piece == ss.CubicSpline(t, P, S2)
 
 
 @pytest.mark.parametrize(

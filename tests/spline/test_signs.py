@@ -33,7 +33,7 @@ def test_a_flipped_sample_warns_once_and_says_what_to_do():
     (warning,) = caught
     message = str(warning.message)
     assert message.startswith(
-        "neighbours of opposite sign on sphere:3: points 3 and 4 have inner product -0.985"
+        "neighbours of opposite sign on sphere:3: points[3] and points[4] have inner product -0.985"
     )
     assert "(and 1 more pairs)" in message and "so:3" in message and "rp:3" in message
     assert "warnings.filterwarnings('ignore', message='neighbours of opposite sign')" in message
@@ -44,11 +44,14 @@ def test_a_flipped_sample_warns_once_and_says_what_to_do():
 
 def test_which_curve_it_was():
     batch = np.stack([motion(), flipped(9)])
-    with pytest.warns(UserWarning, match="points 8 and 9 of curve 1 have"):
+    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
         ss.CubicSpline(None, batch, "sphere:3")
-    with pytest.warns(UserWarning, match="points 8 and 9 of curve 1 have"):
+    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
         ss.fit_many([(None, motion()), (None, flipped(9))], "sphere:3")
-    with pytest.warns(UserWarning, match="points 8 and 9 have"):
+    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
+        ss.fit_many([(None, flipped(3)), (None, flipped(9))], "sphere:3", where=[False, True])
+    silent(lambda: ss.fit_many([(None, flipped(3))], "sphere:3", where=[False]))
+    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] have"):
         ss.CubicSpline(None, (np.zeros((10, 2)), flipped(9)), "r:2 x sphere:3")
 
 

@@ -74,6 +74,54 @@ def test_faults_and_errors_name_the_curve_in_the_whole_batch():
         ss.CubicSpline(None, p, "s:2", where=mask)
 
 
+def test_times_are_those_of_the_curve_in_the_whole_batch():
+    t, mask = [[0, 1, 2], [0, 1, 2], [0, 2, 1]], np.array([False, True, True])
+    with pytest.raises(ss.ValidationError, match=r"t\[2\]\[2\] = 1 is before t\[2\]\[1\] = 2"):
+        ss.CubicSpline(t, [np.eye(3)] * 3, "s:2", where=mask)
+    with pytest.raises(ss.ValidationError, match=r"t\[2\]\[2\] = 1 is before t\[2\]\[1\] = 2"):
+        ss.fit_many([(row, np.eye(3)) for row in t], "s:2", where=mask)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "cp:1", "sphere:2 x r:3", "sphere:300"])
+def test_wanted_curves_of_different_lengths(name):
+    space = ss.space(name)
+    pairs = [(np.arange(n) + 3.0, points_on(space, n, step=0.4)) for n in (4, 2, 5, 3)]
+    start = points_on(space, 4, (4,), step=0.4)
+    v = [tuple(0 * part[:, 0] for part in parts(start))] if len(parts(start)) > 1 else [0 * start[:, 0]]
+    options = {"bc_type": ((1, v[0]), "natural"), "extrapolate": True}
+    whole = ss.fit_many(pairs, space, **options)
+    pairs[1] = pairs[1][0], each(lambda part: np.nan * part, pairs[1][1])
+    mask = np.array([True, False, False, True])
+    some = ss.fit_many(pairs, space, where=mask, **options)
+    for found, expected, wanted in zip(some, whole, mask, strict=True):
+        assert np.array_equal(found.t, expected.t) and found.report.converged == wanted
+        if wanted:
+            assert found == expected and found.report == expected.report
+        else:
+            assert all(np.isnan(part).all() for part in (*parts(found(3.5)), *parts(found.points)))
+    assert not any(one.report.converged for one in ss.fit_many(pairs, space, where=~(mask | ~mask)))
+    assert ss.fit_many([], space, where=[]) == []
+
+
+def test_errors_name_the_curve_in_the_whole_list():
+    bad = [(None, np.eye(3)), (None, np.eye(3)), (None, np.eye(3)[[0, 0]] * [[1], [-1]])]
+    mask = np.array([False, True, True])
+    with pytest.raises(ss.CutLocusError, match="of curve 2 ") as caught:
+        ss.fit_many(bad, "s:2", where=mask)
+    assert [one.report.converged for one in caught.value.spline] == [False, True, False]
+    bad[2] = (None, 2 * np.eye(3))
+    with pytest.raises(ss.ValidationError, match=r"points\[0\] of curve 2 is off"):
+        ss.fit_many(bad, "s:2", where=mask)
+    bad[1] = (None, np.eye(3, dtype=np.float32))
+    bad[2] = (None, (1 + 1e-6) * np.eye(3))
+    with pytest.raises(ss.ValidationError, match=r"^curve 2: point 0 is off"):
+        ss.fit_many(bad, "s:2", where=mask)
+    with pytest.raises(
+        ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"
+    ):
+        ss.fit_many(bad, "s:2", where=mask[:2])
+
+
 @pytest.mark.parametrize("where", [[True], [1, 0], [True, False, True], True])
 def test_bad_masks(where):
     fit_error(

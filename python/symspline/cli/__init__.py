@@ -10,14 +10,11 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
-from ..arrays import brief
 from ..version import VERSION
 from . import check, demo, fit, plot, sample
-from .errors import Problem, with_names
+from .errors import Problem, say, with_names
 
 FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
-# Letters of a message, which may quote any file.
-_LONGEST = 1000
 
 _DESCRIPTION = "Smooth C2 curves through data in files, on spheres and other curved spaces."
 _EPILOG = """\
@@ -65,8 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _say(message: object, code: int) -> int:
-    """Print one line on stderr."""
-    print("symspline:", brief(message, _LONGEST), file=sys.stderr)
+    """Print one line on stderr; returns the exit code."""
+    say(message)
     return code
 
 

@@ -89,7 +89,13 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         if "names.npy" in entries:
             splines, named = load_many(file), True
         else:
-            splines = dict(_singles(load(file)))
+            spline = load(file)
+            if not isinstance(spline, CubicSpline):
+                raise Problem(
+                    f"{path} is a HermiteSpline, whose acceleration jumps; the commands are for C² splines, "
+                    "symspline.load reads it in Python"
+                )
+            splines = dict(_singles(spline))
             named = len(splines) > 1
         space = next(iter(splines.values())).space
         if lonlat:

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
 from ..archive import replacing
+from ..arrays import brief
 from ..spaces.base import CLASSES
 
 _NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
 _SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\(([\w, ]+)\)")
+
+
+# Letters of a message, which may quote any file.
+_LONGEST = 1000
+
+
+def say(message: object) -> None:
+    """Print one line on stderr."""
+    print("symspline:", brief(message, _LONGEST), file=sys.stderr)
 
 
 class Problem(Exception):

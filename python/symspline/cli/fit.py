@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,13 +11,14 @@ from typing import Any
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from ..functions import fit_many
+from ..signs import IN_PYTHON
 from ..spaces import Space
 from ..spaces import space as space_named
 from ..spline import CubicSpline
 from .curves import ENDING, Columns, Curves, write_curves
 from .data import Data
 from .entries import completed
-from .errors import Problem, check_target
+from .errors import Problem, check_target, say
 from .formats import open_table
 from .numbers import real
 from .points import GLOBE, require_globe
@@ -53,6 +55,7 @@ examples:
 
 symspline.load reads the curve in Python; with --curve, symspline.load_many reads all of them."""
 
+_FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 _EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
 
 
@@ -159,7 +162,7 @@ def _fit(data: Data, space: Space, columns: Columns, options: argparse.Namespace
     """All curves in one call."""
     bc_type = _bc_type(options.bc_type)
     try:
-        with Progress("fitting") as progress:
+        with warnings.catch_warnings(record=True) as noted, Progress("fitting") as progress:
             fitted = fit_many(
                 data.curves(space, columns),
                 space,
@@ -171,6 +174,8 @@ def _fit(data: Data, space: Space, columns: Columns, options: argparse.Namespace
             )
     except (ValidationError, CutLocusError, ConvergenceError) as error:
         raise type(error)(data.located(str(error))) from None
+    for note in noted:
+        say(data.located(str(note.message).replace(IN_PYTHON, _FOR_ROTATIONS)))
     return dict(zip(data.groups, fitted, strict=True))
 
 

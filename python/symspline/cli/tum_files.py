@@ -13,18 +13,17 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ..pose_files import TUM, tum_rows
 from ..spaces import space as space_named
 from .curves import Curves
 from .errors import Problem, reading
-from .numbers import is_number
-from .numbers import numbers as as_numbers
 from .progress import Progress
 from .quaternions import places_of
 from .tables import Array, Rows, Table
 
 ENDINGS = (".tum", ".txt")
-_POSE = ["tx", "ty", "tz", "qx", "qy", "qz", "qw"]
-_NAMES = ["time", *_POSE]
+_NAMES = list(TUM)
+_POSE = _NAMES[1:]
 _SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3")]
 
 
@@ -35,41 +34,17 @@ class TumTable(Table):
         self.path = path
         self.names, self.numeric, self.dates = _NAMES, _NAMES, []
         with reading(path):
-            try:
-                text = path.read_text("utf-8-sig")
-            except UnicodeDecodeError:
-                raise Problem(f"{path} is not text in UTF-8") from None
-        self._lines = [(n, cells) for n, line in enumerate(text.splitlines(), 1) if (cells := _cells(line))]
-        if not self._lines:
-            raise Problem(f"{path} is empty")
-        for n, cells in self._lines:
-            if len(cells) != len(_NAMES):
-                raise Problem(
-                    f"{path}, line {n}: {len(cells)} numbers, but a line of a TUM trajectory has {len(_NAMES)}: "
-                    f"{' '.join(_NAMES)}"
-                )
+            self._rows, self._place = tum_rows(path)
 
     def read(self, numbers: Sequence[str], time: str | None, label: str | None, progress: Progress) -> Rows:
-        def place(row: int) -> str:
-            return f"line {self._lines[row][0]}"
+        def column(name: str) -> Array:
+            return self._rows[:, _NAMES.index(name)]
 
-        table = np.empty((len(self._lines), len(_NAMES)))
-        columns = zip(*(cells for _, cells in self._lines), strict=True)
-        for done, (name, cells) in enumerate(zip(_NAMES, columns, strict=True)):
-            progress(done, len(_NAMES))
-            try:
-                table[:, done] = as_numbers(cells)
-            except ValueError:
-                i = next(i for i, cell in enumerate(cells) if not is_number(cell))
-                raise self._fail(name, place)(i, f"holds {cells[i]!r}, which is not a number") from None
-            self._finite(table[:, done], name, place)
-        times = np.empty(0) if time is None else table[:, _NAMES.index(time)]
-        labels = None if label is None else [str(x) for x in table[:, _NAMES.index(label)]]
-        return Rows(table[:, [_NAMES.index(name) for name in numbers]], times, False, labels, place)
-
-
-def _cells(line: str) -> list[str]:
-    return [] if line.lstrip().startswith("#") else line.split()
+        times = np.empty(0) if time is None else column(time)
+        labels = None if label is None else [str(x) for x in column(label)]
+        return Rows(
+            self._rows[:, [_NAMES.index(name) for name in numbers]], times, False, labels, self._place
+        )
 
 
 def as_tum(curves: Curves, orders: list[int]) -> Curves:

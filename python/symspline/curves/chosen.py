@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from ..arrays import as_array
 from ..spaces import Array, Space, factors_of
-from .fit import Asked, Fit, Points, finished, first_faults, solve_factors
-from .solve import Fault, Progress, Solved
+from .ends import End
+from .fit import Asked, Fit, Points, finished, first_faults, fit_many, solve_factors
+from .solve import Fault, Options, Progress, Solved
 
 Numbers = NDArray[np.int64]
 
@@ -83,12 +84,43 @@ def fit_chosen(asked: Asked, progress: Progress | None, chosen: Numbers) -> Fit:
     return finished(asked, spread)._replace(faults=faults)
 
 
+def fit_many_chosen(
+    space: Space,
+    times: list[NDArray[np.float64]],
+    points: list[list[Points]],
+    ends: list[list[End] | None],
+    options: Options,
+    check: bool,
+    progress: Progress | None,
+    chosen: Numbers,
+) -> tuple[list[Fit], list[Fault]]:
+    """The same of single curves of different lengths."""
+    found: list[Fit] = []
+    faults: list[Fault] = []
+    if len(chosen):
+        some = [times[i] for i in chosen], [points[i] for i in chosen], _some_ends(space, ends, chosen)
+        try:
+            found, faults = fit_many(space, *some, options, check, progress)
+        except ValidationError as error:
+            raise ValidationError(_renamed(str(error), chosen, (len(times),))) from None
+    fitted = dict(zip(chosen.tolist(), found, strict=True))
+
+    def left_out(i: int) -> Fit:
+        parts = zip(factors_of(space), points[i], strict=True)
+        return finished(
+            Asked(space, times[i], points[i], [], options, check),
+            [_left_out(factor, part) for factor, part in parts],
+        )
+
+    fits = [fitted[i] if i in fitted else left_out(i) for i in range(len(times))]
+    return fits, [(int(chosen[i]), kind, _renamed(why, chosen, (len(times),))) for i, kind, why in faults]
+
+
 def _some(asked: Asked, chosen: Numbers) -> Asked:
     """These curves alone."""
 
     def picked(rows: Array, axes: int) -> Array:
-        """The chosen rows of an array that has the batch axes, then some more."""
-        return np.ascontiguousarray(rows.reshape(-1, *rows.shape[rows.ndim - axes :])[chosen])
+        return _rows(rows, axes, chosen)
 
     factors = factors_of(asked.space)
     return asked._replace(
@@ -97,11 +129,20 @@ def _some(asked: Asked, chosen: Numbers) -> Asked:
             part._replace(doubles=picked(part.doubles, 1 + len(factor.point_shape)), batch=(len(chosen),))
             for factor, part in zip(factors, asked.points, strict=True)
         ],
-        ends=[
-            own and [(kind, None if v is None else picked(v, len(factor.point_shape))) for kind, v in own]
-            for factor, own in zip(factors, asked.ends, strict=True)
-        ],
+        ends=_some_ends(asked.space, asked.ends, chosen),
     )
+
+
+def _some_ends(space: Space, ends: list[list[End] | None], chosen: Numbers) -> list[list[End] | None]:
+    return [
+        own and [(kind, None if v is None else _rows(v, len(factor.point_shape), chosen)) for kind, v in own]
+        for factor, own in zip(factors_of(space), ends, strict=True)
+    ]
+
+
+def _rows(rows: Array, axes: int, chosen: Numbers) -> Array:
+    """The chosen rows of an array that has the batch axes, then some more."""
+    return np.ascontiguousarray(rows.reshape(-1, *rows.shape[rows.ndim - axes :])[chosen])
 
 
 def _left_out(space: Space, points: Points) -> Solved:
@@ -128,7 +169,12 @@ def _advance(progress: Progress, before: int, total: int, finished: int, _: int)
 
 
 def _renamed(message: str, chosen: Numbers, batch: tuple[int, ...]) -> str:
-    return re.sub(r"of curve (\d+)", lambda m: f"of curve {_place(int(chosen[int(m[1])]), batch)}", message)
+    """A message with the places of its curves in the whole batch, where it names points or times of them."""
+
+    def there(found: re.Match[str]) -> str:
+        return found[1] + _place(int(chosen[int(found[2])]), batch)
+
+    return re.sub(r"(of curve |^curve |\bt\[(?=\d+\]\[))(\d+)", there, message)
 
 
 def _place(number: int, batch: tuple[int, ...]) -> str:

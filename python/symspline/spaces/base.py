@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable
+from functools import wraps
+from inspect import signature
 from typing import Any, ClassVar
 
 import numpy as np
@@ -329,3 +333,31 @@ class Space:
     def __init_subclass__(cls) -> None:
         if hasattr(cls, "_name"):
             CLASSES[cls._name] = cls
+            cls.__init__ = _taking_numbers(cls, cls.__init__)  # type: ignore[method-assign]
+
+
+def example_of(cls: type[Space]) -> str:
+    """How one of a family of spaces is written."""
+    numbers = "2, 4" if cls._name in ("gr", "cgr") else "2"
+    return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
+
+
+def _taking_numbers(cls: type[Space], init: Callable[..., None]) -> Callable[..., None]:
+    """The constructor, whose error says which numbers are wanted where they are not given."""
+    names = [*signature(init).parameters][1:]
+
+    @wraps(init)
+    def checked(self: Space, *numbers: Any, **named: Any) -> None:
+        # Not asked beforehand, which would take longer than to make the space.
+        try:
+            init(self, *numbers, **named)
+        except TypeError:
+            if len(numbers) + len(named) == len(names) and set(named) <= set(names):
+                raise
+            what = re.split("[:.]", " ".join((cls.__doc__ or "").split()))[0]
+            raise TypeError(
+                f"{cls.__name__} takes {' and '.join(names)}, such as {example_of(cls)}: "
+                f"{what[:1].lower()}{what[1:]}"
+            ) from None
+
+    return checked

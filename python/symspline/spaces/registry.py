@@ -8,7 +8,7 @@ from typing import Any
 
 from .._core import Handle, ValidationError
 from ..arrays import shown
-from .base import CLASSES, Space
+from .base import CLASSES, Space, example_of
 
 # No number of a space is as long.
 _DIGITS = 40
@@ -42,9 +42,7 @@ def _whole(cls: Any) -> str:
     """How to name one of a family."""
     if not hasattr(cls, "_name"):
         return "a space or its name is needed, such as Sphere(2) or 'sphere:2'"
-    numbers = [2, 4] if cls._name in ("gr", "cgr") else [2]
-    given = ", ".join(map(str, numbers))
-    return f"give its dimension, such as {cls.__name__}({given}) or '{cls._name}:{given.replace(' ', '')}'"
+    return f"give its dimension, such as {example_of(cls)}"
 
 
 def _named(name: str) -> Space:

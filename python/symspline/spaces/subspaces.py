@@ -3,10 +3,61 @@ point."""
 
 from __future__ import annotations
 
-from .base import Space
+from typing import Any
+
+import numpy as np
+
+from .._core import ValidationError
+from .base import Array, Space
+
+# No more than a hint is made of it: rows of such matrices are no unit vectors, whatever the rounding.
+_NEAR = 1e-4
 
 
-class RealProjective(Space):
+class _Projective(Space):
+    """Lines, of which people also hold the projectors."""
+
+    # The space of positive definite matrices of the same numbers.
+    _definite: str
+
+    def _array(self, value: Any, name: str) -> Array:
+        array = super()._array(value, name)
+        if name in ("points", "p", "q") and _are_densities(array):
+            purity = np.einsum("...ij,...ji->...", array, array).real
+            advice = (
+                "symspline.convert.density_to_state makes those of pure states"
+                if (purity > 1 - _NEAR).all()
+                else "states that are mixed have none. There is no space of density matrices: those of full rank are "
+                f"points of {self._definite}({array.shape[-1]}), where curves leave trace 1"
+            )
+            raise ValidationError(
+                f"{name} has shape {array.shape} and looks like density matrices, Hermitian of trace 1, but points of "
+                f"{self!r} are unit vectors; {advice}"
+            )
+        return array
+
+
+def _are_densities(array: Array) -> bool:
+    """Whether an array is square matrices, Hermitian, of trace 1, and of no larger purity than pure states."""
+    square = array.ndim > 1 and array.shape[-2] == array.shape[-1] > 1
+    if not square or not array.size or array.dtype.kind not in "ifc":
+        return False
+    flat = array.reshape(-1, *array.shape[-2:])
+    return _is_density(flat[:1]) and _is_density(flat)
+
+
+def _is_density(x: Array) -> bool:
+    with np.errstate(all="ignore"):
+        skew = np.abs(x - np.swapaxes(x.conj(), -1, -2)).max()
+        trace = np.trace(x, axis1=-2, axis2=-1)
+        return bool(
+            skew < _NEAR
+            and (np.abs(trace - 1) < _NEAR).all()
+            and ((np.abs(x) ** 2).sum(axis=(-2, -1)) < 1 + _NEAR).all()
+        )
+
+
+class RealProjective(_Projective):
     """Real projective space RPⁿ, lines through the origin of Rⁿ⁺¹: points are unit vectors of n + 1
     numbers, of which x and −x are the same point. Distance is the angle between lines, at most π/2.
 
@@ -17,16 +68,18 @@ class RealProjective(Space):
 
     _name = "rp"
     _linear = True
+    _definite = "SymmetricPositiveDefinite"
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
 
-class ComplexProjective(Space):
+class ComplexProjective(_Projective):
     """Complex projective space CPⁿ, pure quantum states of n + 1 levels: points are complex unit vectors
     of n + 1 numbers up to a phase, with the Fubini–Study metric: distance is arccos |⟨p, q⟩|.
 
-    CP¹ is the Bloch sphere, of radius ½.
+    CP¹ is the Bloch sphere, of radius ½. Density matrices of pure states become points by
+    `symspline.convert.density_to_state`.
 
     >>> import symspline as ss
     >>> ss.ComplexProjective(1).distance([1, 0], [0.6, 0.8j]).round(8)
@@ -35,6 +88,7 @@ class ComplexProjective(Space):
 
     _name = "cp"
     _linear = True
+    _definite = "HermitianPositiveDefinite"
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
