@@ -88,3 +88,9 @@ def skewed():
     matrix = np.eye(3)
     matrix[0, 1] = 1e-3
     return matrix
+
+
+def test_precision():
+    for given, kept in (("f2", "f4"), ("f4", "f4"), ("f8", "f8"), ("i4", "f8"), ("?", "f8")):
+        matrices = from_vectors(np.ones(6, given), "fsl")
+        assert matrices.dtype == kept and to_vectors(matrices, "fsl").dtype == kept
