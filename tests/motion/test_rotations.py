@@ -275,6 +275,10 @@ def test_six_numbers(order, entries):
 def test_six_numbers_of_nearly_parallel_vectors(order):
     near = rotations.from_six_numbers([1, 0, 0, 1, 1e-5, 0], order=order)
     assert np.abs(near - np.eye(3)).max() < 1e-9
+    # What cancels in the second vector does not show in the matrix.
+    a, b = np.random.default_rng(4).standard_normal((2, 3))
+    r = rotations.from_six_numbers([*a, *(a + 1e-5 * b)], order=order)
+    assert np.abs(r.T @ r - np.eye(3)).max() < 1e-15
     with pytest.raises(ss.ValidationError, match="not parallel"):
         rotations.from_six_numbers([1, 0, 0, 1, 1e-8, 0], order=order)
 
@@ -295,6 +299,7 @@ def test_six_numbers_of_nearly_parallel_vectors(order):
             r"numbers\[0\] are .* not parallel",
         ),
         (lambda s: rotations.from_six_numbers(np.zeros(6), order="rows"), "not zero"),
+        (lambda s: rotations.velocities(2 * np.eye(3), [0, 0, 1]), "off the space"),
         (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
         (lambda s: rotations.from_rotation_vectors([1, 2, np.nan]), "nan"),
     ],

@@ -61,6 +61,13 @@ def test_smaller_steps_change_nothing(name, monkeypatch):
     assert np.abs(propagator(spline, X) - u).max() < 1e-13
 
 
+def test_steps_are_short_where_the_curve_is_fast():
+    """It rests at both ends, and is fast between."""
+    spline = ss.CubicSpline(None, [[1, 0], [np.cos(1.4), np.sin(1.4)]], "cp:1", bc_type="clamped")
+    u = propagator(spline, 1.0)
+    assert reaches(spline, u, np.array([1.0])) < 1e-14
+
+
 def test_gauss_integrates_polynomials():
     nodes, weights, matrix = propagation.gauss()
     for k in range(2 * propagation.STAGES):
@@ -228,6 +235,12 @@ def test_what_is_left_of_a_pulse_is_named():
     left = (h - np.einsum("mab,ba->m", h, PAULI[1]).real[:, None, None] / 2 * PAULI[1])[i]
     assert np.abs(left[j, k]) == np.abs(left).max() < 1e-5
     assert complex(re.search(message, str(error.value))[1]) == pytest.approx(left[j, k], rel=0.01)
+
+
+def test_the_entry_that_is_missing_has_its_sign():
+    path = ss.CubicSpline(None, [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    with pytest.raises(ss.ValidationError, match=r"entries \[0, 1\] and \[1, 0\] \(-?0-0.785j\)"):
+        pulses(path, [0, 1, 2], operators=PAULI[[0, 2]])
 
 
 def test_edges_too_far_apart():
