@@ -50,6 +50,11 @@ def test_the_mean_is_where_directions_add_up_to_zero(space):
     assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), each(lambda a: a[alone], p)) < 1e-15
 
 
+def test_times_close_together_are_not_one():
+    (found,) = ss.fit_segments([0, 1e-12, 1], [[0], [1], [2]], "r:1", max_gap=2, duplicates="first")
+    assert len(found.t) == 3
+
+
 @pytest.mark.parametrize("dtype", ["f4", "i8"])
 def test_means_in_other_numbers(dtype):
     points = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0]], dtype)
