@@ -174,12 +174,26 @@ def steep_tangent(space, p, rng):
     return v / space.norm(p, v)
 
 
+WALKS = {}
+"""Those made so far, and the generator after them: most tests begin with the same seed, and making the points
+takes longer than fitting them."""
+
+
 def walk(space, step, n, rng, turn=0.5):
     """Points with equal steps whose direction changes by about `turn` radians a step.
 
     On spaces without a cut locus the walk turns back when it has gone far: rounding grows with the
     distance there, in units of the curvature.
     """
+    generator = rng.bit_generator
+    key = str(space), float(step), n, turn, str(generator.state)
+    if key not in WALKS:
+        WALKS[key] = _walk(space, step, n, rng, turn), generator.state
+    points, generator.state = WALKS[key]
+    return points.copy()
+
+
+def _walk(space, step, n, rng, turn):
     p = [base_point(space, rng)]
     direction = unit_tangent(space, p[0], rng)
     for _ in range(n - 1):

@@ -351,9 +351,9 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     q = as_quaternions(rotations, scalar_first=True)
     w, v = q[..., 0], q[..., 1:]
     sine = length(v)
-    # angle / sin(angle/2), whose limit for small angles is 2.
+    # angle / sin(angle/2); of no turn v is zero, and any number does.
     factor = 2 * np.arctan2(sine, w) / np.where(sine > 0, sine, 1)
-    result: Array = np.where(sine > 0, factor, 2.0)[..., None] * v
+    result: Array = factor[..., None] * v
     return result
 
 

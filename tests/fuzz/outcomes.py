@@ -44,7 +44,10 @@ def attempt(call, *inputs, wrong_types=False):
             if type(error).__name__ == "PanicException":
                 raise AssertionError(f"the compiled code panicked: {error}") from error
             raise
-    assert all(issubclass(w.category, ss.ConvergenceWarning) for w in caught), [str(w) for w in caught]
+    # Of points of sphere:3, which are no quaternions here.
+    signs = "neighbours of opposite sign"
+    told = [w for w in caught if not str(w.message).startswith(signs)]
+    assert all(issubclass(w.category, ss.ConvergenceWarning) for w in told), [str(w) for w in told]
     assert np.geterr() == state
     assert [snapshot(x) for x in inputs] == before, "an input was modified"
     return result

@@ -7,7 +7,7 @@ import pytest
 from curves import S2
 
 import symspline as ss
-from symspline.geo import EARTH_RADIUS, cog, from_lonlat, sog, to_lonlat
+from symspline.geo import EARTH_RADIUS, cog, compass, from_lonlat, sog, to_lonlat
 
 LON, LAT = [172, 175, 178, -179, -176, -172, -167], [12, 14, 15, 17, 20, 24, 27]
 HOURS = np.array([0, 6, 12, 18, 24, 33, 36])
@@ -88,3 +88,26 @@ def test_the_old_name_warns():
         assert old.from_lonlat is from_lonlat
     with pytest.raises(AttributeError, match="cog"):
         _ = old.cog
+
+
+def test_due_north_is_a_course():
+    """The eastward part of the velocity is then 0 to the last bit, and the place does not rest."""
+    track = ss.CubicSpline([0, 1, 2], from_lonlat([0, 0, 0], [10, 11, 12]), "sphere:2")
+    assert (cog(track, [0, 0.5, 2]) == 0).all()
+
+
+def test_one_degree_of_the_mean_sphere():
+    track = ss.CubicSpline([0, 1], from_lonlat([0, 1], [0, 0]), "sphere:2")
+    assert sog(track, 0.5) == pytest.approx(np.radians(6_371_008.8), rel=1e-14)
+
+
+def test_latitudes_near_a_pole_keep_their_digits():
+    co = np.array([1e-3, 1e-7, 1e-9])
+    near = np.stack([np.sin(np.radians(co)), 0 * co, np.cos(np.radians(co))], axis=-1)
+    assert np.abs(90 - to_lonlat(near)[1] - co).max() < 5e-14
+
+
+def test_east_and_north_beside_a_pole():
+    east, north = compass(from_lonlat([90, 180], [90 - 1e-6, -90 + 1e-6]))
+    assert np.abs(east - [[-1, 0, 0], [0, -1, 0]]).max() < 1e-7
+    assert np.abs(north - [[0, -1, 0], [-1, 0, 0]]).max() < 1e-7

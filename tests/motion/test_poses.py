@@ -106,6 +106,19 @@ def test_a_sensor_that_falls_measures_nothing():
 
 
 @every_space
+def test_a_sensor_measures_in_its_own_axes(name):
+    spline = curve(name)
+    gyro, force = poses.imu(spline, INNER)
+    r = pose(spline, INNER)[..., :3, :3]
+    rate = rotations.angular_velocity(spline, INNER, "world")
+    assert np.allclose(np.einsum("nij,nj->ni", r, gyro), rate, rtol=0, atol=1e-13)
+    # What turns about several axes does so in others.
+    assert np.abs(gyro - rate).max() > 0.1
+    up = poses.linear_acceleration(spline, INNER) - np.array([0, 0, -9.81])
+    assert np.allclose(np.einsum("nij,nj->ni", r, force), up, rtol=0, atol=1e-12)
+
+
+@every_space
 def test_calls_are_those_of_a_spline(name):
     spline = curve(name, (2,))
     for call in (poses.twist, poses.linear_acceleration, lambda *a, **k: poses.imu(*a, **k).specific_force):
@@ -228,6 +241,12 @@ def test_euroc_files(tmp_path):
     wide = "\n".join([lines[0] + ", v", *(line + ",0.1,0.2,0.3" for line in lines[1:])])
     assert np.array_equal(poses.read_euroc(io.StringIO(wide))[1], found)
     seconds = (t - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+    # To the nearest nanosecond: products are a little below some of these.
+    few = np.arange(1000, 1000 + len(given))
+    file = io.StringIO()
+    poses.write_euroc(file, few / 1e9, given)
+    file.seek(0)
+    assert np.array_equal(poses.read_euroc(file)[0].astype(int), few)
     poses.write_euroc(tmp_path / "b.csv", seconds, given)
     assert np.abs(poses.read_euroc(tmp_path / "b.csv")[0] - t).max() < np.timedelta64(300, "ns")
 
@@ -263,6 +282,8 @@ def test_dates_in_tum_files():
             r"line 3: the quaternion has length 1\.41421",
         ),
         (poses.read_euroc, "# x\n1,0,0,0,1,1,0,0\n", r"line 2: the quaternion has length 1\.41421, not 1"),
+        (poses.read_tum, "0 0 0 0 0 0 0 1.01\n", r"line 1: the quaternion has length 1\.01"),
+        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1.01 0\n", r"pose \[0\] has no rotation"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1\n", "not of 11 numbers"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 2 0\n", r"pose \[0\] has no rotation"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 -1 0\n", r"pose \[0\] has no rotation"),

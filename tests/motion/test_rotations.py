@@ -189,6 +189,31 @@ def test_quaternions_of_a_closed_curve_go_on(rounds, batch):
     assert (start[..., 0] > 0.9).all()
 
 
+def test_quaternions_of_closed_curves_of_which_one_turns_over():
+    """The one comes back as −q, the other as q."""
+    t = np.arange(7.0)
+    around = Rotation.from_rotvec(np.outer(t, [0, 0, np.pi / 3])).as_matrix()
+    angles = 0.4 * np.stack([np.sin(t * np.pi / 3), np.cos(t * np.pi / 3), 0 * t], axis=-1)
+    points = np.stack([around, Rotation.from_rotvec(angles).as_matrix()])
+    points[:, -1] = points[:, 0]
+    spline = ss.CubicSpline(t, points, "so:3", bc_type="periodic")
+    q = rotations.quaternion(spline, [0.5, 6.5, 12.5], scalar_first=True)
+    assert np.abs(q[0] - np.array([[1], [-1], [1]]) * q[0, :1]).max() < 1e-14
+    assert np.abs(q[1] - q[1, :1]).max() < 1e-14
+
+
+def test_quaternions_follow_the_curve_and_not_its_chord():
+    """Its points are 170° apart, its inner control points 227° on that way: the curve goes the other way round."""
+    angle = np.radians([0, 170])
+    points = rotations.from_rotation_vectors(np.outer(angle, [0, 0, 1]))
+    back = rotations.velocities(points, [0, 0, -1.5])
+    spline = ss.CubicSpline([0, 1], points, "so:3", bc_type=((1, back[0]), (1, back[1])))
+    x = np.linspace(0, 1, 101)
+    q = rotations.quaternion(spline, x, scalar_first=True)
+    assert ((q[1:] * q[:-1]).sum(axis=-1) > 0.99).all()
+    assert np.abs(rotations.from_quaternions(q, scalar_first=True) - spline(x)).max() < 1e-14
+
+
 @every_curve
 def test_calls_are_those_of_a_spline(space):
     spline = curve(space, (2,))
@@ -262,6 +287,18 @@ def test_six_numbers(order, entries):
     assert ((second * b).sum(-1) > 0).all() and np.abs((third * b).sum(-1)).max() < 1e-14
 
 
+@pytest.mark.parametrize("order", ["columns", "rows"])
+def test_six_numbers_of_nearly_parallel_vectors(order):
+    near = rotations.from_six_numbers([1, 0, 0, 1, 1e-5, 0], order=order)
+    assert np.abs(near - np.eye(3)).max() < 1e-9
+    # What cancels in the second vector does not show in the matrix.
+    a, b = np.random.default_rng(4).standard_normal((2, 3))
+    r = rotations.from_six_numbers([*a, *(a + 1e-5 * b)], order=order)
+    assert np.abs(r.T @ r - np.eye(3)).max() < 1e-15
+    with pytest.raises(ss.ValidationError, match="not parallel"):
+        rotations.from_six_numbers([1, 0, 0, 1, 1e-8, 0], order=order)
+
+
 # ---- what is refused ----
 
 
@@ -278,6 +315,7 @@ def test_six_numbers(order, entries):
             r"numbers\[0\] are .* not parallel",
         ),
         (lambda s: rotations.from_six_numbers(np.zeros(6), order="rows"), "not zero"),
+        (lambda s: rotations.velocities(2 * np.eye(3), [0, 0, 1]), "off the space"),
         (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
         (lambda s: rotations.from_rotation_vectors([1, 2, np.nan]), "nan"),
     ],

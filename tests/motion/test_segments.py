@@ -21,8 +21,9 @@ def test_pieces_are_fitted_alone(space):
     (first,) = ss.fit_segments(T, p, space, max_gap=2, min_points=4)
     assert len(first.t) == 4
     # Across the pauses some do not converge.
-    (whole,) = ss.fit_segments(T, p, space, max_gap=23, on_failure="ignore")
-    assert whole == ss.CubicSpline(T, p, space, on_failure="ignore")
+    options = {"max_iter": 60, "on_failure": "ignore"}
+    (whole,) = ss.fit_segments(T, p, space, max_gap=23, **options)
+    assert whole == ss.CubicSpline(T, p, space, **options)
 
 
 @every_space
@@ -47,6 +48,11 @@ def test_the_mean_is_where_directions_add_up_to_zero(space):
         assert factor.norm(middle, factor.log(middle, means[3])) < 5e-15
     alone = [0, 4, 7]
     assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), each(lambda a: a[alone], p)) < 1e-15
+
+
+def test_times_close_together_are_not_one():
+    (found,) = ss.fit_segments([0, 1e-12, 1], [[0], [1], [2]], "r:1", max_gap=2, duplicates="first")
+    assert len(found.t) == 3
 
 
 @pytest.mark.parametrize("dtype", ["f4", "i8"])

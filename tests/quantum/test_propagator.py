@@ -1,7 +1,10 @@
 """Propagators and pulses: where they bring the states."""
 
+import re
+
 import numpy as np
 import pytest
+from curves import points_on
 from scipy.integrate import solve_ivp
 from test_hamiltonian import GATES, KNOTS, STATES, X, adjoint, columns, curve
 
@@ -58,6 +61,13 @@ def test_smaller_steps_change_nothing(name, monkeypatch):
     assert np.abs(propagator(spline, X) - u).max() < 1e-13
 
 
+def test_steps_are_short_where_the_curve_is_fast():
+    """It rests at both ends, and is fast between."""
+    spline = ss.CubicSpline(None, [[1, 0], [np.cos(1.4), np.sin(1.4)]], "cp:1", bc_type="clamped")
+    u = propagator(spline, 1.0)
+    assert reaches(spline, u, np.array([1.0])) < 1e-14
+
+
 def test_gauss_integrates_polynomials():
     nodes, weights, matrix = propagation.gauss()
     for k in range(2 * propagation.STAGES):
@@ -89,6 +99,21 @@ def test_batches(name):
     assert np.abs(propagator(own, X)[1] - propagator(own[1], X)).max() < 1e-13
 
 
+def test_products_of_many_steps_stay_unitary():
+    """Rounding of hundreds of factors does not add up."""
+    spline = ss.CubicSpline(None, points_on(ss.ComplexProjective(1), 200, step=0.5), "cp:1")
+    assert off_one(propagator(spline, np.linspace(0, 199, 50))) < 1e-15
+
+
+def test_steps_are_short_enough_for_the_fastest_of_a_batch():
+    space = ss.ComplexProjective(2)
+    both = ss.CubicSpline(None, np.stack([points_on(space, 6, step=step) for step in (0.01, 1.2)]), space)
+    x = np.linspace(0, 5, 11)
+    for u, spline in zip(propagator(both, x), both, strict=True):
+        assert np.abs(u - propagator(spline, x)).max() < 1e-14
+        assert reaches(spline, u, x) < 1e-13
+
+
 def test_the_adiabatic_phase_of_a_circle_of_latitude():
     """States carried once round a circle of the Bloch sphere come back with half the solid angle as their phase."""
     angle, n = np.radians(50), 60
@@ -107,6 +132,11 @@ def test_times_outside_the_knots():
             ss.ValidationError, match=r"x\[1\] is .*outside the knots, which go from 0.0 to 5.0"
         ):
             propagator(spline, [1.0, x])
+    # Where one curve of a batch has ended there is none of it.
+    own = ss.CubicSpline([[0, 1, 5], [1, 2, 4]], spline.points[:6].reshape(2, 3, 2), "cp:1")
+    for x in (0.5, 4.5):
+        with pytest.raises(ss.ValidationError, match=r"outside the knots, which go from 1.0 to 4.0"):
+            propagator(own, x)
     dates = np.datetime64("2024-01-01") + np.array([[0, 1, 2], [1, 2, 4]])
     own = ss.CubicSpline(dates, spline.points[:6].reshape(2, 3, 2), "cp:1")
     with pytest.raises(ss.ValidationError, match=r"one at a time: propagator\(spline\[i\], x\)"):
@@ -182,12 +212,35 @@ def test_in_operators_that_are_not_orthogonal():
             {"operators": [*PAULI[:2], PAULI[0] - PAULI[1]]},
         ),
         (r"operators\[4\] is a combination", {"operators": [*PAULI, np.eye(2), PAULI[0] + PAULI[1]]}),
+        (r"operators\[1\] is a combination", {"operators": [PAULI[0], PAULI[0] + 1e-12 * PAULI[1]]}),
         (r"pulse\[0\] cannot be expressed .* entries \[0, 1\] and \[1, 0\]", {"operators": PAULI[[0, 2]]}),
     ],
 )
 def test_what_is_no_pulse_train(match, options):
     with pytest.raises(ss.ValidationError, match=match):
         pulses(curve("cp:1"), **{"edges": [0, 1, 2]} | options)
+
+
+def test_what_is_left_of_a_pulse_is_named():
+    """A millionth of it, and the number in the place that is said."""
+    angle = 1e-6
+    phases = np.exp([[0.5j * angle * k, -0.5j * angle * k] for k in range(3)])
+    points = [[1, 0], [np.cos(0.5), np.sin(0.5)], [np.cos(1), np.sin(1)]] * phases
+    path = ss.CubicSpline(None, points, "cp:1")
+    message = r"left, most of it in the entries \[\d, \d\] and \[\d, \d\] \((.*)\); add"
+    with pytest.raises(ss.ValidationError, match=message) as error:
+        pulses(path, [0, 1, 2], operators=PAULI[1:2])
+    h = pulses(path, [0, 1, 2])
+    i, j, k = (int(d) for d in re.findall(r"pulse\[(\d)\].*?\[(\d), (\d)\] and", str(error.value))[0])
+    left = (h - np.einsum("mab,ba->m", h, PAULI[1]).real[:, None, None] / 2 * PAULI[1])[i]
+    assert np.abs(left[j, k]) == np.abs(left).max() < 1e-5
+    assert complex(re.search(message, str(error.value))[1]) == pytest.approx(left[j, k], rel=0.01)
+
+
+def test_the_entry_that_is_missing_has_its_sign():
+    path = ss.CubicSpline(None, [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    with pytest.raises(ss.ValidationError, match=r"entries \[0, 1\] and \[1, 0\] \(-?0-0.785j\)"):
+        pulses(path, [0, 1, 2], operators=PAULI[[0, 2]])
 
 
 def test_edges_too_far_apart():

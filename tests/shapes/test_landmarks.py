@@ -97,3 +97,12 @@ FLAT = np.array([[0.0, 0], [1, 1], [2, 2], [3, 3]])
 def test_what_is_no_shape(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
+
+
+def test_nearly_flat_drawings_have_a_shape():
+    """As long as rounding leaves a few digits of it."""
+    thin = np.array(SQUARE) * [1, 1e-7]
+    distance = ss.Grassmannian(2, 4).distance(*map(from_landmarks, (SQUARE, thin)))
+    assert distance < 1e-8
+    with pytest.raises(ss.ValidationError, match="hyperplane"):
+        from_landmarks(np.array(SQUARE) * [1, 1e-12])

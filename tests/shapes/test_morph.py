@@ -120,6 +120,13 @@ def test_closed_films_are_c2_at_the_seam(base):
     assert np.abs(first.holonomy - morph.holonomy).max() < NEAR
 
 
+@pytest.mark.parametrize("bc_type", ["natural", "periodic"])
+def test_a_film_may_begin_at_any_time(bc_type):
+    x = turned(2, 5, closed=bc_type == "periodic")
+    film = AffineMorph(KNOTS, x, bc_type=bc_type)(X)
+    assert np.abs(AffineMorph(KNOTS - 7, x, bc_type=bc_type)(X - 7) - film).max() < 10 * NEAR
+
+
 def test_the_holonomy_of_four_landmarks_is_an_area():
     """By Gauss and Bonnet: planes in R³ are turned, going round, by the area that their normals enclose."""
     angle = 2 * np.pi * np.arange(9) / 8
@@ -205,6 +212,12 @@ def flat():
             lambda: AffineMorph(KNOTS, turned(2, 5))([1, 4.5]),
         ),
         ("only a closed film has a holonomy", lambda: AffineMorph(KNOTS, turned(2, 5)).holonomy),
+        (
+            "the last drawing of a closed film must be the first, and is .*e-07 away from it",
+            lambda: AffineMorph(
+                KNOTS, turned(2, 5, True) + np.array([0, 0, 0, 0, 4e-7])[:, None, None], bc_type="periodic"
+            ),
+        ),
         (
             "the last drawing of a closed film must be the first, and is .* frame='first'",
             lambda: AffineMorph(

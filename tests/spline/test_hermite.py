@@ -213,6 +213,14 @@ def test_control_points_beyond_reach_are_refused(batch):
         ss.HermiteSpline(None, points, velocities, S2)
 
 
+def test_the_curve_and_segment_beyond_reach_are_named():
+    points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], (2, 3, 3, 3))
+    velocities = np.zeros(points.shape)
+    velocities[1, 2, 2, 0] = 1.5 * np.pi
+    with pytest.raises(ss.CutLocusError, match=r"segment 1 of curve 1,2, between t\[1\]"):
+        ss.HermiteSpline(None, points, velocities, S2)
+
+
 def test_only_batches_are_sequences():
     found = curve(S2)
     with pytest.raises(TypeError, match="one curve"):
@@ -230,3 +238,12 @@ def test_all_factors_are_checked():
     with pytest.raises(ss.ValidationError, match="velocities must be a tuple of 2 arrays"):
         ss.HermiteSpline(None, (THREE, np.zeros((3, 1))), np.zeros((3, 4)), space)
     assert at_node(space, curve(space).points, 0)[1].shape == (1,)
+
+
+def test_velocities_become_tangent_to_rounding():
+    """They may be off by what rounded files are."""
+    p = points_on(S2)
+    v = S2.project_tangent(p, np.roll(p, 1, axis=1))
+    curve = ss.HermiteSpline(None, p, v + 1e-10 * p, S2)
+    assert np.abs(np.sum(curve.points * curve.velocities, axis=-1)).max() < 1e-15
+    assert np.abs(curve.velocities - v).max() < 1e-15

@@ -42,6 +42,11 @@ def test_a_flipped_sample_warns_once_and_says_what_to_do():
     assert warning.category is UserWarning
 
 
+def test_half_a_turn_of_rotations_goes_either_way():
+    """Of two quaternions at right angles neither sign is the nearer one."""
+    silent(lambda: ss.CubicSpline(None, np.eye(4)[:3], "sphere:3"))
+
+
 def test_which_curve_it_was():
     batch = np.stack([motion(), flipped(9)])
     with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from curves import points_on
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import aslinearoperator
 
@@ -55,6 +56,14 @@ def test_the_best_subspace_of_its_dimension(field):
     assert np.abs(np.linalg.norm(left, axis=(1, 2)) - np.linalg.norm(sizes[:, 2:], axis=1)).max() < 1e-14
 
 
+def test_singular_values_that_differ_by_rounding_are_equal():
+    left, right = (np.linalg.qr(np.random.default_rng(i).standard_normal((6, 6)))[0] for i in (0, 1))
+    sizes = np.array([3, 2, 2, 1, 1, 1]) / 7
+    with pytest.raises(ss.ValidationError, match="singular values 2 and 3"):
+        from_snapshots(left * sizes @ right, 2)
+    assert from_snapshots(left * sizes @ right, 3).shape == (6, 3)
+
+
 @pytest.mark.parametrize("energy", [0.5, 0.9, 0.999, 1 - 1e-9])
 def test_enough_dimensions_for_the_energy(energy):
     basis = from_snapshots(ALL, energy=energy)
@@ -103,6 +112,14 @@ def test_they_are_the_operator_in_the_subspace():
         lambda mu: LAPLACE,
     ):
         assert np.abs(reduced_operator(spline, same, X) - found[0]).max() < 1e-12 * np.abs(found).max()
+
+
+def test_complex_bases():
+    rng = np.random.default_rng(3)
+    a = rng.standard_normal((5, 5)) + 1j * rng.standard_normal((5, 5))
+    spline = ss.CubicSpline(None, points_on(ss.space("cgr:2,5"), 4), "cgr:2,5")
+    found, y = reduced_operator(spline, a, [0.3, 2.5]), spline.lift([0.3, 2.5])
+    assert np.abs(found - np.einsum("mia,ij,mjb->mab", y.conj(), a, y)).max() < 1e-14
 
 
 def test_it_does_not_depend_on_the_bases_of_the_data():

@@ -52,6 +52,8 @@ def test_there_and_back(order, nibabel, tmp_path):
     assert np.array_equal(back.mask, given.mask) and np.array_equal(back.affine, AFFINE)
     image, numbers = raw(nibabel, name)
     assert int(image.header["intent_code"]) == (1005 if order == "itk" else 0)
+    # nifti1.h: intent_p1 is the number of rows.
+    assert image.header["intent_p1"] == (3 if order == "itk" else 0)
     # ITK's files hold the lower triangle row by row, along the fifth axis.
     assert numbers.shape == ((4, 3, 2, 1, 6) if order == "itk" else (4, 3, 2, 6))
     expected = to_vectors(given.tensors, "dipy" if order == "itk" else order)
@@ -73,6 +75,13 @@ def test_masks(nibabel, tmp_path):
     numbers[1, 1, 0, 3] = np.nan
     nibabel.save(nibabel.Nifti1Image(numbers, AFFINE), name)
     assert np.array_equal(read_nifti(name, "fsl").tensors, given.tensors[1:])
+
+
+def test_tensors_along_the_axes_are_inside(nibabel, tmp_path):
+    """Three of their six numbers are 0."""
+    name, given = str(tmp_path / "tensors.nii"), volume()
+    write_nifti(name, Volume(np.stack([np.diag([1.0, 2, 3])] * 4), given.mask, AFFINE), "fsl")
+    assert np.array_equal(read_nifti(name, "fsl").mask, given.mask)
 
 
 def test_what_is_no_volume(nibabel, tmp_path):

@@ -88,3 +88,14 @@ def skewed():
     matrix = np.eye(3)
     matrix[0, 1] = 1e-3
     return matrix
+
+
+def test_precision():
+    for given, kept in (("f2", "f4"), ("f4", "f4"), ("f8", "f8"), ("i4", "f8"), ("?", "f8")):
+        matrices = from_vectors(np.ones(6, given), "fsl")
+        assert matrices.dtype == kept and to_vectors(matrices, "fsl").dtype == kept
+
+
+def test_what_rounding_does_to_symmetry_is_allowed():
+    matrix = np.array([[2, 0.3, 0], [0.3 * (1 + 1e-14), 1, 0], [0, 0, 1]])
+    assert to_vectors(matrix, "mrtrix")[3] == pytest.approx(0.3, rel=1e-13)
