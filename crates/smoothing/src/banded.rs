@@ -1,5 +1,6 @@
 //! Symmetric banded matrices, eight side by side.
 
+use std::ops::Range;
 use symspline_core::scalar::Lane;
 
 /// Entries on the diagonal and `width` places left of it, row by row; after [`factor`](Banded::factor) those of L and
@@ -68,9 +69,9 @@ impl Banded {
             .fold(Lane::splat(f64::INFINITY), |least, d| d.simd_lt(least).select(d, least))
     }
 
-    /// Of a factored matrix: ln det A.
-    pub fn log_det(&self) -> Lane {
-        (0..self.size).fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
+    /// Of a factored matrix: ln det A, or what some rows have of it.
+    pub fn log_det(&self, rows: Range<usize>) -> Lane {
+        rows.fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
     }
 
     /// Of a factored matrix: A⁻¹x in place, for rows of several numbers.

@@ -66,6 +66,14 @@ impl<'a> Linear<'a> {
                 row.spread(x, &mut stiffness);
             }
         }
+        if flat.own.knots.len() < flat.basis.count() {
+            // Where the turns of a closed curve end, splines end that should go on.
+            let rows = flat.basis.count();
+            for at in [0..4 * m, (rows - 4) * m..rows * m] {
+                pull[at.clone()].fill(0.0);
+                stiffness[at].fill(0.0);
+            }
+        }
         Linear { flat, m, weights, residuals, bends, sigma, pull, stiffness }
     }
 
@@ -101,24 +109,24 @@ impl<'a> Linear<'a> {
         factors.solve(m, &mut x);
         let freedom = flat.freedom(&factors.inverse_band());
         let mut rss = Lane::ZERO;
-        for ((row, w), r) in flat.data.iter().zip(self.weights).zip(self.residuals.chunks_exact(m)) {
-            for (c, r) in r.iter().enumerate() {
-                let moved = lane(*r) - row_times(row, &x, m, c);
-                rss = (moved * lane(*w)).mul_add(moved, rss);
+        for k in flat.own.data.clone() {
+            for c in 0..m {
+                let moved = lane(self.residuals[k * m + c]) - row_times(&flat.data[k], &x, m, c);
+                rss = (moved * lane(self.weights[k])).mul_add(moved, rss);
             }
         }
         // (a + Sδ)ᵀM(a + Sδ)
         let mut energy = Lane::ZERO;
         let bend = |i: usize, c: usize| lane(self.bends[i * m + c]) + row_times(&flat.bends[i], &x, m, c);
         for c in 0..m {
-            let mut left = bend(0, c);
-            for i in 0..flat.basis.count() - 1 {
+            let mut left = bend(flat.own.segments.start, c);
+            for i in flat.own.segments.clone() {
                 let right = bend(i + 1, c);
                 energy += (left * left + left * right + right * right) * lane(flat.basis.h(i) / 3.0);
                 left = right;
             }
         }
-        Look { freedom, rss, energy, log_det: factors.log_det() }
+        Look { freedom, rss, energy, log_det: factors.log_det(flat.own.knots.clone()) }
     }
 
     /// The λ that a criterion likes best, from a guess or from everywhere, and whether it lies at a bound.
@@ -172,7 +180,8 @@ impl<'a> Linear<'a> {
     }
 
     fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
-        let (n, m) = (self.weights.len() as f64, self.m as f64);
+        let own = &self.flat.own;
+        let (n, m) = (own.data.len() as f64, self.m as f64);
         let per = look.rss / lane(m);
         match criterion {
             Criterion::Gcv { penalty } => {
@@ -182,7 +191,7 @@ impl<'a> Linear<'a> {
             }
             Criterion::Cp => per + look.freedom * lane(2.0 * self.sigma * self.sigma),
             Criterion::Reml => {
-                let count = self.flat.basis.count() as f64;
+                let count = own.knots.len() as f64;
                 lane(n - 2.0) * (per + lam * look.energy / lane(m)).ln() + look.log_det
                     - lane(count - 2.0) * lam.ln()
             }

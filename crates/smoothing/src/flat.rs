@@ -5,6 +5,7 @@
 //! spacing.
 
 use crate::banded::Banded;
+use std::ops::Range;
 use symspline_core::scalar::{Lane, lane};
 
 /// Places beside the diagonal in BᵀWB and Ω.
@@ -210,11 +211,37 @@ pub struct Flat {
     gram: Vec<f64>,
     /// Ω.
     penalty: Vec<f64>,
+    /// What is counted.
+    pub own: Own,
+}
+
+/// The part of a problem that is counted: of a closed curve, which is unrolled three times, the turn in the middle.
+#[derive(Clone)]
+pub struct Own {
+    /// Data.
+    pub data: Range<usize>,
+    /// Coefficients, and the knots that they belong to.
+    pub knots: Range<usize>,
+    /// Segments.
+    pub segments: Range<usize>,
+}
+
+impl Own {
+    /// All.
+    pub fn all(data: usize, knots: usize) -> Self {
+        Own { data: 0..data, knots: 0..knots, segments: 0..knots - 1 }
+    }
+
+    /// The turn in the middle of three.
+    pub fn turn(data: usize, knots: usize) -> Self {
+        let (data, n) = (data / 3, (knots - 1) / 3);
+        Own { data: data..2 * data, knots: n..2 * n, segments: n..2 * n }
+    }
 }
 
 impl Flat {
     /// For data that lie at places of segments, with their weights.
-    pub fn new(basis: Basis, places: &[(usize, f64)], weights: &[f64]) -> Self {
+    pub fn new(basis: Basis, places: &[(usize, f64)], weights: &[f64], own: Own) -> Self {
         let count = basis.count();
         let data: Vec<Row> = places.iter().map(|&(segment, place)| basis.row(segment, place, 0)).collect();
         let (values, bends) = (basis.at_knots(0), basis.at_knots(2));
@@ -225,7 +252,7 @@ impl Flat {
         });
         let penalty = gram(count, hats);
         let gram = gram(count, data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)));
-        Flat { data, values, bends, gram, penalty, basis }
+        Flat { data, values, bends, gram, penalty, basis, own }
     }
 
     /// A, factored, for another λ on each lane.
@@ -240,10 +267,9 @@ impl Flat {
     /// The trace of A⁻¹BᵀWB, given the band of A⁻¹: the degrees of freedom of one coordinate.
     pub fn freedom(&self, inverse: &Banded) -> Lane {
         let mut sum = Lane::ZERO;
-        for i in 0..self.basis.count() {
-            for d in 0..=WIDTH.min(i) {
-                let twice = if d > 0 { 2.0 } else { 1.0 };
-                sum += inverse.at(i, i - d) * lane(twice * self.gram[i * BAND + d]);
+        for i in self.own.knots.clone() {
+            for j in i.saturating_sub(WIDTH)..(i + BAND).min(self.basis.count()) {
+                sum += inverse.at(i, j) * lane(self.gram[i.max(j) * BAND + i.abs_diff(j)]);
             }
         }
         sum
@@ -310,7 +336,7 @@ mod tests {
     #[test]
     fn energy_is_that_of_the_second_derivative() {
         let basis = Basis::new(&KNOTS, [FlatEnd::Natural; 2]);
-        let flat = Flat::new(basis, &[(0, 0.0)], &[0.0]);
+        let flat = Flat::new(basis, &[(0, 0.0)], &[0.0], Own::all(1, 6));
         let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
         let mut bends = vec![0.0; 6];
         flat.bends.iter().zip(&mut bends).for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));

@@ -22,6 +22,7 @@ mod path;
 mod smooth;
 mod start;
 mod track;
+mod turns;
 mod variance;
 
 pub use choice::Criterion;
@@ -45,6 +46,9 @@ pub struct Data<'a> {
     pub lam: Option<f64>,
     /// The standard deviation of the noise in a coordinate at weight one, if that is known.
     pub sigma: Option<f64>,
+    /// Velocities at the ends that have [`FlatEnd::Velocity`]: tangent at the first and the last of the points, from where
+    /// they are carried in parallel to the ends of the curve.
+    pub ends: [&'a [f64]; 2],
 }
 
 /// Which way to the minimum.
@@ -58,6 +62,15 @@ pub enum Tier {
     Newton,
 }
 
+/// What happens at the ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// A condition at either end.
+    Open([FlatEnd; 2]),
+    /// The last knot is the first again; only the flat way leads there.
+    Periodic,
+}
+
 /// How to smooth.
 #[derive(Clone, Copy)]
 pub struct Options {
@@ -67,6 +80,8 @@ pub struct Options {
     pub loss: Loss,
     /// Which way.
     pub tier: Tier,
+    /// What happens at the ends.
+    pub ends: Ends,
     /// The step that ends the search, in standard deviations of the points.
     pub tol: f64,
     /// Iterations at most.
@@ -128,8 +143,10 @@ pub struct Smooth {
     pub points: Vec<f64>,
     /// Velocities at the knots.
     pub velocities: Vec<f64>,
-    /// The band of A⁻¹, see [`variance`]: four numbers a knot.
+    /// The band of A⁻¹, see [`variance`]: four numbers for each of the knots, or of those of [`Smooth::wide`].
     pub inverse: Vec<f64>,
+    /// Of a closed curve: knots before, in and behind the turn that is the curve. Else empty.
+    pub wide: Vec<f64>,
     /// How it went.
     pub report: Report,
 }

@@ -1,25 +1,34 @@
 //! Many curves at a time: those that are not done go one step on together.
 
-use crate::flat::FlatEnd;
 use crate::loss::{self, Loss};
 use crate::path::{Path, moved, places};
 use crate::start::{Level, levels};
-use crate::track::Track;
-use crate::variance::rows_of;
-use crate::{Data, Options, Report, Smooth, State};
-use symspline_core::fit::{End, Ends, Method, Options as FitOptions, Problem, Status, fit};
+use crate::track::{Track, end_of};
+use crate::turns::{self, Turns};
+use crate::{Data, Ends, Options, Smooth};
+use std::ops::Range;
+use symspline_core::fit::{End, Ends as FitEnds, Method, Options as FitOptions, Problem, Status, fit};
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
 use symspline_core::space::{Ambient, Erased, Origin};
 
 const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: None };
-/// Ends without acceleration.
-pub const NATURAL: Ends<'static> = Ends::Open([End::Natural; 2]);
+const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
 /// Knots times dimensions from which threads pay.
 const PARALLEL: usize = 4096;
 
 /// Smooths curves; they are independent of each other.
 pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
+    if options.ends == Ends::Periodic {
+        let turns: Vec<Turns> = data.iter().map(Turns::of).collect();
+        let unrolled: Vec<Data> = turns.iter().zip(data).map(|(turns, data)| turns.data(data)).collect();
+        return smooth_all(space, &unrolled, options, monitor);
+    }
+    smooth_all(space, data, options, monitor)
+}
+
+fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
+    let len = space.point_len();
     let work: usize = data.iter().map(|d| d.times.len()).sum::<usize>() * space.dim();
     let threads = data.len() > 1 && work > PARALLEL;
     let mut tracks = start(space, data, options, monitor, threads);
@@ -29,13 +38,22 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         if running.is_empty() {
             break;
         }
-        let fitted =
-            fit_all(space, running.iter().map(|track| (&track.knots[..], &track.points[..])), monitor);
+        let ends: Vec<[Vec<f64>; 2]> = running.iter().map(|track| track.end_velocities(space)).collect();
+        let ends = [0, 1].map(|e| ends.iter().flat_map(|own| own[e].iter().copied()).collect::<Vec<f64>>());
+        let ends = match options.ends {
+            Ends::Periodic => FitEnds::Periodic,
+            open => FitEnds::Open(std::array::from_fn(|e| end_of(open, e, &ends[e]))),
+        };
+        let curves = running.iter().map(|track| {
+            let Range { start, end } = track.curve();
+            (&track.knots[start..end], &track.points[start * len..end * len])
+        });
+        let fitted = fit_all(space, curves, ends, monitor);
         let items: Vec<_> = running.iter_mut().zip(fitted).collect();
         parallel::for_each(items, threads, monitor, |(track, velocities)| match velocities {
             None => track.retreat(space),
             Some(velocities) => {
-                track.velocities = velocities;
+                track.take(velocities, len);
                 track.advance(space, options);
                 if track.done() {
                     monitor.advance(track.knots.len());
@@ -43,28 +61,22 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
             }
         });
     }
-    let nothing = |data: &Data| {
-        let report = Report { state: State::NoCurve, ..Report::default() };
-        let none = vec![f64::NAN; data.knots.len() * space.point_len()];
-        Smooth {
-            knots: data.knots.to_vec(),
-            points: none.clone(),
-            velocities: none,
-            inverse: vec![f64::NAN; data.knots.len() * 4],
-            report,
-        }
-    };
-    tracks
-        .into_iter()
-        .zip(data)
-        .map(|(track, data)| track.map_or_else(|| nothing(data), Track::finish))
-        .collect()
+    let ended = tracks.into_iter().zip(data).map(|(track, data)| {
+        track.unwrap_or_else(|| {
+            let points = vec![f64::NAN; data.knots.len() * len];
+            let mut none = Track::new(*data, data.knots.to_vec(), points, options.ends, f64::INFINITY);
+            none.retreat(space);
+            none
+        })
+    });
+    ended.map(|track| track.finish(len)).collect()
 }
 
-/// The velocities of the natural splines through points, where there are such splines.
+/// The velocities of the splines through points, where there are such splines.
 fn fit_all<'a>(
     space: &Erased,
     curves: impl Iterator<Item = (&'a [f64], &'a [f64])>,
+    ends: FitEnds,
     monitor: &Monitor,
 ) -> Vec<Option<Vec<f64>>> {
     let len = space.point_len();
@@ -75,7 +87,7 @@ fn fit_all<'a>(
         offsets.push(t.len());
     }
     let mut velocities = vec![0.0; points.len()];
-    let problem = Problem { t: &t, shared: false, points: &points, offsets: &offsets, ends: NATURAL };
+    let problem = Problem { t: &t, shared: false, points: &points, offsets: &offsets, ends };
     // Those who watch count curves, not the fits on the way to them.
     let silent = |_| !monitor.poll();
     let reports = fit(space, &problem, &FIT, &Monitor::new(&silent), &mut velocities);
@@ -112,15 +124,16 @@ fn start<'a>(
             return tracks;
         }
         let levels = tried.iter().map(|(_, level)| (&level.times[..], &level.points[..]));
-        let fitted = fit_all(space, levels, monitor);
+        let fitted = fit_all(space, levels, NATURAL, monitor);
         for ((c, level), velocities) in tried.iter().zip(fitted) {
             let Some(velocities) = velocities else { continue };
             let path = Path { t: &level.times, points: &level.points, velocities: &velocities };
             let knots = data[*c].knots;
-            let points = prolonged(space, &path, knots);
-            let ends = [FlatEnd::Natural; 2];
-            tracks[*c] =
-                Some(Track::new(data[*c], knots.to_vec(), points, ends, data[*c].lam, pyramids[*c].1));
+            let mut points = prolonged(space, &path, knots);
+            if options.ends == Ends::Periodic {
+                turns::repeat(&mut points, space.point_len());
+            }
+            tracks[*c] = Some(Track::new(data[*c], knots.to_vec(), points, options.ends, pyramids[*c].1));
         }
     }
 }
@@ -140,15 +153,4 @@ fn prolonged(space: &Erased, path: &Path, times: &[f64]) -> Vec<f64> {
     }
     points = moved(space, &points, &beyond);
     points
-}
-
-impl Track<'_> {
-    fn finish(self) -> Smooth {
-        let inverse = match &self.inverse {
-            Some(inverse) => rows_of(inverse),
-            None => vec![f64::NAN; self.knots.len() * 4],
-        };
-        let report = self.report();
-        Smooth { knots: self.knots, points: self.points, velocities: self.velocities, inverse, report }
-    }
 }

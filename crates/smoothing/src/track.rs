@@ -3,13 +3,16 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::exact::{self, Pull};
-use crate::flat::{Basis, Flat, FlatEnd};
+use crate::flat::{Basis, Flat, FlatEnd, Own};
 use crate::frames::{Frames, lanes_of};
 use crate::loss;
 use crate::path::{Path, Place, moved, places};
-use crate::smooth::NATURAL;
-use crate::{Data, Options, Report, State, Tier};
+use crate::turns;
+use crate::variance::rows_of;
+use crate::{Data, Ends, Options, Report, Smooth, State, Tier};
 use std::f64::consts::PI;
+use std::ops::Range;
+use symspline_core::fit::{End, Ends as FitEnds};
 use symspline_core::scalar::{LANES, Lane, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased, Origin};
 
@@ -23,7 +26,8 @@ const SETTLED: f64 = 3e-3;
 const ROUNDS: usize = 12;
 /// Steps are taken back and halved at most so often where no spline goes through the points they lead to.
 const RETREATS: usize = 6;
-
+/// Knots that are kept beyond either end of a closed curve's turn; of it there are three.
+const BEYOND: usize = 24;
 /// J is known to this part of it.
 const ROUNDING: f64 = 1e-12;
 
@@ -34,6 +38,7 @@ pub struct Track<'a> {
     pub knots: Vec<f64>,
     places: Vec<Place>,
     flat: Flat,
+    ends: Ends,
     /// The residual from which a robust loss counts less.
     corner: f64,
     /// Whether that has its final size.
@@ -48,7 +53,7 @@ pub struct Track<'a> {
     /// J on the exact way, at the last λ.
     objective: f64,
     /// The band of A⁻¹ at the end.
-    pub inverse: Option<Banded>,
+    inverse: Option<Banded>,
     progress: Progress,
 }
 
@@ -58,6 +63,8 @@ struct Progress {
     lam: Option<f64>,
     settled: bool,
     last_step: f64,
+    /// The size of residuals, by which steps are judged.
+    scale: f64,
     /// Iterations in a row in which the step hardly shrank.
     slow: usize,
     report: Report,
@@ -67,18 +74,16 @@ impl<'a> Track<'a> {
     /// A curve with given knots through first points.
     ///
     /// `corner` is the residual from which a robust loss counts less.
-    pub fn new(
-        data: Data<'a>,
-        knots: Vec<f64>,
-        points: Vec<f64>,
-        ends: [FlatEnd; 2],
-        lam: Option<f64>,
-        corner: f64,
-    ) -> Self {
+    pub fn new(data: Data<'a>, knots: Vec<f64>, points: Vec<f64>, ends: Ends, corner: f64) -> Self {
         let places = places(&knots, data.times);
-        let basis = Basis::new(&knots, ends);
+        let (kinds, own) = match ends {
+            Ends::Open(kinds) => (kinds, Own::all(data.times.len(), knots.len())),
+            Ends::Periodic => ([FlatEnd::Natural; 2], Own::turn(data.times.len(), knots.len())),
+        };
+        let basis = Basis::new(&knots, kinds);
         let unit = basis.spacing.powi(3);
-        let flat = Flat::new(basis, &places, data.weights);
+        let flat = Flat::new(basis, &places, data.weights, own);
+        let lam = data.lam;
         let balance = flat.balance();
         // From here on curves are geodesics; with larger λ rounding would make A forget the data.
         let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
@@ -86,6 +91,7 @@ impl<'a> Track<'a> {
             data,
             places,
             flat,
+            ends,
             corner,
             rescaled: corner.is_infinite() || data.sigma.is_some(),
             velocities: vec![0.0; points.len()],
@@ -99,6 +105,7 @@ impl<'a> Track<'a> {
                 lam: lam.map(|lam| (lam / unit).min(stiffest)),
                 settled: lam.is_some(),
                 last_step: f64::INFINITY,
+                scale: f64::NAN,
                 slow: 0,
                 report: Report {
                     at_bound: lam.is_some_and(|lam| lam / unit > stiffest),
@@ -108,9 +115,72 @@ impl<'a> Track<'a> {
         }
     }
 
+    /// The curve as it is.
+    pub fn finish(self, len: usize) -> Smooth {
+        let report = self.report();
+        let curve = self.curve();
+        // Of a closed curve some knots beyond its turn are kept, so that its splines do not end there.
+        let wide = match self.ends {
+            Ends::Open(_) => curve.clone(),
+            Ends::Periodic => curve.start.saturating_sub(BEYOND)..(curve.end + BEYOND).min(self.knots.len()),
+        };
+        let inverse = match &self.inverse {
+            Some(inverse) => rows_of(inverse)[wide.start * 4..wide.end * 4].to_vec(),
+            None => vec![f64::NAN; wide.len() * 4],
+        };
+        let part = |x: &[f64], size: usize| x[curve.start * size..curve.end * size].to_vec();
+        Smooth {
+            knots: part(&self.knots, 1),
+            points: part(&self.points, len),
+            velocities: part(&self.velocities, len),
+            inverse,
+            wide: if self.ends == Ends::Periodic { self.knots[wide].to_vec() } else { Vec::new() },
+            report,
+        }
+    }
+
     /// How it goes.
     pub fn report(&self) -> Report {
         self.progress.report
+    }
+
+    /// The part of the knots that is the curve.
+    pub fn curve(&self) -> Range<usize> {
+        let Own { segments, .. } = &self.flat.own;
+        segments.start..segments.end + 1
+    }
+
+    /// Velocities at the ends, carried from the first and the last of the data to the ends of the curve.
+    pub fn end_velocities(&self, space: &Erased) -> [Vec<f64>; 2] {
+        let len = space.point_len();
+        std::array::from_fn(|e| {
+            let velocity = self.data.ends[e];
+            if velocity.is_empty() {
+                return Vec::new();
+            }
+            let at = |x: &[f64]| -> Vec<Lane> {
+                let row = if e == 0 { &x[..len] } else { &x[x.len() - len..] };
+                row.iter().map(|&x| lane(x)).collect()
+            };
+            let (y, x) = (at(self.data.points), at(&self.points));
+            let (mut way, mut out) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
+            let v: Vec<Lane> = velocity.iter().map(|&v| lane(v)).collect();
+            space.log(&y, &x, &mut way);
+            space.carry(&y, &x, &way, &v, &mut out);
+            out.iter().map(|x| x.as_array()[0]).collect()
+        })
+    }
+
+    /// Takes the velocities of the fitted curve.
+    pub fn take(&mut self, velocities: Vec<f64>, len: usize) {
+        match self.ends {
+            Ends::Open(_) => self.velocities = velocities,
+            Ends::Periodic => {
+                let start = self.curve().start * len;
+                self.velocities[start..start + velocities.len()].copy_from_slice(&velocities);
+                turns::repeat(&mut self.velocities, len);
+            }
+        }
     }
 
     /// Whether nothing is left to do.
@@ -127,10 +197,14 @@ impl<'a> Track<'a> {
         };
         step.iter_mut().for_each(|x| *x *= 0.5);
         self.points = moved(space, points, step);
+        if self.ends == Ends::Periodic {
+            turns::repeat(&mut self.points, space.point_len());
+        }
     }
 
     /// One step from the spline through the points, or the end.
     pub fn advance(&mut self, space: &Erased, options: &Options) {
+        let velocities = self.end_velocities(space);
         let Track { data, flat, progress, .. } = self;
         let (m, spacing, weights) = (space.dim(), flat.basis.spacing, data.weights);
         progress.report.iterations += 1;
@@ -168,10 +242,12 @@ impl<'a> Track<'a> {
         }
         let inverse = factors.inverse_band();
         progress.note(&linear, &inverse, lam, softness);
-        progress.report.misfit = squares.iter().zip(weights).map(|(s, w)| s * w).sum();
+        let own = flat.own.data.clone();
+        progress.report.misfit = own.map(|k| weights[k] * squares[k]).sum();
         progress.expect(space, &speeds, weights, lam);
 
         let exact = match options.tier {
+            _ if self.ends == Ends::Periodic => false,
             Tier::Flat => false,
             Tier::Newton => true,
             Tier::Auto => {
@@ -188,7 +264,8 @@ impl<'a> Track<'a> {
         let (step, ambient) = if exact {
             let unit = spacing.powi(3);
             let pull = Pull { places: &self.places, vectors: &vectors, weights };
-            let ambient = exact::step(space, &path, NATURAL, &pull, lam * unit);
+            let kinds = std::array::from_fn(|e| end_of(self.ends, e, &velocities[e]));
+            let ambient = exact::step(space, &path, FitEnds::Open(kinds), &pull, lam * unit);
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {
             let change = linear.step(lam, &factors);
@@ -199,12 +276,16 @@ impl<'a> Track<'a> {
         let deviations: Vec<f64> =
             flat.values.iter().map(|row| (row.square(&inverse).as_array()[0] * m as f64).sqrt()).collect();
         let reach = speeds.chunks_exact(m).map(length).sum::<f64>();
-        let small = progress.judge(&step, &deviations, reach, options);
+        let own = flat.own.knots.clone();
+        let own_step = &step[own.start * m..own.end * m];
+        let small = progress.judge(own_step, &deviations[own], reach, options);
         self.inverse = Some(inverse);
         if progress.settled && small {
             if !self.rescaled {
                 // Once more with the noise beside the curve, which is never taken to be larger, nor much smaller.
-                let noise = loss::noise_beside(&squares, weights, progress.report.freedom, m);
+                let own = flat.own.data.clone();
+                let noise =
+                    loss::noise_beside(&squares[own.clone()], &weights[own], progress.report.freedom, m);
                 let corner = noise * options.loss.corner(m);
                 self.corner = corner.clamp(0.5 * self.corner, self.corner);
                 (self.rescaled, self.objective) = (true, f64::INFINITY);
@@ -225,7 +306,10 @@ impl<'a> Track<'a> {
         if longest > farthest {
             ambient.iter_mut().for_each(|x| *x *= farthest / longest);
         }
-        let next = moved(space, &self.points, &ambient);
+        let mut next = moved(space, &self.points, &ambient);
+        if self.ends == Ends::Periodic {
+            turns::repeat(&mut next, space.point_len());
+        }
         self.before = Some((std::mem::replace(&mut self.points, next), ambient));
     }
 }
@@ -249,13 +333,18 @@ impl Progress {
     fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
         let Linear { flat, m, weights, residuals, .. } = linear;
         let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
-        let rss: f64 = residuals.chunks_exact(*m).zip(*weights).map(|(r, w)| w * square(r)).sum();
+        let own = flat.own.data.clone();
+        let count = own.len() as f64;
+        let rss: f64 = own.map(|k| weights[k] * square(&residuals[k * m..][..*m])).sum();
         let unit = flat.basis.spacing.powi(3);
         let freedom = flat.freedom(inverse).as_array()[0];
         self.report.freedom = freedom;
         self.report.lam = lam * softness * unit;
         self.report.band_lam = lam * unit;
-        self.report.sigma = (rss / (*m as f64 * (weights.len() as f64 - freedom).max(0.0))).sqrt();
+        // A curve through all data says nothing of noise.
+        let left = count - freedom;
+        self.report.sigma = if left > 1e-9 * count { (rss / (*m as f64 * left)).sqrt() } else { f64::NAN };
+        self.scale = (rss / (*m as f64 * left.max(1.0))).sqrt();
     }
 
     /// The contraction that the flat way is expected to have: `K²|γ'|²√(λ/w)`, with the mean
@@ -275,8 +364,7 @@ impl Progress {
         const STILL: f64 = 1e-13;
         let lengths: Vec<f64> = step.chunks_exact(step.len() / deviations.len()).map(length).collect();
         let longest = lengths.iter().copied().fold(0.0, larger);
-        let relative =
-            lengths.iter().zip(deviations).map(|(x, d)| x / (d * self.report.sigma)).fold(0.0, larger);
+        let relative = lengths.iter().zip(deviations).map(|(x, d)| x / (d * self.scale)).fold(0.0, larger);
         let rate = longest / self.last_step;
         if self.last_step.is_finite() {
             self.report.rate = rate;
@@ -287,6 +375,14 @@ impl Progress {
         self.last_step = longest;
         self.report.step = relative;
         relative <= options.tol || longest <= STILL * reach || (longest <= FLOOR * reach && rate > SLOW)
+    }
+}
+
+/// The condition at an end.
+pub fn end_of(ends: Ends, e: usize, velocity: &[f64]) -> End<'_> {
+    match ends {
+        Ends::Open(kinds) if kinds[e] == FlatEnd::Velocity => End::Velocity(velocity),
+        _ => End::Natural,
     }
 }
 

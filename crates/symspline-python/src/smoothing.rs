@@ -2,21 +2,28 @@
 
 use crate::arrays::{in_order, room, zeros};
 use crate::errors::invalid;
+use crate::fit::EndOf;
 use crate::space::Handle;
 use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline::smoothing::{
-    Criterion, Data, FlatEnd, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
+    Criterion, Data, Ends, FlatEnd, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
     variance as variance_at,
 };
 use symspline::space::Ambient;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Points at the knots, the band of A⁻¹, and the columns of the report.
-type Smoothed<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>);
+/// Points and velocities at the knots, the band of A⁻¹ and its knots, and the columns of the report.
+type Smoothed<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyTuple>,
+);
 
 /// Smooths curves. `t` and `weights` are of all data, (N,) or (..., N); `knots` (K,) or (..., K); `lam` and `sigma` one
 /// a curve, NaN where λ is to be chosen.
@@ -30,6 +37,7 @@ pub fn smooth<'py>(
     knots: Array<'py>,
     lam: Array<'py>,
     sigma: Array<'py>,
+    ends: Option<[EndOf<'py>; 2]>,
     criterion: &str,
     loss: &str,
     method: &str,
@@ -53,6 +61,15 @@ pub fn smooth<'py>(
         },
         tol,
         max_iter,
+        ends: match &ends {
+            None => Ends::Periodic,
+            Some(kinds) => Ends::Open([kind(&kinds[0])?, kind(&kinds[1])?]),
+        },
+    };
+    let none: &[f64] = &[];
+    let vectors: [&[f64]; 2] = match &ends {
+        None => [none; 2],
+        Some([a, b]) => [a.1.as_ref().map_or(Ok(none), in_order)?, b.1.as_ref().map_or(Ok(none), in_order)?],
     };
     let space = handle.space.get();
     let len = space.point_len();
@@ -85,17 +102,48 @@ pub fn smooth<'py>(
             knots: &k[own(k, count, c)..][..count],
             lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
             sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),
+            ends: vectors.map(|v| if v.is_empty() { none } else { &v[c * len..][..len] }),
         })
         .collect();
     let found = watched(py, progress, curves * count, |monitor| run(&space, &data, &options, monitor))?;
 
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
-    let (out, bands) = (zeros(py, &shape)?, zeros(py, &[batch, &[count, 4]].concat())?);
-    let (mut out_write, mut bands_write) = (out.readwrite(), bands.readwrite());
-    copy(&found, |smooth| &smooth.points, out_write.as_slice_mut()?);
-    copy(&found, |smooth| &smooth.inverse, bands_write.as_slice_mut()?);
-    drop((out_write, bands_write));
-    Ok((out, bands, columns(py, &found)?))
+    let wide = found.first().map_or(count, |smooth| smooth.inverse.len() / 4);
+    let closed = ends.is_none();
+    Ok((
+        gathered(py, &shape, &found, |smooth| &smooth.points)?,
+        gathered(py, &shape, &found, |smooth| &smooth.velocities)?,
+        gathered(py, &[batch, &[wide, 4]].concat(), &found, |smooth| &smooth.inverse)?,
+        gathered(py, &[batch, &[if closed { wide } else { 0 }]].concat(), &found, |smooth| &smooth.wide)?,
+        columns(py, &found)?,
+    ))
+}
+
+fn kind((name, _): &EndOf) -> PyResult<FlatEnd> {
+    match name.as_str() {
+        "natural" => Ok(FlatEnd::Natural),
+        "velocity" => Ok(FlatEnd::Velocity),
+        _ => Err(invalid(format!("a smooth curve cannot have the end condition {name:?}"))),
+    }
+}
+
+/// One part of all curves in an array.
+fn gathered<'py>(
+    py: Python<'py>,
+    shape: &[usize],
+    found: &[Smooth],
+    part: impl Fn(&Smooth) -> &Vec<f64>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let out = zeros(py, shape)?;
+    let mut write = out.readwrite();
+    let mut rest = write.as_slice_mut()?;
+    for smooth in found {
+        let own;
+        (own, rest) = rest.split_at_mut(part(smooth).len());
+        own.copy_from_slice(part(smooth));
+    }
+    drop(write);
+    Ok(out)
 }
 
 fn criterion_named(name: &str) -> PyResult<Criterion> {
@@ -108,15 +156,6 @@ fn criterion_named(name: &str) -> PyResult<Criterion> {
             return Err(invalid(format!("criterion must be 'gcv', 'gcv1.4', 'reml' or 'cp', not {name:?}")));
         }
     })
-}
-
-fn copy(found: &[Smooth], part: impl Fn(&Smooth) -> &Vec<f64>, out: &mut [f64]) {
-    let mut at = 0;
-    for smooth in found {
-        let rows = part(smooth);
-        out[at..at + rows.len()].copy_from_slice(rows);
-        at += rows.len();
-    }
 }
 
 /// state, iterations, lam, band_lam, at_bound, freedom, sigma, step, rate, kappa, exact.
@@ -143,7 +182,8 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
     Ok(all.to_tuple())
 }
 
-/// Variances of a coordinate of one smoothed curve at times, at noise of variance one; see the core.
+/// Variances of a coordinate of one smoothed curve at times, at noise of variance one; see the core. `fixed` are ends with
+/// a given velocity.
 #[pyfunction]
 pub fn smoothing_variance<'py>(
     py: Python<'py>,
@@ -152,8 +192,9 @@ pub fn smoothing_variance<'py>(
     lam: f64,
     x: Array<'py>,
     nu: usize,
+    fixed: [bool; 2],
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let ends = [FlatEnd::Natural; 2];
+    let ends = fixed.map(|fixed| if fixed { FlatEnd::Velocity } else { FlatEnd::Natural });
     let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);
     Ok(PyArray1::from_vec(py, variance_at(knots, band, lam, ends, x, nu)))
 }

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
 from ..arrays import as_array, cast, shown
+from ..curves.ends import End
 from ..curves.fit import Points, read, read_ends, validated
 from ..options import within
 from ..spaces import Array, Space, factors_of
@@ -44,9 +45,14 @@ class Knots(NamedTuple):
 
 
 def read_noisy(
-    t: ArrayLike | None, points: Any, space: Space, weights: ArrayLike | None, atol: float | None
-) -> Noisy:
-    """The data, after all checks.
+    t: ArrayLike | None,
+    points: Any,
+    space: Space,
+    weights: ArrayLike | None,
+    bc_type: Any,
+    atol: float | None,
+) -> tuple[Noisy, list[list[End] | None]]:
+    """The data, and the conditions at the ends in every factor, after all checks.
 
     Raises:
         ValidationError: something is wrong with them; it says where.
@@ -59,9 +65,17 @@ def read_noisy(
         data = [_without_missing(part, checked) for part in data]
     # Points only: times may repeat, and knots need not be where data are.
     plain = np.arange(count, dtype=np.float64)
-    on_space = validated(space, plain, data, read_ends("natural", space, batch))
+    ends = read_ends(bc_type, space, batch)
+    for kind, _ in (end for own in ends for end in own or []):
+        if kind not in ("natural", "velocity"):
+            raise ValidationError(
+                f"bc_type {kind!r} is no end of a smooth curve: 'natural', 'clamped', 'periodic', or (1, velocity)"
+            )
+    # The ends of a closed curve are noisy, too, and differ.
+    natural = read_ends("natural", space, batch)
+    on_space = validated(space, plain, data, [own or other for own, other in zip(ends, natural, strict=True)])
     _check_enough(times, checked, batch, count)
-    return Noisy(clock, shown_times, times, on_space, checked, batch)
+    return Noisy(clock, shown_times, times, on_space, checked, batch), ends
 
 
 def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[Clock, Array, Doubles]:

@@ -9,14 +9,15 @@ from numpy.typing import ArrayLike
 
 from .._core import ValidationError
 from ..arrays import shown, whole_number
+from ..curves.ends import End, kept
 from ..curves.fit import Asked as Fitted
-from ..curves.fit import Points, fit, read_ends
+from ..curves.fit import Points, fit
 from ..curves.solve import Fault, Options, Progress
 from ..failures import fail
 from ..options import check_on_failure, check_progress, checked_policy
 from ..spaces import Product, Space, factors_of
 from ..spaces import space as space_named
-from .data import Knots, knots_for, points_of, read_noisy
+from .data import Knots, Noisy, knots_for, points_of, read_noisy
 from .solve import Asked, enough, one_a_curve, smoothed, stiffness
 from .spline import SmoothingSpline
 
@@ -37,6 +38,7 @@ def make_smoothing_spline(
     knots: Any = None,
     criterion: str = "gcv",
     sigma: Any = None,
+    bc_type: Any = "natural",
     loss: str = "linear",
     method: str = "auto",
     tol: float = 1e-3,
@@ -46,7 +48,7 @@ def make_smoothing_spline(
     atol: float | None = None,
     progress: Progress | None = None,
 ) -> SmoothingSpline:
-    """The C² curve γ with natural ends that makes ``Σ w d(y, γ(t))² + λ ∫ |∇γ'|² dt`` least.
+    """The C² curve γ that makes ``Σ w d(y, γ(t))² + λ ∫ |∇γ'|² dt`` least.
 
     In flat space it is SciPy's ``make_smoothing_spline``. λ is chosen from the data unless it is given.
 
@@ -70,6 +72,10 @@ def make_smoothing_spline(
             ``"reml"``, or ``"cp"`` (Mallows' C_p, which needs ``sigma``).
         sigma: standard deviation of the noise in a coordinate for weight one, if it is known; also one a curve, or a
             tuple for a product.
+        bc_type: conditions at the ends: ``"natural"``, ``"clamped"``, ``(1, velocity)`` at either end, as for
+            `CubicSpline`, or ``"periodic"``. Velocities are tangent at the first and the last of the points, and are
+            carried from there to the curve in parallel. A closed curve has the period of its knots, and the flat way
+            only.
         loss: ``"linear"`` for least squares; ``"huber"`` or ``"cauchy"`` if there are outliers.
         method: ``"flat"`` solves the problem of numbers in frames along the curve, again and again; its result is
             within about 1e-4 of the error of the minimum. ``"newton"`` is the Gauss-Newton method for the minimum
@@ -102,15 +108,15 @@ def make_smoothing_spline(
     if not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
         raise ValidationError(f"tol must be a number > 0, not {shown(tol)}")
     asked = Asked(criterion, loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
-    noisy = read_noisy(t, points, space, weights, atol)
+    noisy, ends = read_noisy(t, points, space, weights, bc_type, atol)
     lams = _in_factors(space, lam, "lam", noisy.batch)
     sigmas = _in_factors(space, sigma, "sigma", noisy.batch)
 
     def run(at: Knots) -> list[Any]:
-        each = zip(points_of(noisy, space), lams, sigmas, strict=True)
+        each = zip(points_of(noisy, space), lams, sigmas, ends, strict=True)
         return [
-            smoothed(factor, noisy, own, at, one_lam, one_sigma, asked, progress)
-            for (factor, own), one_lam, one_sigma in each
+            smoothed(factor, noisy, own, at, one_lam, one_sigma, end, asked, progress)
+            for (factor, own), one_lam, one_sigma, end in each
         ]
 
     at, whole = knots_for(noisy, knots), None
@@ -134,10 +140,20 @@ def make_smoothing_spline(
         Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, noisy.batch, at.times.shape[-1])
         for factor, (own, _, _) in zip(factors_of(space), found, strict=True)
     ]
-    ends = read_ends("natural", space, noisy.batch)
-    curve, reports, _ = fit(Fitted(space, at.times, parts, ends, _FIT, False), None)
+    carried = [
+        _carried(end, factor, own, curve_points, noisy)
+        for end, (factor, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
+    ]
+    curve, reports, _ = fit(Fitted(space, at.times, parts, carried, _FIT, False), None)
     spline = SmoothingSpline._of(
-        noisy.clock, at.t, curve, "natural", policy, reports, noisy, [part for _, part, _ in found]
+        noisy.clock,
+        at.t,
+        curve,
+        _conditions(bc_type, carried, space),
+        policy,
+        reports,
+        noisy,
+        [part for _, part, _ in found],
     )
     faults: list[Fault] = next((faults for _, _, faults in found if faults), [])
     if faults:
@@ -181,3 +197,37 @@ def _in_factors(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> 
             raise ValidationError(f"{name} has {len(value)} entries, but the product {len(factors)} factors")
         return [one_a_curve(one, name, batch) for one in value]
     return [one_a_curve(value, name, batch)] * len(factors)
+
+
+def _carried(ends: list[End] | None, space: Space, data: Any, points: Any, noisy: Noisy) -> list[End] | None:
+    """Velocities at the first and the last of the data, carried to the ends of the curve."""
+    axis = len(noisy.batch)
+    result: list[End] = []
+    for (kind, vector), index in zip(ends or [], (0, -1), strict=ends is not None):
+        if vector is not None:
+            y, x = (np.take(rows, index, axis=axis) for rows in (data, points))
+            good = np.isfinite(x).all(axis=tuple(range(axis, x.ndim)))
+            moved = np.array(space._numbers(vector))
+            moved[good] = space._apply("transport", p=y[good], q=x[good], v=moved[good])
+            vector = np.ascontiguousarray(space._as_doubles(moved))
+        result.append((kind, vector))
+    return None if ends is None else result
+
+
+def _conditions(bc_type: Any, carried: list[list[End] | None], space: Space) -> Any:
+    """The same as a user may write it."""
+    if isinstance(bc_type, str):
+        return bc_type
+
+    def one(e: int) -> Any:
+        each = [(ends or [])[e] for ends in carried]
+        if each[0][1] is None:
+            return "natural"
+        vectors = tuple(
+            factor._numbers(vector)
+            for factor, (_, vector) in zip(factors_of(space), each, strict=True)
+            if vector is not None
+        )
+        return (1, vectors if isinstance(space, Product) else vectors[0])
+
+    return kept((one(0), one(1)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._core import ValidationError
 from ..arrays import shown
+from ..curves.ends import End
 from ..curves.in_span import reduced
 from ..curves.solve import Fault, Progress
 from ..spaces import Array, Space
@@ -26,19 +27,28 @@ class Smoothed(NamedTuple):
 
     Attributes:
         band: the band of A⁻¹, shape (..., K, 4): variances of the curve, at noise of variance one.
+        wide: the knots that go with it: those of the curve, or of a closed curve some more on either side.
+        fixed: which ends have a given velocity.
         band_lam: the λ that goes with it, that of the pseudo-data of a robust loss.
         sigma: the standard deviation of a coordinate by which bands are scaled, estimated or known.
     """
 
     report: SmoothingReport
     band: Doubles
+    wide: Doubles
+    fixed: tuple[bool, bool]
     band_lam: Any
     sigma: Any
 
     def map(self, function: Any) -> Smoothed:
         """The same for a part of a batch."""
         return Smoothed(
-            self.report.map(function), function(self.band), function(self.band_lam), function(self.sigma)
+            self.report.map(function),
+            function(self.band),
+            function(self.wide) if self.wide.ndim > 1 else self.wide,
+            self.fixed,
+            function(self.band_lam),
+            function(self.sigma),
         )
 
 
@@ -59,13 +69,16 @@ def smoothed(
     knots: Knots,
     lam: Doubles,
     sigma: Doubles,
+    ends: list[End] | None,
     asked: Asked,
     progress: Progress | None,
 ) -> tuple[Array, Smoothed, list[Fault]]:
     """The points of smooth curves at the knots, in a space that is no product."""
     small, inside, span = reduced(space, points)
     batch = noisy.batch
-    found, band, columns = _core.smooth(
+    if span is not None and any(vector is not None for _, vector in ends or []):
+        raise ValidationError(f"in as many dimensions as {space} has, end velocities cannot be given")
+    found, _, band, wide, columns = _core.smooth(
         small._handle,
         np.ascontiguousarray(noisy.times),
         np.ascontiguousarray(small._as_doubles(inside)),
@@ -73,6 +86,7 @@ def smoothed(
         np.ascontiguousarray(knots.times),
         lam,
         sigma,
+        ends,
         *asked,
         progress,
     )
@@ -98,7 +112,9 @@ def smoothed(
         for number, kind in enumerate(np.ravel(state).tolist())
         if kind
     ]
-    return numbers if span is None else span.up(numbers), Smoothed(report, band, band_lam, scale), faults
+    fixed = (False, False) if ends is None else (ends[0][0] == "velocity", ends[1][0] == "velocity")
+    kept = Smoothed(report, band, knots.times if ends else wide, fixed, band_lam, scale)
+    return numbers if span is None else span.up(numbers), kept, faults
 
 
 def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingReport, asked: Asked) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .. import _core
 from .._core import ValidationError
 from ..curves.curve import Curve
+from ..curves.ends import is_closed
 from ..report import Report
 from ..spaces import Array, Product, factors_of
 from ..spline import CubicSpline
@@ -98,7 +99,7 @@ class SmoothingSpline(CubicSpline):
         of a spline (Wahba 1983) in frames along the curve.
 
         Args:
-            x: times, any shape; beyond the knots the curve goes on straight.
+            x: times, any shape; beyond the knots the curve goes on straight, or round again if it is closed.
             nu: 0 for the point, 1 for the velocity.
 
         Returns:
@@ -117,18 +118,28 @@ class SmoothingSpline(CubicSpline):
         times, per_curve = self._clock.at(x, self._batch, False)
         if not np.isfinite(times).all():
             raise ValidationError("x must be finite")
+        if is_closed(self._bc_type):
+            first, last = (self._times[..., end] for end in (0, -1))
+            shape = (*first.shape, *[1] * (times.ndim - first.ndim))
+            first, period = first.reshape(shape), (last - first).reshape(shape)
+            times, per_curve = first + (times - first) % period, per_curve or self._times.ndim > 1
         batch = self._batch
         own = times.shape[len(batch) :] if per_curve else times.shape
         found = []
         for part in self._smoothed:
             out = np.empty((*batch, *own))
             for index in np.ndindex(batch):
-                knots = self._times[index] if self._times.ndim > 1 else self._times
+                knots = part.wide[index] if part.wide.ndim > 1 else part.wide
                 at = times[index] if per_curve else times
                 lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
                 rows = np.ascontiguousarray(np.ravel(at))
                 variance = _core.smoothing_variance(
-                    np.ascontiguousarray(knots), np.ascontiguousarray(part.band[index]), lam, rows, nu
+                    np.ascontiguousarray(knots),
+                    np.ascontiguousarray(part.band[index]),
+                    lam,
+                    rows,
+                    nu,
+                    part.fixed,
                 )
                 out[index] = sigma * np.sqrt(variance).reshape(own)
             found.append(out[()])

@@ -1,0 +1,47 @@
+//! A closed curve, unrolled: three turns of it, of which the one in the middle counts.
+//!
+//! What happens at a knot fades with the distance, so that the artificial ends do no harm; and what is left of them
+//! vanishes where the gradient does.
+
+use crate::Data;
+
+/// Three turns of noisy data and knots.
+pub struct Turns {
+    times: Vec<f64>,
+    points: Vec<f64>,
+    weights: Vec<f64>,
+    knots: Vec<f64>,
+}
+
+impl Turns {
+    /// Of a curve whose last knot is the first again.
+    pub fn of(data: &Data) -> Self {
+        let last = data.knots.len() - 1;
+        let period = data.knots[last] - data.knots[0];
+        let turns = |x: &[f64]| -> Vec<f64> {
+            [-period, 0.0, period].iter().flat_map(|shift| x.iter().map(move |x| x + shift)).collect()
+        };
+        let mut knots = turns(&data.knots[..last]);
+        knots.push(data.knots[last] + period);
+        Turns {
+            times: turns(data.times),
+            points: data.points.repeat(3),
+            weights: data.weights.repeat(3),
+            knots,
+        }
+    }
+
+    /// As data of a curve.
+    pub fn data<'a>(&'a self, of: &Data<'a>) -> Data<'a> {
+        Data { times: &self.times, points: &self.points, weights: &self.weights, knots: &self.knots, ..*of }
+    }
+}
+
+/// Repeats what the rows of the turn in the middle have in the other two, and behind them.
+pub fn repeat(rows: &mut [f64], len: usize) {
+    let n = (rows.len() / len - 1) / 3;
+    let turn = rows[n * len..2 * n * len].to_vec();
+    for (k, row) in rows.chunks_exact_mut(len).enumerate() {
+        row.copy_from_slice(&turn[k % n * len..][..len]);
+    }
+}

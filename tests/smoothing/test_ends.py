@@ -1,0 +1,135 @@
+"""Smooth curves with given velocities at their ends, and closed ones."""
+
+import numpy as np
+import pytest
+from noisy import beside, example
+
+import symspline as ss
+
+TIGHT = {"tol": 1e-8, "max_iter": 200}
+
+
+def flatness(space, t, noisy, spline, lam, conditions, closed):
+    """How far from its minimum J is in random directions: slope over curvature."""
+    rng = np.random.default_rng(0)
+    places = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3)
+    h = np.diff(spline.t)
+    x = spline.t[:-1, None] + h[:, None] * places
+
+    def objective(points):
+        if closed:
+            points[-1] = points[0]
+        curve = ss.CubicSpline(spline.t, points, space, bc_type=conditions(points))
+        at, bends = curve(x), curve(x, nu=2)
+        energy = np.sum(0.5 * h[:, None] * space.inner(at, bends, bends))
+        return np.sum(space.distance(curve(t), noisy) ** 2) + lam * energy
+
+    found = []
+    for _ in range(3):
+        v = space.random_tangent(rng, spline.points)
+        here, up, down = (objective(space.exp(spline.points, s * 1e-4 * v)) for s in (0, 1, -1))
+        bend = (up + down - 2 * here) / 1e-8
+        assert bend > 0
+        found.append(abs((up - down) / 2e-4 / bend))
+    return max(found)
+
+
+@pytest.mark.parametrize(("name", "far"), [("r:2", 1e-9), ("sphere:2", 3e-5), ("so:3", 3e-5)])
+def test_given_velocities(name, far):
+    """The curve has them, and is the least with them."""
+    space, t, noisy, _ = example(name, 0.05, n=25, segments=3)
+    rng = np.random.default_rng(1)
+    start, end = (0.2 * space.random_tangent(rng, noisy[e]) for e in (0, -1))
+    spline = ss.make_smoothing_spline(t, noisy, space, 0.3, bc_type=((1, start), (1, end)), **TIGHT)
+
+    def conditions(points):
+        each = zip((0, -1), (start, end), strict=True)
+        return tuple((1, space.transport(noisy[e], points[e], v)) for e, v in each)
+
+    for e, (_, v) in zip((0, -1), conditions(spline.points), strict=True):
+        assert np.abs(spline.velocities[e] - v).max() < 1e-12
+    # The flat way solves an estimating equation beside the minimum, whose velocities stay while ends move.
+    assert flatness(space, t, noisy, spline, 0.3, conditions, False) < far
+    still = ss.make_smoothing_spline(t, noisy, space, bc_type="clamped")
+    assert np.abs(still.velocities[[0, -1]]).max() == 0
+    # What is fixed is less uncertain.
+    free = ss.make_smoothing_spline(t, noisy, space, still.lam)
+    assert still.std(0.0) < free.std(0.0) and still.std(0.0, 1) < 1e-3 * free.std(0.0, 1)
+    assert still.std(5.0) == pytest.approx(free.std(5.0), rel=0.1)
+
+
+def test_the_exact_way_has_given_velocities_too():
+    space, t, noisy, _ = example("sphere:2", 0.05, n=20, segments=3)
+    start = 0.2 * space.random_tangent(np.random.default_rng(1), noisy[0])
+    ways = [
+        ss.make_smoothing_spline(
+            t, noisy, space, 0.3, bc_type=((1, start), "natural"), method=method, tol=1e-5
+        )
+        for method in ("flat", "newton")
+    ]
+    assert space.distance(ways[0].points, ways[1].points).max() < 1e-4
+
+
+def ring(name, n, sigma=0.05):
+    """A noisy closed curve without a last point."""
+    space = ss.space(name)
+    rng = np.random.default_rng(3)
+    p = space.random_point(rng)
+    v, w = space.random_tangent(rng, p), space.random_tangent(rng, p)
+    angle = 2 * np.pi * np.arange(n) / n
+    shape = (n,) + (1,) * p.ndim
+    # Not so small that its holonomy would not matter.
+    truth = space.exp(p, 0.6 * (np.cos(angle).reshape(shape) * v + np.sin(angle).reshape(shape) * w))
+    return space, np.arange(n) * 10 / n, beside(space, truth, sigma), truth
+
+
+@pytest.mark.parametrize(
+    ("name", "far"), [("r:2", 1e-9), ("sphere:1", 1e-9), ("sphere:2", 3e-5), ("so:3", 3e-5), ("spd:2", 3e-5)]
+)
+def test_closed_curves(name, far):
+    space, t, noisy, truth = ring(name, 40)
+    knots = np.append(t, 10.0)
+    spline = ss.make_smoothing_spline(t, noisy, space, 0.3, knots=knots, bc_type="periodic", **TIGHT)
+    assert np.array_equal(spline.points[0], spline.points[-1])
+    for nu in range(3):
+        assert np.abs(spline(10.0 - 1e-9, nu) - spline(1e-9, nu)).max() < 1e-6
+    assert np.array_equal(spline(11.0), spline(1.0))
+    assert flatness(space, t, noisy, spline, 0.3, lambda _: "periodic", True) < far
+    # Wherever the turn begins.
+    other = ss.make_smoothing_spline(
+        t, np.roll(noisy, -7, axis=0), space, 0.3, knots=knots, bc_type="periodic", **TIGHT
+    )
+    assert space.distance(np.roll(spline.points[:-1], -7, axis=0), other.points[:-1]).max() < 1e-6
+    assert other.std(0.1) == pytest.approx(spline.std(t[7] + 0.1), rel=1e-6)
+    assert other.df == pytest.approx(spline.df, rel=1e-6)
+    chosen = ss.make_smoothing_spline(t, noisy, space, knots=knots, bc_type="periodic", criterion="reml")
+    assert chosen.report.converged and 0.025 < chosen.sigma < 0.075
+    errors = space.distance(chosen(t), truth)
+    assert np.sqrt(np.mean(errors**2)) < 0.6 * np.sqrt(np.mean(space.distance(noisy, truth) ** 2))
+    assert 0.8 < np.mean(errors < chosen.band(t)) <= 1
+    assert chosen.std(12.5) == pytest.approx(chosen.std(2.5))
+
+
+def test_a_closed_curve_of_numbers_is_a_filter():
+    """Equal times: its coefficients in Fourier's basis are those of the data, each shrunk by itself."""
+    n, lam = 32, 0.2
+    rng = np.random.default_rng(4)
+    y = rng.standard_normal(n)
+    spline = ss.make_smoothing_spline(
+        np.arange(n), y[:, None], "r:1", lam, knots=np.arange(n + 1), bc_type="periodic", **TIGHT
+    )
+    unit = np.eye(n)[0]
+    # The energy of the interpolant of one number by its second derivatives M: m'' = (1, 4, 1)/6 M.
+    second = np.fft.fft(np.roll(unit, 1) - 2 * unit + np.roll(unit, -1)).real
+    mass = np.fft.fft((np.roll(unit, 1) + 4 * unit + np.roll(unit, -1)) / 6).real
+    shrink = 1 / (1 + lam * second**2 / mass)
+    assert np.abs(spline.points[:-1, 0] - np.fft.ifft(shrink * np.fft.fft(y)).real).max() < 1e-8
+    assert spline.df == pytest.approx(shrink.sum(), rel=1e-6)
+
+
+def test_other_ends_are_refused():
+    space, t, noisy, _ = example("sphere:2", 0.05, n=10)
+    with pytest.raises(ss.ValidationError, match="no end of a smooth curve"):
+        ss.make_smoothing_spline(t, noisy, space, bc_type="not-a-knot")
+    with pytest.raises(ss.ValidationError, match="tangent"):
+        ss.make_smoothing_spline(t, noisy, space, bc_type=((1, noisy[0]), "natural"))
