@@ -8,6 +8,8 @@
 use crate::path::{Path, Place};
 use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
+use symspline_core::monitor::Monitor;
+use symspline_core::parallel;
 use symspline_core::scalar::{LANES, Lane, lane};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
@@ -46,18 +48,50 @@ fn lanes(row: &[f64]) -> Vec<Lane> {
 }
 
 /// The step of the points as tangent vectors. λ is in the units of the knots.
-pub fn step(space: &Erased, path: &Path, ends: Ends, pull: &Pull, lam: f64) -> Vec<f64> {
+pub fn step(
+    space: &Erased,
+    path: &Path,
+    ends: Ends,
+    pull: &Pull,
+    lam: f64,
+    monitor: &Monitor,
+    threads: bool,
+) -> Vec<f64> {
     let (m, len, n) = (space.dim(), space.point_len(), path.t.len() - 1);
-    let mut derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
+    let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
     // Velocities in units of the mean knot spacing, so that all unknowns are of one size.
     let unit = (path.t[n] - path.t[0]) / n as f64;
     let mut system = Tridiagonal::new(n + 1, 3 * m);
-    let mut add = |segment: usize, matrix: Matrix, value: &Vector, weight: f64| {
-        let mut scaled = matrix;
-        for e in 0..2 {
-            scaled.columns_mut((2 * e + 1) * m, m).scale_mut(1.0 / unit);
+
+    let places = quadrature(n);
+    let samples = [(pull.places, path.at(space, pull.places)), (&places, path.at(space, &places))];
+    let bends = path.bends(space, &places);
+    let mut parts: Vec<(usize, Matrix, Vector)> =
+        (0..n).map(|i| (i, Matrix::zeros(4 * m, 4 * m), Vector::zeros(4 * m))).collect();
+    parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
+        let motion = derivative.motion(*segment);
+        let mut add = |kind: usize, k: usize, of: Of, vector: &[f64], weight: f64| {
+            let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);
+            let (mut matrix, value) =
+                in_coordinates(space, &motion.point(tau), &motion.at(tau, of), p, vector);
+            for e in 0..2 {
+                matrix.columns_mut((2 * e + 1) * m, m).scale_mut(1.0 / unit);
+            }
+            *square += matrix.tr_mul(&matrix) * weight;
+            *right += matrix.tr_mul(&value) * weight;
+        };
+        let first = pull.places.partition_point(|place| place.0 < *segment);
+        let here = pull.places[first..].iter().take_while(|place| place.0 == *segment).count();
+        for k in first..first + here {
+            add(0, k, Of::Point, &pull.vectors[k * len..][..len], pull.weights[k]);
         }
-        let (square, right) = (scaled.tr_mul(&scaled) * weight, scaled.tr_mul(value) * weight);
+        let h = path.t[*segment + 1] - path.t[*segment];
+        for k in 2 * *segment..2 * *segment + 2 {
+            let against: Vec<f64> = bends[k * len..][..len].iter().map(|x| -x).collect();
+            add(1, k, Of::Acceleration, &against, lam * h / 2.0);
+        }
+    });
+    for (segment, square, right) in &parts {
         for a in 0..2 {
             for b in 0..2 {
                 let block = square.view((2 * a * m, 2 * b * m), (2 * m, 2 * m));
@@ -67,22 +101,6 @@ pub fn step(space: &Erased, path: &Path, ends: Ends, pull: &Pull, lam: f64) -> V
             let mut rows = system.right[segment + a].rows_mut(0, 2 * m);
             rows += right.rows(2 * a * m, 2 * m);
         }
-    };
-    let points = path.at(space, pull.places);
-    for (k, &(segment, tau)) in pull.places.iter().enumerate() {
-        let (motion, q) = (derivative.motion(segment, tau, Of::Point), derivative.point(segment, tau));
-        let (p, vector) = (&points[k * len..][..len], &pull.vectors[k * len..][..len]);
-        let (matrix, value) = in_coordinates(space, &q, &motion, p, vector);
-        add(segment, matrix, &value, pull.weights[k]);
-    }
-    let places = quadrature(n);
-    let (points, bends) = (path.at(space, &places), path.bends(space, &places));
-    for (k, &(segment, tau)) in places.iter().enumerate() {
-        let h = path.t[segment + 1] - path.t[segment];
-        let (motion, q) = (derivative.motion(segment, tau, Of::Acceleration), derivative.point(segment, tau));
-        let (p, vector) = (&points[k * len..][..len], &bends[k * len..][..len]);
-        let (matrix, value) = in_coordinates(space, &q, &motion, p, vector);
-        add(segment, matrix, &-value, lam * h / 2.0);
     }
     for i in 0..=n {
         let row = derivative.condition(i);

@@ -54,7 +54,7 @@ fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
             None => track.retreat(space),
             Some(velocities) => {
                 track.take(velocities, len);
-                track.advance(space, options);
+                track.advance(space, options, monitor, !threads);
                 if track.done() {
                     monitor.advance(track.knots.len());
                 }

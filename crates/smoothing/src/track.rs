@@ -13,6 +13,7 @@ use crate::{Data, Ends, Options, Report, Smooth, State, Tier};
 use std::f64::consts::PI;
 use std::ops::Range;
 use symspline_core::fit::{End, Ends as FitEnds};
+use symspline_core::monitor::Monitor;
 use symspline_core::scalar::{LANES, Lane, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased, Origin};
 
@@ -202,8 +203,8 @@ impl<'a> Track<'a> {
         }
     }
 
-    /// One step from the spline through the points, or the end.
-    pub fn advance(&mut self, space: &Erased, options: &Options) {
+    /// One step from the spline through the points, or the end; on all cores if no other curve is worked on.
+    pub fn advance(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) {
         let velocities = self.end_velocities(space);
         let Track { data, flat, progress, .. } = self;
         let (m, spacing, weights) = (space.dim(), flat.basis.spacing, data.weights);
@@ -265,7 +266,7 @@ impl<'a> Track<'a> {
             let unit = spacing.powi(3);
             let pull = Pull { places: &self.places, vectors: &vectors, weights };
             let kinds = std::array::from_fn(|e| end_of(self.ends, e, &velocities[e]));
-            let ambient = exact::step(space, &path, FitEnds::Open(kinds), &pull, lam * unit);
+            let ambient = exact::step(space, &path, FitEnds::Open(kinds), &pull, lam * unit, monitor, alone);
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {
             let change = linear.step(lam, &factors);

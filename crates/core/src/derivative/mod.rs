@@ -50,6 +50,36 @@ pub struct Derivative<'a> {
     beziers: BTreeMap<usize, Bezier>,
 }
 
+/// How samples of one segment follow the points and velocities of the two knots beside it.
+pub struct Motion<'a> {
+    derivative: &'a Derivative<'a>,
+    bezier: Bezier,
+    segment: usize,
+}
+
+impl Motion<'_> {
+    /// Of a sample, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last.
+    pub fn at(&self, tau: f64, of: Of) -> Matrix {
+        let m = self.derivative.space.dim();
+        let place = Place { segment: self.segment, tau };
+        let (columns, _) = self.derivative.columns(&self.bezier, &place, of);
+        let Segment { h, functions, .. } = &self.derivative.system.segments[self.segment];
+        let mut out = Matrix::zeros(columns.nrows(), 4 * m);
+        for (e, f) in functions.iter().enumerate() {
+            let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
+            let inner = columns.columns((1 + e) * m, m);
+            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * &f.cosh));
+            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * &f.stretch * third));
+        }
+        out
+    }
+
+    /// The point to which such motions belong: of its arrays the one that they are made at.
+    pub fn point(&self, tau: f64) -> Vec<f64> {
+        self.bezier.gamma(self.derivative.space, tau)
+    }
+}
+
 /// Where a time falls.
 struct Place {
     segment: usize,
@@ -88,17 +118,13 @@ impl<'a> Derivative<'a> {
         Place { segment, tau: (x - self.t[segment]) / (self.t[segment + 1] - self.t[segment]) }
     }
 
-    fn bezier(&mut self, segment: usize) -> &Bezier {
-        let (space, nodes) = (self.space, &self.polygon.nodes[segment..segment + 2]);
-        self.beziers
-            .entry(segment)
-            .or_insert_with(|| Bezier::new(space, nodes, &self.system.segments[segment]))
+    fn bezier(&self, segment: usize) -> Bezier {
+        Bezier::new(self.space, &self.polygon.nodes[segment..segment + 2], &self.system.segments[segment])
     }
 
     /// The columns by which a sample follows the four control points, τ and (behind a factor) h.
-    fn columns(&mut self, &Place { segment, tau }: &Place, of: Of) -> (Matrix, Vector) {
+    fn columns(&self, bezier: &Bezier, &Place { segment, tau }: &Place, of: Of) -> (Matrix, Vector) {
         let (space, inverse) = (self.space, 1.0 / self.system.segments[segment].h);
-        let bezier = self.bezier(segment);
         // Behind the control points the last column is the derivative in τ.
         let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
         match of {
@@ -124,7 +150,8 @@ impl<'a> Derivative<'a> {
         let m = self.space.dim();
         for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
             let place = self.place(x);
-            let ((columns, by_h), Place { segment: i, tau }) = (self.columns(&place, of), place);
+            let (columns, by_h) = self.kept(&place, of);
+            let Place { segment: i, tau } = place;
             let segment = &self.system.segments[i];
             let (dh, dt) = (change.lengths[i], change.knots[i]);
             let mut z = Vector::zeros(4 * m + 1);
@@ -155,7 +182,8 @@ impl<'a> Derivative<'a> {
         let mut u = zero();
         for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
             let place = self.place(x);
-            let ((columns, by_h), Place { segment: i, tau }) = (self.columns(&place, of), place);
+            let (columns, by_h) = self.kept(&place, of);
+            let Place { segment: i, tau } = place;
             let segment = &self.system.segments[i];
             let cotangent = Vector::from_column_slice(cotangent);
             let z = columns.tr_mul(&cotangent);
@@ -177,27 +205,17 @@ impl<'a> Derivative<'a> {
         self.ambient(&gradient)
     }
 
-    /// How a sample at a place of a segment follows the points and velocities of the two knots beside it, in their
-    /// frames: columns for ξ, υ of the first and ξ, υ of the last.
-    pub fn motion(&mut self, segment: usize, tau: f64, of: Of) -> Matrix {
-        let m = self.space.dim();
-        let (columns, _) = self.columns(&Place { segment, tau }, of);
-        let Segment { h, functions, .. } = &self.system.segments[segment];
-        let mut out = Matrix::zeros(columns.nrows(), 4 * m);
-        for e in 0..2 {
-            let f = &functions[e];
-            let third = if e == 0 { h / 3.0 } else { -h / 3.0 };
-            let inner = columns.columns((1 + e) * m, m);
-            out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * &f.cosh));
-            out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * &f.stretch * third));
-        }
-        out
+    /// The same for a segment that is asked for again and again.
+    fn kept(&mut self, place: &Place, of: Of) -> (Matrix, Vector) {
+        let bezier = self.beziers.remove(&place.segment).unwrap_or_else(|| self.bezier(place.segment));
+        let found = self.columns(&bezier, place, of);
+        self.beziers.insert(place.segment, bezier);
+        found
     }
 
-    /// The point to which such motions belong: of its arrays the one that they are made at.
-    pub fn point(&mut self, segment: usize, tau: f64) -> Vec<f64> {
-        let space = self.space;
-        self.bezier(segment).gamma(space, tau)
+    /// How samples of a segment follow the two knots beside it.
+    pub fn motion(&self, segment: usize) -> Motion<'_> {
+        Motion { derivative: self, bezier: self.bezier(segment), segment }
     }
 
     /// The C² condition at a knot, linearised.
