@@ -126,23 +126,27 @@ impl<'a> Linear<'a> {
                 left = right;
             }
         }
-        Look { freedom, rss, energy, log_det: factors.log_det(flat.own.knots.clone()) }
+        let definite = factors.least_pivot().simd_gt(Lane::ZERO);
+        Look { freedom, rss, energy, definite, log_det: factors.log_det(flat.own.knots.clone()) }
     }
 
     /// The λ that a criterion likes best, from a guess or from everywhere, and whether it lies at a bound.
     pub fn choose(&self, criterion: Criterion, guess: Option<f64>) -> (f64, bool) {
-        /// Decades of λ over the balance of data and energy, and how far a guess may be off.
+        /// Decades of λ over the balance of data and energy (on short segments where they are unequal), and how far a
+        /// guess may be off.
         const RANGE: (f64, f64) = (-9.0, 12.5);
         const NEAR: f64 = 0.6;
+        /// Decades that eight looks are enough for at first.
+        const DECADES: f64 = 7.5;
         /// Fewer degrees of freedom than this are a geodesic, for which every larger λ is as good.
         const STRAIGHT: f64 = 2.01;
         let start = self.flat.balance().log10();
-        let (mut from, mut to) = (start + RANGE.0, start + RANGE.1);
+        let (mut from, mut to) = (start + RANGE.0 + 3.0 * self.flat.basis.short().log10(), start + RANGE.1);
         let bounds = (from, to);
         if let Some(guess) = guess {
             (from, to) = ((guess.log10() - NEAR).max(from), (guess.log10() + NEAR).min(to));
         }
-        let passes = if guess.is_some() { 1 } else { 3 };
+        let passes = if guess.is_some() { 1 } else { ((to - from) / DECADES).ceil() as usize };
         let mut seen: Vec<(f64, f64, f64)> = Vec::new();
         let look = |seen: &mut Vec<(f64, f64, f64)>, from: f64, to: f64, part: usize, parts: usize| {
             let at: [f64; LANES] = std::array::from_fn(|l| {
@@ -173,7 +177,8 @@ impl<'a> Linear<'a> {
         seen.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
         let Some(best) = least(&seen, STRAIGHT) else { return (10f64.powf(from), true) };
         let straight = seen.get(best + 1).is_none_or(|next| next.2 <= STRAIGHT);
-        if best == 0 || straight {
+        let rough = best == 0 || !seen[best - 1].1.is_finite();
+        if rough || straight {
             return (10f64.powf(seen[best].0), true);
         }
         (10f64.powf(lowest([seen[best - 1], seen[best], seen[best + 1]].map(|(x, y, _)| (x, y)))), false)
@@ -181,9 +186,12 @@ impl<'a> Linear<'a> {
 
     fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
         let own = &self.flat.own;
+        // Where no degrees of freedom are left, or rounding leaves no matrix, there is nothing to compare.
+        let known =
+            (lane(own.data.len() as f64 * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.definite;
         let (n, m) = (own.data.len() as f64, self.m as f64);
         let per = look.rss / lane(m);
-        match criterion {
+        let score = match criterion {
             Criterion::Gcv { penalty } => {
                 let left = lane(n) - look.freedom * lane(penalty);
                 // With 1.4 the denominator passes through zero: rougher curves than that are out of the question.
@@ -195,7 +203,8 @@ impl<'a> Linear<'a> {
                 lane(n - 2.0) * (per + lam * look.energy / lane(m)).ln() + look.log_det
                     - lane(count - 2.0) * lam.ln()
             }
-        }
+        };
+        known.select(score, lane(f64::INFINITY))
     }
 }
 
@@ -209,6 +218,8 @@ pub struct Look {
     pub energy: Lane,
     /// ln det A.
     pub log_det: Lane,
+    /// Where A is positive definite, as far as rounding tells.
+    pub definite: Lane,
 }
 
 fn row_times(row: &Row, x: &[Lane], m: usize, c: usize) -> Lane {

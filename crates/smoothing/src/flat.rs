@@ -90,6 +90,13 @@ impl Basis {
         self.tau[segment + 1] - self.tau[segment]
     }
 
+    /// A segment than which few are shorter, divided by the mean.
+    pub fn short(&self) -> f64 {
+        let mut lengths: Vec<f64> = self.tau.windows(2).map(|t| t[1] - t[0]).collect();
+        lengths.sort_by(f64::total_cmp);
+        lengths[lengths.len() / 10]
+    }
+
     /// Knots with the first and the last one three times more: the support of the i-th B-spline begins at the i-th.
     fn extended(&self, i: usize) -> f64 {
         self.tau[i.saturating_sub(3).min(self.tau.len() - 1)]
@@ -275,10 +282,11 @@ impl Flat {
         sum
     }
 
-    /// tr BᵀWB/tr Ω: the λ at which data and energy weigh about the same for the roughest splines.
+    /// The λ at which data and energy weigh about the same for splines that turn at every knot: the mean weight of a
+    /// coefficient over that of Ω on equal knots.
     pub fn balance(&self) -> f64 {
-        let trace = |x: &[f64]| x.chunks(BAND).map(|row| row[0]).sum::<f64>();
-        trace(&self.gram) / trace(&self.penalty)
+        const EQUAL: f64 = 8.0 / 3.0;
+        self.gram.chunks(BAND).map(|row| row[0]).sum::<f64>() / (EQUAL * self.basis.count() as f64)
     }
 }
 

@@ -27,7 +27,8 @@ impl<'a> Frames<'a> {
     pub fn new(space: &'a Erased<'a>, points: &'a [f64]) -> Self {
         let (len, size, m) = (space.point_len(), space.frame_len(), space.dim());
         let count = points.len() / len;
-        let run = count.div_ceil(LANES).max(4);
+        // What joins the runs costs about as much as 2m steps.
+        let run = if 2 * m + count / LANES < count { count.div_ceil(LANES).max(4) } else { count };
         let runs = count.div_ceil(run);
         let last = count - 1;
         let point = |knot: usize| &points[knot.min(last) * len..][..len];

@@ -47,6 +47,7 @@ impl Loss {
     pub fn value(self, square: f64, corner: f64) -> f64 {
         let q = square / (corner * corner);
         match self {
+            _ if corner.is_infinite() => square,
             Loss::Huber if q > 1.0 => corner * corner * (2.0 * q.sqrt() - 1.0),
             Loss::Linear | Loss::Huber => square,
             Loss::Cauchy => corner * corner * q.ln_1p(),
@@ -81,8 +82,11 @@ impl Loss {
 /// from the geodesics between their neighbours. NaN for fewer than three data.
 pub fn noise(space: &Erased, data: &Data) -> f64 {
     let [times, points, weights] = [data.times, data.points, data.weights];
-    let median = median(&deviations(space, times, points, weights));
-    (median / chi::quantile(space.dim(), 0.5)).sqrt()
+    /// Of rounded data most deviations may vanish; then some part of their mean stands for the median.
+    const LEAST: f64 = 0.01;
+    let found = deviations(space, times, points, weights);
+    let mean = found.iter().sum::<f64>() / found.len() as f64;
+    (median(&found).max(LEAST * mean) / chi::quantile(space.dim(), 0.5)).sqrt()
 }
 
 /// Squared distances of all data but the first and the last from the geodesic between their neighbours, in units of
@@ -201,4 +205,64 @@ fn medoids(space: &Erased, data: &Data) -> Vec<usize> {
         chosen = (0..count).collect();
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_those_of_the_loss() {
+        // ψ is half the gradient of ρ(|r|²), ψ' its divergence over m.
+        let (corner, h) = (0.7, 1e-4);
+        for loss in [Loss::Linear, Loss::Huber, Loss::Cauchy] {
+            for r in [[0.3, 0.1, 0.2], [1.1, -0.4, 0.5], [4.0, 1.0, -3.0]] {
+                let square = |r: [f64; 3]| r.iter().map(|x| x * x).sum::<f64>();
+                let value = |r: [f64; 3]| loss.value(square(r), corner);
+                let moved = |c: usize, by: f64| {
+                    let mut x = r;
+                    x[c] += by;
+                    x
+                };
+                let (factor, slope) = loss.slopes(square(r) / (corner * corner), 3);
+                let mut divergence = 0.0;
+                for c in 0..3 {
+                    let (up, down) = (value(moved(c, h)), value(moved(c, -h)));
+                    assert!((factor * r[c] - (up - down) / (4.0 * h)).abs() < 1e-7);
+                    divergence += (up + down - 2.0 * value(r)) / (2.0 * h * h) / 3.0;
+                }
+                assert!((slope - divergence).abs() < 1e-5, "{loss:?} {r:?}: {slope} {divergence}");
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_that_of_the_data() {
+        use symspline_core::space::Table;
+        let plane = symspline_vectors::Euclidean::new(1).unwrap();
+        let space = Erased(&plane as &dyn Table);
+        // Normal noise from a hash of its number, about a straight line.
+        let n = 4001;
+        let times: Vec<f64> = (0..n).map(|i| i as f64 + 0.3 * (i as f64).sin()).collect();
+        let weights: Vec<f64> = (0..n).map(|i| 1.0 + (i % 3) as f64).collect();
+        let normal = |u: f64| chi::quantile(1, (2.0 * u - 1.0).abs()).sqrt().copysign(u - 0.5);
+        let points: Vec<f64> = (0..n)
+            .map(|i| {
+                let u = ((i as f64 * 12.9898).sin() * 43_758.545_3).rem_euclid(1.0);
+                3.0 * times[i] + 0.2 * normal(u.clamp(1e-9, 1.0 - 1e-9)) / weights[i].sqrt()
+            })
+            .collect();
+        let none: &[f64] = &[];
+        let data = Data {
+            times: &times,
+            points: &points,
+            weights: &weights,
+            knots: &times,
+            lam: None,
+            sigma: None,
+            ends: [none; 2],
+        };
+        let found = noise(&space, &data);
+        assert!((found / 0.2 - 1.0).abs() < 0.05, "{found}");
+    }
 }

@@ -109,7 +109,8 @@ fn start<'a>(
             (data.times.to_vec(), data.points.to_vec(), data.weights.to_vec());
         if options.loss != Loss::Linear {
             let sigma = data.sigma.unwrap_or_else(|| loss::noise(space, data));
-            found.1 = sigma * options.loss.corner(space.dim());
+            // Where nothing deviates nothing is an outlier.
+            found.1 = if sigma > 0.0 { sigma * options.loss.corner(space.dim()) } else { f64::INFINITY };
             [times, points, weights] = loss::plausible(space, data);
         }
         found.0 = levels(space, &times, &points, &weights);

@@ -21,6 +21,8 @@ use symspline_core::space::{Ambient, Erased, Origin};
 const SLOW: f64 = 0.5;
 /// The same while λ and the curve are still rough guesses.
 const HOPELESS: f64 = 2.0;
+/// Dimension up to which the exact way is taken by itself.
+const LARGE: usize = 64;
 /// λ moves by less than this between rounds when it is settled, in natural logarithms.
 const SETTLED: f64 = 3e-3;
 /// Rounds of choosing λ, at most.
@@ -64,6 +66,8 @@ struct Progress {
     lam: Option<f64>,
     settled: bool,
     last_step: f64,
+    /// The last step, unless it was lengthened.
+    last: Vec<f64>,
     /// The size of residuals, by which steps are judged.
     scale: f64,
     /// Iterations in a row in which the step hardly shrank.
@@ -106,6 +110,7 @@ impl<'a> Track<'a> {
                 lam: lam.map(|lam| (lam / unit).min(stiffest)),
                 settled: lam.is_some(),
                 last_step: f64::INFINITY,
+                last: Vec::new(),
                 scale: f64::NAN,
                 slow: 0,
                 report: Report {
@@ -242,7 +247,11 @@ impl<'a> Track<'a> {
             return;
         }
         let inverse = factors.inverse_band();
+        let before = progress.report.freedom;
         progress.note(&linear, &inverse, lam, softness);
+        // Where λ hardly matters, as for a geodesic, its best value wanders.
+        progress.settled |= progress.report.rounds > 1
+            && (progress.report.freedom - before).abs() < SETTLED * progress.report.freedom;
         let own = flat.own.data.clone();
         progress.report.misfit = own.map(|k| weights[k] * squares[k]).sum();
         progress.expect(space, &speeds, weights, lam);
@@ -251,6 +260,8 @@ impl<'a> Track<'a> {
             _ if self.ends == Ends::Periodic => false,
             Tier::Flat => false,
             Tier::Newton => true,
+            // In flat space the flat way is the exact one; and the blocks of the other have a limit.
+            Tier::Auto if !(space.curvature() > 0.0) || m > LARGE => false,
             Tier::Auto => {
                 let limit = if progress.settled { SLOW } else { HOPELESS };
                 let known = progress.settled && progress.report.exact;
@@ -300,7 +311,9 @@ impl<'a> Track<'a> {
             progress.report.state = State::Unconverged;
             return;
         }
+        let further = if progress.settled { progress.further(&step) } else { 1.0 };
         let mut ambient = ambient.unwrap_or_else(|| frames.tangents(&step));
+        ambient.iter_mut().for_each(|x| *x *= further);
         // Farther than the data are nothing is known.
         let farthest = squares.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
         let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
@@ -316,6 +329,18 @@ impl<'a> Track<'a> {
 }
 
 impl Progress {
+    /// How far to go along a step if steps shrink slowly in one direction: the limit of their geometric series (Aitken).
+    fn further(&mut self, step: &[f64]) -> f64 {
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let ratio = product(step, &self.last) / product(&self.last, &self.last);
+        if self.last.len() == step.len() && ratio > 0.3 && ratio < 0.9 {
+            self.last.clear();
+            return 1.0 / (1.0 - ratio);
+        }
+        self.last = step.to_vec();
+        1.0
+    }
+
     /// A better λ, unless it is given or settled.
     fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
         if self.settled {
