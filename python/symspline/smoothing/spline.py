@@ -16,6 +16,7 @@ from ..spline import CubicSpline
 from ..times import Clock
 from .data import Noisy
 from .solve import Smoothed
+from .stored import noisy_arrays
 
 
 class SmoothingSpline(CubicSpline):
@@ -200,6 +201,9 @@ class SmoothingSpline(CubicSpline):
     def __reduce__(self) -> tuple[Any, ...]:
         _, parts = super().__reduce__()
         return SmoothingSpline._of, (*parts, self._noisy, self._smoothed)
+
+    def _arrays(self) -> dict[str, Any]:
+        return super()._arrays() | noisy_arrays(self.space, self._noisy, self._smoothed)
 
     def __repr__(self) -> str:
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
