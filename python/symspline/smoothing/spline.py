@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 from .. import _core
 from .._core import ValidationError
 from ..curves.curve import Curve
+from ..curves.noise import Noise
 from ..report import Report
-from ..spaces import Array, Product, factors_of
+from ..spaces import Array, Product, Space, factors_of
 from ..spline import CubicSpline
 from ..times import Clock
-from .data import Noisy
+from .data import Doubles, Noisy
 from .solve import Smoothed
 from .stored import noisy_arrays
 
@@ -24,7 +25,8 @@ class SmoothingSpline(CubicSpline):
 
     It has all that a `CubicSpline` has; its points are those of the smooth curve at its knots, and derivatives by
     `jvp` and `vjp` are with respect to them, not to the data. Numbers that belong to the noise are tuples with one
-    entry a factor in a `Product`, and arrays with the batch axes for a batch of curves.
+    entry a factor in a `Product`, and arrays with the batch axes for a batch of curves. `save` keeps all of them,
+    and the data; `plot` shows the data and 95 % bands.
     """
 
     _kind = "Smoothing spline"
@@ -124,16 +126,24 @@ class SmoothingSpline(CubicSpline):
         for part in self._smoothed:
             out = np.empty((*batch, *own))
             for index in np.ndindex(batch):
-                knots = self._times[index] if self._times.ndim > 1 else self._times
                 at = times[index] if per_curve else times
-                lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
-                rows = np.ascontiguousarray(np.ravel(at))
-                variance = _core.smoothing_variance(
-                    np.ascontiguousarray(knots), np.ascontiguousarray(part.band[index]), lam, rows, nu
-                )
-                out[index] = sigma * np.sqrt(variance).reshape(own)
+                out[index] = self._spread(part, index, np.ravel(at), nu).reshape(own)
             found.append(out[()])
         return self._each(found)
+
+    def _spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        """The standard deviation of one curve in a factor at times x of the core."""
+        knots = self._times[index] if self._times.ndim > 1 else self._times
+        lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
+        variance = _core.smoothing_variance(
+            np.ascontiguousarray(knots),
+            np.ascontiguousarray(part.band[index]),
+            lam,
+            np.ascontiguousarray(x),
+            nu,
+        )
+        spread: Doubles = sigma * np.sqrt(variance)
+        return spread
 
     def band(self, x: ArrayLike, level: float = 0.95) -> Any:
         """Radius of the ball about the curve at times x that holds the true point with probability ``level``.
@@ -154,10 +164,32 @@ class SmoothingSpline(CubicSpline):
         each = spreads if isinstance(self.space, Product) else (spreads,)
         return self._each(
             [
-                np.sqrt(_core.chi_squared(factor.dim, level)) * spread
+                _radius(factor, level) * spread
                 for factor, spread in zip(factors_of(self.space), each, strict=True)
             ]
         )
+
+    # ---- what a plot shows ----
+
+    @property
+    def _made_of(self) -> str:
+        count = int(np.max(np.sum(self._noisy.weights > 0, axis=-1)))
+        df = _ranges([part.report.df for part in self._smoothed], 3)
+        sigma = _ranges([part.sigma for part in self._smoothed], 2)
+        each = " each" if self._batch else ""
+        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}"
+
+    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> Noise:
+        noisy = self._noisy
+        own = [array[index] if array.ndim > 1 else array for array in (noisy.times, noisy.weights)]
+        used = own[1] > 0
+        radii = [
+            _radius(factor, 0.95) * self._spread(part, index, x, 0)
+            for factor, part in zip(factors_of(self.space), self._smoothed, strict=True)
+        ]
+        product = isinstance(self.space, Product)
+        speed = None if product else self._spread(self._smoothed[0], index, x, 1)
+        return Noise(own[0][used], [points[index][used] for points in noisy.points], radii, speed)
 
     @property
     def _unconverged(self) -> int:
@@ -209,3 +241,21 @@ class SmoothingSpline(CubicSpline):
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
         return f"<SmoothingSpline on {self.space!r}: {batch}{data} data, {knots} knots>"
+
+
+def _radius(space: Space, level: float) -> float:
+    """How many standard deviations of a coordinate the ball reaches that holds a normal vector so often."""
+    return float(np.sqrt(_core.chi_squared(space.dim, level)))
+
+
+def _ranges(factors: list[Any], digits: int) -> str:
+    """A number of every factor, of a batch the least and the largest; of many factors these, too."""
+    few = factors if len(factors) <= 3 else [np.concatenate([np.ravel(values) for values in factors])]
+    return " and ".join(_range(np.ravel(values), digits) for values in few)
+
+
+def _range(values: Doubles, digits: int) -> str:
+    good = values[np.isfinite(values)]
+    ends = (good.min(), good.max()) if good.size else ()
+    # Once, if they look alike.
+    return " to ".join(dict.fromkeys(f"{value:.{digits}g}" for value in ends)) or "unknown"
