@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from .piecewise import Piecewise
 from .report import Report
 from .spaces import Product, Space
+from .times import Clock
 
 FORMAT = "symspline-curve"
 HERMITE = "symspline-hermite"
+SMOOTHING = "symspline-smoothing"
 MANY = "symspline-curves"
-LISTS = ("bc_type", "extrapolate", "report")
+LISTS = ("bc_type", "extrapolate", "report", "noise")
 VERSION = 1
 
 
@@ -33,13 +35,11 @@ def fitted_arrays(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
 
 def arrays_of(spline: Piecewise, format: str) -> dict[str, Any]:
     """The arrays of one curve, or of a batch; the format says which kind of curve it is."""
-    unit = _unit(spline._t.dtype, spline._clock.zone) if spline._clock.dates else ""
     arrays: dict[str, Any] = {
         "format": format,
         "version": VERSION,
         "space": str(spline.space),
-        "t": spline._t.astype(np.int64) if unit else spline._t,
-        "t_unit": unit,
+        **times_arrays("t", spline._t, spline._clock),
         "extrapolate": json.dumps(spline.extrapolate),
     }
     for i, part in enumerate(spline._curve.parts):
@@ -47,6 +47,12 @@ def arrays_of(spline: Piecewise, format: str) -> dict[str, Any]:
         arrays["points" + suffix] = part.points
         arrays["velocities" + suffix] = part.velocities
     return arrays
+
+
+def times_arrays(name: str, t: NDArray[Any], clock: Clock) -> dict[str, Any]:
+    """Times as numbers, and the unit of dates."""
+    unit = _unit(t.dtype, clock.zone) if clock.dates else ""
+    return {name: t.astype(np.int64) if unit else t, f"{name}_unit": unit}
 
 
 def write(file: Any, arrays: dict[str, Any]) -> None:

@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._core import ValidationError
-from .archive import FORMAT, HERMITE, LISTS, MANY, VERSION, fitted_arrays, rich, write
+from .archive import FORMAT, HERMITE, LISTS, MANY, SMOOTHING, VERSION, rich, write
 from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
 from .handed import NO_ZONE, UTC_ZONE
 from .hermite import HermiteSpline
 from .options import checked_policy
 from .report import Report, longest_gap
+from .smoothing import SmoothingSpline
+from .smoothing.stored import read_stored
 from .spaces import Array, Product, Space, factors_of
 from .spaces import space as space_named
 from .spline import CubicSpline
@@ -30,10 +32,12 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
     """Write curves of one space, of any lengths, to one NPZ file, which `load_many` reads back.
 
     Knots, points and velocities of all curves follow each other in one array each; ``knots`` holds how
-    many of them every curve has, ``names`` and the conditions and reports are lists in JSON.
+    many of them every curve has, ``names`` and the conditions and reports are lists in JSON. Smoothing splines keep
+    their data and bands.
 
     Args:
-        curves: names and curves, none of them a batch; the knots of all are numbers, or all dates of one unit.
+        curves: names and curves, none of them a batch; the knots of all are numbers, or all dates of one unit. All are
+            smoothing splines or none is.
         file: where to write, a name or an open file.
 
     >>> import io, symspline as ss
@@ -55,12 +59,18 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
         raise ValidationError(
             "save_many needs curves, all of one space and with knots of one type, dates all with a time zone or without"
         )
-    each = [fitted_arrays(spline, spline._reports) for spline in curves.values()]
+    each = [spline._arrays() for spline in curves.values()]
+    if len({(a["format"], a.get("data_t_unit")) for a in each}) != 1:
+        raise ValidationError(
+            "save_many takes smoothing splines, with data at times of one type, or other curves, not both"
+        )
     arrays: dict[str, Any] = {
         "format": MANY,
         "names": json.dumps(list(curves)),
         "knots": [len(a["t"]) for a in each],
     }
+    if each[0]["format"] == SMOOTHING:
+        arrays["samples"] = [len(a["data_t"]) for a in each]
     for key in each[0]:
         values = [a[key] for a in each]
         if key in LISTS:
@@ -73,7 +83,8 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
 
 
 def load(file: Any) -> CubicSpline | HermiteSpline:
-    """Read a curve that `CubicSpline.save` or `HermiteSpline.save` wrote, as the kind of curve that it was.
+    """Read a curve that `CubicSpline.save`, `SmoothingSpline.save` or `HermiteSpline.save` wrote, as the kind of curve
+    that it was.
 
     Raises:
         ValidationError: the file is damaged, or not a symspline curve.
@@ -130,21 +141,33 @@ def _arrays_of(file: Any) -> dict[str, NDArray[Any]]:
 
 
 def _read_many(arrays: dict[str, NDArray[Any]]) -> dict[str, CubicSpline]:
-    if str(arrays["format"]) == FORMAT:
+    if str(arrays["format"]) in (FORMAT, SMOOTHING):
         raise ValidationError("this file holds no collection of curves; read it with symspline.load")
     if str(arrays["format"]) != MANY:
         raise ValidationError(f"format {str(arrays['format'])!r}, expected {MANY!r}")
-    names, ends = json.loads(str(arrays["names"])), np.cumsum(arrays["knots"])
-    if ends[-1:].tolist() != [len(arrays["t"])]:
-        raise ValidationError(f"the curves have {arrays['knots'].sum()} knots, but t has {len(arrays['t'])}")
-    lists = {key: json.loads(str(arrays[key])) for key in LISTS}
+    names, own = json.loads(str(arrays["names"])), _slices(arrays, "knots", "t")
+    smooth = "samples" in arrays
+    data = _slices(arrays, "samples", "data_t") if smooth else own
+    lists = {key: json.loads(str(arrays[key])) for key in LISTS if key in arrays}
     curves = {}
-    for i, (name, end) in enumerate(zip(names, ends, strict=True)):
-        own = slice(end - arrays["knots"][i], end)
-        one = {key: array[own] if array.ndim else array for key, array in arrays.items()}
+    for i, (name, knots, samples) in enumerate(zip(names, own, data, strict=True)):
+        one = {
+            key: array[samples if key.startswith("data") else knots] if array.ndim else array
+            for key, array in arrays.items()
+        }
         one |= {key: np.array(json.dumps(values[i])) for key, values in lists.items()}
-        curves[str(name)] = _cubic(one)
+        curves[str(name)] = _smoothing(one) if smooth else _cubic(one)
     return curves
+
+
+def _slices(arrays: dict[str, NDArray[Any]], counts: str, times: str) -> list[slice]:
+    """Which part of the arrays belongs to which curve."""
+    ends = np.cumsum(arrays[counts])
+    if ends[-1:].tolist() != [len(arrays[times])]:
+        raise ValidationError(
+            f"the curves have {arrays[counts].sum()} {counts}, but {times} has {len(arrays[times])}"
+        )
+    return [slice(end - count, end) for end, count in zip(ends, arrays[counts], strict=True)]
 
 
 def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
@@ -153,13 +176,21 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
         raise ValidationError("this file holds several curves; read them with symspline.load_many")
     if kind == FORMAT:
         return _cubic(arrays)
+    if kind == SMOOTHING:
+        return _smoothing(arrays)
     if kind == HERMITE:
         return _hermite(arrays)
-    raise ValidationError(f"format {kind!r}, expected {FORMAT!r} or {HERMITE!r}")
+    raise ValidationError(f"format {kind!r}, expected {FORMAT!r}, {SMOOTHING!r} or {HERMITE!r}")
 
 
-def _cubic(arrays: dict[str, NDArray[Any]]) -> CubicSpline:
-    space, clock, knots, found, extrapolate = _piecewise(arrays)
+def _smoothing(arrays: dict[str, NDArray[Any]]) -> SmoothingSpline:
+    clock, t = _times(arrays, "data_t")
+    spline = _cubic(arrays, clock)
+    return SmoothingSpline._like(spline, *read_stored(arrays, clock, t, spline._curve))
+
+
+def _cubic(arrays: dict[str, NDArray[Any]], counted: Clock | None = None) -> CubicSpline:
+    space, clock, knots, found, extrapolate = _piecewise(arrays, counted)
     times = clock.knots(knots)
     curve = curve_of(space, times, found)
     bc_type = rich(json.loads(str(arrays["bc_type"])), space)
@@ -179,10 +210,14 @@ def _hermite(arrays: dict[str, NDArray[Any]]) -> HermiteSpline:
 
 
 def _piecewise(
-    arrays: dict[str, NDArray[Any]],
+    arrays: dict[str, NDArray[Any]], counted: Clock | None = None
 ) -> tuple[Space, Clock, NDArray[Any], list[tuple[Array, Array]], Any]:
     """What curves of every kind have: space, clock, knots as shown, points and velocities in every factor, and what
-    happens outside the knots."""
+    happens outside the knots.
+
+    Args:
+        counted: the clock, if times are not counted from the first knot.
+    """
     version = int(arrays["version"])
     if version != VERSION:
         raise ValidationError(
@@ -190,12 +225,11 @@ def _piecewise(
         )
     space = space_named(str(arrays["space"]))
     extrapolate = checked_policy(json.loads(str(arrays["extrapolate"])))
-    unit, _, zone = str(arrays["t_unit"]).partition(" ")
-    if zone not in ("", UTC_ZONE, NO_ZONE):
-        raise ValidationError(f"the zone of the times is {shown(zone)}")
-    clock, knots = clock_of(
-        Moments(arrays["t"].astype(f"datetime64[{unit}]") if unit else arrays["t"], zone or None)
-    )
+    clock, knots = _times(arrays, "t")
+    if counted is not None:
+        if counted.dates != clock.dates:
+            raise ValidationError("the times of the knots and of the data are of different kinds")
+        clock = counted
     times = clock.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("the knots do not increase")
@@ -204,6 +238,15 @@ def _piecewise(
         for i, factor in enumerate(factors_of(space))
     ]
     return space, clock, knots, found, extrapolate
+
+
+def _times(arrays: dict[str, NDArray[Any]], name: str) -> tuple[Clock, NDArray[Any]]:
+    """Times as shown, and how they are counted."""
+    unit, _, zone = str(arrays[f"{name}_unit"]).partition(" ")
+    if zone not in ("", UTC_ZONE, NO_ZONE):
+        raise ValidationError(f"the zone of the times is {shown(zone)}")
+    t = arrays[name].astype(f"datetime64[{unit}]") if unit else arrays[name]
+    return clock_of(Moments(t, zone or None))
 
 
 def _arrays_in(

@@ -17,6 +17,7 @@ from ._core import ValidationError
 from .arrays import in_single, is_single, read_only, shown
 from .curves.curve import Curve, Doubles, quantity_of
 from .curves.integrals import integrate
+from .curves.noise import Noise
 from .curves.solve import Progress
 from .options import check_progress, checked_policy, outside
 from .spaces import Array, Product, Space, parts_of
@@ -39,6 +40,16 @@ class Piecewise(ABC):
     @abstractmethod
     def _ends(self) -> str:
         """Conditions at the ends, in words."""
+
+    @property
+    def _made_of(self) -> str:
+        """What a plot says of the data."""
+        return f"{self._t.shape[-1]} points{' each' if self._batch else ''}, {self._ends}"
+
+    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> Noise | None:
+        """Noisy data near one curve of a batch, with bands at times x of the core; None where the given points are
+        on the curve."""
+        return None
 
     @property
     @abstractmethod
@@ -344,6 +355,9 @@ class Piecewise(ABC):
         - Other projective spaces and Grassmannians: the principal angles to the first point.
         - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
         - Otherwise the components against time, imaginary parts dashed.
+
+        A smoothing spline has its data as light dots, and a light band that holds the true curve with probability 95 %
+        where the space has room for one; so has its speed, but in a product. Of a batch a few curves have them.
 
         For a product the pictures of its factors. Of a batch at most 50 curves are drawn. Neither pyplot nor
         any setting of matplotlib is touched.

@@ -290,7 +290,11 @@ class CubicSpline(Piecewise):
 
     def save(self, file: Any) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        archive.write(file, archive.fitted_arrays(self, self._reports))
+        archive.write(file, self._arrays())
+
+    def _arrays(self) -> dict[str, Any]:
+        """What stands in a file."""
+        return archive.fitted_arrays(self, self._reports)
 
     # What a plot says of it.
     _kind = "C² spline"

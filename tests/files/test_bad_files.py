@@ -18,35 +18,44 @@ from stored import archive, load, npy, stored, with_arrays
 
 import symspline as ss
 
+KINDS = {
+    "interpolating": ss.CubicSpline(None, P, S2),
+    "smoothing": ss.make_smoothing_spline([0, 1, 1, 2], P[[0, 1, 1, 2]], S2, 0.1),
+}
+kinds = pytest.mark.parametrize("kind", KINDS)
 
-def is_good_or_refused(data):
+
+def is_good_or_refused(data, kind="interpolating"):
     """A damaged file must be refused, or be read as what it was (damage may be where it does not matter)."""
     try:
-        return load(data) == ss.CubicSpline(None, P, S2)
+        return load(data) == KINDS[kind]
     except (ss.ValidationError, OSError):
         return True
 
 
-def test_truncated_files():
-    data = stored()
+@kinds
+def test_truncated_files(kind):
+    data = stored(KINDS[kind])
     for n in range(len(data)):
         with pytest.raises(ss.ValidationError, match="the file"):
             load(data[:n])
 
 
+@kinds
 @pytest.mark.parametrize("mask", [0x01, 0xFF])
-def test_files_with_one_bad_byte(mask):
-    data = stored()
+def test_files_with_one_bad_byte(mask, kind):
+    data = stored(KINDS[kind])
     for i in range(len(data)):
-        assert is_good_or_refused(data[:i] + bytes([data[i] ^ mask]) + data[i + 1 :])
+        assert is_good_or_refused(data[:i] + bytes([data[i] ^ mask]) + data[i + 1 :], kind)
 
 
-def test_files_with_many_bad_bytes():
-    data, rng = np.frombuffer(stored(), np.uint8), np.random.default_rng(0)
+@kinds
+def test_files_with_many_bad_bytes(kind):
+    data, rng = np.frombuffer(stored(KINDS[kind]), np.uint8), np.random.default_rng(0)
     for _ in range(500):
         bad = data.copy()
         bad[rng.integers(len(bad), size=rng.integers(1, 200))] = rng.integers(256)
-        assert is_good_or_refused(bad.tobytes())
+        assert is_good_or_refused(bad.tobytes(), kind)
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,22 @@ def stored(*arguments, **options):
     return file.getvalue()
 
 
+def smooth(**options):
+    return ss.make_smoothing_spline(np.arange(6) // 1.5, P[[0, 0, 1, 1, 2, 2]], "sphere:2", 0.1, **options)
+
+
+def stored_smooth():
+    file = io.BytesIO()
+    smooth(weights=[1, 2, 1, 1, 0, 1]).save(file)
+    return file.getvalue()
+
+
+def stored_many_smooth():
+    file = io.BytesIO()
+    ss.save_many({"a": smooth(), "b": smooth(knots=2)}, file)
+    return file.getvalue()
+
+
 def stored_many():
     file = io.BytesIO()
     long, short = ss.fit_many([(None, P), ([0, 2], P[:2])], "sphere:2")
@@ -46,8 +62,9 @@ ONE = [
     stored(
         None, [[[2, 1j], [-1j, 2]], [[1, 0], [0, 3]]], "hpd:2", bc_type=((2, [[0, 1j], [-1j, 1]]), "natural")
     ),
+    stored_smooth(),
 ]
-MANY = stored_many()
+MANY = [stored_many(), stored_many_smooth()]
 
 
 def check_loaded(curve):
@@ -83,13 +100,13 @@ def check_file(data):
 
 @given(st.data())
 def test_damaged_files(data):
-    check_file(data.draw(damaged_bytes(data.draw(st.sampled_from([*ONE, MANY])), [*ONE, MANY])))
+    check_file(data.draw(damaged_bytes(data.draw(st.sampled_from([*ONE, *MANY])), [*ONE, *MANY])))
 
 
 @given(st.data())
 def test_files_with_other_arrays(data):
     draw = data.draw
-    arrays = dict(np.load(io.BytesIO(draw(st.sampled_from([*ONE, MANY])))))
+    arrays = dict(np.load(io.BytesIO(draw(st.sampled_from([*ONE, *MANY])))))
     for key in draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2, unique=True)):
         array = arrays[key]
         if rarely(draw):
@@ -100,6 +117,7 @@ def test_files_with_other_arrays(data):
             words = [
                 "symspline-curve",
                 "symspline-curves",
+                "symspline-smoothing",
                 "sphere:2",
                 "s:2 x s:2",
                 "r:1",

@@ -133,3 +133,16 @@ def test_other_ends_are_refused():
         ss.make_smoothing_spline(t, noisy, space, bc_type="not-a-knot")
     with pytest.raises(ss.ValidationError, match="tangent"):
         ss.make_smoothing_spline(t, noisy, space, bc_type=((1, noisy[0]), "natural"))
+
+
+@pytest.mark.parametrize("bc_type", ["periodic", "clamped"])
+def test_their_deviations_come_back_from_files(bc_type, tmp_path):
+    space, t, noisy, _ = ring("sphere:2", 20)
+    spline = ss.make_smoothing_spline(t, noisy, space, 0.1, knots=np.append(t, 10.0), bc_type=bc_type)
+    spline.save(tmp_path / "curve.npz")
+    back = ss.load(tmp_path / "curve.npz")
+    assert back == spline and np.array_equal(back.std(t), spline.std(t))
+    batch = ss.make_smoothing_spline(
+        t, np.stack([noisy] * 2), space, 0.1, knots=np.append(t, 10.0), bc_type=bc_type
+    )
+    assert np.array_equal(batch[1].std(t), spline.std(t)) and np.array_equal(batch.std(t)[0], spline.std(t))

@@ -143,10 +143,8 @@ pub struct Smooth {
     pub points: Vec<f64>,
     /// Velocities at the knots.
     pub velocities: Vec<f64>,
-    /// The band of A⁻¹, see [`variance`]: four numbers for each of the knots, or of those of [`Smooth::wide`].
+    /// The band of A⁻¹, see [`variance`]: four numbers a knot.
     pub inverse: Vec<f64>,
-    /// Of a closed curve: knots before, in and behind the turn that is the curve. Else empty.
-    pub wide: Vec<f64>,
     /// How it went.
     pub report: Report,
 }

@@ -29,8 +29,6 @@ const SETTLED: f64 = 3e-3;
 const ROUNDS: usize = 12;
 /// Steps are taken back and halved at most so often where no spline goes through the points they lead to.
 const RETREATS: usize = 6;
-/// Knots that are kept beyond either end of a closed curve's turn; of it there are three.
-const BEYOND: usize = 24;
 /// J is known to this part of it.
 const ROUNDING: f64 = 1e-12;
 
@@ -125,14 +123,9 @@ impl<'a> Track<'a> {
     pub fn finish(self, len: usize) -> Smooth {
         let report = self.report();
         let curve = self.curve();
-        // Of a closed curve some knots beyond its turn are kept, so that its splines do not end there.
-        let wide = match self.ends {
-            Ends::Open(_) => curve.clone(),
-            Ends::Periodic => curve.start.saturating_sub(BEYOND)..(curve.end + BEYOND).min(self.knots.len()),
-        };
         let inverse = match &self.inverse {
-            Some(inverse) => rows_of(inverse)[wide.start * 4..wide.end * 4].to_vec(),
-            None => vec![f64::NAN; wide.len() * 4],
+            Some(inverse) => rows_of(inverse)[curve.start * 4..curve.end * 4].to_vec(),
+            None => vec![f64::NAN; curve.len() * 4],
         };
         let part = |x: &[f64], size: usize| x[curve.start * size..curve.end * size].to_vec();
         Smooth {
@@ -140,7 +133,6 @@ impl<'a> Track<'a> {
             points: part(&self.points, len),
             velocities: part(&self.velocities, len),
             inverse,
-            wide: if self.ends == Ends::Periodic { self.knots[wide].to_vec() } else { Vec::new() },
             report,
         }
     }

@@ -16,18 +16,12 @@ pub struct Turns {
 impl Turns {
     /// Of a curve whose last knot is the first again.
     pub fn of(data: &Data) -> Self {
-        let last = data.knots.len() - 1;
-        let period = data.knots[last] - data.knots[0];
-        let turns = |x: &[f64]| -> Vec<f64> {
-            [-period, 0.0, period].iter().flat_map(|shift| x.iter().map(move |x| x + shift)).collect()
-        };
-        let mut knots = turns(&data.knots[..last]);
-        knots.push(data.knots[last] + period);
+        let period = data.knots[data.knots.len() - 1] - data.knots[0];
         Turns {
-            times: turns(data.times),
+            times: turns(data.times, period),
             points: data.points.repeat(3),
             weights: data.weights.repeat(3),
-            knots,
+            knots: knots(data.knots),
         }
     }
 
@@ -35,6 +29,20 @@ impl Turns {
     pub fn data<'a>(&'a self, of: &Data<'a>) -> Data<'a> {
         Data { times: &self.times, points: &self.points, weights: &self.weights, knots: &self.knots, ..*of }
     }
+}
+
+/// Times, a period earlier, as they are, and a period later.
+fn turns(x: &[f64], period: f64) -> Vec<f64> {
+    [-period, 0.0, period].iter().flat_map(|shift| x.iter().map(move |x| x + shift)).collect()
+}
+
+/// Knots of three turns, of those of one.
+pub fn knots(one: &[f64]) -> Vec<f64> {
+    let last = one.len() - 1;
+    let period = one[last] - one[0];
+    let mut knots = turns(&one[..last], period);
+    knots.push(one[last] + period);
+    knots
 }
 
 /// Repeats what the rows of the turn in the middle have in the other two, and behind them.

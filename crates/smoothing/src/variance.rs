@@ -3,6 +3,7 @@
 use crate::banded::Banded;
 use crate::flat::{Basis, FlatEnd, WIDTH};
 use crate::path::places;
+use crate::{Ends, turns};
 use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
@@ -22,14 +23,23 @@ pub fn rows_of(inverse: &Banded) -> Vec<f64> {
 /// The points at the knots have the covariance PA⁻¹Pᵀ. An integrated Wiener process through given points has velocities
 /// there with the inverse covariance λT, `vᵀTv` being the part of ∫ x''² in them; and between two knots whose points and
 /// velocities are given it has the variance `h³s³(1 − s)³/(3λ)`, and its velocity `h s(1 − s)(1 − 3s(1 − s))/λ`.
-pub fn variance(
-    knots: &[f64],
-    rows: &[f64],
-    lam: f64,
-    ends: [FlatEnd; 2],
-    times: &[f64],
-    nu: usize,
-) -> Vec<f64> {
+pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64], nu: usize) -> Vec<f64> {
+    match ends {
+        Ends::Open(ends) => on_line(knots, rows, lam, ends, times, nu),
+        Ends::Periodic => {
+            let last = knots.len() - 1;
+            let (first, period) = (knots[0], knots[last] - knots[0]);
+            let inside: Vec<f64> = times.iter().map(|t| first + (t - first).rem_euclid(period)).collect();
+            let mut turn = rows.to_vec();
+            turn.truncate(last * BAND);
+            let mut three = turn.repeat(3);
+            three.extend_from_slice(&turn[..BAND]);
+            on_line(&turns::knots(knots), &three, lam, [FlatEnd::Natural; 2], &inside, nu)
+        }
+    }
+}
+
+fn on_line(knots: &[f64], rows: &[f64], lam: f64, ends: [FlatEnd; 2], times: &[f64], nu: usize) -> Vec<f64> {
     let inverse = Banded::of(knots.len(), WIDTH, |at| lane(rows[at]));
     let velocities = velocities_given_points(knots, ends);
     let basis = Basis::new(knots, ends);

@@ -16,14 +16,8 @@ use symspline::space::Ambient;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Points and velocities at the knots, the band of A⁻¹ and its knots, and the columns of the report.
-type Smoothed<'py> = (
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyTuple>,
-);
+/// Points at the knots, the band of A⁻¹, and the columns of the report.
+type Smoothed<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>);
 
 /// Smooths curves. `t` and `weights` are of all data, (N,) or (..., N); `knots` (K,) or (..., K); `lam` and `sigma` one
 /// a curve, NaN where λ is to be chosen.
@@ -108,13 +102,9 @@ pub fn smooth<'py>(
     let found = watched(py, progress, curves * count, |monitor| run(&space, &data, &options, monitor))?;
 
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
-    let wide = found.first().map_or(count, |smooth| smooth.inverse.len() / 4);
-    let closed = ends.is_none();
     Ok((
         gathered(py, &shape, &found, |smooth| &smooth.points)?,
-        gathered(py, &shape, &found, |smooth| &smooth.velocities)?,
-        gathered(py, &[batch, &[wide, 4]].concat(), &found, |smooth| &smooth.inverse)?,
-        gathered(py, &[batch, &[if closed { wide } else { 0 }]].concat(), &found, |smooth| &smooth.wide)?,
+        gathered(py, &[batch, &[count, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
     ))
 }
@@ -182,8 +172,8 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
     Ok(all.to_tuple())
 }
 
-/// Variances of a coordinate of one smoothed curve at times, at noise of variance one; see the core. `fixed` are ends with
-/// a given velocity.
+/// Variances of a coordinate of one smoothed curve at times, at noise of variance one; see the core. `fixed` are the ends
+/// with a given velocity, None of a closed curve.
 #[pyfunction]
 pub fn smoothing_variance<'py>(
     py: Python<'py>,
@@ -192,9 +182,14 @@ pub fn smoothing_variance<'py>(
     lam: f64,
     x: Array<'py>,
     nu: usize,
-    fixed: [bool; 2],
+    fixed: Option<[bool; 2]>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let ends = fixed.map(|fixed| if fixed { FlatEnd::Velocity } else { FlatEnd::Natural });
+    let ends = match fixed {
+        None => Ends::Periodic,
+        Some(fixed) => {
+            Ends::Open(fixed.map(|fixed| if fixed { FlatEnd::Velocity } else { FlatEnd::Natural }))
+        }
+    };
     let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);
     Ok(PyArray1::from_vec(py, variance_at(knots, band, lam, ends, x, nu)))
 }

@@ -77,6 +77,15 @@ def is_closed(bc_type: Any) -> bool:
     return isinstance(bc_type, str) and bc_type == "periodic"
 
 
+def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
+    """Which ends have a given velocity; None for a closed curve."""
+    if is_closed(bc_type):
+        return None
+    first, last = (bc_type, bc_type) if isinstance(bc_type, str) else bc_type
+    fixed = [end == "clamped" if isinstance(end, str) else end[0] == 1 for end in (first, last)]
+    return fixed[0], fixed[1]
+
+
 def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
     """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
     if isinstance(bc_type, str):

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
+from .bands import draw_strip
 from .curves import Curve
 from .timeline import timelines
 
@@ -41,7 +42,10 @@ def _draw(
     """The angle against time, without jumps."""
     (axes,) = timelines(panel, curves, ["angle, degrees"])
     for curve in curves:
-        angle = np.degrees(np.unwrap(angles(curve.points), period=period))
-        graph = np.column_stack([curve.times, angle])
-        curve.draw_line(axes, graph)
-        curve.draw_dots(axes, graph[curve.knots])
+        line, given = curve.marked(angles)
+        line = np.unwrap(line, period=period)
+        given = given + period * np.rint((curve.beside(line) - given) / period)
+        if curve.radii is not None:
+            draw_strip(axes, curve, np.degrees(line), np.degrees(curve.radii))
+        curve.draw_line(axes, np.column_stack([curve.times, np.degrees(line)]))
+        curve.draw_dots(axes, np.column_stack([curve.on_axis(curve.given_x), np.degrees(given)]))

@@ -22,12 +22,13 @@ _LABELS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "|0⟩": (0.0, 0.0, 1.0),
 
 def draw_bloch(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """CP¹: the Bloch sphere or, where states are close together, a part of it."""
-    lines = [bloch_vectors(curve.points) for curve in curves]
-    everything = np.concatenate(lines)
+    pairs = [curve.marked(bloch_vectors) for curve in curves]
+    everything = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
     part = part_of_globe(panel, everything)
     axes, view = part or _ball(panel, everything)
-    for curve, line in zip(curves, lines, strict=True):
-        draw_on_globe(axes, view, curve, line, line[curve.knots])
+    for curve, (line, given) in zip(curves, pairs, strict=True):
+        # States turn half as far as their vectors.
+        draw_on_globe(axes, view, curve, line, given, None if curve.radii is None else 2 * curve.radii)
     note = "part of the Bloch sphere: longitude from x, |0⟩ is 90°N" if part else "Bloch sphere"
     panel.text(0.5, 0.02, note, ha="center", color=INK, fontsize=9)
 

@@ -24,7 +24,7 @@ def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
     space = curves[0].space
     kept = independent(space)
     names = component_names(space.point_shape, space.dtype.kind == "c")
-    numbers = [components(curve.points)[:, kept] for curve in curves]
+    numbers = [curve.marked(lambda points: components(points)[:, kept]) for curve in curves]
     draw_numbers(panel, curves, "components", [names[i] for i in kept], numbers)
 
 
@@ -33,14 +33,14 @@ def draw_numbers(
     curves: Sequence[Curve],
     label: str,
     names: Sequence[str],
-    numbers: Sequence[NDArray[np.float64]],
+    numbers: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> None:
     """Several numbers against time, the first twelve with their names.
 
     Args:
         label: of the vertical axis.
         names: one a number; "Im ..." follows the real part of the same number.
-        numbers: of every curve, one row a time.
+        numbers: of every curve, one row a time, and of its given points.
     """
     in_row = min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9))
     looks = _looks(names[:_NAMED])
@@ -53,13 +53,16 @@ def draw_numbers(
         rest = rest[:: 1 + len(rest) // _OTHERS]
     rows = -(-len(labels) // in_row)
     (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * rows)
-    for curve, values in zip(curves, numbers, strict=True):
+    for curve, (values, given) in zip(curves, numbers, strict=True):
         axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
         for i, look in enumerate(looks):
             axes.plot(curve.times, values[:, i], linewidth=1.8 if curve.alone else 0.9, **look)
             if curve.alone:
-                knots = curve.knots
-                axes.plot(curve.times[knots], values[knots, i], "o", color=look["color"], markersize=3)
+                places = np.column_stack([curve.on_axis(curve.given_x), given[:, i]])
+                if curve.noise is None:
+                    axes.plot(*places.T, "o", color=look["color"], markersize=3)
+                else:
+                    curve.draw_dots(axes, places, color=look["color"], alpha=0.4)
     order = [i for column in range(in_row) for i in range(column, len(labels), in_row)]
     place: dict[str, Any] = {
         "loc": "lower right",

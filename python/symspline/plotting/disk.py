@@ -12,6 +12,7 @@ from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
 from ..spaces import Hyperbolic
+from .bands import CIRCLE, draw_tube, places_of_discs
 from .curves import Curve
 from .style import EDGE, GRID, INK, PAPER, inside
 
@@ -27,7 +28,7 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
     A curve that is far from the middle is moved there, and a small one is enlarged.
     """
-    everything = np.concatenate([curve.points for curve in curves])
+    everything = np.concatenate([curve.extent for curve in curves])
     centre, reach = _centre(everything)
     half = 1.04 if reach > 1.2 or reach < 1e-7 else 1.4 * np.tanh(reach / 2)
     axes = panel.add_axes(inside(panel, 0.25, 0.45, 0.25, 0.1))
@@ -36,6 +37,9 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
     spacing = 0.5 if half > 1 else _nice(0.6 * reach)
     _draw_grid(axes, spacing)
     for curve in curves:
+        if curve.radii is not None:
+            some = places_of_discs(curve)
+            draw_tube(axes, curve, _rims(flat(curve.points[some], centre), curve.radii[some]))
         curve.draw_line(axes, flat(curve.points, centre))
         curve.draw_dots(axes, flat(curve.given, centre))
     note = f"Poincaré disk; geodesics that cross the axes every {spacing:g}"
@@ -49,6 +53,15 @@ def flat(points: Array, centre: Array) -> Array:
     moved = _PLANE.transvection(centre, _PLANE.log(centre, _ORIGIN), points)
     places: Array = moved[..., 1:] / (1 + moved[..., :1])
     return places
+
+
+def _rims(places: Array, radii: Array) -> Array:
+    """The rims of discs of the hyperbolic plane around places, shape (m, k, 2): circles around the middle, moved by
+    Möbius transformations."""
+    middle = (places @ [1, 1j])[:, None]
+    around = np.tanh(radii / 2)[:, None] * (CIRCLE @ [1, 1j])
+    moved = (around + middle) / (1 + middle.conj() * around)
+    return np.stack([moved.real, moved.imag], axis=-1)
 
 
 def _centre(points: Array) -> tuple[Array, float]:

@@ -53,8 +53,12 @@ def _draw(panel: SubFigure, curves: Sequence[Curve], vectors: Callable[[Any], Ar
     axes, view = part or _dome(panel, np.concatenate([line * sides(line) for line in lines]))
     for curve, line in zip(curves, lines, strict=True):
         whole = line if part else broken(line)
-        given = line if part else line * sides(line)
-        draw_on_globe(axes, view, curve, whole, given[curve.knots])
+        if curve.noise is None:
+            given = (line if part else line * sides(line))[curve.knots]
+        else:
+            given = vectors(curve.given)
+            given = given * _sides_of(given, curve.beside(line) if part else np.array([0.0, 0.0, 1.0]))
+        draw_on_globe(axes, view, curve, whole, given, curve.radii if part else None)
     note += "; points are normals" if what == "plane" else ""
     panel.text(0.5, 0.02, note, ha="center", color=INK, fontsize=9)
 
@@ -73,6 +77,11 @@ def sides(line: Array) -> Array:
     last = np.maximum.accumulate(np.where(known, np.arange(len(line)), -1))
     last = np.where(last < 0, known.argmax(), last)
     return np.where(line[last, 2] < 0, -1.0, 1.0)[:, None]
+
+
+def _sides_of(vectors: Array, near: Array) -> Array:
+    """1 or −1, shape (m, 1), such that vectors are on the side of others."""
+    return np.where(np.sum(vectors * near, axis=1) < 0, -1.0, 1.0)[:, None]
 
 
 def broken(line: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgba
 from matplotlib.figure import SubFigure
 from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
@@ -71,7 +72,8 @@ def _draw(panel: SubFigure, curves: Sequence[Curve], view: Array) -> None:
     Args:
         view: right, up and, of ellipsoids, towards the viewer.
     """
-    note = "half axes: √eigenvalues; filled: given"
+    noisy = curves[0].noise is not None
+    note = "half axes: √eigenvalues; filled: " + ("curve, outlines: data" if noisy else "given")
     if len(view) == 3:
         note += "; x₁ forwards, x₂ right, x₃ up"
     # Beside the scale, which is an inch wide.
@@ -81,7 +83,7 @@ def _draw(panel: SubFigure, curves: Sequence[Curve], view: Array) -> None:
         note += f"; {len(rows)} of the curves"
     axes.text(0, 1.02, note, transform=axes.transAxes, color=INK, fontsize=9, va="bottom")
     width, height = axes.bbox.width / panel.dpi, axes.bbox.height / len(rows) / panel.dpi
-    largest = max(np.sqrt(np.linalg.eigvalsh(curves[i].points).max()) for i in rows)
+    largest = max(np.sqrt(np.linalg.eigvalsh(curves[i].extent).max()) for i in rows)
     inches = min(0.45 * height, 0.7) / largest
     number = int(width / (0.9 * inches * largest))
     for row, i in enumerate(rows):
@@ -89,6 +91,10 @@ def _draw(panel: SubFigure, curves: Sequence[Curve], view: Array) -> None:
         for picked, bold in zip(curves[i].picked(number)[::-1], (False, True), strict=True):
             places = np.column_stack([curves[i].times[picked], np.full(len(picked), -row)])
             _draw_row(axes, places, matrices[picked], inches, bold)
+        data = curves[i].picked_data(number)
+        if len(data):
+            places = np.column_stack([curves[i].on_axis(curves[i].given_x[data]), np.full(len(data), -row)])
+            _draw_row(axes, places, view @ curves[i].given[data] @ view.T, inches, False, INK)
     _draw_scale(axes, width, inches)
 
 
@@ -103,21 +109,25 @@ def _draw_scale(axes: Axes, width: float, inches: float) -> None:
     axes.text(ends[0] - 0.01, 1.07, f"{length:g}", fontsize=9, ha="right", va="center_baseline", **look)
 
 
-def _draw_row(axes: Axes, places: Array, matrices: Array, inches: float, bold: bool) -> None:
-    """Ellipses at places of the axes, in colours by time.
+def _draw_row(
+    axes: Axes, places: Array, matrices: Array, inches: float, bold: bool, color: Any = None
+) -> None:
+    """Ellipses at places of the axes, in colours by time unless there is one for all.
 
     Args:
         inches: how long 1 is on paper: the time axis has another scale.
     """
     first, last = axes.get_xlim()
     colors = colormaps["viridis"](0.85 * (places[:, 0] - first) / (last - first))
+    if color is not None:
+        colors = np.array([to_rgba(color)] * len(places))
     inside = colors * [1, 1, 1, 0.45 if bold else 0]
     where: dict[str, Any] = {
         "offsets": places,
         "offset_transform": axes.transData,
         "transform": Affine2D().scale(inches) + axes.figure.dpi_scale_trans,
         "clip_on": False,
-        "zorder": 4 if bold else 3,
+        "zorder": 5 if color is not None else 4 if bold else 3,
         "edgecolors": colors,
     }
     rings = list(outlines(matrices))

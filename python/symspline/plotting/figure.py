@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from ..spaces import Product, SpecialEuclidean, factors_of
+from .bands import ALPHA
 from .curves import Curve, Spline, curves_of
 from .pictures import Picture, picture_of
 from .style import DPI, INK, heading
@@ -18,6 +19,8 @@ from .timeline import timelines
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 4.0
 _FACTORS = 6
+_NORMAL = 1.96
+"""A normal variable is nearer to its mean than so many deviations with probability 95 %."""
 
 
 class CurveFigure(Figure):
@@ -41,7 +44,9 @@ def plot(spline: Spline, file: Any = None) -> Figure:
     figure = CurveFigure(figsize=(sum(widths), sum(heights)), dpi=DPI, facecolor="white")
     grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
     title = shorten(f"{spline._kind} on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
-    heading(figure, title, words + _description(spline) + _gaps(curves), 1 - 0.5 / sum(heights))
+    heading(
+        figure, title, words + _description(spline) + _noise(curves) + _gaps(curves), 1 - 0.5 / sum(heights)
+    )
     picture.draw(figure.add_subfigure(grid[1, 0]), curves)
     _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
     if file is not None:
@@ -50,8 +55,8 @@ def plot(spline: Spline, file: Any = None) -> Figure:
 
 
 def _description(spline: Spline) -> str:
-    """Points, end conditions and whether the solver got there."""
-    words = f"{spline.t.shape[-1]} points{' each' if spline._curve.batch else ''}, {spline._ends}"
+    """What it is made of, and whether the solver got there."""
+    words = spline._made_of
     factors = len(factors_of(spline.space))
     if factors > _FACTORS:
         words += f", {_FACTORS} of {factors} factors"
@@ -61,6 +66,14 @@ def _description(spline: Spline) -> str:
     return f"{words}, {number}not converged"
 
 
+def _noise(curves: Sequence[Curve]) -> str:
+    """What the light bands are, and how many curves have them."""
+    if curves[0].noise is None:
+        return ""
+    shown = sum(curve.shown for curve in curves)
+    return ", band 95 %" if shown == len(curves) else f", data and 95 % bands of {shown}"
+
+
 def _gaps(curves: Sequence[Curve]) -> str:
     """How many bands mark missing points."""
     number = sum(len(curve.gaps) for curve in curves)
@@ -68,17 +81,24 @@ def _gaps(curves: Sequence[Curve]) -> str:
 
 
 def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """|γ'| and |∇γ'| of every curve."""
+    """|γ'| and |∇γ'| of every curve, and the band of the speed where noise is known."""
     per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
     # Rigid motions have no invariant lengths, see `SpecialEuclidean`.
     rigid = isinstance(curves[0].space, SpecialEuclidean)
     first, second = ("|(ω, v)|", "|(ω′, v′)|") if rigid else ("|γ′|", "|∇γ′|")
     speed, bend = timelines(panel, curves, [f"speed\n{first}{per[0]}", f"acceleration\n{second}{per[1]}"])
+    tops: list[float] = []
     for curve in curves:
         line = {"color": curve.color, "linewidth": 1.8 if curve.alone else 1.1}
         speed.plot(curve.times, curve.speed, **line)
         bend.plot(curve.times, curve.bend, **line)
-    top = max(curve.speed.max() for curve in curves) or 1.0
+        if curve.noise is not None and curve.noise.speed is not None and curve.shown:
+            spread = _NORMAL * curve.noise.speed
+            low, high = np.maximum(curve.speed - spread, 0), curve.speed + spread
+            band: Any = {"color": curve.color, "alpha": ALPHA, "linewidth": 0, "label": "band"}
+            speed.fill_between(curve.times, low, high, **band)
+            tops.append(high.max())
+    top = max([curve.speed.max() for curve in curves] + tops) or 1.0
     unit = top / max(curve.x[-1] - curve.x[0] for curve in curves)
     highest = max(curve.bend.max() for curve in curves)
     speed.set_ylim(0, 1.08 * top)

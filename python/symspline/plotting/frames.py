@@ -66,9 +66,19 @@ def draw_frames(panel: SubFigure, curves: Sequence[Curve], matrices: Callable[[A
     for row, i in enumerate(rows):
         bold, between = curves[i].picked(number)
         frames = length * VIEW @ matrices(curves[i].points)
+        data = curves[i].picked_data(number)
+        if len(data):
+            noisy = length * VIEW @ matrices(curves[i].given[data])
+            _draw_arrows(axes, curves[i].on_axis(curves[i].given_x[data]), -row, noisy, bold=False)
         _draw_arrows(axes, curves[i].times[between], -row, frames[between], bold=False)
         _draw_arrows(axes, curves[i].times[bold], -row, frames[bold], bold=True)
-    explain(axes, "bold: given" if len(rows) == len(curves) else f"bold: given; {len(rows)} of the curves")
+    note = given_note(curves)
+    explain(axes, note if len(rows) == len(curves) else f"{note}; {len(rows)} of the curves")
+
+
+def given_note(curves: Sequence[Curve]) -> str:
+    """Which frames are the given ones."""
+    return "bold: given" if curves[0].noise is None else "bold: curve, light: data"
 
 
 def explain(axes: Axes, note: str, height: float = 1.0) -> None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from .curves import Curve
 from .flat import plane, room
-from .frames import explain
-from .style import AXES, INK, window
+from .frames import explain, given_note
+from .style import AXES, DATA, INK, window
 
 Array = NDArray[np.float64]
 
@@ -27,12 +27,17 @@ _MANY = 24
 def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """SE(2): arrow heads that stand on the path and point along their first axis; the given ones filled."""
     axes = plane(panel)
-    _, half = window(np.concatenate([curve.points[:, :2, 2] for curve in curves]), 1.0)
+    _, half = window(np.concatenate([curve.extent[:, :2, 2] for curve in curves]), 1.0)
     length = 0.07 * (half or 1.0) * (1 if curves[0].alone else 0.6)
     for curve in curves:
         curve.draw_line(axes, curve.points[:, :2, 2], linewidth=1.2, alpha=0.6)
         bold, between = curve.picked(max(2, _MANY // len(curves)))
         edge = INK if curve.alone else curve.color
+        if curve.noise is not None:
+            curve.draw_dots(axes, curve.given[:, :2, 2])
+            some = curve.picked_data(max(2, _MANY // len(curves)))
+            light = DATA if curve.alone else curve.color
+            _draw_bodies(axes, curve.given[some], length, facecolor="none", edgecolor=light, alpha=0.6)
         _draw_bodies(axes, curve.points[between], length, facecolor="none", edgecolor=curve.color)
         _draw_bodies(axes, curve.points[bold[1:]], length, facecolor=edge, edgecolor=edge)
         _draw_bodies(axes, curve.points[bold[:1]], length, facecolor="white", edgecolor=edge)
@@ -47,15 +52,20 @@ def _draw_bodies(axes: Axes, poses: Array, length: float, **look: Any) -> None:
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     """SE(3): frames that stand on the path; the given ones bold."""
     paths = [curve.points[:, :3, 3] for curve in curves]
-    axes = room(panel, paths, 1.2, below=0.4)
+    axes = room(panel, paths, 1.2, below=0.4, others=[curve.given[:, :3, 3] for curve in curves])
     length = 0.12 * float(np.ptp(axes.get_xlim()))
     for curve, path in zip(curves, paths, strict=True):
         curve.draw_line(axes, path, linewidth=1.2)
         bold, between = curve.picked(max(2, _MANY // len(curves)))
         _draw_frames(axes, curve.points[between], 0.8 * length, linewidth=0.8, alpha=0.55)
         _draw_frames(axes, curve.points[bold], length, linewidth=2.0 if curve.alone else 1.3)
-        curve.draw_dots(axes, path[bold], markersize=3.5 if curve.alone else 2)
-    explain(axes, "bold: given", height=-0.06)
+        if curve.noise is None:
+            curve.draw_dots(axes, path[bold], markersize=3.5 if curve.alone else 2)
+        else:
+            curve.draw_dots(axes, curve.given[:, :3, 3])
+            some = curve.picked_data(max(2, _MANY // len(curves)))
+            _draw_frames(axes, curve.given[some], 0.8 * length, linewidth=0.8, alpha=0.55)
+    explain(axes, given_note(curves), height=-0.06)
 
 
 def _draw_frames(axes: Any, poses: Array, length: float, **look: Any) -> None:

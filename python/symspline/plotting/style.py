@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 EDGE, GRID, INK, PAPER = "#a8a18f", "#b9c8d1", "#22303a", "#eff4f7"
 SPLINE = "#0b559f"
+DATA = "#7d8f9c"
+"""Of noisy data beside the only curve."""
 GAP = "#faeee4"
 """Of bands where points are missing."""
 DISTINCT = ["#0b559f", "#d95f0e", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00"]

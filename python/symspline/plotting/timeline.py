@@ -76,8 +76,8 @@ def _mark_gaps(axes: Axes, curves: Sequence[Curve]) -> None:
 
 
 def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Thin lines at the knots; short ticks where lines would be too many."""
-    knots = np.unique(np.concatenate([curve.times[curve.knots] for curve in curves]))
+    """Thin lines at the knots, or where there are noisy data; short ticks where lines would be too many."""
+    knots = np.unique(np.concatenate([curve.marks for curve in curves]))
     height = 1.0 if len(knots) <= _LINES else 0.04
     knots = knots[:: 1 + len(knots) // _TICKS]
     axes.vlines(

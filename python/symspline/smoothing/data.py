@@ -11,6 +11,7 @@ from .._core import ValidationError
 from ..arrays import as_array, cast, shown
 from ..curves.ends import End
 from ..curves.fit import Points, read, read_ends, validated
+from ..handed import times_of
 from ..options import within
 from ..spaces import Array, Space, factors_of
 from ..times import Clock, clock_of
@@ -158,9 +159,10 @@ def knots_for(noisy: Noisy, knots: Any) -> Knots:
         raise ValidationError(
             f"knots must be None, a number of knots, or an array of them, not {shown(knots)}"
         )
-    found, _ = noisy.clock.at(knots, noisy.batch, False)
-    if found.ndim > 1 and np.ndim(noisy.clock.origin) == 0:
+    given = as_array(times_of(knots, "knots")[0], "knots")
+    if given.ndim != 1:
         raise ValidationError("knots are those of all curves, shape (K,)")
+    found, _ = noisy.clock.at(knots, noisy.batch, False)
     if found.shape[-1:] < (2,):
         raise ValidationError("knots: a curve needs at least two")
     if not np.all(np.diff(found) > 0):
@@ -168,12 +170,12 @@ def knots_for(noisy: Noisy, knots: Any) -> Knots:
         raise ValidationError(f"knots[{index + 1}] is not behind knots[{index}]; knots must increase")
     if np.any(found[..., 0] > times[..., 0]) or np.any(found[..., -1] < times[..., -1]):
         raise ValidationError("knots must reach from the first to the last time of the data")
-    given = np.asarray(knots)
     if noisy.clock.dates:
         given = given.astype(np.promote_types(given.dtype, t.dtype))
     elif noisy.clock.plain:
         given = found
-    return Knots(given, found)
+    # Curves that count from a time of their own each have them.
+    return Knots(np.broadcast_to(given, found.shape).copy(), found)
 
 
 def _different(t: Array, times: Doubles) -> Knots:

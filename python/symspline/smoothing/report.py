@@ -48,6 +48,14 @@ class SmoothingReport:
             )
         return f"{np.count_nonzero(good)} of {good.size} curves converged: {self.method}"
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, SmoothingReport):
+            return NotImplemented
+        (ours, *columns), (theirs, *others) = vars(self).values(), vars(other).values()
+        return ours == theirs and all(
+            np.array_equal(a, b, equal_nan=True) for a, b in zip(columns, others, strict=True)
+        )
+
     def map(self, function: Any) -> SmoothingReport:
         """The report with a function applied to the fields that are per curve."""
         method, *columns = vars(self).values()

@@ -27,16 +27,12 @@ class Smoothed(NamedTuple):
 
     Attributes:
         band: the band of A⁻¹, shape (..., K, 4): variances of the curve, at noise of variance one.
-        wide: the knots that go with it: those of the curve, or of a closed curve some more on either side.
-        fixed: which ends have a given velocity.
         band_lam: the λ that goes with it, that of the pseudo-data of a robust loss.
         sigma: the standard deviation of a coordinate by which bands are scaled, estimated or known.
     """
 
     report: SmoothingReport
     band: Doubles
-    wide: Doubles
-    fixed: tuple[bool, bool]
     band_lam: Any
     sigma: Any
 
@@ -45,8 +41,6 @@ class Smoothed(NamedTuple):
         return Smoothed(
             self.report.map(function),
             function(self.band),
-            function(self.wide) if self.wide.ndim > 1 else self.wide,
-            self.fixed,
             function(self.band_lam),
             function(self.sigma),
         )
@@ -78,7 +72,7 @@ def smoothed(
     batch = noisy.batch
     if span is not None and any(vector is not None for _, vector in ends or []):
         raise ValidationError(f"in as many dimensions as {space} has, end velocities cannot be given")
-    found, _, band, wide, columns = _core.smooth(
+    found, band, columns = _core.smooth(
         small._handle,
         np.ascontiguousarray(noisy.times),
         np.ascontiguousarray(small._as_doubles(inside)),
@@ -112,9 +106,7 @@ def smoothed(
         for number, kind in enumerate(np.ravel(state).tolist())
         if kind
     ]
-    fixed = (False, False) if ends is None else (ends[0][0] == "velocity", ends[1][0] == "velocity")
-    kept = Smoothed(report, band, knots.times if ends else wide, fixed, band_lam, scale)
-    return numbers if span is None else span.up(numbers), kept, faults
+    return numbers if span is None else span.up(numbers), Smoothed(report, band, band_lam, scale), faults
 
 
 def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingReport, asked: Asked) -> str:

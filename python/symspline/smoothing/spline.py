@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike
 from .. import _core
 from .._core import ValidationError
 from ..curves.curve import Curve
-from ..curves.ends import is_closed
+from ..curves.ends import fixed_velocities
+from ..curves.noise import Noise
 from ..report import Report
-from ..spaces import Array, Product, factors_of
+from ..spaces import Array, Product, Space, factors_of
 from ..spline import CubicSpline
 from ..times import Clock
-from .data import Noisy
+from .data import Doubles, Noisy
 from .solve import Smoothed
+from .stored import noisy_arrays
 
 
 class SmoothingSpline(CubicSpline):
@@ -24,7 +26,8 @@ class SmoothingSpline(CubicSpline):
 
     It has all that a `CubicSpline` has; its points are those of the smooth curve at its knots, and derivatives by
     `jvp` and `vjp` are with respect to them, not to the data. Numbers that belong to the noise are tuples with one
-    entry a factor in a `Product`, and arrays with the batch axes for a batch of curves.
+    entry a factor in a `Product`, and arrays with the batch axes for a batch of curves. `save` keeps all of them,
+    and the data; `plot` shows the data and 95 % bands.
     """
 
     _kind = "Smoothing spline"
@@ -118,32 +121,31 @@ class SmoothingSpline(CubicSpline):
         times, per_curve = self._clock.at(x, self._batch, False)
         if not np.isfinite(times).all():
             raise ValidationError("x must be finite")
-        if is_closed(self._bc_type):
-            first, last = (self._times[..., end] for end in (0, -1))
-            shape = (*first.shape, *[1] * (times.ndim - first.ndim))
-            first, period = first.reshape(shape), (last - first).reshape(shape)
-            times, per_curve = first + (times - first) % period, per_curve or self._times.ndim > 1
         batch = self._batch
         own = times.shape[len(batch) :] if per_curve else times.shape
         found = []
         for part in self._smoothed:
             out = np.empty((*batch, *own))
             for index in np.ndindex(batch):
-                knots = part.wide[index] if part.wide.ndim > 1 else part.wide
                 at = times[index] if per_curve else times
-                lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
-                rows = np.ascontiguousarray(np.ravel(at))
-                variance = _core.smoothing_variance(
-                    np.ascontiguousarray(knots),
-                    np.ascontiguousarray(part.band[index]),
-                    lam,
-                    rows,
-                    nu,
-                    part.fixed,
-                )
-                out[index] = sigma * np.sqrt(variance).reshape(own)
+                out[index] = self._spread(part, index, np.ravel(at), nu).reshape(own)
             found.append(out[()])
         return self._each(found)
+
+    def _spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
+        """The standard deviation of one curve in a factor at times x of the core."""
+        knots = self._times[index] if self._times.ndim > 1 else self._times
+        lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
+        variance = _core.smoothing_variance(
+            np.ascontiguousarray(knots),
+            np.ascontiguousarray(part.band[index]),
+            lam,
+            np.ascontiguousarray(x),
+            nu,
+            fixed_velocities(self._bc_type),
+        )
+        spread: Doubles = sigma * np.sqrt(variance)
+        return spread
 
     def band(self, x: ArrayLike, level: float = 0.95) -> Any:
         """Radius of the ball about the curve at times x that holds the true point with probability ``level``.
@@ -164,10 +166,32 @@ class SmoothingSpline(CubicSpline):
         each = spreads if isinstance(self.space, Product) else (spreads,)
         return self._each(
             [
-                np.sqrt(_core.chi_squared(factor.dim, level)) * spread
+                _radius(factor, level) * spread
                 for factor, spread in zip(factors_of(self.space), each, strict=True)
             ]
         )
+
+    # ---- what a plot shows ----
+
+    @property
+    def _made_of(self) -> str:
+        count = int(np.max(np.sum(self._noisy.weights > 0, axis=-1)))
+        df = _ranges([part.report.df for part in self._smoothed], 3)
+        sigma = _ranges([part.sigma for part in self._smoothed], 2)
+        each = " each" if self._batch else ""
+        return f"{count} data{each}, {df} degrees of freedom, noise {sigma}"
+
+    def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> Noise:
+        noisy = self._noisy
+        own = [array[index] if array.ndim > 1 else array for array in (noisy.times, noisy.weights)]
+        used = own[1] > 0
+        radii = [
+            _radius(factor, 0.95) * self._spread(part, index, x, 0)
+            for factor, part in zip(factors_of(self.space), self._smoothed, strict=True)
+        ]
+        product = isinstance(self.space, Product)
+        speed = None if product else self._spread(self._smoothed[0], index, x, 1)
+        return Noise(own[0][used], [points[index][used] for points in noisy.points], radii, speed)
 
     @property
     def _unconverged(self) -> int:
@@ -212,7 +236,28 @@ class SmoothingSpline(CubicSpline):
         _, parts = super().__reduce__()
         return SmoothingSpline._of, (*parts, self._noisy, self._smoothed)
 
+    def _arrays(self) -> dict[str, Any]:
+        return super()._arrays() | noisy_arrays(self.space, self._noisy, self._smoothed)
+
     def __repr__(self) -> str:
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
         return f"<SmoothingSpline on {self.space!r}: {batch}{data} data, {knots} knots>"
+
+
+def _radius(space: Space, level: float) -> float:
+    """How many standard deviations of a coordinate the ball reaches that holds a normal vector so often."""
+    return float(np.sqrt(_core.chi_squared(space.dim, level)))
+
+
+def _ranges(factors: list[Any], digits: int) -> str:
+    """A number of every factor, of a batch the least and the largest; of many factors these, too."""
+    few = factors if len(factors) <= 3 else [np.concatenate([np.ravel(values) for values in factors])]
+    return " and ".join(_range(np.ravel(values), digits) for values in few)
+
+
+def _range(values: Doubles, digits: int) -> str:
+    good = values[np.isfinite(values)]
+    ends = (good.min(), good.max()) if good.size else ()
+    # Once, if they look alike.
+    return " to ".join(dict.fromkeys(f"{value:.{digits}g}" for value in ends)) or "unknown"

@@ -1,0 +1,110 @@
+"""What a file keeps of noisy data, beside the curve."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from ..archive import SMOOTHING, plain, times_arrays
+from ..arrays import shown
+from ..curves.curve import Curve
+from ..spaces import Product, Space, factors_of
+from ..times import Clock
+from .data import Noisy
+from .report import SmoothingReport
+from .solve import Smoothed
+
+_KINDS = {"converged": "b", "iterations": "i", "at_bound": "b"}
+_NUMBERS = ("step", "rate", "lam", "df", "sigma", "band_lam", "scale")
+
+
+def noisy_arrays(space: Space, noisy: Noisy, smoothed: list[Smoothed]) -> dict[str, Any]:
+    """The arrays that a smoothing spline has more than another one."""
+    arrays: dict[str, Any] = {
+        "format": SMOOTHING,
+        **times_arrays("data_t", noisy.t, noisy.clock),
+        "data_weights": noisy.weights,
+        "noise": json.dumps([_plain(found) for found in smoothed]),
+    }
+    for i, (points, found) in enumerate(zip(noisy.points, smoothed, strict=True)):
+        suffix = _suffix(space, i)
+        arrays["data" + suffix], arrays["band" + suffix] = points, found.band
+    return arrays
+
+
+def _suffix(space: Space, i: int) -> str:
+    return f"_{i}" if isinstance(space, Product) else ""
+
+
+def _plain(found: Smoothed) -> dict[str, Any]:
+    numbers = vars(found.report) | {"band_lam": found.band_lam, "scale": found.sigma}
+    return {key: plain(value) for key, value in numbers.items()}
+
+
+def read_stored(
+    arrays: Mapping[str, NDArray[Any]], clock: Clock, t: NDArray[Any], curve: Curve
+) -> tuple[Noisy, list[Smoothed]]:
+    """The data of a curve, and what is known of their noise.
+
+    Args:
+        clock, t: of the data.
+
+    Raises:
+        ValidationError: something does not fit.
+    """
+    space, batch, times = curve.space, curve.batch, clock.knots(t)
+    count, knots = times.shape[-1], curve.times.shape[-1]
+    if times.shape not in ((count,), (*batch, count)):
+        raise ValidationError(f"the times of the data have shape {times.shape}")
+    if not (np.isfinite(times).all() and (np.diff(times) >= 0).all()):
+        raise ValidationError("the times of the data go back")
+    if np.any(times[..., 0] < curve.times[..., 0]) or np.any(times[..., -1] > curve.times[..., -1]):
+        raise ValidationError("there are data before the first or behind the last knot")
+    weights = arrays["data_weights"]
+    _check_shape("the weights", weights, (count,), (*batch, count))
+    if not (np.isfinite(weights) & (weights >= 0)).all():
+        raise ValidationError("the weights are no numbers >= 0")
+    points, smoothed = [], []
+    for i, (factor, numbers) in enumerate(
+        zip(factors_of(space), json.loads(str(arrays["noise"])), strict=True)
+    ):
+        suffix = _suffix(space, i)
+        own = factor._numbers(factor._doubles(arrays["data" + suffix], "data" + suffix))
+        if own.shape != (*batch, count, *factor.point_shape):
+            raise ValidationError(f"the data have shape {own.shape}")
+        factor.check_point(own)
+        points.append(own)
+        band = arrays["band" + suffix]
+        _check_shape("the band", band, (*batch, knots, 4))
+        found = _smoothed(numbers, band, batch)
+        if not np.isfinite(band[np.asarray(found.report.converged)]).all():
+            raise ValidationError("the band is not finite")
+        smoothed.append(found)
+    return Noisy(clock, t, times, points, weights, batch), smoothed
+
+
+def _check_shape(what: str, array: NDArray[Any], *shapes: tuple[int, ...]) -> None:
+    if array.dtype != np.float64 or array.shape not in shapes:
+        raise ValidationError(f"{what} are {array.dtype} of shape {array.shape}")
+
+
+def _smoothed(numbers: dict[str, Any], band: NDArray[np.float64], batch: tuple[int, ...]) -> Smoothed:
+    method = numbers.pop("method")
+    if method not in ("flat", "newton"):
+        raise ValidationError(f"the method of the smoothing is {shown(method)}")
+    columns = {}
+    for key, kind in (_KINDS | dict.fromkeys(_NUMBERS, "f")).items():
+        value = numbers.pop(key)
+        array = np.asarray(value)
+        if array.shape != batch or array.dtype.kind != kind:
+            raise ValidationError(f"{key} of the smoothing is {shown(value)}")
+        columns[key] = array if batch else value
+    if numbers:
+        raise ValidationError(f"the smoothing has unknown entries: {shown(list(numbers))}")
+    band_lam, scale = columns.pop("band_lam"), columns.pop("scale")
+    return Smoothed(SmoothingReport(method, **columns), band, band_lam, scale)

@@ -1,0 +1,218 @@
+"""Pictures of smoothing splines: data instead of knots, and bands."""
+
+import numpy as np
+import pytest
+from drawn import axes_named, points_around, rendered, texts_of
+from matplotlib.dates import date2num
+from matplotlib.path import Path
+
+import symspline as ss
+from symspline.plotting import disk, sphere
+from symspline.plotting.pictures import _PICTURES
+
+T = np.linspace(0, 10, 40)
+
+
+def noisy(name, curves=None, n=40, seed=0):
+    """Data near smooth curves."""
+    space, rng = ss.space(name), np.random.default_rng(seed)
+    shape = () if curves is None else (curves,)
+    truth = ss.CubicSpline(np.linspace(0, 10, 4), points_around(space, rng, (*shape, 4)), space)
+    points = truth(np.linspace(0, 10, n))
+    return space.exp(points, 0.05 * space.random_tangent(rng, points))
+
+
+def smooth(name, t=T, curves=None, **options):
+    return ss.make_smoothing_spline(t, noisy(name, curves, len(t)), name, **options)
+
+
+def data_of(axes):
+    """Where the small dots are."""
+    dots = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    return np.concatenate(dots)
+
+
+def bands_of(axes):
+    return [artist for artist in (*axes.patches, *axes.collections) if artist.get_label() == "band"]
+
+
+# One of every kind of picture.
+NAMES = [*{_PICTURES[name].draw: name for name in _PICTURES}.values(), "rp:3", "ch:2", "spd:4", "u:3"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_space_shows_data(name):
+    spline = smooth(name)
+    figure = rendered(spline.plot())
+    assert f"Smoothing spline on {spline.space!r}" in texts_of(figure)
+    speed = axes_named(figure, "speed")
+    x, y = speed.lines[0].get_data()
+    (band,) = bands_of(speed)
+    corners = band.get_paths()[0].vertices
+    wanted = y + 1.96 * spline.std(x, 1)
+    assert np.abs(corners[:, None] - np.column_stack([x, wanted])).sum(axis=2).min(axis=0).max() < 1e-12
+    assert speed.get_ylim()[1] > wanted.max()
+
+
+@pytest.mark.parametrize(
+    "name", ["r:2", "r:3", "sphere:2", "h:2", "so:3", "spd:3", "se:2", "se:3", "rp:2", "s:1"]
+)
+def test_batches(name):
+    figure = rendered(smooth(name, curves=3).plot())
+    assert len(bands_of(axes_named(figure, "speed"))) == 3
+
+
+def test_heading():
+    spline = smooth("r:2", weights=np.where(np.arange(40) % 4, 1.0, 0.0))
+    wanted = f"30 data, {spline.df:.3g} degrees of freedom, noise {spline.sigma:.2g}, band 95 %"
+    assert wanted in texts_of(spline.plot())
+    both = ss.make_smoothing_spline(T, (noisy("r:1"), noisy("s:2")), "r:1 x s:2")
+    (one, other), (first, second) = both.df, both.sigma
+    wanted = f"40 data, {one:.3g} and {other:.3g} degrees of freedom, noise {first:.2g} and {second:.2g}, band 95 %"
+    assert wanted in texts_of(rendered(both.plot()))
+
+
+def test_data_are_drawn_and_not_knots():
+    weights = np.where(np.arange(40) % 4, 1.0, 0.0)
+    spline = smooth("r:2", weights=weights, knots=9)
+    figure = rendered(spline.plot())
+    np.testing.assert_array_equal(data_of(figure.axes[0]), spline.data[1][weights > 0])
+    marks = next(c for c in axes_named(figure, "speed").collections if c.get_label() != "band")
+    np.testing.assert_array_equal([path[0, 0] for path in marks.get_segments()], T[weights > 0])
+
+
+def test_few_of_many_curves_have_data():
+    figure = rendered(smooth("r:2", curves=12).plot())
+    (heading,) = [text for text in texts_of(figure) if "degrees of freedom" in text]
+    assert heading.startswith("12 curves, 40 data each, ") and heading.endswith("data and 95 % bands of 5")
+    assert len(bands_of(figure.axes[0])) == len(bands_of(axes_named(figure, "speed"))) == 5
+    assert len(data_of(figure.axes[0])) == 5 * 40
+
+
+def test_products_have_no_band_of_the_speed():
+    both = ss.make_smoothing_spline(T, (noisy("r:1"), noisy("s:2")), "r:1 x s:2")
+    figure = rendered(both.plot())
+    assert not bands_of(axes_named(figure, "speed"))
+    graph = axes_named(figure, "x")
+    np.testing.assert_array_equal(data_of(graph), np.column_stack([T, both.data[1][0][:, 0]]))
+    assert len(bands_of(graph)) == 1
+
+
+def test_band_of_a_graph():
+    spline = smooth("r:1")
+    axes = axes_named(spline.plot(), "x")
+    x, y = axes.lines[0].get_data()
+    (band,) = bands_of(axes)
+    path = band.get_paths()[0]
+    radius = spline.band(x[10])
+    assert path.contains_points([[x[10], y[10] + 0.98 * radius], [x[10], y[10] - 0.98 * radius]]).all()
+    assert not path.contains_points([[x[10], y[10] + 1.02 * radius], [x[10], y[10] - 1.02 * radius]]).any()
+
+
+def covered(band, places):
+    """Which places are filled: where the polygons go round more than not."""
+    polygons = band.get_path().to_polygons(closed_only=False)
+    return np.any([Path(polygon).contains_points(places) for polygon in polygons], axis=0)
+
+
+def test_band_of_a_path():
+    """What is nearer to the curve than the radius is filled, and nothing beyond."""
+    spline = smooth("r:2")
+    (band,) = bands_of(rendered(spline.plot()).axes[0])
+    fine = np.linspace(0, 10, 4001)
+    places = np.random.default_rng(0).uniform(-0.3, 0.3, (500, 2)) + spline(np.linspace(0, 10, 500))
+    reach = np.linalg.norm(places[:, None] - spline(fine), axis=2) / spline.band(fine)
+    inside = reach.min(axis=1)
+    assert (inside < 0.98).sum() > 50 and covered(band, places[inside < 0.98]).all()
+    assert (inside > 1.001).sum() > 50 and not covered(band, places[inside > 1.001]).any()
+
+
+def test_polygons_of_a_tube_go_round_to_the_left():
+    """Else those that lie upon each other would be holes, also where the curve turns in less than the radius."""
+    spline = smooth("r:2", lam=0.0, knots=25)
+    (band,) = bands_of(spline.plot().axes[0])
+    for polygon in band.get_path().to_polygons(closed_only=False):
+        x, y = (polygon - polygon.mean(axis=0)).T
+        assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > -1e-12
+
+
+@pytest.mark.parametrize("radius", [1e-4, 0.3, 1.4])
+def test_caps_have_their_radius(radius):
+    rng = np.random.default_rng(0)
+    points = np.concatenate([ss.Sphere(2).random_point(rng, 20), np.eye(3), -np.eye(3)])
+    rims = sphere.caps(points, np.full(26, radius))
+    np.testing.assert_allclose(ss.Sphere(2).distance(points[:, None], rims), radius, rtol=1e-9)
+    np.testing.assert_allclose(rims.mean(axis=1), np.cos(radius) * points, atol=1e-12)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 0.3, 2.0])
+def test_discs_of_the_hyperbolic_plane_have_their_radius(radius):
+    plane, rng = ss.Hyperbolic(2), np.random.default_rng(0)
+    points = plane.random_point(rng, 20)
+    rims = disk._rims(disk.flat(points, np.array([1.0, 0, 0])), np.full(20, radius))
+    square = np.sum(rims**2, axis=-1, keepdims=True)
+    lifted = np.concatenate([1 + square, 2 * rims], axis=-1) / (1 - square)
+    distance = plane.distance(points[:, None], plane.project(lifted))
+    np.testing.assert_allclose(distance, radius, rtol=1e-6)
+
+
+def test_the_band_stays_on_the_globe_and_on_the_map():
+    """Also around a pole, across the date line and beyond the horizon."""
+    t = np.linspace(0, 2 * np.pi, 60)
+    circle = np.stack([np.cos(t), 0.1 * np.sin(2 * t), np.sin(t)], axis=-1)
+    rng, space = np.random.default_rng(1), ss.Sphere(2)
+    points = space.project(circle)
+    spline = ss.make_smoothing_spline(t, space.exp(points, 0.1 * space.random_tangent(rng, points)), space)
+    figure = rendered(spline.plot())
+    globe, chart = figure.axes[0], axes_named(figure, "map")
+    for axes, most in ((globe, 1.0), (chart, 360)):
+        for band in bands_of(axes):
+            vertices = band.get_path().vertices
+            assert np.isfinite(vertices).all() and np.abs(vertices).max() < most + 1e-9
+    (_,), (band,) = bands_of(globe), bands_of(chart)
+    # No piece of it goes across the map.
+    assert max(np.ptp(polygon[:, 0]) for polygon in band.get_path().to_polygons()) <= 180
+    # It goes on at the date line.
+    edge = covered(band, np.column_stack([np.repeat([-179.9, 179.9], 179), np.tile(np.arange(-89, 90), 2)]))
+    assert edge.any() and (edge[:179] == edge[179:]).mean() > 0.96
+
+
+def test_angles_of_data_are_those_beside_the_curve():
+    """After several turns."""
+    t = np.linspace(0, 10, 80)
+    angle = 2 * t + 0.05 * np.random.default_rng(0).standard_normal(80)
+    for name, half in (("sphere:1", 1), ("rp:1", 2)):
+        points = np.stack([np.cos(angle / half), np.sin(angle / half)], axis=-1)
+        figure = rendered(ss.make_smoothing_spline(t, points, name).plot())
+        dots = data_of(axes_named(figure, "angle, degrees"))
+        np.testing.assert_allclose(dots, np.column_stack([t, np.degrees(angle / half)]), atol=1e-6)
+
+
+def test_dates_and_repeated_times():
+    dates = np.datetime64("2024-05-01") + np.repeat(np.arange(20), 2).astype("m8[h]")
+    dates[30:] += np.timedelta64(3, "D")
+    spline = smooth("r:1", dates)
+    figure = rendered(spline.plot())
+    axes = axes_named(figure, "x")
+    np.testing.assert_allclose(data_of(axes)[:, 0], date2num(dates), rtol=0, atol=2e-11)
+    assert any(text.endswith("band 95 %, 1 long gap") for text in texts_of(figure))
+
+
+def test_data_of_frames_stand_beside_the_curve():
+    spline = smooth("so:3")
+    axes = rendered(spline.plot()).axes[0]
+    arrows = [c for c in axes.collections if hasattr(c, "U") and len(c.U)]
+    light, bold = sorted(arrows, key=lambda c: c.width)
+    np.testing.assert_allclose(light.get_offsets()[:, 0], bold.get_offsets()[:, 0])
+    assert set(light.get_offsets()[:, 0]) <= set(T)
+
+
+def test_unconverged_curves_say_so():
+    figure = smooth("r:2", max_iter=1, tol=1e-12, on_failure="ignore").plot()
+    assert any(text.endswith("band 95 %") for text in texts_of(figure))
+    failed = smooth("sphere:2", max_iter=1, tol=1e-12, on_failure="ignore")
+    assert any("not converged" in text for text in texts_of(rendered(failed.plot())))
+
+
+def test_it_is_what_notebooks_show():
+    assert smooth("sphere:2")._repr_html_().startswith("<pre>&lt;SmoothingSpline")

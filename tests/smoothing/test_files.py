@@ -1,0 +1,219 @@
+"""Files keep the curve, its data and what is known of their noise, to the last bit."""
+
+import datetime
+import io
+import json
+
+import numpy as np
+import pytest
+from noisy import beside, example
+
+import symspline as ss
+from symspline.cli import main
+
+S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
+WEIGHTS = np.where(np.arange(40) == 3, 0.0, np.linspace(0.5, 2, 40))
+DATES = np.datetime64("2024-03-01") + (T * 60).astype("timedelta64[s]")
+TEXTS = DATES[8::8].astype(str)
+ZONED = [
+    datetime.datetime(2024, 3, 1, tzinfo=datetime.UTC) + datetime.timedelta(minutes=i) for i in range(40)
+]
+
+
+def saved_curves():
+    smooth = ss.make_smoothing_spline
+    pair = np.stack([NOISY, NOISY[::-1]])
+    gaps = np.where(WEIGHTS[:, None] > 0, NOISY, np.nan)
+    return {
+        "one": smooth(T, NOISY, S2),
+        "weights": smooth(T, gaps, S2, weights=WEIGHTS, sigma=0.05, extrapolate="geodesic"),
+        "robust": smooth(T, NOISY, S2, loss="cauchy"),
+        "few knots": smooth(np.round(T), NOISY, S2, knots=[-1.0, 2, 5, 8, 11]),
+        "least squares": ss.make_lsq_spline(T, NOISY, 8, S2),
+        "batch": smooth(T, pair, S2),
+        "own times": smooth(np.stack([T, 2 * T]), pair, S2, weights=[WEIGHTS, WEIGHTS[::-1]]),
+        "dates": smooth(DATES, NOISY, S2),
+        "date knots": smooth(DATES, NOISY, S2, knots=["2024-02-29T23:59:00.5", *TEXTS, "2024-03-01T00:11"]),
+        "own dates": smooth(np.stack([DATES, DATES + 60]), pair, S2, knots=DATES[0] + 66 * np.arange(11)),
+        "zones": smooth(ZONED, NOISY, S2, knots=[*ZONED[::10], ZONED[-1]]),
+        "nanoseconds": smooth(1_700_000_000_000_000_000 + np.arange(40), NOISY, S2),
+        "product": smooth(T, (NOISY, NOISY[:, :1]), "sphere:2 x r:1"),
+        "product batch": smooth(T, (pair, pair[..., :1]), "sphere:2 x r:1"),
+        "complex": smooth(T, example("cp:1", 0.05, n=40)[2], "cp:1"),
+        "unconverged": smooth(T, pair, S2, max_iter=1, on_failure="ignore"),
+    }
+
+
+SAVED = saved_curves()
+
+
+def stored(spline):
+    file = io.BytesIO()
+    spline.save(file)
+    file.seek(0)
+    return file
+
+
+def parts(value):
+    return value if isinstance(value, tuple) else (value,)
+
+
+def same(a, b):
+    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(parts(a), parts(b), strict=True))
+
+
+def assert_same(read, spline):
+    assert type(read) is ss.SmoothingSpline and read == spline and repr(read) == repr(spline)
+    assert read.t.dtype == spline.t.dtype and read.data[0].dtype == spline.data[0].dtype
+    assert np.array_equal(read.data[0], spline.data[0]) and same(read.data[1], spline.data[1])
+    assert same(read.residuals, spline.residuals)
+    for ours, theirs in zip(parts(spline.report), parts(read.report), strict=True):
+        assert type(theirs) is type(ours) and str(theirs) == str(ours)
+        assert theirs == ours
+    for name in ("lam", "df", "sigma"):
+        assert same(getattr(read, name), getattr(spline, name))
+    x = spline.t.ravel()[1:3]
+    for nu in (0, 1):
+        assert same(read.std(x, nu), spline.std(x, nu)) and same(read(x, nu), spline(x, nu))
+    assert same(read.band(x), spline.band(x)) and read.extrapolate == spline.extrapolate
+
+
+@pytest.mark.parametrize("name", SAVED)
+def test_files_keep_everything(name):
+    assert_same(ss.load(stored(SAVED[name])), SAVED[name])
+
+
+def test_zones_are_kept():
+    read = ss.load(stored(SAVED["zones"]))
+    assert read.std(ZONED[3]) == SAVED["zones"].std(ZONED[3])
+    with pytest.raises(ss.ValidationError, match="no time zone"):
+        read.std(datetime.datetime(2024, 3, 1))
+
+
+def test_curves_of_a_batch_come_back_one_by_one():
+    for name in ("batch", "own times", "own dates"):
+        for read, spline in zip(ss.load(stored(SAVED[name])), SAVED[name], strict=True):
+            assert_same(read, spline)
+
+
+def test_many_smoothing_splines_in_one_file():
+    for names in (["one", "few knots", "robust"], ["dates"], ["product"], ["zones"]):
+        curves = {name: SAVED[name] for name in names}
+        file = io.BytesIO()
+        ss.save_many(curves, file)
+        file.seek(0)
+        read = ss.load_many(file)
+        assert list(read) == names
+        for name in names:
+            assert_same(read[name], curves[name])
+    plain = ss.CubicSpline(SAVED["one"].t, SAVED["one"].points, S2)
+    with pytest.raises(ss.ValidationError, match="not both"):
+        ss.save_many({"smooth": SAVED["one"], "plain": plain}, io.BytesIO())
+    with pytest.raises(ss.ValidationError, match=r"read it with symspline\.load"):
+        ss.load_many(stored(SAVED["one"]))
+
+
+ARRAYS = dict(np.load(stored(SAVED["weights"])))
+
+
+def with_arrays(**changes):
+    file = io.BytesIO()
+    arrays = ARRAYS | changes
+    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    file.seek(0)
+    return file
+
+
+def noise_with(**changes):
+    return json.dumps([json.loads(str(ARRAYS["noise"]))[0] | changes])
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_files_with_a_missing_array(name):
+    with pytest.raises(ss.ValidationError, match=name if name != "format" else "not a symspline curve"):
+        ss.load(with_arrays(**{name: None}))
+
+
+def swapped(array):
+    return array[::-1].copy()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"data": 2 * ARRAYS["data"]},
+        {"data": np.nan * ARRAYS["data"]},
+        {"data": ARRAYS["data"][1:]},
+        {"data": ARRAYS["data"] + 0j},
+        {"data_t": swapped(ARRAYS["data_t"])},
+        {"data_t": ARRAYS["data_t"] - 1},
+        {"data_t": ARRAYS["data_t"] + 1},
+        {"data_t": ARRAYS["data_t"][1:]},
+        {"data_t": np.nan * ARRAYS["data_t"]},
+        {"data_t": np.arange(40), "data_t_unit": "s"},
+        {"data_t_unit": "s CET"},
+        {"data_t": 1.0},
+        {"data_weights": -ARRAYS["data_weights"]},
+        {"data_weights": ARRAYS["data_weights"][1:]},
+        {"data_weights": ARRAYS["data_weights"].astype(str)},
+        {"band": ARRAYS["band"][1:]},
+        {"band": ARRAYS["band"][:, :3]},
+        {"band": np.nan * ARRAYS["band"]},
+        {"band": 3.0},
+        {"noise": "{"},
+        {"noise": "[]"},
+        {"noise": "[{}]"},
+        {"noise": "5"},
+        {"noise": noise_with(method="guess")},
+        {"noise": noise_with(method=[])},
+        {"noise": noise_with(converged="no")},
+        {"noise": noise_with(lam=[1.0])},
+        {"noise": noise_with(iterations=1.5)},
+        {"noise": noise_with(scale=None)},
+        {"noise": noise_with(surprise=1)},
+        {"points": 2 * ARRAYS["points"]},
+        {"version": 99},
+    ],
+    ids=lambda changes: " ".join(changes),
+)
+def test_files_with_a_wrong_array(changes):
+    with pytest.raises(ss.ValidationError, match="the file"):
+        ss.load(with_arrays(**changes))
+
+
+def test_collections_that_are_damaged():
+    file = io.BytesIO()
+    ss.save_many({"a": SAVED["one"], "b": SAVED["robust"]}, file)
+    file.seek(0)
+    arrays = dict(np.load(file))
+    for key, value in {"samples": [40, 41], "knots": [3, 3], "noise": "[]", "data_weights": [1.0]}.items():
+        file = io.BytesIO()
+        np.savez(file, **arrays | {key: value})
+        file.seek(0)
+        with pytest.raises(ss.ValidationError, match="the file"):
+            ss.load_many(file)
+
+
+@pytest.mark.parametrize("name", ["one", "batch", "dates", "product"])
+def test_the_command_line_reads_them(name, tmp_path, capsys):
+    SAVED[name].save(tmp_path / "smooth.npz")
+    assert main(["check", str(tmp_path / "smooth.npz")]) == 0
+    assert main(["sample", str(tmp_path / "smooth.npz"), "-n", "5", "-o", str(tmp_path / "out.csv")]) == 0
+    which = ["--curve", "1"] if name == "batch" else []
+    assert main(["plot", str(tmp_path / "smooth.npz"), *which, "-o", str(tmp_path / "out.png")]) == 0
+    assert "rounding allows" in capsys.readouterr().out
+    assert (tmp_path / "out.png").stat().st_size > 1000
+
+
+def test_the_command_line_reads_collections(tmp_path):
+    curves = {"a": SAVED["one"], "b": SAVED["few knots"]}
+    ss.save_many(curves, tmp_path / "many.npz")
+    assert main(["check", str(tmp_path / "many.npz")]) == 0
+    assert main(["plot", str(tmp_path / "many.npz"), "--curve", "b", "-o", str(tmp_path / "b.png")]) == 0
+
+
+def test_knots_of_curves_that_count_from_their_own_time():
+    both = SAVED["own dates"]
+    assert both.t.shape == (2, 11) and both[0].t.shape == (11,)
+    with pytest.raises(ss.ValidationError, match=r"those of all curves, shape \(K,\)"):
+        ss.make_smoothing_spline(T, beside(S2, NOISY, 0.01), S2, knots=np.eye(3))
