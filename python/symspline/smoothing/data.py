@@ -54,7 +54,7 @@ def read_noisy(
     data = within(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
     clock, shown_times, times = _times_of(t, batch, count)
-    checked = _weights_of(weights, batch, count)
+    checked = checked_weights(weights, batch, count)
     if weights is not None:
         data = [_without_missing(part, checked) for part in data]
     # Points only: times may repeat, and knots need not be where data are.
@@ -86,7 +86,8 @@ def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[
     return clock, shown_times, times
 
 
-def _weights_of(weights: ArrayLike | None, batch: tuple[int, ...], count: int) -> Doubles:
+def checked_weights(weights: ArrayLike | None, batch: tuple[int, ...], count: int) -> Doubles:
+    """Weights, one of every point."""
     if weights is None:
         return np.ones(count)
     array = as_array(weights, "weights")
