@@ -63,7 +63,8 @@ def fit_segments(
         duplicates: what happens where a time comes several times: ``"raise"`` an error, keep the ``"first"`` point, or
             take their ``"mean"``, the point from which the directions to them add up to zero.
         smooth: whether the points are noisy: every piece is a `SmoothingSpline` then, with a smoothness and a noise of
-            its own. Of points with one time all count, unless the ``"first"`` are to be kept.
+            its own. Of points with one time all count, unless the ``"first"`` are to be kept, as they must be where
+            a recorder wrote points twice: copies make all noise look like none.
         options: those of `CubicSpline`, or with ``smooth`` those of `make_smoothing_spline`, for all pieces alike;
             ``weights`` has shape (n,), ``knots`` is a number in each piece. Points of weight zero are left out before
             the recording is cut, so that many of them are a pause.

@@ -105,9 +105,29 @@ def test_every_factor_has_its_own(run, line, options):
     assert f"so:3: λ {turning.lam:.3g}" in out and f"; euclidean:3: λ {place.lam:.3g}" in out
 
 
+def test_pieces_of_two_points(run):
+    t = np.r_[T[:30], T[30:32] + 50, T[32:] + 200]
+    write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
+    for more in ("", "--robust", "--sigma 0.01"):
+        run(f"fit a.csv --lonlat --smooth --max-gap 5 {more} -o a.npz")
+        piece = ss.load_many("a.npz")["2"]
+        assert np.abs(piece.points - PLACES[30:32]).max() < 1e-10
+
+
 def test_a_bound_is_told(run):
     write_table("b.csv", {"t": T, "x": T**2})
     assert "(at its bound), 60 degrees" in run("fit b.csv --space r:1 --smooth reml -o b.npz")
+
+
+def test_rows_written_twice_are_suspected(run):
+    i = np.sort(np.r_[np.arange(60), 30])
+    write_table("a.csv", {"t": T[i], "lon": LON[i], "lat": LAT[i]})
+    # Where two points agree exactly, cross-validation takes all for exact.
+    out = run("fit a.csv --lonlat --smooth -o a.npz")
+    assert "(at its bound)" in out and "--dedup first leaves them out" in out
+    out = run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
+    assert "copies" not in out
+    near(ss.load("a.npz"), ss.make_smoothing_spline(T, PLACES, "sphere:2"))
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,8 @@ from .numbers import is_number
 
 _CRITERIA = ("gcv", "gcv1.4", "reml")
 _BEST = "best"
+# Degrees of freedom of a geodesic, or hardly more.
+_STRAIGHT = 3
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,12 @@ def summary(splines: Sequence[SmoothingSpline], lonlat: bool) -> str:
             f"{of}λ {_range([report.lam for report in own])}{_at_bound(bound, len(own))}, "
             f"{_range([report.df for report in own])} degrees of freedom, noise {_range(noise)}"
             f"{'°' if lonlat else ''}"
+        )
+    rough = [any(part.at_bound and part.df > _STRAIGHT for part in report) for report in reports]
+    times = [spline.data[0] for spline, own in zip(splines, rough, strict=True) if own]
+    if any((own[1:] == own[:-1]).any() for own in times):
+        parts.append(
+            "times repeat, and copies of rows make noise look like none: --dedup first leaves them out"
         )
     return f"{curves} near {data} points of {splines[0].space}, converged: {'; '.join(parts)}"
 

@@ -51,8 +51,9 @@ def make_smoothing_spline(
     In flat space it is SciPy's ``make_smoothing_spline``. λ is chosen from the data unless it is given.
 
     Args:
-        t: times of the data, not decreasing; several data may have one time. None for 0, 1, …, shape (N,) or
-            (..., N).
+        t: times of the data, not decreasing; several data may have one time. But copies of a datum are no data:
+            where they agree to the last digit, ``"gcv"`` and ``"reml"`` may find no noise at all. None for 0, 1, …,
+            shape (N,) or (..., N).
         points: noisy points y, shape (..., N, *space.point_shape); leading axes are independent curves, each with a
             λ of its own. For a `Product` a tuple of arrays.
         space: a space or its name. In `SpecialEuclidean`, which has no invariant metric, the curve solves the same
@@ -103,11 +104,14 @@ def make_smoothing_spline(
         raise ValidationError(f"tol must be a number > 0, not {shown(tol)}")
     asked = Asked(criterion, loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
     noisy = read_noisy(t, points, space, weights, atol)
+    if noisy.times.shape[-1] == 2:
+        # Of two points none is an outlier, and nothing says how large the noise is.
+        asked = asked._replace(loss="linear")
     lams = _in_factors(space, lam, "lam", noisy.batch)
     sigmas = _in_factors(space, sigma, "sigma", noisy.batch)
 
     def run(at: Knots) -> list[Any]:
-        each = zip(points_of(noisy, space), lams, sigmas, strict=True)
+        each = zip(points_of(noisy, space), _chosen(lams, at), sigmas, strict=True)
         return [
             smoothed(factor, noisy, own, at, one_lam, one_sigma, asked, progress)
             for (factor, own), one_lam, one_sigma in each
@@ -171,6 +175,14 @@ def make_lsq_spline(
     if knots is None:
         raise ValidationError("knots must be given: an array of times, or how many there are to be")
     return make_smoothing_spline(t, points, space, 0.0, weights=weights, knots=knots, loss=loss, **options)
+
+
+def _chosen(lams: list[Any], at: Knots) -> list[Any]:
+    """Between two knots there is nothing to choose: the curve is the nearest geodesic, whatever λ is."""
+    if at.times.shape[-1] > 2:
+        return lams
+    cube = np.ravel(at.times[..., 1] - at.times[..., 0]) ** 3
+    return [np.where(np.isnan(lam), cube, lam) for lam in lams]
 
 
 def _in_factors(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> list[Any]:
