@@ -143,7 +143,7 @@ def resample(
             continue
         own = rows[np.argsort(utc[rows], kind="stable")]
         try:
-            pieces, *_ = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates)
+            pieces = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates).curves
         except ValidationError as error:
             of = "" if by is None else f"{by} {label}, rows in the order of time: "
             raise ValidationError(f"{of}{error}") from None

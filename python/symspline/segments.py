@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
-from typing import Any
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,9 @@ from .arrays import as_array, shown, whole_number
 from .curves.fit import read
 from .functions import fit_many
 from .handed import times_of
+from .smoothing import SmoothingSpline
+from .smoothing.data import checked_weights
+from .smoothing.many import smooth_many
 from .spaces import Array, Product, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline
@@ -23,6 +26,18 @@ _DUPLICATES = ("raise", "first", "mean")
 _STEPS = 50
 
 
+@overload
+def fit_segments(
+    t: ArrayLike, points: Any, space: Space | str, *, max_gap: Any, smooth: Literal[True], **options: Any
+) -> list[SmoothingSpline]: ...
+
+
+@overload
+def fit_segments(
+    t: ArrayLike, points: Any, space: Space | str, *, max_gap: Any, smooth: bool = False, **options: Any
+) -> list[CubicSpline]: ...
+
+
 def fit_segments(
     t: ArrayLike,
     points: Any,
@@ -31,8 +46,9 @@ def fit_segments(
     max_gap: Any,
     min_points: int = 2,
     duplicates: str = "raise",
+    smooth: bool = False,
     **options: Any,
-) -> list[CubicSpline]:
+) -> list[CubicSpline] | list[SmoothingSpline]:
     """Fit a recording that pauses: cut where neighbouring times are more than ``max_gap`` apart, one curve a piece.
 
     A curve drawn across a pause swings out far and looks plausible. What lies between the curves is not known.
@@ -46,10 +62,16 @@ def fit_segments(
         min_points: pieces of fewer points are left out; 2 or more.
         duplicates: what happens where a time comes several times: ``"raise"`` an error, keep the ``"first"`` point, or
             take their ``"mean"``, the point from which the directions to them add up to zero.
-        options: those of `CubicSpline`, for all pieces alike.
+        smooth: whether the points are noisy: every piece is a `SmoothingSpline` then, with a smoothness and a noise of
+            its own. Of points with one time all count, unless the ``"first"`` are to be kept; copies of a
+            point are one.
+        options: those of `CubicSpline`, or with ``smooth`` those of `make_smoothing_spline`, for all pieces alike;
+            ``weights`` has shape (n,), ``knots`` is a number in each piece. Points of weight zero are left out before
+            the recording is cut, so that many of them are a pause.
 
     Returns:
-        The curves in the order of time: ``curve.t[0]`` and ``curve.t[-1]`` are where each begins and ends.
+        The curves in the order of time, each a `CubicSpline`: ``curve.t[0]`` and ``curve.t[-1]`` are where it begins
+        and ends.
 
     Raises:
         ValidationError: the input is not what is described above, times fall or repeat, or no piece has ``min_points``.
@@ -60,22 +82,73 @@ def fit_segments(
     >>> here, there = ss.fit_segments(t, [[0], [1], [2], [4], [0], [3]], "r:1", max_gap=5, duplicates="mean")
     >>> here.t, here.points[:, 0], there.t
     (array([0., 1., 2.]), array([0. , 1.5, 4. ]), array([14., 15.]))
+
+    >>> import numpy as np
+    >>> t = np.r_[0:10:0.1, 30:40:0.1]
+    >>> y = np.sin(t) + 0.1 * np.random.default_rng(0).standard_normal(200)
+    >>> pieces = ss.fit_segments(t, y[:, None], "r:1", max_gap=1, smooth=True)
+    >>> [round(piece.sigma, 1) for piece in pieces]
+    [0.1, 0.1]
     """
     space = space_named(space)
-    curves, steps, gap = cut(t, points, space, max_gap, min_points, duplicates)
+    if smooth not in (True, False):
+        raise ValidationError(
+            f"smooth must be True or False, not {shown(smooth)}; lam, criterion and the like are keywords of their own"
+        )
+    weights = _taken_weights(options, points, space, duplicates) if smooth else None
+    curves, rows, steps, gap = cut(
+        t, points, space, max_gap, min_points, duplicates, None if weights is None else weights > 0
+    )
     if not curves:
         raise ValidationError(
             f"no piece has {min_points} points: {np.sum(steps > gap)} of {len(steps)} steps are longer than "
             f"max_gap={max_gap}, the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
-    return fit_many(curves, space, **options)
+    if weights is None:
+        return fit_many(curves, space, **options)
+    own = [(*curve, weights[kept]) for curve, kept in zip(curves, rows, strict=True)]
+    return smooth_many(own, space, **options)
+
+
+def _taken_weights(
+    options: dict[str, Any], points: Any, space: Space, duplicates: str
+) -> NDArray[np.float64]:
+    """The weights of noisy points, taken from the options."""
+    if duplicates == "mean":
+        raise ValidationError("with smooth all points of one time count; leave duplicates='mean' out")
+    if np.ndim(options.get("knots", 0)) > 0:
+        raise ValidationError(
+            "knots: give a number of knots for each piece, or none; pieces have their own times"
+        )
+    return checked_weights(options.pop("weights", None), (), read(points, space)[0].nodes)
+
+
+class Cut(NamedTuple):
+    """A recording in pieces.
+
+    Attributes:
+        curves: times and points of each; none where all are too short.
+        rows: which points these are.
+        steps: all between neighbouring times, as the core counts them.
+        gap: the longest of a piece.
+    """
+
+    curves: list[tuple[Any, Any]]
+    rows: list[NDArray[np.intp]]
+    steps: NDArray[np.float64]
+    gap: float
 
 
 def cut(
-    t: ArrayLike, points: Any, space: Space | str, max_gap: Any, min_points: int, duplicates: str
-) -> tuple[list[tuple[Any, Any]], NDArray[np.float64], float]:
-    """Times and points of the pieces, as `fit_segments` says, none where all are too short; all steps, and the longest
-    of a piece, as the core counts times."""
+    t: ArrayLike,
+    points: Any,
+    space: Space | str,
+    max_gap: Any,
+    min_points: int,
+    duplicates: str,
+    used: NDArray[np.bool_] | None = None,
+) -> Cut:
+    """The pieces as `fit_segments` says; of noisy points those that are used, whose times may repeat."""
     space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
     if not isinstance(duplicates, str) or duplicates not in _DUPLICATES:
@@ -88,20 +161,30 @@ def cut(
     if times.shape != (data[0].nodes,):
         raise ValidationError(f"t has shape {times.shape}, but there are {data[0].nodes} points")
     seconds = clock.knots(times)
-    _check_order(times, seconds, duplicates)
+    all_count = used is not None and duplicates == "raise"
+    _check_order(times, seconds, "first" if all_count else duplicates)
     arrays = [
         factor._array(part, "points")
         for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True)
     ]
     # As they were given, so that curves know of a zone, and of durations.
     moments = as_array(given, "t")
-    starts = np.flatnonzero(np.diff(seconds, prepend=-np.inf) > 0)
-    if len(starts) < len(seconds):
+    rows = np.arange(len(seconds))
+    if used is not None:
+        rows = rows[used]
+        arrays, moments, seconds = [a[used] for a in arrays], moments[used], seconds[used]
+    new = np.diff(seconds, prepend=-np.inf) > 0
+    if not all_count and not new.all():
+        starts = np.flatnonzero(new)
         arrays = [_at_once(f, a, starts, duplicates) for f, a in zip(factors_of(space), arrays, strict=True)]
-        moments, seconds = moments[starts], seconds[starts]
+        rows, moments, seconds, new = rows[new], moments[new], seconds[new], new[new]
     gap = _seconds(max_gap, clock.dates)
     cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
-    pieces = [slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True) if b - a >= least]
+    pieces = [
+        slice(a, b)
+        for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True)
+        if np.count_nonzero(new[a:b]) >= least
+    ]
     curves = [
         (
             Moments(moments[own], zone),
@@ -109,7 +192,7 @@ def cut(
         )
         for own in pieces
     ]
-    return curves, np.diff(seconds), gap
+    return Cut(curves, [rows[own] for own in pieces], np.diff(seconds), gap)
 
 
 def _seconds(max_gap: Any, dates: bool) -> float:

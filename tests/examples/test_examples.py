@@ -15,6 +15,11 @@ SAYS = {
     "tensor_volume": r"280 voxels, mean diffusivity 8.\d\de-04 mm²/s, all positive: True",
     "pod_over_a_parameter": r"4 numbers in place of 80: off by 0.\d%",
     "storms_from_a_table": "37 storms, 946 fixes, 5900 hours; fastest: Martin 2022",
+    "noisy_gps": r"2\d degrees of freedom; half way known to 4\.\d m",
+    "noisy_attitude": r"noise 1\.0\d degrees found; the curve is off by 0\.[45]\d degrees",
+    "noisy_tensors": r"noise 0\.1[3-6] in every coordinate; the curve is off by 0\.1\d",
+    "polar_wander": r"[5-8] degrees of freedom; 100 million years ago A95 is 2\.\d degrees",
+    "noisy_camera": r"λ = 0\.03\d*, noise 0\.04\d m; λ = 0\.2\d*, noise 0\.05\d rad",
     "morph": "100 frames of 12 landmarks",
 }
 

@@ -142,3 +142,84 @@ def test_a_long_recording_becomes_an_imu_signal(tmp_path):
         a = np.stack([-0.32 * np.cos(0.4 * x), -0.64 * np.sin(0.8 * x), 0 * x + 9.81], axis=-1)
         assert np.abs(force - at[1].inv().apply(a)).max() < 2e-5
     assert [len(piece.t) for piece in pieces] == [10_000, 10_000]
+
+
+def noisy(space, seed=0):
+    """A recording of 60 points with a pause, each off by about 0.05."""
+    t = np.r_[np.linspace(0, 3, 30), np.linspace(13, 16, 30)]
+    rng = np.random.default_rng(seed)
+    p = points_on(space, 8, step=0.2)
+    smooth = ss.CubicSpline(np.linspace(0, 16, 8), p, space)(t)
+    both = [
+        factor.exp(part, 0.05 * factor.random_tangent(rng, part))
+        for factor, part in zip(factors(space), parts(smooth), strict=True)
+    ]
+    return t, tuple(both) if isinstance(smooth, tuple) else both[0]
+
+
+@pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "spd:3", "so:3 x r:3"])
+def test_noisy_pieces_are_smoothed_alone(name):
+    space = ss.space(name)
+    t, p = noisy(space)
+    pieces = ss.fit_segments(t, p, space, max_gap=2, smooth=True, criterion="reml")
+    assert len(pieces) == 2
+    for piece, own in zip(pieces, (slice(0, 30), slice(30, 60)), strict=True):
+        alone = ss.make_smoothing_spline(t[own], each(lambda a, own=own: a[own], p), space, criterion="reml")
+        assert piece == alone and piece.report == alone.report
+        for found, expected in ((piece.residuals, alone.residuals), (piece.band(t[own]), alone.band(t[own]))):
+            assert all(map(np.array_equal, parts(found), parts(expected)))
+        assert all(0.02 < sigma < 0.08 for sigma in np.atleast_1d(piece.sigma))
+
+
+def test_weights_go_with_their_points_and_none_makes_a_pause():
+    space = ss.space("sphere:2")
+    t, p = noisy(space)
+    weights = np.random.default_rng(1).uniform(1, 2, 60)
+    weights[[3, *range(10, 20)]] = 0
+    p[weights == 0] = np.nan
+    pieces = ss.fit_segments(t, p, space, max_gap=0.5, smooth=True, weights=weights, lam=0.1)
+    assert [len(piece.data[0]) for piece in pieces] == [9, 10, 30]
+    for piece in pieces:
+        own = np.isin(t, piece.data[0])
+        assert piece == ss.make_smoothing_spline(t[own], p[own], space, 0.1, weights=weights[own])
+
+
+def test_noisy_points_of_one_time_all_count():
+    t, y = np.array([0.0, 1, 1, 2, 3, 9, 9]), np.array([[0.0], [1], [2], [3], [4], [5], [6]])
+    (piece,) = ss.fit_segments(t, y, "r:1", max_gap=2, smooth=True, lam=1.0)
+    assert piece == ss.make_smoothing_spline(t[:5], y[:5], "r:1", 1.0) and len(piece.t) == 4
+    (first,) = ss.fit_segments(
+        t, y, "r:1", max_gap=2, smooth=True, lam=1.0, duplicates="first", weights=np.arange(1, 8)
+    )
+    kept = [0, 1, 3, 4]
+    assert first == ss.make_smoothing_spline(t[kept], y[kept], "r:1", 1.0, weights=[1, 2, 4, 5])
+
+
+def test_of_noisy_pieces_that_fail_all_are_kept():
+    t, p = noisy(ss.space("sphere:2"))
+    with pytest.raises(ss.ConvergenceError, match=r"curve 0: .* raise max_iter.*and 1 more") as caught:
+        ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1)
+    assert [len(piece.t) for piece in caught.value.spline] == [30, 30]
+    with pytest.warns(ss.ConvergenceWarning, match="curve 0: "):
+        ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="warn")
+    assert (
+        len(ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="ignore")) == 2
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"smooth": "gcv"}, "smooth must be True or False, not 'gcv'; lam, criterion"),
+        ({"duplicates": "mean"}, "all points of one time count"),
+        ({"knots": [0.0, 1.0]}, "give a number of knots"),
+        ({"weights": [1.0]}, r"weights has shape \(1,\), but 60 points need \(60,\)"),
+        ({"weights": np.zeros(60)}, "no piece has 2 points"),
+        ({"criterion": "aic"}, "curve 0: "),
+        ({"bc_type": "not-a-knot"}, "bc_type"),
+    ],
+)
+def test_what_noisy_pieces_do_not_take(options, says):
+    t, p = noisy(ss.space("sphere:2"))
+    with pytest.raises((ss.ValidationError, TypeError), match=says):
+        ss.fit_segments(t, p, "sphere:2", **{"max_gap": 2, "smooth": True, **options})

@@ -151,10 +151,21 @@ def test_weights_of_zero_leave_out(name):
 @every
 def test_two_data_at_one_time_are_one_of_twice_the_weight(name):
     space, t, noisy, _ = example(name, 0.05, n=20)
-    twice = ss.make_smoothing_spline(np.repeat(t, 2), np.repeat(noisy, 2, axis=0), space, 0.1, **TIGHT)
+    # Not quite copies, which are counted as one.
+    near = np.repeat(noisy, 2, axis=0)
+    near[1::2] = beside(space, noisy, 1e-12)
+    twice = ss.make_smoothing_spline(np.repeat(t, 2), near, space, 0.1, **TIGHT)
     heavy = ss.make_smoothing_spline(t, noisy, space, 0.1, weights=np.full(20, 2.0), **TIGHT)
     assert np.array_equal(twice.t, t)
     assert space.distance(twice.points, heavy.points).max() < 1e-9
+
+
+def test_copies_of_a_row_are_one_of_their_weight():
+    space, t, noisy, _ = example("sphere:2", 0.05)
+    i = np.sort(np.r_[np.arange(60), 7, 7, 30])
+    copied = ss.make_smoothing_spline(t[i], noisy[i], space)
+    heavy = ss.make_smoothing_spline(t, noisy, space, weights=np.bincount(i))
+    assert np.array_equal(copied.points, heavy.points) and copied.lam == heavy.lam
 
 
 @every
@@ -185,3 +196,57 @@ def test_a_large_space_is_smoothed_in_the_span_of_its_data():
     spline = ss.make_smoothing_spline(t, basis @ noisy, "gr:2,300", 0.1)
     inside = ss.make_smoothing_spline(t, noisy, small, 0.1)
     assert spline.space.distance(spline(t), basis @ inside(t)).max() < 1e-6
+
+
+def test_times_that_nearly_coincide_are_one_knot():
+    """Rounding beside λ/h³ would make the data vanish."""
+    rng = np.random.default_rng(0)
+    t = np.linspace(0, 10, 50)
+    near = np.sort(np.r_[t, t[1:-1] + 1e-9])
+    y = np.sin(near)[:, None] + 0.05 * rng.standard_normal((98, 1))
+    spline = ss.make_smoothing_spline(near, y, "r:1")
+    assert len(spline.t) == 50 and spline.sigma == pytest.approx(0.05, rel=0.3)
+    # A given λ is kept on times over many decades.
+    t = np.r_[0, np.logspace(-8, 1, 99)]
+    y = np.sin(t) + 0.05 * rng.standard_normal(100)
+    spline = ss.make_smoothing_spline(t, y[:, None], "r:1", 0.05)
+    assert spline.lam == pytest.approx(0.05) and not spline.report.at_bound
+    assert 5 < spline.df < 12 and np.abs(spline(t)[:, 0] - np.sin(t)).max() < 0.1
+
+
+def test_crowds_of_times_do_not_starve_the_others():
+    rng = np.random.default_rng(1)
+    t = np.sort(np.r_[np.linspace(0, 10, 450), np.linspace(4, 4.01, 4050)])
+    y = np.sin(50 * t)[:, None] + 0.3 * rng.standard_normal((4500, 1))
+    few, whole = (ss.make_smoothing_spline(t, y, "r:1", knots=knots) for knots in (None, t))
+    assert len(few.t) < 2500 and few.df == pytest.approx(whole.df, rel=0.01)
+    assert np.abs(few(t) - whole(t)).max() < 0.05
+
+
+def test_the_search_ends_where_nothing_is_left_to_compare():
+    rng = np.random.default_rng(2)
+    few = np.zeros(60)
+    few[[0, 30, 59]] = 1
+    y = rng.standard_normal((60, 1))
+    assert ss.make_smoothing_spline(np.linspace(0, 10, 60), y, "r:1", weights=few).report.converged
+    many = ss.make_smoothing_spline(np.linspace(0, 1, 60), y, "r:1", knots=np.linspace(0, 1, 400))
+    assert many.report.converged
+    # λ = 0 from a start that is far from the data.
+    through = ss.make_smoothing_spline(np.linspace(0, 1, 60), y, "r:1", 0.0)
+    assert np.abs(through.points - y).max() < 1e-12 and np.isnan(through.sigma)
+    for loss in ("linear", "huber", "cauchy"):
+        still = ss.make_smoothing_spline(
+            np.arange(30.0), np.tile([0.0, 0, 1], (30, 1)), "sphere:2", loss=loss
+        )
+        assert np.abs(still.points - [0, 0, 1]).max() < 1e-12
+
+
+def test_few_knots_take_the_same_curve_either_way():
+    """Residuals between knots are carried to the nearest one."""
+    space, t, noisy, points = example("sphere:2", 0.1, n=40, step=1.2)
+    ways = [
+        ss.make_smoothing_spline(t, noisy, space, 0.05, knots=9, method=method, **TIGHT)
+        for method in ("flat", "newton")
+    ]
+    # On long segments the linear acceleration of the flat way is further from that of the curve.
+    assert rms(space, ways[0](t), ways[1](t)) < 0.06 * rms(space, ways[1](t), points)

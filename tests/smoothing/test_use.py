@@ -124,3 +124,20 @@ def test_band_and_deviation_check_their_arguments():
         spline.band(2.0, 95)
     with pytest.raises(TypeError, match="make_smoothing_spline"):
         ss.SmoothingSpline()
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}]
+)
+def test_between_two_knots_there_is_the_nearest_geodesic(options):
+    two = ss.make_smoothing_spline([3.0, 5e6], NOISY[:2], S2, **options)
+    assert np.abs(two.points - NOISY[:2]).max() < 1e-12 and two.df == pytest.approx(2)
+    own = np.array([[0.0, 1.0], [0.0, 9.0]])
+    assert ss.make_smoothing_spline(own, np.stack([NOISY[:2]] * 2), S2, **options).points.shape == (2, 2, 3)
+    y = np.array([[0.0], [0.1], [0.04], [1.0], [1.2], [1.1]])
+    several = ss.make_smoothing_spline([0, 0, 0, 1, 1, 1], y, "r:1", **options)
+    assert several.df == pytest.approx(2) and np.abs(several.points - [[0.05], [1.1]]).max() < 0.01
+    if "loss" not in options:
+        line = np.polyfit(T, NOISY, 1)
+        straight = ss.make_smoothing_spline(T, NOISY, "r:3", knots=2, **options)
+        assert np.abs(straight(T) - T[:, None] * line[0] - line[1]).max() < 1e-12

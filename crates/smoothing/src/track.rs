@@ -253,7 +253,7 @@ impl<'a> Track<'a> {
             Tier::Flat => false,
             Tier::Newton => true,
             // In flat space the flat way is the exact one; and the blocks of the other have a limit.
-            Tier::Auto if !(space.curvature() > 0.0) || m > LARGE => false,
+            Tier::Auto if space.curvature() == 0.0 || m > LARGE => false,
             Tier::Auto => {
                 let limit = if progress.settled { SLOW } else { HOPELESS };
                 let known = progress.settled && progress.report.exact;

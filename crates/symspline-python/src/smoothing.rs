@@ -76,16 +76,30 @@ pub fn smooth<'py>(
     let (t, p, w, k) = (in_order(&t)?, in_order(&points)?, in_order(&weights)?, in_order(&knots)?);
     let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
     drop(room::<f64>(curves * count * (8 * len + 64))?);
-    // Data without weight are left out.
+    // Data without weight are left out, and copies of a row, as loggers write them, are one of their weight: they would
+    // say that there is no noise.
     let rows: Vec<[Vec<f64>; 3]> = (0..curves)
         .map(|c| {
-            let weights = &w[own(w, n, c)..][..n];
-            let used = || (0..n).filter(|&i| weights[i] > 0.0);
-            [
-                used().map(|i| t[own(t, n, c) + i]).collect(),
-                used().flat_map(|i| p[(c * n + i) * len..][..len].iter().copied()).collect(),
-                used().map(|i| weights[i]).collect(),
-            ]
+            let (times, weights) = (&t[own(t, n, c)..][..n], &w[own(w, n, c)..][..n]);
+            let point = |i: usize| &p[(c * n + i) * len..][..len];
+            let mut rows = [Vec::new(), Vec::new(), Vec::new()];
+            let mut before = None;
+            for i in (0..n).filter(|&i| weights[i] > 0.0) {
+                match before {
+                    Some(k) if times[k] == times[i] && point(k) == point(i) => {
+                        if let Some(weight) = rows[2].last_mut() {
+                            *weight += weights[i];
+                        }
+                    }
+                    _ => {
+                        rows[0].push(times[i]);
+                        rows[1].extend_from_slice(point(i));
+                        rows[2].push(weights[i]);
+                    }
+                }
+                before = Some(i);
+            }
+            rows
         })
         .collect();
     let data: Vec<Data> = (0..curves)

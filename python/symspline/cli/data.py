@@ -41,7 +41,8 @@ class Data:
         joined, alone: how many rows had the time of another one, and how many points stood alone between gaps.
     """
 
-    def __init__(self, path: Path, rows: Rows, repair: Repair = _NOTHING) -> None:
+    def __init__(self, path: Path, rows: Rows, repair: Repair = _NOTHING, repeats: bool = False) -> None:
+        """With ``repeats`` several points of a curve may have one time."""
         self._path = path
         self._rows = rows
         self._repair = repair
@@ -50,7 +51,7 @@ class Data:
         firsts = {name: own[starts] for name, (own, starts) in self._runs.items()}
         self.joined = sum(len(own) - len(starts) for own, starts in self._runs.values())
         for name, own in firsts.items():
-            self._check_curve(name, own)
+            self._check_curve(name, own, repeats)
         self.groups, self.alone = repair.cut(firsts, rows.times, rows.labels is not None)
         self.named = rows.labels is not None or repair.max_gap is not None
         if not self.groups:
@@ -137,8 +138,8 @@ class Data:
                 all_points[own[starts]] = mean
         return points
 
-    def _check_curve(self, name: str, own: NDArray[np.int64]) -> None:
-        """Raise `Problem` unless there are two points, and their times increase."""
+    def _check_curve(self, name: str, own: NDArray[np.int64], repeats: bool) -> None:
+        """Raise `Problem` unless there are two points, and their times increase, or do not fall."""
         of = f" of curve {name!r}" if self._rows.labels is not None else ""
         if len(own) < 2:
             where = f", {self._rows.place(own[0])}" if len(own) else ""
@@ -146,14 +147,14 @@ class Data:
         if not self._rows.times.size:
             return
         times = self._rows.times[own]
-        bad = np.flatnonzero(~(times[1:] > times[:-1]))
+        bad = np.flatnonzero(~((times[1:] > times[:-1]) | (repeats & (times[1:] == times[:-1]))))
         if bad.size:
             before, here = (self._rows.place(own[i]) for i in (bad[0], bad[0] + 1))
             same = times[bad[0] + 1] == times[bad[0]]
             advice = "--dedup first or mean makes one point of them" if same else "--sort puts rows in order"
             raise Problem(
                 f"{self._path}, {here}: time {times[bad[0] + 1]}{of} does not come after {times[bad[0]]} in {before}; "
-                f"times must increase; {advice}"
+                f"times must {'not fall' if repeats else 'increase'}; {advice}"
             )
 
 

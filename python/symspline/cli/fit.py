@@ -7,14 +7,17 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from ..functions import fit_many
 from ..signs import IN_PYTHON
+from ..smoothing import SmoothingSpline
+from ..smoothing.many import smooth_many
 from ..spaces import Space
 from ..spaces import space as space_named
 from ..spline import CubicSpline
+from . import smoothing
 from .curves import ENDING, Columns, Curves, write_curves
 from .data import Data
 from .entries import completed
@@ -29,7 +32,7 @@ from .roles import named_columns, point_entries, split_names
 from .tables import ending
 from .time_columns import check_days, time_column
 
-SUMMARY = "fit C2 splines to the points in a table"
+SUMMARY = "fit C2 splines to the points in a table, through them or, with --smooth, near them"
 DESCRIPTION = """\
 Fit C2 splines to the points in a table: CSV, NPZ or Parquet, by the ending of its name.
 
@@ -44,6 +47,9 @@ rounding in a file makes them, are moved onto it. A rotation of so:3 may also be
 names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a place, such as tx, ty, tz, and a
 quaternion. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw.
 
+Curves go through the points. --smooth is for noisy ones: the curve passes near them, as smooth as the data say, and
+symspline sample writes its standard deviation, too.
+
 In an NPZ file columns are arrays with one entry a row, which may be complex, or vectors or matrices; an array
 `points` may hold all numbers of the points."""
 EPILOG = """\
@@ -52,10 +58,12 @@ examples:
   symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
   symspline fit attitude.parquet --space sphere:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
+  symspline fit gps.csv --lonlat --smooth -o gps.npz
 
 symspline.load reads the curve in Python; with --curve, symspline.load_many reads all of them."""
 
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
+_TOL = 1e-12
 _EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
 
 
@@ -111,7 +119,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--tol",
         type=real,
-        default=1e-12,
         help="relative C2 defect that counts as converged (default: 1e-12)",
     )
     add(
@@ -120,6 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the curve outside its times: the last segment continued, a geodesic at constant speed, "
         "or the same again (default: there is none)",
     )
+    smoothing.add_arguments(parser)
     add("-o", dest="output", type=Path, metavar="OUT", required=True, help="file of curves to write: .npz")
 
 
@@ -127,6 +135,7 @@ def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
     ending(options.output, ENDING, "a file of curves")
     check_target(options.output)
+    smooth = smoothing.asked(options)
     space = _space(options.space, options.lonlat)
     table = open_table(options.input)
     curve = table.require(options.curve) if options.curve is not None else None
@@ -140,12 +149,18 @@ def run(options: argparse.Namespace) -> int:
     check_days(table, time, rows)
     if not options.lonlat and quaternion is None:
         rows = replace(rows, numbers=completed(rows.numbers, entries, space))
-    data = Data(table.path, rows, Repair(options.sort, options.dedup, options.max_gap))
+    data = Data(table.path, rows, Repair(options.sort, options.dedup, options.max_gap), smooth is not None)
     columns = named_columns(entries, time, curve, options.lonlat)
     columns = replace(columns, utc=rows.utc, quaternion=quaternion)
-    splines = _fit(data, space, columns, options)
+    splines = _fit(data, space, columns, options, smooth)
     write_curves(options.output, Curves(splines, data.named, columns))
-    print(f"{options.output}: {_summary(list(splines.values()))}{_repaired(data)}")
+    fitted = list(splines.values())
+    said = (
+        _summary(fitted)
+        if smooth is None
+        else smoothing.summary(cast(list[SmoothingSpline], fitted), options.lonlat)
+    )
+    print(f"{options.output}: {said}{_repaired(data)}")
     return 0
 
 
@@ -158,20 +173,33 @@ def _space(name: str | None, lonlat: bool) -> Space:
     return space
 
 
-def _fit(data: Data, space: Space, columns: Columns, options: argparse.Namespace) -> dict[str, CubicSpline]:
+def _fit(
+    data: Data, space: Space, columns: Columns, options: argparse.Namespace, smooth: smoothing.Asked | None
+) -> dict[str, CubicSpline]:
     """All curves in one call."""
     bc_type = _bc_type(options.bc_type)
+    extrapolate = _EXTRAPOLATE.get(options.extrapolate)
+    fitted: Sequence[CubicSpline]
     try:
         with warnings.catch_warnings(record=True) as noted, Progress("fitting") as progress:
-            fitted = fit_many(
-                data.curves(space, columns),
-                space,
-                bc_type=bc_type,
-                method=options.method,
-                tol=options.tol,
-                extrapolate=_EXTRAPOLATE.get(options.extrapolate),
-                progress=progress,
-            )
+            if smooth is None:
+                fitted = fit_many(
+                    data.curves(space, columns),
+                    space,
+                    bc_type=bc_type,
+                    method=options.method,
+                    tol=_TOL if options.tol is None else options.tol,
+                    extrapolate=extrapolate,
+                    progress=progress,
+                )
+            else:
+                fitted = smooth_many(
+                    [(*curve, None) for curve in data.curves(space, columns)],
+                    space,
+                    extrapolate=extrapolate,
+                    progress=progress,
+                    **smooth.keywords,
+                )
     except (ValidationError, CutLocusError, ConvergenceError) as error:
         raise type(error)(data.located(str(error))) from None
     for note in noted:

@@ -61,8 +61,8 @@ class Repair:
         alone = 0
         for name, own in groups.items():
             parts = np.split(own, 1 + np.flatnonzero(gap_of(self.max_gap, times[own])))
-            good = [part for part in parts if len(part) > 1]
-            alone += len(parts) - len(good)
+            good = [part for part in parts if times[part[0]] < times[part[-1]]]
+            alone += len(own) - sum(map(len, good))
             for number, part in enumerate(good, 1):
                 new = name if labelled and len(good) == 1 else f"{name}/{number}" if labelled else str(number)
                 if new in pieces or (new != name and new in groups):

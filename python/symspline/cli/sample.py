@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curves.ends import is_closed
+from ..smoothing import SmoothingSpline
 from ..spline import CubicSpline
 from .curves import Columns, Curves, read_curves
 from .data import Groups, group
@@ -21,6 +22,7 @@ from .numbers import whole
 from .points import motion_degrees, motion_labels, to_degrees
 from .progress import Progress
 from .quaternions import Signs, columns_of
+from .smoothing import spread_names, spreads
 from .tables import ENDINGS, Rows, Table, ending
 from .time_columns import time_column
 from .times import Times, every, spread
@@ -35,7 +37,9 @@ fitted, or x0, x1, ... in the order of its array, and m11, m12, ... for a matrix
 number x0_re and x0_im. With --nu 1 there is the velocity, x0_d1, ... or x0_d1_re, ..., and with --nu 2 the
 covariant acceleration, x0_d2, ..., per unit of time, which is a second for dates. For longitude and latitude
 these are east_d1, north_d1, ..., in degrees of arc; for unit quaternions, whose sign
-does not jump along a curve, the derivatives on their sphere. A line or a subspace has many arrays: which one stands for
+does not jump along a curve, the derivatives on their sphere. Of curves fitted with --smooth there is the standard
+deviation of a coordinate of the point, std, in a product std1, std2, ... of its factors, and of the velocity, std_d1;
+for longitude and latitude in degrees. A line or a subspace has many arrays: which one stands for
 it may change from one segment of a curve to the next, and vectors go with the one in their row."""
 EPILOG = """\
 examples:
@@ -84,16 +88,18 @@ def run(options: argparse.Namespace) -> int:
     check_target(options.output)
     orders = _orders(options.nu)
     curves = read_curves(options.curves, options.lonlat)
-    if options.output.suffix.lower() in TUM:
+    is_tum = options.output.suffix.lower() in TUM
+    if is_tum:
         curves = as_tum(curves, orders)
     if options.at is not None:
         times, rows = _given(options.at, curves)
     else:
         times = {name: _along(spline.t, options) for name, spline in curves.splines.items()}
         rows = None
-    names = _names(curves, orders)
+    # A trajectory of TUM has no place for deviations.
+    names = _names(curves, orders, not is_tum)
     with Progress("sampling") as progress:
-        values = _values(curves, times, orders, progress)
+        values = _values(curves, times, orders, not is_tum, progress)
     columns: list[NDArray[Any]] = [np.concatenate(list(times.values())), *values.T]
     if curves.named:
         columns.insert(1, np.repeat(list(times), [len(x) for x in times.values()]))
@@ -172,7 +178,7 @@ def _orders(text: str) -> list[int]:
     return list(map(int, orders))
 
 
-def _names(curves: Curves, orders: list[int]) -> list[str]:
+def _names(curves: Curves, orders: list[int], with_spreads: bool) -> list[str]:
     columns, space = curves.columns, next(iter(curves.splines.values())).space
     names = [columns.time, *([columns.curve] if curves.named else [])]
     for nu in orders:
@@ -182,27 +188,36 @@ def _names(curves: Curves, orders: list[int]) -> list[str]:
             names += motion_labels(nu) if nu else columns.points
         else:
             names += column_names(space, columns.points, nu)
+        if with_spreads and _all_smooth(curves):
+            names += spread_names(space, nu)
     twice = first_twice(names)
     if twice is not None:
         raise Problem(f"two columns would have the name {twice!r}; fit with other names")
     return names
 
 
+def _all_smooth(curves: Curves) -> bool:
+    """Whether deviations are known of all curves."""
+    return all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
+
+
 def _values(
-    curves: Curves, times: Mapping[str, Times], orders: list[int], progress: Progress
+    curves: Curves, times: Mapping[str, Times], orders: list[int], with_spreads: bool, progress: Progress
 ) -> NDArray[np.float64]:
     """The numbers of all samples, one curve after the other."""
     total = sum(map(len, times.values()))
+    with_spreads = with_spreads and _all_smooth(curves)
     blocks: list[NDArray[np.float64]] = []
     done = 0
     for name, all_times in times.items():
         signs = [Signs() for _ in orders]
         for start in range(0, len(all_times), _CHUNK):
             x = all_times[start : start + _CHUNK]
-            parts = [
-                _quantity(curves.splines[name], x, nu, curves.columns, sign)
-                for nu, sign in zip(orders, signs, strict=True)
-            ]
+            spline, parts = curves.splines[name], []
+            for nu, sign in zip(orders, signs, strict=True):
+                parts.append(_quantity(spline, x, nu, curves.columns, sign))
+                if with_spreads and isinstance(spline, SmoothingSpline):
+                    parts.append(spreads(spline, x, nu, curves.columns.lonlat))
             blocks.append(np.concatenate(parts, axis=1))
             done += len(x)
             progress(done, total)

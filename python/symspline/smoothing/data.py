@@ -61,7 +61,7 @@ def read_noisy(
     data = within(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
     clock, shown_times, times = _times_of(t, batch, count)
-    checked = _weights_of(weights, batch, count)
+    checked = checked_weights(weights, batch, count)
     if weights is not None:
         data = [_without_missing(part, checked) for part in data]
     # Points only: times may repeat, and knots need not be where data are.
@@ -101,7 +101,8 @@ def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[
     return clock, shown_times, times
 
 
-def _weights_of(weights: ArrayLike | None, batch: tuple[int, ...], count: int) -> Doubles:
+def checked_weights(weights: ArrayLike | None, batch: tuple[int, ...], count: int) -> Doubles:
+    """Weights, one of every point."""
     if weights is None:
         return np.ones(count)
     array = as_array(weights, "weights")
@@ -152,7 +153,7 @@ def knots_for(noisy: Noisy, knots: Any) -> Knots:
     """Knots: None for all different times, a number of them, or the knots themselves."""
     t, times = noisy.t, noisy.times
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
-        return _some(_different(t, times), int(knots))
+        return some(_different(t, times), int(knots))
     if knots is None:
         return _different(t, times)
     if isinstance(knots, (str, bool)):
@@ -190,13 +191,44 @@ def _different(t: Array, times: Doubles) -> Knots:
     return Knots(t, times)
 
 
-def _some(all_knots: Knots, count: int) -> Knots:
-    """So many of the knots, evenly counted."""
-    there = all_knots.times.shape[-1]
+def some(knots: Knots, count: int) -> Knots:
+    """So many of the knots, even in what is half their number and half time: neither crowds nor thin places get few."""
+    there = knots.times.shape[-1]
     if count < 2:
         raise ValidationError(f"knots must be at least 2, not {count}")
-    index = np.unique(np.round(np.linspace(0, there - 1, min(count, there))).astype(int))
-    return Knots(all_knots.t[..., index], np.ascontiguousarray(all_knots.times[..., index]))
+    if count >= there:
+        return knots
+    place = np.linspace(0, 1, there)
+    if knots.times.ndim == 1:
+        place = 0.5 * (place + (knots.times - knots.times[0]) / np.ptp(knots.times))
+    index = np.searchsorted(place, np.linspace(0, 1, count) * (1 - 1e-12))
+    return _picked(knots, np.unique(np.append(index[:-1], there - 1)))
+
+
+def sparse(knots: Knots, noisy: Noisy, lam: float | None) -> Knots:
+    """The knots without those that lie too near to each other: beside λ/h³ rounding makes the weights of data vanish.
+    None for a λ like a weight on knots at equal distances."""
+    most = 1e11
+    times = knots.times
+    if times.ndim > 1 or len(times) <= 16:
+        return knots
+    span = float(times[-1] - times[0])
+    mean = span / (len(times) - 1)
+    weight = float(np.max(np.sum(noisy.weights, axis=-1))) / noisy.weights.shape[-1]
+    # In units of the mean distance nothing overflows.
+    ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
+    least = min(mean * (ratio / most) ** (1 / 3), span / 15)
+    if np.diff(times).min() >= least:
+        return knots
+    kept = [0]
+    for i in range(1, len(times) - 1):
+        if times[i] - times[kept[-1]] >= least and times[-1] - times[i] >= least:
+            kept.append(i)
+    return _picked(knots, np.array([*kept, len(times) - 1]))
+
+
+def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
+    return Knots(knots.t[..., index], np.ascontiguousarray(knots.times[..., index]))
 
 
 def points_of(noisy: Noisy, space: Space) -> list[tuple[Space, Array]]:

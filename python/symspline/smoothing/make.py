@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,15 +18,15 @@ from ..failures import fail
 from ..options import check_on_failure, check_progress, checked_policy
 from ..spaces import Product, Space, factors_of
 from ..spaces import space as space_named
-from .data import Knots, Noisy, knots_for, points_of, read_noisy
-from .solve import Asked, enough, one_a_curve, smoothed, stiffness
+from .data import Knots, Noisy, knots_for, points_of, read_noisy, some, sparse
+from .solve import Asked, enough, one_a_curve, smoothed
 from .spline import SmoothingSpline
 
 _FIT = Options("auto", 1e-12, None)
 # Knots from which fewer are tried first, and how many.
 _MANY, _FIRST = 4000, 2000
-# λ from which fewer knots are taken, see `stiffness`: rounding would spoil its choice.
-_STIFF = 1e11
+# How often λ may ask for other knots.
+_TRIES = 4
 
 
 def make_smoothing_spline(
@@ -53,8 +54,8 @@ def make_smoothing_spline(
     In flat space it is SciPy's ``make_smoothing_spline``. λ is chosen from the data unless it is given.
 
     Args:
-        t: times of the data, not decreasing; several data may have one time. None for 0, 1, …, shape (N,) or
-            (..., N).
+        t: times of the data, not decreasing; several data may have one time, and copies of a datum in a row are one
+            of their weight. None for 0, 1, …, shape (N,) or (..., N).
         points: noisy points y, shape (..., N, *space.point_shape); leading axes are independent curves, each with a
             λ of its own. For a `Product` a tuple of arrays.
         space: a space or its name. In `SpecialEuclidean`, which has no invariant metric, the curve solves the same
@@ -109,33 +110,24 @@ def make_smoothing_spline(
         raise ValidationError(f"tol must be a number > 0, not {shown(tol)}")
     asked = Asked(criterion, loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
     noisy, ends = read_noisy(t, points, space, weights, bc_type, atol)
+    if noisy.times.shape[-1] == 2:
+        # Of two points none is an outlier, and nothing says how large the noise is.
+        asked = asked._replace(loss="linear")
     lams = _in_factors(space, lam, "lam", noisy.batch)
     sigmas = _in_factors(space, sigma, "sigma", noisy.batch)
 
     def run(at: Knots) -> list[Any]:
-        each = zip(points_of(noisy, space), lams, sigmas, ends, strict=True)
+        each = zip(points_of(noisy, space), _chosen(lams, at), sigmas, ends, strict=True)
         return [
             smoothed(factor, noisy, own, at, one_lam, one_sigma, end, asked, progress)
             for (factor, own), one_lam, one_sigma, end in each
         ]
 
-    at, whole = knots_for(noisy, knots), None
-    if knots is None and at.times.shape[-1] > _MANY:
-        at, whole = knots_for(noisy, _FIRST), at
-    found = run(at)
-    while whole is not None:
-        count = max(enough(part.report.df) for _, part, _ in found)
-        if count <= at.times.shape[-1]:
-            break
-        # A rough curve is rougher still with more knots.
-        at = knots_for(noisy, 2 * count) if 2 * count < whole.times.shape[-1] else whole
-        whole = None if at.times.shape == whole.times.shape else whole
-        found = run(at)
-    if knots is None and all(stiffness(at, noisy, part.report.lam) > _STIFF for _, part, _ in found):
-        count = max(enough(part.report.df) for _, part, _ in found)
-        if count < at.times.shape[-1]:
-            at = knots_for(noisy, count)
-            found = run(at)
+    whole = knots_for(noisy, knots)
+    if knots is None:
+        found, at = _with_enough(whole, noisy, lams, run)
+    else:
+        found, at = run(whole), whole
     parts = [
         Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, noisy.batch, at.times.shape[-1])
         for factor, (own, _, _) in zip(factors_of(space), found, strict=True)
@@ -189,6 +181,14 @@ def make_lsq_spline(
     return make_smoothing_spline(t, points, space, 0.0, weights=weights, knots=knots, loss=loss, **options)
 
 
+def _chosen(lams: list[Any], at: Knots) -> list[Any]:
+    """Between two knots there is nothing to choose: the curve is the nearest geodesic, whatever λ is."""
+    if at.times.shape[-1] > 2:
+        return lams
+    cube = np.ravel(at.times[..., 1] - at.times[..., 0]) ** 3
+    return [np.where(np.isnan(lam), cube, lam) for lam in lams]
+
+
 def _in_factors(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> list[Any]:
     """A number a curve in every factor."""
     factors = factors_of(space)
@@ -197,6 +197,31 @@ def _in_factors(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> 
             raise ValidationError(f"{name} has {len(value)} entries, but the product {len(factors)} factors")
         return [one_a_curve(one, name, batch) for one in value]
     return [one_a_curve(value, name, batch)] * len(factors)
+
+
+def _with_enough(
+    whole: Knots, noisy: Noisy, lams: list[Any], run: Callable[[Knots], list[Any]]
+) -> tuple[list[Any], Knots]:
+    """What is found with as many of the knots as λ and the degrees of freedom ask for; and these knots."""
+    given = [lam for lam in lams if np.isfinite(lam).any()]
+    at = sparse(whole, noisy, max((float(np.nanmax(lam)) for lam in given), default=None))
+    if at.times.shape[-1] > _MANY:
+        at = some(at, _FIRST)
+    for tries in range(_TRIES):
+        found = run(at)
+        count = at.times.shape[-1]
+        known = [np.asarray(part.report.lam) for _, part, _ in found]
+        largest = max((float(np.nanmax(lam, initial=0.0)) for lam in known), default=0.0)
+        better = sparse(whole, noisy, largest)
+        most = 2 * max(enough(part.report.df) for _, part, _ in found)
+        if better.times.shape[-1] > max(_MANY, most):
+            better = some(better, max(_FIRST, most))
+        wanted = better.times.shape[-1]
+        # A rough curve is rougher still with more knots; one that is stiff needs fewer.
+        if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
+            break
+        at = better
+    return found, at
 
 
 def _carried(ends: list[End] | None, space: Space, data: Any, points: Any, noisy: Noisy) -> list[End] | None:

@@ -126,15 +126,6 @@ def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingRe
     )
 
 
-def stiffness(knots: Knots, noisy: Noisy, lam: Any) -> float:
-    """λ over the mean weight of a knot, in units of their spacing: rounding errors grow by it. The least of a batch."""
-    times = knots.times
-    count = times.shape[-1]
-    spacing = (times[..., -1] - times[..., 0]) / (count - 1)
-    ratio = np.asarray(lam / spacing**3 / (np.sum(noisy.weights, axis=-1) / count))
-    return float(np.min(ratio, initial=np.inf))
-
-
 def enough(df: Any) -> int:
     """How many knots are enough for so many degrees of freedom: with three times as many nothing is lost."""
     return 4 * int(np.ceil(np.nanmax(df, initial=2.0))) + 8

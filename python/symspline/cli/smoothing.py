@@ -1,0 +1,160 @@
+"""What ``symspline fit --smooth`` asks for, and what it prints."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..smoothing import SmoothingSpline
+from ..spaces import Space, factors_of
+from .errors import Problem
+from .layout import Doubles
+from .numbers import is_number
+
+_CRITERIA = ("gcv", "gcv1.4", "reml")
+_BEST = "best"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How to smooth.
+
+    Attributes:
+        criterion: how λ is chosen, if it is not given.
+        lam, sigma: numbers, in a product perhaps tuples with one of every factor, or None; sigma in radians on a globe.
+        loss: ``"linear"``, or ``"cauchy"``.
+    """
+
+    criterion: str
+    lam: Any
+    sigma: Any
+    loss: str
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Those of `symspline.make_smoothing_spline`."""
+        return dict(vars(self))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of ``symspline fit`` for noisy data."""
+    add = parser.add_argument_group("noisy data").add_argument
+    add(
+        "--smooth",
+        nargs="?",
+        const=_BEST,
+        metavar="HOW",
+        help="a smooth curve near the points, not through them; times may repeat. Write it behind IN. HOW smooth is "
+        "chosen from the data by gcv (default; with --sigma it is Mallows' C_p), gcv1.4, which is safer where motion "
+        "is nearly straight, or reml; or it is a number λ >= 0, in a product perhaps one of every factor with commas",
+    )
+    add(
+        "--sigma",
+        metavar="S",
+        help="standard deviation of the noise in a coordinate, if it is known, for --smooth: in the unit of distances, "
+        "radians for rotations, degrees with --lonlat; in a product perhaps one of every factor with commas",
+    )
+    add("--robust", action="store_true", help="points far off count little, for --smooth (loss 'cauchy')")
+
+
+def asked(options: argparse.Namespace) -> Asked | None:
+    """How to smooth; None to fit curves through the points.
+
+    Raises:
+        Problem: options do not go together.
+    """
+    if options.smooth is None:
+        for option, given in (("--sigma", options.sigma is not None), ("--robust", options.robust)):
+            if given:
+                raise Problem(f"{option} is for noisy data; give --smooth, too")
+        return None
+    if options.bc_type != "natural":
+        raise Problem(f"--smooth makes curves with natural ends; leave --bc-type {options.bc_type} out")
+    if options.method != "auto" or options.tol is not None:
+        option = "--tol" if options.tol is not None else "--method"
+        raise Problem(f"{option} is for curves through the points; leave it out with --smooth")
+    if options.dedup == "mean":
+        raise Problem("with --smooth all points of one time count; leave --dedup mean out")
+    sigma = None if options.sigma is None else _numbers(options.sigma, "--sigma", "0.1")
+    if sigma is not None and not np.all(np.greater(sigma, 0)):
+        raise Problem(f"--sigma {options.sigma}: noise is more than 0")
+    if options.lonlat and isinstance(sigma, float):
+        sigma = math.radians(sigma)
+    loss = "cauchy" if options.robust else "linear"
+    how = options.smooth
+    if how == _BEST:
+        return Asked("gcv" if sigma is None else "cp", None, sigma, loss)
+    if how in _CRITERIA:
+        return Asked(how, None, sigma, loss)
+    if not all(map(is_number, how.split(","))):
+        raise Problem(
+            f"--smooth {how}: give {', '.join(_CRITERIA)} or a number; where the table is meant, write it in front of "
+            "--smooth"
+        )
+    return Asked("gcv", _numbers(how, "--smooth", "0.5"), sigma, loss)
+
+
+def _numbers(text: str, option: str, example: str) -> Any:
+    """A number, or a tuple of several."""
+    cells = text.split(",")
+    if not all(map(is_number, cells)):
+        raise Problem(f"{option} {text}: give a number such as {example}")
+    values = tuple(map(float, cells))
+    bad = [value for value in values if not 0 <= value < np.inf]
+    if bad:
+        raise Problem(f"{option} {text}: {bad[0]:g} is not a number >= 0")
+    return values if len(values) > 1 else values[0]
+
+
+def summary(splines: Sequence[SmoothingSpline], lonlat: bool) -> str:
+    """What a user wants to know of all curves."""
+    data = sum(len(spline.data[0]) for spline in splines)
+    curves = f"{len(splines)} curve{'s' if len(splines) > 1 else ''}"
+    reports = [spline.report if isinstance(spline.report, tuple) else (spline.report,) for spline in splines]
+    spaces = factors_of(splines[0].space)
+    parts = []
+    for number, space in enumerate(spaces):
+        own = [report[number] for report in reports]
+        noise = [np.degrees(report.sigma) if lonlat else report.sigma for report in own]
+        bound = sum(bool(report.at_bound) for report in own)
+        of = f"{space}: " if len(spaces) > 1 else ""
+        parts.append(
+            f"{of}λ {_range([report.lam for report in own])}{_at_bound(bound, len(own))}, "
+            f"{_range([report.df for report in own])} degrees of freedom, noise {_range(noise)}"
+            f"{'°' if lonlat else ''}"
+        )
+    return f"{curves} near {data} points of {splines[0].space}, converged: {'; '.join(parts)}"
+
+
+def _range(values: Sequence[float]) -> str:
+    least, most = f"{min(values):.3g}", f"{max(values):.3g}"
+    return least if least == most else f"{least} to {most}"
+
+
+def _at_bound(count: int, of: int) -> str:
+    """A λ that was not found between its bounds is to be looked at."""
+    if not count:
+        return ""
+    return " (at its bound)" if of == 1 else f" ({count} at a bound)"
+
+
+def spread_names(space: Space, nu: int) -> list[str]:
+    """The columns of standard deviations: of points and velocities, one a factor."""
+    if nu > 1:
+        return []
+    count, end = len(factors_of(space)), f"_d{nu}" if nu else ""
+    return [f"std{number}{end}" for number in range(1, count + 1)] if count > 1 else [f"std{end}"]
+
+
+def spreads(spline: SmoothingSpline, x: Any, nu: int, lonlat: bool) -> Doubles:
+    """These columns at times x, shape (rows, columns)."""
+    if nu > 1:
+        return np.empty((len(x), 0))
+    found = spline.std(x, nu)
+    columns = np.stack(found if isinstance(found, tuple) else (found,), axis=-1)
+    return np.degrees(columns) if lonlat else columns

@@ -1,0 +1,51 @@
+"""Smoothing splines of different lengths, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from .._core import ConvergenceError, ValidationError
+from ..curves.solve import Fault, Progress
+from ..failures import fail
+from ..options import check_on_failure, check_progress
+from ..spaces import Space
+from .make import make_smoothing_spline
+from .spline import SmoothingSpline
+
+
+def smooth_many(
+    curves: Iterable[tuple[Any, Any, Any]],
+    space: Space,
+    *,
+    on_failure: str = "raise",
+    progress: Progress | None = None,
+    **options: Any,
+) -> list[SmoothingSpline]:
+    """One spline a curve of times, points and weights, each with a λ of its own.
+
+    Args:
+        options: those of `make_smoothing_spline`, for all curves alike.
+
+    Raises:
+        ValidationError: something is wrong with a curve; it says with which.
+        ConvergenceError: a curve failed; the exception's ``.spline`` is the list of all.
+    """
+    check_on_failure(on_failure)
+    check_progress(progress)
+    given = list(curves)
+    found: list[SmoothingSpline] = []
+    faults: list[Fault] = []
+    for number, (t, points, weights) in enumerate(given):
+        try:
+            found.append(make_smoothing_spline(t, points, space, weights=weights, **options))
+        except ConvergenceError as error:
+            found.append(error.spline)
+            faults.append((number, "unconverged", f"curve {number}: {error}"))
+        except ValidationError as error:
+            raise ValidationError(f"curve {number}: {error}") from None
+        if progress is not None:
+            progress(number + 1, len(given))
+    if faults:
+        fail(faults, on_failure, found)
+    return found

@@ -1,0 +1,191 @@
+"""Curves near noisy points: ``fit --smooth``."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from curves import each, parts
+from tabular import numbered, numbers, read_table, table, write, write_table
+
+import symspline as ss
+from symspline.cli import curves as files
+
+RNG = np.random.default_rng(0)
+T = np.arange(60.0)
+LON, LAT = (
+    10 + 1e-2 * T + 1e-2 * RNG.standard_normal(60),
+    50 + np.sin(T / 20) + 1e-2 * RNG.standard_normal(60),
+)
+PLACES = ss.geo.from_lonlat(LON, LAT)
+
+
+@pytest.fixture(autouse=True)
+def track():
+    write_table("a.csv", {"t": T, "lon": LON, "lat": LAT})
+
+
+def near(found, expected):
+    """Curves with the same knots; points go through text, degrees and back."""
+    assert np.array_equal(found.t, expected.t)
+    for own, other in zip(parts(found.points), parts(expected.points), strict=True):
+        assert np.abs(own - other).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("line", "options"),
+    [
+        ("", {}),
+        ("gcv", {}),
+        ("gcv1.4", {"criterion": "gcv1.4"}),
+        ("reml", {"criterion": "reml"}),
+        ("12.5", {"lam": 12.5}),
+        ("--sigma 0.01", {"criterion": "cp", "sigma": np.radians(0.01)}),
+        ("gcv --robust", {"loss": "cauchy"}),
+    ],
+)
+def test_a_noisy_track(run, line, options):
+    out = run(f"fit a.csv --lonlat -o a.npz --smooth {line}")
+    expected = ss.make_smoothing_spline(T, PLACES, "sphere:2", **options)
+    near(ss.load("a.npz"), expected)
+    report = expected.report
+    assert out == (
+        f"a.npz: 1 curve near 60 points of sphere:2, converged: λ {report.lam:.3g}, {report.df:.3g} degrees of "
+        f"freedom, noise {np.degrees(report.sigma):.3g}°\n"
+    )
+    run("sample a.npz -n 5 -o b.csv")
+    assert np.abs(numbers(table("b.csv"), "lon", "lat")[0] - [LON[0], LAT[0]]).max() < 0.05
+    run("check a.npz")
+
+
+def test_times_may_repeat(run, fails):
+    write_table("a.csv", {"t": T // 2, "lon": LON, "lat": LAT})
+    assert "--dedup first or mean" in fails("fit a.csv --lonlat -o a.npz")
+    run("fit a.csv --lonlat --smooth -o a.npz")
+    near(ss.load("a.npz"), ss.make_smoothing_spline(T // 2, PLACES, "sphere:2"))
+    run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
+    near(ss.load("a.npz"), ss.make_smoothing_spline(T[:30], PLACES[::2], "sphere:2"))
+    write_table("a.csv", {"t": -(T // 2), "lon": LON, "lat": LAT})
+    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith("must not fall; --sort puts rows in order")
+    write_table("a.csv", {"t": T - T, "lon": LON, "lat": LAT})
+    assert "the data lie at one time" in fails("fit a.csv --lonlat --smooth -o b.npz")
+
+
+def test_pieces_and_several_curves(run):
+    t = np.r_[T[:20], T[20:40] + 50, 200, 200, T[42:] + 300]
+    write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
+    out = run("fit a.csv --lonlat --smooth --max-gap 5 -o a.npz")
+    assert out.startswith("a.npz: 3 curves near 58 points") and " to " in out
+    assert out.endswith("; 2 rows alone between gaps left out\n")
+    pieces = ss.fit_segments(t, PLACES, "sphere:2", max_gap=5, smooth=True)
+    for found, expected in zip(ss.load_many("a.npz").values(), pieces, strict=True):
+        near(found, expected)
+    rows = "".join(f"{'ab'[i % 2]},{i},{LON[i]}\n" for i in range(60))
+    write("b.csv", "id,t,x\n" + rows)
+    run("fit b.csv --space r:1 --curve id --smooth reml -o b.npz")
+    for i, found in enumerate(ss.load_many("b.npz").values()):
+        near(found, ss.make_smoothing_spline(T[i::2], LON[i::2, None], "r:1", criterion="reml"))
+
+
+def poses():
+    turning = ss.rotations.from_rotation_vectors(0.02 * RNG.standard_normal((60, 3)) + [[0, 0, 1]])
+    return turning, np.stack([T, LON, LAT], axis=-1)
+
+
+@pytest.mark.parametrize(
+    ("line", "options"),
+    [("", {}), ("2,3", {"lam": (2.0, 3.0)}), ("--sigma 0.02,0.1", {"criterion": "cp", "sigma": (0.02, 0.1)})],
+)
+def test_every_factor_has_its_own(run, line, options):
+    space, p = ss.space("so:3 x r:3"), poses()
+    write_table("a.npz", {"t": T, **numbered(p)})
+    out = run(f"fit a.npz --space '{space}' -o b.npz --smooth {line}")
+    expected = ss.make_smoothing_spline(T, p, space, **options)
+    near(ss.load("b.npz"), expected)
+    turning, place = expected.report
+    assert f"so:3: λ {turning.lam:.3g}" in out and f"; euclidean:3: λ {place.lam:.3g}" in out
+
+
+def test_pieces_of_two_points(run):
+    t = np.r_[T[:30], T[30:32] + 50, T[32:] + 200]
+    write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
+    for more in ("", "--robust", "--sigma 0.01"):
+        run(f"fit a.csv --lonlat --smooth --max-gap 5 {more} -o a.npz")
+        piece = ss.load_many("a.npz")["2"]
+        assert np.abs(piece.points - PLACES[30:32]).max() < 1e-10
+
+
+def test_a_bound_is_told(run):
+    write_table("b.csv", {"t": T, "x": T**2})
+    assert "(at its bound), 60 degrees" in run("fit b.csv --space r:1 --smooth reml -o b.npz")
+
+
+def test_rows_written_twice_are_one(run):
+    i = np.sort(np.r_[np.arange(60), 30])
+    write_table("a.csv", {"t": T[i], "lon": LON[i], "lat": LAT[i]})
+    # Else cross-validation would take two points that agree exactly for data without noise.
+    assert "(at its bound)" not in run("fit a.csv --lonlat --smooth -o a.npz")
+    run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
+    near(ss.load("a.npz"), ss.make_smoothing_spline(T, PLACES, "sphere:2"))
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        (
+            "--smooth --bc-type not-a-knot",
+            "--smooth makes curves with natural ends; leave --bc-type not-a-knot out",
+        ),
+        ("--smooth --method newton", "--method is for curves through the points; leave it out with --smooth"),
+        ("--smooth --tol 1e-9", "--tol is for curves through the points; leave it out with --smooth"),
+        ("--smooth --dedup mean", "with --smooth all points of one time count; leave --dedup mean out"),
+        ("--sigma 0.1", "--sigma is for noisy data; give --smooth, too"),
+        ("--robust", "--robust is for noisy data; give --smooth, too"),
+        (
+            "--smooth b.csv",
+            "--smooth b.csv: give gcv, gcv1.4, reml or a number; where the table is meant, write it",
+        ),
+        ("--smooth 1_0", "--smooth 1_0: give gcv"),
+        ("--smooth=-1", "--smooth -1: -1 is not a number >= 0"),
+        ("--smooth nan", "--smooth nan: nan is not a number >= 0"),
+        ("--smooth 1,2", "lam must be a number, not (1.0, 2.0)"),
+        ("--smooth --sigma small", "--sigma small: give a number such as 0.1"),
+        ("--smooth --sigma 0", "--sigma 0: noise is more than 0"),
+    ],
+)
+def test_what_does_not_go_together(fails, line, says):
+    assert says in fails(f"fit a.csv --lonlat -o a.npz {line}")
+
+
+def test_a_bad_point_is_named_by_its_line(fails):
+    write(
+        "b.csv",
+        "id,t,x,y,z\n" + "".join(f"{'ab'[i > 2]},{i},1,0,{'0' if i != 4 else '2'}\n" for i in range(7)),
+    )
+    assert "line 6" in fails("fit b.csv --space sphere:2 --curve id --smooth -o b.npz")
+
+
+def test_samples_have_standard_deviations(run, monkeypatch):
+    spline = ss.make_smoothing_spline(T, PLACES, "sphere:2")
+    run("fit a.csv --lonlat --smooth -o a.npz")
+    monkeypatch.setattr(files, "load", lambda file: spline)
+    run("sample a.npz -n 7 --nu 0,1,2 -o b.npz")
+    found, x = read_table("b.npz"), np.linspace(0, 59, 7)
+    assert [name for name in found if name.startswith("std")] == ["std", "std_d1"]
+    assert np.array_equal(found["std"], np.degrees(spline.std(x)))
+    assert np.array_equal(found["std_d1"], np.degrees(spline.std(x, 1)))
+
+
+def test_deviations_of_every_factor(run, monkeypatch):
+    p = poses()
+    spline = ss.make_smoothing_spline(T, p, "so:3 x r:3")
+    write_table("a.npz", {"t": T, **numbered(p)})
+    run("fit a.npz --space 'so:3 x r:3' --smooth -o b.npz")
+    monkeypatch.setattr(files, "load", lambda file: spline)
+    run("sample b.npz -n 7 -o c.npz")
+    found = read_table("c.npz")
+    for i, expected in enumerate(spline.std(np.linspace(0, 59, 7)), 1):
+        assert np.array_equal(found[f"std{i}"], expected)
+    assert found["a0"].shape == each(np.shape, expected)
+    # Poses of TUM have no place for them.
+    run("sample b.npz -n 7 -o c.tum")
+    assert len(Path("c.tum").read_text().splitlines()) == 8
