@@ -107,7 +107,9 @@ def make_smoothing_spline(
     sigmas = _in_factors(space, sigma, "sigma", noisy.batch)
 
     def run(at: Knots) -> list[Any]:
-        each = zip(points_of(noisy, space), lams, sigmas, strict=True)
+        # Two knots make a geodesic, whatever λ is.
+        used = [np.zeros_like(lam) for lam in lams] if at.times.shape[-1] == 2 else lams
+        each = zip(points_of(noisy, space), used, sigmas, strict=True)
         return [
             smoothed(factor, noisy, own, at, one_lam, one_sigma, asked, progress)
             for (factor, own), one_lam, one_sigma in each
