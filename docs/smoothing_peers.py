@@ -28,8 +28,9 @@ class Chart(NamedTuple):
 def tangent(space: ss.Space, points: Array) -> Chart:
     """Orthonormal coordinates of the logarithms at the mean of all points."""
     mean = points[len(points) // 2]
-    for _ in range(50):
-        mean = space.exp(mean, _logarithms(space, mean, points).mean(axis=0))
+    for _ in range(100):
+        # Full steps to the mean would go astray in hyperbolic space.
+        mean = space.exp(mean, 0.3 * _logarithms(space, mean, points).mean(axis=0))
     vectors = _logarithms(space, mean, points)
     shape = vectors.shape
     rows = vectors.reshape(len(points), -1)
