@@ -83,6 +83,24 @@ def test_a_bound_is_told():
         assert "at its bound: a geodesic" in str(noisy.report)
 
 
+def test_two_times_make_a_geodesic():
+    line = ss.make_smoothing_spline([0.0, 1.0], NOISY[[0, -1]], S2)
+    assert S2.distance(line.points, NOISY[[0, -1]]).max() < 1e-12
+    assert line.df == pytest.approx(2) and line.report.converged
+    rng = np.random.default_rng(0)
+    y = rng.standard_normal((100, 1)) + np.repeat([[1.0], [5.0]], 50, axis=0)
+    for options in ({"t": np.repeat([0.0, 1.0], 50)}, {"t": np.linspace(0, 1, 100), "knots": 2}):
+        spline = ss.make_smoothing_spline(points=y, space="r:1", **options)
+        (slope, start), *_ = np.polyfit(options["t"], y[:, 0], 1, full=True)
+        assert spline([0.0, 1.0])[:, 0] == pytest.approx([start, start + slope], abs=1e-12)
+        assert spline.sigma == pytest.approx(np.std(spline.residuals) * np.sqrt(100 / 98))
+
+
+def test_three_points_that_are_met_are_no_geodesic():
+    spline = ss.make_smoothing_spline([0.0, 1.0, 2.0], NOISY[[0, 20, 30]], S2, criterion="reml")
+    assert "a geodesic" not in str(spline.report) or spline.df < 2.5
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -128,7 +128,7 @@ def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingRe
 
 def enough(df: Any) -> int:
     """How many knots are enough for so many degrees of freedom: with three times as many nothing is lost."""
-    return 4 * int(np.ceil(np.nanmax(df, initial=2.0))) + 8
+    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
 
 
 def one_a_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
