@@ -123,8 +123,6 @@ pub struct Report {
     pub freedom: f64,
     /// Estimated standard deviation of the noise in a coordinate, at weight one.
     pub sigma: f64,
-    /// Σ w d².
-    pub misfit: f64,
     /// The last step, in standard deviations of the points.
     pub step: f64,
     /// Contraction in the last iteration.

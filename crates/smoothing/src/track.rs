@@ -194,10 +194,8 @@ impl<'a> Track<'a> {
             return;
         };
         step.iter_mut().for_each(|x| *x *= 0.5);
-        self.points = moved(space, points, step);
-        if self.ends == Ends::Periodic {
-            turns::repeat(&mut self.points, space.point_len());
-        }
+        let (points, step) = (points.clone(), step.clone());
+        self.go(space, &points, &step);
     }
 
     /// One step from the spline through the points, or the end; on all cores if no other curve is worked on.
@@ -214,11 +212,14 @@ impl<'a> Track<'a> {
         if progress.report.exact && progress.settled {
             let lam = progress.lam.unwrap_or(0.0) * spacing.powi(3);
             let terms = squares.iter().zip(weights).map(|(s, w)| options.loss.value(w * s, self.corner));
-            let objective = terms.sum::<f64>() + lam * exact::energy(space, &path);
-            if objective > self.objective * (1.0 + ROUNDING) && self.retreats < RETREATS {
+            let before = std::mem::replace(
+                &mut self.objective,
+                terms.sum::<f64>() + lam * exact::energy(space, &path),
+            );
+            if self.objective > before * (1.0 + ROUNDING) && self.retreats < RETREATS {
+                self.objective = before;
                 return self.retreat(space);
             }
-            self.objective = objective;
         }
         self.retreats = 0;
         let residuals = path.at_knots(space, &frames, &self.places, &vectors);
@@ -244,22 +245,9 @@ impl<'a> Track<'a> {
         // Where λ hardly matters, as for a geodesic, its best value wanders.
         progress.settled |= progress.report.rounds > 1
             && (progress.report.freedom - before).abs() < SETTLED * progress.report.freedom;
-        let own = flat.own.data.clone();
-        progress.report.misfit = own.map(|k| weights[k] * squares[k]).sum();
         progress.expect(space, &speeds, weights, lam);
 
-        let exact = match options.tier {
-            _ if self.ends == Ends::Periodic => false,
-            Tier::Flat => false,
-            Tier::Newton => true,
-            // In flat space the flat way is the exact one; and the blocks of the other have a limit.
-            Tier::Auto if space.curvature() == 0.0 || m > LARGE => false,
-            Tier::Auto => {
-                let limit = if progress.settled { SLOW } else { HOPELESS };
-                let known = progress.settled && progress.report.exact;
-                known || progress.report.kappa > limit || progress.slow > 1
-            }
-        };
+        let exact = self.ends != Ends::Periodic && progress.takes_exact_way(space, options.tier);
         if exact && !progress.report.exact {
             // What is known of steps is of the other way.
             (progress.last_step, progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
@@ -286,15 +274,7 @@ impl<'a> Track<'a> {
         self.inverse = Some(inverse);
         if progress.settled && small {
             if !self.rescaled {
-                // Once more with the noise beside the curve, which is never taken to be larger, nor much smaller.
-                let own = flat.own.data.clone();
-                let noise =
-                    loss::noise_beside(&squares[own.clone()], &weights[own], progress.report.freedom, m);
-                let corner = noise * options.loss.corner(m);
-                self.corner = corner.clamp(0.5 * self.corner, self.corner);
-                (self.rescaled, self.objective) = (true, f64::INFINITY);
-                (progress.settled, progress.report.rounds) = (data.lam.is_some(), 0);
-                return;
+                return self.rescale(options, &squares, m);
             }
             progress.report.state = State::Converged;
             return;
@@ -303,20 +283,34 @@ impl<'a> Track<'a> {
             progress.report.state = State::Unconverged;
             return;
         }
-        let further = if progress.settled { progress.further(&step) } else { 1.0 };
-        let mut ambient = ambient.unwrap_or_else(|| frames.tangents(&step));
-        ambient.iter_mut().for_each(|x| *x *= further);
         // Farther than the data are nothing is known.
         let farthest = squares.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
         let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
-        if longest > farthest {
-            ambient.iter_mut().for_each(|x| *x *= farthest / longest);
-        }
-        let mut next = moved(space, &self.points, &ambient);
+        let further = if progress.settled { progress.further(&step) } else { 1.0 };
+        let factor = if longest * further > farthest { farthest / longest } else { further };
+        let mut ambient = ambient.unwrap_or_else(|| frames.tangents(&step));
+        ambient.iter_mut().for_each(|x| *x *= factor);
+        let before = self.points.clone();
+        self.go(space, &before, &ambient);
+        self.before = Some((before, ambient));
+    }
+
+    /// Moves the points.
+    fn go(&mut self, space: &Erased, from: &[f64], step: &[f64]) {
+        self.points = moved(space, from, step);
         if self.ends == Ends::Periodic {
-            turns::repeat(&mut next, space.point_len());
+            turns::repeat(&mut self.points, space.point_len());
         }
-        self.before = Some((std::mem::replace(&mut self.points, next), ambient));
+    }
+
+    /// Once more with the noise beside the curve, which is never taken to be larger, nor much smaller.
+    fn rescale(&mut self, options: &Options, squares: &[f64], m: usize) {
+        let own = self.flat.own.data.clone();
+        let freedom = self.progress.report.freedom;
+        let noise = loss::noise_beside(&squares[own.clone()], &self.data.weights[own], freedom, m);
+        self.corner = (noise * options.loss.corner(m)).clamp(0.5 * self.corner, self.corner);
+        (self.rescaled, self.objective) = (true, f64::INFINITY);
+        (self.progress.settled, self.progress.report.rounds) = (self.data.lam.is_some(), 0);
     }
 }
 
@@ -331,6 +325,21 @@ impl Progress {
         }
         self.last = step.to_vec();
         1.0
+    }
+
+    /// Whether the exact way is to be taken.
+    fn takes_exact_way(&self, space: &Erased, tier: Tier) -> bool {
+        match tier {
+            Tier::Flat => false,
+            Tier::Newton => true,
+            // In flat space the flat way is the exact one; and the blocks of the other have a limit.
+            Tier::Auto if space.curvature() == 0.0 || space.dim() > LARGE => false,
+            Tier::Auto => {
+                let limit = if self.settled { SLOW } else { HOPELESS };
+                let known = self.settled && self.report.exact;
+                known || self.report.kappa > limit || self.slow > 1
+            }
+        }
     }
 
     /// A better λ, unless it is given or settled.
