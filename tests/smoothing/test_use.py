@@ -105,7 +105,7 @@ def test_three_points_that_are_met_are_no_geodesic():
     ("change", "message"),
     [
         ({"t": T[::-1]}, r"t\[1\] is before t\[0\]"),
-        ({"t": T[:-1]}, "40 points need"),
+        ({"t": T[:-1]}, "40 points a curve need"),
         ({"t": np.where(T > 5, np.nan, T)}, "is nan"),
         ({"t": np.zeros(40)}, "lie at one time"),
         ({"lam": -1.0}, "lam must be finite and >= 0"),
@@ -118,6 +118,10 @@ def test_three_points_that_are_met_are_no_geodesic():
         ({"knots": [0.0, 5.0]}, "from the first to the last time"),
         ({"knots": [0.0, 5.0, 5.0, 10.0]}, r"knots\[2\] is not behind knots\[1\]"),
         ({"criterion": "aic"}, "criterion must be"),
+        ({"criterion": 3}, "criterion must be a word, not 3"),
+        ({"tol": True}, "tol must be"),
+        ({"bc_type": "periodic", "method": "newton"}, "closed curves go the flat way only"),
+        ({"bc_type": "periodic", "knots": 3}, "a closed curve needs at least 4 knots"),
         ({"criterion": "cp"}, "needs sigma"),
         ({"loss": "l1"}, "loss must be"),
         ({"method": "fast"}, "method must be"),
@@ -159,3 +163,10 @@ def test_between_two_knots_there_is_the_nearest_geodesic(options):
         line = np.polyfit(T, NOISY, 1)
         straight = ss.make_smoothing_spline(T, NOISY, "r:3", knots=2, **options)
         assert np.abs(straight(T) - T[:, None] * line[0] - line[1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e200])
+def test_squares_beyond_doubles_are_no_result(size):
+    data = size * np.random.default_rng(0).standard_normal((20, 2))
+    with pytest.raises(ss.ConvergenceError):
+        ss.make_smoothing_spline(np.arange(20.0), data, "r:2")

@@ -401,7 +401,12 @@ impl Progress {
         }
         self.last_step = longest;
         self.report.step = relative;
-        relative <= options.tol || longest <= STILL * reach || (longest <= FLOOR * reach && rate > SLOW)
+        // Squares that are too large or too small for doubles say nothing.
+        let known = self.scale.is_finite() && (longest > 0.0 || step.iter().all(|x| *x == 0.0));
+        known
+            && (relative <= options.tol
+                || longest <= STILL * reach
+                || (longest <= FLOOR * reach && rate > SLOW))
     }
 }
 

@@ -14,7 +14,7 @@ from ..curves.fit import Points, read, read_ends, validated
 from ..handed import times_of
 from ..options import within
 from ..spaces import Array, Space, factors_of
-from ..times import Clock, clock_of
+from ..times import Clock, knots_of
 
 Doubles = NDArray[np.float64]
 
@@ -80,14 +80,7 @@ def read_noisy(
 
 
 def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[Clock, Array, Doubles]:
-    if t is None:
-        plain = np.arange(count, dtype=np.float64)
-        return Clock(), plain, plain
-    clock, shown_times = clock_of(t)
-    if shown_times.shape != (count,) and shown_times.shape != (*batch, count):
-        own = f" or {(*batch, count)}" if batch else ""
-        raise ValidationError(f"t has shape {shown_times.shape}, but {count} points need {(count,)}{own}")
-    times = clock.knots(shown_times)
+    clock, shown_times, times = knots_of(t, batch, count)
     if not np.isfinite(times).all():
         index = np.argwhere(~np.isfinite(times))[0].tolist()
         raise ValidationError(f"t{index} is {times[tuple(index)]}; times must be finite")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .._core import ValidationError
 from ..arrays import shown, whole_number
-from ..curves.ends import End, kept
+from ..curves.ends import End, is_closed, kept
 from ..curves.fit import Asked as Fitted
 from ..curves.fit import Points, fit
 from ..curves.solve import Fault, Options, Progress
@@ -106,7 +106,12 @@ def make_smoothing_spline(
     check_progress(progress)
     if criterion == "cp" and sigma is None:
         raise ValidationError("criterion 'cp' needs sigma, the standard deviation of the noise")
-    if not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
+    for name, word in (("criterion", criterion), ("loss", loss), ("method", method)):
+        if not isinstance(word, str):
+            raise ValidationError(f"{name} must be a word, not {shown(word)}")
+    if is_closed(bc_type) and method == "newton":
+        raise ValidationError("method 'newton': closed curves go the flat way only")
+    if isinstance(tol, bool) or not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
         raise ValidationError(f"tol must be a number > 0, not {shown(tol)}")
     asked = Asked(criterion, loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
     noisy, ends = read_noisy(t, points, space, weights, bc_type, atol)
@@ -124,6 +129,8 @@ def make_smoothing_spline(
         ]
 
     whole = knots_for(noisy, knots)
+    if is_closed(bc_type) and whole.times.shape[-1] < 4:
+        raise ValidationError(f"a closed curve needs at least 4 knots, not {whole.times.shape[-1]}")
     if knots is None:
         found, at = _with_enough(whole, noisy, lams, run)
     else:
