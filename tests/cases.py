@@ -77,6 +77,14 @@ CASES = [
     Case("hpd:5", far=1.5, few=True),
     Case("se:2", far=1.5, face=True),
     Case("se:3", far=1.5, face=True),
+    Case("gl:2", far=1.5, face=True),
+    Case("gl:3", far=1.5, few=True),
+    Case("cgl:2", far=1.5, few=True, face=True),
+    Case("aff:2", far=1.5, few=True, face=True),
+    Case("sim:3", far=1.5, few=True, face=True),
+    Case("sl:3", far=1.5, few=True, face=True),
+    Case("sp:4", far=1.5, few=True, face=True),
+    Case("lorentz:3", far=1.5, few=True, face=True),
 ]
 
 # Matrices so long that a law takes seconds: they obey three, of the space, of the curve and of its derivatives.
@@ -105,6 +113,15 @@ FAMILIES = Handle.names()
 
 POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite)
 HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
+LINEAR = (
+    ss.GeneralLinear,
+    ss.ComplexGeneralLinear,
+    ss.Affine,
+    ss.Similarity,
+    ss.SpecialLinear,
+    ss.Symplectic,
+    ss.Lorentz,
+)
 QUOTIENTS = (
     ss.RealProjective,
     ss.ComplexProjective,
@@ -116,14 +133,14 @@ QUOTIENTS = (
 
 def condition(space, points):
     """By how much rounding of points near these counts: |p|² on the hyperboloid, |p| cond(p) for positive
-    definite matrices, |p| otherwise."""
+    definite and for invertible matrices, |p| otherwise."""
     if isinstance(space, HYPERBOLIC):
         return float(np.max(np.sum(np.square(np.abs(points)), axis=-1)))
     if len(space.point_shape) == 2:
         largest = max(1.0, float(np.max(np.linalg.norm(points, axis=(-2, -1)))))
     else:
         largest = max(1.0, float(np.max(np.abs(points))))
-    if isinstance(space, POSITIVE):
+    if isinstance(space, (*POSITIVE, *LINEAR)):
         return largest * float(np.max(np.linalg.cond(np.asarray(points))))
     return largest
 
@@ -136,8 +153,13 @@ def apart(space, p, q):
     return float(np.abs(np.asarray(p) - q).max())
 
 
+def has_metric(space):
+    """Whether lengths mean anything; K is NaN where they do not."""
+    return not np.isnan(space.curvature)
+
+
 def compact(space):
-    return np.isfinite(space.injectivity_radius) and not isinstance(space, ss.SpecialEuclidean)
+    return np.isfinite(space.injectivity_radius) and has_metric(space)
 
 
 def base_point(space, rng):

@@ -4,7 +4,7 @@ geodesics and transport of the space, and every segment evaluated by itself."""
 from dataclasses import dataclass
 
 import numpy as np
-from cases import EPS, POSITIVE, QUOTIENTS
+from cases import EPS, LINEAR, POSITIVE, QUOTIENTS
 
 import symspline as ss
 
@@ -156,6 +156,9 @@ def margin(space, p, q):
             p, q = p[..., None], q[..., None]
         cosines = np.linalg.svd(np.swapaxes(p.conj(), -1, -2) @ q, compute_uv=False)
         return np.arcsin(np.minimum(1.0, cosines.min(axis=-1))), np.pi / 2
+    if isinstance(space, LINEAR):
+        phases = np.angle(np.linalg.eigvals(np.linalg.solve(p, q)))
+        return np.pi - np.abs(phases).max(axis=-1), np.pi
     if isinstance(space, GROUPS):
         if isinstance(space, ss.SpecialEuclidean):
             p, q = p[..., :-1, :-1], q[..., :-1, :-1]

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from cases import COMMON, FAMILIES, SINGLE, SPACES
+from cases import COMMON, FAMILIES, LINEAR, SINGLE, SPACES
 from curves import S2, every_single, every_space, points_on
 from refused import INF, fit_error
 
@@ -120,10 +120,17 @@ DIMENSIONS = {
     "spd": lambda n: n * (n + 1) // 2,
     "hpd": lambda n: n * n,
     "se": lambda n: n * (n + 1) // 2,
+    "gl": lambda n: n * n,
+    "cgl": lambda n: 2 * n * n,
+    "aff": lambda n: n * (n + 1),
+    "sim": lambda n: n * (n + 1) // 2 + 1,
+    "sl": lambda n: n * n - 1,
+    "sp": lambda n: n * (n + 1) // 2,
+    "lorentz": lambda n: n * (n + 1) // 2,
 }
 
 
-COMPLEX_FAMILIES = {"cp", "ch", "cgr", "u", "su", "hpd"}
+COMPLEX_FAMILIES = {"cp", "ch", "cgr", "u", "su", "hpd", "cgl"}
 
 
 @every_single
@@ -132,8 +139,8 @@ def test_what_a_space_says_of_itself(space):
     assert space.dim == DIMENSIONS[family](*map(int, size.split(",")))
     assert space.dtype == (np.complex128 if family in COMPLEX_FAMILIES else np.float64)
     assert space.injectivity_radius > 0
-    # Poses have no invariant metric, and so no K.
-    assert np.isnan(space.curvature) if family == "se" else space.curvature >= 0
+    # Poses and invertible matrices have no invariant metric, and so no K.
+    assert np.isnan(space.curvature) if family == "se" or isinstance(space, LINEAR) else space.curvature >= 0
     assert points_on(space).shape[1:] == space.point_shape
 
 

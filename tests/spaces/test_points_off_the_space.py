@@ -76,7 +76,7 @@ def test_the_phase_of_the_determinant(name, phase):
 
 def test_a_rotation_next_to_a_reflection():
     p = spoiled("o:3", 2, lambda x: x * [-1, 1, 1])
-    match = r"points\[1\] and points\[2\]{} have opposite determinants: no curve joins a rotation and a reflection"
+    match = r"points\[1\] and points\[2\]{} have opposite determinants: no curve joins them"
     with pytest.raises(ss.ValidationError, match=match.format("")):
         ss.CubicSpline(None, p, "o:3")
     both = np.stack([points("o:3"), p])

@@ -149,7 +149,7 @@ def test_length_and_energy_of_a_geodesic(space):
 @every_batch
 def test_length_and_energy_by_quadrature(space, batch):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)
-    nodes, weights = np.polynomial.legendre.leggauss(40)
+    nodes, weights = np.polynomial.legendre.leggauss(80)
     length = energy = 0.0
     for a, b in pairwise(KNOTS):
         x = (a + b) / 2 + (b - a) / 2 * nodes

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import has_metric
 from curves import (
     KNOTS,
     S2,
@@ -47,7 +48,7 @@ def test_report_of_one_curve(space):
 @every_single
 @every_batch
 def test_max_step_is_the_longest_distance(space, batch):
-    if isinstance(space, ss.SpecialEuclidean):
+    if not has_metric(space):
         # There is no invariant metric: it is measured elsewhere.
         return
     p = points_on(space, batch=batch, step=0.5)

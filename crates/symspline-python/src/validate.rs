@@ -70,8 +70,7 @@ fn one_component(space: &Erased, points: &[f64], offsets: &[usize], batch: &[usi
         if let Some(i) = (ends[0] + 1..ends[1]).find(|&i| part(i) != part(i - 1)) {
             let i = i - ends[0];
             return Err(invalid(format!(
-                "points[{}] and points[{i}]{} have opposite determinants: no curve joins a rotation and a \
-                 reflection",
+                "points[{}] and points[{i}]{} have opposite determinants: no curve joins them",
                 i - 1,
                 of_curve(curve, batch)
             )));

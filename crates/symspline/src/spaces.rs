@@ -5,6 +5,7 @@ use symspline_core::space::{Entry, Erased, Table};
 
 pub use symspline_forms::PositiveDefinite;
 pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
+pub use symspline_linear::{GeneralLinear, Members};
 pub use symspline_subspaces::{ComplexHyperbolic, Subspaces};
 pub use symspline_vectors::{Curved, Euclidean, Hyperbolic, Sphere};
 
@@ -15,6 +16,7 @@ pub fn all() -> impl Iterator<Item = &'static Entry> {
         symspline_subspaces::FAMILY,
         symspline_groups::FAMILY,
         symspline_forms::FAMILY,
+        symspline_linear::FAMILY,
     ]
     .into_iter()
     .flatten()

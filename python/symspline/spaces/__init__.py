@@ -2,6 +2,15 @@
 
 from .base import Array, Space
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
+from .linear import (
+    Affine,
+    ComplexGeneralLinear,
+    GeneralLinear,
+    Lorentz,
+    Similarity,
+    SpecialLinear,
+    Symplectic,
+)
 from .named import space
 from .positive import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, together
@@ -11,23 +20,30 @@ from .vectors import Euclidean, Hyperbolic, Sphere
 
 __all__ = [
     "POINT_TOL_FLOAT32",
+    "Affine",
     "Array",
+    "ComplexGeneralLinear",
     "ComplexGrassmannian",
     "ComplexHyperbolic",
     "ComplexProjective",
     "Euclidean",
+    "GeneralLinear",
     "Grassmannian",
     "HermitianPositiveDefinite",
     "Hyperbolic",
+    "Lorentz",
     "Orthogonal",
     "Product",
     "RealProjective",
+    "Similarity",
     "Space",
     "SpecialEuclidean",
+    "SpecialLinear",
     "SpecialOrthogonal",
     "SpecialUnitary",
     "Sphere",
     "SymmetricPositiveDefinite",
+    "Symplectic",
     "Unitary",
     "factors_of",
     "parts_of",

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from .._core import CutLocusError, ValidationError
 from .base import Array, Space
+from .two_parts import TwoParts
 
 
 class SpecialOrthogonal(Space):
@@ -42,7 +38,7 @@ def _matrices(value: Any) -> Any:
     return value
 
 
-class Orthogonal(Space):
+class Orthogonal(TwoParts):
     """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
     of the two parts.
 
@@ -55,27 +51,6 @@ class Orthogonal(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
-
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
-        try:
-            return super()._finite(operation, t, **inputs)
-        except (CutLocusError, ValidationError):
-            if "q" in inputs:
-                self._check_same_part(inputs["p"], inputs["q"])
-            raise
-
-    def _check_same_part(self, p: ArrayLike, q: ArrayLike) -> None:
-        pairs: Array = np.zeros((0, 0), int)
-        # Arrays of a wrong shape have an error of their own.
-        with np.errstate(all="ignore"), suppress(ValueError):
-            pairs = np.argwhere(
-                np.linalg.det(self._doubles(p, "p")) * np.linalg.det(self._doubles(q, "q")) < -0.5
-            )
-        if len(pairs):
-            pair = ",".join(map(str, pairs[0])) or "0"
-            raise ValidationError(
-                f"pair {pair} has opposite determinants: no curve joins a rotation and a reflection"
-            )
 
 
 class SpecialUnitary(Space):

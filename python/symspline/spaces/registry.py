@@ -48,6 +48,9 @@ def _whole(cls: Any) -> str:
 def _named(name: str) -> Space:
     word, _, parameters = name.partition(":")
     word = word.strip().lower()
+    # SO(1, n), as it is written, is no rotation group.
+    if word == "so" and parameters.count(",") == 1 and parameters.partition(",")[0].strip() == "1":
+        word, parameters = "lorentz", parameters.partition(",")[2]
     names = {alias: row[0] for row in Handle.names() for alias in row}
     if word not in names:
         known = ", ".join(" or ".join(row) for row in Handle.names())

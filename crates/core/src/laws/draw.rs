@@ -7,6 +7,8 @@ use crate::space::{Ambient, Erased, Frame, Origin};
 pub const STEPS: [f64; 8] = [1e-9, 1e-6, 1e-3, 0.03, 0.2, 0.6, 0.95, 0.999];
 /// The largest step in a space that has no cut locus.
 const FAR: f64 = 3.0;
+/// Where directions have small angles, steps may be so much longer than the limit of angles.
+const LONGEST: f64 = 3.0;
 
 /// A source of random data.
 pub struct Draw(u64);
@@ -56,9 +58,10 @@ impl Draw {
         let x = self.unit(space);
         let angle = space.angle(&x);
         let limit = space.cut_angle();
-        // Where directions have no angle (shifts among motions) lengths decide.
+        // Where directions have no angle (shifts among motions, stretches among matrices) lengths decide.
         let scale = if limit.is_finite() {
-            angle.simd_gt(lane(1e-3)).select(lane(part * limit) / angle, lane(part))
+            let far = lane(part * limit) / angle;
+            far.simd_lt(lane(LONGEST * part * limit)).select(far, lane(part))
         } else {
             lane(part * FAR) / dot(&x, &x).sqrt()
         };

@@ -95,10 +95,14 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
             space.tidy(&mut moving.frame, &moving.p);
         }
     }
-    // An error of the frame goes eightfold into a jump of the acceleration. Frames of motions hold translations,
-    // which have grown on the way.
-    let count = if space.curvature().is_nan() { 300.0 } else { 10.0 };
-    is_frame(&moving, draw, rounding(space, count, &[&p], &[]))
+    // An error of the frame goes eightfold into a jump of the acceleration. Frames of motions and of invertible
+    // matrices grow on the way.
+    let grown = if space.curvature().is_nan() {
+        lane(30.0) * norm(&moving.frame) * norm(&moving.frame)
+    } else {
+        Lane::ONE
+    };
+    is_frame(&moving, draw, rounding(space, 10.0, &[&p], &[]) * grown)
 }
 
 /// A chord and two legs, and w⁺ and w⁻.

@@ -6,13 +6,19 @@
 mod dense;
 mod eigen;
 mod function;
+mod general;
+mod inverse;
 mod large;
+mod schur;
 mod series;
 mod storage;
 
 pub use dense::{cholesky, determinant, orthonormalise, polar, reorthonormalise, solve_lower};
 pub use eigen::{diagonalise, orthogonalise, sort_columns};
 pub use function::{Unary, from_parts, function_of, parts_of};
+pub use general::{exp_any_minus_one, log_any_one_plus};
+pub use inverse::inverse;
+pub use schur::{largest_argument, largest_imaginary};
 pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};
 pub use storage::{Dynamic, Known, Small, Storage};
 

@@ -1,4 +1,4 @@
-//! Power series in a Hermitian matrix, and the functions made of them.
+//! Power series in a matrix, and the functions of Hermitian ones made of them.
 //!
 //! Of a matrix of size three or less the powers reduce to I, H, H² by the theorem of Cayley and
 //! Hamilton, so that a series costs a few multiplications a term; larger ones use the scheme of
@@ -11,7 +11,7 @@ use crate::scalar::{LANES, Lane, Scalar, few, lane};
 use crate::special::{ARC, SINC, VERSINE, arc_full_range};
 
 /// What the series in one matrix share.
-struct Powers<'a, S: Scalar, const D: usize, A: Storage> {
+pub(super) struct Powers<'a, S: Scalar, const D: usize, A: Storage> {
     h: &'a Matrix<S, D, A>,
     known: Known<S, D, A>,
 }
@@ -32,38 +32,62 @@ enum Known<S: Scalar, const D: usize, A: Storage> {
     Many(Vec<Matrix<S, D, A>>),
 }
 
+impl<S: Scalar, const D: usize, A: Storage> Known<S, D, A> {
+    /// Given the product of the entries beside the diagonal.
+    #[inline(always)]
+    fn two(h: &Matrix<S, D, A>, beside: S) -> Self {
+        let (a, d) = (h[(0, 0)][0], h[(1, 1)][0]);
+        Known::Two { e1: a + d, e2: a * d - beside }
+    }
+
+    #[inline(always)]
+    fn three(h: &Matrix<S, D, A>, square: Matrix<S, D, A>) -> Self {
+        let e = invariants(h, &square);
+        Known::Three { square, e }
+    }
+
+    #[inline(always)]
+    fn many(h: &Matrix<S, D, A>, terms: usize) -> Self {
+        // Paterson & Stockmeyer's best number of powers.
+        let block = (terms as f64).sqrt().round() as usize;
+        let mut powers = vec![h.clone()];
+        while powers.len() < block {
+            powers.push(powers[powers.len() - 1].times(h));
+        }
+        Known::Many(powers)
+    }
+}
+
 impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
-    /// For several series of so many terms in all.
+    /// Of a Hermitian matrix, for several series of so many terms in all.
     #[inline(always)]
     fn of(h: &'a Matrix<S, D, A>, terms: usize) -> Self {
         let known = match h.rows() {
             1 => Known::Itself,
             2 => {
-                let (a, d, off) = (h[(0, 0)][0], h[(1, 1)][0], h[(0, 1)]);
-                let zero = S::constant(Lane::ZERO);
-                Known::Two { e1: a + d, e2: a * d - inner_add(off, off, zero) }
+                let off = h[(0, 1)];
+                Known::two(h, inner_add(off, off, S::constant(Lane::ZERO)))
             }
-            3 => {
-                let square = h.times_adjoint_hermitian(h);
-                let e = invariants(h, &square);
-                Known::Three { square, e }
-            }
-            _ => {
-                // Paterson & Stockmeyer's best number of powers.
-                let block = (terms as f64).sqrt().round() as usize;
-                let mut powers = vec![h.clone()];
-                while powers.len() < block {
-                    powers.push(powers[powers.len() - 1].times(h));
-                }
-                Known::Many(powers)
-            }
+            3 => Known::three(h, h.times_adjoint_hermitian(h)),
+            _ => Known::many(h, terms),
+        };
+        Powers { h, known }
+    }
+
+    /// Of any matrix. The theorem needs complex numbers where its entries are.
+    pub(super) fn of_any(h: &'a Matrix<S, D, A>, terms: usize) -> Self {
+        let known = match h.rows() {
+            1 if D == 1 => Known::Itself,
+            2 if D == 1 => Known::two(h, h[(0, 1)][0] * h[(1, 0)][0]),
+            3 if D == 1 => Known::three(h, h.times(h)),
+            _ => Known::many(h, terms),
         };
         Powers { h, known }
     }
 
     /// Σ cⱼ Hʲ
     #[inline(always)]
-    fn sum(&self, c: &[f64]) -> Matrix<S, D, A> {
+    pub(super) fn sum(&self, c: &[f64]) -> Matrix<S, D, A> {
         match &self.known {
             Known::Itself => {
                 let x = self.h[(0, 0)][0];
@@ -151,13 +175,13 @@ fn paterson_stockmeyer<S: Scalar, const D: usize, A: Storage>(
 }
 
 /// Terms that leave less than a rounding error, one more for every derivative.
-fn terms<S: Scalar>(c: &[f64], n: usize) -> &[f64] {
+pub(super) fn terms<S: Scalar>(c: &[f64], n: usize) -> &[f64] {
     &c[..(n + S::ORDER).min(c.len())]
 }
 
 /// How often sizes must be divided by `base` to come below a limit, lane by lane, and by what in all.
 #[cold]
-fn reductions(size: Lane, limit: f64, base: f64) -> (Lane, Lane) {
+pub(super) fn reductions(size: Lane, limit: f64, base: f64) -> (Lane, Lane) {
     let (mut times, mut divisor) = ([0.0; LANES], [1.0; LANES]);
     for (l, size) in size.to_array().into_iter().enumerate() {
         // Infinity and NaN stay what they are; more than 2⁶⁴ is no length of a geodesic.
@@ -169,7 +193,7 @@ fn reductions(size: Lane, limit: f64, base: f64) -> (Lane, Lane) {
 }
 
 /// Applies `step` so many times, lane by lane.
-fn repeat<R: Select + Clone>(mut x: R, times: Lane, step: impl Fn(&R) -> R) -> R {
+pub(super) fn repeat<R: Select + Clone>(mut x: R, times: Lane, step: impl Fn(&R) -> R) -> R {
     let mut done = Lane::ZERO;
     loop {
         let on = times.simd_gt(done);
@@ -223,8 +247,16 @@ const EXP: [f64; 25] = {
 
 /// `exp(A) − 1` of a Hermitian matrix.
 pub fn exp_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    exp_by(a, |a, n| Powers::of(a, n))
+}
+
+/// `exp(A) − 1`, by the powers of A or of a part of it.
+pub(super) fn exp_by<S: Scalar, const D: usize, A: Storage>(
+    a: &Matrix<S, D, A>,
+    powers: impl for<'b> Fn(&'b Matrix<S, D, A>, usize) -> Powers<'b, S, D, A>,
+) -> Matrix<S, D, A> {
     const LIMITS: [f64; 3] = [0.1, 0.4, 1.5];
-    let inside = |a: &Matrix<S, D, A>, n: usize| Powers::of(a, n).sum(terms::<S>(&EXP, n));
+    let inside = |a: &Matrix<S, D, A>, n: usize| powers(a, n).sum(terms::<S>(&EXP, n));
     let size = a.size();
     by_size(size, &LIMITS, |tier| match tier {
         0 => inside(a, 11),

@@ -1,0 +1,69 @@
+//! The inverse of a matrix, with its derivatives.
+
+use super::{Matrix, Storage, determinant, inner_add, mul_add};
+use crate::scalar::{Each, Lane, Scalar, few, lane};
+
+/// `A⁻¹`; not finite on lanes where A has none.
+pub fn inverse<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    let mut x = of_values(&a.value()).map(S::constant);
+    // Newton's method carries the derivatives: each step doubles how many of them are right.
+    for _ in 0..S::ORDER {
+        let rest = (-a.times(&x)).plus_identity(Lane::ONE);
+        x = &x + &x.times(&rest);
+    }
+    x
+}
+
+/// Gauss and Jordan, with row exchanges lane by lane.
+fn of_values<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
+    let n = a.rows();
+    let (mut a, mut x) = (a.clone(), Matrix::identity(n));
+    for k in 0..n {
+        for i in k + 1..n {
+            let [best, other] = [k, i].each(|i| inner_add(a[(i, k)], a[(i, k)], Lane::ZERO));
+            let larger = other.simd_gt(best);
+            if larger.any() {
+                exchange(&mut a, (k, i), larger);
+                exchange(&mut x, (k, i), larger);
+            }
+        }
+        let pivot = a[(k, k)];
+        let square = inner_add(pivot, pivot, Lane::ZERO);
+        let mut inverse = pivot.each(|x| x / square);
+        if D > 1 {
+            inverse[D - 1] = -inverse[D - 1];
+        }
+        for m in [&mut a, &mut x] {
+            for j in 0..n {
+                m[(k, j)] = mul_add::<Lane, D, false>(m[(k, j)], inverse, [Lane::ZERO; D]);
+            }
+        }
+        for i in (0..n).filter(|&i| i != k) {
+            let factor = a[(i, k)].each(|x| -x);
+            for m in [&mut a, &mut x] {
+                for j in 0..n {
+                    m[(i, j)] = mul_add::<Lane, D, false>(factor, m[(k, j)], m[(i, j)]);
+                }
+            }
+        }
+    }
+    x
+}
+
+/// Exchanges two rows on the lanes of a mask.
+fn exchange<const D: usize, A: Storage>(m: &mut Matrix<Lane, D, A>, (p, q): (usize, usize), mask: Lane) {
+    for j in 0..m.cols() {
+        let (a, b) = (m[(p, j)], m[(q, j)]);
+        m[(p, j)] = few(|c| mask.select(b[c], a[c]));
+        m[(q, j)] = few(|c| mask.select(a[c], b[c]));
+    }
+}
+
+/// `|det A|` to the power −1/n: a matrix times it has a determinant of size one. One where that is no number.
+pub(super) fn balance<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>) -> Lane {
+    let det = determinant(a);
+    let size = inner_add(det, det, Lane::ZERO).sqrt();
+    let factor = (size.ln() * lane(-1.0 / a.rows() as f64)).exp();
+    let good = factor.simd_gt(Lane::ZERO) & factor.simd_lt(lane(f64::INFINITY));
+    good.select(factor, Lane::ONE)
+}

@@ -1,0 +1,258 @@
+//! Groups of invertible matrices as symmetric spaces with the connection of Cartan and Schouten: G × G acts by
+//! g·p = g_L p g_R⁻¹, the symmetry at p is x ↦ p x⁻¹ p, geodesics are p exp(tΩ).
+//!
+//! A tangent vector at p is v = pΩ; its transvection is `E_p(v)x = p e^{Ω/2} p⁻¹ x e^{Ω/2}`. The logarithm
+//! `log_p(q) = p log(p⁻¹q)` is the principal one: it exists while no eigenvalue of p⁻¹q is a negative number, and the
+//! deciding angle is the largest |arg| of one. No metric belongs to the group: lengths are those of Ω and serve for
+//! reporting only. Curves through points of a closed subgroup stay in it, so that its page is this one, with
+//! [`Members`] that know what belongs to it.
+
+use crate::algebra::Algebra;
+use crate::members::{Members, condition};
+use std::f64::consts::{PI, SQRT_2};
+use symspline_core::matrix::{
+    Matrix, Moved, determinant, exp_any_minus_one, inverse, largest_imaginary, log_any_one_plus,
+};
+use symspline_core::scalar::{Lane, Scalar, lane, max_or_nan};
+use symspline_core::space::{Ambient, Frame, Origin, Space};
+
+/// Invertible matrices: real for D = 1, complex for D = 2.
+#[derive(Clone, Copy)]
+pub struct GeneralLinear<const D: usize> {
+    n: usize,
+    members: Members,
+    algebra: Algebra<D>,
+}
+
+impl<const D: usize> GeneralLinear<D> {
+    /// The group, or a closed subgroup of it, by the n of its name.
+    pub fn new(n: usize, members: Members) -> Result<Self, String> {
+        let n = members.rows(n)?;
+        Ok(GeneralLinear { n, members, algebra: Algebra::new(n, members) })
+    }
+
+    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+        Matrix::read(self.n, self.n, x)
+    }
+
+    /// The Ω with v = pΩ.
+    fn generator(&self, p: &[Lane], v: &[Lane]) -> Matrix<Lane, D> {
+        self.algebra.part(inverse(&self.read(p)).times(&self.read(v)))
+    }
+
+    /// `log(p⁻¹q)` and its deciding angle; `p⁻¹q − 1` without cancellation for near points.
+    fn log_between<S: Scalar>(&self, p: &Matrix<S, D>, q: &Matrix<S, D>) -> (Matrix<S, D>, Lane) {
+        log_any_one_plus(&inverse(p).times(&(q - p)))
+    }
+
+    /// p e^{tΩ} and its derivatives in t, as many as are asked for.
+    fn moved(
+        &self,
+        p: &[Lane],
+        v: &[Lane],
+        t: Lane,
+        order: usize,
+    ) -> Moved<D, symspline_core::matrix::Dynamic> {
+        let omega = self.generator(p, v);
+        let p = self.read(p);
+        let x = &p.times(&exp_any_minus_one(&omega.scaled(t))) + &p;
+        if order == 0 {
+            return Moved(x, None);
+        }
+        let d = x.times(&omega);
+        let dd = if order > 1 { d.times(&omega) } else { d.clone() };
+        Moved(x, Some([d, dd]))
+    }
+}
+
+impl<const D: usize> Ambient for GeneralLinear<D> {
+    fn point_len(&self) -> usize {
+        self.n * self.n * D
+    }
+    fn point_shape(&self) -> Vec<usize> {
+        vec![self.n, self.n]
+    }
+    fn is_complex(&self) -> bool {
+        D == 2
+    }
+    fn is_connected(&self) -> bool {
+        D == 2 || !self.members.two_parts()
+    }
+    fn component(&self, p: &[f64]) -> bool {
+        let lanes: Vec<Lane> = p.iter().map(|&x| lane(x)).collect();
+        determinant(&self.read(&lanes))[0].to_array()[0] > 0.0
+    }
+    fn cut_angle(&self) -> f64 {
+        PI
+    }
+    fn injectivity_radius(&self) -> f64 {
+        // Eigenvalues are no longer than the matrix; those of real ones come in pairs.
+        if D == 1 { SQRT_2 * PI } else { PI }
+    }
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        self.moved(p, v, t.value(), S::ORDER).write(t, out);
+    }
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        let p = self.read(p);
+        let (omega, angle) = self.log_between(&p, &self.read(q));
+        p.times(&self.algebra.part(omega)).write(out);
+        angle
+    }
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        let p = self.read(p);
+        let (omega, _) = self.log_between(&p, &self.read(q));
+        (&p.times(&exp_any_minus_one(&omega.times_scalar(t))) + &p).write(out);
+    }
+    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
+        let length = max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt();
+        if self.is_connected() {
+            return length;
+        }
+        // No curve joins matrices whose determinants have different signs.
+        let [p, q] = [p, q].map(|x| determinant(&self.read(x))[0].signum());
+        (p * q).simd_lt(Lane::ZERO).select(lane(f64::INFINITY), length)
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        let p = self.read(p);
+        let back = inverse(&p);
+        let omega = self.algebra.part(back.times(&self.read(v)));
+        let half = exp_any_minus_one(&omega.scaled(lane(0.5))).plus_identity(Lane::ONE);
+        p.times(&half).times(&back).times(&self.read(x)).times(&half).write(out);
+    }
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        let omega = self.generator(gamma, d);
+        self.read(gamma).times(&omega).write(d);
+    }
+    fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
+        // γ d/dt(γ⁻¹γ') = γ(γ⁻¹γ'' − (γ⁻¹γ')²)
+        let p = self.read(gamma);
+        let back = inverse(&p);
+        let omega = back.times(&self.read(d));
+        let rest = &back.times(&self.read(dd)) - &omega.times(&omega);
+        p.times(&self.algebra.part(rest)).write(dd);
+    }
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        self.generator(p, u).inner(&self.generator(p, v))
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        let mut p = self.read(x);
+        let off = self.members.project(&mut p);
+        p.write(x);
+        off
+    }
+    fn scatter(&self, noise: &mut [Lane]) {
+        let omega = self.algebra.part(self.read(noise)).scaled(lane(0.4 / (self.n as f64).sqrt()));
+        exp_any_minus_one(&omega).plus_identity(Lane::ONE).write(noise);
+        self.project(noise);
+    }
+    fn complaint(&self, x: &[f64]) -> String {
+        let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
+        self.members.complaint(&self.read(&lanes))
+    }
+    /// The condition of p: a change of p by its rounding is so much larger seen from p.
+    fn rounding(&self, p: &[Lane]) -> Lane {
+        condition(&self.read(p)).max(Lane::ONE)
+    }
+}
+
+impl<const D: usize> Frame for GeneralLinear<D> {
+    fn frame_len(&self) -> usize {
+        2 * self.point_len()
+    }
+    // A frame at p is g_R of a pair (g_L, g_R) with p = g_L g_R⁻¹, and its inverse: coordinates of pΩ are those of
+    // g_R⁻¹ Ω g_R.
+    fn lift(&self, _p: &[Lane], frame: &mut [Lane]) {
+        for half in frame.chunks_exact_mut(self.point_len()) {
+            Matrix::<Lane, D>::identity(self.n).write(half);
+        }
+    }
+    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        let (omega, angle) = self.log_between(&self.read(p), &self.read(q));
+        let [r, back] = self.frame(frame);
+        self.algebra.coordinates(&back.times(&omega).times(&r), chord);
+        // Moved by what its coordinates say, it stays in the group.
+        let r = &r.times(&exp_any_minus_one(&self.algebra.multiple(-0.5, chord))) + &r;
+        let (first, second) = frame.split_at_mut(self.point_len());
+        r.write(first);
+        inverse(&r).write(second);
+        angle
+    }
+    fn tidy(&self, frame: &mut [Lane], _p: &[Lane]) {
+        let (r, back) = frame.split_at_mut(self.point_len());
+        self.project(r);
+        inverse(&self.read(r)).write(back);
+    }
+    fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        let [r, back] = self.frame(frame);
+        self.algebra.coordinates(&back.times(&self.generator(p, v)).times(&r), x);
+    }
+    fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        let [r, back] = self.frame(frame);
+        let omega = r.times(&self.algebra.multiple(1.0, x)).times(&back);
+        self.read(p).times(&omega).write(v);
+    }
+}
+
+impl<const D: usize> GeneralLinear<D> {
+    fn frame(&self, frame: &[Lane]) -> [Matrix<Lane, D>; 2] {
+        let (r, back) = frame.split_at(self.point_len());
+        [self.read(r), self.read(back)]
+    }
+}
+
+impl<const D: usize> Origin for GeneralLinear<D> {
+    fn dim(&self) -> usize {
+        self.algebra.dim()
+    }
+    fn chord_len(&self) -> usize {
+        self.point_len()
+    }
+    fn curvature(&self) -> f64 {
+        // There is no invariant metric.
+        f64::NAN
+    }
+    fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
+        exp_any_minus_one(&self.algebra.multiple(0.5, chord)).write(prepared);
+    }
+    /// With m = e^{−a/2}e^{d/2}e^{−b/2} and m' the same in reverse order: w⁺ = log(m m'), w⁻ = −m⁻¹ w⁺ m.
+    fn legs<S: Scalar>(
+        &self,
+        _d: &[Lane],
+        prepared: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    ) {
+        let ea = exp_any_minus_one(&self.algebra.multiple(-0.5, a));
+        let eb = exp_any_minus_one(&self.algebra.multiple(-0.5, b));
+        let ed = Matrix::constant(self.n, self.n, prepared);
+        let m = ea.compose(&ed).compose(&eb);
+        let (plus, _) = log_any_one_plus(&m.compose(&eb.compose(&ed).compose(&ea)));
+        let m = m.plus_identity(Lane::ONE);
+        let minus = -inverse(&m).times(&plus).times(&m);
+        self.algebra.coordinates(&plus, w_plus);
+        self.algebra.coordinates(&minus, w_minus);
+    }
+    fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
+        self.algebra.triple(a, b, c, out);
+    }
+    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
+        self.algebra.stretch(v, x);
+    }
+    fn angle(&self, v: &[Lane]) -> Lane {
+        largest_imaginary(&self.algebra.multiple(1.0, v))
+    }
+    /// The square of the condition of e^{d/2}, and what the logarithm near the cut locus makes of errors.
+    fn condition(&self, chord: &[Lane]) -> Lane {
+        let half = exp_any_minus_one(&self.algebra.multiple(0.5, chord)).plus_identity(Lane::ONE);
+        // Angles are at most as large as the part that turns.
+        let turn = self.algebra.multiple(1.0, chord).skew_part().size();
+        let angle = if turn.simd_le(Lane::ONE).all() { turn } else { self.angle(chord) };
+        let near = angle.simd_gt(lane(1.0)).select(angle / angle.sin().abs(), Lane::ONE);
+        let grown = condition(&half).max(Lane::ONE);
+        grown * grown * near
+    }
+}
+
+impl<const D: usize> Space for GeneralLinear<D> {}

@@ -1,0 +1,29 @@
+//! GL(n) and what lies in it: groups of invertible matrices, to which no metric belongs.
+
+mod algebra;
+mod general_linear;
+mod members;
+
+pub use general_linear::GeneralLinear;
+pub use members::Members;
+
+use symspline_core::space::{Entry, Made, table};
+
+/// The spaces of this family.
+pub static FAMILY: &[Entry] = &[
+    Entry { names: &["gl", "general-linear"], parameters: &["n"], make: |p| real(p, Members::All) },
+    Entry {
+        names: &["cgl", "complex-general-linear"],
+        parameters: &["n"],
+        make: |p| table(GeneralLinear::<2>::new(p[0], Members::All)),
+    },
+    Entry { names: &["aff", "affine"], parameters: &["n"], make: |p| real(p, Members::Affine) },
+    Entry { names: &["sim", "similarity"], parameters: &["n"], make: |p| real(p, Members::Similarity) },
+    Entry { names: &["sl", "special-linear"], parameters: &["n"], make: |p| real(p, Members::Special) },
+    Entry { names: &["sp", "symplectic"], parameters: &["n"], make: |p| real(p, Members::Symplectic) },
+    Entry { names: &["lorentz"], parameters: &["n"], make: |p| real(p, Members::Lorentz) },
+];
+
+fn real(p: &[usize], members: Members) -> Made {
+    table(GeneralLinear::<1>::new(p[0], members))
+}

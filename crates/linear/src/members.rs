@@ -1,0 +1,184 @@
+//! Which matrices belong to a group: how far one is from it, the nearest that does, and why one does not.
+
+use symspline_core::matrix::{Matrix, Select, determinant, inverse};
+use symspline_core::scalar::{Lane, lane, max_or_nan};
+
+/// Closed subgroups of GL(n), all of them as matrices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Members {
+    /// Every invertible matrix.
+    All,
+    /// x ↦ Ax + b as (A, b; 0, 1).
+    Affine,
+    /// x ↦ sRx + b with a rotation R and s > 0.
+    Similarity,
+    /// Determinant one.
+    Special,
+    /// XᵀJX = J with J = (0, 1; −1, 0).
+    Symplectic,
+    /// XᵀηX = η with η = diag(−1, 1, …, 1), of determinant one and keeping the direction of time.
+    Lorentz,
+}
+
+/// Condition from which on a matrix is singular as far as doubles can tell.
+const SINGULAR: f64 = 1e14;
+
+type Point<const D: usize> = Matrix<Lane, D>;
+
+impl Members {
+    /// Rows of the matrices, for the n of the name; or why n is bad.
+    pub fn rows(self, n: usize) -> Result<usize, String> {
+        let (name, least) = match self {
+            Members::All => ("GeneralLinear", 1),
+            Members::Affine => ("Affine", 1),
+            Members::Similarity => ("Similarity", 2),
+            Members::Special => ("SpecialLinear", 2),
+            Members::Symplectic => ("Symplectic", 2),
+            Members::Lorentz => ("Lorentz", 1),
+        };
+        if n < least {
+            return Err(format!("{name}(n) needs n >= {least}, not {n}"));
+        }
+        match self {
+            Members::Symplectic if n % 2 == 1 => Err(format!("Symplectic(n) needs an even n, not {n}")),
+            Members::Affine | Members::Similarity | Members::Lorentz => Ok(n + 1),
+            _ => Ok(n),
+        }
+    }
+
+    /// Whether the last row is (0, …, 0, 1).
+    fn maps(self) -> bool {
+        matches!(self, Members::Affine | Members::Similarity)
+    }
+
+    /// Whether matrices of negative determinant are a second part.
+    pub fn two_parts(self) -> bool {
+        matches!(self, Members::All | Members::Affine)
+    }
+
+    /// The adjoint X* for which X*X = 1 on the group; for similarities on their linear parts, up to their scale.
+    fn adjoint<const D: usize>(self, x: &Point<D>) -> Option<Point<D>> {
+        let n = x.rows();
+        let entry = |i: usize, j: usize, minus: bool| {
+            let x = x[(i, j)];
+            if minus { x.map(|x| -x) } else { x }
+        };
+        match self {
+            Members::Symplectic => {
+                let m = n / 2;
+                let other = |i: usize| (i + m) % n;
+                Some(Matrix::from_fn(n, n, |i, j| entry(other(j), other(i), (i < m) != (j < m))))
+            }
+            Members::Lorentz => Some(Matrix::from_fn(n, n, |i, j| entry(j, i, (i == 0) != (j == 0)))),
+            Members::Similarity => Some(Matrix::from_fn(n - 1, n - 1, |i, j| entry(j, i, false))),
+            _ => None,
+        }
+    }
+
+    /// X*X − 1, for similarities with the mean of the diagonal as the unit.
+    fn defect<const D: usize>(self, x: &Point<D>) -> Option<Point<D>> {
+        let adjoint = self.adjoint(x)?;
+        let m = adjoint.rows();
+        let product = adjoint.times(&linear(x, m));
+        let unit = if self == Members::Similarity { product.trace() / lane(m as f64) } else { Lane::ONE };
+        Some(product.scaled(Lane::ONE / unit).plus_identity(lane(-1.0)))
+    }
+
+    /// Replaces a matrix by one of the group beside it; returns how far it was.
+    pub fn project<const D: usize>(self, p: &mut Point<D>) -> Lane {
+        let n = p.rows();
+        let mut off = Lane::ZERO;
+        if self.maps() {
+            for j in 0..n {
+                let expected = if j + 1 == n { Lane::ONE } else { Lane::ZERO };
+                // Also shifts that are not finite are far off: 0·∞ is NaN.
+                off = max_or_nan(off, (p[(n - 1, j)][0] - expected).abs() + p[(j, n - 1)][0] * Lane::ZERO);
+                p[(n - 1, j)][0] = expected;
+            }
+        }
+        // A matrix that is singular to rounding is none at all.
+        let condition = condition(p);
+        off = condition.simd_lt(lane(SINGULAR)).select(off, lane(f64::NAN));
+        let rounding = lane(4.0 * n as f64 * f64::EPSILON) * condition.max(Lane::ONE);
+        if self == Members::Special {
+            let det = determinant(p)[0];
+            let wrong = (det - Lane::ONE).abs();
+            off = max_or_nan(off, det.simd_gt(Lane::ZERO).select(wrong, lane(f64::NAN)));
+            let scale = (det.ln() * lane(-1.0 / n as f64)).exp();
+            let scaled = p.scaled(scale);
+            *p = Select::select(wrong.simd_le(rounding), p.clone(), scaled);
+        }
+        if let Some(mut defect) = self.defect(p) {
+            let wrong = defect.size() * lane(0.5);
+            off = max_or_nan(off, wrong);
+            let start = p.clone();
+            let m = defect.rows();
+            for _ in 0..4 {
+                // Newton's method for the factor of a polar decomposition.
+                let part = linear(p, m);
+                put(p, &(&part - &part.times(&defect.scaled(lane(0.5)))));
+                defect = self.defect(p).unwrap_or(defect);
+            }
+            *p = Select::select(wrong.simd_le(rounding), start, p.clone());
+        }
+        if matches!(self, Members::Similarity | Members::Lorentz) {
+            let mut good = determinant(p)[0].simd_gt(Lane::ZERO);
+            if self == Members::Lorentz {
+                good = good & p[(0, 0)][0].simd_gt(Lane::ZERO);
+            }
+            off = good.select(off, lane(f64::NAN));
+        }
+        off
+    }
+
+    /// Says in words and numbers why x, which is finite, is not a point.
+    pub fn complaint<const D: usize>(self, p: &Point<D>) -> String {
+        let n = p.rows();
+        let number = |x: Lane| x.to_array()[0];
+        if self.maps() {
+            let last: Vec<f64> = (0..n).map(|j| number(p[(n - 1, j)][0])).collect();
+            if last.iter().enumerate().any(|(j, x)| (x - if j + 1 == n { 1.0 } else { 0.0 }).abs() > 1e-8) {
+                return format!("its last row is {last:?}, not (0, …, 0, 1)");
+            }
+        }
+        let condition = number(condition(p));
+        if !(condition < SINGULAR) {
+            return format!("it is singular: its condition number is {condition:.1e}");
+        }
+        let det = number(determinant(p)[0]);
+        let off = self.defect(p).map_or(0.0, |defect| number(defect.size()));
+        match self {
+            Members::Special => format!("its determinant is {det:.9e}, not 1"),
+            Members::Symplectic => format!("it is not symplectic: |J⁻¹xᵀJx - 1| = {off:.3e}"),
+            Members::Lorentz if off > 1e-8 => {
+                format!("it does not preserve -t² + x²: |ηxᵀηx - 1| = {off:.3e}")
+            }
+            Members::Lorentz if det < 0.0 => "its determinant is -1: it is a reflection".into(),
+            Members::Lorentz => "it turns time round: its first number is negative".into(),
+            Members::Similarity if off > 1e-8 => {
+                format!("its linear part is not a multiple of a rotation: |rᵀr/s² - 1| = {off:.3e}")
+            }
+            Members::Similarity => "its linear part is a reflection, not a rotation".into(),
+            Members::All | Members::Affine => String::new(),
+        }
+    }
+}
+
+/// The first m rows and columns.
+fn linear<const D: usize>(x: &Point<D>, m: usize) -> Point<D> {
+    Matrix::from_fn(m, m, |i, j| x[(i, j)])
+}
+
+/// Replaces the first rows and columns.
+fn put<const D: usize>(x: &mut Point<D>, part: &Point<D>) {
+    for i in 0..part.rows() {
+        for j in 0..part.cols() {
+            x[(i, j)] = part[(i, j)];
+        }
+    }
+}
+
+/// |p| |p⁻¹|/n: one for a multiple of a rotation.
+pub fn condition<const D: usize>(p: &Point<D>) -> Lane {
+    p.size() * inverse(p).size() / lane(p.rows() as f64)
+}
