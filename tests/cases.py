@@ -72,6 +72,7 @@ CASES = [
     Case("spd:1", far=1.5, smooth=False, few=True),
     Case("spd:2", far=1.5, face=True),
     Case("spd:3", far=1.5),
+    Case("sspd:3", far=1.5, few=True, face=True),
     Case("hpd:1", far=1.5, smooth=False, few=True, face=True),
     Case("hpd:2", far=1.5, face=True),
     Case("hpd:5", far=1.5, few=True),
@@ -111,7 +112,7 @@ LOOPS = [*CURVED, "se:3"]
 # The names of every space in the library, one row a family.
 FAMILIES = Handle.names()
 
-POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite)
+POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite, ss.SpecialPositiveDefinite)
 HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
 LINEAR = (
     ss.GeneralLinear,

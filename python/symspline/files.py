@@ -281,12 +281,16 @@ def _check(space: Space, points: Array, velocities: Array, converged: Any) -> No
         raise ValidationError("velocities are not tangent")
 
 
+# Of the report, what need not be known.
+_MAYBE = ("invariant_radius", "alternative_energy")
+
+
 def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int, ...]) -> Report:
-    numbers = dict.fromkeys(("residual", "max_step", "curvature", "invariant_radius", "rate"), "f")
+    numbers = dict.fromkeys(("residual", "max_step", "curvature", "rate", *_MAYBE), "f")
     kinds = {"converged": "b", "iterations": "i"} | numbers
 
     def column(key: str, value: Any) -> Any:
-        if key not in kinds or (key == "invariant_radius" and value is None):
+        if key not in kinds or (key in _MAYBE and value is None):
             return value
         shape = () if key == "curvature" else batch
         array = np.asarray(value)

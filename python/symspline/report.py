@@ -41,6 +41,9 @@ class Report:
             unequal knots and other ends than natural ones and given velocities; NaN for such a curve of a
             batch.
         rate: mean contraction of the residual per iteration.
+        alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
+            found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
+            batch.
     """
 
     method: str
@@ -52,6 +55,7 @@ class Report:
     curvature: float
     invariant_radius: Number | None
     rate: Number
+    alternative_energy: Number | None = None
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -83,10 +87,11 @@ class Report:
 
     def map(self, function: Any) -> Report:
         """The report with a function applied to the fields that are per curve."""
-        radius = self.invariant_radius
-        if radius is not None:
-            part = function(radius)
-            radius = None if np.ndim(part) == 0 and np.isnan(part) else part
+
+        def known(value: Any) -> Any:
+            part = None if value is None else function(value)
+            return None if part is None or (np.ndim(part) == 0 and np.isnan(part)) else part
+
         return Report(
             self.method,
             function(self.converged),
@@ -95,8 +100,9 @@ class Report:
             function(self.max_step),
             function(self.max_gap),
             self.curvature,
-            radius,
+            known(self.invariant_radius),
             function(self.rate),
+            known(self.alternative_energy),
         )
 
 
@@ -107,7 +113,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 # As the compiled core numbers them, in the order in which they are tried.
-SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy")
+SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
 
 
 def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Report:
@@ -129,6 +135,8 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
         # The theorem is about each factor by itself.
         invariant_radius=None,
         rate=largest("rate"),
+        # Nor are curves of one factor alternatives to the whole.
+        alternative_energy=None,
     )
 
 
@@ -148,7 +156,7 @@ def shaped(
     """A report from the compiled core's columns, of curves with these knots; ``method`` is what was asked for."""
     gap = longest_gap(times, batch)
     if batch == ():
-        converged, iterations, residual, max_step, rate, last, radius = [c.item() for c in columns]
+        converged, iterations, residual, max_step, rate, last, radius, other = [c.item() for c in columns]
         return Report(
             SOLVERS[last],
             converged,
@@ -159,8 +167,9 @@ def shaped(
             curvature,
             None if math.isnan(radius) else radius,
             rate,
+            None if math.isnan(other) else other,
         )
-    converged, iterations, residual, max_step, rate, solvers, radius = [c.reshape(batch) for c in columns]
+    converged, iterations, residual, max_step, rate, solvers, *rest = [c.reshape(batch) for c in columns]
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
-    known = None if np.isnan(radius).all() else radius
-    return Report(used, converged, iterations, residual, max_step, gap, curvature, known, rate)
+    radius, other = (None if np.isnan(column).all() else column for column in rest)
+    return Report(used, converged, iterations, residual, max_step, gap, curvature, radius, rate, other)

@@ -49,9 +49,11 @@ class CubicSpline(Piecewise):
             pair with one of ``"natural"``, ``"clamped"``, ``"not-a-knot"``, ``(1, velocity)``,
             ``(2, acceleration)`` for either end. The paper's clamped spline is ``((1, v0), (1, vN))``.
             Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
-        method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1), or ``"auto"``:
-            quasi-Newton, for curves that it leaves Newton's method, and then a homotopy from flat space.
-            `Report.method` says which was used.
+        method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1), ``"homotopy"`` (the
+            curve that is continued from near points), or ``"auto"``: quasi-Newton, for curves that it leaves Newton's
+            method, and then the homotopy. Points far apart (steps beyond 0.6 of the injectivity radius) may have
+            several C² curves: of those that it, the homotopy and a trust region lead to, it keeps the one that bends
+            least. `Report.method` says which was used.
         tol: largest relative C² defect that counts as converged, see `Report.residual`.
         max_iter: largest number of iterations; None for the method's own.
         extrapolate: what happens outside the knots: None raises (and wraps for periodic curves), True

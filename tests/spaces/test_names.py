@@ -119,6 +119,7 @@ DIMENSIONS = {
     "su": lambda n: n * n - 1,
     "spd": lambda n: n * (n + 1) // 2,
     "hpd": lambda n: n * n,
+    "sspd": lambda n: n * (n + 1) // 2 - 1,
     "se": lambda n: n * (n + 1) // 2,
     "gl": lambda n: n * n,
     "cgl": lambda n: 2 * n * n,

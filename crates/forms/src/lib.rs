@@ -9,19 +9,20 @@ use symspline_core::space::{Entry, Made, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
-    Entry { names: &["spd", "symmetric-positive-definite"], parameters: &["n"], make: real },
+    Entry { names: &["spd", "symmetric-positive-definite"], parameters: &["n"], make: |p| real(p, false) },
     Entry {
         names: &["hpd", "hermitian-positive-definite"],
         parameters: &["n"],
-        make: |p| table(PositiveDefinite::<2>::new(p[0])),
+        make: |p| table(PositiveDefinite::<2>::new(p[0], false)),
     },
+    Entry { names: &["sspd", "special-positive-definite"], parameters: &["n"], make: |p| real(p, true) },
 ];
 
 /// In code of its own where the size is known to the compiler.
-fn real(p: &[usize]) -> Made {
+fn real(p: &[usize], special: bool) -> Made {
     match p[0] {
-        2 => table(PositiveDefinite::<1, Known<2, 4>>::new(2)),
-        3 => table(PositiveDefinite::<1, Known<3, 9>>::new(3)),
-        n => table(PositiveDefinite::<1>::new(n)),
+        2 => table(PositiveDefinite::<1, Known<2, 4>>::new(2, special)),
+        3 => table(PositiveDefinite::<1, Known<3, 9>>::new(3, special)),
+        n => table(PositiveDefinite::<1>::new(n, special)),
     }
 }

@@ -16,6 +16,8 @@ use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PositiveDefinite<const D: usize, A = Dynamic> {
     n: usize,
+    /// Of determinant one: a totally geodesic part, SL(n)/SO(n).
+    special: bool,
     storage: PhantomData<A>,
 }
 
@@ -23,18 +25,38 @@ pub struct PositiveDefinite<const D: usize, A = Dynamic> {
 const NEAR: f64 = 0.35;
 
 impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
-    /// The n × n matrices.
-    pub fn new(n: usize) -> Result<Self, String> {
-        let name = if D == 1 { "SymmetricPositiveDefinite" } else { "HermitianPositiveDefinite" };
-        if n == 0 {
-            Err(format!("{name}(n) needs n >= 1"))
+    /// The n × n matrices, or those of determinant one.
+    pub fn new(n: usize, special: bool) -> Result<Self, String> {
+        let (name, least) = match (D, special) {
+            (_, true) => ("SpecialPositiveDefinite", 2),
+            (1, false) => ("SymmetricPositiveDefinite", 1),
+            _ => ("HermitianPositiveDefinite", 1),
+        };
+        if n < least {
+            Err(format!("{name}(n) needs n >= {least}"))
         } else {
-            Ok(PositiveDefinite { n, storage: PhantomData })
+            Ok(PositiveDefinite { n, special, storage: PhantomData })
         }
     }
 
+    /// The logarithm of the determinant.
+    fn log_det(&self, p: &Matrix<Lane, D, A>) -> Lane {
+        let l = cholesky(p);
+        (0..self.n).fold(Lane::ZERO, |sum, j| sum + l[(j, j)][0].ln()) * lane(2.0)
+    }
+
+    /// A tangent vector at p without what changes the determinant, where that is one.
+    fn tangential(&self, p: &[Lane], v: Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
+        if !self.special {
+            return v;
+        }
+        let p = self.read(p);
+        let mean = whiten(&cholesky(&p), &v).trace() * lane(1.0 / self.n as f64);
+        &v - &p.scaled(mean)
+    }
+
     fn algebra(&self) -> Algebra<D, A> {
-        Algebra { n: self.n, skew: false, traceless: false, storage: PhantomData }
+        Algebra { n: self.n, skew: false, traceless: self.special, storage: PhantomData }
     }
 
     /// L e^{tw} L* with p = L L* and v = L w L*, and its derivatives in t, as many as are asked for.
@@ -185,13 +207,14 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         let g = l.times(&exp_minus_one(&half).plus_identity(Lane::ONE));
         congruent(&g, &whiten(&l, &self.read(x))).write(out);
     }
-    fn velocity(&self, _gamma: &[Lane], d: &mut [Lane]) {
-        self.read(d).hermitian_part().write(d);
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        self.tangential(gamma, self.read(d).hermitian_part()).write(d);
     }
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
         // γ'' − γ'γ⁻¹γ'
         let x = solve_lower(&cholesky(&self.read(gamma)), &self.read(d));
-        (&self.read(dd).hermitian_part() - &x.adjoint_times(&x)).hermitian_part().write(dd);
+        let rest = (&self.read(dd).hermitian_part() - &x.adjoint_times(&x)).hermitian_part();
+        self.tangential(gamma, rest).write(dd);
     }
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         let l = cholesky(&self.read(p));
@@ -203,14 +226,30 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         // Squares of very large or small entries would overflow or vanish.
         let largest = x.iter().fold(Lane::ZERO, |m, x| max_or_nan(m, x.abs()));
         let unit = Lane::ONE / largest.simd_gt(Lane::ZERO).select(largest, Lane::ONE);
-        let off = (&p - &before).scaled(unit).size() / p.scaled(unit).size();
+        let mut off = (&p - &before).scaled(unit).size() / p.scaled(unit).size();
         let good = positive_definite(&p) & largest.is_finite();
+        let mut p = p;
+        if self.special {
+            let wrong = self.log_det(&p);
+            off = max_or_nan(off, wrong.abs());
+            p.write(x);
+            let rounding = lane(4.0 * self.n as f64 * f64::EPSILON) * self.rounding(x);
+            let scale = (wrong * lane(-1.0 / self.n as f64)).exp();
+            p = p.scaled(wrong.abs().simd_le(rounding).select(Lane::ONE, scale));
+        }
         p.map(|x| good.select(x, lane(f64::NAN))).write(x);
         good.select(off, lane(f64::INFINITY))
     }
     fn scatter(&self, noise: &mut [Lane]) {
-        let h = self.read(noise).hermitian_part();
+        let mut h = self.read(noise).hermitian_part();
+        if self.special {
+            let mean = h.trace() * lane(1.0 / self.n as f64);
+            h = h.plus_identity(-mean);
+        }
         exp_minus_one(&h).plus_identity(Lane::ONE).write(noise);
+        if self.special {
+            self.project(noise);
+        }
     }
     fn complaint(&self, x: &[f64]) -> String {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
@@ -226,7 +265,10 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         diagonalise(&mut values);
         let least = (0..self.n).map(|i| values[0][(i, i)][0].to_array()[0]).fold(f64::INFINITY, f64::min);
         let rounding = if least > 0.0 { ", which is rounding beside the others" } else { "" };
-        if positive_definite(&p).all() {
+        if self.special && positive_definite(&p).all() && off < 1e-8 {
+            let det = self.log_det(&p).to_array()[0].exp();
+            format!("its determinant is {det:.9e}, not 1 (SymmetricPositiveDefinite({}) takes it)", self.n)
+        } else if positive_definite(&p).all() {
             format!("it is not {what}: the skew part is {off:.3e} of it")
         } else {
             format!("it is not positive definite: its smallest eigenvalue is {least:.6e}{rounding}")

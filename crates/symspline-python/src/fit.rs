@@ -49,9 +49,10 @@ pub fn fit<'py>(
         "fixed-point" => Method::FixedPoint,
         "quasi-newton" => Method::QuasiNewton,
         "newton" => Method::Newton,
+        "homotopy" => Method::Homotopy,
         _ => {
             return Err(invalid(format!(
-                "method must be 'auto', 'fixed-point', 'quasi-newton' or 'newton', not {method:?}"
+                "method must be 'auto', 'fixed-point', 'quasi-newton', 'newton' or 'homotopy', not {method:?}"
             )));
         }
     };
@@ -125,15 +126,15 @@ pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
     })
 }
 
-/// The report's columns: converged, iterations, residual, max_step, rate, solver, invariant_radius.
+/// The report's columns: converged, iterations, residual, max_step, rate, solver, invariant_radius, alternative.
 fn arrays<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyTuple>> {
     let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
     let converged = PyArray1::from_iter(py, reports.iter().map(|r| r.status == Status::Converged));
     let iterations = PyArray1::from_iter(py, reports.iter().map(|r| r.iterations as i64));
     let solver = PyArray1::from_iter(py, reports.iter().map(|r| r.solver as i64));
     let [residual, step, rate] = [column(|r| r.residual), column(|r| r.max_step), column(|r| r.rate)];
-    let radius = column(|r| r.invariant_radius);
-    (converged, iterations, residual, step, rate, solver, radius).into_pyobject(py)
+    let [radius, alternative] = [column(|r| r.invariant_radius), column(|r| r.alternative)];
+    (converged, iterations, residual, step, rate, solver, radius, alternative).into_pyobject(py)
 }
 
 fn faults(

@@ -115,7 +115,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="natural (default), not-a-knot, clamped, periodic; "
         "or two of the first three with a comma, for start and end",
     )
-    add("--method", default="auto", metavar="M", help="auto (default), quasi-newton, newton or fixed-point")
+    add(
+        "--method",
+        default="auto",
+        metavar="M",
+        help="auto (default), quasi-newton, newton, homotopy or fixed-point",
+    )
     add(
         "--tol",
         type=real,

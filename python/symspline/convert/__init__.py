@@ -1,4 +1,5 @@
-"""Other coordinates of points: models of hyperbolic space, projectors, density matrices, quaternions.
+"""Other coordinates of points: models of hyperbolic space, projectors, density matrices, quaternions, spaces that lie
+in others.
 
 Every function works on arrays of points: leading axes stay as they are. Input of double precision may be
 off by 1e-8, of single precision by 1e-4; what comes out is exact to rounding.
@@ -8,6 +9,12 @@ off by 1e-8, of single precision by 1e-4; what comes out is exact to rounding.
 array([0.76159416])
 """
 
+from .embeddings import (
+    positive_definite_to_siegel,
+    quaternions_to_subspace,
+    siegel_to_positive_definite,
+    subspace_to_quaternions,
+)
 from .models import (
     ball_to_half_space,
     ball_to_hyperboloid,
@@ -29,7 +36,11 @@ __all__ = [
     "hyperboloid_to_ball",
     "hyperboloid_to_half_space",
     "matrix_to_quaternion",
+    "positive_definite_to_siegel",
     "projector_to_basis",
     "quaternion_to_matrix",
+    "quaternions_to_subspace",
+    "siegel_to_positive_definite",
     "state_to_density",
+    "subspace_to_quaternions",
 ]

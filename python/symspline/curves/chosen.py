@@ -150,8 +150,9 @@ def _left_out(space: Space, points: Points) -> Solved:
     count = math.prod(points.batch)
     shape = (*points.batch, points.nodes, *space.point_shape)
     places, velocities = (np.full(shape, np.nan, space.dtype) for _ in range(2))
-    # As the core writes them: converged, iterations, residual, longest step, rate, solver, radius.
-    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(7)]
+    # As the core writes them: converged, iterations, residual, longest step, rate, solver, radius,
+    # energy of another curve.
+    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(8)]
     columns[0], columns[1], columns[5] = (np.zeros(count, kind) for kind in (bool, np.int64, np.int64))
     return Solved(places, velocities, tuple(columns), [])
 

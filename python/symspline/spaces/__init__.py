@@ -12,7 +12,7 @@ from .linear import (
     Symplectic,
 )
 from .named import space
-from .positive import HermitianPositiveDefinite, SymmetricPositiveDefinite
+from .positive import HermitianPositiveDefinite, SpecialPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, together
 from .subspaces import ComplexGrassmannian, ComplexHyperbolic, ComplexProjective, Grassmannian, RealProjective
 from .tolerance import POINT_TOL_FLOAT32, point_tol
@@ -40,6 +40,7 @@ __all__ = [
     "SpecialEuclidean",
     "SpecialLinear",
     "SpecialOrthogonal",
+    "SpecialPositiveDefinite",
     "SpecialUnitary",
     "Sphere",
     "SymmetricPositiveDefinite",

@@ -21,6 +21,22 @@ class SymmetricPositiveDefinite(Space):
         super().__init__(n)
 
 
+class SpecialPositiveDefinite(Space):
+    """Symmetric positive definite n × n matrices of determinant 1, SL(n)/SO(n): the shape of a tensor without its
+    size. A totally geodesic part of `SymmetricPositiveDefinite`, with its metric.
+
+    >>> import numpy as np, symspline as ss
+    >>> ss.SpecialPositiveDefinite(2).geodesic(np.eye(2), np.diag([4, 0.25]), 0.5).round(12)
+    array([[2. , 0. ],
+           [0. , 0.5]])
+    """
+
+    _name = "sspd"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+
 class HermitianPositiveDefinite(Space):
     """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
 

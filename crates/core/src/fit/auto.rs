@@ -2,9 +2,9 @@
 
 use super::chain::Chain;
 use super::ends::ChainEnds;
-use super::homotopy;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{Method, Options, Solver};
+use super::{calm, homotopy};
 use crate::monitor::Monitor;
 use crate::scalar::Lane;
 use crate::space::Erased;
@@ -20,18 +20,31 @@ enum Start {
     Zero,
 }
 
-/// Solves by the method asked for.
+/// Solves by the method asked for: `whole` curves, or pieces of longer ones.
 pub fn run(
     space: &Erased,
     chain: &mut Chain,
     ends: &ChainEnds,
     options: &Options,
     idle: Lane,
+    whole: bool,
     work: &mut Workspace,
     monitor: &Monitor,
 ) -> Outcome {
     let (solver, most) = match options.method {
-        Method::Auto => return in_turn(space, chain, ends, options, idle, work, monitor),
+        Method::Auto => {
+            let mut outcome = in_turn(space, chain, ends, options, idle, work, monitor);
+            // Pieces of one curve must not choose apart.
+            if whole {
+                calm::settle(space, chain, ends, options, idle, work, monitor, &mut outcome);
+            }
+            return outcome;
+        }
+        Method::Homotopy => {
+            let mut outcome = Outcome::none(Solver::Homotopy);
+            homotopy::follow(space, chain, ends, options, idle, work, monitor, &mut outcome);
+            return outcome;
+        }
         Method::FixedPoint => (Solver::FixedPoint, 2000),
         Method::QuasiNewton => (Solver::QuasiNewton, 300),
         Method::Newton => (Solver::Newton, 100),

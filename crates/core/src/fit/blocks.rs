@@ -21,6 +21,34 @@ impl Blocks {
         }
     }
 
+    /// `A x`; of a closed curve the first and the last node are neighbours.
+    pub fn times(&self, nodes: usize, m: usize, closed: bool, x: &[Lane], out: &mut [Lane]) {
+        out.fill(Lane::ZERO);
+        self.each(nodes, m, closed, |at, i, j| out[i] = at.mul_add(x[j], out[i]));
+    }
+
+    /// `Aᵀ x`.
+    pub fn transposed_times(&self, nodes: usize, m: usize, closed: bool, x: &[Lane], out: &mut [Lane]) {
+        out.fill(Lane::ZERO);
+        self.each(nodes, m, closed, |at, i, j| out[j] = at.mul_add(x[i], out[j]));
+    }
+
+    /// Hands out every number with its row and column.
+    fn each(&self, nodes: usize, m: usize, closed: bool, mut f: impl FnMut(Lane, usize, usize)) {
+        for (side, block) in self.sides.iter().enumerate() {
+            for i in 0..nodes {
+                let inside = i + side >= 1 && i + side <= nodes;
+                if !(inside || closed) {
+                    continue;
+                }
+                let j = (i + side + nodes - 1) % nodes;
+                for (at, number) in block[i * m * m..(i + 1) * m * m].iter().enumerate() {
+                    f(*number, i * m + at / m, j * m + at % m);
+                }
+            }
+        }
+    }
+
     /// Solves the block tridiagonal system of the first nodes in place, for several right sides, which
     /// overwrites the blocks:
     /// `x` holds m × `columns` numbers a node.

@@ -219,6 +219,16 @@ impl Chain {
         vector.iter_mut().for_each(|x| *x *= self.scale);
     }
 
+    /// Frame and point at the first node.
+    pub fn home(&self) -> (&[Lane], &[Lane]) {
+        (&self.start.0, &self.start.1)
+    }
+
+    /// What energies are multiplied by to bring them to the units of knots and points.
+    pub fn unit_of_energy(&self) -> Lane {
+        self.clock * self.clock * self.clock / (self.scale * self.scale)
+    }
+
     /// The velocities of all nodes.
     pub fn velocities(&self) -> &[Lane] {
         &self.u

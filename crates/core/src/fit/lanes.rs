@@ -83,7 +83,8 @@ fn fit_in(
     let idle = mask_from(|l| cut[l].is_some());
     let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
     let options = Options { tol: pieces_tol, ..*options };
-    let outcome = auto::run(space, chain, &ends, &options, idle, work, monitor);
+    let outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
+    let alternative = outcome.alternative.to_array();
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
     let noisy = noisy_legs(space, chain, &runs, outcome.leg);
     let steps = chain.max_step.to_array();
@@ -109,6 +110,7 @@ fn fit_in(
             rate: rate[l],
             solver: outcome.solver[l],
             invariant_radius: f64::NAN,
+            alternative: alternative[l],
         };
         p.end_leg = given[l];
     }

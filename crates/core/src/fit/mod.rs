@@ -2,11 +2,13 @@
 
 mod auto;
 mod blocks;
+mod calm;
 mod certificate;
 mod chain;
 mod condition;
 mod convergence;
 mod ends;
+mod energy;
 mod fixed_point;
 mod homotopy;
 mod lanes;
@@ -17,6 +19,7 @@ mod pieces;
 mod quasi_newton;
 mod solve;
 mod tridiagonal;
+mod trust_region;
 
 pub use blocks::Blocks;
 pub use chain::{Chain, Run, Visit};
@@ -78,6 +81,8 @@ pub enum Method {
     QuasiNewton,
     /// Newton's method with the block-tridiagonal Jacobian.
     Newton,
+    /// Newton's method along a homotopy from flat space.
+    Homotopy,
 }
 
 /// The solver that a curve ended with, in the order in which they are tried.
@@ -91,6 +96,8 @@ pub enum Solver {
     Newton,
     /// Newton's method along a homotopy from flat space.
     Homotopy,
+    /// Least squares in a trust region.
+    TrustRegion,
 }
 
 /// Solver options.
@@ -171,6 +178,8 @@ pub struct Report {
     pub solver: Solver,
     /// The smallest V of (38), NaN where Theorem 3.1 says nothing.
     pub invariant_radius: f64,
+    /// The least energy ∫ |∇γ'|² dt of other C² curves through the points that were found, NaN where none was.
+    pub alternative: f64,
 }
 
 impl Default for Report {
@@ -183,6 +192,7 @@ impl Default for Report {
             rate: 0.0,
             solver: Solver::FixedPoint,
             invariant_radius: f64::NAN,
+            alternative: f64::NAN,
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::space::Erased;
 /// The Jacobian and memory to solve with it.
 #[derive(Default)]
 pub struct Newton {
-    blocks: Blocks,
+    pub(super) blocks: Blocks,
     vectors: NodeVectors<Dual>,
     u: Vec<Dual>,
     r: Vec<Dual>,
@@ -23,6 +23,11 @@ pub struct Newton {
 /// `step ← −J⁻¹ r` for the defect in `chain.r`.
 pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [Lane]) {
     newton.differentiate(space, chain, ends);
+    solve(chain, ends, newton, step);
+}
+
+/// The same with the Jacobian that is there, which it overwrites.
+pub fn solve(chain: &Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [Lane]) {
     step.copy_from_slice(&chain.r[..step.len()]);
     let (n, m) = (chain.n, chain.m);
     match ends {
@@ -36,7 +41,7 @@ pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, newton: &mut 
 
 impl Newton {
     /// Fills the blocks with the derivatives of the defect.
-    fn differentiate(&mut self, space: &Erased, chain: &mut Chain, ends: &ChainEnds) {
+    pub(super) fn differentiate(&mut self, space: &Erased, chain: &mut Chain, ends: &ChainEnds) {
         let (n, m) = (chain.n, chain.m);
         let closed = matches!(ends, ChainEnds::Periodic);
         let nodes = if closed { n } else { n + 1 };

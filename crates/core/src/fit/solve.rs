@@ -27,6 +27,7 @@ pub struct Limits {
 }
 
 /// How eight iterations ended.
+#[derive(Clone)]
 pub struct Outcome {
     /// Residual evaluations.
     pub iterations: [usize; LANES],
@@ -42,9 +43,53 @@ pub struct Outcome {
     pub rate: Lane,
     /// Which solver got there.
     pub solver: [Solver; LANES],
+    /// The least energy of other curves that were found; NaN where none was.
+    pub alternative: Lane,
 }
 
 impl Outcome {
+    /// That of a solver that has not begun on the lanes of a mask; on others it is settled.
+    pub fn afresh(&self, on: Lane) -> Self {
+        let on_lane = mask_bits(on);
+        Outcome {
+            iterations: [0; LANES],
+            residual: on.select(lane(f64::INFINITY), self.residual),
+            converged: std::array::from_fn(|l| !on_lane[l]),
+            fault: [None; LANES],
+            ..self.clone()
+        }
+    }
+
+    /// Takes everything of a solver that ran before, on the lanes of a mask; on others its work counts.
+    pub fn fill(&mut self, before: &Outcome, lanes: Lane) {
+        let ended = mask_bits(lanes);
+        self.residual = lanes.select(before.residual, self.residual);
+        self.rate = lanes.select(before.rate, self.rate);
+        self.leg = lanes.select(before.leg, self.leg);
+        for l in 0..LANES {
+            self.iterations[l] += before.iterations[l];
+            if ended[l] {
+                self.converged[l] = before.converged[l];
+                self.fault[l] = before.fault[l];
+                self.solver[l] = before.solver[l];
+            }
+        }
+    }
+
+    /// That of a solver that has not begun.
+    pub fn none(solver: Solver) -> Self {
+        Outcome {
+            iterations: [0; LANES],
+            residual: lane(f64::INFINITY),
+            converged: [false; LANES],
+            fault: [None; LANES],
+            leg: Lane::ZERO,
+            rate: Lane::ZERO,
+            solver: [solver; LANES],
+            alternative: lane(f64::NAN),
+        }
+    }
+
     /// The lanes that need no further solver.
     pub fn settled(&self, idle: Lane) -> Lane {
         idle | mask_from(|l| self.converged[l])
@@ -63,13 +108,27 @@ impl Outcome {
         let better: [bool; LANES] = std::array::from_fn(|l| {
             lanes[l] && (found.converged[l] || !(new[l] >= old[l])) && new[l].is_finite()
         });
-        let mask = mask_from(|l| better[l]);
+        self.adopt(space, chain, before, found, mask_from(|l| better[l]), mask_from(|l| lanes[l]));
+    }
+
+    /// Takes over what was found on the lanes of a mask, and goes back to what was there on others. What ran on
+    /// counts as work.
+    pub fn adopt(
+        &mut self,
+        space: &Erased,
+        chain: &mut Chain,
+        before: &[Lane],
+        found: &Outcome,
+        mask: Lane,
+        on: Lane,
+    ) {
         chain.update(space, |_, u| u.iter_mut().zip(before).for_each(|(u, b)| *u = mask.select(*u, *b)));
+        let (better, on) = (mask_bits(mask), mask_bits(on));
         self.residual = mask.select(found.residual, self.residual);
         self.rate = mask.select(found.rate, self.rate);
         self.leg = mask.select(found.leg, self.leg);
         for l in 0..LANES {
-            self.iterations[l] += found.iterations[l];
+            self.iterations[l] += if on[l] { found.iterations[l] } else { 0 };
             if better[l] {
                 self.converged[l] = found.converged[l];
                 self.fault[l] = found.fault[l];
@@ -83,9 +142,9 @@ impl Outcome {
 #[derive(Default)]
 pub struct Workspace {
     t: Tridiagonal,
-    vectors: NodeVectors<Lane>,
+    pub(super) vectors: NodeVectors<Lane>,
     anderson: Anderson,
-    newton: Newton,
+    pub(super) newton: Newton,
     step: Vec<Lane>,
     next_step: Vec<Lane>,
     best: Best,
@@ -126,7 +185,9 @@ pub fn solve(
         if !worse.all() {
             match solver {
                 Solver::FixedPoint => fixed_point::update(chain, t, next_step),
-                Solver::Newton | Solver::Homotopy => newton::update(space, chain, ends, newton, next_step),
+                Solver::Newton | Solver::Homotopy | Solver::TrustRegion => {
+                    newton::update(space, chain, ends, newton, next_step);
+                }
                 Solver::QuasiNewton => {
                     quasi_newton::update(space, chain, ends, t, next_step);
                     if iteration > 1 {
@@ -162,5 +223,6 @@ pub fn solve(
         leg: state.leg,
         rate: state.rate(),
         solver: [solver; LANES],
+        alternative: lane(f64::NAN),
     }
 }

@@ -15,6 +15,7 @@ mod storage;
 
 pub use dense::{cholesky, determinant, orthonormalise, polar, reorthonormalise, solve_lower};
 pub use eigen::{diagonalise, orthogonalise, sort_columns};
+pub(crate) use function::GAUSS;
 pub use function::{Unary, from_parts, function_of, parts_of};
 pub use general::{exp_any_minus_one, log_any_one_plus};
 pub use inverse::inverse;

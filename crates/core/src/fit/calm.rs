@@ -1,0 +1,105 @@
+//! Which of several curves: where points are far apart, and where none was found, more ways are tried, and of the
+//! curves that they lead to the one that bends least is kept.
+
+use super::chain::Chain;
+use super::ends::ChainEnds;
+use super::energy::bending;
+use super::solve::{Limits, Outcome, Workspace, solve};
+use super::{Options, Solver, homotopy, trust_region};
+use crate::monitor::Monitor;
+use crate::scalar::{Lane, lane, mask_from};
+use crate::space::{Ambient, Erased};
+
+/// Steps beyond this part of the distance to the cut locus may have several curves.
+const FAR: f64 = 0.6;
+/// Energies that differ by no more than this part are those of one curve.
+const SAME: f64 = 1e-6;
+/// Steps in a trust region, and of Algorithm 1 before it.
+const STEPS: usize = 120;
+const SWEEPS: usize = 2000;
+
+/// The ways that are tried, in turn.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    Homotopy,
+    Newton,
+    FromZero,
+    FromAlgorithm1,
+    FromBest,
+}
+
+/// Tries further ways on the lanes that are far apart or not settled.
+pub fn settle(
+    space: &Erased,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    options: &Options,
+    idle: Lane,
+    work: &mut Workspace,
+    monitor: &Monitor,
+    outcome: &mut Outcome,
+) {
+    let radius = space.injectivity_radius();
+    let far = chain.max_step.simd_gt(lane(FAR * radius)) & lane(radius).simd_lt(lane(f64::INFINITY));
+    let lanes = (far | !outcome.settled(idle)) & !idle;
+    if lanes.none() {
+        return;
+    }
+    let infinity = lane(f64::INFINITY);
+    let energy = |chain: &mut Chain, on: Lane| on.select(bending(space, chain), infinity);
+    let mut least = energy(chain, outcome.settled(idle) & lanes);
+    let mut second = infinity;
+    for way in [Way::Homotopy, Way::Newton, Way::FromZero, Way::FromAlgorithm1, Way::FromBest] {
+        let left = options.max_iter.map(|n| n.saturating_sub(outcome.used()));
+        if left == Some(0) || monitor.poll() {
+            break;
+        }
+        let on = lanes
+            & match way {
+                Way::Homotopy => mask_from(|l| outcome.solver[l] != Solver::Homotopy),
+                Way::Newton => lanes & outcome.settled(idle),
+                Way::FromZero | Way::FromAlgorithm1 => lanes,
+                Way::FromBest => !outcome.settled(idle),
+            };
+        if on.none() {
+            continue;
+        }
+        let before = chain.unknowns().to_vec();
+        let limits = |most: usize| Limits { tol: options.tol, max_iter: left.map_or(most, |n| n.min(most)) };
+        if way != Way::FromBest {
+            chain.update(space, |_, u| u.iter_mut().for_each(|u| *u = on.select(Lane::ZERO, *u)));
+        }
+        let found = match way {
+            Way::Homotopy => {
+                let mut found = outcome.afresh(on);
+                homotopy::follow(space, chain, ends, options, !on, work, monitor, &mut found);
+                found
+            }
+            Way::Newton => solve(space, chain, ends, Solver::Newton, limits(STEPS), !on, work, monitor),
+            Way::FromZero | Way::FromBest => {
+                trust_region::solve(space, chain, ends, limits(STEPS), !on, work, monitor)
+            }
+            Way::FromAlgorithm1 => {
+                let found = solve(space, chain, ends, Solver::FixedPoint, limits(SWEEPS), !on, work, monitor);
+                let rest = on & !found.settled(!on);
+                if rest.none() {
+                    found
+                } else {
+                    let mut whole =
+                        trust_region::solve(space, chain, ends, limits(STEPS), !rest, work, monitor);
+                    whole.fill(&found, !rest);
+                    whole
+                }
+            }
+        };
+        let arrived = on & mask_from(|l| found.converged[l]);
+        let bends = energy(chain, arrived);
+        let other = arrived & !(bends - least).abs().simd_le(lane(SAME) * least.max(bends));
+        let calmer = other & bends.simd_lt(least);
+        second = calmer.select(least, other.select(second.min(bends), second));
+        least = calmer.select(bends, least);
+        let nearer = on & !outcome.settled(idle) & found.residual.simd_lt(outcome.residual);
+        outcome.adopt(space, chain, &before, &found, calmer | nearer, on);
+    }
+    outcome.alternative = second.simd_lt(infinity).select(second, lane(f64::NAN));
+}

@@ -1,0 +1,43 @@
+//! How much a curve bends: ∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise.
+
+use super::chain::Chain;
+use crate::curve::Segment;
+use crate::matrix::GAUSS;
+use crate::scalar::{Jet, Lane, lane};
+use crate::space::{Ambient, Erased, Frame};
+
+/// The energy of each lane, in units of the knots and the points. Every segment is carried home in parallel to the
+/// first point, which changes no length.
+pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
+    let (n, m, len) = (chain.n, chain.m, space.point_len());
+    let mut segment = Segment::<Jet>::new(len);
+    let zeros = || vec![Lane::ZERO; len];
+    let (mut along, mut behind) = (zeros(), zeros());
+    let mut gamma = vec![Jet { v: Lane::ZERO, d: Lane::ZERO, dd: Lane::ZERO }; len];
+    let mut sum = Lane::ZERO;
+    chain.with_velocities(|chain, u| {
+        let (frame, p) = chain.home();
+        for i in 0..n {
+            let h = chain.h[i];
+            let third = |i: usize| -> Vec<Lane> {
+                u[i * m..(i + 1) * m].iter().map(|u| *u * h * lane(1.0 / 3.0)).collect()
+            };
+            space.tangent(frame, p, &chain.chord[i * m..(i + 1) * m], &mut along);
+            segment.ends[0].copy_from_slice(p);
+            let [_, q] = &mut segment.ends;
+            space.ray(p, &along, Lane::ONE, q);
+            space.tangent(frame, p, &third(i), &mut segment.legs[0]);
+            space.tangent(frame, p, &third(i + 1), &mut behind);
+            space.carry(p, &segment.ends[1], &along, &behind, &mut segment.legs[1]);
+            segment.prepare(space, len);
+            for (s, weight) in GAUSS {
+                segment.at(space, len, Jet { v: lane(s), d: Lane::ONE, dd: Lane::ZERO }, &mut gamma);
+                let part = |f: fn(&Jet) -> Lane| -> Vec<Lane> { gamma.iter().map(f).collect() };
+                let (at, d, mut dd) = (part(|x| x.v), part(|x| x.d), part(|x| x.dd));
+                space.acceleration(&at, &d, &mut dd);
+                sum += lane(weight) * space.inner(&at, &dd, &dd) / (h * h * h);
+            }
+        }
+    });
+    sum * chain.unit_of_energy()
+}

@@ -1,0 +1,192 @@
+//! Least squares of the C² defect in a trust region: Powell's dogleg (1970) with the block tridiagonal Jacobian.
+//!
+//! It gets from zero velocities to a curve where Newton's method is thrown about: every step is one that makes the
+//! defect smaller, in the region where its linear model was seen to hold.
+
+use super::chain::Chain;
+use super::condition::{Defect, residual};
+use super::convergence::Convergence;
+use super::ends::{ChainEnds, EndKind, of_kind};
+use super::legs::{long_legs, shorten};
+use super::solve::{Limits, Outcome, Workspace};
+use super::{Solver, newton};
+use crate::monitor::Monitor;
+use crate::scalar::{LANES, Lane, dot, lane, mask_bits};
+use crate::space::{Ambient, Erased};
+
+/// Outer legs are kept within this part of the distance to the cut locus.
+const LEG_LIMIT: f64 = 0.999;
+/// Parts of the predicted gain from which on a step is taken, and the region made larger or smaller.
+const TAKEN: f64 = 1e-4;
+const POOR: f64 = 0.25;
+const GOOD: f64 = 0.75;
+/// The first region, as a part of the largest distance over time: larger first steps land beyond the cut locus.
+const FIRST: f64 = 0.1;
+/// A region of this part of the velocities holds no further step.
+const SMALLEST: f64 = 1e-12;
+
+/// The linear model of the defect where an iteration stands.
+struct Model {
+    /// Half the gradient of the squared defect, and what the Jacobian makes of it.
+    gradient: Vec<Lane>,
+    image2: Lane,
+    /// The step of Newton's method.
+    newton: Vec<Lane>,
+}
+
+/// Iterates from the unknowns of a chain; lanes in `idle` are left alone.
+pub fn solve(
+    space: &Erased,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    limits: Limits,
+    idle: Lane,
+    work: &mut Workspace,
+    monitor: &Monitor,
+) -> Outcome {
+    let count = chain.unknowns().len();
+    let weights = weights(chain, ends);
+    let limit = space.cut_angle() * LEG_LIMIT;
+    let mut state = Convergence::new(chain, limits.tol, idle);
+    let zeros = || vec![Lane::ZERO; count];
+    let mut model = Model { gradient: zeros(), image2: Lane::ONE, newton: zeros() };
+    let mut here = chain.unknowns().to_vec();
+    let infinity = lane(f64::INFINITY);
+    let mut defect = Defect { defect: infinity, speed: Lane::ONE, leg: Lane::ZERO };
+    let (mut square, mut gain, mut length) = (infinity, infinity, Lane::ZERO);
+    let mut radius = chain.pace * lane(FIRST);
+    let least = chain.pace * lane(SMALLEST);
+    for iteration in 1.. {
+        let found = residual(space, chain, ends, &mut work.vectors);
+        let now = weighted2(&chain.r[..count], &weights, chain.m);
+        // The first point is taken as it is.
+        let part = square.simd_eq(infinity).select(Lane::ONE, (square - now) / gain);
+        let taken = part.simd_gt(lane(TAKEN)) & now.simd_lt(infinity) & !state.done;
+        let keep = |new: Lane, old: Lane| taken.select(new, old);
+        defect = Defect {
+            defect: keep(found.defect, defect.defect),
+            speed: keep(found.speed, defect.speed),
+            leg: keep(found.leg, defect.leg),
+        };
+        for (h, u) in here.iter_mut().zip(chain.unknowns()) {
+            *h = keep(*u, *h);
+        }
+        square = keep(now, square);
+        let shrunk = !part.simd_ge(lane(POOR));
+        let grown = part.simd_gt(lane(GOOD)) & length.simd_gt(radius * lane(0.99));
+        radius = shrunk.select(length * lane(POOR), grown.select(radius * lane(2.0), radius));
+        state.note(iteration, defect, chain.pace);
+        let stuck = state.done | radius.simd_le(least);
+        if stuck.all() || iteration >= limits.max_iter || monitor.poll() {
+            state.end();
+            break;
+        }
+        if taken.any() {
+            linearise(space, chain, ends, work, &weights, taken, &mut model);
+        }
+        let step = dogleg(&model, square, radius);
+        (gain, length) = (step.gain, step.length);
+        let done = state.done;
+        chain.update(space, |chain, u| {
+            for (i, u) in u.iter_mut().enumerate() {
+                let s = step.newton * model.newton[i] - step.gradient * model.gradient[i];
+                *u = done.select(here[i], here[i] + s);
+            }
+            shorten(space, chain, limit, |node| done | ends.given(chain.n, node), u);
+        });
+    }
+    chain.update(space, |_, u| u.copy_from_slice(&here));
+    let fault = long_legs(space, chain, state.leg, state.converged);
+    let converged = mask_bits(state.converged);
+    Outcome {
+        iterations: state.iterations,
+        residual: state.residual,
+        converged: std::array::from_fn(|l| converged[l] && fault[l].is_none()),
+        fault,
+        leg: state.leg,
+        rate: state.rate(),
+        solver: [Solver::TrustRegion; LANES],
+        alternative: lane(f64::NAN),
+    }
+}
+
+/// What the defect of a node is multiplied by to make it a velocity.
+fn weights(chain: &Chain, ends: &ChainEnds) -> Vec<Lane> {
+    let n = chain.n;
+    let joint = |a: usize, b: usize| chain.h[a] * chain.h[b] / (chain.h[a] + chain.h[b]);
+    let mut weights: Vec<Lane> = (0..=n).map(|i| joint((i + n - 1) % n, i % n)).collect();
+    if let ChainEnds::Open(kinds) = ends {
+        for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
+            // There the defect is a velocity, or a third of one.
+            let given = of_kind(kinds, EndKind::Velocity) | of_kind(kinds, EndKind::NotAKnot);
+            weights[node] = given.select(lane(3.0), chain.h[segment]);
+        }
+    }
+    weights
+}
+
+fn weighted2(r: &[Lane], weights: &[Lane], m: usize) -> Lane {
+    r.chunks_exact(m).zip(weights).fold(Lane::ZERO, |sum, (r, w)| sum + dot(r, r) * *w * *w)
+}
+
+/// Makes the model of the defect in `chain.r` on the lanes of a mask.
+fn linearise(
+    space: &Erased,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    work: &mut Workspace,
+    weights: &[Lane],
+    lanes: Lane,
+    model: &mut Model,
+) {
+    let (m, closed) = (chain.m, matches!(ends, ChainEnds::Periodic));
+    let nodes = model.gradient.len() / m;
+    work.newton.differentiate(space, chain, ends);
+    let scaled: Vec<Lane> = chain.r[..nodes * m]
+        .chunks_exact(m)
+        .zip(weights)
+        .flat_map(|(r, w)| r.iter().map(|r| *r * *w * *w).collect::<Vec<_>>())
+        .collect();
+    let (mut gradient, mut image) = (vec![Lane::ZERO; nodes * m], vec![Lane::ZERO; nodes * m]);
+    work.newton.blocks.transposed_times(nodes, m, closed, &scaled, &mut gradient);
+    work.newton.blocks.times(nodes, m, closed, &gradient, &mut image);
+    let mut step = vec![Lane::ZERO; nodes * m];
+    newton::solve(chain, ends, &mut work.newton, &mut step);
+    for (old, new) in [(&mut model.gradient, &gradient), (&mut model.newton, &step)] {
+        old.iter_mut().zip(new).for_each(|(old, new)| *old = lanes.select(*new, *old));
+    }
+    model.image2 = lanes.select(weighted2(&image, weights, m), model.image2);
+}
+
+/// A step `newton · n − gradient · g`, its length, and by how much it should lower the squared defect.
+struct Step {
+    newton: Lane,
+    gradient: Lane,
+    length: Lane,
+    gain: Lane,
+}
+
+fn dogleg(model: &Model, square: Lane, radius: Lane) -> Step {
+    let (g, n) = (&model.gradient[..], &model.newton[..]);
+    let (gg, nn, gn) = (dot(g, g), dot(n, n), dot(g, n));
+    // The best point downhill.
+    let cauchy = gg / model.image2;
+    let down = (cauchy * cauchy * gg).sqrt();
+    // On the way from there to Newton's: |c + τ(n − c)| = radius with c = −cauchy · g.
+    let cn = -(cauchy * gn);
+    let (a, b, c) = (nn - cn * lane(2.0) + down * down, cn - down * down, down * down - radius * radius);
+    let tau = (-c) / (b + (b * b - a * c).max(Lane::ZERO).sqrt());
+    let whole = nn.sqrt().simd_le(radius);
+    let short = !down.simd_lt(radius) | !nn.is_finite();
+    let newton = whole.select(Lane::ONE, short.select(Lane::ZERO, tau));
+    let steepest = short.select(radius.min(down) / gg.sqrt(), cauchy * (Lane::ONE - tau));
+    let gradient = whole.select(Lane::ZERO, steepest);
+    let moved = newton.simd_eq(Lane::ZERO).select(
+        gradient * gradient * gg,
+        newton * newton * nn - newton * gradient * gn * lane(2.0) + gradient * gradient * gg,
+    );
+    // r + J s = (1 − newton) r − gradient · J g, and r · J g = |g|².
+    let rest = Lane::ONE - newton;
+    let left = rest * rest * square - lane(2.0) * rest * gradient * gg + gradient * gradient * model.image2;
+    Step { newton, gradient, length: moved.sqrt(), gain: square - left }
+}

@@ -1,0 +1,206 @@
+"""Curves through points of a totally geodesic subspace stay in it: the list of docs/totally-geodesic.md."""
+
+import numpy as np
+import pytest
+from cases import EPS
+from curves import points_on
+
+import symspline as ss
+from symspline import convert
+
+KNOTS = np.array([0.0, 0.7, 2.0, 2.4, 3.9, 5.0])
+X = np.linspace(0, 5, 61)
+
+
+def turned(x):
+    return np.swapaxes(x, -1, -2)
+
+
+def symplectic(n):
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
+
+
+def walk_in(basis, start, seed=3, step=0.5):
+    """Points of a part of a space: each by a step in directions `basis(rng)` at the one before, carried from the
+    first by a product of group elements."""
+    rng = np.random.default_rng(seed)
+    p = [start]
+    for _ in range(len(KNOTS) - 1):
+        p.append(basis(rng, p[-1], step))
+    return np.array(p)
+
+
+def expm(x):
+    values, vectors = np.linalg.eig(x)
+    return (vectors * np.exp(values)) @ np.linalg.inv(vectors)
+
+
+def compact_symplectic(rng, p, step):
+    # Sp(2): unitary with xᵀJx = J; its algebra is (A, B; −B̄, Ā) with A skew-Hermitian, B symmetric.
+    a, b = (rng.standard_normal((2, 2)) + 1j * rng.standard_normal((2, 2)) for _ in range(2))
+    a, b = (a - a.conj().T) / 2, (b + b.T) / 2
+    return p @ expm(step * np.block([[a, b], [-b.conj(), a.conj()]]) / 2)
+
+
+def symmetric_unitary(rng, p, step):
+    # U(n)/O(n) as the symmetric unitary matrices: p ↦ u p uᵀ.
+    h = rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3))
+    u = expm(step * (h - h.conj().T) / 4)
+    return u @ p @ u.T
+
+
+def siegel(rng, p, step):
+    a, b, c = (rng.standard_normal((2, 2)) for _ in range(3))
+    g = expm(step * np.block([[a, b + b.T], [c + c.T, -a.T]]) / 4).real
+    p = g @ p @ g.T
+    return (p + p.T) / 2
+
+
+def shape_of_tensor(rng, p, step):
+    a = rng.standard_normal((3, 3))
+    g = expm(step * (a - np.trace(a) / 3 * np.eye(3)) / 2).real
+    p = g @ p @ g.T
+    return (p + p.T) / 2
+
+
+def hyperbolic(rng, p, step):
+    # Positive definite and in SU(1, 2): the image of complex hyperbolic space by p ↦ 2 |z><z|η − η, with sign.
+    w = step * (rng.standard_normal(2) + 1j * rng.standard_normal(2)) / 2
+    a = np.zeros((3, 3), complex)
+    a[0, 1:], a[1:, 0] = w.conj(), w
+    g = expm(a)
+    p = g @ p @ g.conj().T
+    return (p + p.conj().T) / 2
+
+
+SIGNS = np.diag([-1.0, 1, 1])
+CASES = {
+    "the compact symplectic group Sp(2) in U(4)": (
+        "u:4",
+        compact_symplectic,
+        np.eye(4, dtype=complex),
+        lambda x: turned(x) @ symplectic(2) @ x - symplectic(2),
+    ),
+    "U(3)/O(3) in U(3)": ("u:3", symmetric_unitary, np.eye(3, dtype=complex), lambda x: x - turned(x)),
+    "Siegel's half space in P(4)": (
+        "spd:4",
+        siegel,
+        np.eye(4),
+        lambda x: turned(x) @ symplectic(2) @ x - symplectic(2),
+    ),
+    "SL(3)/SO(3) in P(3)": ("spd:3", shape_of_tensor, np.eye(3), lambda x: np.linalg.det(x) - 1),
+    "complex hyperbolic plane in HPD(3)": (
+        "hpd:3",
+        hyperbolic,
+        np.eye(3, dtype=complex),
+        lambda x: x @ SIGNS @ x - SIGNS,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("bc_type", ["natural", "not-a-knot"])
+def test_curves_stay(name, bc_type):
+    space, step, start, defect = CASES[name]
+    p = walk_in(step, start)
+    assert np.abs(defect(p)).max() <= 1e-13
+    values = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type)(X)
+    size = max(1.0, float(np.abs(values).max()) ** 2)
+    assert np.abs(defect(values)).max() <= 100 * EPS * size
+    # The part is not all: a curve through other points leaves it.
+    other = ss.CubicSpline(KNOTS, points_on(ss.space(space), 6, step=0.5), space)(X)
+    assert np.abs(defect(other)).max() > 1e-2
+
+
+def test_grassmannian_in_the_orthogonal_group():
+    # The reflections 2pp* − 1.
+    p = points_on(ss.Grassmannian(2, 5), 6, step=0.5)
+    spline = ss.CubicSpline(KNOTS, p, "gr:2,5", bc_type="not-a-knot")
+    reflected = ss.CubicSpline(
+        KNOTS, 2 * convert.basis_to_projector(p) - np.eye(5), "o:5", bc_type="not-a-knot"
+    )
+    np.testing.assert_allclose(
+        reflected(X), 2 * convert.basis_to_projector(spline(X)) - np.eye(5), atol=1e-12
+    )
+
+
+def test_siegel_of_one_dimension_is_the_half_plane():
+    ball = 0.6 * np.random.default_rng(1).uniform(-1, 1, (6, 2))
+    half = convert.ball_to_half_space(ball)
+    hyperbolic_curve = ss.CubicSpline(KNOTS, convert.ball_to_hyperboloid(ball), "h:2", bc_type="not-a-knot")
+    # The last coordinate of the half space is the height.
+    z = (half[:, 0] + 1j * half[:, 1])[:, None, None]
+    curve = ss.CubicSpline(KNOTS, convert.siegel_to_positive_definite(z), "spd:2", bc_type="not-a-knot")
+    found = convert.positive_definite_to_siegel(curve(X))[:, 0, 0]
+    expected = convert.hyperboloid_to_half_space(hyperbolic_curve(X))
+    np.testing.assert_allclose(found, expected[:, 0] + 1j * expected[:, 1], atol=1e-12)
+
+
+def test_siegel_there_and_back():
+    rng = np.random.default_rng(2)
+    x, y = rng.standard_normal((2, 7, 3, 3))
+    z = x + turned(x) + 1j * (y @ turned(y) + 0.3 * np.eye(3))
+    p = convert.siegel_to_positive_definite(z)
+    j = symplectic(3)
+    assert np.abs(turned(p) @ j @ p - j).max() <= 1e-12 * np.abs(p).max() ** 2
+    np.testing.assert_allclose(convert.positive_definite_to_siegel(p), z, atol=1e-11)
+    # Symplectic maps act by Möbius transformations on one side, by congruence on the other: here z ↦ −z⁻¹.
+    moved = convert.siegel_to_positive_definite(-np.linalg.inv(z))
+    np.testing.assert_allclose(moved, j @ p @ j.T, rtol=0, atol=1e-11 * np.abs(p).max())
+
+
+def test_quaternionic_lines():
+    rng = np.random.default_rng(3)
+    q = np.add(rng.standard_normal((6, 2, 4)), [[2.0, 0, 0, 0], [0, 0, 0, 0]])
+    q /= np.linalg.norm(q, axis=(-2, -1), keepdims=True)
+    p = convert.quaternions_to_subspace(q)
+    np.testing.assert_allclose(turned(p.conj()) @ p, np.broadcast_to(np.eye(2), (6, 2, 2)), atol=1e-15)
+    np.testing.assert_allclose(convert.subspace_to_quaternions(p), q, atol=1e-15)
+    curve = ss.CubicSpline(KNOTS, p, "cgr:2,4", bc_type="not-a-knot")
+    found = convert.subspace_to_quaternions(curve(X))
+    # HP¹ is the sphere of radius ½ in R⁵: (2 q₁ q̄₀, |q₁|² − |q₀|²)/2.
+    sphere = ss.CubicSpline(KNOTS, hopf(q), "sphere:4", bc_type="not-a-knot")
+    np.testing.assert_allclose(hopf(found), sphere(X), atol=1e-12)
+
+
+def hopf(q):
+    a, b = q[..., 0, :], q[..., 1, :]
+    r, v = a[..., :1], -a[..., 1:]
+    product = np.concatenate(
+        [
+            b[..., :1] * r - np.sum(b[..., 1:] * v, -1, keepdims=True),
+            b[..., :1] * v + r * b[..., 1:] + np.cross(b[..., 1:], v),
+        ],
+        axis=-1,
+    )
+    height = np.sum(b**2, -1, keepdims=True) - np.sum(a**2, -1, keepdims=True)
+    return np.concatenate([2 * product, height], axis=-1)
+
+
+def test_special_positive_definite_is_a_part_of_positive_definite():
+    p = points_on(ss.space("sspd:3"), 6, step=0.6)
+    a, b = (ss.CubicSpline(KNOTS, p, name, bc_type="not-a-knot", tol=1e-14) for name in ("sspd:3", "spd:3"))
+    for nu in range(3):
+        np.testing.assert_allclose(a(X, nu), b(X, nu), rtol=0, atol=1e-12 * max(1.0, np.abs(b(X, nu)).max()))
+    assert np.abs(np.linalg.det(a(X)) - 1).max() <= 1e-14 * np.abs(p).max() ** 3
+    with pytest.raises(ss.ValidationError, match=r"points\[1\].*its determinant is 2.0+e0, not 1"):
+        ss.CubicSpline(None, [np.eye(2), np.diag([2.0, 1.0])], "sspd:2")
+
+
+@pytest.mark.parametrize(
+    ("call", "value", "why"),
+    [
+        (convert.siegel_to_positive_definite, [[[1j, 0], [1, 1j]]], r"z\[0\] is not symmetric"),
+        (convert.siegel_to_positive_definite, [[1.0]], "imaginary part that is not positive definite"),
+        (convert.siegel_to_positive_definite, [[1j, 0]], "square matrices"),
+        (convert.positive_definite_to_siegel, np.diag([2.0, 1.0]), "not symplectic"),
+        (convert.positive_definite_to_siegel, np.eye(3), "2n, 2n"),
+        (convert.quaternions_to_subspace, [[1.0, 0, 0, 1]], "has length 1.41421356, not 1"),
+        (convert.quaternions_to_subspace, [[1.0, 0, 0]], "must be real, of shape"),
+        (convert.subspace_to_quaternions, np.eye(4)[:, ::2], "spans no quaternionic line"),
+        (convert.subspace_to_quaternions, np.eye(3), "2n . 2, 2"),
+    ],
+)
+def test_what_is_none_is_told(call, value, why):
+    with pytest.raises(ss.ValidationError, match=why):
+        call(value)
