@@ -12,7 +12,7 @@ from ._core import ValidationError
 from .arrays import read_only
 from .curves import fit as fitting
 from .curves.chosen import fit_many_chosen, mask_of
-from .curves.curve import quantity_of
+from .curves.curve import Curve, quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
 from .failures import fail
@@ -23,7 +23,7 @@ from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline
-from .times import knots_of
+from .times import Clock, knots_of
 
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
@@ -72,6 +72,13 @@ def evaluate(
     """
     space = space_named(space)
     check_progress(progress)
+    clock, curve = given(t, points, u, space)
+    where = outside(checked_policy(extrapolate), "natural")
+    return evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
+
+
+def given(t: ArrayLike | None, points: Any, u: Any, space: Space) -> tuple[Clock, Curve]:
+    """The curve with given knots, points and velocities, and how it counts times."""
     data = fitting.read(points, space)
     velocities = [
         velocities_of(factor, part.doubles, own)
@@ -83,9 +90,8 @@ def evaluate(
         on_space = fitting.validated(space, times, data, fitting.read_ends("natural", space, batch))
     except ValidationError as error:
         raise clock.explain(error) from None
-    curve = fitting.curve_of(space, times, list(zip(on_space, velocities, strict=True)), fitted=False)
-    where = outside(checked_policy(extrapolate), "natural")
-    return evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
+    arrays = list(zip(on_space, velocities, strict=True))
+    return clock, fitting.curve_of(space, times, arrays, fitted=False)
 
 
 def velocities_of(space: Space, points: Array, u: Any, name: str = "u") -> Array:
