@@ -16,6 +16,7 @@ from .curves.curve import Curve, quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
 from .failures import fail
+from .handed import in_library, library_of
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .piecewise import evaluated
 from .report import Report
@@ -32,7 +33,8 @@ def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) ->
     Takes the arguments of `CubicSpline`.
 
     Returns:
-        The velocities, of the shape of the points, and the report.
+        The velocities, of the shape of the points, and the report. Where the points are arrays of another library that
+        follows the array API standard, and on the CPU, velocities are of it, too.
 
     >>> import symspline as ss
     >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
@@ -40,7 +42,7 @@ def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) ->
     ((3, 3), True)
     """
     spline = CubicSpline(t, points, space, **options)
-    return spline.velocities, spline.report
+    return in_library(library_of(points), spline.velocities), spline.report
 
 
 def evaluate(
@@ -64,6 +66,9 @@ def evaluate(
         space: the space or its name.
         nu, extrapolate, per_curve, progress: as for calling a `CubicSpline`.
 
+    Returns:
+        Values as of calling a `CubicSpline`, as arrays of the library that points, u or x come from.
+
     >>> import symspline as ss
     >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> u, _ = ss.fit(None, p, "sphere:2")
@@ -74,7 +79,8 @@ def evaluate(
     check_progress(progress)
     clock, curve = given(t, points, u, space)
     where = outside(checked_policy(extrapolate), "natural")
-    return evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
+    values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
+    return in_library(library_of(points, u, x), values)
 
 
 def given(t: ArrayLike | None, points: Any, u: Any, space: Space) -> tuple[Clock, Curve]:

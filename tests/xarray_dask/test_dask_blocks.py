@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import sys
 import threading
 import warnings
 
@@ -9,7 +10,7 @@ import dask
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, same
+from curves import S2, run_python, same
 from fields import field, numbers, point_dims
 
 import symspline as ss
@@ -112,6 +113,25 @@ def test_one_thread_in_blocks_and_all_without(threads, monkeypatch):
     # Before that, a rehearsal on one curve.
     assert seen == [3] + [1] * 6
     assert ss.num_threads() == 3
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_workers_times_threads_do_not_multiply():
+    """Four workers of dask need no threads of the core."""
+    code = """
+import os, threading, dask, numpy as np, xarray as xr, symspline as ss, symspline.xarray as sx
+ss.set_num_threads(3)
+p = ss.Sphere(2).geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 20))
+da = xr.DataArray(p, dims=("time", "q")).expand_dims(curve=8000)
+def extra():
+    return len(os.listdir("/proc/self/task")) - threading.active_count()
+before = extra()
+sx.fit(da.chunk(curve=1000), "sphere:2").compute(scheduler="threads", num_workers=4)
+print(extra() - before)
+sx.fit(da, "sphere:2")
+print(extra() - before)
+"""
+    assert run_python(code, timeout=60).split() == ["0", "3"]
 
 
 def test_one_thread_is_counted():
