@@ -2,7 +2,7 @@
 
 python docs/many_curves.py [--write] [--curves N] [PART ...]
 
-Parts: rates (some five minutes on two cores), store (two minutes for a million curves).
+Parts: rates (three minutes on two idle cores), store (two minutes for a million curves).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import dask.array
 import numpy as np
 import xarray as xr
 from comparisons.page import insert, parser, table, versions
-from distributed import Client, LocalCluster, wait
+from distributed import Client, LocalCluster, futures_of, wait
 from numpy.typing import NDArray
 
 import symspline as ss
@@ -74,10 +75,10 @@ def spaced(number: float) -> str:
 
 # ---- curves per second ----
 
-WORK: dict[str, Callable[[xr.DataArray], Any]] = {
-    "S², fit": lambda da: sx.fit(da, "sphere:2", point_dims=("row",)),
-    "S², resample": lambda da: sx.resample(da, "sphere:2", TO, point_dims=("row",)),
-    "SO(3), fit": lambda da: sx.fit(da, "so:3", point_dims=("row", "column")),
+WORK: dict[str, tuple[Callable[[xr.DataArray], Any], Callable[[int, Any], Any]]] = {
+    "S², fit": (lambda da: sx.fit(da, "sphere:2", point_dims=("row",)), tracks),
+    "S², resample": (lambda da: sx.resample(da, "sphere:2", TO, point_dims=("row",)), tracks),
+    "SO(3), fit": (lambda da: sx.fit(da, "so:3", point_dims=("row", "column")), attitudes),
 }
 
 
@@ -98,54 +99,73 @@ def cluster(workers: int, memory: str | int = 0) -> Iterator[Client]:
         yield client
 
 
-def seconds(call: Callable[[], Any]) -> float:
-    start = time.perf_counter()
+def seconds(call: Callable[[], Any]) -> tuple[float, float]:
+    """How long a call takes, and how much time of processors it takes in this process."""
+    start = time.perf_counter(), time.process_time()
     call()
-    return time.perf_counter() - start
+    return time.perf_counter() - start[0], time.process_time() - start[1]
 
 
-def rates_table(count: int = 10 * CHUNK, rounds: int = 7, chunk: int = CHUNK) -> str:
+WAYS = (
+    "one thread",
+    "one thread of dask",
+    "one worker process",
+    "two threads",
+    "two threads of dask",
+    "two worker processes",
+)
+
+
+def rates_table(count: int = 10 * CHUNK, rounds: int = 5, chunk: int = CHUNK) -> str:
     """Curves per second: the best of some rounds, in each of which every way has its turn."""
-    best: dict[tuple[str, str], float] = {}
-    ways = ["one thread", "one thread of dask", "one worker process", "two threads", "two threads of dask",
-            "two worker processes"]  # fmt: skip
-    with cluster(1) as one, cluster(2) as two:
-        for name, work in WORK.items():
-            lazy = simulated(count, chunk, attitudes if name.startswith("SO") else tracks)
-            plain = lazy.compute(scheduler="threads")
-            blocks = plain.chunk(curve=chunk)
-            # Workers have the points before.
-            there = {client: client.persist(lazy) for client in (one, two)}
-            wait(list(there.values()))
-
-            def alone(n: int, work: Any = work, plain: Any = plain) -> Any:
-                ss.set_num_threads(n)
-                try:
-                    return work(plain)
-                finally:
-                    ss.set_num_threads(0)
-
-            def threads(n: int, work: Any = work, blocks: Any = blocks) -> Any:
-                return work(blocks).compute(scheduler="threads", num_workers=n)
-
-            def workers(client: Client, work: Any = work, there: Any = there) -> None:
-                wait(client.persist(work(there[client])))
-
-            calls = [lambda: alone(1), lambda: threads(1), lambda: workers(one), lambda: alone(2),
-                     lambda: threads(2), lambda: workers(two)]  # fmt: skip
-            for _ in range(rounds):
-                for way, call in zip(ways, calls, strict=True):
-                    took = seconds(call)
-                    best[way, name] = min(took, best.get((way, name), took))
-            del there
-    rows = []
-    for i, way in enumerate(ways):
-        cells = []
-        for name in WORK:
-            took, base = best[way, name], best[ways[0], name]
-            cells.append(spaced(count / took) + (f" ({base / took:.2f})" if i else ""))
-        rows.append([way, *cells])
+    with cluster(2) as client:
+        columns = [_rates(work, make, count, rounds, chunk, client) for work, make in WORK.values()]
+    rows = [[way, *(spaced(count / column[way][0]) for column in columns)] for way in WAYS]
+    costs = (column[WAYS[1]][1] / column[WAYS[0]][1] for column in columns)
+    rows.append(["processor time of dask's one thread : of one thread", *(f"{cost:.2f}" for cost in costs)])
     return table(["curves per second", *WORK], rows)
+
+
+def _rates(
+    work: Callable[[xr.DataArray], Any],
+    make: Callable[[int, Any], Any],
+    count: int,
+    rounds: int,
+    chunk: int,
+    client: Client,
+) -> dict[str, tuple[float, ...]]:
+    """The least time, and the least time of processors, that each way takes."""
+    lazy = simulated(count, chunk, make)
+    plain = lazy.compute(scheduler="threads")
+    blocks = plain.chunk(curve=chunk)
+    # The first worker alone, and both. They have the points before.
+    names = sorted(client.scheduler_info()["workers"])
+    crews = [names[:1], names]
+    own = (named(lazy.data.map_blocks(np.copy, name=f"{make.__name__} of {len(crew)}")) for crew in crews)
+    there = [client.persist(da, workers=crew) for da, crew in zip(own, crews, strict=True)]
+    wait(there)
+    client.rebalance(futures_of(there[1]))
+
+    def alone(n: int) -> None:
+        ss.set_num_threads(n)
+        try:
+            work(plain)
+        finally:
+            ss.set_num_threads(0)
+
+    def threads(n: int) -> None:
+        # As on the way to a store, blocks are not put together to one array.
+        work(blocks).persist(scheduler="threads", num_workers=n)
+
+    def workers(n: int) -> None:
+        wait(client.persist(work(there[n - 1]), workers=crews[n - 1]))
+
+    calls = [partial(call, n) for n in (1, 2) for call in (alone, threads, workers)]
+    found = [[seconds(call) for call in calls] for _ in range(rounds)]
+    return {
+        way: tuple(map(min, zip(*times, strict=True)))
+        for way, times in zip(WAYS, zip(*found, strict=True), strict=True)
+    }
 
 
 # ---- from disk to disk ----
@@ -166,19 +186,18 @@ def raw(ds: xr.Dataset) -> dict[str, Any]:
     return {name: {"compressors": None} for name in ds.variables}
 
 
-def store_table(count: int = 1_000_000, chunk: int = 2 * CHUNK, folder: str | None = None) -> str:
+def store_table(count: int = 1_000_000, chunk: int = 2 * CHUNK) -> str:
     """Curves from one zarr store to another, and the peak memory of the workers."""
-    with tempfile.TemporaryDirectory(dir=folder) as directory, cluster(2, LIMIT) as client:
+    with tempfile.TemporaryDirectory() as directory:
         given, found = f"{directory}/given.zarr", f"{directory}/found.zarr"
         made = simulated(count, chunk).to_dataset(name="tracks")
-        simulating = seconds(lambda: made.to_zarr(given, encoding=raw(made), consolidated=False))
-        # What the workers had so far is none of what is measured.
-        client.restart()
-        client.run(lambda: (ss.Sphere, sx.fit, xr.open_zarr))
-        before = max(client.run(peak).values())
+        simulating, _ = seconds(lambda: made.to_zarr(given, encoding=raw(made), consolidated=False))
         ds = sx.fit(xr.open_zarr(given, consolidated=False).tracks, "sphere:2", point_dims=("row",))
-        took = seconds(lambda: ds.to_zarr(found, encoding=raw(ds), consolidated=False))
-        most = max(client.run(peak).values())
+        with cluster(2, LIMIT) as client:
+            client.run(lambda: (ss.Sphere, sx.fit, xr.open_zarr))
+            before = max(client.run(peak).values())
+            took, _ = seconds(lambda: ds.to_zarr(found, encoding=raw(ds), consolidated=False))
+            most = max(client.run(peak).values())
         check = xr.open_zarr(found, consolidated=False)
         converged = int(check.converged.sum())
         blocks = range(0, count, chunk)
