@@ -116,7 +116,7 @@ WAYS = (
 )
 
 
-def rates_table(count: int = 10 * CHUNK, rounds: int = 5, chunk: int = CHUNK) -> str:
+def rates_table(count: int = 5 * CHUNK, rounds: int = 5, chunk: int = CHUNK) -> str:
     """Curves per second: the best of some rounds, in each of which every way has its turn."""
     with cluster(2) as client:
         columns = [_rates(work, make, count, rounds, chunk, client) for work, make in WORK.values()]
@@ -241,8 +241,9 @@ def main() -> None:
     arguments.add_argument("parts", nargs="*", metavar="PART", default=list(PARTS), help=", ".join(PARTS))
     given = arguments.parse_args()
     for part in given.parts:
+        load = os.getloadavg()[0]
         text = f"{PARTS[part](given.curves)}\n\n{versions('dask', 'distributed', 'numpy', 'xarray', 'zarr')}"
-        text += f" {os.cpu_count()} cores."
+        text += f" {os.cpu_count()} cores, which had {load:.1f} processes of others in the minute before."
         print(text, flush=True)
         if given.write:
             insert(part, text, PAGE)

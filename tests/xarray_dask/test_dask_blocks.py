@@ -65,6 +65,19 @@ def test_lazy_times():
     assert dask.is_dask_collection(sx.evaluate(ds.compute(), x.chunk(lon=2)))
 
 
+def test_blocks_are_those_of_the_points():
+    da = field(chunks={"lon": 4})
+    where = xr.DataArray(np.ones((2, 6), bool), dims=("lat", "lon"))
+    ds = sx.fit(da, S2, point_dims=("r",), where=where.chunk(lon=1, lat=1))
+    # Consistent with the coordinate, or this would raise.
+    assert ds.chunksizes["lon"] == (4, 2) and "place" in ds.coords
+    x = xr.DataArray(np.linspace(0, 13, 30).reshape(6, 5), dims=("lon", "sample"))
+    for times in (x.chunk(lon=1), x.chunk(sample=2), x.chunk(sample=2, lon=3)):
+        values = sx.evaluate(ds, times)
+        assert values.variable.chunksizes["lon"] == (4, 2)
+        assert same(values.values, sx.evaluate(ds.compute(), x).values)
+
+
 def test_end_vectors_in_blocks():
     da = field()
     start = S2.random_tangent(np.random.default_rng(0), da.values[:, :, 0])

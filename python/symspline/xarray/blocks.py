@@ -39,14 +39,7 @@ def apply(
     **kwargs: Any,
 ) -> tuple[xr.DataArray, ...]:
     """The outputs of a function of blocks."""
-    cuts = inputs[0][0].variable.chunksizes
-    # Blocks are those of the points: coordinates have the same.
-    arrays = [
-        array
-        if array.chunks is None
-        else array.chunk({d: cuts.get(d, -1) for d in array.dims} if cuts else {})
-        for array, _ in inputs
-    ]
+    arrays = _cut_alike([array for array, _ in inputs])
     kwargs["function"] = function
     # A worker of dask is one of many. What is no dask array is worked on by all threads.
     kwargs["alone"] = any(array.chunks is not None for array in arrays)
@@ -67,6 +60,16 @@ def apply(
     for output in outputs:
         output.attrs = {}
     return outputs
+
+
+def _cut_alike(arrays: list[xr.DataArray]) -> list[xr.DataArray]:
+    """Arrays of dask in the blocks of the first, whose coordinates are cut like that; what it has not is one chunk."""
+    first, *others = arrays
+    cuts = first.variable.chunksizes
+    return [
+        first,
+        *(a if a.chunks is None else a.chunk({d: cuts.get(d, -1) for d in a.dims}) for a in others),
+    ]
 
 
 def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
