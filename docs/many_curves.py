@@ -2,7 +2,7 @@
 
 python docs/many_curves.py [--write] [--curves N] [PART ...]
 
-Parts: rates (three minutes on two idle cores), store (two minutes for a million curves).
+Parts: rates (a minute or two on two idle cores), store (half a minute for a million curves).
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ WAYS = (
 )
 
 
-def rates_table(count: int = 5 * CHUNK, rounds: int = 5, chunk: int = CHUNK) -> str:
+def rates_table(count: int = 5 * CHUNK, rounds: int = 4, chunk: int = CHUNK) -> str:
     """Curves per second: the best of some rounds, in each of which every way has its turn."""
     with cluster(2) as client:
         columns = [_rates(work, make, count, rounds, chunk, client) for work, make in WORK.values()]
