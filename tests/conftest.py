@@ -12,7 +12,8 @@
     subspaces    reduced bases over a parameter
     tensors      diffusion tensors in the order of each program, NIfTI files
     shapes       affine shapes of landmarks, morphs and their pictures
-    host         the program around: threads, memory, interruptions
+    xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
+    host         the program around: threads, memory, interruptions, arrays of other libraries
     docs, bench  what they show runs
     examples     the recipes run
     fuzz         random input; `make fuzz` runs it at length

@@ -18,7 +18,7 @@ LAYERS = [
     ["archive"],
     ["spline"],
     ["functions"],
-    ["adapters", "convert", "files", "hermite", "jax", "pieces", "segments", "smoothing", "torch"],
+    ["adapters", "convert", "files", "hermite", "jax", "pieces", "segments", "smoothing", "torch", "xarray"],
     [
         "geo",
         "hurdat",

@@ -12,10 +12,11 @@ from ._core import ValidationError
 from .arrays import read_only
 from .curves import fit as fitting
 from .curves.chosen import fit_many_chosen, mask_of
-from .curves.curve import quantity_of
+from .curves.curve import Curve, quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
 from .failures import fail
+from .handed import in_library, library_of
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .piecewise import evaluated
 from .report import Report
@@ -23,7 +24,7 @@ from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline
-from .times import knots_of
+from .times import Clock, knots_of
 
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
@@ -32,7 +33,8 @@ def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) ->
     Takes the arguments of `CubicSpline`.
 
     Returns:
-        The velocities, of the shape of the points, and the report.
+        The velocities, of the shape of the points, and the report. Where the points are arrays of another library that
+        follows the array API standard, and on the CPU, velocities are of it, too.
 
     >>> import symspline as ss
     >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
@@ -40,7 +42,7 @@ def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) ->
     ((3, 3), True)
     """
     spline = CubicSpline(t, points, space, **options)
-    return spline.velocities, spline.report
+    return in_library(library_of(points), spline.velocities), spline.report
 
 
 def evaluate(
@@ -64,6 +66,9 @@ def evaluate(
         space: the space or its name.
         nu, extrapolate, per_curve, progress: as for calling a `CubicSpline`.
 
+    Returns:
+        Values as of calling a `CubicSpline`, as arrays of the library that points, u or x come from.
+
     >>> import symspline as ss
     >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> u, _ = ss.fit(None, p, "sphere:2")
@@ -72,6 +77,14 @@ def evaluate(
     """
     space = space_named(space)
     check_progress(progress)
+    clock, curve = given(t, points, u, space)
+    where = outside(checked_policy(extrapolate), "natural")
+    values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
+    return in_library(library_of(points, u, x), values)
+
+
+def given(t: ArrayLike | None, points: Any, u: Any, space: Space) -> tuple[Clock, Curve]:
+    """The curve with given knots, points and velocities, and how it counts times."""
     data = fitting.read(points, space)
     velocities = [
         velocities_of(factor, part.doubles, own)
@@ -83,9 +96,8 @@ def evaluate(
         on_space = fitting.validated(space, times, data, fitting.read_ends("natural", space, batch))
     except ValidationError as error:
         raise clock.explain(error) from None
-    curve = fitting.curve_of(space, times, list(zip(on_space, velocities, strict=True)), fitted=False)
-    where = outside(checked_policy(extrapolate), "natural")
-    return evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
+    arrays = list(zip(on_space, velocities, strict=True))
+    return clock, fitting.curve_of(space, times, arrays, fitted=False)
 
 
 def velocities_of(space: Space, points: Array, u: Any, name: str = "u") -> Array:

@@ -44,6 +44,7 @@ def unwrapped(value: Any, name: str) -> Any:
         if set(map(type, value)) <= _SIMPLE:
             return value
         return [unwrapped(part, f"{name}[{i}]") for i, part in enumerate(value)]
+    refuse_blocks(value, name)
     if hasattr(value, "requires_grad") and hasattr(value, "detach"):
         return _tensor(value, name)
     if hasattr(value, "isket") and hasattr(value, "full"):
@@ -79,6 +80,32 @@ def _quantum(value: Any, name: str) -> Any:
     return array
 
 
+def refuse_blocks(value: Any, name: str) -> None:
+    """Raise ValidationError for what dask has not computed yet, which would be loaded as a whole."""
+    if hasattr(value, "__dask_graph__") and value.__dask_graph__() is not None:
+        raise ValidationError(
+            f"{name} is in blocks of dask, which would be loaded as a whole; symspline.xarray works block by block, "
+            f"and {name}.compute() is an array"
+        )
+
+
+def library_of(*values: Any) -> Any:
+    """The namespace (array API standard) of the first array that is not NumPy's, None if there is none. A tuple stands
+    for its parts."""
+    for value in values:
+        for part in value if isinstance(value, tuple) else (value,):
+            if type(part) not in _SIMPLE and hasattr(part, "__array_namespace__"):
+                return part.__array_namespace__()
+    return None
+
+
+def in_library(library: Any, values: Any) -> Any:
+    """Arrays of NumPy, or a tuple of them, as those of another library."""
+    if library is None:
+        return values
+    return tuple(map(library.asarray, values)) if isinstance(values, tuple) else library.asarray(values)
+
+
 def refuse_objects(array: NDArray[Any], name: str) -> None:
     """Raise ValidationError, naming the first entry that is no number, and what makes an array of it."""
     flat = array.ravel()
@@ -104,6 +131,7 @@ def times_of(value: Any, name: str) -> tuple[Any, str | None]:
     Raises:
         ValidationError: some have a time zone and others not, or a text is no date.
     """
+    refuse_blocks(value, name)
     kind = getattr(value, "dtype", None)
     if type(value) is np.ndarray or isinstance(value, np.generic):
         if value.dtype.kind not in "OU":

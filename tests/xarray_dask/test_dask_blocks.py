@@ -1,0 +1,221 @@
+"""Blocks of dask: nothing is computed before it is asked for, by any scheduler, and one thread a worker is enough."""
+
+import os
+import pickle
+import sys
+import threading
+import warnings
+
+import dask
+import numpy as np
+import pytest
+import xarray as xr
+from curves import S2, run_python, same
+from fields import field, numbers, point_dims
+
+import symspline as ss
+import symspline.xarray as sx
+from symspline import _core
+from symspline.threads import one_thread
+from symspline.xarray import blocks
+
+X = np.array([0.0, 0.3, 2.5, 7.7, 13.0])
+
+
+@pytest.mark.parametrize("scheduler", ["synchronous", "threads", "processes"])
+def test_blocks_give_the_bits_of_the_whole(scheduler):
+    da = field("so:3")
+    where = xr.DataArray(np.arange(12).reshape(2, 6) != 5, dims=("lat", "lon"))
+    dims = point_dims("so:3")
+    expected = sx.fit(da, "so:3", point_dims=dims, where=where)
+    blocks = da.transpose("s", "lon", ...).chunk(lon=4, lat=1)
+    ds = sx.fit(blocks, "so:3", point_dims=dims, where=where.chunk(lon=2))
+    values, speed = sx.evaluate(ds, X, 1), sx.speed(ds, X)
+    made = sx.resample(blocks, "so:3", X, point_dims=dims, where=where)
+    lazy = (ds, values, speed, made)
+    assert all(dask.is_dask_collection(found) for found in lazy)
+    ds, values, speed, made = dask.compute(
+        *lazy, scheduler=scheduler, num_workers=1 if scheduler == "processes" else 2
+    )
+    assert same(numbers(ds.velocities, "time", *dims), expected.velocities.values)
+    assert same(numbers(ds.converged), expected.converged.values) and ds.converged.sum() == 11
+    assert same(numbers(values, "time", *dims), sx.evaluate(expected, X, 1).values)
+    assert same(numbers(speed, "time"), sx.speed(expected, X).values)
+    assert same(numbers(made, "time", *dims), sx.evaluate(expected, X).values)
+
+
+def test_nothing_is_computed_before_it_is_asked_for():
+    def never(block):
+        raise AssertionError
+
+    da = field(chunks={"lon": 3})
+    lazy = da.copy(data=da.data.map_blocks(never, dtype=float, meta=np.empty((0, 0, 0, 0))))
+    ds = sx.fit(lazy, S2, point_dims=("r",), bc_type=((1, lazy[:, :, 0]), "natural"))
+    assert ds.velocities.chunks == ((2,), (3, 3), (10,), (3,)) and ds.residual.chunks == ((2,), (3, 3))
+    assert ds.points.dtype == float and ds.converged.dtype == bool and ds.iterations.dtype == int
+    for values in (sx.evaluate(ds, X), sx.lift(ds, X), sx.resample(lazy, S2, X, point_dims=("r",))):
+        assert values.shape == (2, 6, 5, 3)
+    with pytest.raises(AssertionError):
+        ds.compute(scheduler="synchronous")
+
+
+def test_lazy_times():
+    da = field(chunks={"lon": 3})
+    x = xr.DataArray(np.linspace(0, 13, 30).reshape(6, 5), dims=("lon", "sample"))
+    ds = sx.fit(da, S2, point_dims=("r",))
+    assert same(sx.evaluate(ds, x.chunk(lon=2)).values, sx.evaluate(ds.compute(), x).values)
+    assert dask.is_dask_collection(sx.evaluate(ds.compute(), x.chunk(lon=2)))
+
+
+def test_blocks_are_those_of_the_points():
+    da = field(chunks={"lon": 4})
+    where = xr.DataArray(np.ones((2, 6), bool), dims=("lat", "lon"))
+    ds = sx.fit(da, S2, point_dims=("r",), where=where.chunk(lon=1, lat=1))
+    # Consistent with the coordinate, or this would raise.
+    assert ds.chunksizes["lon"] == (4, 2) and "place" in ds.coords
+    x = xr.DataArray(np.linspace(0, 13, 30).reshape(6, 5), dims=("lon", "sample"))
+    for times in (x.chunk(lon=1), x.chunk(sample=2), x.chunk(sample=2, lon=3)):
+        values = sx.evaluate(ds, times)
+        assert values.variable.chunksizes["lon"] == (4, 2)
+        assert same(values.values, sx.evaluate(ds.compute(), x).values)
+
+
+def test_end_vectors_in_blocks():
+    da = field()
+    start = S2.random_tangent(np.random.default_rng(0), da.values[:, :, 0])
+    start = xr.DataArray(start, dims=("lat", "lon", "r"))
+    whole = sx.fit(da, S2, point_dims=("r",), bc_type=((1, start), "not-a-knot"))
+    parts = sx.fit(
+        da.chunk(lat=1, lon=4), S2, point_dims=("r",), bc_type=((1, start.chunk(lon=3)), "not-a-knot")
+    )
+    assert same(whole.velocities.values, parts.velocities.values)
+
+
+def test_a_failure_says_that_it_counts_in_its_block():
+    da = field()
+    da[1, 5, 3] = np.nan
+    ds = sx.fit(da.chunk(lon=4), S2, point_dims=("r",), on_failure="raise")
+    with pytest.raises(ss.ValidationError, match=r"points?.*3.* of curve 1,1") as caught:
+        ds.compute(scheduler="synchronous")
+    assert caught.value.__notes__ == ["Indices of curves count within one block of the dask array."]
+    da[1, 5, 3] = -da.values[1, 5, 2]
+    ds = sx.fit(da.chunk(lon=4), S2, point_dims=("r",), on_failure="raise")
+    with pytest.raises(ss.CutLocusError, match=r"of curve 1,1") as caught:
+        ds.compute(scheduler="synchronous")
+    sent = pickle.loads(pickle.dumps(caught.value))
+    assert type(sent) is ss.CutLocusError and not hasattr(sent, "spline") and sent.__notes__
+
+
+# ---- threads ----
+
+
+def test_one_thread_in_blocks_and_all_without(threads, monkeypatch):
+    seen = []
+    for name in ("CubicSpline", "given"):
+        function = getattr(blocks, name)
+
+        def spy(*arguments, function=function, **options):
+            seen.append(_core.num_threads())
+            return function(*arguments, **options)
+
+        monkeypatch.setattr(blocks, name, spy)
+    ss.set_num_threads(3)
+    da = field()
+    sx.evaluate(sx.fit(da, S2, point_dims=("r",)), X)
+    assert set(seen) == {3}
+    seen.clear()
+    sx.evaluate(sx.fit(da.chunk(lon=2), S2, point_dims=("r",)), X).compute(scheduler="threads", num_workers=2)
+    # Before that, a rehearsal on one curve.
+    assert seen == [3] + [1] * 6
+    assert ss.num_threads() == 3
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_workers_times_threads_do_not_multiply():
+    """Four workers of dask need no threads of the core."""
+    code = """
+import os, threading, dask, numpy as np, xarray as xr, symspline as ss, symspline.xarray as sx
+ss.set_num_threads(3)
+p = ss.Sphere(2).geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 20))
+da = xr.DataArray(p, dims=("time", "q")).expand_dims(curve=8000)
+def extra():
+    return len(os.listdir("/proc/self/task")) - threading.active_count()
+before = extra()
+sx.fit(da.chunk(curve=1000), "sphere:2").compute(scheduler="threads", num_workers=4)
+print(extra() - before)
+sx.fit(da, "sphere:2")
+print(extra() - before)
+"""
+    assert run_python(code, timeout=60).split() == ["0", "3"]
+
+
+def test_one_thread_is_counted():
+    ss.set_num_threads(3)
+    try:
+        with one_thread():
+            with one_thread():
+                assert ss.num_threads() == 1
+            assert ss.num_threads() == 1
+            # It holds when this is over.
+            ss.set_num_threads(5)
+            assert ss.num_threads() == 1
+        assert ss.num_threads() == 5
+        with pytest.raises(KeyError), one_thread():
+            raise KeyError
+        assert ss.num_threads() == 5
+    finally:
+        ss.set_num_threads(0)
+
+
+def test_one_thread_in_many(threads):
+    ss.set_num_threads(2)
+    barrier = threading.Barrier(8)
+
+    def work():
+        barrier.wait(10)
+        for _ in range(500):
+            with one_thread():
+                assert ss.num_threads() == 1
+
+    workers = [threading.Thread(target=work) for _ in range(8)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(20)
+    assert ss.num_threads() == 2
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_child_that_was_forked_meanwhile_has_all_threads(threads):
+    ss.set_num_threads(3)
+    with warnings.catch_warnings():
+        # Of the threads of other tests.
+        warnings.simplefilter("ignore")
+        with one_thread():
+            child = os.fork()
+            if child == 0:
+                os._exit(ss.num_threads())
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 3
+
+
+# ---- files ----
+
+
+@pytest.mark.parametrize("space", ["sphere:2", "cp:2", "so:3"])
+def test_curves_come_back_from_zarr(space, tmp_path):
+    dims = point_dims(space)
+    da = field(space, chunks={"lon": 2}).assign_coords(
+        time=np.datetime64("2021-08-28", "ms") + np.arange(10) * np.timedelta64(90, "m")
+    )
+    x = np.datetime64("2021-08-28T01", "s") + np.arange(3)
+    da.to_zarr(tmp_path / "in.zarr", consolidated=False)
+    read = xr.open_zarr(tmp_path / "in.zarr", consolidated=False)["direction"]
+    sx.fit(read, space, point_dims=dims, bc_type="clamped", extrapolate="geodesic").to_zarr(
+        tmp_path / "out.zarr", consolidated=False
+    )
+    ds = xr.open_zarr(tmp_path / "out.zarr", consolidated=False)
+    expected = ss.CubicSpline(da.time.values, da.values, space, bc_type="clamped", extrapolate="geodesic")
+    assert same(sx.evaluate(ds, x).values, expected(x))
+    late = np.datetime64("2021-08-30")
+    assert same(sx.speed(ds, late).values, expected.speed(late))
+    assert ds.attrs["space"] == space and bool(ds.converged.all())
