@@ -57,8 +57,7 @@ pub fn settle(
         let on = lanes
             & match way {
                 Way::Homotopy => mask_from(|l| outcome.solver[l] != Solver::Homotopy),
-                Way::Newton => lanes & outcome.settled(idle),
-                Way::FromZero | Way::FromAlgorithm1 => lanes,
+                Way::Newton | Way::FromZero | Way::FromAlgorithm1 => lanes,
                 Way::FromBest => !outcome.settled(idle),
             };
         if on.none() {
@@ -94,7 +93,7 @@ pub fn settle(
         };
         let arrived = on & mask_from(|l| found.converged[l]);
         let bends = energy(chain, arrived);
-        let other = arrived & !(bends - least).abs().simd_le(lane(SAME) * least.max(bends));
+        let other = arrived & !(bends - least).abs().simd_le(lane(SAME) * bends);
         let calmer = other & bends.simd_lt(least);
         second = calmer.select(least, other.select(second.min(bends), second));
         least = calmer.select(bends, least);
