@@ -65,7 +65,7 @@ autosummary_generate = True
 autosummary_ignore_module_all = False
 # A space's own page has what is its own; what all share stands on the page of `Space`.
 autosummary_context = {"spaces": [name for name in symspline.__all__ if _is_space(getattr(symspline, name))]}
-autodoc_member_order = "groupwise"
+autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 # It is described without being installed: it is large, and nothing on these pages runs it.
 autodoc_mock_imports = ["torch"]
@@ -89,6 +89,7 @@ sphinx_gallery_conf = {
     "reference_url": {"symspline": None},
     "inspect_global_variables": True,
     "remove_config_comments": True,
+    "thumbnail_size": (480, 320),
     "show_memory": False,
     # What a last line returns is not shown, as axes and legends would be.
     "capture_repr": (),
@@ -104,6 +105,8 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"symspline {release}"
 html_static_path = ["_static"]
 html_css_files = ["symspline.css"]
+# These have nothing beside them.
+html_sidebars: dict[str, list[str]] = {"index": [], "start": []}
 html_copy_source = html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": False,

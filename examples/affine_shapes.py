@@ -63,3 +63,4 @@ ax.legend(frameon=False)
 fig8 = spline.plot()
 print(f"largest speed {spline.speed(x).max():.2f}, also near (C)")
 plt.show()
+# sphinx_gallery_thumbnail_number = 3

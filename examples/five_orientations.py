@@ -57,3 +57,4 @@ frames = spline.plot()
 out = ss.rotations.quaternion(spline, x, scalar_first=False)
 print(f"largest step of a component: {np.abs(np.diff(out, axis=0)).max():.3f}")
 plt.show()
+# sphinx_gallery_thumbnail_number = 2

@@ -65,3 +65,4 @@ below.legend()
 
 strip = film.plot()
 plt.show()
+# sphinx_gallery_thumbnail_number = 2

@@ -68,6 +68,8 @@ def test_every_public_name_has_a_description():
 
 def test_every_example_is_in_the_gallery_once():
     named = re.findall(r"^    \.\./examples/(\w+)\.py$", GALLERY, re.M)
+    # And in the same order beside the pages.
+    assert named == re.findall(r"^   (\w+)$", GALLERY, re.M)
     assert sorted(named) == sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 
 
