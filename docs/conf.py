@@ -32,18 +32,17 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["gallery/*.ipynb", "gallery/*.py", "**/sg_execution_times.rst"]
+exclude_patterns = ["gallery/*.ipynb", "gallery/*.py"]
 templates_path = ["_templates"]
 
 # ---- pages ----
 
-myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
 # Links to headings.
 myst_heading_anchors = 3
 suppress_warnings: list[str] = []
@@ -73,6 +72,7 @@ napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
+napoleon_attr_annotations = False
 maximum_signature_line_length = 90
 add_module_names = False
 
@@ -94,7 +94,7 @@ sphinx_gallery_conf = {
     # What a last line returns is not shown, as axes and legends would be.
     "capture_repr": (),
     "show_signature": False,
-    "min_reported_time": 1,
+    "write_computation_times": False,
     "download_all_examples": False,
     "parallel": False,
 }
@@ -116,6 +116,7 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],
+    "primary_sidebar_end": [],
     "pygments_light_style": "tango",
     "pygments_dark_style": "monokai",
 }

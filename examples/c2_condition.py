@@ -42,8 +42,9 @@ assert sphere.distance(sphere.transvection(p, v, p), q) < 1e-14
 # At pᵢ, with the control points qᵢ± on either side and vᵢ = log(pᵢ, qᵢ⁺) = −log(pᵢ, qᵢ⁻), two sums of two vectors must
 # be the same, for knots at equal distances:
 #
-# .. math:: \log_{p_i}\bigl(E_{p_i}(-v_i) \cdot q_{i+1}^-\bigr) + \log_{p_i} q_i^-
-#           = \log_{p_i}\bigl(E_{p_i}(v_i) \cdot q_{i-1}^+\bigr) + \log_{p_i} q_i^+ .
+# .. code-block:: text
+#
+#     log(pᵢ, E(−vᵢ)·qᵢ₊₁⁻) + log(pᵢ, qᵢ⁻)  =  log(pᵢ, E(vᵢ)·qᵢ₋₁⁺) + log(pᵢ, qᵢ⁺)
 #
 # In the picture the geodesics of these vectors are dashed green and dotted purple, as in Fig. 3. For the curve of
 # Catmull and Rom they differ; the solver makes the difference zero.

@@ -56,7 +56,7 @@ def globe(axes, title):
     axes.set_axis_off()
 
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+figure, left = plt.subplots(figsize=(8, 5), layout="constrained")
 globe(left, "Fig. 1: de Casteljau's algorithm at t = 0.25")
 left.plot(*polynomial.T[[1, 2]], color="0.6", linestyle=":", label="polynomial")
 left.plot(*curve(t[:, 0]).T[[1, 2]], "k", linewidth=2, label="curve")
@@ -77,6 +77,7 @@ plus, minus = sphere.exp(data, spline.velocities / 3), sphere.exp(data, -spline.
 np.testing.assert_allclose(spline.control_points[:, 1], plus[:-1], atol=1e-14)
 np.testing.assert_allclose(spline.control_points[:, 2], minus[1:], atol=1e-14)
 
+figure, right = plt.subplots(figsize=(8, 5), layout="constrained")
 globe(right, "Fig. 4: velocities and control points")
 right.plot(*spline(np.linspace(0, 3, 300)).T[[1, 2]], "k", linewidth=2)
 for i in range(4):

@@ -30,7 +30,9 @@ print("auto:", ss.CubicSpline(None, zigzag, sphere).report.method)
 # ------------------
 # D is the largest distance between neighbours, K the square root of the curvature. The theorem needs a V with
 #
-# .. math:: \tfrac12\, \frac{u}{\sin u}\,(u - KV) \le KV, \qquad u = KD + 2KV < \pi,
+# .. code-block:: text
+#
+#     ½ u/sin(u) (u − KV) ≤ KV,   u = KD + 2KV < π,
 #
 # so that control legs that begin below V stay below it. It is the blue region of the paper's Fig. 10; the smallest V is
 # ``report.invariant_radius``. The paper's lower rectangle, "sufficiently small", has no number; measured instead are

@@ -17,7 +17,6 @@ PAGES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".md", ".rst"
 PAGES = [
     path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)
 ]
-PAGES = [path for path in PAGES if path.name != "sg_execution_times.rst"]
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
 OTHERS = {"adding-a-space.md", "derivatives.md", "smoothing.md", "shapes.md", "solvers.md"}
@@ -64,6 +63,17 @@ def test_every_public_name_has_a_description():
             members = getattr(importlib.import_module(thing.__name__), "__all__", [])
             # Numbers are described in the source.
             assert all(getattr(thing, member).__doc__ for member in members)
+
+
+def test_notation_names_what_exists():
+    spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2")
+    things = {"spline": spline, "space": spline.space, "report": spline.report, "ss": ss}
+    text = (DOCS / "notation.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(spline|space|report)\.(\w+)", text)
+    assert len(named) > 15 and all(hasattr(things[thing], name) for thing, name in named)
+    for call, name in re.findall(r"`(\w+\([kn, ]+\))`, `\"([^`]+)\"`", text):
+        call, name = (re.sub(r"\bk\b", "2", re.sub(r"\bn\b", "5", part)) for part in (call, name))
+        assert eval(f"ss.{call}") == ss.space(name)
 
 
 def test_every_example_is_in_the_gallery_once():
