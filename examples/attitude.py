@@ -33,6 +33,15 @@ slerp_rate = (slerp(mid).inv() * slerp(mid + step)).as_rotvec(degrees=True) / st
 
 attitude = ss.CubicSpline(minutes, pointings, "so:3", bc_type="clamped")
 
+# %%
+# Everything else is a method away, and a `Rotation` comes back where one went in.
+
+pointing = ss.rotations.rotation(attitude, 6.5)
+print("at 6.5 minutes:", pointing.as_euler("ZYX", degrees=True).round(2))
+
+# %%
+# Slerp's rate above, the spline's below:
+
 figure, axes = plt.subplots(4, figsize=(9, 9), sharex=True, layout="constrained")
 axes[0].plot(mid, slerp_rate)
 axes[1].plot(x, np.degrees(ss.rotations.angular_velocity(attitude, x)), label=list("xyz"))
@@ -44,11 +53,6 @@ axes[2].set(ylabel="its derivative\ndegrees/min²")
 axes[3].set(ylabel="quaternion", xlabel="minutes", xticks=minutes)
 for ax in axes:
     ax.grid(axis="x")
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5)) if ax is not axes[0] else None
-
-# %%
-# Everything else is a method away, and a `Rotation` comes back where one went in.
-
-pointing = ss.rotations.rotation(attitude, 6.5)
-print("at 6.5 minutes:", pointing.as_euler("ZYX", degrees=True).round(2))
+for ax in axes[1:]:
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 plt.show()

@@ -32,6 +32,13 @@ naive = CubicSpline(hours, np.column_stack([lon, lat]))(x)
 track = ss.CubicSpline(3600 * hours, ss.geo.from_lonlat(lon, lat), "sphere:2", bc_type="not-a-knot")
 smooth_lon, smooth_lat = ss.geo.to_lonlat(track(3600 * x))
 
+# %%
+# Speed and course need no care for the date line either.
+
+print(f"speed {ss.geo.sog(track, 3600 * 20):.1f} m/s, course {ss.geo.cog(track, 3600 * 20):.0f} degrees")
+
+# %%
+
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
 left.plot(*naive.T, color="0.6", label="spline of longitude and latitude")
 left.plot(lon, lat, "k.")
@@ -46,9 +53,4 @@ right.plot(smooth_lon % 360, smooth_lat, "C0")
 right.plot(lon % 360, lat, "k.")
 right.axvline(180, color="0.8", zorder=0)
 right.set(xlabel="degrees east", title="Near the date line")
-
-# %%
-# Speed and course need no care for the date line either.
-
-print(f"speed {ss.geo.sog(track, 3600 * 20):.1f} m/s, course {ss.geo.cog(track, 3600 * 20):.0f} degrees")
 plt.show()

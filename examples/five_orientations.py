@@ -47,14 +47,14 @@ axes.set(xlabel="t", ylabel="degrees per unit of time", xticks=t)
 axes.legend()
 
 # %%
-# As in Fig. 5 of the paper, a rotation is drawn as the frame that it makes of the three axes; bold are the data.
-
-frames = spline.plot()
-
-# %%
 # Quaternions come out without jumps of sign, whatever came in.
 
 out = ss.rotations.quaternion(spline, x, scalar_first=False)
 print(f"largest step of a component: {np.abs(np.diff(out, axis=0)).max():.3f}")
+
+# %%
+# As in Fig. 5 of the paper, a rotation is drawn as the frame that it makes of the three axes; bold are the data.
+
+frames = spline.plot()
 plt.show()
 # sphinx_gallery_thumbnail_number = 2
