@@ -6,7 +6,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo check test test-oracles test-torch fuzz bench check-tools clean
+.PHONY: demo check test test-oracles test-torch fuzz bench docs check-tools clean
 
 demo: .venv/built
 	$(BIN)/symspline demo --out demo-output
@@ -47,6 +47,12 @@ fuzz: .venv/tools
 bench: .venv/tools
 	$(BIN)/python -m benchmarks
 
+# The site, in build/docs: its gallery is run, and what is wrong with a page or a link to another one is an error.
+docs: .venv/tools
+	$(INSTALL) $$($(BIN)/python -c 'import tomllib; \
+		print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
+	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
+
 # The compiled module, and what the demonstration needs.
 .venv/built: pyproject.toml $(RUST) | check-tools
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -67,4 +73,4 @@ check-tools:
 		{ echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian: python3-venv)"; exit 1; }
 
 clean:
-	rm -rf .venv .venv-oracles target demo-output
+	rm -rf .venv .venv-oracles target demo-output build docs/gallery docs/api/generated docs/api/backreferences

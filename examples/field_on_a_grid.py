@@ -1,13 +1,23 @@
-"""The direction of a magnetic field at 2592 places, known every ten years: every year between, block by block in dask,
-from one zarr store to another, and a map of how fast it turns, turning.png."""
+"""
+A field on a grid, in blocks
+============================
 
+The direction of a magnetic field at 2592 places, known every ten years. A loop over the places would do, and hold all
+of them in memory; here the years between are made block by block in dask, from one zarr store to another, and a map
+shows how fast the field turns.
+"""
+
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 import symspline as ss
 import symspline.xarray as sx
 
+stores = Path(tempfile.mkdtemp())
 years = np.arange("1900", "2021", 10, dtype="datetime64[Y]").astype("datetime64[s]")
 lat, lon = np.arange(-87.5, 90, 5), np.arange(-177.5, 180, 5)
 place = ss.geo.from_lonlat(*np.meshgrid(lon, lat))
@@ -21,12 +31,12 @@ direction = xr.DataArray(
     coords={"lat": lat, "lon": lon, "time": years},
     name="direction",
 )
-direction.chunk(lat=9).to_zarr("field.zarr", mode="w", consolidated=False)
+direction.chunk(lat=9).to_zarr(stores / "field.zarr", mode="w", consolidated=False)
 
-blocks = xr.open_zarr("field.zarr", consolidated=False).direction
-sx.fit(blocks, "sphere:2", bc_type="not-a-knot").to_zarr("curves.zarr", mode="w", consolidated=False)
+blocks = xr.open_zarr(stores / "field.zarr", consolidated=False).direction
+sx.fit(blocks, "sphere:2", bc_type="not-a-knot").to_zarr(stores / "curves.zarr", mode="w", consolidated=False)
 
-curves = xr.open_zarr("curves.zarr", consolidated=False)
+curves = xr.open_zarr(stores / "curves.zarr", consolidated=False)
 middle = np.arange("1900", "2020", dtype="datetime64[Y]").astype("datetime64[s]") + np.timedelta64(182, "D")
 speed = np.degrees(sx.speed(curves, middle)) * 365.25 * 86400
 fastest = speed.max("time").compute()
@@ -35,8 +45,7 @@ print(
     f"the field turns by up to {float(fastest.max()):.2f} degrees a year"
 )
 
-figure = Figure(figsize=(7, 4), layout="constrained")
-axes = figure.subplots()
+figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
 figure.colorbar(axes.pcolormesh(lon, lat, fastest, shading="nearest"), label="degrees a year, at most")
 axes.set(title="turning of the field's direction", xlabel="longitude", ylabel="latitude")
-figure.savefig("turning.png", dpi=120)
+plt.show()

@@ -1,31 +1,55 @@
-"""What an inertial sensor on a handheld camera would have measured, from its recorded poses: draws imu.png.
-
-The recording is of TUM's RGB-D benchmark (CC BY 4.0), every tenth of its poses; eight seconds are left out as if the
-tracking had been lost.
 """
+Poses and an IMU
+================
+
+What would an inertial sensor on a handheld camera have measured? The camera's poses were recorded, every tenth of
+them is used. The recording is of TUM's RGB-D benchmark (CC BY 4.0); eight seconds are left out as if the tracking had
+been lost.
+"""
+
+# %%
+# The naive way
+# -------------
+# Divide differences of positions by differences of times, twice. The acceleration is a staircase in the wrong
+# frame, and in the pause it says that the camera was still: a line that looks like data.
 
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import symspline as ss
 
-FILE = Path(__file__).parents[1] / "docs" / "comparisons" / "data" / "freiburg1_xyz-groundtruth.txt.gz"
+# A notebook, which has no file, runs in the folder of the examples.
+HERE = Path(globals().get("__file__", "notebook")).resolve()
+FILE = HERE.parents[1] / "docs" / "comparisons" / "data" / "freiburg1_xyz-groundtruth.txt.gz"
 
 t, poses = (values[::10] for values in ss.poses.read_tum(FILE))
 t = t - t[0]
 seen = (t < 10) | (t > 18)
+t, poses = t[seen], poses[seen]
 
-pieces = ss.fit_segments(t[seen], poses[seen], "se:3", max_gap=0.5, duplicates="mean")
-figure = Figure(figsize=(9, 6), layout="constrained")
-axes = figure.subplots(2, sharex=True)
+velocity = np.diff(poses[:, :3, 3], axis=0) / np.diff(t)[:, None]
+middle = (t[1:] + t[:-1]) / 2
+acceleration = np.diff(velocity, axis=0) / np.diff(middle)[:, None]
+
+# %%
+# The spline
+# ----------
+# `fit_segments` cuts the recording where it pauses. `ss.poses.imu` gives what a gyroscope and an accelerometer in the
+# frame of the camera would have said at any rate, gravity included.
+
+pieces = ss.fit_segments(t, poses, "se:3", max_gap=0.5, duplicates="mean")
+
+figure, axes = plt.subplots(3, figsize=(9, 8), sharex=True, layout="constrained")
+axes[0].plot(t[1:-1], acceleration, drawstyle="steps-mid", linewidth=1)
+axes[0].set(ylabel="m/s²", ylim=(-3, 3), title="Differences of differences of positions, in the world")
 for piece in pieces:
     x = np.arange(piece.t[0], piece.t[-1], 0.01)
-    for axis, values in zip(axes, ss.poses.imu(piece, x), strict=True):
-        axis.set_prop_cycle(None)
-        axis.plot(x, values, linewidth=1)
-axes[0].set(ylabel="angular velocity, rad/s", title="In the frame of the camera")
-axes[0].legend(axes[0].lines[:3], list("xyz"), loc="upper center", ncols=3)
-axes[1].set(ylabel="specific force, m/s²", xlabel="seconds")
-figure.savefig("imu.png")
+    for ax, values in zip(axes[1:], ss.poses.imu(piece, x), strict=True):
+        ax.set_prop_cycle(None)
+        ax.plot(x, values, linewidth=1)
+axes[1].set(ylabel="angular velocity, rad/s", title="From the spline, in the frame of the camera")
+axes[1].legend(axes[1].lines[:3], list("xyz"), loc="upper center", ncols=3)
+axes[2].set(ylabel="specific force, m/s²", xlabel="seconds")
+plt.show()

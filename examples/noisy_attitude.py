@@ -1,7 +1,17 @@
-"""Attitudes from a noisy sensor: the angular velocity before and after smoothing; draws noisy_attitude.png."""
+"""
+Angular velocity of a noisy attitude
+====================================
 
+A sensor says the attitude ten times a second, off by one degree about each axis. The angular velocity is wanted.
+"""
+
+# %%
+# The naive way
+# -------------
+# A curve through all measurements. Its rates are noise: one degree in a tenth of a second is ten degrees a second.
+
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -11,16 +21,20 @@ t = np.arange(0, 20, 0.1)  # seconds
 truth = Rotation.from_euler(
     "ZYX", np.stack([90 * np.sin(t / 3), 20 * np.sin(t), 8 * t], axis=-1), degrees=True
 )
-measured = truth * Rotation.from_rotvec(
-    np.radians(1) * rng.standard_normal((len(t), 3))
-)  # 1 degree about each axis
+measured = truth * Rotation.from_rotvec(np.radians(1) * rng.standard_normal((len(t), 3)))
 
 through = ss.CubicSpline(t, measured, "so:3")
+
+# %%
+# The smooth curve
+# ----------------
+# How smooth is found from the data, and bands say how sure the rates are.
+
 near = ss.make_smoothing_spline(t, measured, "so:3")
 x = np.linspace(0, t[-1], 1000)
 exact = ss.rotations.angular_velocity(ss.CubicSpline(t, truth, "so:3", bc_type="not-a-knot"), x)
 
-figure = Figure(figsize=(9, 6), layout="constrained")
+figure = plt.figure(figsize=(9, 6), layout="constrained")
 before, after = figure.subplots(2, sharex=True)
 before.plot(x, np.degrees(ss.rotations.angular_velocity(through, x)), linewidth=0.7)
 rates, band = ss.rotations.angular_velocity(near, x), 1.96 * near.std(x, nu=1)
@@ -35,8 +49,8 @@ after.set(
     ylabel="degrees/s", xlabel="seconds", title="of the smooth curve, with 95 % bands; dotted, the truth"
 )
 after.legend(loc="lower left", ncols=3)
-figure.savefig("noisy_attitude.png")
 off = near.space.distance(near(t), truth.as_matrix())
 print(
     f"noise {np.degrees(near.sigma):.2f} degrees found; the curve is off by {np.degrees(off.mean()):.2f} degrees"
 )
+plt.show()

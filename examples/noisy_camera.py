@@ -1,8 +1,18 @@
-"""A camera that goes round a table, from noisy tracking: places and attitudes are each smoothed by as much as they
-need; draws camera.png."""
+"""
+A noisy camera path
+===================
 
+A camera goes round a table, and its tracking is off by 4 cm and 3 degrees.
+"""
+
+# %%
+# The naive way
+# -------------
+# One smoothing for the pose as a whole. In ``se:3`` metres and radians count alike, and one λ has to do for both: which
+# of them it suits depends on the unit of length.
+
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -14,9 +24,17 @@ truth = (
     np.stack([2 * np.cos(turn), 1.3 * np.sin(turn), 1.5 + 0.1 * np.sin(5 * turn)], axis=-1),
     Rotation.from_euler("ZY", np.stack([turn + np.pi, 0.3 + 0.1 * np.sin(3 * turn)], axis=-1)).as_matrix(),
 )
-space = ss.space("r:3 x so:3")  # not se:3, where metres and radians would count alike
+space = ss.space("r:3 x so:3")
 noise = [0.04 * rng.standard_normal((len(t), 3)), np.radians(3) * rng.standard_normal((len(t), 3))]
 tracked = (truth[0] + noise[0], truth[1] @ Rotation.from_rotvec(noise[1]).as_matrix())
+
+pose = ss.make_smoothing_spline(t, ss.poses.join(tracked[1], tracked[0]), "se:3")
+attitude, place = ss.poses.split(pose(t))
+
+# %%
+# A λ for each
+# ------------
+# In the product of R³ and SO(3) places and attitudes are each smoothed by as much as they need.
 
 path = ss.make_smoothing_spline(t, tracked, space)
 print(
@@ -25,7 +43,11 @@ print(
     )
 )
 
-figure = Figure(figsize=(10, 4.5), layout="constrained")
+for name, places, attitudes in (("one λ", place, attitude), ("a λ for each", *path(t))):
+    off = ss.space("r:3").distance(places, truth[0]), ss.space("so:3").distance(attitudes, truth[1])
+    print(f"{name}: off by {100 * off[0].mean():.1f} cm, {np.degrees(off[1].mean()):.2f} degrees")
+
+figure = plt.figure(figsize=(10, 4.5), layout="constrained")
 axes = figure.subplot_mosaic([["above", "r:3"], ["above", "so:3"]], width_ratios=(5, 4))
 axes["above"].plot(*tracked[0][:, :2].T, ".", color="0.75", label="tracked")
 axes["above"].plot(*path.points[0][:, :2].T, label="smooth")
@@ -33,11 +55,13 @@ for colour, (places, attitudes) in (("0.75", tracked), ("C0", path(t))):
     axes["above"].quiver(*places[::4, :2].T, *attitudes[::4, :2, 0].T, color=colour, scale=15, width=0.004)
 axes["above"].set(aspect="equal", title="From above: places, and where the camera looks", xlabel="metres")
 axes["above"].legend(loc="center")
-for name, seen, smooth, true, unit in zip(
-    ["r:3", "so:3"], tracked, path(t), truth, [100, 180 / np.pi], strict=True
+for name, seen, whole, smooth, true, unit in zip(
+    ["r:3", "so:3"], tracked, (place, attitude), path(t), truth, [100, 180 / np.pi], strict=True
 ):
     axes[name].plot(t, unit * ss.space(name).distance(seen, true), ".", color="0.75")
+    axes[name].plot(t, unit * ss.space(name).distance(whole, true), color="C1", linewidth=1, label="se:3")
     axes[name].plot(t, unit * ss.space(name).distance(smooth, true))
 axes["r:3"].set(title="Distance from the truth", ylabel="centimetres", xticklabels=[])
+axes["r:3"].legend(loc="upper left")
 axes["so:3"].set(ylabel="degrees", xlabel="seconds")
-figure.savefig("camera.png")
+plt.show()

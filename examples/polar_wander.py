@@ -1,12 +1,21 @@
-"""An apparent polar wander path near mean poles of which some are known better than others; draws poles.png.
-
-The poles are made up: they are off a given path by as much as their circles of 95 % confidence, A95, say.
 """
+A polar wander path
+===================
+
+Mean poles of rocks of twenty ages, some known better than others, and the path of the pole through time. The poles are
+made up: they are off a given path by as much as their circles of 95 % confidence, A95, say.
+"""
+
+# %%
+# The naive way
+# -------------
+# A running mean over five poles, as the literature has it: it treats good and bad poles alike, and has nothing to say
+# at the ends. And near the pole of the globe, where the path begins, means of longitudes mean nothing.
 
 from importlib.resources import files
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import symspline as ss
 
@@ -16,7 +25,11 @@ ages, a95 = np.linspace(5, 195, 20), np.radians(rng.uniform(2, 10, 20))  # milli
 spread = a95 / np.sqrt(-2 * np.log(0.05))  # in one direction, if errors are Gaussian
 poles = sphere.exp(path(ages), spread[:, None] * sphere.random_tangent(rng, path(ages)))
 
+# %%
+# The smooth path
+# ---------------
 # The weights say how large the errors are, not only which are larger: sigma is 1.
+
 smooth = ss.make_smoothing_spline(ages, poles, sphere, weights=1 / spread**2, sigma=1.0, criterion="cp")
 x = np.linspace(5, 195, 300)
 print(
@@ -37,7 +50,7 @@ def circle(pole, radius):
     return seen(sphere.exp(pole, radius * directions))
 
 
-figure = Figure(figsize=(8, 6.5), layout="constrained")
+figure = plt.figure(figsize=(8, 6.5), layout="constrained")
 axes = figure.subplots()
 for lat in (30, 45, 60, 75):
     axes.plot(*seen(ss.geo.from_lonlat(np.arange(361), lat)), color="0.85", linewidth=0.7)
@@ -49,9 +62,11 @@ for pole, radius in zip(smooth(x), smooth.band(x), strict=True):
 dots = axes.scatter(*seen(poles), c=ages, s=30, cmap="plasma", zorder=3, label="mean poles and their A95")
 for pole, radius, colour in zip(poles, a95, dots.to_rgba(ages), strict=True):
     axes.plot(*circle(pole, radius), color=colour, linewidth=0.8)
+running = sphere.project(np.stack([poles[i - 2 : i + 3].mean(axis=0) for i in range(2, 18)]))
+axes.plot(*seen(running), color="0.4", linewidth=1, label="running mean")
 axes.plot(*seen(smooth(x)), label="smooth, and its A95")
 axes.plot(*seen(path(x)), "k--", linewidth=1, label="true")
 figure.colorbar(dots, label="age, million years", shrink=0.8)
 axes.set(aspect="equal", xlim=(-0.65, 0.65), ylim=(-0.55, 0.7), xticks=[], yticks=[])
 axes.legend(loc="lower left")
-figure.savefig("poles.png")
+plt.show()

@@ -1,16 +1,57 @@
-"""Steer a qubit through six states (Fig. 6 of the paper) by pulses in three fields."""
+"""
+Control of a qubit, both steps (Fig. 6)
+=======================================
 
+§4.2 of the paper: a curve through six states of a qubit, drawn on the Bloch sphere, and the Hamiltonian that drives the
+states along it.
+"""
+
+# %%
+# The naive way
+# -------------
+# Kets come with any phase: two kets that differ by a factor of modulus one are the same state. A spline through their
+# complex numbers takes the phases for data. The curve below goes through the same six states, but between
+# them it depends on phases that mean nothing.
+
+import matplotlib.pyplot as plt
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 import symspline as ss
-
-PAULIS = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 
 # The paper does not give its states; these are six places on the Bloch sphere.
 places = ss.geo.from_lonlat([0, 60, 100, 170, 220, 300], [60, 20, -30, -10, 40, 10])
 times = np.array([0.0, 1.0, 2.0, 3.5, 4.5, 6.0])
-path = ss.CubicSpline(times, ss.quantum.from_bloch_vector(places), "cp:1")
+kets = ss.quantum.from_bloch_vector(places)
+phases = np.exp([0, 2j, 5j, 1j, 4j, 3j])
+x = np.linspace(0, 6, 600)
 
+
+def naive(kets):
+    numbers = CubicSpline(times, kets, bc_type="natural")(x)
+    return numbers / np.linalg.norm(numbers, axis=1, keepdims=True)
+
+
+between = ss.space("cp:1").distance(naive(kets), naive(phases[:, None] * kets))
+print(f"the same states with other phases: up to {between.max():.2f} of {np.pi / 2:.2f} apart")
+
+# %%
+# First step: the curve
+# ---------------------
+# On ``cp:1`` phases play no part.
+
+path = ss.CubicSpline(times, kets, "cp:1")
+other = ss.CubicSpline(times, phases[:, None] * kets, "cp:1")
+assert path.space.distance(path(x), other(x)).max() < 1e-7
+
+bloch = path.plot()
+
+# %%
+# Second step: the fields
+# -----------------------
+# Fields along x, y and z that are constant during each pulse, and drive the states through all six exactly.
+
+PAULIS = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 edges = np.linspace(0, 6, 49)  # among them all the times
 fields = ss.quantum.pulses(path, edges, operators=PAULIS)  # one row of three strengths a pulse
 
@@ -19,4 +60,21 @@ for strengths, duration in zip(fields, np.diff(edges), strict=True):
     values, vectors = np.linalg.eigh(np.einsum("q,qab->ab", strengths, PAULIS))
     state = vectors @ (np.exp(-1j * values * duration) * (vectors.conj().T @ state))
 print(f"missed by {path.space.distance(state, path.points[-1]):.1e}, strongest field {abs(fields).max():.2f}")
-path.plot("qubit.png")
+
+smooth = np.einsum("xab,qba->xq", ss.quantum.hamiltonian(path, x), PAULIS).real / 2
+figure, axes = plt.subplots(2, figsize=(8, 5), sharex=True, layout="constrained")
+axes[0].plot(x, np.abs(naive(kets)[:, 0]) ** 2, color="0.6", label="components")
+axes[0].plot(
+    x, np.abs(naive(phases[:, None] * kets)[:, 0]) ** 2, color="0.6", linestyle=":", label="other phases"
+)
+axes[0].plot(x, np.abs(path(x)[:, 0]) ** 2, label="spline")
+axes[0].plot(times, np.abs(kets[:, 0]) ** 2, "k.")
+axes[0].set(ylabel="probability of |0⟩")
+axes[0].legend(ncols=3)
+for i, name in enumerate("xyz"):
+    axes[1].plot(x, smooth[:, i], f"C{i}", label=name)
+    axes[1].stairs(fields[:, i], edges, color=f"C{i}", alpha=0.5)
+axes[1].set(xlabel="time", ylabel="field", title="The Hamiltonian of the curve, continuous, and its pulses")
+axes[1].legend(ncols=3)
+plt.show()
+# sphinx_gallery_thumbnail_number = 1

@@ -79,16 +79,11 @@ pub fn settle(
                 trust_region::solve(space, chain, ends, limits(STEPS), !on, work, monitor)
             }
             Way::FromAlgorithm1 => {
-                let found = solve(space, chain, ends, Solver::FixedPoint, limits(SWEEPS), !on, work, monitor);
-                let rest = on & !found.settled(!on);
-                if rest.none() {
-                    found
-                } else {
-                    let mut whole =
-                        trust_region::solve(space, chain, ends, limits(STEPS), !rest, work, monitor);
-                    whole.fill(&found, !rest);
-                    whole
-                }
+                let before =
+                    solve(space, chain, ends, Solver::FixedPoint, limits(SWEEPS), !on, work, monitor);
+                let mut found = trust_region::solve(space, chain, ends, limits(STEPS), !on, work, monitor);
+                found.iterations = std::array::from_fn(|l| found.iterations[l] + before.iterations[l]);
+                found
             }
         };
         let arrived = on & mask_from(|l| found.converged[l]);

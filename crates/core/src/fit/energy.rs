@@ -6,7 +6,7 @@ use crate::matrix::GAUSS;
 use crate::scalar::{Jet, Lane, lane};
 use crate::space::{Ambient, Erased, Frame};
 
-/// The energy of each lane, in units of the knots and the points. Every segment is carried home in parallel to the
+/// The energy of each lane, in the units of the chain. Every segment is carried home in parallel to the
 /// first point, which changes no length.
 pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
     let (n, m, len) = (chain.n, chain.m, space.point_len());
@@ -39,5 +39,5 @@ pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
             }
         }
     });
-    sum * chain.unit_of_energy()
+    sum
 }

@@ -84,7 +84,7 @@ fn fit_in(
     let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
     let options = Options { tol: pieces_tol, ..*options };
     let outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
-    let alternative = outcome.alternative.to_array();
+    let alternative = (outcome.alternative * chain.unit_of_energy()).to_array();
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
     let noisy = noisy_legs(space, chain, &runs, outcome.leg);
     let steps = chain.max_step.to_array();

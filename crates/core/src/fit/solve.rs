@@ -43,7 +43,7 @@ pub struct Outcome {
     pub rate: Lane,
     /// Which solver got there.
     pub solver: [Solver; LANES],
-    /// The least energy of other curves that were found; NaN where none was.
+    /// The least energy of other curves that were found, in the units of the chain; NaN where none was.
     pub alternative: Lane,
 }
 
@@ -57,22 +57,6 @@ impl Outcome {
             converged: std::array::from_fn(|l| !on_lane[l]),
             fault: [None; LANES],
             ..self.clone()
-        }
-    }
-
-    /// Takes everything of a solver that ran before, on the lanes of a mask; on others its work counts.
-    pub fn fill(&mut self, before: &Outcome, lanes: Lane) {
-        let ended = mask_bits(lanes);
-        self.residual = lanes.select(before.residual, self.residual);
-        self.rate = lanes.select(before.rate, self.rate);
-        self.leg = lanes.select(before.leg, self.leg);
-        for l in 0..LANES {
-            self.iterations[l] += before.iterations[l];
-            if ended[l] {
-                self.converged[l] = before.converged[l];
-                self.fault[l] = before.fault[l];
-                self.solver[l] = before.solver[l];
-            }
         }
     }
 

@@ -1,0 +1,168 @@
+"""How Sphinx makes the documentation: `make docs`. The gallery is `examples/`, run while the pages are made."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+# `gallery_pictures` lies here, and the package in the checkout.
+sys.path[:0] = [str(HERE), str(HERE.parent / "python")]
+
+import matplotlib as mpl  # noqa: E402
+from docutils import nodes  # noqa: E402
+
+import symspline  # noqa: E402
+
+mpl.use("agg")
+
+
+def _is_space(thing: object) -> bool:
+    return isinstance(thing, type) and issubclass(thing, symspline.Space) and thing is not symspline.Space
+
+
+project = "symspline"
+author = "The symspline developers"
+copyright = "2026, The symspline developers"
+release = version = symspline.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["gallery/*.ipynb", "gallery/*.py"]
+templates_path = ["_templates"]
+
+# ---- pages ----
+
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
+# Links to headings.
+myst_heading_anchors = 3
+suppress_warnings: list[str] = []
+nitpicky = True
+# What an exception carries, in docstrings of the compiled module.
+nitpick_ignore = [("py:obj", "spline")]
+# Other projects' names cannot be looked up without a network, and types of arrays stand for what they take.
+nitpick_ignore_regex = [
+    (
+        "py:.*",
+        r"(numpy|np|scipy|jax|torch|pandas|pd|matplotlib|qutip|qt|nibabel|collections|pathlib|typing)\..*",
+    ),
+]
+default_role = "autolink"
+
+# ---- reference ----
+
+autosummary_generate = True
+autosummary_ignore_module_all = False
+# A space's own page has what is its own; what all share stands on the page of `Space`.
+autosummary_context = {"spaces": [name for name in symspline.__all__ if _is_space(getattr(symspline, name))]}
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+# It is described without being installed: it is large, and nothing on these pages runs it.
+autodoc_mock_imports = ["torch"]
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+napoleon_attr_annotations = False
+maximum_signature_line_length = 90
+add_module_names = False
+
+# ---- gallery ----
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["../examples"],
+    "gallery_dirs": ["gallery"],
+    "copyfile_regex": r"index\.rst",
+    "filename_pattern": r"\.py$",
+    "image_scrapers": ("gallery_pictures",),
+    "backreferences_dir": "api/backreferences",
+    "doc_module": ("symspline",),
+    "reference_url": {"symspline": None},
+    "inspect_global_variables": True,
+    "remove_config_comments": True,
+    "thumbnail_size": (480, 320),
+    "show_memory": False,
+    # What a last line returns is not shown, as axes and legends would be.
+    "capture_repr": (),
+    "show_signature": False,
+    "write_computation_times": False,
+    "download_all_examples": False,
+    "parallel": False,
+}
+
+# ---- looks ----
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"symspline {release}"
+html_static_path = ["_static"]
+html_css_files = ["symspline.css"]
+# These have nothing beside them.
+html_sidebars: dict[str, list[str]] = {"index": [], "start": []}
+html_copy_source = html_show_sourcelink = False
+html_theme_options = {
+    "show_prev_next": False,
+    "navigation_with_keys": False,
+    "navbar_align": "left",
+    "header_links_before_dropdown": 6,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "primary_sidebar_end": [],
+    "pygments_light_style": "tango",
+    "pygments_dark_style": "monokai",
+}
+
+# ---- what docstrings and pages have that Sphinx would misread ----
+
+
+# A character of the private use area, while Napoleon works.
+COLON = "\ue000"
+
+
+def _escape(app: Any, what: str, name: str, thing: object, options: Any, lines: list[str]) -> None:
+    """Norms |v| and shapes (..., *point_shape) are no markup; they stand plain for `help`."""
+    for i, line in enumerate(lines):
+        if line.startswith((">>>", "...", "    >>>", "    ...")):
+            continue
+        parts = re.split(r"(``.*?``)", line)
+        parts[::2] = (re.sub(r"\||(?<=[( ])\*(?=\w[\w.]*[),])", r"\\\g<0>", part) for part in parts[::2])
+        lines[i] = "".join(parts)
+    if what in ("property", "attribute", "data"):
+        # Napoleon would read a first line "Metres: …" as a type.
+        lines[0] = lines[0].replace(":", COLON)
+
+
+def _restore(app: Any, what: str, name: str, thing: object, options: Any, lines: list[str]) -> None:
+    lines[:] = [line.replace(COLON, ":") for line in lines]
+
+
+def _public(app: Any, env: Any, node: Any, contnode: nodes.Node) -> nodes.Node | None:
+    """`CubicSpline` is ``symspline.CubicSpline``, in the docstrings of every module."""
+    if node.get("refdomain") != "py" or node["reftarget"].startswith("symspline."):
+        return None
+    target = f"symspline.{node['reftarget']}"
+    domain = env.get_domain("py")
+    if not domain.find_obj(env, None, None, target, None):
+        return None
+    return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", target, node, contnode)
+
+
+def _links(app: Any, docname: str, source: list[str]) -> None:
+    """On the site a page outside `docs` is the page that includes it."""
+    source[0] = source[0].replace("](../benchmarks/README.md)", "](benchmarks.md)")
+
+
+def setup(app: Any) -> None:
+    app.connect("autodoc-process-docstring", _escape, priority=100)
+    app.connect("autodoc-process-docstring", _restore, priority=900)
+    app.connect("missing-reference", _public)
+    app.connect("source-read", _links)

@@ -1,0 +1,131 @@
+"""What is cheap to check of the site that `make docs` builds: nothing is left out, and what pages say runs."""
+
+import doctest
+import importlib
+import re
+import types
+from pathlib import Path
+
+import pytest
+
+import symspline as ss
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".md", ".rst"))
+# Made by the build, where there was one.
+PAGES = [
+    path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)
+]
+GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
+# Their own tests run or compare what they quote.
+OTHERS = {"adding-a-space.md", "derivatives.md", "smoothing.md", "shapes.md", "solvers.md"}
+
+
+def blocks(page, language):
+    return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S)
+
+
+def listed(page):
+    """Pages in the toctrees of a page."""
+    text = page.read_text(encoding="utf-8")
+    trees = re.findall(r"^```\{toctree\}\n(.*?)^```$", text, re.M | re.S)
+    entries = (line.strip() for tree in trees for line in tree.splitlines() if line and line[0] != ":")
+    for entry in entries:
+        path = page.parent / entry
+        for suffix in (".md", ".rst"):
+            if path.with_name(path.name + suffix).exists():
+                yield path.with_name(path.name + suffix).resolve()
+
+
+def test_every_page_is_in_a_toctree():
+    found, left = set(), [DOCS / "index.md"]
+    while left:
+        page = left.pop()
+        if page not in found:
+            found.add(page)
+            left += listed(page)
+    assert set(PAGES) == found - {DOCS / "gallery/index.rst"}
+
+
+def test_every_public_name_is_in_the_reference():
+    lines = (DOCS / "api/index.rst").read_text(encoding="utf-8").splitlines()
+    names = [line.strip().removeprefix("symspline.") for line in lines if line.startswith("   symspline.")]
+    assert len(set(names)) == len(names)
+    assert set(names) == {*ss.__all__, "jax", "torch", "xarray"}
+
+
+def test_every_public_name_has_a_description():
+    for name in ss.__all__:
+        thing = getattr(ss, name)
+        assert thing.__doc__, name
+        if isinstance(thing, types.ModuleType):
+            members = getattr(importlib.import_module(thing.__name__), "__all__", [])
+            # Numbers are described in the source.
+            assert all(getattr(thing, member).__doc__ for member in members)
+
+
+def test_notation_names_what_exists():
+    spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2")
+    things = {"spline": spline, "space": spline.space, "report": spline.report, "ss": ss}
+    text = (DOCS / "notation.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(spline|space|report)\.(\w+)", text)
+    assert len(named) > 15 and all(hasattr(things[thing], name) for thing, name in named)
+    for call, name in re.findall(r"`(\w+\([kn, ]+\))`, `\"([^`]+)\"`", text):
+        call, name = (re.sub(r"\bk\b", "2", re.sub(r"\bn\b", "5", part)) for part in (call, name))
+        assert eval(f"ss.{call}") == ss.space(name)
+
+
+def test_every_example_is_in_the_gallery_once():
+    named = re.findall(r"^    \.\./examples/(\w+)\.py$", GALLERY, re.M)
+    # And in the same order beside the pages.
+    assert named == re.findall(r"^   (\w+)$", GALLERY, re.M)
+    assert sorted(named) == sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
+
+
+def test_every_figure_of_the_paper_has_an_entry():
+    entries = re.findall(r"^\* Figures? ([\d, ]+): :doc:`[^<]+ <(\w+)>`$", GALLERY, re.M)
+    figures = [int(number) for numbers, _ in entries for number in numbers.split(",")]
+    assert sorted(figures) == list(range(1, 11))
+    for numbers, name in entries:
+        text = (ROOT / f"examples/{name}.py").read_text(encoding="utf-8")
+        title = text.splitlines()[1]
+        assert re.search(r"\(Figs?\. ", title) and numbers.split(",")[0] in title
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if blocks(page, "pycon")], ids=lambda page: page.stem
+)
+def test_sessions_are_as_printed(page):
+    session = "\n".join(blocks(page, "pycon"))
+    test = doctest.DocTestParser().get_doctest(session, {}, page.name, str(page), 0)
+    said = []
+    assert test.examples
+    doctest.DocTestRunner(verbose=False).run(test, out=said.append)
+    assert not said, "".join(said)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [page for page in PAGES if blocks(page, "python") and page.name not in OTHERS],
+    ids=lambda page: page.stem,
+)
+def test_code_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in blocks(page, "python"):
+        exec(compile(block, page.name, "exec"), names)
+
+
+def test_code_of_the_page_on_shapes_runs():
+    names = {}
+    for block in blocks(DOCS / "shapes.md", "python"):
+        exec(compile(block, "shapes.md", "exec"), names)
+    assert names["film"].shape == (100, 4, 2)
+
+
+def test_links_to_files_lead_somewhere():
+    for page in PAGES:
+        text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+        for link in re.findall(r"\]\((?!https?:|#|gallery/)([^)#]+)", text):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
