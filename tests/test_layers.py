@@ -12,6 +12,7 @@ LAYERS = [
     ["_core", "_cpu"],
     ["arrays", "handed", "places", "report", "threads", "times", "version"],
     ["spaces"],
+    ["manifolds"],
     ["curves"],
     ["failures", "options", "plotting", "signs"],
     ["piecewise", "free"],
