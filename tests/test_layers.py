@@ -30,6 +30,7 @@ LAYERS = [
         "shapes",
         "subspaces",
         "tensors",
+        "testing",
         "tracks",
     ],
     ["cli", "demo", "lonlat"],

@@ -16,7 +16,7 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
-from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors  # noqa: E402
+from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .curves.gradient import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
@@ -110,6 +110,7 @@ __all__ = [
     "space",
     "subspaces",
     "tensors",
+    "testing",
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):

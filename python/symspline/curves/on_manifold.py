@@ -35,6 +35,8 @@ class OnManifold(Plain):
     """Curves on a `Manifold`."""
 
     space: Manifold
+    # Derivatives are differences.
+    exact = 1e-9
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:

@@ -7,6 +7,8 @@ the frames.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .._core import ValidationError
@@ -15,6 +17,8 @@ from .operations import Operations
 
 # Squared lengths, relative to the longest, below which vectors are not independent.
 _RANK = 1e-8
+# Numbers that are worked on at a time.
+_AT_ONCE = 1 << 22
 
 
 def basis_at(operations: Operations, p: Array) -> Array:
@@ -39,9 +43,9 @@ def basis_at(operations: Operations, p: Array) -> Array:
         index = int(np.argwhere(~np.isfinite(gram))[0, 0])
         raise ValidationError(f"inner or project_tangent of {space!r} is not finite at points[{index}]")
     values, turned = np.linalg.eigh((gram + np.swapaxes(gram, -1, -2)) / 2)
-    large = values > _RANK * values[:, -1:]
+    large = values > _RANK * np.abs(values).max(axis=1, keepdims=True)
     dims = np.count_nonzero(large, axis=1)
-    if len(dims) and (dims[0] == 0 or (dims != dims[0]).any()):
+    if len(dims) and (dims.min() == 0 or (dims != dims[0]).any()):
         raise ValidationError(
             f"project_tangent and inner of {space!r} give tangent spaces of {sorted(set(dims.tolist()))} dimensions; "
             "inner must be positive, and all tangent spaces have one dimension"
@@ -56,13 +60,17 @@ def basis_at(operations: Operations, p: Array) -> Array:
 def products(operations: Operations, p: Array, a: Array, b: Array) -> Array:
     """All inner products of two rows of tangent vectors: p of shape (m, ...), a and b (m, rows, ...)."""
     m, shape = len(p), operations.space.point_shape
-    full = m, a.shape[1], b.shape[1], *shape
-    expanded = [
-        np.broadcast_to(p[:, None, None], full),
-        np.broadcast_to(a.reshape(m, a.shape[1], 1, *shape), full),
-        np.broadcast_to(b.reshape(m, 1, b.shape[1], *shape), full),
-    ]
-    return operations.inner(*expanded)
+    result = np.empty((m, a.shape[1], b.shape[1]))
+    pairs = a.shape[1] * b.shape[1] * math.prod(shape)
+    for some in np.array_split(np.arange(m), max(1, min(m, math.ceil(m * pairs / _AT_ONCE)))):
+        full = len(some), a.shape[1], b.shape[1], *shape
+        expanded = [
+            p[some].reshape(-1, 1, 1, *shape),
+            a[some].reshape(-1, a.shape[1], 1, *shape),
+            b[some].reshape(-1, 1, b.shape[1], *shape),
+        ]
+        result[some] = operations.inner(*(np.broadcast_to(x, full) for x in expanded))
+    return result
 
 
 def frames_along(operations: Operations, p: Array) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .._core import ValidationError
 from ..arrays import shown, whole_number
-from ..spaces import Array, Space
+from ..spaces import Array, Space, factors_of
 from .differences import dlog_by_differences
 from .frames import basis_at
 from .operations import Function, Functions, Operations, described
@@ -138,6 +138,14 @@ class Manifold(Space):
         numbers = rng.standard_normal((*lead, frames.shape[len(lead)]))
         return np.asarray(np.einsum("...a,...ai->...i", numbers, frames)).reshape(*lead, *self.point_shape)
 
+    def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
+        """Length of the geodesic between p and q that ``log`` gives; shape of the leading axes.
+
+        Raises:
+            CutLocusError: ``log`` gives none.
+        """
+        return self.norm(p, self.log(p, q))
+
     def _description(self) -> str:
         return f"exp={described(self.functions.exp)}, point_shape={self.point_shape}"
 
@@ -190,3 +198,11 @@ def _radius(value: Any) -> float:
             f"injectivity_radius must be a positive number, or None for no limit, not {shown(value)}"
         )
     return float(value)
+
+
+def refuse_functions(space: Space, what: str, named: bool = False) -> None:
+    """Raise ValidationError if the space, or a factor of it, is a manifold that is made of functions, on which there is
+    no such thing; ``named`` ones, which the library makes by their names, may be let through."""
+    for factor in factors_of(space):
+        if isinstance(factor, Manifold) and not (named and hasattr(factor, "_name")):
+            raise ValidationError(f"{what} on a manifold that is made of functions, {factor!r}")

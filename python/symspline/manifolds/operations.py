@@ -65,10 +65,15 @@ class Operations:
     def log(self, p: Array, q: Array) -> Array:
         """NaN where there is no logarithm."""
         try:
-            return self._call("log", p, q)
+            found = self._call("log", p, q)
         except CutLocusError:
             # That of a space of this library raises for all rows if there is none for one.
-            return self._log_each(p, q)
+            found = self._log_each(p, q)
+        # Formulas that divide by the distance have nothing to say of equal points.
+        same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
+        if same.any():
+            found[same] = 0.0
+        return found
 
     def project_tangent(self, p: Array, v: Array) -> Array:
         return self._call("project_tangent", p, v)
@@ -101,7 +106,8 @@ class Operations:
         count = math.prod(lead)
         shape, dtype = ((), np.dtype(np.float64)) if name == "inner" else (space.point_shape, space.dtype)
         rows = [x.reshape(count, *space.point_shape) for x in inputs]
-        good = np.logical_and.reduce([np.isfinite(x).reshape(count, -1).all(axis=1) for x in rows])
+        axes = tuple(range(1, rows[0].ndim))
+        good = np.logical_and.reduce([np.isfinite(x).all(axis=axes) for x in rows])
         if good.all() and count:
             return self._of_rows(name, function, rows).reshape(lead + shape)
         result = np.full((count, *shape), np.nan, dtype)
@@ -223,7 +229,7 @@ class Operations:
         p, v = (self.space._numbers(np.ascontiguousarray(x).reshape(shape)) for x in (points, vectors))
         size = np.abs(v).reshape(len(v), -1).max(axis=1)
         off = np.abs(v - self.project_tangent(p, v)).reshape(len(v), -1).max(axis=1)
-        return np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0)
+        return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
 
 
 def _times(t: Doubles | None, p: Array) -> Doubles:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._core import CutLocusError, ValidationError
 from ..arrays import shown
-from ..spaces import Array, SpecialOrthogonal
+from ..spaces import Array, Space, SpecialOrthogonal
 from .manifold import Manifold
 
 # Of Rentmeesters, Algorithms for data fitting on some common homogeneous spaces (2013), Theorem 5.5.
@@ -38,6 +38,9 @@ class Stiefel(Manifold):
     True
     """
 
+    _name = "stiefel"
+    _aliases = ("st",)
+
     def __init__(self, k: int, n: int) -> None:
         for value in (k, n):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
@@ -46,7 +49,7 @@ class Stiefel(Manifold):
             raise ValidationError(
                 f"Stiefel({k}, {n}) needs k < n: frames of all of R^n are SpecialOrthogonal({n})"
             )
-        self._k, self._n = int(k), int(n)
+        self._k, self._n = self._parameters = int(k), int(n)
         super().__init__(
             exp=self._exp,
             log=self._log,
@@ -61,14 +64,11 @@ class Stiefel(Manifold):
         self._m = min(2 * self._k, self._n)
         self._rotations = SpecialOrthogonal(self._m)
 
-    def __repr__(self) -> str:
-        return f"Stiefel({self._k}, {self._n})"
-
     def _key(self) -> tuple[Any, ...]:
-        return self._k, self._n
+        return self._parameters
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Stiefel, (self._k, self._n)
+    # It has a name, which other manifolds have not.
+    __str__, __repr__, __reduce__ = Space.__str__, Space.__repr__, Space.__reduce__
 
     def _exp(self, p: Array, v: Array) -> Array:
         frame, a, b = self._reduced(p, v)
