@@ -7,6 +7,7 @@
     derivatives  with respect to the data; JAX
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo
+    manifolds    curves on manifolds that are made of functions, Stiefel manifolds, surfaces; the public suite of laws
     geo          places, speed and course on a globe
     quantum      Hamiltonians, propagators, pulses, the Bloch sphere
     subspaces    reduced bases over a parameter

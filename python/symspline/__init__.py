@@ -16,13 +16,14 @@ from . import _cpu
 
 _cpu.check(_Path(__file__).parent)
 
-from . import convert, geo, poses, quantum, rotations, shapes, subspaces, tensors  # noqa: E402
+from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .curves.gradient import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
 from .functions import evaluate, fit, fit_many  # noqa: E402
 from .hermite import HermiteSpline  # noqa: E402
+from .manifolds import Manifold, Stiefel  # noqa: E402
 from .report import ConvergenceWarning, Report  # noqa: E402
 from .segments import fit_segments  # noqa: E402
 from .smoothing import (  # noqa: E402
@@ -84,6 +85,7 @@ __all__ = [
     "HermitianPositiveDefinite",
     "Hyperbolic",
     "Lorentz",
+    "Manifold",
     "Orthogonal",
     "Product",
     "RealProjective",
@@ -98,6 +100,7 @@ __all__ = [
     "SpecialPositiveDefinite",
     "SpecialUnitary",
     "Sphere",
+    "Stiefel",
     "SymmetricPositiveDefinite",
     "Symplectic",
     "Unitary",
@@ -112,6 +115,7 @@ __all__ = [
     "load_many",
     "make_lsq_spline",
     "make_smoothing_spline",
+    "manifolds",
     "num_threads",
     "poses",
     "quantum",
@@ -122,6 +126,7 @@ __all__ = [
     "space",
     "subspaces",
     "tensors",
+    "testing",
 ]
 
 if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .manifolds import refuse_functions
 from .piecewise import Piecewise
 from .report import Report
 from .spaces import Product, Space
@@ -35,6 +36,11 @@ def fitted_arrays(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
 
 def arrays_of(spline: Piecewise, format: str) -> dict[str, Any]:
     """The arrays of one curve, or of a batch; the format says which kind of curve it is."""
+    refuse_functions(
+        spline.space,
+        "curves are not saved (files hold no functions: pickle them, or keep t, points and velocities)",
+        named=True,
+    )
     arrays: dict[str, Any] = {
         "format": format,
         "version": VERSION,

@@ -13,6 +13,7 @@ from .arrays import as_array, cast, whole_number
 from .curves.control import checked_knots, checked_points, control_array
 from .curves.curve import quantity_of
 from .curves.in_span import reduced
+from .manifolds import refuse_functions
 from .spaces import Array, Product, Space
 from .spaces import space as space_named
 
@@ -168,4 +169,5 @@ def _factor(space: Space | str) -> Space:
     space = space_named(space)
     if isinstance(space, Product):
         raise ValidationError("a curve in a product is one curve in every factor: make one for each")
+    refuse_functions(space, "B-spline and Bézier curves are not made")
     return space

@@ -227,7 +227,9 @@ class Piecewise(ABC):
     def length(self) -> Any:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
         curve = self._curve
-        return integrate(curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch)
+        return integrate(
+            curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
+        )
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
@@ -240,7 +242,12 @@ class Piecewise(ABC):
             return bend * bend / unit
 
         with np.errstate(all="ignore"):
-            return integrate(times, power, self._batch) / unit[..., 0] / unit[..., 0] / unit[..., 0]
+            return (
+                integrate(times, power, self._batch, self._curve.exact)
+                / unit[..., 0]
+                / unit[..., 0]
+                / unit[..., 0]
+            )
 
     # ---- what it is made of ----
 

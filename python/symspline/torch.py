@@ -9,6 +9,7 @@ import torch
 
 from .adapters import fitted, movable, split
 from .curves.ends import ends_in_factors
+from .manifolds import refuse_functions
 from .spaces import Product, Space, parts_of
 from .spaces import space as space_named
 
@@ -41,6 +42,7 @@ def curve(
         Shape batch axes + x.shape + point_shape; for a `Product` a tuple.
     """
     space = space_named(space)
+    refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):
         pieces = zip(
             parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True

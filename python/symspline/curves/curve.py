@@ -12,6 +12,7 @@ from .._core import ValidationError
 from ..arrays import shown
 from ..spaces import Space
 from .gradient import Gradient, Places
+from .integrals import EXACT
 from .solve import Progress
 
 Doubles = NDArray[np.float64]
@@ -37,8 +38,10 @@ class Curve(ABC):
         space: where they run.
         times: knots, shape (N+1,) or (..., N+1).
         points, velocities: shape (..., N+1, *point_shape); in a product tuples of such arrays.
+        exact: to what relative error integrals of speed and acceleration are worth computing.
     """
 
+    exact: float = EXACT
     space: Space
     times: Doubles
     points: Any

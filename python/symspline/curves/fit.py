@@ -1,7 +1,7 @@
 """From points to curves: the same for one curve, a batch, and many of different lengths, in any space.
 
-A space has its kind of curve: plain, in the span of its points, or, for a product, one in every factor. A further
-kind is a class with the methods of `Curve` and a `solve`, and its line in `kind_of`.
+A space has its kind of curve: plain, in the span of its points, on a manifold that is made of functions, or, for a
+product, one in every factor. A further kind is a class with the methods of `Plain`, and its line in `kind_of`.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
+from ..manifolds import Manifold
 from ..report import Report, shaped
 from ..spaces import Array, Product, Space, factors_of, parts_of, point_tol
 from .curve import Curve
 from .ends import End, ends_in_factors, ends_of
-from .in_span import InSpan, kind_of
+from .in_span import InSpan, is_large
+from .on_manifold import OnManifold
 from .plain import Plain
-from .solve import Fault, Options, Progress, Solved, Task, checked, solve
+from .solve import Fault, Options, Progress, Solved, Task
 from .together import Together, share
 
 _T = TypeVar("_T")
@@ -65,6 +67,13 @@ class Fit(NamedTuple):
     curve: Curve
     reports: list[Report]
     faults: list[Fault]
+
+
+def kind_of(space: Space) -> type[Plain]:
+    """How curves are made in a space that is no product."""
+    if isinstance(space, Manifold):
+        return OnManifold
+    return InSpan if is_large(space) else Plain
 
 
 def read(points: Any, space: Space) -> list[Points]:
@@ -116,9 +125,10 @@ def curve_of(
 
 
 def _part(space: Space, times: NDArray[np.float64], points: Array, velocities: Array, fitted: bool) -> Plain:
-    if kind_of(space) is InSpan:
+    kind = kind_of(space)
+    if kind is InSpan:
         return InSpan(space, times, points, velocities, fitted)
-    return Plain(space, times, points, velocities)
+    return kind(space, times, points, velocities)
 
 
 def fit(asked: Asked, progress: Progress | None) -> Fit:
@@ -189,7 +199,8 @@ def validated(
         Task(factor, times, part.doubles, end, part.tol)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
-    return _in_factors(space, lambda _, task: solve(task, _ANY, dry=True).points, tasks)
+    tasks = _checked(space, tasks, _ANY)
+    return [task.space._numbers(task.points) for task in tasks]
 
 
 def _solve(space: Space, tasks: list[Task], options: Options, progress: Progress | None) -> list[Solved]:
@@ -204,7 +215,7 @@ def _solve(space: Space, tasks: list[Task], options: Options, progress: Progress
 
 
 def _checked(space: Space, tasks: list[Task], options: Options) -> list[Task]:
-    return _in_factors(space, lambda _, task: checked(task, options), tasks)
+    return _in_factors(space, lambda factor, task: kind_of(factor).checked(task, options), tasks)
 
 
 def first_faults(solved: list[Solved]) -> list[Fault]:

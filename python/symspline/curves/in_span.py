@@ -7,8 +7,7 @@ coordinates there; the curve is fitted and evaluated in them and lifted back.
 
 from __future__ import annotations
 
-from functools import cached_property, partial
-from itertools import pairwise
+from functools import cached_property
 from typing import Any, Never, Self
 
 import numpy as np
@@ -19,18 +18,13 @@ from ..spaces.base import LARGE as _LARGE
 from .curve import NORMS, Doubles
 from .gradient import Places
 from .plain import Plain
-from .solve import Options, Progress, Solved, Task, solve
+from .solve import Options, Progress, Solved, Task, one_by_one, solve
 from .span import Span, span_of
 
 
 def is_large(space: Space) -> bool:
     """Whether curves in a space are made in the span of their points."""
     return space._linear and space.point_shape[0] >= _LARGE
-
-
-def kind_of(space: Space) -> type[Plain]:
-    """How curves are made in a space that is no product."""
-    return InSpan if is_large(space) else Plain
 
 
 def reduced(space: Space, points: Array) -> tuple[Space, Array, Span | None]:
@@ -59,7 +53,7 @@ class InSpan(Plain):
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
         if task.offsets is None:
             return _solve(task, options, progress)
-        return _solve_each(task, task.offsets, options, progress)
+        return one_by_one(task, task.offsets, options, progress, _solve)
 
     @cached_property
     def small(self) -> tuple[Span, Plain]:
@@ -136,30 +130,3 @@ def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
     small = task._replace(space=span.space, points=span.space._as_doubles(span.down(points)), ends=ends)
     found = solve(small, options, progress)
     return found._replace(points=points, velocities=span.up(found.velocities))
-
-
-def _solve_each(task: Task, offsets: list[int], options: Options, progress: Progress | None) -> Solved:
-    """Curves that follow each other in one array, each in a span of its own."""
-    each = []
-    for i, (start, stop) in enumerate(pairwise(offsets)):
-        ends = task.ends and [
-            (kind, None if value is None else value[i : i + 1]) for kind, value in task.ends
-        ]
-        one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
-        each.append(_solve(one, options, progress and partial(_advance, progress, start, offsets[-1])))
-    faults = [
-        (i, kind, why.replace(" of curve 0", f" of curve {i}"))
-        for i, found in enumerate(each)
-        for _, kind, why in found.faults
-    ]
-    columns = zip(*(found.columns for found in each), strict=True)
-    return Solved(
-        task.space._numbers(task.points),
-        np.concatenate([found.velocities[0] for found in each]),
-        tuple(map(np.concatenate, columns)),
-        faults,
-    )
-
-
-def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:
-    return progress(before + finished, total)

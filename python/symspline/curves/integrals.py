@@ -12,12 +12,12 @@ Doubles = NDArray[np.float64]
 
 # Gauss's rule with this many nodes, on an interval and on its halves.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
-_TOL = 1e-14
+EXACT = 1e-14
 _PATIENCE = 5
 
 
-def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...]) -> Any:
-    """∫ f dt over all segments, adaptively; f takes times of shape batch + (m,).
+def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT) -> Any:
+    """∫ f dt over all segments, adaptively; f takes times of shape batch + (m,), and is exact to ``tol``.
 
     Where f is smooth the error falls fast; speed has kinks where a curve stops and turns, and
     bisection closes in on them. An error that does not fall for some rounds is rounding, and is left.
@@ -28,10 +28,10 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
         return np.zeros(batch)
     # What is too large for doubles becomes infinite, and a curve that was not found is NaN.
     with np.errstate(all="ignore"):
-        return _refined(a, b, f, batch)
+        return _refined(a, b, f, batch, tol)
 
 
-def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...]) -> Any:
+def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float) -> Any:
     total = np.zeros(batch)
     whole = _rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)
@@ -45,7 +45,7 @@ def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[i
         stalled = stalled + ~(left <= before / 2)
         before = left
         # Curves of a batch are refined together, interval by interval.
-        open_still = (stalled <= _PATIENCE)[..., None] & (error > _TOL * scale[..., None])
+        open_still = (stalled <= _PATIENCE)[..., None] & (error > tol * scale[..., None])
         rough = open_still.reshape(-1, a.shape[-1]).any(axis=0)
         if not rough.any():
             return (total + better.sum(axis=-1))[()]

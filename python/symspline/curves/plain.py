@@ -14,7 +14,7 @@ from . import derivatives
 from .curve import REAL, Curve, Doubles
 from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
-from .solve import Options, Progress, Solved, Task, solve
+from .solve import Options, Progress, Solved, Task, checked, solve
 
 
 class Plain(Curve):
@@ -31,6 +31,15 @@ class Plain(Curve):
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
         """The velocities that make the curve C²; only plain curves are checked on the way."""
         return solve(task, options, progress)
+
+    @staticmethod
+    def checked(task: Task, options: Options) -> Task:
+        """The task with its points copied and moved onto the space, so that nothing is left to check.
+
+        Raises:
+            ValidationError: something is wrong with it.
+        """
+        return checked(task, options)
 
     @property
     def batch(self) -> tuple[int, ...]:

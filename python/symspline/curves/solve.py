@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,3 +73,36 @@ def checked(task: Task, options: Options) -> Task:
     """
     points = solve(task, options, dry=True).points
     return task._replace(points=task.space._as_doubles(points), tol=None)
+
+
+def one_by_one(
+    task: Task,
+    offsets: list[int],
+    options: Options,
+    progress: Progress | None,
+    solve_one: Callable[[Task, Options, Progress | None], Solved],
+) -> Solved:
+    """Curves that follow each other in one array, of different lengths, each solved by itself; nothing is checked."""
+    each = []
+    for i, (start, stop) in enumerate(pairwise(offsets)):
+        ends = task.ends and [
+            (kind, None if value is None else value[i : i + 1]) for kind, value in task.ends
+        ]
+        one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
+        each.append(solve_one(one, options, progress and partial(_advance, progress, start, offsets[-1])))
+    faults = [
+        (i, kind, why.replace(" of curve 0", f" of curve {i}"))
+        for i, found in enumerate(each)
+        for _, kind, why in found.faults
+    ]
+    columns = zip(*(found.columns for found in each), strict=True)
+    return Solved(
+        task.space._numbers(task.points),
+        np.concatenate([found.velocities[0] for found in each]),
+        tuple(map(np.concatenate, columns)),
+        faults,
+    )
+
+
+def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:
+    return progress(before + finished, total)

@@ -25,6 +25,7 @@ class Together(Curve):
 
     def __init__(self, space: Product, parts: tuple[Plain, ...]) -> None:
         self.space, self._parts, self.times = space, parts, parts[0].times
+        self.exact = max(part.exact for part in parts)
         self.points: Tuple = tuple(part.points for part in parts)
         self.velocities: Tuple = tuple(part.velocities for part in parts)
 

@@ -15,6 +15,7 @@ from ..curves.fit import Asked as Fitted
 from ..curves.fit import Points, fit
 from ..curves.solve import Fault, Options, Progress
 from ..failures import fail
+from ..manifolds import refuse_functions
 from ..options import check_on_failure, check_progress, checked_policy
 from ..spaces import Product, Space, factors_of
 from ..spaces import space as space_named
@@ -101,6 +102,7 @@ def make_smoothing_spline(
     (True, 0.05)
     """
     space = space_named(space)
+    refuse_functions(space, "smoothing splines are not made")
     policy = checked_policy(extrapolate)
     check_on_failure(on_failure)
     check_progress(progress)

@@ -47,6 +47,8 @@ class Space:
     """
 
     _name: ClassVar[str]
+    # Further names, of spaces that the compiled core does not know.
+    _aliases: ClassVar[tuple[str, ...]] = ()
     # Whether points are vectors or bases of subspaces, so that curves stay in the span of their points.
     _linear: ClassVar[bool] = False
     _handle: Handle
@@ -286,7 +288,7 @@ class Space:
         array = self._array(value, name)
         if array.dtype.kind not in ("biufc" if self._complex else "biuf"):
             numbers = "numbers" if self._complex else "real numbers"
-            complex_twin = COMPLEX_TWINS.get(self._name) if array.dtype.kind == "c" else None
+            complex_twin = COMPLEX_TWINS.get(getattr(self, "_name", "")) if array.dtype.kind == "c" else None
             hint = f"; did you mean {complex_twin}?" if complex_twin else ""
             raise ValidationError(f"{name} must be an array of {numbers}, not of {array.dtype}{hint}")
         shape = self.point_shape
@@ -338,7 +340,7 @@ class Space:
 
 def example_of(cls: type[Space]) -> str:
     """How one of a family of spaces is written."""
-    numbers = "2, 4" if cls._name in ("gr", "cgr") else "2"
+    numbers = "2, 4" if cls._name in ("gr", "cgr", "stiefel") else "2"
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 

@@ -27,6 +27,13 @@ def spaces_named(name: Any) -> list[Space]:
     return [_named(factor) for factor in name.split(" x ")]
 
 
+def _rows() -> list[list[str]]:
+    """All names, one row a family: those of the compiled core, and of spaces that are made in Python."""
+    compiled = Handle.names()
+    known = {row[0] for row in compiled}
+    return compiled + [[name, *cls._aliases] for name, cls in CLASSES.items() if name not in known]
+
+
 def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
     """What a name that is none may have been, "SO3" and "SpecialOrthogonal(3)" too; or nothing."""
     glued = re.fullmatch(r"([a-z_ -]+)\(?(\d[\d, ]*)\)?", word)
@@ -51,9 +58,10 @@ def _named(name: str) -> Space:
     # SO(1, n), as it is written, is no rotation group.
     if word == "so" and parameters.count(",") == 1 and parameters.partition(",")[0].strip() == "1":
         word, parameters = "lorentz", parameters.partition(",")[2]
-    names = {alias: row[0] for row in Handle.names() for alias in row}
+    rows = _rows()
+    names = {alias: row[0] for row in rows for alias in row}
     if word not in names:
-        known = ", ".join(" or ".join(row) for row in Handle.names())
+        known = ", ".join(" or ".join(row) for row in rows)
         guess = _guess(word, parameters, names)
         raise ValidationError(f"unknown space {shown(name)}; {guess}known are {known}, e.g. 'sphere:2'")
     if not parameters.strip():

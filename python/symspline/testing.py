@@ -1,0 +1,287 @@
+"""Whether a space is one: laws that anyone can run on a space of their own.
+
+>>> import symspline as ss
+>>> print(ss.testing.check(ss.Sphere(2)))  # doctest: +ELLIPSIS
+Sphere(2) obeys
+  log inverts exp                    ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import ValidationError
+from .functions import evaluate
+from .manifolds import Manifold
+from .spaces import Array, Product, Space, SpecialEuclidean
+from .spaces import space as space_named
+from .spline import CubicSpline
+
+Doubles = NDArray[np.float64]
+
+# Lengths of steps as parts of the longest.
+_PARTS = (1e-4, 1e-2, 0.3, 1.0)
+# Differences of order four: places, weights, and how far they and their errors are, relative to what is compared.
+_PLACES = np.array([-2.0, -1.0, 1.0, 2.0])
+_WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12
+_STEP = 3e-3
+_DIFFERENCES = 1e-8
+# By how much errors of exp and log may be larger in second derivatives.
+_BENT = 1e4
+_COUNT = 6
+
+
+@dataclass(frozen=True)
+class Conformance:
+    """How far a space is from the laws that it obeys.
+
+    Attributes:
+        space: the space.
+        deviations: the largest relative deviation from each law; for the law of the order how far it is from four.
+        allowed: what is allowed of each.
+    """
+
+    space: Space
+    deviations: dict[str, float] = field(default_factory=dict)
+    allowed: dict[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {law:34} {value:.1e} (allowed {self.allowed[law]:.0e})"
+            for law, value in self.deviations.items()
+        ]
+        return "\n".join([f"{self.space!r} obeys", *lines])
+
+    def _add(self, law: str, deviation: Any, allowed: float) -> None:
+        largest = float(np.max(deviation))
+        self.deviations[law], self.allowed[law] = largest, allowed
+        if not largest <= allowed:
+            raise AssertionError(
+                f"{self.space!r} breaks the law that {law}: off by {largest:.3e}, allowed {allowed:.1e}"
+            )
+
+
+def check(
+    space: Space | str,
+    *,
+    point: ArrayLike | None = None,
+    length: float | None = None,
+    tol: float = 1e-10,
+    seed: int = 0,
+) -> Conformance:
+    """Check a space, such as a `symspline.Manifold`, and the curves on it.
+
+    The laws: log inverts exp and exp log; what they give is tangent, and on the space; the inner product is one;
+    distance is symmetric, and its derivative is that of the first variation, which ties geodesics to the inner
+    product; the derivative of log is that of differences; splines interpolate, velocity and covariant acceleration are
+    the same from both sides of every knot, on equal and unequal knots; and with not-a-knot ends a smooth curve is
+    found with an error that falls with the fourth power of the spacing.
+
+    Args:
+        space: a space, no product, or its name.
+        point: a point to start from; None for a random one, which a `Manifold` has if it has ``project``.
+        length: of the longest steps that are tried; None for half the injectivity radius, and no more than 0.5.
+        tol: how exact exp, log and distances are meant to be, relative to numbers of size 1; what is allowed of the
+            other laws follows from it. Distances that are arc cosines need 1e-7.
+        seed: of the random numbers.
+
+    Returns:
+        The largest deviation from each law.
+
+    Raises:
+        AssertionError: a law is broken; the message says which and by how much.
+        ValidationError: the space cannot be checked.
+    """
+    space = space_named(space)
+    if isinstance(space, Product):
+        raise ValidationError("a product is checked factor by factor")
+    rng = np.random.default_rng(seed)
+    if point is None:
+        base = space.random_point(rng)
+    else:
+        space.check_point(point)
+        base = np.asarray(point, space.dtype)
+    longest = min(0.5, space.injectivity_radius / 2) if length is None else length
+    found = Conformance(space)
+    rounding = float(np.max(space.rounding(base)))
+    sample = _Sample(space, base, longest, max(tol, 1e-14 * rounding), rng)
+    _operations(found, sample)
+    if not isinstance(space, SpecialEuclidean):
+        # Poses have no invariant metric.
+        _metric(found, sample)
+    if isinstance(space, Manifold):
+        _derivative(found, sample)
+    _smoothness(found, sample)
+    _order(found, sample)
+    return found
+
+
+class _Sample:
+    """Points and steps of many lengths from them."""
+
+    def __init__(
+        self, space: Space, base: Array, longest: float, tol: float, rng: np.random.Generator
+    ) -> None:
+        self.space, self.base, self.longest, self.tol, self.rng = space, base, longest, tol, rng
+        around = self.tangents(np.broadcast_to(base, (_COUNT, *base.shape)))
+        points = space.exp(base, longest * around)
+        self.lengths = longest * np.repeat(_PARTS, _COUNT)
+        self.p = np.concatenate([points] * len(_PARTS))
+        self.v = self.wide(self.lengths) * self.tangents(self.p)
+        self.q = space.exp(self.p, self.v)
+
+    def tangents(self, p: Array) -> Array:
+        """Random unit tangent vectors."""
+        v = self.space.random_tangent(self.rng, p)
+        return np.asarray(v / self.wide(self.space.norm(p, v)))
+
+    def wide(self, x: Any) -> Array:
+        """Numbers, to multiply points with."""
+        shape = *np.shape(x), *[1] * len(self.space.point_shape)
+        return np.asarray(x).reshape(shape)
+
+    def size(self, x: Array) -> Array:
+        """The largest entry of every point or vector."""
+        axes = tuple(range(-len(self.space.point_shape), 0))
+        return np.asarray(np.abs(x).max(axis=axes))
+
+
+def _operations(found: Conformance, s: _Sample) -> None:
+    space = s.space
+    logs = space.log(s.p, s.q)
+    # Of short steps rounding of the points is what is left.
+    found._add("log inverts exp", s.size(logs - s.v) / np.maximum(1.0, s.lengths), s.tol)
+    found._add("exp inverts log", space.distance(space.exp(s.p, logs), s.q), s.tol)
+    space.check_point(s.q)
+    noise = s.rng.standard_normal(s.p.shape).astype(space.dtype)
+    tangent = space.project_tangent(s.p, noise)
+    found._add(
+        "project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol
+    )
+    found._add("log is tangent", s.size(space.project_tangent(s.p, logs) - logs), s.tol)
+    half = space.exp(s.p, s.v / 2)
+    found._add(
+        "geodesics run at constant speed",
+        s.size(2 * space.log(s.p, half) - logs) / np.maximum(1.0, s.lengths),
+        s.tol,
+    )
+    onward = -space.log(half, s.p)
+    found._add("geodesics go on as geodesics", _apart(s, space.exp(half, onward), s.q), s.tol)
+
+
+def _apart(s: _Sample, x: Array, y: Array) -> Array:
+    return np.asarray(s.space.distance(x, y))
+
+
+def _metric(found: Conformance, s: _Sample) -> None:
+    space = s.space
+    a, b, c = (s.tangents(s.p) for _ in range(3))
+    found._add("inner is symmetric", np.abs(space.inner(s.p, a, b) - space.inner(s.p, b, a)), s.tol)
+    both = space.inner(s.p, a + 2 * b, c) - space.inner(s.p, a, c) - 2 * space.inner(s.p, b, c)
+    found._add("inner is bilinear", np.abs(both), s.tol)
+    found._add("inner is positive", np.maximum(0.0, -space.inner(s.p, a, a)), 0.0)
+    there, back = space.distance(s.p, s.q), space.distance(s.q, s.p)
+    found._add("distance is symmetric", np.abs(there - back), s.tol)
+    found._add("distance is the length of log", np.abs(there - s.lengths), s.tol)
+
+    # Of the half square of distance, whose gradient at q is minus the logarithm.
+    w = s.tangents(s.q)
+    squares = [space.distance(s.p, space.exp(s.q, place * _STEP * w)) ** 2 / 2 for place in _PLACES]
+    slope = np.tensordot(_WEIGHTS, np.array(squares), 1) / _STEP
+    expected = -space.inner(s.q, space.log(s.q, s.p), w)
+    found._add("distance has its first variation", np.abs(slope - expected), _allowed(s))
+
+
+def _allowed(s: _Sample) -> float:
+    """Of differences: their own error, and that of what they are made of."""
+    return max(_DIFFERENCES / min(1.0, s.longest) ** 2, 10 * s.tol / _STEP)
+
+
+def _derivative(found: Conformance, s: _Sample) -> None:
+    space = s.space
+    assert isinstance(space, Manifold)
+    w = s.tangents(s.q)
+    step = _STEP * min(1.0, 2 * s.longest)
+    logs = [space.log(s.p, space.exp(s.q, place * step * w)) for place in _PLACES]
+    slope = np.tensordot(_WEIGHTS, np.array(logs), 1) / step
+    found._add("dlog is the derivative of log", s.size(space.dlog(s.p, s.q, w) - slope), _allowed(s))
+
+
+def _walk(s: _Sample) -> Array:
+    """Points whose steps are as long as the longest, and turn by half a radian."""
+    space, p = s.space, [s.base]
+    direction = s.tangents(s.base)
+    for _ in range(5):
+        q = space.exp(p[-1], s.longest * direction)
+        direction = -space.log(q, p[-1]) / s.longest + 0.5 * s.tangents(q)
+        direction = direction / s.wide(space.norm(q, direction))
+        p.append(q)
+    return np.array(p)
+
+
+def _smoothness(found: Conformance, s: _Sample) -> None:
+    space, p = s.space, _walk(s)
+    offs: list[Any] = []
+    jumps: list[tuple[float, float, float]] = []
+    for t in (np.arange(len(p), dtype=float), np.cumsum(s.rng.uniform(0.7, 1.3, len(p)))):
+        for ends in ("natural", "not-a-knot"):
+            spline = CubicSpline(t, p, space, bc_type=ends)
+            offs.append(_apart(s, spline(t), p).max())
+            jumps.append(_jumps(s, spline))
+    value, velocity, acceleration = np.max(jumps, axis=0)
+    found._add("splines interpolate", offs, s.tol)
+    found._add("splines are continuous", value, s.tol)
+    found._add("velocity is continuous", velocity, 100 * s.tol)
+    found._add("acceleration is continuous", acceleration, _BENT * s.tol)
+
+
+def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
+    """The largest jumps at a knot of value, velocity and acceleration, each segment evaluated by itself; the last two
+    relative to what jumps."""
+    space, p, u = s.space, spline.points, spline.velocities
+    h = np.diff(spline.t)
+    knots = np.stack([0 * h, h], axis=1)
+    points, velocities = (np.stack([x[:-1], x[1:]], axis=1) for x in (p, u))
+
+    def sides(nu: int) -> tuple[Array, Array]:
+        values = evaluate(knots, knots, points, velocities, space, nu, per_curve=True)
+        return values[:-1, 1], values[1:, 0]
+
+    def jump(nu: int) -> float:
+        left, right = sides(nu)
+        if s.size(before - behind).max() > 1e-6:
+            # One point may have several arrays.
+            left = space.transport(before, behind, left)
+        # A straight walk has no acceleration.
+        return float(s.size(left - right).max() / max(s.size(left).max(), s.size(right).max(), s.longest))
+
+    before, behind = sides(0)
+    return float(_apart(s, before, behind).max()), jump(1), jump(2)
+
+
+def _order(found: Conformance, s: _Sample) -> None:
+    """Of curves with not-a-knot ends through points of a smooth curve."""
+    space = s.space
+    axes = [s.tangents(s.base) for _ in range(3)]
+
+    def curve(t: Doubles) -> Array:
+        waves = 0.9 * t + 0.3 * np.sin(3 * t), 0.5 * np.cos(2 * t), 0.4 * np.sin(4 * t)
+        v = sum(s.wide(wave) * axis for wave, axis in zip(waves, axes, strict=True))
+        return space.exp(s.base, s.longest * np.asarray(v))
+
+    errors = [_error(space, curve, n) for n in (16, 32)]
+    # Where an error is rounding there is nothing to measure.
+    order = np.log2(errors[0] / errors[1]) if errors[1] > 1e3 * s.tol * s.longest else 4.0
+    found._add("the order of not-a-knot is four", abs(order - 4.0), 0.6)
+
+
+def _error(space: Space, curve: Callable[[Doubles], Array], n: int) -> float:
+    t = np.linspace(0, 1, n + 1)
+    x = np.linspace(0, 1, 4 * n + 1)[1::2]
+    spline = CubicSpline(t, curve(t), space, bc_type="not-a-knot")
+    return float(np.max(space.distance(spline(x), curve(x))))

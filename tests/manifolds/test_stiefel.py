@@ -1,0 +1,119 @@
+"""Stiefel manifolds by other formulas."""
+
+import numpy as np
+import pytest
+from made import twin
+from scipy.linalg import expm
+
+import symspline as ss
+
+SIZES = [(1, 2), (1, 4), (2, 3), (2, 5), (3, 4), (3, 5), (3, 6), (2, 20)]
+every = pytest.mark.parametrize(("k", "n"), SIZES)
+
+
+def steps(space, length, count=6, seed=1):
+    rng = np.random.default_rng(seed)
+    p = space.random_point(rng, count)
+    v = space.random_tangent(rng, p)
+    return p, length * v / space.norm(p, v)[:, None, None]
+
+
+@every
+def test_exp_is_a_rotation_of_the_whole_space(k, n):
+    """exp_p(v) = exp(Ω)p, Ω = (1 − ppᵀ/2)vpᵀ − pvᵀ(1 − ppᵀ/2), by SciPy's Padé approximation."""
+    space = ss.Stiefel(k, n)
+    for p, v in zip(*steps(space, 1.7), strict=True):
+        half = v - p @ (p.T @ v) / 2
+        assert np.abs(expm(half @ p.T - p @ half.T) @ p - space.exp(p, v)).max() <= 1e-14
+
+
+@every
+@pytest.mark.parametrize("length", [1e-9, 1e-4, 0.1, 1.0, 2.0, 2.7])
+def test_log_inverts_exp(k, n, length):
+    space = ss.Stiefel(k, n)
+    p, v = steps(space, length)
+    q = space.exp(p, v)
+    space.check_point(q)
+    # Near conjugate points rounding counts more.
+    allowed = 5e-14 if length < 2.5 else 1e-12
+    assert np.abs(space.log(p, q) - v).max() <= allowed
+    assert space.distance(p, q) == pytest.approx(length, abs=allowed)
+
+
+@every
+@pytest.mark.parametrize("length", [1e-6, 1.0, 2.0])
+def test_dlog_is_that_of_differences(k, n, length):
+    space = ss.Stiefel(k, n)
+    p, v = steps(space, length)
+    q = space.exp(p, v)
+    w = space.random_tangent(np.random.default_rng(2), q)
+    exact, differences = space.dlog(p, q, w), twin(space).dlog(p, q, w)
+    space.check_tangent(p, exact)
+    # Differences of order four are good to some 1e-12, less near conjugate points.
+    assert np.abs(exact - differences).max() <= (2e-11 if length < 1.5 else 2e-9)
+
+
+def test_dlog_inverts_the_derivative_of_exp():
+    space = ss.Stiefel(2, 5)
+    p, v = steps(space, 1.0)
+    e = space.random_tangent(np.random.default_rng(3), p)
+    h = 1e-3
+    values = [space.exp(p, v + s * h * e) for s in (-2, -1, 1, 2)]
+    w = np.tensordot([1, -8, 8, -1], values, 1) / (12 * h)
+    q = space.exp(p, v)
+    assert np.abs(space.dlog(p, q, w) - e).max() <= 1e-10
+
+
+def test_one_vector_is_the_sphere():
+    space, sphere = ss.Stiefel(1, 4), ss.Sphere(3)
+    p, v = steps(space, 1.3)
+    assert np.abs(space.exp(p, v)[..., 0] - sphere.exp(p[..., 0], v[..., 0])).max() <= 1e-15
+    assert np.abs(space.inner(p, v, v) - 1.69).max() <= 1e-14
+
+
+def test_all_but_one_vector_is_rotations():
+    """The last column of a rotation follows from the others, and the metric of rotations is the canonical one."""
+    space, rotations = ss.Stiefel(2, 3), ss.SpecialOrthogonal(3)
+    r = rotations.random_point(np.random.default_rng(4), 2)
+    v = rotations.log(r[0], r[1])
+    assert np.abs(space.log(r[0][:, :2], r[1][:, :2]) - v[:, :2]).max() <= 1e-14
+    assert space.distance(r[0][:, :2], r[1][:, :2]) == pytest.approx(
+        rotations.distance(r[0], r[1]), abs=1e-14
+    )
+    p = rotations.exp(
+        r[0], 0.4 * rotations.random_tangent(np.random.default_rng(5), np.repeat(r[:1], 6, axis=0))
+    )
+    curve, frames = ss.CubicSpline(None, p, rotations), ss.CubicSpline(None, p[..., :2], space)
+    x = np.linspace(0, 5, 30)
+    assert np.abs(frames(x) - curve(x)[..., :2]).max() <= 1e-11
+
+
+def test_the_metric_is_invariant():
+    space = ss.Stiefel(2, 5)
+    p, v = steps(space, 0.9)
+    q = space.exp(p, v)
+    left = ss.SpecialOrthogonal(5).random_point(np.random.default_rng(6))
+    right = ss.SpecialOrthogonal(2).random_point(np.random.default_rng(7))
+    assert np.abs(space.distance(left @ p @ right, left @ q @ right) - 0.9).max() <= 1e-14
+
+
+def test_opposite_frames_have_no_logarithm():
+    """A turn by π in the plane of the frame, which goes either way."""
+    space = ss.Stiefel(2, 5)
+    p = space.random_point(np.random.default_rng(8))
+    for call in (space.log, space.distance):
+        with pytest.raises(ss.CutLocusError, match="pair 0"):
+            call(p, -p)
+
+
+@pytest.mark.parametrize("arguments", [(2, 2), (5, 2), (0, 3), (-1, 3), (1.5, 3), (True, 3)])
+def test_sizes_that_are_none(arguments):
+    with pytest.raises(ss.ValidationError, match="Stiefel"):
+        ss.Stiefel(*arguments)
+
+
+def test_names():
+    assert ss.space("stiefel:2,5") == ss.space("st:2,5") == ss.Stiefel(2, 5) != ss.Stiefel(2, 6)
+    assert str(ss.Stiefel(2, 5)) == "stiefel:2,5" and repr(ss.Stiefel(2, 5)) == "Stiefel(2, 5)"
+    assert ss.Stiefel(2, 5).dim == 7 and ss.Stiefel(2, 5).point_shape == (5, 2)
+    assert hash(ss.Stiefel(2, 5)) == hash(ss.space("st:2,5"))
