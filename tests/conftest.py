@@ -4,7 +4,8 @@
     fit          the spline is C² and obeys its laws; solvers
     spline       the interface of `CubicSpline`, promise by promise, with what it refuses
     motion       what curves of rotations and poses are asked: rates, quaternions, recordings
-    derivatives  with respect to the data; JAX
+    derivatives  with respect to the data
+    in_jax       the compiled spline as a function in JAX, and those that are all JAX
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo
     manifolds    curves on manifolds that are made of functions, Stiefel manifolds, surfaces; the public suite of laws

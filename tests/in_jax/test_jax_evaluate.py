@@ -1,0 +1,174 @@
+"""De Casteljau's algorithm in JAX itself beside the compiled core, and derivatives where formulas like to break."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from cases import QUOTIENTS, condition, unit_tangent, walk
+from double import double_and_quickly_compiled
+
+import symspline as ss
+from symspline.jax import evaluate
+
+T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
+X = np.concatenate([np.linspace(0, 4.1, 12), [1.0, 2.2]])
+SPACES = [
+    "r:2",
+    "sphere:2",
+    "h:2",
+    "so:2",
+    "so:3",
+    "se:2",
+    "se:3",
+    "cp:2",
+    "gr:2,5",
+    "cgr:2,4",
+    "spd:3",
+    "hpd:2",
+]
+# Of each formula one; the rest is compiled without second derivatives, which take seconds.
+QUICK = ["sphere:2", "h:2", "so:3", "se:3", "cp:2", "gr:2,5", "spd:2"]
+
+
+@pytest.fixture(autouse=True)
+def double_precision():
+    with double_and_quickly_compiled():
+        yield
+
+
+def projector(value, point):
+    """What does not depend on the representative: V γ*."""
+    if point.ndim == 2:
+        value, point = value[..., None], point[..., None]
+    return value @ jnp.conj(jnp.swapaxes(point, -1, -2))
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_curves_are_those_of_the_core(name):
+    space = ss.space(name)
+    points = walk(space, 0.8, 5, np.random.default_rng(0))
+    spline = ss.CubicSpline(T, points, space)
+
+    orders = (0, 2) if name in (*QUICK, "spd:3") else (0,)
+
+    @jax.jit
+    def curves(*data):
+        return [evaluate(*data, X, space, nu) for nu in orders]
+
+    found = curves(T, points, spline.velocities)
+    for nu, value in zip(orders, found, strict=True):
+        expected = spline(X, nu=nu)
+        if isinstance(space, QUOTIENTS):
+            value, expected = projector(value, found[0]), projector(expected, spline(X))
+        tol = 1e-14 * condition(space, points) * max(1.0, np.abs(expected).max())
+        np.testing.assert_allclose(value, expected, atol=(20 if nu else 2) * tol)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_curves_that_stand_still_have_derivatives(name):
+    """Equal points, zero velocities; for positive definite matrices equal eigenvalues, too."""
+    space = ss.space(name)
+    one = np.eye(2) if name == "spd:2" else walk(space, 0.5, 1, np.random.default_rng(0))[0]
+    points = np.stack([one, one])
+    rng = np.random.default_rng(1)
+    v, w = (np.array([unit_tangent(space, p, rng) for p in points]) for _ in range(2))
+
+    def number(s):
+        # Points move along straight lines, and are brought back to the space.
+        value = evaluate(T[:2], points + s * v, s * w, 0.3, space)
+        if isinstance(space, QUOTIENTS):
+            value = projector(value, value)
+        return jnp.sum(value.real**3)
+
+    h = 1e-2
+
+    @jax.jit
+    def both(s):
+        slope = jax.jacfwd(number)
+        return jax.jacfwd(slope)(s), slope(s), jax.grad(number)(s), jax.vmap(number)(h * jnp.arange(-2.0, 3))
+
+    second, slope, backward, values = both(0.0)
+    np.testing.assert_allclose(backward, slope, atol=1e-13)
+    # The errors of differences of fourth order.
+    np.testing.assert_allclose(slope, np.dot([1, -8, 0, 8, -1], values) / (12 * h), atol=2e-6)
+    np.testing.assert_allclose(second, np.dot([-1, 16, -30, 16, -1], values) / (12 * h * h), atol=1e-5)
+
+
+def test_derivatives_of_third_order_in_time():
+    """Of a geodesic on a sphere, and of a resting one."""
+    p = jnp.array([[1.0, 0, 0], [0.0, 1, 0]])
+    u = jnp.array([[0, 1.0, 0], [-1.0, 0, 0]]) * np.pi / 2
+
+    @jax.jit
+    def third(points, u):
+        curve = lambda x: evaluate(jnp.arange(2.0), points, u, x, "sphere:2")  # noqa: E731
+        return jax.jacfwd(jax.jacfwd(jax.jacfwd(curve)))(0.4)
+
+    angle = 0.2 * np.pi
+    expected = (np.pi / 2) ** 3 * np.array([np.sin(angle), -np.cos(angle), 0])
+    np.testing.assert_allclose(third(p, u), expected, atol=1e-12)
+    np.testing.assert_allclose(third(p[jnp.array([0, 0])], 0 * u), np.zeros(3), atol=1e-15)
+
+
+def test_the_core_has_the_same_gradient():
+    """With respect to points and velocities, by finite differences of `symspline.evaluate`."""
+    space = ss.space("spd:2")
+    points = walk(space, 0.5, 5, np.random.default_rng(0))
+    u = ss.CubicSpline(T, points, space).velocities
+    rng = np.random.default_rng(1)
+    dp, du = (np.array([unit_tangent(space, p, rng) for p in points]) for _ in range(2))
+    move = jax.jit(
+        lambda t, p, u, dt, dp, du: jax.jvp(lambda *a: evaluate(*a, X, space), (t, p, u), (dt, dp, du))[1]
+    )
+    found = move(T, points, u, 0.1 * X[:5] * 0, dp, du)
+
+    def moved(e):
+        return ss.evaluate(X, T, points + e * dp, u + e * du, space)
+
+    h = 1e-3
+    weights = {1: 0.75, 2: -0.15, 3: 1 / 60}
+    expected = sum(w * (moved(k * h) - moved(-k * h)) for k, w in weights.items()) / h
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+
+
+def test_batches_products_and_maps():
+    names = ("sphere:2", "r:3")
+    points = tuple(
+        np.stack([walk(ss.space(n), 0.5, 5, np.random.default_rng(i)) for i in range(3)]) for n in names
+    )
+    knots = T * np.array([[1.0], [1.1], [1.3]])
+    spline = ss.CubicSpline(knots, points, " x ".join(names))
+    found = evaluate(knots, points, spline.velocities, X, spline.space)
+    mapped = jax.vmap(lambda t, p, u: evaluate(t, p, u, X, spline.space))(knots, points, spline.velocities)
+    for value, other, expected in zip(found, mapped, spline(X), strict=True):
+        np.testing.assert_allclose(value, expected, atol=1e-14)
+        np.testing.assert_allclose(other, expected, atol=1e-14)
+
+
+def test_outside_the_knots_and_off_the_space_is_nan():
+    points, u = np.eye(3)[:2], np.zeros((2, 3))
+    found = evaluate([0.0, 1.0], points, u, [-0.1, 0.5, 1.1], "sphere:2")
+    np.testing.assert_array_equal(np.isnan(found).all(axis=-1), [True, False, True])
+    mirror = np.stack([np.diag([1.0, 1, -1])] * 2)
+    assert np.isnan(evaluate([0.0, 1.0], mirror, 0 * mirror, 0.5, "so:3")).all()
+
+
+def test_single_precision_stays_single():
+    found = evaluate(
+        *(jnp.asarray(a, jnp.float32) for a in ([0, 1], np.eye(3)[:2], np.zeros((2, 3)), 0.5)), "sphere:2"
+    )
+    assert found.dtype == jnp.float32
+
+
+def test_what_cannot_be_is_an_error():
+    p = np.eye(3)[:2]
+    with pytest.raises(ss.ValidationError, match=r"u:2.* are not made in JAX"):
+        evaluate([0, 1], np.stack([np.eye(2)] * 2), np.zeros((2, 2, 2)), 0.5, "u:2")
+    with pytest.raises(ss.ValidationError, match=r"velocities has shape \(1, 3\)"):
+        evaluate([0, 1], p, p[:1], 0.5, "sphere:2")
+    with pytest.raises(ss.ValidationError, match=r"t has shape \(3,\)"):
+        evaluate([0, 1, 2], p, p, 0.5, "sphere:2")
+    with pytest.raises(ss.ValidationError, match=r"points has shape \(2, 3\)"):
+        evaluate([0, 1], p, p, 0.5, "sphere:3")
+    with pytest.raises(ss.ValidationError, match="nu must be"):
+        evaluate([0, 1], p, p, 0.5, "sphere:2", 3)

@@ -1,0 +1,119 @@
+"""Fits in JAX itself beside the compiled core."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from cases import unit_tangent, walk
+from double import double_and_quickly_compiled
+
+import symspline as ss
+from symspline.jax import curve, evaluate, fit
+
+T = np.array([0.0, 1.0, 2.2, 3.0, 4.1, 5.0])
+
+
+@pytest.fixture(autouse=True)
+def double_precision():
+    with double_and_quickly_compiled():
+        yield
+
+
+def data(name, step=0.8):
+    space = ss.space(name)
+    points = walk(space, step, len(T), np.random.default_rng(0))
+    return space, points, 0.5 * unit_tangent(space, points[0], np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("ends", ["natural", "clamped", "velocity"])
+@pytest.mark.parametrize("name", ["sphere:2", "sphere:3", "so:2", "so:3"])
+def test_velocities_are_those_of_the_core(name, ends):
+    space, points, v = data(name)
+    bc_type = ((1, v), "natural") if ends == "velocity" else ends
+    u, residual = jax.jit(lambda t, p: fit(t, p, space, bc_type=bc_type))(T, points)
+    expected = ss.CubicSpline(T, points, space, bc_type=bc_type).velocities
+    np.testing.assert_allclose(u, expected, atol=1e-11)
+    assert residual < 1e-13
+
+
+def test_the_residual_says_when_steps_are_too_few():
+    space, points, _ = data("sphere:2", 1.2)
+    expected = ss.CubicSpline(T, points, space).velocities
+    before = 1.0
+    for steps in (2, 5, 10, 20):
+        u, residual = fit(T, points, space, steps=steps)
+        error = np.abs(u - expected).max() / np.abs(expected).max()
+        assert 0.1 * error < residual < before
+        before = residual / 2
+
+
+def test_batches_are_curves_one_by_one():
+    space = ss.space("so:3")
+    points = np.stack([walk(space, 0.5, len(T), np.random.default_rng(i)) for i in range(3)])
+    knots = T * np.array([[1.0], [1.1], [1.3]])
+    together = jax.jit(lambda t, p: fit(t, p, space))
+    for t in (T, knots):
+        u, residual = together(t, points)
+        assert residual.shape == (3,)
+        np.testing.assert_allclose(u, ss.CubicSpline(t, points, space).velocities, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3"])
+def test_gradients_through_fit_and_evaluate_are_those_of_the_core(name):
+    """In all of points, knots and the given velocity."""
+    space, points, v = data(name)
+    x, wanted = np.array([0.3, 1.7, 3.1, 4.8]), walk(space, 0.5, 4, np.random.default_rng(5))
+
+    def in_jax(t, points, v):
+        u, _ = fit(t, points, space, bc_type=((1, v), "natural"))
+        return jnp.sum((evaluate(t, points, u, x, space) - wanted) ** 2)
+
+    def compiled(t, points, v):
+        return jnp.sum((curve(x, t, points, space, bc_type=((1, v), "natural")) - wanted) ** 2)
+
+    found = jax.jit(jax.grad(in_jax, (0, 1, 2)))(T, points, v)
+    for a, b in zip(found, jax.grad(compiled, (0, 1, 2))(T, points, v), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-11)
+
+
+def test_second_derivatives_follow_the_refitted_curve():
+    """A Hessian in two directions, beside differences of gradients of the core."""
+    space, points, _ = data("sphere:2")
+    rng = np.random.default_rng(3)
+    a, b = (np.array([unit_tangent(space, p, rng) for p in points]) for _ in range(2))
+
+    def moved(s):
+        p = points + s[0] * a + s[1] * b
+        return p / jnp.linalg.norm(p, axis=-1, keepdims=True)
+
+    def number(s):
+        return jnp.sum(fit(T, moved(s), space)[0] ** 3)
+
+    found = jax.jit(jax.hessian(number))(jnp.zeros(2))
+    np.testing.assert_allclose(found, found.T, atol=1e-11 * np.abs(found).max())
+
+    def value(s):
+        return np.sum(ss.CubicSpline(T, np.asarray(moved(s)), space).velocities ** 3)
+
+    h = 1e-3
+    mixed = sum(i * j * value(np.array([i * h, j * h])) for i in (1, -1) for j in (1, -1)) / (4 * h * h)
+    # The error of the difference.
+    np.testing.assert_allclose(found[0, 1], mixed, rtol=1e-4)
+
+
+def test_a_curve_that_stands_still_has_a_gradient():
+    points = np.tile(np.eye(3)[0], (4, 1))
+    gradient = jax.jit(jax.grad(lambda p: jnp.sum(fit(T[:4], p, "sphere:2")[0] ** 2)))(points)
+    np.testing.assert_array_equal(gradient, np.zeros((4, 3)))
+
+
+def test_what_cannot_be_is_an_error():
+    p = np.eye(3)
+    with pytest.raises(ss.ValidationError, match="not fitted in JAX"):
+        fit(T[:3], p, "h:2")
+    with pytest.raises(ss.ValidationError, match="bc_type is 'natural'"):
+        fit(T[:3], p, "sphere:2", bc_type="periodic")
+    with pytest.raises(ss.ValidationError, match="steps must be"):
+        fit(T[:3], p, "sphere:2", steps=0)
+    with pytest.raises(ss.ValidationError, match="start velocity has shape"):
+        fit(T[:3], p, "sphere:2", bc_type=((1, np.zeros(2)), "natural"))

@@ -1,0 +1,125 @@
+"""The functions that geodesics in JAX are made of, and their derivatives, beside mpmath."""
+
+from itertools import combinations
+
+import jax
+import jax.numpy as jnp
+import mpmath as mp
+import numpy as np
+import pytest
+from double import double_and_quickly_compiled
+
+from symspline.jax import series, spectral
+
+
+@pytest.fixture(autouse=True)
+def double_precision():
+    with double_and_quickly_compiled(), mp.workdps(40):
+        yield
+
+
+def worst(function, exact, at, orders=4):
+    """The largest relative error of derivatives of some orders."""
+    errors = []
+    for k in range(orders):
+        found = jax.jit(jax.vmap(function))(jnp.asarray(at))
+        errors.append(
+            max(
+                abs(float(f) / float(mp.diff(exact, mp.mpf(z), k)) - 1)
+                for f, z in zip(found, at, strict=True)
+            )
+        )
+        function = jax.grad(function)
+    return errors
+
+
+@pytest.mark.parametrize("n, sign", [(0, 1), (1, 1), (3, 1), (0, -1), (1, -1)])
+def test_stumpff_on_both_sides_of_the_switch(n, sign):
+    def exact(z):
+        return sum((-sign * z) ** k / mp.factorial(2 * k + n) for k in range(80))
+
+    at = [0.0, 1e-8, 0.3, 3.99, 4.01, 9.0, 30.0]
+    # Recurrences lose a digit an order.
+    assert max(worst(lambda z: series.stumpff(n, sign, z), exact, at)) < 1e-12
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_arc_on_both_sides_of_the_switch(sign):
+    def exact(y):
+        angle = mp.asin(mp.sqrt(y)) if sign > 0 else mp.asinh(mp.sqrt(y))
+        return angle / mp.sqrt(y * (1 - sign * y))
+
+    at = [1e-8, 0.05, 0.299, 0.301, 0.6, 0.95]
+    assert max(worst(lambda y: series.arc(y, 1 - sign * y, sign), exact, at)) < 1e-13
+    assert float(jax.grad(lambda y: series.arc(y, 1 - y))(0.0)) == pytest.approx(2 / 3, rel=1e-15)
+
+
+def test_unbent_is_what_inverts_the_integral():
+    def exact(z):
+        half = mp.sqrt(z) / 2
+        return (1 - half * mp.cot(half)) / z
+
+    assert max(worst(series.unbent, exact, [1e-6, 0.5, 4.0, 20.0], 3)) < 1e-13
+
+
+DIVIDED = {
+    "_exp": (mp.exp, [-2.0, -1.99, 0.5, 0.5, 3.0]),
+    "_log": (mp.log, [0.1, 0.1, 0.101, 2.0, 20.0]),
+    "_arc": (lambda y: mp.asin(mp.sqrt(y)) / mp.sqrt(y * (1 - y)), [1e-3, 0.2, 0.2, 0.21, 0.85]),
+}
+
+
+@pytest.mark.parametrize("name", DIVIDED)
+def test_divided_differences(name):
+    """By their definition in 40 digits, at numbers far from each other, near, and equal but for 1e-9."""
+    function, numbers = DIVIDED[name]
+    for k in (1, 2, 3, 4):
+        for chosen in combinations(numbers, k):
+            x = [mp.mpf(a) + mp.mpf(10) ** -9 * i * (len(set(chosen)) < k) for i, a in enumerate(chosen)]
+            column = [function(a) for a in x]
+            for j in range(1, k):
+                column = [(column[i + 1] - column[i]) / (x[i + j] - x[i]) for i in range(len(column) - 1)]
+            found = getattr(spectral, name)(*(jnp.array(float(a)) for a in x))
+            np.testing.assert_allclose(float(found), float(column[0]), rtol=5e-14)
+
+
+def symmetric(seed):
+    a = np.random.default_rng(seed).standard_normal((3, 3))
+    return a + a.T
+
+
+def test_functions_of_matrices_where_eigenvalues_repeat():
+    """Along lines through multiples of the identity they are power series of one matrix."""
+    h = symmetric(0)
+
+    def derivatives(function):
+        found = []
+        for _ in range(4):
+            found.append(jax.jit(function)(0.0))
+            function = jax.jacfwd(function)
+        return found
+
+    one = jnp.eye(3)
+    powers = [np.linalg.matrix_power(h, k) for k in range(4)]
+    for k, found in enumerate(derivatives(lambda s: spectral.exponential(0.5 * one + s * h))):
+        np.testing.assert_allclose(found, np.exp(0.5) * powers[k], atol=1e-13)
+    logs = [0 * one, powers[1], -powers[2], 2 * powers[3]]
+    for found, expected in zip(derivatives(lambda s: spectral.logarithm(one + s * h)), logs, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_the_logarithm_inverts_the_exponential_in_two_directions():
+    """Second mixed derivatives, where two of three eigenvalues are equal and matrices do not commute."""
+    g, h = symmetric(1), symmetric(2)
+    base = jnp.diag(jnp.array([0.3, 0.3, -1.0]))
+
+    def both(s, t):
+        a = base + s * g + t * h + s * t * (g @ g)
+        return spectral.logarithm(spectral.exponential(a)) - a
+
+    mixed = jax.jit(jax.jacfwd(jax.jacfwd(both, 0), 1))(0.0, 0.0)
+    np.testing.assert_allclose(mixed, np.zeros((3, 3)), atol=2e-13)
+    gradient = jax.jit(jax.grad(lambda a: jnp.trace(spectral.logarithm(spectral.hermitian(a)))))(
+        jnp.diag(jnp.array([2.0, 2.0, 5.0]))
+    )
+    np.testing.assert_allclose(gradient, np.diag([0.5, 0.5, 0.2]), atol=1e-15)
