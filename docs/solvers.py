@@ -2,7 +2,7 @@
 
 python docs/solvers.py [--write]
 
-Less than a minute.
+Some minutes.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 import solvers_figures as figures
 from comparisons.page import insert, parser, table, versions
 from numpy.typing import NDArray
+from solvers_calm import calm_table
 
 import symspline as ss
 
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 PAGE = HERE / "solvers.md"
 METHODS = ("fixed-point", "quasi-newton", "newton", "auto")
+ENDED = ("quasi-newton", "newton", "homotopy")
 S2, S3, ROTATIONS = ss.Sphere(2), ss.Sphere(3), ss.SpecialOrthogonal(3)
 GRASSMANNIAN = ss.Grassmannian(2, 5)
 ZIGZAGS = (0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 2.8, 3.0)
@@ -75,7 +77,7 @@ def fit(p: Array, space: ss.Space, t: Array | None = None, **options: object) ->
 
 
 def zigzag_table(steps: Sequence[float] = ZIGZAGS) -> str:
-    """Iterations of every solver; a dagger where it found another curve than auto."""
+    """Iterations and energies of every solver; a dagger where it found another curve than auto."""
     rows = []
     for step in steps:
         curves = {method: fit(zigzag(step), S2, method=method) for method in METHODS}
@@ -90,7 +92,7 @@ def _iterations(curve: ss.CubicSpline, reference: ss.CubicSpline) -> str:
         return f"none in {curve.report.iterations}"
     energies = curve.bending_energy(), reference.bending_energy()
     same = abs(energies[0] - energies[1]) < 1e-3 * energies[1]
-    return f"{curve.report.iterations}{'' if same else ' †'}"
+    return f"{curve.report.iterations}, {energies[0]:.4g}{'' if same else ' †'}"
 
 
 def walk_table(space: ss.Space, steps: Sequence[float] = STEPS, t: Array | None = None) -> str:
@@ -107,8 +109,9 @@ def walk_table(space: ss.Space, steps: Sequence[float] = STEPS, t: Array | None 
             done = [r for r in reports if r.converged]
             row.append(f"{len(done)}, {np.median([r.iterations for r in done]):.0f}" if done else "0")
         ended = Counter(r.method for r in done)
-        rows.append([*row, " + ".join(str(ended[name]) for name in ("quasi-newton", "newton", "homotopy"))])
-    return table(["step", *METHODS, "auto: q.-n. + newton + homotopy"], rows)
+        rest = len(done) - sum(ended[name] for name in ENDED)
+        rows.append([*row, " + ".join([*(str(ended[name]) for name in ENDED), str(rest)])])
+    return table(["step", *METHODS, "auto: q.-n. + newton + homotopy + others"], rows)
 
 
 def time_table(copies: int = 16) -> str:
@@ -169,6 +172,7 @@ def main() -> None:
     parts = {
         "zigzags": zigzag_table(),
         "walks": f"**S²**\n\n{walk_table(S2)}\n\n**S³**\n\n{walk_table(S3)}",
+        "calm": calm_table(),
         "knots": f"**S²**\n\n{walk_table(S2, t=t)}\n\n**S³**\n\n{walk_table(S3, t=t)}",
         "time": f"{time_table()}\n\n{versions('symspline')}",
     }

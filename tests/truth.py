@@ -73,7 +73,8 @@ def _measured(space, t, p, u, controls, residual, closed):
     knots = np.stack([0 * h, h], axis=-1)
     place, rate, bend = (ss.evaluate(knots, knots, *pairs, space, nu, per_curve=True) for nu in range(3))
     ends = np.stack([p[:, :-1], p[:, 1:]], axis=2)
-    off = space.distance(place, ends).max(axis=2) / (50 * EPS * cond[:, None])
+    # At its end a segment goes through the logarithm of a leg, which may nearly reach the cut locus.
+    off = space.distance(place, ends).max(axis=2) / (50 * EPS * inner)
     found = [off.max(axis=1)]
     if closed:
         found[0] = np.maximum(found[0], space.distance(p[:, -1], p[:, 0]) / (50 * EPS * cond))
@@ -105,6 +106,8 @@ def _measured(space, t, p, u, controls, residual, closed):
     at = stretch[:, before, 1] * stretch[:, behind, 0]
     weight = speed[:, None] * (1 / h[:, before] + 1 / h[:, behind]) * at
     jump = jumps(space, place, bend, before, behind)
+    # And so does the acceleration, once more.
+    rounding = rounding * np.maximum(near[:, before], near[:, behind])
     allowed = 12 * np.maximum(residual, 64 * EPS)[:, None] * weight + at * rounding / shorter**2
     found.append((jump / allowed).max(axis=1, initial=0.0))
     found.append(_bezier(space, t, p, u, controls) / (100 * EPS * inner).max(axis=1))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import solvers
+import solvers_calm
 import solvers_figures as figures
 
 import symspline as ss
@@ -15,7 +16,7 @@ def cells(table):
 def test_zigzag_table():
     (near, far) = cells(solvers.zigzag_table((0.2, 2.5)))
     assert near[0] == "0.2" and near[-1] == "quasi-newton" and near[2] == near[4]
-    assert far[2] == "none in 300" and far[-1] in ("newton", "homotopy")
+    assert far[2] == "none in 300" and far[-1] == "trust-region"
 
 
 def test_walk_table_counts_walks(monkeypatch):
@@ -23,11 +24,18 @@ def test_walk_table_counts_walks(monkeypatch):
     solvers.walks.cache_clear()
     (row,) = cells(solvers.walk_table(solvers.S2, (0.3,)))
     assert [cell.partition(",")[0] for cell in row[1:5]] == ["3"] * 4
-    assert row[5] == "3 + 0 + 0"
+    assert row[5] == "3 + 0 + 0 + 0"
     (row,) = cells(solvers.walk_table(solvers.S2, (0.3,), solvers.unequal_knots()))
-    assert row[5] == "3 + 0 + 0"
+    assert row[5] == "3 + 0 + 0 + 0"
     assert all(len(row) == 6 for row in cells(solvers.time_table(1)))
     solvers.walks.cache_clear()
+
+
+def test_calm_table(monkeypatch):
+    monkeypatch.setattr(solvers_calm, "KINDS", {"walks of 0.5": solvers_calm.KINDS["walks of 0.5"]})
+    (row,) = cells(solvers_calm.calm_table(3))
+    # Of no set of points another method finds a calmer curve.
+    assert row[0] == "walks of 0.5" and row[2] == "0" and row[3].startswith("0 of ") and float(row[4]) <= 1.05
 
 
 def test_walks_have_equal_steps_and_stay_near_home():

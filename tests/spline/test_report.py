@@ -29,6 +29,7 @@ FIELDS = [
     "curvature",
     "invariant_radius",
     "rate",
+    "alternative_energy",
 ]
 
 

@@ -54,7 +54,8 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
         ],
         axis=-2,
     )
-    return 0.5 * (whole + np.swapaxes(whole, -1, -2))
+    symmetric: Array = 0.5 * (whole + np.swapaxes(whole, -1, -2))
+    return symmetric
 
 
 def positive_definite_to_siegel(p: ArrayLike) -> Array:

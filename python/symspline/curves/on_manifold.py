@@ -287,7 +287,7 @@ def _report(progress: Progress, nodes: int, count: int, finished: int) -> object
 
 def _no_columns(count: int) -> list[NDArray[Any]]:
     """As the compiled core writes them: converged, iterations, residual, longest step, rate, solver, radius."""
-    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(7)]
+    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(8)]
     columns[0], columns[1] = np.zeros(count, bool), np.zeros(count, np.int64)
     columns[2] = np.full(count, np.inf)
     columns[5] = np.full(count, SOLVERS.index("quasi-newton"))

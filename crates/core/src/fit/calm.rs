@@ -64,14 +64,19 @@ pub fn settle(
             continue;
         }
         let before = chain.unknowns().to_vec();
-        let limits = |most: usize| Limits { tol: options.tol, max_iter: left.map_or(most, |n| n.min(most)) };
+        let within = |most: usize, used: usize| Limits {
+            tol: options.tol,
+            max_iter: left.map_or(most, |n| n.saturating_sub(used).min(most)),
+        };
+        let limits = |most: usize| within(most, 0);
         if way != Way::FromBest {
             chain.update(space, |_, u| u.iter_mut().for_each(|u| *u = on.select(Lane::ZERO, *u)));
         }
         let found = match way {
             Way::Homotopy => {
                 let mut found = outcome.afresh(on);
-                homotopy::follow(space, chain, ends, options, !on, work, monitor, &mut found);
+                let options = Options { max_iter: left, ..*options };
+                homotopy::follow(space, chain, ends, &options, !on, work, monitor, &mut found);
                 found
             }
             Way::Newton => solve(space, chain, ends, Solver::Newton, limits(STEPS), !on, work, monitor),
@@ -81,9 +86,14 @@ pub fn settle(
             Way::FromAlgorithm1 => {
                 let before =
                     solve(space, chain, ends, Solver::FixedPoint, limits(SWEEPS), !on, work, monitor);
-                let mut found = trust_region::solve(space, chain, ends, limits(STEPS), !on, work, monitor);
-                found.iterations = std::array::from_fn(|l| found.iterations[l] + before.iterations[l]);
-                found
+                let rest = within(STEPS, before.used());
+                if rest.max_iter == 0 {
+                    before
+                } else {
+                    let mut found = trust_region::solve(space, chain, ends, rest, !on, work, monitor);
+                    found.iterations = std::array::from_fn(|l| found.iterations[l] + before.iterations[l]);
+                    found
+                }
             }
         };
         let arrived = on & mask_from(|l| found.converged[l]);

@@ -86,6 +86,12 @@ impl Convergence {
         self.done |= arrived;
     }
 
+    /// There is no further iteration on some lanes.
+    pub fn leave(&mut self, lanes: Lane) {
+        self.converged |= self.now.simd_le(self.tol) & lanes & !self.done;
+        self.done |= lanes;
+    }
+
     /// There is no further iteration: what is within the tolerance has arrived.
     pub fn end(&mut self) {
         self.converged |= self.now.simd_le(self.tol) & !self.done;

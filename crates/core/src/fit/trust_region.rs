@@ -76,8 +76,8 @@ pub fn solve(
         let grown = part.simd_gt(lane(GOOD)) & length.simd_gt(radius * lane(0.99));
         radius = shrunk.select(length * lane(POOR), grown.select(radius * lane(2.0), radius));
         state.note(iteration, defect, chain.pace);
-        let stuck = state.done | radius.simd_le(least);
-        if stuck.all() || iteration >= limits.max_iter || monitor.poll() {
+        state.leave(radius.simd_le(least));
+        if state.done.all() || iteration >= limits.max_iter || monitor.poll() {
             state.end();
             break;
         }

@@ -1,0 +1,94 @@
+"""Of several C² curves through points far apart, which one is found: a table of ``solvers.md``."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from comparisons.page import table
+from numpy.typing import NDArray
+
+import symspline as ss
+
+Array = NDArray[np.float64]
+
+OTHERS = ("quasi-newton", "newton", "fixed-point", "homotopy")
+SETS = 60
+BENDS = ("natural", "periodic", "not-a-knot")
+
+
+def _walk(space: ss.Space, part: float, n: int, rng: np.random.Generator) -> Array:
+    p = [space.random_point(rng)]
+    for _ in range(n - 1):
+        v = space.random_tangent(rng, p[-1])
+        p.append(space.exp(p[-1], part * np.pi * v / space.norm(p[-1], v)))
+    return np.array(p)
+
+
+def _zigzag(space: ss.Space, part: float, n: int, rng: np.random.Generator) -> Array:
+    i = np.arange(min(n, 15))
+    p = np.zeros((len(i), space.point_shape[0]))
+    p[:, :3] = ss.geo.from_lonlat(180 * part * (i % 2), np.degrees(0.1 * (i - (len(i) - 1) / 2)))
+    p += 0.02 * rng.standard_normal(p.shape)
+    return p / np.linalg.norm(p, axis=1, keepdims=True)
+
+
+KINDS: dict[str, Callable[[ss.Space, int, np.random.Generator], Array]] = {
+    "random points": lambda space, n, rng: space.random_point(rng, n),
+    **{
+        f"walks of {part:g}": lambda s, n, rng, part=part: _walk(s, part, n, rng)
+        for part in (0.5, 0.7, 0.9, 0.97)
+    },
+    **{
+        f"zigzags of {part:g}": lambda s, n, rng, part=part: _zigzag(s, part, n, rng)
+        for part in (0.9, 0.99, 0.999)
+    },
+}
+
+
+def data(kind: str, sets: int) -> Iterator[tuple[Array | None, Array, ss.Space, str]]:
+    """Knots, points, space and ends: S² and S³ in turn, three ends, equal and unequal knots, 3 to 50 points."""
+    rng = np.random.default_rng(5)
+    for k in range(sets):
+        space = ss.Sphere(2 + k % 2)
+        p = KINDS[kind](space, int(rng.integers(3, 51)), rng)
+        ends = BENDS[k % 3]
+        if ends == "periodic":
+            p = np.concatenate([p, p[:1]])
+        yield None if k % 4 < 2 else np.cumsum(rng.uniform(0.2, 2.0, len(p))), p, space, ends
+
+
+def calm_table(sets: int = SETS) -> str:
+    """How often `auto` finds no curve, how often another method does, and how much more its curve bends."""
+    rows = []
+    for kind in KINDS:
+        failed = found = more = both = 0
+        worst = 1.0
+        for t, p, space, ends in data(kind, sets):
+            with warnings.catch_warnings():
+                # The points of S³ are no quaternions.
+                warnings.simplefilter("ignore")
+                curves = {
+                    m: ss.CubicSpline(t, p, space, bc_type=ends, method=m, on_failure="ignore")
+                    for m in ("auto", *OTHERS)
+                }
+            auto = curves.pop("auto")
+            energies = [curve.bending_energy() for curve in curves.values() if curve.report.converged]
+            if not auto.report.converged:
+                failed += 1
+                found += bool(energies)
+            elif energies:
+                both += 1
+                ratio = auto.bending_energy() / min(energies)
+                more += ratio > 1.01
+                worst = max(worst, ratio)
+        rows.append([kind, str(failed), str(found), f"{more} of {both}", f"{worst:.3f}"])
+    head = [
+        "data",
+        "`auto` fails",
+        "of these, another finds one",
+        "`auto` bends > 1 % more",
+        "at most, times",
+    ]
+    return table(head, rows)
