@@ -17,8 +17,11 @@ pub struct Algebra<const D: usize> {
     basis: &'static [Element],
 }
 
+/// Bases by the numbers of an entry, the size and the group.
+type Bases = BTreeMap<(usize, usize, Members), &'static [Element]>;
+
 /// Bases of all algebras that were asked for. They stay, so that a space can be copied.
-static BASES: Mutex<BTreeMap<(usize, usize, Members), &'static [Element]>> = Mutex::new(BTreeMap::new());
+static BASES: Mutex<Bases> = Mutex::new(Bases::new());
 
 impl<const D: usize> Algebra<D> {
     /// That of a group of n × n matrices.

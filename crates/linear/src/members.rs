@@ -124,7 +124,7 @@ impl Members {
         if matches!(self, Members::Similarity | Members::Lorentz) {
             let mut good = determinant(p)[0].simd_gt(Lane::ZERO);
             if self == Members::Lorentz {
-                good = good & p[(0, 0)][0].simd_gt(Lane::ZERO);
+                good &= p[(0, 0)][0].simd_gt(Lane::ZERO);
             }
             off = good.select(off, lane(f64::NAN));
         }

@@ -94,7 +94,7 @@ pub struct Chain {
     pub h: Vec<Lane>,
     /// Chords dᵢ, m numbers each.
     pub chord: Vec<Lane>,
-    /// What [`Space::prepare`] keeps of each chord.
+    /// What [`Origin::prepare`] keeps of each chord.
     pub prepared: Vec<Lane>,
     /// The velocities uᵢ.
     u: Vec<Lane>,
@@ -112,7 +112,7 @@ pub struct Chain {
     pub max_step: Lane,
     /// The largest |dᵢ|/hᵢ of each lane.
     pub pace: Lane,
-    /// By how much rounding errors may grow in each lane, see [`Space::condition`].
+    /// By how much rounding errors may grow in each lane, see [`Origin::condition`].
     pub condition: Lane,
     /// Where neighbours lie at or past the cut locus: the first segment and its deciding angle.
     pub cut: [Option<(usize, f64)>; LANES],
