@@ -1,12 +1,12 @@
 # Each target sets up what it needs: a virtual environment in .venv, and the compiled module.
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
-BIN := .venv/bin
+BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/config.toml
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo check test test-oracles test-torch fuzz bench docs check-tools clean
+.PHONY: demo check test test-oracles test-torch fuzz bench docs wheel sdist test-wheel crate check-tools clean
 
 demo: .venv/built
 	$(BIN)/symspline demo --out demo-output
@@ -53,6 +53,31 @@ docs: .venv/tools
 		print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
 
+# One wheel for every processor of this architecture, in dist/: on x86-64 with two compiled modules, so two builds.
+wheel: .venv/maturin
+	$(BIN)/python packaging/wheel.py
+
+# The source archive, in dist/.
+sdist: .venv/maturin
+	$(BIN)/python -m maturin sdist --out dist
+
+# Installs the wheel of dist/ where there is nothing but NumPy, and tests it far from the checkout. NUMPY='numpy==1.26.4'
+# takes another NumPy, the environment variable SYMSPLINE_CPU=plain the module for any processor.
+NUMPY ?= numpy
+test-wheel: .venv/maturin
+	$(BIN)/python packaging/test_wheel.py '$(NUMPY)'
+
+# What Rust users get: documentation without warnings, its examples, and packages without surprises.
+crate:
+	RUSTDOCFLAGS='-D warnings' cargo doc --quiet --no-deps --workspace --exclude symspline-python
+	cargo test --quiet --doc -p symspline
+	cargo package --quiet --list --allow-dirty -p symspline
+
+.venv/maturin: | check-tools
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(INSTALL) 'maturin>=1.9,<2'
+	touch $@
+
 # The compiled module, and what the demonstration needs.
 .venv/built: pyproject.toml $(RUST) | check-tools
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -73,4 +98,4 @@ check-tools:
 		{ echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian: python3-venv)"; exit 1; }
 
 clean:
-	rm -rf .venv .venv-oracles target demo-output build docs/gallery docs/api/generated docs/api/backreferences
+	rm -rf .venv .venv-oracles target demo-output dist build docs/gallery docs/api/generated docs/api/backreferences

@@ -14,10 +14,11 @@ from pathlib import Path as _Path
 
 from . import _cpu
 
-_cpu.check(_Path(__file__).parent)
+_cpu.load(_Path(__file__).parent)
 
 from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
+from .config import show_config  # noqa: E402
 from .curves.gradient import Gradient  # noqa: E402
 from .files import load, load_many, save_many  # noqa: E402
 from .free import BezierCurve, BSpline  # noqa: E402
@@ -123,6 +124,7 @@ __all__ = [
     "save_many",
     "set_num_threads",
     "shapes",
+    "show_config",
     "space",
     "subspaces",
     "tensors",

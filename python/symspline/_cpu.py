@@ -1,17 +1,28 @@
-"""Refuses, with a clear message, to load a compiled module that this processor cannot run."""
+"""Picks the compiled module that suits this processor, before any other is imported.
+
+A wheel for x86-64 holds two: ``_core``, which runs on all of them, and ``_core_v3`` for those with AVX2 and FMA
+(x86-64-v3, since about 2013). A checkout, and a wheel for another architecture, have ``_core`` only.
+"""
 
 import ctypes
+import os
 import platform
 import subprocess
 import sys
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-_MARK = b"symspline built for x86-64-v3"
+# In the compiled file.
+MARK = b"symspline built for x86-64-v3"
 _NEEDED = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"}
+
+# What `load` did, for `show_config`.
+reason = ""
 
 
 def _has_v3() -> bool:
-    """Whether the processor has x86-64-v3; True where it cannot be found out."""
+    """Whether the processor has x86-64-v3, as its system says; True where it cannot be found out."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return True
     try:
@@ -30,14 +41,69 @@ def _has_v3() -> bool:
     return True
 
 
+def _says_v3(plain: Path) -> bool:
+    """Whether the processor has x86-64-v3, as it says itself.
+
+    Asked through a module that it can run in any case: emulators show programs the files of another processor.
+    """
+    ask = ctypes.CDLL(str(plain)).symspline_has_v3
+    ask.restype = ctypes.c_bool
+    return bool(ask())
+
+
+def _find(folder: Path, name: str) -> Path | None:
+    files = (folder / (name + suffix) for suffix in EXTENSION_SUFFIXES)
+    return next((file for file in files if file.is_file()), None)
+
+
 def check(folder: Path) -> None:
     """Raise ImportError if the compiled module in ``folder`` needs what the processor lacks."""
     if _has_v3():
         return
-    for file in [*folder.glob("_core*.so"), *folder.glob("_core*.pyd")]:
-        if _MARK in file.read_bytes():
+    file = _find(folder, "_core")
+    if file and MARK in file.read_bytes():
+        raise ImportError(
+            "symspline was built for processors with AVX2 and FMA (x86-64-v3), which this one lacks. "
+            'Build it for any x86-64 processor with: RUSTFLAGS="-C target-cpu=x86-64" '
+            "pip install --no-binary symspline symspline"
+        )
+
+
+def _choose(folder: Path) -> tuple[Path | None, str]:
+    """The file to load as ``_core``, None for the one that Python finds by itself, and why."""
+    asked = os.environ.get("SYMSPLINE_CPU", "")
+    if asked not in ("", "plain", "v3"):
+        raise ImportError(f"SYMSPLINE_CPU must be plain or v3, not {asked[:99]!r}")
+    plain, fast = _find(folder, "_core"), _find(folder, "_core_v3")
+    if not plain or not fast:
+        check(folder)
+        if asked and plain and (MARK in plain.read_bytes()) != (asked == "v3"):
+            other = "any processor" if asked == "v3" else "x86-64-v3"
             raise ImportError(
-                "symspline was built for processors with AVX2 and FMA (x86-64-v3), which this one lacks. "
-                'Build it for any x86-64 processor with: RUSTFLAGS="-C target-cpu=x86-64" '
-                "pip install --no-binary symspline symspline"
+                f"SYMSPLINE_CPU={asked} cannot be done: the only compiled module here is {plain.name}, "
+                f"built for {other}"
             )
+        return None, "the only one here"
+    if asked == "plain":
+        return None, "SYMSPLINE_CPU=plain"
+    if _says_v3(plain):
+        return fast, "SYMSPLINE_CPU=v3" if asked else "the processor has x86-64-v3"
+    if asked:
+        raise ImportError("SYMSPLINE_CPU=v3 cannot be done: this processor lacks x86-64-v3 (AVX2 and FMA)")
+    return None, "the processor lacks x86-64-v3"
+
+
+def load(folder: Path) -> None:
+    """Make ``_core`` of the package in ``folder`` the compiled module that suits; else raise ImportError."""
+    global reason
+    file, reason = _choose(folder)
+    if file is None:
+        return
+    name = f"{__package__}._core"
+    # The compiled file knows itself as `_core`, whatever it is called.
+    spec = spec_from_file_location(name, file, loader=ExtensionFileLoader(name, str(file)))
+    assert spec and spec.loader
+    module = module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    sys.modules[__package__]._core = module  # type: ignore[attr-defined]

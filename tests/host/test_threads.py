@@ -114,6 +114,25 @@ def test_calls_from_many_threads_give_the_same_bits(threads):
             assert all(map(same, values, expected[seed % 8][1:]))
 
 
+@every_common
+def test_one_spline_asked_by_many_threads(threads, space):
+    """Without a lock of Python's, too, all of them are in the compiled module at once."""
+    ss.set_num_threads(2)
+    spline = ss.CubicSpline(None, points_on(space, 40, step=0.5), space, bc_type="not-a-knot")
+    x = np.random.default_rng(0).uniform(0, 39, 3_000)
+    calls = [lambda nu=nu: spline(x, nu=nu) for nu in range(3)]
+    calls += [lambda: spline.speed(x), spline.length]
+    expected, begin = [call() for call in calls], threading.Barrier(8)
+
+    def ask(i):
+        begin.wait(20)
+        turns = [(i + j) % len(calls) for j in range(20)]
+        return all(same(calls[k](), expected[k]) for k in turns)
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(ask, range(8)))
+
+
 def test_parallel_calls_from_many_threads_give_the_same_bits(threads):
     ss.set_num_threads(2)
     p = S3.geodesic([1, 0, 0, 0], [0, 1, 0, 0], np.linspace(0, 9, 20_000))

@@ -20,6 +20,21 @@ static BUILT_FOR: &[u8] = if cfg!(all(target_arch = "x86_64", target_feature = "
     b"symspline built for any processor"
 };
 
+/// Whether the processor has x86-64-v3. `symspline/_cpu.py` asks the module for any processor, before either is imported.
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "the name must be unique in the process, and is")]
+#[unsafe(no_mangle)]
+pub extern "C" fn symspline_has_v3() -> bool {
+    use std::arch::is_x86_feature_detected as has;
+    has!("avx2")
+        && has!("fma")
+        && has!("bmi1")
+        && has!("bmi2")
+        && has!("f16c")
+        && has!("lzcnt")
+        && has!("movbe")
+}
+
 /// Limits the number of threads; 0 stands for all cores.
 #[pyfunction]
 fn set_num_threads(n: usize) {

@@ -5,6 +5,58 @@
 //!
 //! A curve is three plain arrays: knots t, points p and velocities u = γ'(t). [`fit`] finds the
 //! velocities, [`curve`] evaluates, [`space`] is the geometry, [`spaces`] the list of all spaces.
+//! [`derivative`] says how a curve follows its data, [`smoothing`] finds curves near noisy points.
+//!
+//! # A spline through unit quaternions
+//!
+//! Arrays are plain and flat: of each point its numbers, one after the other, point by point.
+//!
+//! ```
+//! use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
+//! use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
+//! use symspline::monitor::Monitor;
+//! use symspline::space::Erased;
+//! use symspline::spaces::Sphere;
+//!
+//! let sphere = Sphere::new(3).unwrap();
+//! let space = Erased(&sphere);
+//! let go_on = |_| true; // is asked from time to time, and may stop the work
+//!
+//! // w, x, y, z at three times. Neighbours must have the same sign, w w' + … > 0.
+//! let t = [0.0, 1.0, 2.5];
+//! let points = [1.0, 0.0, 0.0, 0.0, 0.8, 0.6, 0.0, 0.0, 0.6, 0.64, 0.48, 0.0];
+//!
+//! let problem = Problem {
+//!     t: &t,
+//!     shared: true,
+//!     points: &points,
+//!     offsets: &[0, 3], // one curve of three points; more may follow, and are fitted in parallel
+//!     ends: Ends::Open([End::Natural, End::NotAKnot]),
+//! };
+//! let options = Options { method: Method::Auto, tol: 1e-12, max_iter: None };
+//! let mut velocities = [0.0; 12];
+//! let reports = fit(&space, &problem, &options, &Monitor::new(&go_on), &mut velocities);
+//! assert_eq!(reports[0].status, Status::Converged);
+//!
+//! let curves = Curves { t: &t, nodes: 3, points: &points, velocities: &velocities };
+//! let x = [0.0, 0.5, 1.0, 2.0];
+//! let times = Times { x: &x, count: x.len() };
+//! let mut q = [0.0; 16];
+//! evaluate(&space, &curves, &times, Quantity::Point, Outside::Continue, &Monitor::new(&go_on), &mut q);
+//!
+//! // The curve stays on the sphere and passes through the points.
+//! for point in q.chunks(4) {
+//!     let square: f64 = point.iter().map(|x| x * x).sum();
+//!     assert!((square - 1.0).abs() < 1e-14);
+//! }
+//! assert!(q[8..12].iter().zip(&points[4..8]).all(|(a, b)| (a - b).abs() < 1e-14));
+//! ```
+//!
+//! Rotations whose quaternions have any sign are points of [`spaces::Rotations`] as matrices.
+//! [`spaces::AnySpace`] makes a space of a name, such as `"so"` with `[3]`.
+//!
+//! Nothing here checks that points lie on their space; [`rows::apply`] with [`rows::Operation::Project`]
+//! puts them there.
 
 pub mod spaces;
 

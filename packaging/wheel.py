@@ -1,0 +1,80 @@
+"""Builds one wheel that suits every processor of this machine's architecture, into dist/.
+
+On x86-64 it holds two compiled modules, of which `symspline/_cpu.py` picks one at import: `_core` for any processor,
+and `_core_v3` for those with AVX2 and FMA. They are two builds, each with its own target folder, joined afterwards:
+nothing is put into the checkout, where a second module would be loaded in place of the one under development.
+"""
+
+import base64
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+
+
+def build(folder: Path, target: Path, flags: str | None) -> Path:
+    """A wheel in ``folder`` by maturin, with the compiler's flags of .cargo/config.toml if there are no others."""
+    environment = {name: value for name, value in os.environ.items() if name != "RUSTFLAGS"}
+    command = [
+        sys.executable,
+        "-m",
+        "maturin",
+        "build",
+        "--release",
+        "--locked",
+        "--interpreter",
+        sys.executable,
+    ]
+    subprocess.run(
+        [*command, "--target-dir", str(target), "--out", str(folder)],
+        cwd=ROOT,
+        env=environment | ({"RUSTFLAGS": flags} if flags else {}),
+        check=True,
+    )
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def join(plain: Path, fast: Path, out: Path) -> Path:
+    """Write the wheel ``plain`` with the compiled module of ``fast`` as its second one."""
+    with zipfile.ZipFile(fast) as archive:
+        (name,) = [
+            n for n in archive.namelist() if n.startswith("symspline/_core.") and not n.endswith(".pyi")
+        ]
+        info, module = archive.getinfo(name), archive.read(name)
+    info.filename = name.replace("_core", "_core_v3", 1)
+    digest = base64.urlsafe_b64encode(hashlib.sha256(module).digest()).rstrip(b"=").decode()
+    made = out / plain.name
+    with zipfile.ZipFile(plain) as source, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as wheel:
+        for entry in source.infolist():
+            content = source.read(entry)
+            if entry.filename.endswith(".dist-info/RECORD"):
+                # The folder .dist-info comes last, as the format recommends.
+                wheel.writestr(info, module)
+                content += f"{info.filename},sha256={digest},{len(module)}\n".encode()
+            wheel.writestr(entry, content)
+    return made
+
+
+def main() -> None:
+    out = ROOT / "dist"
+    out.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        made = build(Path(temporary) / "default", TARGET, None)
+        if platform.machine().lower() in ("x86_64", "amd64"):
+            plain = build(Path(temporary) / "plain", TARGET / "plain", "-C target-cpu=x86-64")
+            print(join(plain, made, out))
+        else:
+            print(shutil.copy(made, out))
+
+
+if __name__ == "__main__":
+    main()
