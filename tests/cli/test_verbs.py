@@ -214,4 +214,4 @@ def test_the_help_names_every_method(run, capsys):
     run("fit axes.csv --space s:2 --method newton -o axes.npz")
     with pytest.raises(SystemExit):
         main(["fit", "--help"])
-    assert "quasi-newton, newton or fixed-point" in " ".join(capsys.readouterr().out.split())
+    assert "quasi-newton, newton, homotopy or fixed-point" in " ".join(capsys.readouterr().out.split())

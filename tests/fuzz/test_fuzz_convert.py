@@ -21,7 +21,9 @@ TAKEN = {
 
 
 def test_all_are_here():
-    assert set(TAKEN) == set(ss.convert.__all__)
+    # Totally geodesic parts have tests of their own.
+    parts = {name for name in ss.convert.__all__ if "siegel" in name or "subspace" in name}
+    assert set(TAKEN) | parts == set(ss.convert.__all__)
 
 
 @st.composite

@@ -75,7 +75,7 @@ def test_curves_that_stand_still_have_derivatives(name):
 
     def number(s):
         # Points move along straight lines, and are brought back to the space.
-        value = evaluate(T[:2], points + s * v, s * w, 0.3, space)
+        value = evaluate(T[:2], points + s * v, s * w, jnp.array([0.3]), space)
         if isinstance(space, QUOTIENTS):
             value = projector(value, value)
         return jnp.sum(value.real**3)

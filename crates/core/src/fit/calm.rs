@@ -14,6 +14,8 @@ use crate::space::{Ambient, Erased};
 const FAR: f64 = 0.6;
 /// Energies that differ by no more than this part are those of one curve.
 const SAME: f64 = 1e-6;
+/// So does, of a curve that is straight, this part of the square of the speed.
+const STRAIGHT: f64 = 1e-12;
 /// Steps in a trust region, and of Algorithm 1 before it.
 const STEPS: usize = 120;
 const SWEEPS: usize = 2000;
@@ -98,7 +100,9 @@ pub fn settle(
         };
         let arrived = on & mask_from(|l| found.converged[l]);
         let bends = energy(chain, arrived);
-        let other = arrived & !(bends - least).abs().simd_le(lane(SAME) * bends);
+        // Of geodesics energies are rounding errors.
+        let rounding = lane(STRAIGHT) * chain.pace * chain.pace;
+        let other = arrived & !(bends - least).abs().simd_le(lane(SAME) * bends + rounding);
         let calmer = other & bends.simd_lt(least);
         second = calmer.select(least, other.select(second.min(bends), second));
         least = calmer.select(bends, least);
