@@ -98,12 +98,7 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
         let p = self.read(p);
         let omega = self.generator(&p, v);
         let x = &p.times(&exp_skew_minus_one(&omega.scaled(t))) + &p;
-        if order == 0 {
-            return Moved(x, None);
-        }
-        let d = x.times(&omega);
-        let dd = if order > 1 { d.times(&omega) } else { d.clone() };
-        Moved(x, Some([d, dd]))
+        Moved::by_generator(x, &omega, order)
     }
 
     /// `log(p⁻¹q)` and its deciding angle.

@@ -11,7 +11,7 @@ use crate::algebra::Algebra;
 use crate::members::{Members, condition};
 use std::f64::consts::{PI, SQRT_2};
 use symspline_core::matrix::{
-    Matrix, Moved, determinant, exp_any_minus_one, inverse, largest_imaginary, log_any_one_plus,
+    Dynamic, Matrix, Moved, determinant, exp_any_minus_one, inverse, largest_imaginary, log_any_one_plus,
 };
 use symspline_core::scalar::{Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Ambient, Frame, Origin, Space};
@@ -46,22 +46,17 @@ impl<const D: usize> GeneralLinear<D> {
     }
 
     /// p e^{tΩ} and its derivatives in t, as many as are asked for.
-    fn moved(
-        &self,
-        p: &[Lane],
-        v: &[Lane],
-        t: Lane,
-        order: usize,
-    ) -> Moved<D, symspline_core::matrix::Dynamic> {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, Dynamic> {
         let omega = self.generator(p, v);
         let p = self.read(p);
         let x = &p.times(&exp_any_minus_one(&omega.scaled(t))) + &p;
-        if order == 0 {
-            return Moved(x, None);
-        }
-        let d = x.times(&omega);
-        let dd = if order > 1 { d.times(&omega) } else { d.clone() };
-        Moved(x, Some([d, dd]))
+        Moved::by_generator(x, &omega, order)
+    }
+
+    /// g_R of a frame, and its inverse.
+    fn frame(&self, frame: &[Lane]) -> [Matrix<Lane, D>; 2] {
+        let (r, back) = frame.split_at(self.point_len());
+        [self.read(r), self.read(back)]
     }
 }
 
@@ -190,13 +185,6 @@ impl<const D: usize> Frame for GeneralLinear<D> {
         let [r, back] = self.frame(frame);
         let omega = r.times(&self.algebra.multiple(1.0, x)).times(&back);
         self.read(p).times(&omega).write(v);
-    }
-}
-
-impl<const D: usize> GeneralLinear<D> {
-    fn frame(&self, frame: &[Lane]) -> [Matrix<Lane, D>; 2] {
-        let (r, back) = frame.split_at(self.point_len());
-        [self.read(r), self.read(back)]
     }
 }
 

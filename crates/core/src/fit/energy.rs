@@ -7,7 +7,7 @@ use crate::scalar::{Jet, Lane, lane};
 use crate::space::{Ambient, Erased, Frame};
 
 /// The energy of each lane, in the units of the chain. Every segment is carried home in parallel to the
-/// first point, which changes no length.
+/// first point, which changes no length where there is a metric; elsewhere lengths are those that frames see.
 pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
     let (n, m, len) = (chain.n, chain.m, space.point_len());
     let mut segment = Segment::<Jet>::new(len);

@@ -48,6 +48,22 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// How an iteration ended, whose last iterate the chain has.
+    pub fn of(space: &Erased, chain: &mut Chain, state: &Convergence, solver: Solver) -> Self {
+        let fault = long_legs(space, chain, state.leg, state.converged);
+        let converged = mask_bits(state.converged);
+        Outcome {
+            iterations: state.iterations,
+            residual: state.residual,
+            converged: std::array::from_fn(|l| converged[l] && fault[l].is_none()),
+            fault,
+            leg: state.leg,
+            rate: state.rate(),
+            solver: [solver; LANES],
+            alternative: lane(f64::NAN),
+        }
+    }
+
     /// That of a solver that has not begun on the lanes of a mask; on others it is settled.
     pub fn afresh(&self, on: Lane) -> Self {
         let on_lane = mask_bits(on);
@@ -197,16 +213,5 @@ pub fn solve(
         });
     }
     best.restore(space, chain, idle, &mut state);
-    let fault = long_legs(space, chain, state.leg, state.converged);
-    let converged = mask_bits(state.converged);
-    Outcome {
-        iterations: state.iterations,
-        residual: state.residual,
-        converged: std::array::from_fn(|l| converged[l] && fault[l].is_none()),
-        fault,
-        leg: state.leg,
-        rate: state.rate(),
-        solver: [solver; LANES],
-        alternative: lane(f64::NAN),
-    }
+    Outcome::of(space, chain, &state, solver)
 }

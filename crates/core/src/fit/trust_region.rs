@@ -7,11 +7,11 @@ use super::chain::Chain;
 use super::condition::{Defect, residual};
 use super::convergence::Convergence;
 use super::ends::{ChainEnds, EndKind, of_kind};
-use super::legs::{long_legs, shorten};
+use super::legs::shorten;
 use super::solve::{Limits, Outcome, Workspace};
 use super::{Solver, newton};
 use crate::monitor::Monitor;
-use crate::scalar::{LANES, Lane, dot, lane, mask_bits};
+use crate::scalar::{Lane, dot, lane};
 use crate::space::{Ambient, Erased};
 
 /// Outer legs are kept within this part of the distance to the cut locus.
@@ -96,18 +96,7 @@ pub fn solve(
         });
     }
     chain.update(space, |_, u| u.copy_from_slice(&here));
-    let fault = long_legs(space, chain, state.leg, state.converged);
-    let converged = mask_bits(state.converged);
-    Outcome {
-        iterations: state.iterations,
-        residual: state.residual,
-        converged: std::array::from_fn(|l| converged[l] && fault[l].is_none()),
-        fault,
-        leg: state.leg,
-        rate: state.rate(),
-        solver: [Solver::TrustRegion; LANES],
-        alternative: lane(f64::NAN),
-    }
+    Outcome::of(space, chain, &state, Solver::TrustRegion)
 }
 
 /// What the defect of a node is multiplied by to make it a velocity.

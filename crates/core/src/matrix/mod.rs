@@ -82,6 +82,16 @@ pub struct Matrix<S: Scalar, const D: usize, A: Storage = Dynamic> {
 pub struct Moved<const D: usize, A: Storage>(pub Matrix<Lane, D, A>, pub Option<[Matrix<Lane, D, A>; 2]>);
 
 impl<const D: usize, A: Storage> Moved<D, A> {
+    /// The point x = p e^{tΩ} of a curve with x' = xΩ, with so many derivatives as are asked for.
+    pub fn by_generator(x: Matrix<Lane, D, A>, omega: &Matrix<Lane, D, A>, order: usize) -> Self {
+        if order == 0 {
+            return Moved(x, None);
+        }
+        let d = x.times(omega);
+        let dd = if order > 1 { d.times(omega) } else { d.clone() };
+        Moved(x, Some([d, dd]))
+    }
+
     /// Writes the curve at the parameter t, with the derivatives that t carries.
     pub fn write<S: Scalar>(&self, t: S, out: &mut [S]) {
         let Moved(x, rates) = self;
