@@ -6,6 +6,7 @@
 pub mod curve;
 pub mod derivative;
 pub mod fit;
+#[cfg(feature = "laws")]
 pub mod laws;
 pub mod matrix;
 pub mod monitor;

@@ -2,7 +2,7 @@
 
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{LANES, Lane, gather, lane, scatter};
+use crate::scalar::{LANES, Lane, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 
 /// Rows worked on by one thread at a time, at most.
@@ -76,8 +76,7 @@ pub fn apply(
         let mut frame = Vec::new();
         let rows = out.len() / size;
         for (group, out) in out.chunks_mut(LANES * size).enumerate() {
-            let at: [usize; LANES] =
-                std::array::from_fn(|l| block * length + (group * LANES + l).min(rows - 1));
+            let at: [usize; LANES] = few(|l| block * length + (group * LANES + l).min(rows - 1));
             for (x, input) in x.iter_mut().zip(inputs) {
                 gather(at.map(|i| &input[i * len..(i + 1) * len]), x);
             }
@@ -173,7 +172,7 @@ fn project_block(space: &Erased, points: &mut [f64], tol: f64) -> Result<(), (us
     let mut x = vec![Lane::ZERO; len];
     for (group, rows) in points.chunks_mut(LANES * len).enumerate() {
         let last = rows.len() / len - 1;
-        let at: [usize; LANES] = std::array::from_fn(|l| l.min(last) * len);
+        let at: [usize; LANES] = few(|l| l.min(last) * len);
         gather(at.map(|i| &rows[i..i + len]), &mut x);
         let off = space.project(&mut x);
         if !off.simd_le(lane(tol)).all() {
@@ -195,7 +194,7 @@ pub fn tangent_defects(space: &Erased, points: &[f64], vectors: &[f64]) -> Vec<f
     let (mut p, mut v) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
     let mut defects = Vec::with_capacity(rows + LANES);
     for group in 0..rows.div_ceil(LANES) {
-        let at: [usize; LANES] = std::array::from_fn(|l| (group * LANES + l).min(rows - 1) * len);
+        let at: [usize; LANES] = few(|l| (group * LANES + l).min(rows - 1) * len);
         gather(at.map(|i| &points[i..i + len]), &mut p);
         gather(at.map(|i| &vectors[i..i + len]), &mut v);
         defects.extend(space.project_tangent(&p, &mut v).to_array());

@@ -6,7 +6,7 @@
 
 use crate::banded::Banded;
 use crate::flat::{Flat, Row, times_mass};
-use symspline_core::scalar::{LANES, Lane, lane};
+use symspline_core::scalar::{LANES, Lane, few, lane};
 
 /// How λ is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,9 +86,7 @@ impl<'a> Linear<'a> {
         let entry = |i: usize, c: usize| self.pull[i * m + c] - lam * self.stiffness[i * m + c];
         for (i, x) in x.chunks_exact_mut(columns).enumerate() {
             for (k, x) in x.iter_mut().enumerate() {
-                *x = Lane::new(std::array::from_fn(|l| {
-                    if k * LANES + l < m { entry(i, k * LANES + l) } else { 0.0 }
-                }));
+                *x = Lane::new(few(|l| if k * LANES + l < m { entry(i, k * LANES + l) } else { 0.0 }));
             }
         }
         factors.solve(columns, &mut x);
@@ -149,9 +147,8 @@ impl<'a> Linear<'a> {
         let passes = if guess.is_some() { 1 } else { ((to - from) / DECADES).ceil() as usize };
         let mut seen: Vec<(f64, f64, f64)> = Vec::new();
         let look = |seen: &mut Vec<(f64, f64, f64)>, from: f64, to: f64, part: usize, parts: usize| {
-            let at: [f64; LANES] = std::array::from_fn(|l| {
-                from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64
-            });
+            let at: [f64; LANES] =
+                few(|l| from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64);
             let found = self.look(Lane::new(at.map(|x| 10f64.powf(x))));
             let scores = self.score(criterion, Lane::new(at.map(|x| 10f64.powf(x))), &found).to_array();
             let freedom = found.freedom.to_array();

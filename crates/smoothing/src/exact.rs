@@ -10,7 +10,7 @@ use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
-use symspline_core::scalar::{LANES, Lane, lane};
+use symspline_core::scalar::{LANES, Lane, few, lane};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
 /// Two Gauss points a segment: exact where the acceleration is linear, as in flat space.
@@ -142,7 +142,7 @@ fn in_coordinates(
     for first in (0..=count).step_by(LANES) {
         for (row, v) in v.iter_mut().enumerate() {
             let number = |c: usize| if c < count { columns[(row, c)] } else { vector[row].as_array()[0] };
-            *v = Lane::new(std::array::from_fn(|l| number((first + l).min(count))));
+            *v = Lane::new(few(|l| number((first + l).min(count))));
         }
         space.coordinates(&frame, &p, &v, &mut x);
         for l in 0..LANES.min(count + 1 - first) {

@@ -4,7 +4,7 @@
 //! into the one that comes out of the run before is kept, so that coordinates are those in one frame carried along the
 //! whole polygon.
 
-use symspline_core::scalar::{LANES, Lane, gather, scatter};
+use symspline_core::scalar::{LANES, Lane, few, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
 /// Steps after which the rounding errors of a frame are removed.
@@ -32,7 +32,7 @@ impl<'a> Frames<'a> {
         let runs = count.div_ceil(run);
         let last = count - 1;
         let point = |knot: usize| &points[knot.min(last) * len..][..len];
-        let begin: [usize; LANES] = std::array::from_fn(|l| l.min(runs - 1) * run);
+        let begin: [usize; LANES] = few(|l| l.min(runs - 1) * run);
 
         let mut frames = vec![0.0; count * size];
         let [mut p, mut q] = [(); 2].map(|_| vec![Lane::ZERO; len]);
@@ -66,7 +66,7 @@ impl<'a> Frames<'a> {
     /// Compares the frames with which runs end, `frame` at `p`, with those with which the next ones begin.
     fn join(&mut self, runs: usize, frame: &[Lane], p: &[Lane]) {
         let (space, m, len) = (self.space, self.space.dim(), self.space.point_len());
-        let next: [usize; LANES] = std::array::from_fn(|l| (l + 1).min(runs - 1) * self.run);
+        let next: [usize; LANES] = few(|l| (l + 1).min(runs - 1) * self.run);
         let mut fresh = vec![Lane::ZERO; frame.len()];
         gather(next.map(|k| &self.frames[k * frame.len()..][..frame.len()]), &mut fresh);
         // Where frames are not orthonormal the way back is no transpose.
@@ -155,7 +155,7 @@ impl<'a> Frames<'a> {
 
 /// The members of a group of eight; those that are missing are the last one again.
 pub fn lanes_of(group: usize, count: usize) -> [usize; LANES] {
-    std::array::from_fn(|l| (group * LANES + l).min(count - 1))
+    few(|l| (group * LANES + l).min(count - 1))
 }
 
 /// a b for m × m matrices.

@@ -10,6 +10,7 @@ use std::ops::Range;
 use symspline_core::fit::{End, Ends as FitEnds, Method, Options as FitOptions, Problem, Status, fit};
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
+use symspline_core::scalar::few;
 use symspline_core::space::{Ambient, Erased, Origin};
 
 const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: None };
@@ -42,7 +43,7 @@ fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         let ends = [0, 1].map(|e| ends.iter().flat_map(|own| own[e].iter().copied()).collect::<Vec<f64>>());
         let ends = match options.ends {
             Ends::Periodic => FitEnds::Periodic,
-            open => FitEnds::Open(std::array::from_fn(|e| end_of(open, e, &ends[e]))),
+            open => FitEnds::Open(few(|e| end_of(open, e, &ends[e]))),
         };
         let curves = running.iter().map(|track| {
             let Range { start, end } = track.curve();

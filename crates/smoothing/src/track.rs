@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use symspline_core::fit::{End, Ends as FitEnds};
 use symspline_core::monitor::Monitor;
-use symspline_core::scalar::{LANES, Lane, gather, lane, scatter};
+use symspline_core::scalar::{LANES, Lane, few, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased, Origin};
 
 /// Contraction of the flat tier, known or expected, from which the exact one takes over.
@@ -256,7 +256,7 @@ impl<'a> Track<'a> {
         let (step, ambient) = if exact {
             let unit = spacing.powi(3);
             let pull = Pull { places: &self.places, vectors: &vectors, weights };
-            let kinds = std::array::from_fn(|e| end_of(self.ends, e, &velocities[e]));
+            let kinds = few(|e| end_of(self.ends, e, &velocities[e]));
             let ambient = exact::step(space, &path, FitEnds::Open(kinds), &pull, lam * unit, monitor, alone);
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {

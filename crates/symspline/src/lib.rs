@@ -62,6 +62,6 @@ pub mod spaces;
 
 pub use symspline_smoothing as smoothing;
 
-pub use symspline_core::{
-    curve, derivative, fit, laws, matrix, monitor, parallel, rows, scalar, space, special,
-};
+#[cfg(feature = "laws")]
+pub use symspline_core::laws;
+pub use symspline_core::{curve, derivative, fit, matrix, monitor, parallel, rows, scalar, space, special};

@@ -6,7 +6,7 @@
 use super::evaluate::Quantity;
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, max_or_nan, scatter};
+use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, few, gather, max_or_nan, scatter};
 use crate::space::{Ambient, Erased};
 
 /// A B-spline curve: `knots.len() = control points + degree + 1`, as in SciPy.
@@ -56,7 +56,7 @@ pub fn evaluate_bspline(
         for (group, out) in out.chunks_mut(LANES * size).enumerate() {
             let first = block * length + group * LANES;
             let samples = out.len() / size;
-            let at = std::array::from_fn(|l| first + l.min(samples - 1));
+            let at = few(|l| first + l.min(samples - 1));
             match quantity.order() {
                 0 => eight::<Lane>(space, curve, x, at, quantity, out),
                 1 => eight::<Dual>(space, curve, x, at, quantity, out),
@@ -86,15 +86,15 @@ fn eight<S: Scalar>(
     let mut row = vec![Lane::ZERO; len];
     let mut points: Vec<Vec<S>> = (0..=degree)
         .map(|j| {
-            gather(std::array::from_fn(|l| point(l, interval[l] - degree + j)), &mut row);
+            gather(few(|l| point(l, interval[l] - degree + j)), &mut row);
             row.iter().map(|&x| S::constant(x)).collect()
         })
         .collect();
     let mut next = vec![S::constant(Lane::ZERO); len];
     for r in 1..=degree {
         for j in (r..=degree).rev() {
-            let from = Lane::new(std::array::from_fn(|l| t[interval[l] + j - degree]));
-            let to = Lane::new(std::array::from_fn(|l| t[interval[l] + j + 1 - r]));
+            let from = Lane::new(few(|l| t[interval[l] + j - degree]));
+            let to = Lane::new(few(|l| t[interval[l] + j + 1 - r]));
             let rate = Lane::ONE / (to - from);
             let alpha = S::from_parts([(Lane::new(times) - from) / (to - from), rate, Lane::ZERO]);
             space.geodesic(&points[j - 1], &points[j], alpha, &mut next);

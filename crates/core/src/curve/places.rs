@@ -2,7 +2,7 @@
 
 use super::evaluate::{Job, Outside, Times};
 use super::locate::Locator;
-use crate::scalar::{LANES, Lane};
+use crate::scalar::{LANES, Lane, few};
 
 /// Where eight samples fall. It goes along the samples of a block in their order.
 pub struct Places<'a> {
@@ -56,7 +56,7 @@ impl<'a> Places<'a> {
         {
             // Dense samples in order stay in a segment for a while.
             let row = if x.len() == count { self.i } else { self.curve * count + self.i };
-            let next = Lane::new(std::array::from_fn(|l| x[row..][..LANES][l]));
+            let next = Lane::new(few(|l| x[row..][..LANES][l]));
             if (next.simd_ge(from) & next.simd_lt(to)).all() {
                 self.x = next;
                 self.step(LANES);

@@ -3,7 +3,7 @@
 use super::operators::{Few, Matrix, Vector, columns, unit};
 use super::polygon::Node;
 use super::segment::Segment;
-use crate::scalar::{Dual, Jet, Lane, Scalar, lane};
+use crate::scalar::{Dual, Jet, Lane, Scalar, few, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 use smallvec::smallvec;
 
@@ -67,7 +67,7 @@ impl Bezier {
     /// The motions of the k-th control point in eight columns from `first` on.
     fn motion(&self, k: usize, row: usize, first: usize) -> Lane {
         let m = self.bases[k].ncols();
-        Lane::new(std::array::from_fn(|l| {
+        Lane::new(few(|l| {
             let column = (first + l).wrapping_sub(k * m);
             if column < m { self.bases[k][(row, column)] } else { 0.0 }
         }))

@@ -3,7 +3,7 @@
 //! Everything comes from `S(v) = sinh(ad_v)/ad_v` and the triple product `[a, [b, c]]`, which every space has;
 //! hyperbolic identities give the other even functions of ad_v.
 
-use crate::scalar::{Dual, LANES, Lane, Scalar, lane};
+use crate::scalar::{Dual, LANES, Lane, Scalar, few, lane};
 use crate::space::{Erased, Origin};
 use nalgebra::{DMatrix, DVector};
 use smallvec::{SmallVec, smallvec};
@@ -32,7 +32,7 @@ pub fn columns(rows: usize, count: usize, mut f: impl FnMut(usize, &mut [Lane]))
 
 /// One number of eight unit vectors e_first, e_{first + 1}, …
 pub fn unit(row: usize, first: usize) -> Lane {
-    Lane::new(std::array::from_fn(|l| if row == first + l { 1.0 } else { 0.0 }))
+    Lane::new(few(|l| if row == first + l { 1.0 } else { 0.0 }))
 }
 
 /// A vector on every lane.

@@ -7,7 +7,7 @@ use super::energy::bending;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{Options, Solver, homotopy, trust_region};
 use crate::monitor::Monitor;
-use crate::scalar::{Lane, lane, mask_from};
+use crate::scalar::{Lane, few, lane, mask_from};
 use crate::space::{Ambient, Erased};
 
 /// Steps beyond this part of the distance to the cut locus may have several curves.
@@ -93,7 +93,7 @@ pub fn settle(
                     before
                 } else {
                     let mut found = trust_region::solve(space, chain, ends, rest, !on, work, monitor);
-                    found.iterations = std::array::from_fn(|l| found.iterations[l] + before.iterations[l]);
+                    found.iterations = few(|l| found.iterations[l] + before.iterations[l]);
                     found
                 }
             }

@@ -8,7 +8,7 @@
 //! long curve.
 
 use super::ends::{ChainEnds, EndKind, of_kind};
-use crate::scalar::{LANES, Lane, Scalar, dot, gather, max_or_nan};
+use crate::scalar::{LANES, Lane, Scalar, dot, few, gather, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 use crate::with_size;
 
@@ -177,7 +177,7 @@ impl Chain {
         let (m, keep, limit) = (self.m, space.chord_len(), below(space.cut_angle()));
         let scales = space.scales();
         for i in 0..self.n {
-            self.h[i] = Lane::new(std::array::from_fn(|l| runs[l].h(i))) * self.clock;
+            self.h[i] = Lane::new(few(|l| runs[l].h(i))) * self.clock;
             let d = &mut self.chord[i * m..(i + 1) * m];
             let angle = self.walker.advance(space, runs, len, d);
             if scales {

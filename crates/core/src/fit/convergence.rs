@@ -2,7 +2,7 @@
 
 use super::chain::Chain;
 use super::condition::Defect;
-use crate::scalar::{LANES, Lane, lane, mask_bits};
+use crate::scalar::{LANES, Lane, few, lane, mask_bits};
 use crate::space::Erased;
 
 /// Defects of this many ε times the condition of the chords are rounding: an iteration that stops
@@ -100,7 +100,7 @@ impl Convergence {
     /// Geometric mean of the contraction, from the second residual on: the first is that of u = 0.
     pub fn rate(&self) -> Lane {
         let (first, last) = (self.second.to_array(), self.residual.to_array());
-        Lane::new(std::array::from_fn(|l| {
+        Lane::new(few(|l| {
             let steps = self.iterations[l].saturating_sub(2);
             if steps == 0 { 0.0 } else { (last[l] / first[l]).powf(1.0 / steps as f64) }
         }))

@@ -8,7 +8,7 @@ use super::pieces::Piece;
 use super::solve::Workspace;
 use super::{Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
-use crate::scalar::{LANES, Lane, dot, lane, mask_from, scatter};
+use crate::scalar::{LANES, Lane, dot, few, lane, mask_from, scatter};
 use crate::space::{Ambient, Erased};
 use std::cell::RefCell;
 
@@ -47,7 +47,7 @@ fn fit_in(
     let nodes = group[0].nodes;
     // Lanes that are left over repeat the first piece.
     let piece = |l: usize| &group[if l < group.len() { l } else { 0 }];
-    let runs: [Run; LANES] = std::array::from_fn(|l| problem.run(piece(l), space.point_len()));
+    let runs: [Run; LANES] = few(|l| problem.run(piece(l), space.point_len()));
     let is_end = |l: usize| {
         let (p, last) = (piece(l), problem.segments(piece(l).curve));
         [p.first == 0, p.first + nodes == last + 1]
@@ -61,17 +61,16 @@ fn fit_in(
             let mut kinds = [[EndKind::Acceleration; LANES]; 2];
             let mut values = [None, None];
             for (e, end) in ends.iter().enumerate() {
-                kinds[e] =
-                    std::array::from_fn(|l| if is_end(l)[e] { end.kind() } else { EndKind::Acceleration });
+                kinds[e] = few(|l| if is_end(l)[e] { end.kind() } else { EndKind::Acceleration });
                 values[e] = end.values().map(|v| (v, space.point_len()));
             }
             (ChainEnds::Open(kinds), values)
         }
     };
     let zeros = vec![0.0; space.point_len()];
-    let rows: [Option<[&[f64]; LANES]>; 2] = std::array::from_fn(|e| {
+    let rows: [Option<[&[f64]; LANES]>; 2] = few(|e| {
         values[e].map(|(v, len)| {
-            std::array::from_fn(|l| {
+            few(|l| {
                 let c = piece(l).curve;
                 if is_end(l)[e] { &v[c * len..(c + 1) * len] } else { &zeros[..] }
             })
@@ -115,7 +114,7 @@ fn fit_in(
         p.end_leg = given[l];
     }
     let runs: [Run; LANES] =
-        std::array::from_fn(|l| problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len()));
+        few(|l| problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len()));
     write_velocities(space, chain, &runs, group);
 }
 

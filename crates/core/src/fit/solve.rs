@@ -11,7 +11,7 @@ use super::quasi_newton::{self, Anderson};
 use super::tridiagonal::Tridiagonal;
 use super::{Solver, Status, fixed_point};
 use crate::monitor::Monitor;
-use crate::scalar::{LANES, Lane, lane, mask_bits, mask_from};
+use crate::scalar::{LANES, Lane, few, lane, mask_bits, mask_from};
 use crate::space::{Ambient, Erased};
 
 /// Outer legs are kept within this part of the distance to the cut locus while iterating.
@@ -55,7 +55,7 @@ impl Outcome {
         Outcome {
             iterations: state.iterations,
             residual: state.residual,
-            converged: std::array::from_fn(|l| converged[l] && fault[l].is_none()),
+            converged: few(|l| converged[l] && fault[l].is_none()),
             fault,
             leg: state.leg,
             rate: state.rate(),
@@ -70,7 +70,7 @@ impl Outcome {
         Outcome {
             iterations: [0; LANES],
             residual: on.select(lane(f64::INFINITY), self.residual),
-            converged: std::array::from_fn(|l| !on_lane[l]),
+            converged: few(|l| !on_lane[l]),
             fault: [None; LANES],
             ..self.clone()
         }
@@ -105,9 +105,8 @@ impl Outcome {
     pub fn take(&mut self, space: &Erased, chain: &mut Chain, before: &[Lane], found: &Outcome, lanes: Lane) {
         let (old, new) = (self.residual.to_array(), found.residual.to_array());
         let lanes = mask_bits(lanes);
-        let better: [bool; LANES] = std::array::from_fn(|l| {
-            lanes[l] && (found.converged[l] || !(new[l] >= old[l])) && new[l].is_finite()
-        });
+        let better: [bool; LANES] =
+            few(|l| lanes[l] && (found.converged[l] || !(new[l] >= old[l])) && new[l].is_finite());
         self.adopt(space, chain, before, found, mask_from(|l| better[l]), mask_from(|l| lanes[l]));
     }
 

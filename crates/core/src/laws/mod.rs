@@ -1,8 +1,10 @@
-//! The laws that every symmetric space obeys, for the tests of a new one: [`check`] runs them all.
+//! The laws that every symmetric space obeys, for the tests of a new one: [`check`] runs them all. They are
+//! there with the feature `laws`.
 //!
 //! They know a space by its operations only. Every law draws its data at random, with eight cases in the lanes,
-//! over decades of step lengths up to just before the cut locus and with random representatives of points; it returns what it found where
-//! that is more than `allowed` rounding errors (times what the space says of its condition).
+//! over decades of step lengths up to just before the cut locus and with random representatives of points; it
+//! returns what it found where that is more than `allowed` rounding errors (times what the space says of its
+//! condition).
 
 mod algebra;
 mod ambient;

@@ -1,7 +1,7 @@
 //! What needs the eigenvalues of a general matrix, one lane after the other by a library.
 
 use super::{Matrix, Storage};
-use crate::scalar::{LANES, Lane};
+use crate::scalar::{LANES, Lane, few};
 use nalgebra::{Complex, DMatrix, Schur};
 
 type Dense = DMatrix<Complex<f64>>;
@@ -30,7 +30,7 @@ fn largest<const D: usize, A: Storage>(m: &Matrix<Lane, D, A>, f: impl Fn(Comple
         schur(dense::<D>(m.rows(), numbers, l))
             .map_or(f64::NAN, |(_, t)| t.diagonal().iter().map(|&x| f(x)).fold(0.0, f64::max))
     };
-    Lane::new(std::array::from_fn(of))
+    Lane::new(few(of))
 }
 
 /// The largest |arg λ| of the eigenvalues.

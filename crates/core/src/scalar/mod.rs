@@ -155,13 +155,13 @@ pub fn max_or_nan(a: Lane, b: Lane) -> Lane {
 #[inline]
 pub fn mask_bits(mask: Lane) -> [bool; LANES] {
     let bits = mask.to_bitmask();
-    std::array::from_fn(|i| bits >> i & 1 == 1)
+    few(|i| bits >> i & 1 == 1)
 }
 
 /// A mask that is set on the lanes where `f` is true.
 #[inline]
 pub fn mask_from(f: impl Fn(usize) -> bool) -> Lane {
-    let array: [f64; LANES] = std::array::from_fn(|i| if f(i) { 1.0 } else { 0.0 });
+    let array: [f64; LANES] = few(|i| if f(i) { 1.0 } else { 0.0 });
     Lane::new(array).simd_gt(Lane::ZERO)
 }
 

@@ -1,6 +1,6 @@
 //! Eight rows of numbers in memory, and the same numbers side by side in lanes.
 
-use super::{LANES, Lane};
+use super::{LANES, Lane, few};
 use wide::bytemuck::cast;
 use wide::f64x4;
 
@@ -21,7 +21,7 @@ pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
         c += 4;
     }
     while c < len {
-        out[c] = Lane::new(std::array::from_fn(|l| rows[l][c]));
+        out[c] = Lane::new(few(|l| rows[l][c]));
         c += 1;
     }
 }
@@ -63,9 +63,9 @@ mod tests {
         fn scatter_undoes_gather(len in 1..11_usize, rows in 1..=LANES) {
             let data: Vec<f64> = (0..LANES * len).map(|i| i as f64).collect();
             let mut lanes = vec![Lane::ZERO; len];
-            gather(std::array::from_fn(|l| &data[l * len..(l + 1) * len]), &mut lanes);
+            gather(few(|l| &data[l * len..(l + 1) * len]), &mut lanes);
             for c in 0..len {
-                prop_assert_eq!(lanes[c].to_array(), std::array::from_fn(|l| (l * len + c) as f64));
+                prop_assert_eq!(lanes[c].to_array(), few(|l| (l * len + c) as f64));
             }
             let mut out = vec![0.0; rows * len];
             scatter(&lanes, &mut out);
