@@ -57,6 +57,7 @@ def evaluate(
     outside: str,
     per_curve: bool,
     progress: _Progress | None = None,
+    out: _Doubles | None = None,
 ) -> _Doubles: ...
 def lift(
     handle: Handle,

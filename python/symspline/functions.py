@@ -56,6 +56,7 @@ def evaluate(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
     progress: Progress | None = None,
+    out: Any = None,
 ) -> Any:
     """The curve with given knots, points and velocities at times x, as plain arrays.
 
@@ -64,7 +65,7 @@ def evaluate(
         t: knots, as for `CubicSpline`.
         points, u: points and velocities, shape (..., N+1, *point_shape).
         space: the space or its name.
-        nu, extrapolate, per_curve, progress: as for calling a `CubicSpline`.
+        nu, extrapolate, per_curve, progress, out: as for calling a `CubicSpline`.
 
     Returns:
         Values as of calling a `CubicSpline`, as arrays of the library that points, u or x come from.
@@ -79,8 +80,8 @@ def evaluate(
     check_progress(progress)
     clock, curve = given(t, points, u, space)
     where = outside(checked_policy(extrapolate), "natural")
-    values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress)
-    return in_library(library_of(points, u, x), values)
+    values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress, out)
+    return values if out is not None else in_library(library_of(points, u, x), values)
 
 
 def given(t: ArrayLike | None, points: Any, u: Any, space: Space) -> tuple[Clock, Curve]:

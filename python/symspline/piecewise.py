@@ -80,6 +80,7 @@ class Piecewise(ABC):
         per_curve: bool = False,
         dtype: Any = None,
         progress: Progress | None = None,
+        out: Any = None,
     ) -> Any:
         """The curve at times x.
 
@@ -92,17 +93,22 @@ class Piecewise(ABC):
             dtype: ``"float32"`` for results in single precision, of complex points in complex64; they are computed in
                 double precision.
             progress: called from time to time with the finished and the total number of points to compute.
+            out: an array of the result's shape, for a product a tuple of them, that takes the result and is
+                returned. One of another type than the space's, or with gaps in memory, costs a copy.
 
         Returns:
             Shape batch axes + x.shape + point_shape (x.shape without its batch axes if ``per_curve``).
 
         Raises:
-            ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None.
+            ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None; ``out`` is no
+                array that can take the result, or ``dtype`` is given beside it.
         """
         if progress is not None:
             check_progress(progress)
         single = dtype is not None and is_single(dtype)
-        values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress)
+        if out is not None and dtype is not None:
+            raise ValidationError("give dtype or out, not both: results have the type of out")
+        values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress, out)
         return in_single(values) if single else values
 
     def lift(
@@ -216,9 +222,17 @@ class Piecewise(ABC):
         return (in_single(values) if single else values)[()]
 
     def _at(
-        self, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool, progress: Progress | None = None
+        self,
+        x: ArrayLike,
+        quantity: str,
+        extrapolate: Any,
+        per_curve: bool,
+        progress: Progress | None = None,
+        out: Any = None,
     ) -> Any:
-        return evaluated(self._curve, self._clock, x, quantity, self._where(extrapolate), per_curve, progress)
+        return evaluated(
+            self._curve, self._clock, x, quantity, self._where(extrapolate), per_curve, progress, out
+        )
 
     def _where(self, extrapolate: Any) -> str:
         """What happens outside the knots, as the core calls it."""
@@ -393,6 +407,7 @@ def evaluated(
     outside: str,
     per_curve: bool,
     progress: Progress | None,
+    out: Any = None,
 ) -> Any:
     """A quantity at times as the user gives them."""
     return timed(
@@ -400,7 +415,7 @@ def evaluated(
         clock,
         x,
         per_curve,
-        lambda curve, x, per_curve: curve.evaluate(x, quantity, outside, per_curve, progress),
+        lambda curve, x, per_curve: curve.evaluate(x, quantity, outside, per_curve, progress, out),
     )
 
 

@@ -39,7 +39,8 @@ class Report:
         invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so
             (Theorem 3.1). None where the theorem says nothing, which is normal for points far apart, for
             unequal knots and other ends than natural ones and given velocities; NaN for such a curve of a
-            batch.
+            batch. In a product the legs in every factor stay below the radius there, and together below the root
+            of the sum of their squares, which is this.
         rate: mean contraction of the residual per iteration.
         alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
             found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
@@ -123,6 +124,10 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
         result: NDArray[Any] = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
         return result.item() if result.ndim == 0 else result
 
+    # The theorem is about each factor by itself.
+    radii = [report.invariant_radius for report in reports if report.invariant_radius is not None]
+    together = len(radii) == len(reports)
+    radius: Any = np.sqrt(np.sum(np.square(np.stack(radii)), axis=0))[()] if together else None
     converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
     return Report(
         method=max((report.method for report in reports), key=SOLVERS.index),
@@ -132,8 +137,7 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
         max_step=max_step,
         max_gap=largest("max_gap"),
         curvature=curvature,
-        # The theorem is about each factor by itself.
-        invariant_radius=None,
+        invariant_radius=radius,
         rate=largest("rate"),
         # Nor are curves of one factor alternatives to the whole.
         alternative_energy=None,

@@ -249,3 +249,29 @@ def test_it_is_the_same_anywhere_on_the_space(rng):
     moved = S2.transvection(o, unit_tangent(S2, o, rng), p)
     radii = [ss.CubicSpline(None, q, S2).report.invariant_radius for q in (p, moved)]
     assert radii[0] == pytest.approx(radii[1], rel=1e-12)
+
+
+# ---- products ----
+
+
+def test_legs_of_a_product_stay_in_the_radii_of_its_factors(rng):
+    parts = [steps(S2, 0.2, rng), steps(S2, 0.1, rng), rng.normal(size=(10, 3))]
+    spaces = S2, S2, ss.Euclidean(3)
+    radii = [ss.CubicSpline(None, p, s).report.invariant_radius for p, s in zip(parts, spaces, strict=True)]
+    spline = ss.CubicSpline(None, tuple(parts), ss.Product(*spaces))
+    assert spline.report.invariant_radius == pytest.approx(np.linalg.norm(radii), rel=1e-15)
+    assert "(Theorem 3.1)" in str(spline.report)
+    legs = (
+        np.sqrt(sum(s.norm(p, u) ** 2 for s, p, u in zip(spaces, parts, spline.velocities, strict=True))) / 3
+    )
+    assert legs.max() <= spline.report.invariant_radius
+
+
+def test_a_product_with_a_factor_of_far_points_has_none(rng):
+    near, far = steps(S2, 0.2, rng), steps(S2, 0.5, rng)
+    product = ss.Product(S2, S2)
+    assert ss.CubicSpline(None, (near, far), product).report.invariant_radius is None
+    radius = ss.CubicSpline(
+        None, (np.stack([near, near]), np.stack([near, far])), product
+    ).report.invariant_radius
+    assert np.isnan(radius).tolist() == [False, True]

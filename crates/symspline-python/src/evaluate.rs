@@ -16,9 +16,10 @@ use symspline::space::{Ambient, Erased};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Evaluates curves: the result is batch axes + axes of one curve's times + axes of a point (or none).
+/// Evaluates curves: the result is batch axes + axes of one curve's times + axes of a point (or none), in `out` if that
+/// is given.
 #[pyfunction]
-#[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, progress=None))]
+#[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, progress=None, out=None))]
 pub fn evaluate<'py>(
     py: Python<'py>,
     handle: &Handle,
@@ -30,9 +31,10 @@ pub fn evaluate<'py>(
     outside: &str,
     per_curve: bool,
     progress: Option<Py<PyAny>>,
+    out: Option<Bound<'py, PyArrayDyn<f64>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let at = (x, outside, per_curve);
-    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, |space, job, monitor, out| {
+    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, out, |space, job, monitor, out| {
         run(space, job.curves, job.times, job.quantity, job.outside, monitor, out);
     })
 }
@@ -57,7 +59,7 @@ pub fn lift<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let at = (x, outside, per_curve);
     let factors = [in_order(&knots)?, in_order(&start)?];
-    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, |space, job, monitor, out| {
+    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, None, |space, job, monitor, out| {
         run_lift(space, job.curves, job.times, job.quantity, job.outside, factors, monitor, out);
     })
 }
@@ -134,6 +136,7 @@ fn sampled<'py>(
     (x, outside, per_curve): (Array<'py>, &str, bool),
     quantity: &str,
     progress: Option<Py<PyAny>>,
+    out: Option<Bound<'py, PyArrayDyn<f64>>>,
     compute: impl FnOnce(&Erased, &Asked, &Monitor, &mut [f64]) + Send,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let quantity = quantity_named(quantity)?;
@@ -154,8 +157,14 @@ fn sampled<'py>(
     } else if !quantity.is_length() {
         shape.extend_from_slice(&points.shape()[points.ndim() - point_axes..]);
     }
-    let out = zeros(py, &shape)?;
+    let out = match out {
+        Some(out) => out,
+        None => zeros(py, &shape)?,
+    };
     let mut write = out.readwrite();
+    if write.shape() != shape {
+        return Err(invalid(format!("out has shape {:?}, but the result has {shape:?}", write.shape())));
+    }
     let result = write.as_slice_mut()?;
     let asked = Asked { curves: &curves, times: &times, quantity, outside: policy };
     watched(py, progress, samples, |monitor| compute(&space, &asked, monitor, result))?;

@@ -59,11 +59,17 @@ class Curve(ABC):
 
     @abstractmethod
     def evaluate(
-        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        progress: Progress | None = None,
+        out: Any = None,
     ) -> Any:
         """A quantity at times x: ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|; of
         rotations also ``"body velocity"`` and ``"body acceleration"``. ``outside`` the knots ``"raise"``,
-        ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+        ``"continue"``, ``"geodesic"`` or ``"periodic"``. Points and vectors are written into ``out``, if given."""
 
     @abstractmethod
     def lift(

@@ -14,6 +14,7 @@ from . import derivatives
 from .curve import REAL, Curve, Doubles
 from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
+from .out import check_out, is_room, put
 from .solve import Options, Progress, Solved, Task, checked, solve
 
 
@@ -50,11 +51,28 @@ class Plain(Curve):
         return (self,)
 
     def evaluate(
-        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        progress: Progress | None = None,
+        out: Any = None,
     ) -> Any:
         self._check_times(x, per_curve)
-        values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress)
-        return values if quantity in REAL else self.space._numbers(values)
+        space, into = self.space, None
+        if out is not None:
+            check_out(out, self._shape(x, per_curve), space.dtype)
+            if is_room(out, space.dtype, x):
+                into = space._as_doubles(out)
+        values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress, into)
+        if into is not None:
+            return out
+        return put(values if quantity in REAL else space._numbers(values), out)
+
+    def _shape(self, x: Doubles, per_curve: bool) -> tuple[int, ...]:
+        """That of points or vectors at times x."""
+        return (x.shape if per_curve else self.batch + x.shape) + self.space.point_shape
 
     def lift(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import signature
 from typing import Any, ClassVar
@@ -306,13 +306,21 @@ class Space:
         """The axes before those of a point."""
         return array.shape[: array.ndim - len(self.point_shape)]
 
+    def _leads(self, shapes: Mapping[str, tuple[int, ...]], further: tuple[int, ...] = ()) -> tuple[int, ...]:
+        """The leading axes that arrays of points of these shapes have together."""
+        try:
+            return np.broadcast_shapes(
+                *(shape[: len(shape) - len(self.point_shape)] for shape in shapes.values()), further
+            )
+        except ValueError:
+            named = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+            raise ValidationError(f"the leading axes do not broadcast: {named}") from None
+
     def _apply(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
         arrays = {name: self._doubles(value, name) for name, value in inputs.items()}
-        try:
-            lead = np.broadcast_shapes(*map(self._lead, arrays.values()), () if t is None else t.shape)
-        except ValueError:
-            shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in inputs.items())
-            raise ValidationError(f"the leading axes do not broadcast: {shapes}") from None
+        lead = self._leads(
+            {name: np.shape(value) for name, value in inputs.items()}, () if t is None else t.shape
+        )
         rows = [self._rows(a, lead) for a in arrays.values()]
         times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
         result = self._handle.apply(operation, rows, times)

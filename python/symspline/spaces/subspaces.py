@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
-from .base import Array, Space
+from .base import LARGE, Array, Space
 
 # No more than a hint is made of it: rows of such matrices are no unit vectors, whatever the rounding.
 _NEAR = 1e-4
@@ -112,7 +113,33 @@ class ComplexHyperbolic(Space):
         super().__init__(n)
 
 
-class Grassmannian(Space):
+class _Subspaces(Space):
+    """Subspaces. What joins two of them lies in their span, where large ones cost less."""
+
+    _linear = True
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+        k, n = self._parameters
+        if operation not in ("exp", "log", "geodesic", "distance") or n < LARGE or n <= 2 * k:
+            return super()._finite(operation, t, **inputs)
+        pair = {name: self._numbers(self._doubles(value, name)) for name, value in inputs.items()}
+        lead = self._leads({name: x.shape for name, x in pair.items()})
+        p, rest = (np.broadcast_to(x, lead + self.point_shape) for x in pair.values())
+        # The second is p·along + basis·beyond. One projection leaves rounding errors along p, which count where
+        # little else is left.
+        along = np.zeros((*lead, k, k), self.dtype)
+        with np.errstate(all="ignore"):
+            for _ in range(2):
+                part = np.swapaxes(p.conj(), -1, -2) @ rest
+                along, rest = along + part, rest - p @ part
+        basis, beyond = np.linalg.qr(rest)
+        rows = (np.broadcast_to(np.eye(k), along.shape), np.zeros_like(along)), (along, beyond)
+        coordinates = [np.concatenate(parts, axis=-2) for parts in rows]
+        result = type(self)(k, 2 * k)._finite(operation, t, **dict(zip(pair, coordinates, strict=True)))
+        return result if operation == "distance" else p @ result[..., :k, :] + basis @ result[..., k:, :]
+
+
+class Grassmannian(_Subspaces):
     """The Grassmannian Gr(k, n), k-dimensional subspaces of Rⁿ: points are n × k matrices with
     orthonormal columns, any basis of the subspace. Distance is √(Σ θᵢ²) of the principal angles.
 
@@ -122,13 +149,12 @@ class Grassmannian(Space):
     """
 
     _name = "gr"
-    _linear = True
 
     def __init__(self, k: int, n: int) -> None:
         super().__init__(k, n)
 
 
-class ComplexGrassmannian(Space):
+class ComplexGrassmannian(_Subspaces):
     """The complex Grassmannian, k-dimensional subspaces of Cⁿ: points are complex n × k matrices with
     orthonormal columns, any basis of the subspace.
 
@@ -138,7 +164,6 @@ class ComplexGrassmannian(Space):
     """
 
     _name = "cgr"
-    _linear = True
 
     def __init__(self, k: int, n: int) -> None:
         super().__init__(k, n)

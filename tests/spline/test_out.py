@@ -1,0 +1,130 @@
+"""Results in arrays that users bring: ``out`` of calls and of `symspline.evaluate`."""
+
+import numpy as np
+import pytest
+from curves import same
+
+import symspline as ss
+
+SPACES = [
+    "sphere:2",
+    "so:3",
+    "cp:2",
+    "spd:2",
+    "se:3",
+    "euclidean:1",
+    "sphere:300",
+    "so:3 x r:3",
+    "stiefel:2,4",
+]
+
+
+def spline_of(space, batch=()):
+    space = ss.Stiefel(2, 4) if space.startswith("stiefel") else ss.space(space)
+    rng = np.random.default_rng(5)
+    factors = space.factors if isinstance(space, ss.Product) else (space,)
+    points = []
+    for factor in factors:
+        p = factor.random_point(rng, (*batch, 1))
+        v = factor.random_tangent(rng, np.repeat(p, 5, axis=len(batch)))
+        points.append(
+            factor.exp(
+                p, 0.3 * v / np.maximum(1, factor.norm(p, v))[(..., *(None,) * len(factor.point_shape))]
+            )
+        )
+    return ss.CubicSpline(None, tuple(points) if isinstance(space, ss.Product) else points[0], space)
+
+
+def like(values, dtype=None):
+    if isinstance(values, tuple):
+        return tuple(like(part, dtype) for part in values)
+    return np.full(values.shape, np.nan, dtype or values.dtype)
+
+
+@pytest.mark.parametrize("nu", [0, 1, 2])
+@pytest.mark.parametrize("batch", [(), (2, 3)])
+@pytest.mark.parametrize("name", SPACES)
+def test_out_takes_the_result(name, batch, nu):
+    if nu and name.startswith("stiefel"):
+        nu = 1
+    spline, x = spline_of(name, batch), np.array([[0.5, 1.0, 3.9], [0.0, 4.0, 2.2]])
+    values = spline(x, nu)
+    out = like(values)
+    given = spline(x, nu, out=out)
+    assert given is out or all(a is b for a, b in zip(given, out, strict=True))
+    assert same(values, out)
+
+
+@pytest.mark.parametrize("x", [1.5, [], [[2.0]]])
+def test_any_shape(x):
+    spline = spline_of("sphere:2")
+    out = like(spline(x))
+    assert spline(x, out=out) is out and same(spline(x), out)
+
+
+def test_own_times():
+    spline = spline_of("so:3", (2,))
+    x = np.linspace(0, 4, 14).reshape(2, 7)
+    out = np.empty((2, 7, 3, 3))
+    assert same(spline(x, per_curve=True), spline(x, per_curve=True, out=out)) and same(
+        spline(x, per_curve=True), out
+    )
+
+
+def test_gaps_in_memory_and_other_types():
+    spline, x = spline_of("so:3"), np.linspace(0, 4, 9)
+    values = spline(x)
+    wide = np.zeros((9, 3, 6))
+    spline(x, out=wide[:, :, ::2])
+    assert same(wide[:, :, ::2], values) and not wide[:, :, 1::2].any()
+    fortran = np.zeros((9, 3, 3), order="F")
+    assert same(spline(x, out=fortran), values)
+    assert same(spline(x, out=np.empty((9, 3, 3), np.float32)), values.astype(np.float32))
+    swapped = np.empty((9, 3, 3), ">f8")
+    assert np.array_equal(spline(x, out=swapped), values)
+    assert same(spline(x, out=np.empty((9, 3, 3), complex)), values.astype(complex))
+
+
+def test_times_may_lie_where_results_go():
+    spline = ss.CubicSpline(None, np.random.default_rng(0).normal(size=(5, 1)), "euclidean:1")
+    x = np.linspace(0, 4, 6)[:, None]
+    values = spline(x[:, 0])
+    assert same(spline(x[:, 0], out=x), values) and same(x, values)
+
+
+def test_of_evaluate():
+    spline, x = spline_of("cp:2", (2,)), np.linspace(0, 4, 6)
+    out = np.empty((2, 6, 3), complex)
+    assert ss.evaluate(x, spline.t, spline.points, spline.velocities, "cp:2", 1, out=out) is out
+    assert same(out, spline(x, 1))
+
+
+@pytest.mark.parametrize(
+    ("out", "message"),
+    [
+        (np.empty((4, 3)), r"out has shape \(4, 3\), but the result has \(5, 3\)"),
+        (np.empty((5, 3), int), "out is of int64, which does not hold numbers of float64"),
+        ([[0.0] * 3] * 5, "out must be a NumPy array, not list"),
+        (np.broadcast_to(0.0, (5, 3)), "out is read-only"),
+    ],
+)
+def test_what_cannot_take_a_result(out, message):
+    with pytest.raises(ss.ValidationError, match=message):
+        spline_of("sphere:2")(np.linspace(0, 4, 5), out=out)
+
+
+def test_complex_results_need_complex_arrays():
+    with pytest.raises(
+        ss.ValidationError, match="out is of float64, which does not hold numbers of complex128"
+    ):
+        spline_of("cp:2")(0.0, out=np.empty(3))
+
+
+def test_products_want_a_tuple():
+    with pytest.raises(ss.ValidationError, match="out"):
+        spline_of("so:3 x r:3")(0.0, out=np.empty((3, 3)))
+
+
+def test_out_or_dtype():
+    with pytest.raises(ss.ValidationError, match="dtype or out"):
+        spline_of("sphere:2")(0.0, out=np.empty(3), dtype="float32")
