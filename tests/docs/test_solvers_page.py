@@ -5,6 +5,7 @@ import pytest
 import solvers
 import solvers_calm
 import solvers_figures as figures
+import solvers_uneven
 
 import symspline as ss
 
@@ -38,6 +39,23 @@ def test_calm_table(monkeypatch):
     assert row[0] == "walks of 0.5" and row[2] == "0" and row[3].startswith("0 of ") and float(row[4]) <= 1.05
 
 
+def test_uneven_table(monkeypatch):
+    monkeypatch.setattr(solvers_uneven, "WALKS", 20)
+    monkeypatch.setattr(solvers_uneven, "SEARCHED", 1)
+    (row,) = cells(solvers_uneven.uneven_table((0.5,)))
+    assert row == ["0.5", "100.0%", "0 of 0", "100.0%", "0 of 0"]
+
+
+def test_the_search_finds_what_auto_finds():
+    rng = np.random.default_rng(1)
+    p, t = solvers_uneven.walks(1.5, rng)[0], np.array([0.0, 1, 2, 4, 5, 8, 9])
+    assert ss.CubicSpline(t, p, solvers_uneven.S2).report.converged
+    search = solvers_uneven.Search(t, p)
+    legs = ss.CubicSpline(t, p, solvers_uneven.S2).velocities * search.longer[:, None] / 3
+    assert np.abs(search.jumps(np.einsum("nd,nkd->nk", legs, search.frames))).max() < 1e-13
+    assert search.finds(rng, 20)
+
+
 def test_walks_have_equal_steps_and_stay_near_home():
     space = ss.Hyperbolic(2)
     p = solvers.walk(space, 1.5, 0, 60)
@@ -66,7 +84,7 @@ def test_figures_are_drawn(tmp_path):
 
 def test_the_page_has_a_place_for_every_table():
     text = solvers.PAGE.read_text(encoding="utf-8")
-    for part in ("zigzags", "walks", "knots", "time"):
+    for part in ("zigzags", "walks", "calm", "uneven", "knots", "time"):
         assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1
     for name in ("solvers_region.png", "solvers_residuals.png"):
         assert name in text and (solvers.HERE / name).stat().st_size < 200_000
