@@ -21,7 +21,7 @@ check: .venv/tools
 	$(BIN)/mypy
 
 test: check
-	$(BIN)/python -m pytest --numprocesses auto --doctest-modules python tests
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests
 
 # Compares with geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
 # compiled module of .venv, which every Python from 3.11 on can load. Needs .5 GB; not part of `test`.

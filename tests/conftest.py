@@ -25,9 +25,15 @@ Beside this file lies what they share: `cases` is the list of spaces and data on
 comparisons, `refused` what must be an error, `lifting` the horizontal lift by a general solver.
 """
 
+import signal
+
 import pytest
 
 import symspline as ss
+
+# What a shell starts in the background ignores Ctrl-C, and so would all that tests start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ PAGES = [
 ]
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
-OTHERS = {"adding-a-space.md", "derivatives.md", "smoothing.md", "shapes.md", "solvers.md"}
+OTHERS = {"adding-a-space.md", "derivatives.md", "jax.md", "smoothing.md", "shapes.md", "solvers.md"}
 
 
 def blocks(page, language):

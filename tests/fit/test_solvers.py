@@ -181,7 +181,8 @@ FAR = ["sphere:2", "sphere:3", "so:3", "rp:2", "cp:1", "gr:2,5"]
 @pytest.mark.parametrize(("part", "at_least"), [(0.5, 1.0), (0.7, 1.0), (0.8, 0.9), (0.9, 0.9), (0.95, 0.75)])
 def test_far_points_converge_or_are_reported(name, part, at_least):
     """Near the cut locus not every curve can be expected to converge, but none may be wrong in silence."""
-    space, curves = far_curves(name, part)
+    # Of a Grassmannian fewer: where steps are long its fits take seconds.
+    space, curves = far_curves(name, part, 4 if name == "gr:2,5" else 15)
     batch = fit(curves, space)
     good = batch.report.converged
     for i in np.flatnonzero(good):
