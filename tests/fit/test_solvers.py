@@ -174,6 +174,13 @@ def far_curves(name, part, count=20):
     )
 
 
+def test_in_many_dimensions_a_curve_that_was_found_is_not_looked_for_at_length():
+    space = ss.SpecialOrthogonal(5)
+    points = space.random_point(np.random.default_rng(0), (4, 7))
+    report = fit(points, space).report
+    assert report.converged.all() and (report.iterations < 100).all()
+
+
 FAR = ["sphere:2", "sphere:3", "so:3", "rp:2", "cp:1", "gr:2,5"]
 
 

@@ -34,9 +34,18 @@ pub fn evaluate<'py>(
     out: Option<Bound<'py, PyArrayDyn<f64>>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let at = (x, outside, per_curve);
-    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, out, |space, job, monitor, out| {
-        run(space, job.curves, job.times, job.quantity, job.outside, monitor, out);
-    })
+    sampled(
+        py,
+        handle,
+        [&t, &points, &velocities],
+        at,
+        quantity,
+        progress,
+        out,
+        |space, job, monitor, out| {
+            run(space, job.curves, job.times, job.quantity, job.outside, monitor, out);
+        },
+    )
 }
 
 /// Evaluates the horizontal lift of curves on a quotient space, and its derivatives, like [`evaluate`]. `knots` are
@@ -59,9 +68,18 @@ pub fn lift<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let at = (x, outside, per_curve);
     let factors = [in_order(&knots)?, in_order(&start)?];
-    sampled(py, handle, [&t, &points, &velocities], at, quantity, progress, None, |space, job, monitor, out| {
-        run_lift(space, job.curves, job.times, job.quantity, job.outside, factors, monitor, out);
-    })
+    sampled(
+        py,
+        handle,
+        [&t, &points, &velocities],
+        at,
+        quantity,
+        progress,
+        None,
+        |space, job, monitor, out| {
+            run_lift(space, job.curves, job.times, job.quantity, job.outside, factors, monitor, out);
+        },
+    )
 }
 
 /// The factors of the horizontal lift at the knots, (curves, knots, k, k, 2).

@@ -16,9 +16,13 @@ const FAR: f64 = 0.6;
 const SAME: f64 = 1e-6;
 /// So does, of a curve that is straight, this part of the square of the speed.
 const STRAIGHT: f64 = 1e-12;
-/// Steps in a trust region, and of Algorithm 1 before it.
+/// Steps of Newton's method or in a trust region, and of Algorithm 1 before it, up to this dimension; beyond it they cost
+/// as much more as its square.
 const STEPS: usize = 120;
 const SWEEPS: usize = 2000;
+const DIMENSION: usize = 4;
+/// With fewer steps only those look for curves who have none.
+const ENOUGH: usize = 20;
 
 /// The ways that are tried, in turn.
 #[derive(Clone, Copy, PartialEq)]
@@ -47,6 +51,9 @@ pub fn settle(
     if lanes.none() {
         return;
     }
+    let part = |most: usize| (most * DIMENSION * DIMENSION / (chain.m * chain.m).max(1)).min(most);
+    let (enough, steps, sweeps) =
+        (part(STEPS) >= ENOUGH, part(STEPS).max(ENOUGH), part(SWEEPS).max(10 * ENOUGH));
     let infinity = lane(f64::INFINITY);
     let energy = |chain: &mut Chain, on: Lane| on.select(bending(space, chain), infinity);
     let mut least = energy(chain, outcome.settled(idle) & lanes);
@@ -59,8 +66,8 @@ pub fn settle(
         let on = lanes
             & match way {
                 Way::Homotopy => mask_from(|l| outcome.solver[l] != Solver::Homotopy),
-                Way::Newton | Way::FromZero | Way::FromAlgorithm1 => lanes,
-                Way::FromBest => !outcome.settled(idle),
+                Way::Newton | Way::FromZero | Way::FromAlgorithm1 if enough => lanes,
+                _ => !outcome.settled(idle),
             };
         if on.none() {
             continue;
@@ -81,14 +88,14 @@ pub fn settle(
                 homotopy::follow(space, chain, ends, &options, !on, work, monitor, &mut found);
                 found
             }
-            Way::Newton => solve(space, chain, ends, Solver::Newton, limits(STEPS), !on, work, monitor),
+            Way::Newton => solve(space, chain, ends, Solver::Newton, limits(steps), !on, work, monitor),
             Way::FromZero | Way::FromBest => {
-                trust_region::solve(space, chain, ends, limits(STEPS), !on, work, monitor)
+                trust_region::solve(space, chain, ends, limits(steps), !on, work, monitor)
             }
             Way::FromAlgorithm1 => {
                 let before =
-                    solve(space, chain, ends, Solver::FixedPoint, limits(SWEEPS), !on, work, monitor);
-                let rest = within(STEPS, before.used());
+                    solve(space, chain, ends, Solver::FixedPoint, limits(sweeps), !on, work, monitor);
+                let rest = within(steps, before.used());
                 if rest.max_iter == 0 {
                     before
                 } else {
