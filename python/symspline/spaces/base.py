@@ -318,9 +318,8 @@ class Space:
 
     def _apply(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
         arrays = {name: self._doubles(value, name) for name, value in inputs.items()}
-        lead = self._leads(
-            {name: np.shape(value) for name, value in inputs.items()}, () if t is None else t.shape
-        )
+        shapes = {name: self._numbers(a).shape for name, a in arrays.items()}
+        lead = self._leads(shapes, () if t is None else t.shape)
         rows = [self._rows(a, lead) for a in arrays.values()]
         times = None if t is None else np.ascontiguousarray(np.broadcast_to(t, lead).ravel())
         result = self._handle.apply(operation, rows, times)
