@@ -150,6 +150,9 @@ def test_positive_numbers_are_a_line():
     [
         ("gl:2", [[1, 2], [2, 4]], "singular: its condition number is"),
         ("gl:2", [[0.1, 0.2], [0.3, 0.6]], "singular: its condition number is"),
+        ("gl:2", np.zeros((2, 2)), "it is zero, or"),
+        ("gl:2", 1e300 * np.eye(2), "too large or too small for doubles"),
+        ("gl:2", 1e-300 * np.eye(2), "too large or too small for doubles"),
         ("aff:1", [[1, 2], [1, 4]], r"its last row is \[1.0, 4.0\], not"),
         ("sim:2", np.diag([2.0, -2, 1]), "linear part is a reflection"),
         ("sim:2", np.diag([2.0, 3, 1]), "not a multiple of a rotation"),

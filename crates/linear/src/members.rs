@@ -141,7 +141,10 @@ impl Members {
                 return format!("its last row is {last:?}, not (0, …, 0, 1)");
             }
         }
-        let condition = number(condition(p));
+        let (condition, size) = (number(condition(p)), number(p.size()));
+        if !(size > 0.0 && size.is_finite()) {
+            return "it is zero, or squares of its numbers are too large or too small for doubles".into();
+        }
         if !(condition < SINGULAR) {
             return format!("it is singular: its condition number is {condition:.1e}");
         }
