@@ -63,7 +63,13 @@ default_role = "autolink"
 autosummary_generate = True
 autosummary_ignore_module_all = False
 # A space's own page has what is its own; what all share stands on the page of `Space`.
-autosummary_context = {"spaces": [name for name in symspline.__all__ if _is_space(getattr(symspline, name))]}
+autosummary_context = {
+    "spaces": [name for name in symspline.__all__ if _is_space(getattr(symspline, name))],
+    # Of what a module shares with the package, whose page is that of the package.
+    "shared": {
+        "symspline.manifolds": [name for name in symspline.manifolds.__all__ if name in symspline.__all__],
+    },
+}
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 # It is described without being installed: it is large, and nothing on these pages runs it.

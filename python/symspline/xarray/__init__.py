@@ -1,7 +1,7 @@
 """Splines of many curves in xarray objects, by blocks in dask where these are dask's.
 
 Curves do not depend on each other, so that an array of them is cut between curves and never along one. Every function
-here is one call of `xarray.apply_ufunc`, of functions of plain arrays that any scheduler of dask can send to its
+here is one call of ``xarray.apply_ufunc``, of functions of plain arrays that any scheduler of dask can send to its
 workers. Dimensions are known by their names, and their order does not matter.
 """
 
