@@ -192,3 +192,10 @@ def test_sizes_that_are_none(name):
 
 def test_every_class_is_here():
     assert {type(ss.space(name)) for name in NAMES} == set(LINEAR)
+
+
+def test_the_radius_is_that_of_the_nearest_matrix_without_a_logarithm():
+    # -1 as a rotation of a plane by pi, and as one number.
+    for name, turn in (("gl:2", np.array([[0, -1], [1, 0]])), ("cgl:1", np.array([[1j]]))):
+        space, one = ss.space(name), np.eye(len(turn))
+        assert space.injectivity_radius == pytest.approx(space.norm(one, np.pi * turn), rel=1e-15)

@@ -113,3 +113,29 @@ fn root_minus_one<S: Scalar, const D: usize, A: Storage>(
     }
     x.plus_identity(lane(-1.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{exp_any_minus_one, log_any_one_plus};
+    use crate::matrix::Matrix;
+    use crate::scalar::{Jet, Lane, Scalar, lane};
+
+    #[test]
+    fn the_logarithm_of_an_exponential_has_its_derivatives() {
+        // Small ones need no roots, the largest turns by 2.5; t A has the derivatives A and 0.
+        for size in [0.01, 0.3, 1.0] {
+            let a = [[0.3, -2.5], [2.4, 0.1]].map(|row| row.map(|x| x * size));
+            let t = Jet::from_parts([Lane::ONE, Lane::ONE, Lane::ZERO]);
+            let ta = Matrix::<Jet, 1>::from_fn(2, 2, |i, j| [t * lane(a[i][j])]);
+            let (log, _) = log_any_one_plus(&exp_any_minus_one(&ta));
+            for i in 0..2 {
+                for j in 0..2 {
+                    let found = log[(i, j)][0].parts().map(|x| x.to_array()[0]);
+                    for (found, expected) in found.into_iter().zip([a[i][j], a[i][j], 0.0]) {
+                        assert!((found - expected).abs() < 1e-13 * size, "{found} at {size}");
+                    }
+                }
+            }
+        }
+    }
+}
