@@ -410,13 +410,13 @@ def evaluated(
     out: Any = None,
 ) -> Any:
     """A quantity at times as the user gives them."""
-    return timed(
-        curve,
-        clock,
-        x,
-        per_curve,
-        lambda curve, x, per_curve: curve.evaluate(x, quantity, outside, per_curve, progress, out),
-    )
+
+    def call(curve: Curve, x: Doubles, per_curve: bool) -> Any:
+        if out is None:
+            return curve.evaluate(x, quantity, outside, per_curve, progress)
+        return curve.write(out, x, quantity, outside, per_curve, progress)
+
+    return timed(curve, clock, x, per_curve, call)
 
 
 def timed(

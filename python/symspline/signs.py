@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from .failures import callers_level
 from .spaces import Array, Space, Sphere, factors_of
 
 _S3 = Sphere(3)
+# Points nearer to each other than this, a little less than π/2, have a positive inner product.
+_NEAR = 1.57
 # What a program may do about it.
 IN_PYTHON = (
     "Curves of rotations are on so:3 (symspline.rotations.from_quaternions makes its points) or on rp:3, where signs "
@@ -21,21 +24,29 @@ IN_PYTHON = (
 )
 
 
-def warn_of_signs(space: Space, curves: Sequence[list[Points] | None]) -> None:
+def warn_of_signs(
+    space: Space, curves: Sequence[list[Points] | None], steps: Sequence[Any] | None = None
+) -> None:
     """Warn once if neighbours on S³ are more than a quarter turn apart: as quaternions they are closer with the other
     sign, and the curve between them turns the long way round.
 
     Args:
         curves: the points of each curve in every factor; of a batch they are one; None for those left out.
+        steps: the longest distances of neighbours in every factor, where they are known: near ones need no look.
     """
-    if _S3 not in factors_of(space):
+    factors = factors_of(space)
+    if _S3 not in factors:
         return
+    looked_at = [
+        factor == _S3 and (steps is None or not np.max(steps[k], initial=0.0) < _NEAR)
+        for k, factor in enumerate(factors)
+    ]
     found = [
         (number, index, part.doubles)
         for number, parts in enumerate(curves)
         if parts is not None
-        for factor, part in zip(factors_of(space), parts, strict=True)
-        if factor == _S3
+        for part, wanted in zip(parts, looked_at, strict=True)
+        if wanted
         for index in _opposite(part.doubles)
     ]
     if not found:

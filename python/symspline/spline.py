@@ -127,9 +127,7 @@ class CubicSpline(Piecewise):
         self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
         if bad or faults:
             fail(sorted(bad + faults), on_failure, self)
-        # Neighbours of opposite sign are more than a quarter turn apart.
-        if not np.max(self.report.max_step, initial=0.0) < 1.57:
-            warn_of_signs(space, [data])
+        warn_of_signs(space, [data], [report.max_step for report in reports])
 
     def _fill(
         self,

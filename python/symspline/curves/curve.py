@@ -59,17 +59,17 @@ class Curve(ABC):
 
     @abstractmethod
     def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
         """A quantity at times x: ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|; of
         rotations also ``"body velocity"`` and ``"body acceleration"``. ``outside`` the knots ``"raise"``,
-        ``"continue"``, ``"geodesic"`` or ``"periodic"``. Points and vectors are written into ``out``, if given."""
+        ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+
+    @abstractmethod
+    def write(
+        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+    ) -> Any:
+        """The same of points or vectors, written into an array that takes them, which is returned."""
 
     @abstractmethod
     def lift(

@@ -17,7 +17,6 @@ from ..spaces import Array, Space
 from ..spaces.base import LARGE as _LARGE
 from .curve import NORMS, Doubles
 from .gradient import Places
-from .out import check_out, put
 from .plain import Plain
 from .solve import Options, Progress, Solved, Task, one_by_one, solve
 from .span import Span, span_of
@@ -44,6 +43,8 @@ class InSpan(Plain):
             at the ends.
     """
 
+    _compiled = False
+
     def __init__(
         self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True
     ) -> None:
@@ -66,19 +67,11 @@ class InSpan(Plain):
         return span, Plain(span.space, self.times, span.down(self.points), span.down(self.velocities))
 
     def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
         span, small = self.small
-        if out is not None:
-            check_out(out, self._shape(x, per_curve), self.space.dtype)
         values = small.evaluate(x, quantity, outside, per_curve, progress)
-        return values if quantity in NORMS else put(span.lifted(values, self.batch), out)
+        return values if quantity in NORMS else span.lifted(values, self.batch)
 
     def _lifted(
         self,

@@ -19,7 +19,6 @@ from .curve import NORMS, REAL, Doubles
 from .gradient import Places
 from .manifold_checks import checked
 from .manifold_fit import fit_of_one_length
-from .out import check_out, put
 from .plain import Plain
 from .solve import Options, Progress, Solved, Task, one_by_one
 
@@ -33,6 +32,7 @@ class OnManifold(Plain):
     space: Manifold
     # Derivatives are differences.
     exact = 1e-9
+    _compiled = False
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
@@ -47,21 +47,13 @@ class OnManifold(Plain):
         return checked(task, options)
 
     def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
         if quantity in REAL and quantity not in NORMS:
             self._refuse(f"{quantity} is that of rotations, not")
         self._check_times(x, per_curve)
         self._check_places(x, outside, per_curve)
         batch, space = self.batch, self.space
-        if out is not None:
-            check_out(out, self._shape(x, per_curve), space.dtype)
         count = math.prod(batch)
         shape = x.shape if per_curve else batch + x.shape
         each = math.prod(shape[len(batch) :])
@@ -75,7 +67,7 @@ class OnManifold(Plain):
             values[number] = self._at(number // max(each, 1), own.ravel()[number], quantity, outside)
             if progress is not None:
                 progress(int(number[-1]) + 1, len(values))
-        return put(values.reshape(shape + values.shape[1:]), out)
+        return values.reshape(shape + values.shape[1:])
 
     def _at(self, curve: NDArray[np.int64], x: Doubles, quantity: str, outside: str) -> Array:
         """A quantity at one time for each of some curves."""

@@ -22,15 +22,7 @@ def check_out(out: Any, shape: tuple[int, ...], dtype: Any) -> None:
         raise ValidationError("out is read-only")
 
 
-def is_room(out: Array, dtype: Any, *read: Array) -> bool:
-    """Whether the core may write into an array while it reads others."""
-    apart = not any(np.may_share_memory(out, other) for other in read)
+def is_room(out: Array, dtype: Any, read: Array) -> bool:
+    """Whether the core may write into an array while it reads another."""
+    apart = not np.may_share_memory(out, read)
     return apart and out.dtype == dtype and out.flags.c_contiguous and out.flags.aligned
-
-
-def put(values: Array, out: Array | None) -> Array:
-    """The values, in an array that takes them if there is one."""
-    if out is None:
-        return values
-    np.copyto(out, values, casting="same_kind")
-    return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from . import derivatives
 from .curve import REAL, Curve, Doubles
 from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
-from .out import check_out, is_room, put
+from .out import check_out, is_room
 from .solve import Options, Progress, Solved, Task, checked, solve
 
 
@@ -23,6 +23,8 @@ class Plain(Curve):
 
     points: Array
     velocities: Array
+    # Whether the core computes points in the space itself.
+    _compiled: ClassVar[bool] = True
 
     def __init__(self, space: Space, times: Doubles, points: Array, velocities: Array) -> None:
         self.space, self.times, self.points, self.velocities = space, times, points, velocities
@@ -51,28 +53,25 @@ class Plain(Curve):
         return (self,)
 
     def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
         self._check_times(x, per_curve)
-        space, into = self.space, None
-        if out is not None:
-            check_out(out, self._shape(x, per_curve), space.dtype)
-            if is_room(out, space.dtype, x):
-                into = space._as_doubles(out)
-        values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress, into)
-        if into is not None:
-            return out
-        return put(values if quantity in REAL else space._numbers(values), out)
+        values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress)
+        return values if quantity in REAL else self.space._numbers(values)
 
-    def _shape(self, x: Doubles, per_curve: bool) -> tuple[int, ...]:
-        """That of points or vectors at times x."""
-        return (x.shape if per_curve else self.batch + x.shape) + self.space.point_shape
+    def write(
+        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+    ) -> Any:
+        self._check_times(x, per_curve)
+        space = self.space
+        check_out(out, (x.shape if per_curve else self.batch + x.shape) + space.point_shape, space.dtype)
+        if self._compiled and is_room(out, space.dtype, x):
+            _core.evaluate(
+                *self._core_curve, x, quantity, outside, per_curve, progress, space._as_doubles(out)
+            )
+        else:
+            np.copyto(out, self.evaluate(x, quantity, outside, per_curve, progress), casting="same_kind")
+        return out
 
     def lift(
         self,

@@ -38,21 +38,23 @@ class Together(Curve):
         return self._parts
 
     def evaluate(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
         count = len(self._parts)
-        outs = (None,) * count if out is None else parts_of(out, self.space, "out")
         values = tuple(
-            part.evaluate(x, quantity, outside, per_curve, share(progress, i, count), one)
-            for i, (part, one) in enumerate(zip(self._parts, outs, strict=True))
+            part.evaluate(x, quantity, outside, per_curve, share(progress, i, count))
+            for i, part in enumerate(self._parts)
         )
         return together(values) if quantity in NORMS else values
+
+    def write(
+        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+    ) -> Any:
+        count = len(self._parts)
+        return tuple(
+            part.write(one, x, quantity, outside, per_curve, share(progress, i, count))
+            for i, (part, one) in enumerate(zip(self._parts, parts_of(out, self.space, "out"), strict=True))
+        )
 
     def lift(
         self,

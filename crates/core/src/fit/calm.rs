@@ -21,8 +21,9 @@ const STRAIGHT: f64 = 1e-12;
 const STEPS: usize = 120;
 const SWEEPS: usize = 2000;
 const DIMENSION: usize = 4;
-/// With fewer steps only those look for curves who have none.
+/// With fewer steps than these only curves that are not there yet are looked for, and those with no fewer.
 const ENOUGH: usize = 20;
+const FEW_SWEEPS: usize = 200;
 
 /// The ways that are tried, in turn.
 #[derive(Clone, Copy, PartialEq)]
@@ -53,7 +54,7 @@ pub fn settle(
     }
     let part = |most: usize| (most * DIMENSION * DIMENSION / (chain.m * chain.m).max(1)).min(most);
     let (enough, steps, sweeps) =
-        (part(STEPS) >= ENOUGH, part(STEPS).max(ENOUGH), part(SWEEPS).max(10 * ENOUGH));
+        (part(STEPS) >= ENOUGH, part(STEPS).max(ENOUGH), part(SWEEPS).max(FEW_SWEEPS));
     let infinity = lane(f64::INFINITY);
     let energy = |chain: &mut Chain, on: Lane| on.select(bending(space, chain), infinity);
     let mut least = energy(chain, outcome.settled(idle) & lanes);
