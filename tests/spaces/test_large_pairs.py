@@ -34,7 +34,10 @@ def test_large_spaces_hold_small_ones(kind, size, rank, rng):
     up = isometry(large, 8, rng)
     assert np.abs(large.exp(up @ p, up @ v) - up @ q).max() < 2e-15
     # Points carry 1e-16, and what leads from one to the other no less.
-    assert np.abs(large.log(up @ p, up @ q) - up @ small.log(p, q)).max() < 1e-15
+    log = large.log(up @ p, up @ q)
+    assert np.abs(log - up @ small.log(p, q)).max() < 1e-15
+    # Along p there is nothing, however short it is.
+    assert np.abs(np.swapaxes((up @ p).conj(), -1, -2) @ log).max() < 1e-15 * size
     assert np.abs(large.distance(up @ p, up @ q) - small.distance(p, q)).max() < 2e-15
     t = np.linspace(-0.5, 1.5, 5)[:, None]
     assert np.abs(large.geodesic(up @ p, up @ q, t) - up @ small.geodesic(p, q, t)).max() < 2e-15

@@ -47,6 +47,12 @@ def test_half_a_turn_of_rotations_goes_either_way():
     silent(lambda: ss.CubicSpline(None, np.eye(4)[:3], "sphere:3"))
 
 
+def test_a_little_more_than_half_a_turn_warns():
+    q = np.array([[1, 0, 0, 0], [np.cos(1.572), np.sin(1.572), 0, 0]])
+    with pytest.warns(UserWarning, match="inner product -0.0012"):
+        ss.CubicSpline(None, q, "sphere:3")
+
+
 def test_which_curve_it_was():
     batch = np.stack([motion(), flipped(9)])
     with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
