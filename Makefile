@@ -15,7 +15,7 @@ demo: .venv/built
 check: .venv/tools
 	cargo fmt --all --check
 	cargo clippy --quiet --all-targets -- -D warnings
-	cargo test --quiet --workspace
+	cargo test --quiet --workspace --exclude symspline-benches
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

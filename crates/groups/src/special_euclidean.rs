@@ -324,21 +324,3 @@ impl Origin for SpecialEuclidean {
 }
 
 impl Space for SpecialEuclidean {}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::rigid::rotate;
-
-    #[test]
-    fn quaternions_rotate_as_their_matrices() {
-        let q = [0.5, -0.5, 0.5, 0.5].map(lane);
-        let x = [1.0, 2.0, -3.0].map(lane);
-        let m = to_matrix(q);
-        let y = rotate(q, x);
-        for i in 0..3 {
-            let z = dot(&m[3 * i..3 * i + 3], &x);
-            assert!((y[i] - z).abs().simd_le(lane(1e-15)).all());
-        }
-    }
-}

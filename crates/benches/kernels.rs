@@ -1,4 +1,4 @@
-//! Microbenchmarks of the kernels: `cargo bench -p symspline`. One core; divan prints the time per
+//! Microbenchmarks of the kernels: `cargo bench -p symspline-benches`. One core; divan prints the time per
 //! sample or per knot as the throughput.
 
 use divan::counter::ItemsCount;
