@@ -101,6 +101,7 @@ def smooth(
     t: _Doubles,
     points: _Doubles,
     weights: _Doubles,
+    information: _Doubles | None,
     knots: _Doubles,
     lam: _Doubles,
     sigma: _Doubles,

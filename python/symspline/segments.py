@@ -14,8 +14,8 @@ from .curves.fit import read
 from .functions import fit_many
 from .handed import times_of
 from .smoothing import SmoothingSpline
-from .smoothing.data import checked_weights
 from .smoothing.many import smooth_many
+from .smoothing.weighing import read_weighing
 from .spaces import Array, Product, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .spline import CubicSpline
@@ -66,8 +66,8 @@ def fit_segments(
             its own. Of points with one time all count, unless the ``"first"`` are to be kept; copies of a
             point are one.
         options: those of `CubicSpline`, or with ``smooth`` those of `make_smoothing_spline`, for all pieces alike;
-            ``weights`` has shape (n,), ``knots`` is a number in each piece. Points of weight zero are left out before
-            the recording is cut, so that many of them are a pause.
+            ``weights`` and ``frames`` are those of all points, ``knots`` is a number in each piece. Points of weight
+            zero are left out before the recording is cut, so that many of them are a pause.
 
     Returns:
         The curves in the order of time, each a `CubicSpline`: ``curve.t[0]`` and ``curve.t[-1]`` are where it begins
@@ -95,32 +95,43 @@ def fit_segments(
         raise ValidationError(
             f"smooth must be True or False, not {shown(smooth)}; lam, criterion and the like are keywords of their own"
         )
-    weights = _taken_weights(options, points, space, duplicates) if smooth else None
-    curves, rows, steps, gap = cut(
-        t, points, space, max_gap, min_points, duplicates, None if weights is None else weights > 0
-    )
+    weighing = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
+    used = _used(weighing, options, points, space, duplicates) if smooth else None
+    curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
     if not curves:
         raise ValidationError(
             f"no piece has {min_points} points: {np.sum(steps > gap)} of {len(steps)} steps are longer than "
             f"max_gap={max_gap}, the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
-    if weights is None:
+    if not smooth:
         return fit_many(curves, space, **options)
-    own = [(*curve, weights[kept]) for curve, kept in zip(curves, rows, strict=True)]
+    own = [
+        (*curve, {key: _of_rows(value, kept) for key, value in weighing.items()})
+        for curve, kept in zip(curves, rows, strict=True)
+    ]
     return smooth_many(own, space, **options)
 
 
-def _taken_weights(
-    options: dict[str, Any], points: Any, space: Space, duplicates: str
-) -> NDArray[np.float64]:
-    """The weights of noisy points, taken from the options."""
+def _used(
+    weighing: dict[str, Any], options: dict[str, Any], points: Any, space: Space, duplicates: str
+) -> NDArray[np.bool_]:
+    """Which noisy points have a weight."""
     if duplicates == "mean":
         raise ValidationError("with smooth all points of one time count; leave duplicates='mean' out")
     if np.ndim(options.get("knots", 0)) > 0:
         raise ValidationError(
             "knots: give a number of knots for each piece, or none; pieces have their own times"
         )
-    return checked_weights(options.pop("weights", None), (), read(points, space)[0].nodes)
+    found = read_weighing(**weighing, space=space, data=read(points, space))
+    used: NDArray[np.bool_] = np.any([own.weights > 0 for own in found], axis=0)
+    return used
+
+
+def _of_rows(value: Any, rows: NDArray[np.intp]) -> Any:
+    """What belongs to some of the points; of a product in every factor."""
+    if isinstance(value, tuple):
+        return tuple(_of_rows(one, rows) for one in value)
+    return None if value is None else np.asarray(value)[rows]
 
 
 class Cut(NamedTuple):

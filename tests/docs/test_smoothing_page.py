@@ -14,13 +14,15 @@ def cells(table):
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
 
 
-def test_the_example_runs():
+def test_the_examples_run():
     names = {}
-    (block,) = re.findall(r"```python\n(.*?)```", smoothing.PAGE.read_text(encoding="utf-8"), re.S)
-    exec(compile(block, smoothing.PAGE.name, "exec"), names)
+    first, matrices = re.findall(r"```python\n(.*?)```", smoothing.PAGE.read_text(encoding="utf-8"), re.S)
+    exec(compile(first, smoothing.PAGE.name, "exec"), names)
     sphere, t, truth = names["sphere"], names["t"], names["truth"]
     errors = [smoothing.rms(sphere, points, truth) for points in (names["s"](t), names["noisy"])]
     assert errors == pytest.approx([0.012, 0.071], abs=5e-4)
+    exec(compile(matrices, smoothing.PAGE.name, "exec"), names)
+    assert f"s.sigma  # {names['s'].sigma:.2f}:" in matrices
 
 
 def test_flat_table():

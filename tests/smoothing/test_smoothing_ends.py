@@ -110,6 +110,42 @@ def test_closed_curves(name, far):
     assert chosen.std(12.5) == pytest.approx(chosen.std(2.5))
 
 
+@pytest.mark.parametrize("name", ["r:2", "sphere:1", "sphere:2", "so:3", "spd:2", "gr:2,5", "cp:2"])
+def test_the_exact_way_closes_curves(name):
+    space, t, noisy, _ = ring(name, 20)
+    # A datum where the curve ends, too.
+    t, noisy = np.append(t, 10.0), np.append(noisy, noisy[:1], axis=0)
+    knots = np.r_[0:8:1.0, 8.5, 10.0]
+    flat, exact = (
+        ss.make_smoothing_spline(
+            t, noisy, space, 0.3, knots=knots, bc_type="periodic", method=method, **TIGHT
+        )
+        for method in ("flat", "newton")
+    )
+    assert exact.report.converged and exact.report.method == "newton" and exact.report.iterations <= 15
+    # Few knots far apart: the estimating equation is off by more than usual.
+    assert space.distance(flat.points, exact.points).max() < 0.3 * exact.sigma
+    assert flatness(space, t, noisy, exact, 0.3, lambda _: "periodic", True) < 1e-8
+
+
+def test_orbits_are_closed_curves_too():
+    """Round the sphere nearly along a great circle, where the flat way does not converge."""
+    space, t = ss.Sphere(2), np.linspace(0, 10, 161)[:-1]
+    angle = 2 * np.pi * t / 10
+    truth = np.stack([np.cos(angle), np.sin(angle), 0.05 * np.sin(2 * angle)], axis=-1)
+    truth /= np.linalg.norm(truth, axis=-1, keepdims=True)
+    noisy = beside(space, truth, 0.05)
+    options = {"knots": np.linspace(0, 10, 41), "bc_type": "periodic"}
+    with pytest.raises(ss.ConvergenceError):
+        ss.make_smoothing_spline(t, noisy, space, 100.0, method="flat", **options)
+    spline = ss.make_smoothing_spline(t, noisy, space, 100.0, **options, **TIGHT)
+    assert spline.report.converged and spline.report.method == "newton"
+    assert flatness(space, t, noisy, spline, 100.0, lambda _: "periodic", True) < 1e-7
+    chosen = ss.make_smoothing_spline(t, noisy, space, **options)
+    assert chosen.report.converged
+    assert np.sqrt(np.mean(space.distance(chosen(t), truth) ** 2)) < 0.02
+
+
 def test_a_closed_curve_of_numbers_is_a_filter():
     """Equal times: its coefficients in Fourier's basis are those of the data, each shrunk by itself."""
     n, lam = 32, 0.2

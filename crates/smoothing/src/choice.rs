@@ -4,8 +4,8 @@
 //! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`. Its residuals and degrees of freedom for eight λ at
 //! a time cost one banded solve.
 
-use crate::banded::Banded;
-use crate::flat::{Flat, Row, times_mass};
+use crate::flat::{Flat, times_mass};
+use crate::misfit::{Factors, Misfit};
 use symspline_core::scalar::{LANES, Lane, few, lane};
 
 /// How λ is chosen.
@@ -28,10 +28,8 @@ pub struct Linear<'a> {
     pub flat: &'a Flat,
     /// Dimension of the space.
     pub m: usize,
-    /// Weights of the data.
-    pub weights: &'a [f64],
-    /// Residuals at the data.
-    pub residuals: &'a [f64],
+    /// Residuals at the data, and their weights.
+    pub misfit: &'a Misfit<'a>,
     /// Accelerations at the knots.
     pub bends: &'a [f64],
     /// The standard deviation of the noise, for [`Criterion::Cp`].
@@ -47,18 +45,12 @@ impl<'a> Linear<'a> {
     pub fn new(
         flat: &'a Flat,
         m: usize,
-        weights: &'a [f64],
-        residuals: &'a [f64],
+        misfit: &'a Misfit<'a>,
         bends: &'a [f64],
         curvature: &[f64],
         sigma: f64,
     ) -> Self {
-        let mut pull = vec![0.0; flat.basis.count() * m];
-        let mut weighted = vec![0.0; m];
-        for ((row, w), r) in flat.data.iter().zip(weights).zip(residuals.chunks_exact(m)) {
-            weighted.iter_mut().zip(r).for_each(|(x, r)| *x = w * r);
-            row.spread(&weighted, &mut pull);
-        }
+        let mut pull = misfit.pull(flat, m);
         let mut stiffness = vec![0.0; pull.len()];
         for (rows, vectors) in [(&flat.bends, bends), (&flat.values, curvature)] {
             let mass = times_mass(&flat.basis, vectors, m);
@@ -74,30 +66,20 @@ impl<'a> Linear<'a> {
                 stiffness[at].fill(0.0);
             }
         }
-        Linear { flat, m, weights, residuals, bends, sigma, pull, stiffness }
+        Linear { flat, m, misfit, bends, sigma, pull, stiffness }
     }
 
     /// The step of the coefficients for one λ, given the factors of A.
-    pub fn step(&self, lam: f64, factors: &Banded) -> Vec<f64> {
-        let (m, count) = (self.m, self.flat.basis.count());
-        // Coordinates in the lanes.
-        let columns = m.div_ceil(LANES);
-        let mut x = vec![Lane::ZERO; count * columns];
-        let entry = |i: usize, c: usize| self.pull[i * m + c] - lam * self.stiffness[i * m + c];
-        for (i, x) in x.chunks_exact_mut(columns).enumerate() {
-            for (k, x) in x.iter_mut().enumerate() {
-                *x = Lane::new(few(|l| if k * LANES + l < m { entry(i, k * LANES + l) } else { 0.0 }));
-            }
-        }
-        factors.solve(columns, &mut x);
-        let number = |i: usize, c: usize| x[i * columns + c / LANES].as_array()[c % LANES];
-        (0..count * m).map(|at| number(at / m, at % m)).collect()
+    pub fn step(&self, lam: f64, factors: &Factors) -> Vec<f64> {
+        let right: Vec<f64> =
+            self.pull.iter().zip(&self.stiffness).map(|(pull, stiffness)| pull - lam * stiffness).collect();
+        factors.solve_one(self.m, &right)
     }
 
     /// What eight λ come to.
     pub fn look(&self, lam: Lane) -> Look {
         let (m, flat) = (self.m, self.flat);
-        let factors = flat.factored(lam);
+        let factors = self.misfit.factored(flat, m, lam);
         let mut x: Vec<Lane> = self
             .pull
             .iter()
@@ -105,17 +87,11 @@ impl<'a> Linear<'a> {
             .map(|(pull, stiffness)| (-lam).mul_add(lane(*stiffness), lane(*pull)))
             .collect();
         factors.solve(m, &mut x);
-        let freedom = flat.freedom(&factors.inverse_band());
-        let mut rss = Lane::ZERO;
-        for k in flat.own.data.clone() {
-            for c in 0..m {
-                let moved = lane(self.residuals[k * m + c]) - row_times(&flat.data[k], &x, m, c);
-                rss = (moved * lane(self.weights[k])).mul_add(moved, rss);
-            }
-        }
+        let freedom = self.misfit.freedom(flat, m, &factors.inverse_band());
+        let rss = self.misfit.rss(flat, m, &x);
         // (a + Sδ)ᵀM(a + Sδ)
         let mut energy = Lane::ZERO;
-        let bend = |i: usize, c: usize| lane(self.bends[i * m + c]) + row_times(&flat.bends[i], &x, m, c);
+        let bend = |i: usize, c: usize| lane(self.bends[i * m + c]) + flat.bends[i].of_lanes(&x, m, c);
         for c in 0..m {
             let mut left = bend(flat.own.segments.start, c);
             for i in flat.own.segments.clone() {
@@ -183,10 +159,9 @@ impl<'a> Linear<'a> {
 
     fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
         let own = &self.flat.own;
+        let (n, m) = (self.misfit.count(own.data.clone(), self.m), self.m as f64);
         // Where no degrees of freedom are left, or rounding leaves no matrix, there is nothing to compare.
-        let known =
-            (lane(own.data.len() as f64 * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.definite;
-        let (n, m) = (own.data.len() as f64, self.m as f64);
+        let known = (lane(n * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.definite;
         let per = look.rss / lane(m);
         let score = match criterion {
             Criterion::Gcv { penalty } => {
@@ -217,16 +192,6 @@ pub struct Look {
     pub log_det: Lane,
     /// Where A is positive definite, as far as rounding tells.
     pub definite: Lane,
-}
-
-fn row_times(row: &Row, x: &[Lane], m: usize, c: usize) -> Lane {
-    let mut sum = Lane::ZERO;
-    for (k, factor) in row.factors.iter().enumerate() {
-        if let Some(x) = x.get((row.first + k) * m + c) {
-            sum = x.mul_add(lane(*factor), sum);
-        }
-    }
-    sum
 }
 
 /// The place of the least score among curves that are no geodesics, or the first geodesic if that is better.

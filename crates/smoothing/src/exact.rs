@@ -5,6 +5,7 @@
 //! `C(ξ, υ) = 0`. Everything is local to a segment: the unknowns of a knot, with the multiplier of its condition, make
 //! a block tridiagonal system.
 
+use crate::information::{self, Root};
 use crate::path::{Path, Place};
 use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
@@ -20,10 +21,16 @@ pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 pub struct Pull<'a> {
     /// Where they are.
     pub places: &'a [Place],
-    /// `log_γ y`, or what a robust loss makes of it.
+    /// The points of the curve there.
+    pub points: &'a [f64],
+    /// `log_γ y`.
     pub vectors: &'a [f64],
+    /// By what a robust loss multiplies it.
+    pub factors: &'a [f64],
     /// Weights.
     pub weights: &'a [f64],
+    /// Of weights that are matrices their roots, and the frames of the data carried to the curve.
+    pub information: Option<(&'a [Root], &'a [f64])>,
 }
 
 /// ∫ |∇γ'|² dt, by two points a segment.
@@ -61,48 +68,66 @@ pub fn step(
     let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
     // Velocities in units of the mean knot spacing, so that all unknowns are of one size.
     let unit = (path.t[n] - path.t[0]) / n as f64;
-    let mut system = Tridiagonal::new(n + 1, 3 * m);
+    // The last knot of a closed curve is the first again.
+    let closed = matches!(ends, Ends::Periodic);
+    let nodes = if closed { n } else { n + 1 };
+    let mut system = Tridiagonal::new(nodes, 3 * m);
 
     let places = quadrature(n);
-    let samples = [(pull.places, path.at(space, pull.places)), (&places, path.at(space, &places))];
+    let between = path.at(space, &places);
+    let samples = [(pull.places, pull.points), (&places, &between)];
     let bends = path.bends(space, &places);
     let mut parts: Vec<(usize, Matrix, Vector)> =
         (0..n).map(|i| (i, Matrix::zeros(4 * m, 4 * m), Vector::zeros(4 * m))).collect();
     parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
         let motion = derivative.motion(*segment);
-        let mut add = |kind: usize, k: usize, of: Of, vector: &[f64], weight: f64| {
+        let at = |kind: usize, k: usize, of: Of, vectors: &[f64]| {
             let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);
-            let (mut matrix, value) =
-                in_coordinates(space, &motion.point(tau), &motion.at(tau, of), p, vector);
+            in_coordinates(space, &motion.point(tau), &motion.at(tau, of), p, vectors)
+        };
+        // With rows N of a weight: |N x|² and its pull on x.
+        let mut add = |mut matrix: Matrix, rows: Option<&Matrix>, pull: Vector, weight: f64| {
             for e in 0..2 {
                 matrix.columns_mut((2 * e + 1) * m, m).scale_mut(1.0 / unit);
             }
-            *square += matrix.tr_mul(&matrix) * weight;
-            *right += matrix.tr_mul(&value) * weight;
+            *right += matrix.tr_mul(&pull) * weight;
+            let weighed = rows.map_or(matrix.clone(), |rows| rows * &matrix);
+            *square += weighed.tr_mul(&weighed) * weight;
         };
         let first = pull.places.partition_point(|place| place.0 < *segment);
         let here = pull.places[first..].iter().take_while(|place| place.0 == *segment).count();
         for k in first..first + here {
-            add(0, k, Of::Point, &pull.vectors[k * len..][..len], pull.weights[k]);
+            let r = &pull.vectors[k * len..][..len];
+            if let Some((roots, frames)) = pull.information {
+                let frame = &frames[k * m * len..][..m * len];
+                let (matrix, all) = at(0, k, Of::Point, &[r, frame].concat());
+                let (r, frame) = (all.column(0).into_owned(), all.columns(1, m).into_owned());
+                let (rows, _, own) = information::at(space, &roots[k].matrix, &frame, &r);
+                add(matrix, Some(&rows), own * pull.factors[k], 1.0);
+            } else {
+                let (matrix, r) = at(0, k, Of::Point, r);
+                add(matrix, None, r.column(0) * pull.factors[k], pull.weights[k]);
+            }
         }
         let h = path.t[*segment + 1] - path.t[*segment];
         for k in 2 * *segment..2 * *segment + 2 {
-            let against: Vec<f64> = bends[k * len..][..len].iter().map(|x| -x).collect();
-            add(1, k, Of::Acceleration, &against, lam * h / 2.0);
+            let (matrix, bend) = at(1, k, Of::Acceleration, &bends[k * len..][..len]);
+            add(matrix, None, -bend.column(0), lam * h / 2.0);
         }
     });
     for (segment, square, right) in &parts {
         for a in 0..2 {
             for b in 0..2 {
                 let block = square.view((2 * a * m, 2 * b * m), (2 * m, 2 * m));
-                let mut place = system.block(segment + a, segment + b).view_mut((0, 0), (2 * m, 2 * m));
+                let (row, column) = ((segment + a) % nodes, (segment + b) % nodes);
+                let mut place = system.block(row, column).view_mut((0, 0), (2 * m, 2 * m));
                 place += block;
             }
-            let mut rows = system.right[segment + a].rows_mut(0, 2 * m);
+            let mut rows = system.right[(segment + a) % nodes].rows_mut(0, 2 * m);
             rows += right.rows(2 * a * m, 2 * m);
         }
     }
-    for i in 0..=n {
+    for i in 0..nodes {
         let row = derivative.condition(i);
         for (from, list, scale) in [(0, &row.points, unit * unit), (m, &row.u, unit)] {
             for (node, matrix) in list {
@@ -115,45 +140,55 @@ pub fn step(
         }
     }
     let mut out = vec![0.0; (n + 1) * len];
-    for (i, x) in system.solve().iter().enumerate() {
+    let found = if closed { system.solve_cyclic() } else { system.solve() };
+    for (i, x) in found.iter().enumerate() {
         derivative.tangent(i, &x.as_slice()[..m], &mut out[i * len..][..len]);
+    }
+    if closed {
+        let (first, last) = out.split_at_mut(n * len);
+        last.copy_from_slice(&first[..len]);
     }
     out
 }
 
-/// The columns of a matrix, tangent at q, and a vector at p in coordinates of one frame: p is the same point, but maybe
+/// The columns of a matrix, tangent at q, and vectors at p in coordinates of one frame: p is the same point, but maybe
 /// another array.
 fn in_coordinates(
     space: &Erased,
     q: &[f64],
     columns: &Matrix,
     p: &[f64],
-    vector: &[f64],
-) -> (Matrix, Vector) {
-    let (m, p, q) = (space.dim(), lanes(p), lanes(q));
-    let mut there = vec![Lane::ZERO; p.len()];
-    space.carry(&p, &q, &vec![Lane::ZERO; p.len()], &lanes(vector), &mut there);
-    let (p, vector) = (q, there);
+    vectors: &[f64],
+) -> (Matrix, Matrix) {
+    let (m, len, p, q) = (space.dim(), p.len(), lanes(p), lanes(q));
     let mut frame = vec![Lane::ZERO; space.frame_len()];
-    space.lift(&p, &mut frame);
-    let count = columns.ncols();
-    let mut all = Matrix::zeros(m, count + 1);
-    let (mut v, mut x) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; m]);
-    for first in (0..=count).step_by(LANES) {
-        for (row, v) in v.iter_mut().enumerate() {
-            let number = |c: usize| if c < count { columns[(row, c)] } else { vector[row].as_array()[0] };
-            *v = Lane::new(few(|l| number((first + l).min(count))));
+    space.lift(&q, &mut frame);
+    let [still, mut v, mut there] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+    let mut x = vec![Lane::ZERO; m];
+    let mut coordinates = |count: usize, number: &dyn Fn(usize, usize) -> f64, carried: bool| {
+        let mut all = Matrix::zeros(m, count);
+        for first in (0..count).step_by(LANES) {
+            for (row, v) in v.iter_mut().enumerate() {
+                *v = Lane::new(few(|l| number(row, (first + l).min(count - 1))));
+            }
+            if carried {
+                space.carry(&p, &q, &still, &v, &mut there);
+                v.copy_from_slice(&there);
+            }
+            space.coordinates(&frame, &q, &v, &mut x);
+            for l in 0..LANES.min(count - first) {
+                (0..m).for_each(|row| all[(row, first + l)] = x[row].as_array()[l]);
+            }
         }
-        space.coordinates(&frame, &p, &v, &mut x);
-        for l in 0..LANES.min(count + 1 - first) {
-            (0..m).for_each(|row| all[(row, first + l)] = x[row].as_array()[l]);
-        }
-    }
-    let value = all.column(count).into_owned();
-    (all.columns(0, count).into_owned(), value)
+        all
+    };
+    (
+        coordinates(columns.ncols(), &|row, c| columns[(row, c)], false),
+        coordinates(vectors.len() / len, &|row, c| vectors[c * len + row], true),
+    )
 }
 
-/// A block tridiagonal system.
+/// A block tridiagonal system; cyclic where the last node is a neighbour of the first.
 struct Tridiagonal {
     /// Blocks left of, on and right of the diagonal.
     sides: [Vec<Matrix>; 3],
@@ -167,28 +202,80 @@ impl Tridiagonal {
     }
 
     fn block(&mut self, row: usize, column: usize) -> &mut Matrix {
-        &mut self.sides[1 + column - row][row]
+        let side = match (row, column) {
+            (0, column) if column > 1 => 0,
+            (row, 0) if row > 1 => 2,
+            _ => 1 + column - row,
+        };
+        &mut self.sides[side][row]
     }
 
     /// By elimination with exchanges inside the blocks.
     fn solve(self) -> Vec<Vector> {
-        let Tridiagonal { sides: [lower, mut diagonal, mut upper], mut right } = self;
-        for i in 0..right.len() {
-            if i > 0 {
-                let (above, from_above) = (&lower[i] * &upper[i - 1], &lower[i] * &right[i - 1]);
-                diagonal[i] -= above;
-                right[i] -= from_above;
-            }
-            let factors = std::mem::replace(&mut diagonal[i], Matrix::zeros(0, 0)).lu();
-            let whole = factors.solve_mut(&mut upper[i]) && factors.solve_mut(&mut right[i]);
-            if !whole {
-                right[i].fill(f64::NAN);
-            }
-        }
-        for i in (0..right.len() - 1).rev() {
-            let behind = &upper[i] * &right[i + 1];
-            right[i] -= behind;
-        }
-        right
+        let Tridiagonal { sides: [lower, diagonal, upper], right } = self;
+        let right = right.into_iter().map(|x| Matrix::from_columns(&[x])).collect();
+        let found = eliminated(&lower, diagonal, upper, right);
+        found.iter().map(|x| x.column(0).into_owned()).collect()
     }
+
+    /// The same of a closed curve: the last node comes at the end.
+    fn solve_cyclic(mut self) -> Vec<Vector> {
+        let last = self.right.len() - 1;
+        let size = self.right[last].len();
+        let take = |x: &mut Matrix| std::mem::replace(x, Matrix::zeros(size, size));
+        let [lower, diagonal, upper] = &mut self.sides;
+        // How the other nodes see the last one, and it them.
+        let (first_sees, before_sees) = (take(&mut lower[0]), take(&mut upper[last - 1]));
+        let (sees_before, sees_first, own) =
+            (take(&mut lower[last]), take(&mut upper[last]), take(&mut diagonal[last]));
+        let mut right: Vec<Matrix> = self.right[..last]
+            .iter()
+            .map(|x| {
+                let mut columns = Matrix::zeros(size, size + 1);
+                columns.set_column(size, x);
+                columns
+            })
+            .collect();
+        right[0].columns_mut(0, size).copy_from(&first_sees);
+        let mut before = right[last - 1].columns_mut(0, size);
+        before += &before_sees;
+        let [lower, mut diagonal, mut upper] = self.sides;
+        diagonal.truncate(last);
+        upper.truncate(last);
+        let found = eliminated(&lower, diagonal, upper, right);
+        let seen = &sees_before * &found[last - 1] + &sees_first * &found[0];
+        let rest = &self.right[last] - seen.column(size);
+        let x = (own - seen.columns(0, size)).lu().solve(&rest);
+        let x = x.unwrap_or_else(|| Vector::from_element(size, f64::NAN));
+        let mut out: Vec<Vector> =
+            found.iter().map(|found| found.column(size) - found.columns(0, size) * &x).collect();
+        out.push(x);
+        out
+    }
+}
+
+/// The solutions of a block tridiagonal system for some right sides.
+fn eliminated(
+    lower: &[Matrix],
+    mut diagonal: Vec<Matrix>,
+    mut upper: Vec<Matrix>,
+    mut right: Vec<Matrix>,
+) -> Vec<Matrix> {
+    for i in 0..right.len() {
+        if i > 0 {
+            let (above, from_above) = (&lower[i] * &upper[i - 1], &lower[i] * &right[i - 1]);
+            diagonal[i] -= above;
+            right[i] -= from_above;
+        }
+        let factors = std::mem::replace(&mut diagonal[i], Matrix::zeros(0, 0)).lu();
+        let whole = factors.solve_mut(&mut upper[i]) && factors.solve_mut(&mut right[i]);
+        if !whole {
+            right[i].fill(f64::NAN);
+        }
+    }
+    for i in (0..right.len() - 1).rev() {
+        let behind = &upper[i] * &right[i + 1];
+        right[i] -= behind;
+    }
+    right
 }

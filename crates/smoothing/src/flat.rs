@@ -47,6 +47,17 @@ impl Row {
         }
     }
 
+    /// A number of the row times coefficients of `m` numbers each.
+    pub fn of_lanes(&self, x: &[Lane], m: usize, c: usize) -> Lane {
+        let mut sum = Lane::ZERO;
+        for (k, factor) in self.factors.iter().enumerate() {
+            if let Some(x) = x.get((self.first + k) * m + c) {
+                sum = x.mul_add(lane(*factor), sum);
+            }
+        }
+        sum
+    }
+
     /// row · Z · rowᵀ for a matrix known within its band.
     pub fn square(&self, z: &Banded) -> Lane {
         let mut sum = Lane::ZERO;
@@ -204,7 +215,7 @@ fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
     out
 }
 
-/// The smoothing problem of numbers: A = BᵀWB + λΩ.
+/// The smoothing problem of numbers.
 pub struct Flat {
     /// The splines.
     pub basis: Basis,
@@ -214,10 +225,10 @@ pub struct Flat {
     pub values: Vec<Row>,
     /// S: second derivatives at the knots.
     pub bends: Vec<Row>,
-    /// BᵀWB.
-    gram: Vec<f64>,
-    /// Ω.
-    penalty: Vec<f64>,
+    /// BᵀWB for weights that are numbers, as the entries (i, i − d) at i · 4 + d.
+    pub gram: Vec<f64>,
+    /// Ω, likewise.
+    pub penalty: Vec<f64>,
     /// What is counted.
     pub own: Own,
 }
@@ -260,26 +271,6 @@ impl Flat {
         let penalty = gram(count, hats);
         let gram = gram(count, data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)));
         Flat { data, values, bends, gram, penalty, basis, own }
-    }
-
-    /// A, factored, for another λ on each lane.
-    pub fn factored(&self, lam: Lane) -> Banded {
-        let mut a = Banded::of(self.basis.count(), WIDTH, |at| {
-            lam.mul_add(lane(self.penalty[at]), lane(self.gram[at]))
-        });
-        a.factor();
-        a
-    }
-
-    /// The trace of A⁻¹BᵀWB, given the band of A⁻¹: the degrees of freedom of one coordinate.
-    pub fn freedom(&self, inverse: &Banded) -> Lane {
-        let mut sum = Lane::ZERO;
-        for i in self.own.knots.clone() {
-            for j in i.saturating_sub(WIDTH)..(i + BAND).min(self.basis.count()) {
-                sum += inverse.at(i, j) * lane(self.gram[i.max(j) * BAND + i.abs_diff(j)]);
-            }
-        }
-        sum
     }
 
     /// The λ at which data and energy weigh about the same for splines that turn at every knot: the mean weight of a

@@ -17,7 +17,9 @@ mod choice;
 mod exact;
 mod flat;
 mod frames;
+mod information;
 mod loss;
+mod misfit;
 mod path;
 mod smooth;
 mod start;
@@ -40,6 +42,9 @@ pub struct Data<'a> {
     pub points: &'a [f64],
     /// A weight a time: one over the variance of its noise, up to a factor.
     pub weights: &'a [f64],
+    /// Weights that are matrices, m × m numbers a time in coordinates of the frame at its point: one over the covariance
+    /// of its noise. The weight is then the mean of the diagonal. Empty where weights are numbers.
+    pub information: &'a [f64],
     /// Knots of the curve, increasing, from the first to the last time.
     pub knots: &'a [f64],
     /// λ, or none if it is to be chosen.
@@ -67,7 +72,7 @@ pub enum Tier {
 pub enum Ends {
     /// A condition at either end.
     Open([FlatEnd; 2]),
-    /// The last knot is the first again; only the flat way leads there.
+    /// The last knot is the first again.
     Periodic,
 }
 

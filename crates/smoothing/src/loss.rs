@@ -54,27 +54,18 @@ impl Loss {
         }
     }
 
-    /// Turns residuals, vectors of `len` numbers in m dimensions, into ψ(r)/ψ̄'; returns ψ̄'.
-    pub fn pseudo(
-        self,
-        corner: f64,
-        squares: &[f64],
-        weights: &[f64],
-        [len, m]: [usize; 2],
-        residuals: &mut [f64],
-    ) -> f64 {
+    /// By which factors ψ(r)/(|r| ψ̄') residuals in m dimensions become those of the pseudo-data, for their weighed
+    /// squares; and ψ̄'.
+    pub fn pseudo(self, corner: f64, squares: &[f64], m: usize) -> (Vec<f64>, f64) {
         if self == Loss::Linear {
-            return 1.0;
+            return (vec![1.0; squares.len()], 1.0);
         }
         let slopes: Vec<(f64, f64)> =
-            squares.iter().zip(weights).map(|(d, w)| self.slopes(w * d / (corner * corner), m)).collect();
+            squares.iter().map(|square| self.slopes(square / (corner * corner), m)).collect();
         let mean = slopes.iter().map(|s| s.1).sum::<f64>() / slopes.len() as f64;
         // Were most data outliers, the slope would say nothing.
         let mean = mean.max(0.05);
-        for (r, (factor, _)) in residuals.chunks_exact_mut(len).zip(&slopes) {
-            r.iter_mut().for_each(|x| *x *= factor / mean);
-        }
-        mean
+        (slopes.iter().map(|(factor, _)| factor / mean).collect(), mean)
     }
 }
 
@@ -119,12 +110,11 @@ fn deviations(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) ->
     squares
 }
 
-/// The same from the squared residuals of a curve with so many degrees of freedom a coordinate. Fewer outliers spoil it:
-/// each is in one residual, but in three of the deviations of neighbours.
-pub fn noise_beside(squares: &[f64], weights: &[f64], freedom: f64, m: usize) -> f64 {
-    let weighted: Vec<f64> = squares.iter().zip(weights).map(|(s, w)| s * w).collect();
-    let left = (1.0 - freedom / weights.len() as f64).max(0.1);
-    (median(&weighted) / chi::quantile(m, 0.5) / left).sqrt()
+/// The same from the weighed squared residuals of a curve with so many degrees of freedom a coordinate. Fewer outliers
+/// spoil it: each is in one residual, but in three of the deviations of neighbours.
+pub fn noise_beside(squares: &[f64], freedom: f64, m: usize) -> f64 {
+    let left = (1.0 - freedom / squares.len() as f64).max(0.1);
+    (median(squares) / chi::quantile(m, 0.5) / left).sqrt()
 }
 
 fn median(x: &[f64]) -> f64 {
@@ -257,6 +247,7 @@ mod tests {
             times: &times,
             points: &points,
             weights: &weights,
+            information: none,
             knots: &times,
             lam: None,
             sigma: None,

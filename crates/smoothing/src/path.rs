@@ -100,33 +100,20 @@ impl Path<'_> {
         (0..=n).map(|i| if i < n { (i, 0.0) } else { (n - 1, 1.0) }).collect()
     }
 
-    /// `log_γ y` at the places of data y, and the squared distances.
-    pub fn pulls(&self, space: &Erased, places: &[Place], data: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let len = space.point_len();
-        let gammas = self.at(space, places);
-        let (mut vectors, mut squares) = (vec![0.0; data.len()], vec![0.0; places.len()]);
-        let [mut p, mut y, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
-        let rows = vectors.chunks_mut(LANES * len).zip(squares.chunks_mut(LANES));
-        for (group, (vectors, squares)) in rows.enumerate() {
-            let at = lanes_of(group, places.len());
-            gather(at.map(|i| &gammas[i * len..][..len]), &mut p);
-            gather(at.map(|i| &data[i * len..][..len]), &mut y);
-            let angle = space.log(&p, &y, &mut v);
-            let distance = space.distance(&p, &y, &v, angle);
-            scatter(&v, vectors);
-            squares.copy_from_slice(&(distance * distance).to_array()[..squares.len()]);
-        }
-        (vectors, squares)
-    }
-
-    /// Vectors at places, carried to the nearest knots: coordinates in the frames there.
-    pub fn at_knots(&self, space: &Erased, frames: &Frames, places: &[Place], vectors: &[f64]) -> Vec<f64> {
+    /// Vectors at places, where the points are `gammas`, carried to the nearest knots: coordinates in the frames there.
+    pub fn at_knots(
+        &self,
+        space: &Erased,
+        frames: &Frames,
+        places: &[Place],
+        gammas: &[f64],
+        vectors: &[f64],
+    ) -> Vec<f64> {
         let len = space.point_len();
         let nearest = |i: usize| nearest(places[i]);
         if places.iter().all(|&place| at_knot(place).is_some()) {
             return frames.coordinates(vectors, nearest);
         }
-        let gammas = self.at(space, places);
         let mut carried = vec![0.0; vectors.len()];
         let [mut p, mut q, mut v, mut way, mut out] = [(); 5].map(|_| vec![Lane::ZERO; len]);
         for (group, carried) in carried.chunks_mut(LANES * len).enumerate() {
@@ -140,6 +127,25 @@ impl Path<'_> {
         }
         frames.coordinates(&carried, nearest)
     }
+}
+
+/// `log_γ y` at points γ of a curve for data y, and the squared distances.
+pub fn pulls(space: &Erased, gammas: &[f64], data: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let len = space.point_len();
+    let count = gammas.len() / len;
+    let (mut vectors, mut squares) = (vec![0.0; data.len()], vec![0.0; count]);
+    let [mut p, mut y, mut v] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+    let rows = vectors.chunks_mut(LANES * len).zip(squares.chunks_mut(LANES));
+    for (group, (vectors, squares)) in rows.enumerate() {
+        let at = lanes_of(group, count);
+        gather(at.map(|i| &gammas[i * len..][..len]), &mut p);
+        gather(at.map(|i| &data[i * len..][..len]), &mut y);
+        let angle = space.log(&p, &y, &mut v);
+        let distance = space.distance(&p, &y, &v, angle);
+        scatter(&v, vectors);
+        squares.copy_from_slice(&(distance * distance).to_array()[..squares.len()]);
+    }
+    (vectors, squares)
 }
 
 /// Points moved along tangent vectors there.

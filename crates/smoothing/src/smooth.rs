@@ -1,5 +1,6 @@
 //! Many curves at a time: those that are not done go one step on together.
 
+use crate::information;
 use crate::loss::{self, Loss};
 use crate::path::{Path, moved, places};
 use crate::start::{Level, levels};
@@ -13,7 +14,8 @@ use symspline_core::parallel;
 use symspline_core::scalar::few;
 use symspline_core::space::{Ambient, Erased, Origin};
 
-const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: None };
+/// Where that is not enough for a spline a shorter step is better than a longer search.
+const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: Some(200) };
 const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
 /// Knots times dimensions from which threads pay.
 const PARALLEL: usize = 4096;
@@ -65,7 +67,8 @@ fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     let ended = tracks.into_iter().zip(data).map(|(track, data)| {
         track.unwrap_or_else(|| {
             let points = vec![f64::NAN; data.knots.len() * len];
-            let mut none = Track::new(*data, data.knots.to_vec(), points, options.ends, f64::INFINITY);
+            let mut none =
+                Track::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, f64::INFINITY);
             none.retreat(space);
             none
         })
@@ -106,14 +109,21 @@ fn start<'a>(
 ) -> Vec<Option<Track<'a>>> {
     let mut pyramids: Vec<(Vec<Level>, f64)> = data.iter().map(|_| (Vec::new(), f64::INFINITY)).collect();
     parallel::for_each(pyramids.iter_mut().zip(data).collect(), threads, monitor, |(found, data)| {
-        let (mut times, mut points, mut weights) =
-            (data.times.to_vec(), data.points.to_vec(), data.weights.to_vec());
-        if options.loss != Loss::Linear {
-            let sigma = data.sigma.unwrap_or_else(|| loss::noise(space, data));
+        let weights = if data.information.is_empty() {
+            data.weights.to_vec()
+        } else {
+            // Here a point is one, and as good as its directions on average.
+            information::roots(data.information, space.dim()).iter().map(|root| root.weight).collect()
+        };
+        let data = Data { weights: &weights, ..*data };
+        let [times, points, weights] = if options.loss == Loss::Linear {
+            [data.times.to_vec(), data.points.to_vec(), weights.clone()]
+        } else {
+            let sigma = data.sigma.unwrap_or_else(|| loss::noise(space, &data));
             // Where nothing deviates nothing is an outlier.
             found.1 = if sigma > 0.0 { sigma * options.loss.corner(space.dim()) } else { f64::INFINITY };
-            [times, points, weights] = loss::plausible(space, data);
-        }
+            loss::plausible(space, &data)
+        };
         found.0 = levels(space, &times, &points, &weights);
         found.0.reverse();
     });
@@ -135,7 +145,8 @@ fn start<'a>(
             if options.ends == Ends::Periodic {
                 turns::repeat(&mut points, space.point_len());
             }
-            tracks[*c] = Some(Track::new(data[*c], knots.to_vec(), points, options.ends, pyramids[*c].1));
+            tracks[*c] =
+                Some(Track::new(data[*c], space.dim(), knots.to_vec(), points, options.ends, pyramids[*c].1));
         }
     }
 }

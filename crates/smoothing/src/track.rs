@@ -5,8 +5,10 @@ use crate::choice::Linear;
 use crate::exact::{self, Pull};
 use crate::flat::{Basis, Flat, FlatEnd, Own};
 use crate::frames::{Frames, lanes_of};
+use crate::information::{self, Root};
 use crate::loss;
-use crate::path::{Path, Place, moved, places};
+use crate::misfit::Misfit;
+use crate::path::{Path, Place, moved, places, pulls};
 use crate::turns;
 use crate::variance::rows_of;
 use crate::{Data, Ends, Options, Report, Smooth, State, Tier};
@@ -38,6 +40,8 @@ pub struct Track<'a> {
     /// Knots.
     pub knots: Vec<f64>,
     places: Vec<Place>,
+    /// Roots of weights that are matrices.
+    roots: Vec<Root>,
     flat: Flat,
     ends: Ends,
     /// The residual from which a robust loss counts less.
@@ -77,7 +81,7 @@ impl<'a> Track<'a> {
     /// A curve with given knots through first points.
     ///
     /// `corner` is the residual from which a robust loss counts less.
-    pub fn new(data: Data<'a>, knots: Vec<f64>, points: Vec<f64>, ends: Ends, corner: f64) -> Self {
+    pub fn new(data: Data<'a>, m: usize, knots: Vec<f64>, points: Vec<f64>, ends: Ends, corner: f64) -> Self {
         let places = places(&knots, data.times);
         let (kinds, own) = match ends {
             Ends::Open(kinds) => (kinds, Own::all(data.times.len(), knots.len())),
@@ -91,6 +95,7 @@ impl<'a> Track<'a> {
         // From here on curves are geodesics; with larger λ rounding would make A forget the data.
         let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
         Track {
+            roots: information::roots(data.information, m),
             data,
             places,
             flat,
@@ -201,20 +206,42 @@ impl<'a> Track<'a> {
     /// One step from the spline through the points, or the end; on all cores if no other curve is worked on.
     pub fn advance(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) {
         let velocities = self.end_velocities(space);
+        let curve = self.curve();
         let Track { data, flat, progress, .. } = self;
         let (m, spacing, weights) = (space.dim(), flat.basis.spacing, data.weights);
         progress.report.iterations += 1;
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
+        // The same without the turns before and after it that a closed curve has.
+        let len = space.point_len();
+        let whole = Path {
+            t: &self.knots[curve.clone()],
+            points: &self.points[curve.start * len..curve.end * len],
+            velocities: &self.velocities[curve.start * len..curve.end * len],
+        };
+        let seen = flat.own.data.clone();
         let frames = Frames::new(space, &self.points);
-        let (mut vectors, squares) = path.pulls(space, &self.places, data.points);
-        let softness =
-            options.loss.pseudo(self.corner, &squares, weights, [space.point_len(), m], &mut vectors);
+        let gammas = path.at(space, &self.places);
+        let (vectors, distances) = pulls(space, &gammas, data.points);
+        let carried =
+            (!self.roots.is_empty()).then(|| information::carried_frames(space, &gammas, data.points));
+        let mut residuals = path.at_knots(space, &frames, &self.places, &gammas, &vectors);
+        let informed = carried.as_ref().map(|carried| {
+            let vectors = |j: usize| information::members(carried, j, m, len);
+            let columns: Vec<Vec<f64>> =
+                (0..m).map(|j| path.at_knots(space, &frames, &self.places, &gammas, &vectors(j))).collect();
+            information::at_data(space, &self.roots, &columns, &residuals)
+        });
+        let squares: Vec<f64> = match &informed {
+            None => distances.iter().zip(weights).map(|(square, w)| square * w).collect(),
+            Some(found) => found.residuals.chunks_exact(m).map(|s| s.iter().map(|x| x * x).sum()).collect(),
+        };
+        let (factors, softness) = options.loss.pseudo(self.corner, &squares, m);
         if progress.report.exact && progress.settled {
             let lam = progress.lam.unwrap_or(0.0) * spacing.powi(3);
-            let terms = squares.iter().zip(weights).map(|(s, w)| options.loss.value(w * s, self.corner));
+            let terms = squares[seen.clone()].iter().map(|square| options.loss.value(*square, self.corner));
             let before = std::mem::replace(
                 &mut self.objective,
-                terms.sum::<f64>() + lam * exact::energy(space, &path),
+                terms.sum::<f64>() + lam * exact::energy(space, &whole),
             );
             if self.objective > before * (1.0 + ROUNDING) && self.retreats < RETREATS {
                 self.objective = before;
@@ -222,32 +249,47 @@ impl<'a> Track<'a> {
             }
         }
         self.retreats = 0;
-        let residuals = path.at_knots(space, &frames, &self.places, &vectors);
+        let softened = |x: &mut [f64]| {
+            for (x, factor) in x.chunks_exact_mut(m).zip(&factors) {
+                x.iter_mut().for_each(|x| *x *= factor);
+            }
+        };
+        let misfit = match informed {
+            None => {
+                softened(&mut residuals);
+                Misfit::Numbers { weights, residuals }
+            }
+            Some(mut found) => {
+                softened(&mut found.residuals);
+                softened(&mut found.pulls);
+                Misfit::matrices(flat, m, found)
+            }
+        };
         let mut bends = frames.coordinates(&path.bends(space, &path.knots()), |i| i);
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
         bends.iter_mut().for_each(|x| *x *= spacing * spacing);
         speeds.iter_mut().for_each(|x| *x *= spacing);
         let curvature = curvature_terms(space, &speeds, &bends);
-        let linear =
-            Linear::new(flat, m, weights, &residuals, &bends, &curvature, data.sigma.unwrap_or(f64::NAN));
+        let linear = Linear::new(flat, m, &misfit, &bends, &curvature, data.sigma.unwrap_or(f64::NAN));
 
         progress.choose(&linear, options, softness);
         // The pseudo-data have the original weights, and their λ is softer by their slope.
         let lam = progress.lam.unwrap_or(0.0) / softness;
-        let factors = flat.factored(lane(lam));
-        if !(factors.least_pivot().as_array()[0] > 0.0) {
+        let system = misfit.factored(flat, m, lane(lam));
+        if !(system.least_pivot().as_array()[0] > 0.0) {
             progress.report.state = State::Undetermined;
             return;
         }
-        let inverse = factors.inverse_band();
+        let band = system.inverse_band();
+        let inverse = system.mean(&band);
         let before = progress.report.freedom;
-        progress.note(&linear, &inverse, lam, softness);
+        progress.note(&linear, &band, lam, softness);
         // Where λ hardly matters, as for a geodesic, its best value wanders.
         progress.settled |= progress.report.rounds > 1
             && (progress.report.freedom - before).abs() < SETTLED * progress.report.freedom;
         progress.expect(space, &speeds, weights, lam);
 
-        let exact = self.ends != Ends::Periodic && progress.takes_exact_way(space, options.tier);
+        let exact = progress.takes_exact_way(space, options.tier);
         if exact && !progress.report.exact {
             // What is known of steps is of the other way.
             (progress.last_step, progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
@@ -255,12 +297,36 @@ impl<'a> Track<'a> {
         progress.report.exact = exact;
         let (step, ambient) = if exact {
             let unit = spacing.powi(3);
-            let pull = Pull { places: &self.places, vectors: &vectors, weights };
-            let kinds = few(|e| end_of(self.ends, e, &velocities[e]));
-            let ambient = exact::step(space, &path, FitEnds::Open(kinds), &pull, lam * unit, monitor, alone);
+            // What lies where one turn ends lies at the end of its last segment.
+            let last = curve.end - 2;
+            let of_place = |&(segment, tau): &Place| {
+                if segment > last { (last - curve.start, 1.0) } else { (segment - curve.start, tau) }
+            };
+            let places: Vec<Place> = self.places[seen.clone()].iter().map(of_place).collect();
+            let information = carried.as_ref().map(|carried| {
+                (&self.roots[seen.clone()], &carried[seen.start * m * len..seen.end * m * len])
+            });
+            let pull = Pull {
+                places: &places,
+                points: &gammas[seen.start * len..seen.end * len],
+                vectors: &vectors[seen.start * len..seen.end * len],
+                factors: &factors[seen.clone()],
+                weights: &weights[seen.clone()],
+                information,
+            };
+            let ends = match self.ends {
+                Ends::Periodic => FitEnds::Periodic,
+                open => FitEnds::Open(few(|e| end_of(open, e, &velocities[e]))),
+            };
+            let own = exact::step(space, &whole, ends, &pull, lam * unit, monitor, alone);
+            let mut ambient = vec![0.0; self.points.len()];
+            ambient[curve.start * len..curve.end * len].copy_from_slice(&own);
+            if self.ends == Ends::Periodic {
+                turns::repeat(&mut ambient, len);
+            }
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {
-            let change = linear.step(lam, &factors);
+            let change = linear.step(lam, &system);
             let mut step = vec![0.0; change.len()];
             flat.values.iter().zip(step.chunks_exact_mut(m)).for_each(|(row, x)| row.apply(&change, x));
             (step, None)
@@ -284,7 +350,7 @@ impl<'a> Track<'a> {
             return;
         }
         // Farther than the data are nothing is known.
-        let farthest = squares.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
+        let farthest = distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
         let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
         let further = if progress.settled { progress.further(&step) } else { 1.0 };
         let factor = if longest * further > farthest { farthest / longest } else { further };
@@ -307,7 +373,7 @@ impl<'a> Track<'a> {
     fn rescale(&mut self, options: &Options, squares: &[f64], m: usize) {
         let own = self.flat.own.data.clone();
         let freedom = self.progress.report.freedom;
-        let noise = loss::noise_beside(&squares[own.clone()], &self.data.weights[own], freedom, m);
+        let noise = loss::noise_beside(&squares[own], freedom, m);
         self.corner = (noise * options.loss.corner(m)).clamp(0.5 * self.corner, self.corner);
         (self.rescaled, self.objective) = (true, f64::INFINITY);
         (self.progress.settled, self.progress.report.rounds) = (self.data.lam.is_some(), 0);
@@ -358,13 +424,12 @@ impl Progress {
 
     /// λ, degrees of freedom and noise of the curve as it is.
     fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
-        let Linear { flat, m, weights, residuals, .. } = linear;
-        let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
+        let Linear { flat, m, misfit, .. } = linear;
         let own = flat.own.data.clone();
-        let count = own.len() as f64;
-        let rss: f64 = own.map(|k| weights[k] * square(&residuals[k * m..][..*m])).sum();
+        let count = misfit.count(own.clone(), *m);
+        let rss = misfit.rss_now(own, *m);
         let unit = flat.basis.spacing.powi(3);
-        let freedom = flat.freedom(inverse).as_array()[0];
+        let freedom = misfit.freedom(flat, *m, inverse).as_array()[0];
         self.report.freedom = freedom;
         self.report.lam = lam * softness * unit;
         self.report.band_lam = lam * unit;

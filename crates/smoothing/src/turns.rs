@@ -10,6 +10,7 @@ pub struct Turns {
     times: Vec<f64>,
     points: Vec<f64>,
     weights: Vec<f64>,
+    information: Vec<f64>,
     knots: Vec<f64>,
 }
 
@@ -21,13 +22,21 @@ impl Turns {
             times: turns(data.times, period),
             points: data.points.repeat(3),
             weights: data.weights.repeat(3),
+            information: data.information.repeat(3),
             knots: knots(data.knots),
         }
     }
 
     /// As data of a curve.
     pub fn data<'a>(&'a self, of: &Data<'a>) -> Data<'a> {
-        Data { times: &self.times, points: &self.points, weights: &self.weights, knots: &self.knots, ..*of }
+        Data {
+            times: &self.times,
+            points: &self.points,
+            weights: &self.weights,
+            information: &self.information,
+            knots: &self.knots,
+            ..*of
+        }
     }
 }
 

@@ -12,14 +12,15 @@ use symspline::smoothing::{
     Criterion, Data, Ends, FlatEnd, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
     variance as variance_at,
 };
-use symspline::space::Ambient;
+use symspline::space::{Ambient, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// Points at the knots, the band of A⁻¹, and the columns of the report.
 type Smoothed<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>);
 
-/// Smooths curves. `t` and `weights` are of all data, (N,) or (..., N); `knots` (K,) or (..., K); `lam` and `sigma` one
+/// Smooths curves. `t` and `weights` are of all data, (N,) or (..., N); `information`, (..., N, m, m), matrices of which
+/// `weights` are the mean diagonals; `knots` (K,) or (..., K); `lam` and `sigma` one
 /// a curve, NaN where λ is to be chosen.
 #[pyfunction]
 pub fn smooth<'py>(
@@ -28,6 +29,7 @@ pub fn smooth<'py>(
     t: Array<'py>,
     points: Array<'py>,
     weights: Array<'py>,
+    information: Option<Array<'py>>,
     knots: Array<'py>,
     lam: Array<'py>,
     sigma: Array<'py>,
@@ -75,14 +77,17 @@ pub fn smooth<'py>(
     let own = |row: &[f64], size: usize, curve: usize| if row.len() == size { 0 } else { curve * size };
     let (t, p, w, k) = (in_order(&t)?, in_order(&points)?, in_order(&weights)?, in_order(&knots)?);
     let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
+    let matrices = information.as_ref().map_or(Ok(none), in_order)?;
+    let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
     drop(room::<f64>(curves * count * (8 * len + 64))?);
     // Data without weight are left out, and copies of a row, as loggers write them, are one of their weight: they would
     // say that there is no noise.
-    let rows: Vec<[Vec<f64>; 3]> = (0..curves)
+    let rows: Vec<[Vec<f64>; 4]> = (0..curves)
         .map(|c| {
             let (times, weights) = (&t[own(t, n, c)..][..n], &w[own(w, n, c)..][..n]);
             let point = |i: usize| &p[(c * n + i) * len..][..len];
-            let mut rows = [Vec::new(), Vec::new(), Vec::new()];
+            let matrix = |i: usize| &matrices[(c * n + i) * entries..][..entries];
+            let mut rows = [(); 4].map(|()| Vec::new());
             let mut before = None;
             for i in (0..n).filter(|&i| weights[i] > 0.0) {
                 match before {
@@ -90,11 +95,14 @@ pub fn smooth<'py>(
                         if let Some(weight) = rows[2].last_mut() {
                             *weight += weights[i];
                         }
+                        let last = rows[3].len() - entries;
+                        rows[3][last..].iter_mut().zip(matrix(i)).for_each(|(sum, x)| *sum += x);
                     }
                     _ => {
                         rows[0].push(times[i]);
                         rows[1].extend_from_slice(point(i));
                         rows[2].push(weights[i]);
+                        rows[3].extend_from_slice(matrix(i));
                     }
                 }
                 before = Some(i);
@@ -107,6 +115,7 @@ pub fn smooth<'py>(
             times: &rows[c][0],
             points: &rows[c][1],
             weights: &rows[c][2],
+            information: &rows[c][3],
             knots: &k[own(k, count, c)..][..count],
             lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
             sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),

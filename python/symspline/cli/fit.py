@@ -199,7 +199,7 @@ def _fit(
                 )
             else:
                 fitted = smooth_many(
-                    [(*curve, None) for curve in data.curves(space, columns)],
+                    [(*curve, {}) for curve in data.curves(space, columns)],
                     space,
                     extrapolate=extrapolate,
                     progress=progress,

@@ -122,6 +122,12 @@ class Manifold(Space):
             return result
         return dlog_by_differences(self.operations, p, v, q, w, self._radius)
 
+    def frame(self, p: ArrayLike) -> Array:
+        """Orthonormal tangent vectors at the points p, shape (..., dim, *point_shape)."""
+        points = self._numbers(self._doubles(p, "p"))
+        frames = basis_at(self.operations, points)
+        return frames.reshape(*frames.shape[:-1], *self.point_shape)
+
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
         """Random points, shape ``shape + point_shape``: normal numbers, projected by ``project``.
 
@@ -132,11 +138,11 @@ class Manifold(Space):
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
         """Standard normal tangent vectors at the points p."""
-        doubles = self._doubles(p, "p")
-        points, lead = self._numbers(doubles), self._lead(doubles)
-        frames = basis_at(self.operations, points)
-        numbers = rng.standard_normal((*lead, frames.shape[len(lead)]))
-        return np.asarray(np.einsum("...a,...ai->...i", numbers, frames)).reshape(*lead, *self.point_shape)
+        frames = self.frame(p)
+        lead = frames.shape[: frames.ndim - len(self.point_shape)]
+        numbers = rng.standard_normal(lead)
+        scaled = numbers.reshape(*lead, *[1] * len(self.point_shape)) * frames
+        return np.asarray(scaled.sum(axis=len(lead) - 1))
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
         """Length of the geodesic between p and q that ``log`` gives; shape of the leading axes.

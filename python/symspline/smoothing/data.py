@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
-from ..arrays import as_array, cast, shown
+from ..arrays import as_array, shown
 from ..curves.ends import End
 from ..curves.fit import Points, read, read_ends, validated
 from ..handed import times_of
 from ..options import within
 from ..spaces import Array, Space, factors_of
 from ..times import Clock, knots_of
+from .weighing import Weighing, read_weighing
 
 Doubles = NDArray[np.float64]
 
@@ -27,15 +29,20 @@ class Noisy(NamedTuple):
         t: times, shape (N,) or (..., N), as they are shown.
         times: the same in the core.
         points: in every factor, on the space; data of weight zero stand for others.
-        weights: shape (N,) or (..., N).
+        weighing: in every factor.
     """
 
     clock: Clock
     t: Array
     times: Doubles
     points: list[Array]
-    weights: Doubles
+    weighing: list[Weighing]
     batch: tuple[int, ...]
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which data count in some factor, shape (N,) or (..., N)."""
+        return reduce(np.logical_or, [own.weights > 0 for own in self.weighing])
 
 
 class Knots(NamedTuple):
@@ -49,7 +56,8 @@ def read_noisy(
     t: ArrayLike | None,
     points: Any,
     space: Space,
-    weights: ArrayLike | None,
+    weights: Any,
+    frames: Any,
     bc_type: Any,
     atol: float | None,
 ) -> tuple[Noisy, list[list[End] | None]]:
@@ -61,9 +69,9 @@ def read_noisy(
     data = within(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
     clock, shown_times, times = _times_of(t, batch, count)
-    checked = checked_weights(weights, batch, count)
+    weighing = read_weighing(weights, frames, space, data)
     if weights is not None:
-        data = [_without_missing(part, checked) for part in data]
+        data = [_without_missing(part, own.weights) for part, own in zip(data, weighing, strict=True)]
     # Points only: times may repeat, and knots need not be where data are.
     plain = np.arange(count, dtype=np.float64)
     ends = read_ends(bc_type, space, batch)
@@ -75,8 +83,9 @@ def read_noisy(
     # The ends of a closed curve are noisy, too, and differ.
     natural = read_ends("natural", space, batch)
     on_space = validated(space, plain, data, [own or other for own, other in zip(ends, natural, strict=True)])
-    _check_enough(times, checked, batch, count)
-    return Noisy(clock, shown_times, times, on_space, checked, batch), ends
+    for own in weighing:
+        _check_enough(times, own.weights, batch, count)
+    return Noisy(clock, shown_times, times, on_space, weighing, batch), ends
 
 
 def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[Clock, Array, Doubles]:
@@ -92,26 +101,6 @@ def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[
             "order = np.argsort(t)"
         )
     return clock, shown_times, times
-
-
-def checked_weights(weights: ArrayLike | None, batch: tuple[int, ...], count: int) -> Doubles:
-    """Weights, one of every point."""
-    if weights is None:
-        return np.ones(count)
-    array = as_array(weights, "weights")
-    if array.dtype.kind not in "iufb":
-        raise ValidationError(f"weights must be numbers, not {array.dtype}")
-    found = cast(array)
-    if found.shape != (count,) and found.shape != (*batch, count):
-        own = f" or {(*batch, count)}" if batch else ""
-        raise ValidationError(f"weights has shape {found.shape}, but {count} points need {(count,)}{own}")
-    bad = ~(np.isfinite(found) & (found >= 0))
-    if bad.any():
-        index = np.argwhere(bad)[0].tolist()
-        raise ValidationError(
-            f"weights{index} is {found[tuple(index)]}; weights are numbers >= 0, and 0 leaves a point out"
-        )
-    return found
 
 
 def _without_missing(part: Points, weights: Doubles) -> Points:
@@ -207,7 +196,7 @@ def sparse(knots: Knots, noisy: Noisy, lam: float | None) -> Knots:
         return knots
     span = float(times[-1] - times[0])
     mean = span / (len(times) - 1)
-    weight = float(np.max(np.sum(noisy.weights, axis=-1))) / noisy.weights.shape[-1]
+    weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.weighing)
     # In units of the mean distance nothing overflows.
     ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
     least = min(mean * (ratio / most) ** (1 / 3), span / 15)

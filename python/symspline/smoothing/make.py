@@ -36,7 +36,8 @@ def make_smoothing_spline(
     space: Space | str,
     lam: Any = None,
     *,
-    weights: ArrayLike | None = None,
+    weights: Any = None,
+    frames: Any = None,
     knots: Any = None,
     criterion: str = "gcv",
     sigma: Any = None,
@@ -65,7 +66,14 @@ def make_smoothing_spline(
         lam: λ >= 0; 0 comes nearest to the data, and large ones give a geodesic. None to choose it; for a batch also
             one a curve, for a product also a tuple with one of every factor. Its unit is weight · time³.
         weights: of the data, >= 0, shape (N,) or (..., N): one over the variance of their noise, up to a factor. Points
-            of weight zero are left out, and may be NaN.
+            of weight zero are left out, and may be NaN. Or information matrices W, shape (N, m, m) or (..., N, m, m)
+            with m = ``space.dim``, inverse covariances of the noise, for points of which some directions are known
+            better than others: eᵀWe takes the place of w d², e being the coordinates of ``space.log(y, γ(t))``.
+            Directions without any information are allowed. For a product a tuple with one of these for
+            every factor.
+        frames: the tangent vectors that the matrices refer to, m at every point and not necessarily orthonormal,
+            shape (..., N, m, *space.point_shape); None for those of ``space.frame(points)``. Of rotations
+            ``symspline.rotations.velocities(points[:, None], np.eye(3))`` are the axes of the body, in radians.
         knots: of the curve: None for all times of data, a number of them, or an array that reaches from the first
             to the last time. About four times the degrees of freedom are enough. Of more than 4000
             times None takes so many that further ones would not change the curve.
@@ -76,8 +84,7 @@ def make_smoothing_spline(
             tuple for a product.
         bc_type: conditions at the ends: ``"natural"``, ``"clamped"``, ``(1, velocity)`` at either end, as for
             `CubicSpline`, or ``"periodic"``. Velocities are tangent at the first and the last of the points, and are
-            carried from there to the curve in parallel. A closed curve has the period of its knots, and the flat way
-            only.
+            carried from there to the curve in parallel. A closed curve has the period of its knots.
         loss: ``"linear"`` for least squares; ``"huber"`` or ``"cauchy"`` if there are outliers.
         method: ``"flat"`` solves the problem of numbers in frames along the curve, again and again; its result is
             within about 1e-4 of the error of the minimum. ``"newton"`` is the Gauss-Newton method for the minimum
@@ -111,12 +118,15 @@ def make_smoothing_spline(
     for name, word in (("criterion", criterion), ("loss", loss), ("method", method)):
         if not isinstance(word, str):
             raise ValidationError(f"{name} must be a word, not {shown(word)}")
-    if is_closed(bc_type) and method == "newton":
-        raise ValidationError("method 'newton': closed curves go the flat way only")
     if isinstance(tol, bool) or not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
         raise ValidationError(f"tol must be a number > 0, not {shown(tol)}")
     asked = Asked(criterion, loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
-    noisy, ends = read_noisy(t, points, space, weights, bc_type, atol)
+    noisy, ends = read_noisy(t, points, space, weights, frames, bc_type, atol)
+    if loss != "linear" and sigma is None and any(own.is_singular for own in noisy.weighing):
+        raise ValidationError(
+            f"loss {loss!r} with weights that know nothing of some directions needs sigma, the size of the noise: "
+            "1 where they are inverse covariances"
+        )
     if noisy.times.shape[-1] == 2:
         # Of two points none is an outlier, and nothing says how large the noise is.
         asked = asked._replace(loss="linear")
@@ -124,10 +134,10 @@ def make_smoothing_spline(
     sigmas = _in_factors(space, sigma, "sigma", noisy.batch)
 
     def run(at: Knots) -> list[Any]:
-        each = zip(points_of(noisy, space), _chosen(lams, at), sigmas, ends, strict=True)
+        each = zip(points_of(noisy, space), noisy.weighing, _chosen(lams, at), sigmas, ends, strict=True)
         return [
-            smoothed(factor, noisy, own, at, one_lam, one_sigma, end, asked, progress)
-            for (factor, own), one_lam, one_sigma, end in each
+            smoothed(factor, noisy, own, weighing, at, one_lam, one_sigma, end, asked, progress)
+            for (factor, own), weighing, one_lam, one_sigma, end in each
         ]
 
     whole = knots_for(noisy, knots)
@@ -168,7 +178,7 @@ def make_lsq_spline(
     knots: Any,
     space: Space | str,
     *,
-    weights: ArrayLike | None = None,
+    weights: Any = None,
     loss: str = "linear",
     **options: Any,
 ) -> SmoothingSpline:

@@ -15,14 +15,14 @@ from .spline import SmoothingSpline
 
 
 def smooth_many(
-    curves: Iterable[tuple[Any, Any, Any]],
+    curves: Iterable[tuple[Any, Any, dict[str, Any]]],
     space: Space,
     *,
     on_failure: str = "raise",
     progress: Progress | None = None,
     **options: Any,
 ) -> list[SmoothingSpline]:
-    """One spline a curve of times, points and weights, each with a λ of its own.
+    """One spline a curve of times, points and keywords of its own, each with a λ of its own.
 
     Args:
         options: those of `make_smoothing_spline`, for all curves alike.
@@ -36,9 +36,9 @@ def smooth_many(
     given = list(curves)
     found: list[SmoothingSpline] = []
     faults: list[Fault] = []
-    for number, (t, points, weights) in enumerate(given):
+    for number, (t, points, own) in enumerate(given):
         try:
-            found.append(make_smoothing_spline(t, points, space, weights=weights, **options))
+            found.append(make_smoothing_spline(t, points, space, **own, **options))
         except ConvergenceError as error:
             found.append(error.spline)
             faults.append((number, "unconverged", f"curve {number}: {error}"))

@@ -16,6 +16,7 @@ from ..curves.solve import Fault, Progress
 from ..spaces import Array, Space
 from .data import Knots, Noisy
 from .report import SmoothingReport
+from .weighing import Weighing
 
 Doubles = NDArray[np.float64]
 
@@ -60,6 +61,7 @@ def smoothed(
     space: Space,
     noisy: Noisy,
     points: Array,
+    weighing: Weighing,
     knots: Knots,
     lam: Doubles,
     sigma: Doubles,
@@ -72,11 +74,15 @@ def smoothed(
     batch = noisy.batch
     if span is not None and any(vector is not None for _, vector in ends or []):
         raise ValidationError(f"in as many dimensions as {space} has, end velocities cannot be given")
+    matrices = weighing.information
+    if matrices is not None:
+        matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
     found, band, columns = _core.smooth(
         small._handle,
         np.ascontiguousarray(noisy.times),
         np.ascontiguousarray(small._as_doubles(inside)),
-        noisy.weights,
+        weighing.weights,
+        matrices,
         np.ascontiguousarray(knots.times),
         lam,
         sigma,

@@ -87,8 +87,10 @@ class SmoothingSpline(CubicSpline):
         at = self._curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)
         found = []
         gammas = at if isinstance(self.space, Product) else (at,)
-        for space, gamma, points in zip(factors_of(self.space), gammas, noisy.points, strict=True):
-            used = np.broadcast_to(noisy.weights > 0, (*noisy.batch, points.shape[len(noisy.batch)]))
+        for space, gamma, points, weighing in zip(
+            factors_of(self.space), gammas, noisy.points, noisy.weighing, strict=True
+        ):
+            used = np.broadcast_to(weighing.weights > 0, (*noisy.batch, points.shape[len(noisy.batch)]))
             used = used & np.isfinite(gamma).all(axis=tuple(range(len(noisy.batch) + 1, gamma.ndim)))
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
@@ -175,7 +177,7 @@ class SmoothingSpline(CubicSpline):
 
     @property
     def _made_of(self) -> str:
-        count = int(np.max(np.sum(self._noisy.weights > 0, axis=-1)))
+        count = int(np.max(np.sum(self._noisy.used, axis=-1)))
         df = _ranges([part.report.df for part in self._smoothed], 3)
         sigma = _ranges([part.sigma for part in self._smoothed], 2)
         each = " each" if self._batch else ""
@@ -183,15 +185,15 @@ class SmoothingSpline(CubicSpline):
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> Noise:
         noisy = self._noisy
-        own = [array[index] if array.ndim > 1 else array for array in (noisy.times, noisy.weights)]
-        used = own[1] > 0
+        times = noisy.times[index] if noisy.times.ndim > 1 else noisy.times
+        used = noisy.used[index] if noisy.used.ndim > 1 else noisy.used
         radii = [
             _radius(factor, 0.95) * self._spread(part, index, x, 0)
             for factor, part in zip(factors_of(self.space), self._smoothed, strict=True)
         ]
         product = isinstance(self.space, Product)
         speed = None if product else self._spread(self._smoothed[0], index, x, 1)
-        return Noise(own[0][used], [points[index][used] for points in noisy.points], radii, speed)
+        return Noise(times[used], [points[index][used] for points in noisy.points], radii, speed)
 
     @property
     def _unconverged(self) -> int:
@@ -206,7 +208,7 @@ class SmoothingSpline(CubicSpline):
             t=noisy.t[index] if noisy.t.ndim > 1 else noisy.t,
             times=noisy.times[index] if noisy.times.ndim > 1 else noisy.times,
             points=[points[index] for points in noisy.points],
-            weights=noisy.weights[index] if noisy.weights.ndim > 1 else noisy.weights,
+            weighing=[own.map(lambda column: column[index]) for own in noisy.weighing],
             batch=curve.batch,
         )
         return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
@@ -214,9 +216,11 @@ class SmoothingSpline(CubicSpline):
     @property
     def _parts(self) -> tuple[SmoothingSpline, ...]:
         """The splines in the factors of a product."""
-        each = zip(super()._parts, self._noisy.points, self._smoothed, strict=True)
+        noisy = self._noisy
+        each = zip(super()._parts, noisy.points, noisy.weighing, self._smoothed, strict=True)
         return tuple(
-            self._like(part, self._noisy._replace(points=[points]), [found]) for part, points, found in each
+            self._like(part, noisy._replace(points=[points], weighing=[weighing]), [found])
+            for part, points, weighing, found in each
         )
 
     @classmethod

@@ -18,6 +18,7 @@ from ..times import Clock
 from .data import Noisy
 from .report import SmoothingReport
 from .solve import Smoothed
+from .weighing import Weighing
 
 _KINDS = {"converged": "b", "iterations": "i", "at_bound": "b"}
 _NUMBERS = ("step", "rate", "lam", "df", "sigma", "band_lam", "scale")
@@ -28,12 +29,20 @@ def noisy_arrays(space: Space, noisy: Noisy, smoothed: list[Smoothed]) -> dict[s
     arrays: dict[str, Any] = {
         "format": SMOOTHING,
         **times_arrays("data_t", noisy.t, noisy.clock),
-        "data_weights": noisy.weights,
         "noise": json.dumps([_plain(found) for found in smoothed]),
     }
-    for i, (points, found) in enumerate(zip(noisy.points, smoothed, strict=True)):
+    first, *others = noisy.weighing
+    alike = all(np.array_equal(first.weights, own.weights) for own in others)
+    if alike:
+        arrays["data_weights"] = first.weights
+    each = zip(noisy.points, noisy.weighing, smoothed, strict=True)
+    for i, (points, weighing, found) in enumerate(each):
         suffix = _suffix(space, i)
         arrays["data" + suffix], arrays["band" + suffix] = points, found.band
+        if not alike:
+            arrays["data_weights" + suffix] = weighing.weights
+        if weighing.information is not None:
+            arrays["data_information" + suffix] = weighing.information
     return arrays
 
 
@@ -65,11 +74,7 @@ def read_stored(
         raise ValidationError("the times of the data go back")
     if np.any(times[..., 0] < curve.times[..., 0]) or np.any(times[..., -1] > curve.times[..., -1]):
         raise ValidationError("there are data before the first or behind the last knot")
-    weights = arrays["data_weights"]
-    _check_shape("the weights", weights, (count,), (*batch, count))
-    if not (np.isfinite(weights) & (weights >= 0)).all():
-        raise ValidationError("the weights are no numbers >= 0")
-    points, smoothed = [], []
+    points, weighing, smoothed = [], [], []
     for i, (factor, numbers) in enumerate(
         zip(factors_of(space), json.loads(str(arrays["noise"])), strict=True)
     ):
@@ -79,13 +84,31 @@ def read_stored(
             raise ValidationError(f"the data have shape {own.shape}")
         factor.check_point(own)
         points.append(own)
+        weighing.append(_weighing(arrays, suffix, factor.dim, batch, count))
         band = arrays["band" + suffix]
         _check_shape("the band", band, (*batch, knots, 4))
         found = _smoothed(numbers, band, batch)
         if not np.isfinite(band[np.asarray(found.report.converged)]).all():
             raise ValidationError("the band is not finite")
         smoothed.append(found)
-    return Noisy(clock, t, times, points, weights, batch), smoothed
+    return Noisy(clock, t, times, points, weighing, batch), smoothed
+
+
+def _weighing(
+    arrays: Mapping[str, NDArray[Any]], suffix: str, m: int, batch: tuple[int, ...], count: int
+) -> Weighing:
+    """What the data count in one factor."""
+    own = "data_weights" + suffix
+    weights = arrays[own if own in arrays else "data_weights"]
+    _check_shape("the weights", weights, (count,), (*batch, count))
+    if not (np.isfinite(weights) & (weights >= 0)).all():
+        raise ValidationError("the weights are no numbers >= 0")
+    information = arrays.get("data_information" + suffix)
+    if information is not None:
+        _check_shape("the information matrices", information, (count, m, m), (*batch, count, m, m))
+        if not np.isfinite(information).all():
+            raise ValidationError("the information matrices are not finite")
+    return Weighing(weights, information)
 
 
 def _check_shape(what: str, array: NDArray[Any], *shapes: tuple[int, ...]) -> None:

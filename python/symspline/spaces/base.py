@@ -238,6 +238,24 @@ class Space:
                 f"off the space (allowed: {tol:.0e}); use space.project_tangent(p, v)"
             )
 
+    def frame(self, p: ArrayLike) -> Array:
+        """Tangent vectors that span the tangent space at every one of the points p, shape (..., dim, *point_shape):
+        orthonormal, where the space has a metric. There are many such frames; this one is no continuous function of p.
+
+        >>> import symspline as ss
+        >>> ss.Sphere(2).frame([0.0, 0.0, 1.0])
+        array([[1., 0., 0.],
+               [0., 1., 0.]])
+        """
+        if self._linear and self.point_shape[0] >= LARGE:
+            raise ValidationError(f"{self!r} has too many dimensions for frames")
+        doubles = self._doubles(p, "p")
+        at_each = np.expand_dims(doubles, len(self._lead(doubles)))
+        size = math.prod(self._doubles_shape)
+        units = np.eye(self.dim, size).reshape(-1, *self._doubles_shape)
+        # From a frame at p the core makes random vectors; these are what it makes of single ones.
+        return self._finite("random_tangent", p=self._numbers(at_each), noise=self._numbers(units))
+
     # ---- chance ----
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:

@@ -87,6 +87,9 @@ class Product(Space):
     def check_tangent(self, p: Any, v: Any) -> None:
         self._each("check_tangent", p, v)
 
+    def frame(self, p: Any) -> Any:
+        return self._each("frame", p)
+
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Any:
         return tuple(factor.random_point(rng, shape) for factor in self.factors)
 

@@ -58,7 +58,8 @@ pub struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Of a sample, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last.
+    /// Of a sample, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last. The last knot of a
+    /// closed curve is the first again, in its frame.
     pub fn at(&self, tau: f64, of: Of) -> Matrix {
         let m = self.derivative.space.dim();
         let place = Place { segment: self.segment, tau };
@@ -70,6 +71,14 @@ impl Motion<'_> {
             let inner = columns.columns((1 + e) * m, m);
             out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * &f.cosh));
             out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * &f.stretch * third));
+        }
+        if let (Some(seam), true) =
+            (&self.derivative.polygon.seam, self.segment + 1 == self.derivative.segments())
+        {
+            for from in [2 * m, 3 * m] {
+                let turned = out.columns(from, m) * seam;
+                out.columns_mut(from, m).copy_from(&turned);
+            }
         }
         out
     }

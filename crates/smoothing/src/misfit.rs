@@ -1,0 +1,231 @@
+//! How far the data are from a curve, weighed, and the problem of numbers that makes of it: A = BᵀWB + λΩ.
+//!
+//! Weights that are numbers weigh all coordinates alike, and A is the same for each of them. Weights that are matrices
+//! couple the coordinates: A is one matrix of all, with the width of a band of blocks.
+
+use crate::banded::Banded;
+use crate::flat::{Flat, Row, WIDTH};
+use crate::information::Seen;
+use std::ops::Range;
+use symspline_core::scalar::{LANES, Lane, few, lane};
+
+/// Residuals at a curve, in coordinates of frames along it, and their weights.
+pub enum Misfit<'a> {
+    /// A number each: `w|r|²`.
+    Numbers {
+        /// Weights w.
+        weights: &'a [f64],
+        /// Residuals r, m numbers each.
+        residuals: Vec<f64>,
+    },
+    /// A matrix each.
+    Matrices {
+        /// Residuals.
+        seen: Seen,
+        /// BᵀNᵀNB: the entries (i, i − d) at i · 4m + d, coordinates of a coefficient side by side.
+        gram: Vec<f64>,
+    },
+}
+
+/// A, factored, for another λ on each lane.
+pub struct Factors {
+    banded: Banded,
+    /// Coordinates that it has in itself: one, which stands for all, or m.
+    coupled: usize,
+}
+
+impl<'a> Misfit<'a> {
+    /// For weights that are matrices.
+    pub fn matrices(flat: &Flat, m: usize, seen: Seen) -> Self {
+        let stride = stride(m);
+        let mut gram = vec![0.0; flat.basis.count() * m * stride];
+        let mut square = vec![0.0; m * m];
+        for (b, n) in flat.data.iter().zip(seen.rows.chunks_exact(m * m)) {
+            square.fill(0.0);
+            for row in n.chunks_exact(m) {
+                for (at, x) in square.iter_mut().enumerate() {
+                    *x = row[at / m].mul_add(row[at % m], *x);
+                }
+            }
+            for (p, f) in b.factors.iter().enumerate() {
+                for (q, g) in b.factors[..=p].iter().enumerate() {
+                    let factor = f * g;
+                    if factor == 0.0 {
+                        continue;
+                    }
+                    for (at, x) in square.iter().enumerate() {
+                        let (i, j) = ((b.first + p) * m + at / m, (b.first + q) * m + at % m);
+                        if i >= j {
+                            gram[i * stride + i - j] += factor * x;
+                        }
+                    }
+                }
+            }
+        }
+        Misfit::Matrices { seen, gram }
+    }
+
+    /// BᵀWr.
+    pub fn pull(&self, flat: &Flat, m: usize) -> Vec<f64> {
+        let mut pull = vec![0.0; flat.basis.count() * m];
+        let mut weighed = vec![0.0; m];
+        for (k, row) in flat.data.iter().enumerate() {
+            match self {
+                Misfit::Numbers { weights, residuals } => {
+                    let r = &residuals[k * m..][..m];
+                    weighed.iter_mut().zip(r).for_each(|(x, r)| *x = weights[k] * r);
+                }
+                Misfit::Matrices { seen, .. } => weighed.copy_from_slice(&seen.pulls[k * m..][..m]),
+            }
+            row.spread(&weighed, &mut pull);
+        }
+        pull
+    }
+
+    /// A for eight λ.
+    pub fn factored(&self, flat: &Flat, m: usize, lam: Lane) -> Factors {
+        let count = flat.basis.count();
+        let (mut banded, coupled) = match self {
+            Misfit::Numbers { .. } => {
+                let entry = |at: usize| lam.mul_add(lane(flat.penalty[at]), lane(flat.gram[at]));
+                (Banded::of(count, WIDTH, entry), 1)
+            }
+            Misfit::Matrices { gram, .. } => {
+                let stride = stride(m);
+                let entry = |at: usize| {
+                    let (i, d) = (at / stride, at % stride);
+                    let stiff = if d % m == 0 { flat.penalty[i / m * (WIDTH + 1) + d / m] } else { 0.0 };
+                    lam.mul_add(lane(stiff), lane(gram[at]))
+                };
+                (Banded::of(count * m, stride - 1, entry), m)
+            }
+        };
+        banded.factor();
+        Factors { banded, coupled }
+    }
+
+    /// What is left of a datum when the coefficients have moved by x, squared and weighed.
+    fn square(&self, row: &Row, k: usize, m: usize, x: &[Lane]) -> Lane {
+        let mut sum = Lane::ZERO;
+        match self {
+            Misfit::Numbers { weights, residuals } => {
+                for c in 0..m {
+                    let moved = lane(residuals[k * m + c]) - row.of_lanes(x, m, c);
+                    sum = (moved * lane(weights[k])).mul_add(moved, sum);
+                }
+            }
+            Misfit::Matrices { seen, .. } => {
+                for (j, n) in seen.rows[k * m * m..][..m * m].chunks_exact(m).enumerate() {
+                    let moved = (0..m).fold(lane(seen.residuals[k * m + j]), |rest, c| {
+                        (-row.of_lanes(x, m, c)).mul_add(lane(n[c]), rest)
+                    });
+                    sum = moved.mul_add(moved, sum);
+                }
+            }
+        }
+        sum
+    }
+
+    /// The number of data for each coordinate.
+    pub fn count(&self, own: Range<usize>, m: usize) -> f64 {
+        match self {
+            Misfit::Numbers { .. } => own.len() as f64,
+            Misfit::Matrices { seen, .. } => seen.ranks[own].iter().sum::<usize>() as f64 / m as f64,
+        }
+    }
+
+    /// The weighed sum of squares when the coefficients have moved by x.
+    pub fn rss(&self, flat: &Flat, m: usize, x: &[Lane]) -> Lane {
+        flat.own.data.clone().fold(Lane::ZERO, |sum, k| sum + self.square(&flat.data[k], k, m, x))
+    }
+
+    /// The weighed sum of squares as it is.
+    pub fn rss_now(&self, own: Range<usize>, m: usize) -> f64 {
+        let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
+        match self {
+            Misfit::Numbers { weights, residuals } => {
+                own.map(|k| weights[k] * square(&residuals[k * m..][..m])).sum()
+            }
+            Misfit::Matrices { seen, .. } => square(&seen.residuals[own.start * m..own.end * m]),
+        }
+    }
+
+    /// tr A⁻¹BᵀWB over the number of coordinates, given the band of A⁻¹: the degrees of freedom of one.
+    pub fn freedom(&self, flat: &Flat, m: usize, inverse: &Banded) -> Lane {
+        let (gram, size) = match self {
+            Misfit::Numbers { .. } => (&flat.gram, 1),
+            Misfit::Matrices { gram, .. } => (gram, m),
+        };
+        let stride = inverse.width + 1;
+        let own = &flat.own.knots;
+        let mut sum = Lane::ZERO;
+        for i in own.start * size..own.end * size {
+            for j in i.saturating_sub(inverse.width)..(i + stride).min(inverse.size) {
+                sum += inverse.at(i, j) * lane(gram[i.max(j) * stride + i.abs_diff(j)]);
+            }
+        }
+        sum * lane(1.0 / size as f64)
+    }
+}
+
+/// Places of a row of the band of coupled coordinates.
+fn stride(m: usize) -> usize {
+    (WIDTH + 1) * m
+}
+
+impl Factors {
+    /// A⁻¹x in place: coefficients of m numbers.
+    pub fn solve(&self, m: usize, x: &mut [Lane]) {
+        self.banded.solve(m / self.coupled, x);
+    }
+
+    /// The same for one λ, which is on all lanes.
+    pub fn solve_one(&self, m: usize, right: &[f64]) -> Vec<f64> {
+        if self.coupled > 1 {
+            let mut x: Vec<Lane> = right.iter().map(|&x| lane(x)).collect();
+            self.solve(m, &mut x);
+            return x.iter().map(|x| x.as_array()[0]).collect();
+        }
+        // Coordinates in the lanes.
+        let columns = m.div_ceil(LANES);
+        let mut x = vec![Lane::ZERO; right.len() / m * columns];
+        for (right, x) in right.chunks_exact(m).zip(x.chunks_exact_mut(columns)) {
+            for (k, x) in x.iter_mut().enumerate() {
+                *x = Lane::new(few(|l| right.get(k * LANES + l).copied().unwrap_or(0.0)));
+            }
+        }
+        self.banded.solve(columns, &mut x);
+        let number = |i: usize, c: usize| x[i * columns + c / LANES].as_array()[c % LANES];
+        (0..right.len()).map(|at| number(at / m, at % m)).collect()
+    }
+
+    /// The smallest pivot: not positive where A is not positive definite, as far as rounding tells.
+    pub fn least_pivot(&self) -> Lane {
+        self.banded.least_pivot()
+    }
+
+    /// ln det A of one coordinate, or what the coefficients of some knots have of it.
+    pub fn log_det(&self, knots: Range<usize>) -> Lane {
+        let rows = knots.start * self.coupled..knots.end * self.coupled;
+        self.banded.log_det(rows) * lane(1.0 / self.coupled as f64)
+    }
+
+    /// The band of A⁻¹.
+    pub fn inverse_band(&self) -> Banded {
+        self.banded.inverse_band()
+    }
+
+    /// The band of A⁻¹ of one coordinate: the mean of all.
+    pub fn mean(&self, inverse: &Banded) -> Banded {
+        let m = self.coupled;
+        let entry = |at: usize| {
+            let (i, d) = (at / (WIDTH + 1), at % (WIDTH + 1));
+            if d > i {
+                return Lane::ZERO;
+            }
+            let sum = (0..m).fold(Lane::ZERO, |sum, c| sum + inverse.at(i * m + c, (i - d) * m + c));
+            sum * lane(1.0 / m as f64)
+        };
+        Banded::of(inverse.size / m, WIDTH, entry)
+    }
+}

@@ -1,0 +1,326 @@
+"""Weights that are matrices: data of which some directions are better known than others."""
+
+import numpy as np
+import pytest
+from noisy import example, rms, truth
+from test_smoothing_laws import NAMES
+
+import symspline as ss
+
+every = pytest.mark.parametrize("name", [n for n in NAMES if n != "sphere:1"])
+TIGHT = {"tol": 1e-8, "max_iter": 200}
+
+
+def matrices(rng, n, m, condition=30.0):
+    """Symmetric matrices with eigenvalues between 1/√condition and √condition."""
+    turn = np.linalg.qr(rng.normal(size=(n, m, m)))[0]
+    values = np.exp(rng.uniform(-0.5, 0.5, (n, m)) * np.log(condition))
+    values[:, 0], values[:, -1] = condition**-0.5, condition**0.5
+    return turn @ (values[..., None] * np.swapaxes(turn, -1, -2))
+
+
+def scattered(space, points, information, sigma, rng):
+    """Noise with the covariances sigma² W⁻¹."""
+    root = np.linalg.cholesky(np.linalg.inv(information))
+    numbers = (root @ rng.standard_normal((*information.shape[:-1], 1)))[..., 0]
+    axes = (1,) * len(space.point_shape)
+    v = np.sum(numbers.reshape(*numbers.shape, *axes) * space.frame(points), axis=1)
+    return space.exp(points, sigma * v)
+
+
+def coordinates(space, frames, v):
+    """Of vectors, one in every frame."""
+    flat = [space._as_doubles(np.ascontiguousarray(x)) for x in (frames, v)]
+    columns = np.swapaxes(flat[0].reshape(*frames.shape[:2], -1), -1, -2)
+    return np.linalg.pinv(columns) @ flat[1].reshape(len(v), -1, 1)
+
+
+@pytest.mark.parametrize("lam", [0.01, 1.0, 100.0])
+def test_numbers_solve_the_equations_of_a_dense_matrix(lam):
+    """(W + λK ⊗ 1) x = W y, with the matrix K of the energy of natural splines (Green & Silverman 1994, §2.1)."""
+    rng = np.random.default_rng(0)
+    n, m = 15, 3
+    t = np.cumsum(rng.uniform(0.3, 1, n))
+    h = np.diff(t)
+    q, r = np.zeros((n, n - 2)), np.zeros((n - 2, n - 2))
+    for j in range(n - 2):
+        q[j, j], q[j + 1, j], q[j + 2, j] = 1 / h[j], -1 / h[j] - 1 / h[j + 1], 1 / h[j + 1]
+        r[j, j] = (h[j] + h[j + 1]) / 3
+        if j < n - 3:
+            r[j, j + 1] = r[j + 1, j] = h[j + 1] / 6
+    energy = np.kron(q @ np.linalg.solve(r, q.T), np.eye(m))
+    y, w = rng.normal(size=(n, m)), matrices(rng, n, m, 1000.0)
+    whole = np.zeros((n * m, n * m))
+    for k in range(n):
+        whole[k * m : k * m + m, k * m : k * m + m] = w[k]
+    a = whole + lam * energy
+    x = np.linalg.solve(a, whole @ y.ravel()).reshape(n, m)
+    spline = ss.make_smoothing_spline(t, y, "r:3", lam, weights=w)
+    assert np.abs(spline.points - x).max() < 1e-10
+    assert spline.report.iterations <= 4
+    df = np.trace(np.linalg.solve(a, whole)) / m
+    assert spline.df == pytest.approx(df, rel=1e-10)
+    rest = (x - y)[:, None, :] @ w @ (x - y)[:, :, None]
+    assert spline.sigma == pytest.approx(np.sqrt(rest.sum() / (m * (n - df))), rel=1e-10)
+    variances = np.diag(np.linalg.inv(a)).reshape(n, m).mean(axis=1)
+    assert spline.std(t) == pytest.approx(spline.sigma * np.sqrt(variances), rel=1e-9)
+
+
+@every
+def test_multiples_of_one_are_numbers(name):
+    if name.startswith("se"):
+        pytest.skip("lengths are those in frames of the curve for numbers, of the data for matrices")
+    space, t, noisy, _ = example(name, 0.1, n=30)
+    w = np.random.default_rng(0).uniform(0.3, 3, 30)
+    information = w[:, None, None] * np.eye(space.dim)
+    for options in ({"criterion": "gcv"}, {"criterion": "reml"}, {"lam": 0.1, "method": "newton"}):
+        one, other = (
+            ss.make_smoothing_spline(t, noisy, space, weights=weights, **options, **TIGHT)
+            for weights in (w, information)
+        )
+        assert other.lam == pytest.approx(one.lam, rel=1e-5)
+        assert other.df == pytest.approx(one.df, rel=1e-5)
+        assert space.distance(other.points, one.points).max() < 1e-7
+
+
+@every
+def test_frames_say_what_matrices_mean(name):
+    """Any basis does; and a curve does not know which."""
+    rng = np.random.default_rng(0)
+    space, t, noisy, _ = example(name, 0.1, n=20)
+    w = matrices(rng, 20, space.dim)
+    change = matrices(rng, 20, space.dim, 5.0) @ np.triu(np.ones((space.dim, space.dim)))
+    flat = space.frame(noisy).reshape(20, space.dim, -1)
+    bent = (np.swapaxes(change, -1, -2) @ flat).reshape(20, space.dim, *space.point_shape)
+    one = ss.make_smoothing_spline(t, noisy, space, 0.1, weights=w, **TIGHT)
+    other = ss.make_smoothing_spline(
+        t, noisy, space, 0.1, weights=np.swapaxes(change, -1, -2) @ w @ change, frames=bent, **TIGHT
+    )
+    assert space.distance(one.points, other.points).max() < 1e-7
+    assert other.df == pytest.approx(one.df, rel=1e-9)
+
+
+def objective(space, t, noisy, points, lam, w):
+    spline = ss.CubicSpline(t, points, space)
+    h = np.diff(t)
+    x = t[:-1, None] + h[:, None] * (0.5 + np.array([-0.5, 0.5]) / np.sqrt(3))
+    at, bends = spline(x), spline(x, nu=2)
+    e = coordinates(space, space.frame(noisy), space.log(noisy, points))
+    misfit = np.sum(np.swapaxes(e, -1, -2) @ w @ e)
+    return misfit + lam * np.sum(0.5 * h[:, None] * space.inner(at, bends, bends))
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "sphere:1" and not n.startswith("se")])
+def test_the_exact_way_leads_to_the_minimum(name):
+    rng = np.random.default_rng(2)
+    space = ss.space(name)
+    t = np.linspace(0, 10, 12)
+    w, lam = matrices(rng, 12, space.dim), 0.3
+    noisy = scattered(space, truth(space, segments=3)(t), w, 0.1, rng)
+    exact = ss.make_smoothing_spline(t, noisy, space, lam, weights=w, method="newton", **TIGHT)
+    assert exact.report.converged and exact.report.method == "newton"
+    here = objective(space, t, noisy, exact.points, lam, w)
+    for _ in range(3):
+        v = space.random_tangent(rng, exact.points)
+        up, down = (
+            objective(space, t, noisy, space.exp(exact.points, s * 1e-4 * v), lam, w) for s in (1, -1)
+        )
+        bend = (up + down - 2 * here) / 1e-8
+        assert bend > 0 and abs(up - down) / 2e-4 / bend < 1e-7
+    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=w, method="flat", **TIGHT)
+    assert flat.report.converged
+    # What the estimating equation is off by, more than usual over steps that are so long.
+    assert rms(space, flat.points, exact.points) < 1.5e-2 * exact.std(t).max()
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3", "spd:2", "se:3", "gr:2,5"])
+def test_poor_directions_do_little_harm(name):
+    """Noise ten times as large in half of the directions: with numbers for weights it is that in all of them."""
+    rng = np.random.default_rng(3)
+    space = ss.space(name)
+    t = np.linspace(0, 10, 100)
+    points = truth(space)(t)
+    w = matrices(rng, 100, space.dim, 300.0)
+    gains = []
+    for seed in range(6):
+        noisy = scattered(space, points, w, 0.03, np.random.default_rng(seed))
+        # The frames of the data are nearly those of the points.
+        informed = ss.make_smoothing_spline(
+            t,
+            noisy,
+            space,
+            weights=w,
+            frames=space.transport(points[:, None], noisy[:, None], space.frame(points)),
+        )
+        plain = ss.make_smoothing_spline(t, noisy, space)
+        assert informed.report.converged
+        assert informed.sigma == pytest.approx(0.03, rel=0.2)
+        gains.append(rms(space, plain(t), points) / rms(space, informed(t), points))
+    assert np.mean(gains) > 1.3
+
+
+def test_each_of_two_sensors_knows_one_direction():
+    """Latitudes and longitudes of their own times: every matrix has rank one."""
+    space, rng = ss.Sphere(2), np.random.default_rng(4)
+    t = np.linspace(0, 10, 200)
+    points = truth(space, step=0.4)(t)
+    up = space.project_tangent(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
+    up /= space.norm(points, up)[:, None]
+    east = np.cross(points, up)
+    numbers = 0.02 * rng.standard_normal((200, 2))
+    # What a sensor does not see is anything.
+    numbers[::2, 0], numbers[1::2, 1] = 5 * numbers[::2, 0], 5 * numbers[1::2, 1]
+    noisy = space.exp(points, numbers[:, :1] * up + numbers[:, 1:] * east)
+    frames = space.transport(points[:, None], noisy[:, None], np.stack([up, east], axis=1))
+    w = np.zeros((200, 2, 2))
+    w[1::2, 0, 0] = w[::2, 1, 1] = 1 / 0.02**2
+    spline = ss.make_smoothing_spline(t, noisy, space, weights=w, frames=frames)
+    assert spline.report.converged
+    assert rms(space, spline(t), points) < 0.012
+    assert spline.sigma == pytest.approx(1, rel=0.1) and 10 < spline.df < 30
+    with pytest.raises(ss.ValidationError, match="needs sigma"):
+        ss.make_smoothing_spline(t, noisy, space, weights=w, frames=frames, loss="huber")
+    robust = ss.make_smoothing_spline(t, noisy, space, weights=w, frames=frames, loss="huber", sigma=1)
+    assert rms(space, robust(t), points) < 0.014
+
+
+def test_outliers_among_them():
+    rng = np.random.default_rng(5)
+    space = ss.space("so:3")
+    t = np.linspace(0, 10, 150)
+    points, w = truth(space)(t), matrices(rng, 150, 3, 100.0)
+    clean = scattered(space, points, w, 0.05, rng)
+    spoiled = clean.copy()
+    spoiled[5::10] = space.random_point(rng, len(spoiled[5::10]))
+    wanted = rms(space, ss.make_smoothing_spline(t, clean, space, weights=w)(t), points)
+    robust = ss.make_smoothing_spline(t, spoiled, space, weights=w, loss="cauchy")
+    assert rms(space, robust(t), points) < 1.3 * wanted
+
+
+def test_batches_are_single_curves():
+    rng = np.random.default_rng(6)
+    space = ss.space("so:3")
+    t = np.linspace(0, 10, 25)
+    batch = np.stack([scattered(space, truth(space, k)(t), matrices(rng, 25, 3), 0.1, rng) for k in range(3)])
+    w = np.stack([matrices(rng, 25, 3) for _ in range(3)])
+    together = ss.make_smoothing_spline(t, batch, space, weights=w)
+    for k in range(3):
+        alone = ss.make_smoothing_spline(t, batch[k], space, weights=w[k])
+        assert np.array_equal(alone.points, together.points[k]) and alone.lam == together.lam[k]
+    shared = ss.make_smoothing_spline(t, batch, space, weights=w[0])
+    assert np.array_equal(shared.points[0], together.points[0])
+
+
+def test_knots_repeated_times_and_gaps():
+    rng = np.random.default_rng(7)
+    space = ss.Sphere(2)
+    t = np.sort(rng.choice(np.linspace(0, 10, 60), 90))
+    curve = truth(space)
+    w = matrices(rng, 90, 2)
+    w[20:30] = 0
+    noisy = scattered(space, curve(t), w + 1e-9 * np.eye(2), 0.03, rng)
+    noisy[20:30] = np.nan
+    frames = space.frame(curve(t))
+    whole = ss.make_smoothing_spline(t, noisy, space, weights=w, knots=20, **TIGHT)
+    assert whole.report.converged and np.isnan(whole.residuals[20:30]).all()
+    used = np.r_[:20, 30:90]
+    rest = ss.make_smoothing_spline(t[used], noisy[used], space, weights=w[used], knots=whole.t, **TIGHT)
+    assert space.distance(rest.points, whole.points).max() < 1e-12
+    assert frames.shape == (90, 2, 3)
+    # Copies of a datum count as one with the sum of their matrices.
+    twice = np.sort(np.r_[np.arange(60), 7])
+    t, noisy, w = t[used][:60], noisy[used][:60], w[used][:60]
+    once = w.copy()
+    once[7] *= 2
+    one = ss.make_smoothing_spline(t, noisy, space, 0.1, weights=once)
+    two = ss.make_smoothing_spline(t[twice], noisy[twice], space, 0.1, weights=w[twice])
+    assert np.abs(one.points - two.points).max() < 1e-14
+
+
+def test_closed_curves():
+    rng = np.random.default_rng(8)
+    space = ss.Sphere(2)
+    t = np.linspace(0, 1, 41)
+    points = np.stack([np.cos(2 * np.pi * t), np.sin(2 * np.pi * t), 0.5 + 0 * t], axis=-1) / np.sqrt(1.25)
+    w = matrices(rng, 41, 2)
+    noisy = scattered(space, points, w, 0.03, rng)
+    spline = ss.make_smoothing_spline(t, noisy, space, weights=w, bc_type="periodic")
+    assert spline.report.converged
+    assert rms(space, spline(t), points) < 0.02
+    for nu in range(3):
+        assert np.abs(spline(0.0, nu=nu) - spline(1.0, nu=nu)).max() < 1e-9
+
+
+def test_a_product_takes_one_of_every_factor(tmp_path):
+    rng = np.random.default_rng(9)
+    t = np.linspace(0, 10, 30)
+    first, _, places, _ = example("r:3", 0.1, n=30)
+    second, _, turns, _ = example("so:3", 0.1, n=30)
+    w = matrices(rng, 30, 3)
+    for weights in ((None, w), (w, None), (w, rng.uniform(1, 2, 30)), (w, w[::-1])):
+        both = ss.make_smoothing_spline(t, (places, turns), "r:3 x so:3", weights=weights)
+        for factor, points, own, part in zip(
+            (first, second), (places, turns), weights, both._parts, strict=True
+        ):
+            alone = ss.make_smoothing_spline(t, points, factor, weights=own)
+            assert np.array_equal(part.points, alone.points)
+        file = tmp_path / "both.npz"
+        both.save(file)
+        again = ss.load(file)
+        assert all(np.array_equal(a, b) for a, b in zip(again.points, both.points, strict=True))
+        for a, b in zip(again._noisy.weighing, both._noisy.weighing, strict=True):
+            assert np.array_equal(a.weights, b.weights)
+            assert (a.information is None) == (b.information is None)
+        assert all(np.array_equal(a, b) for a, b in zip(again.residuals, both.residuals, strict=True))
+
+
+def test_pieces_have_matrices_of_their_own():
+    rng = np.random.default_rng(10)
+    space = ss.space("so:3")
+    t = np.r_[0:10:0.2, 30:40:0.2]
+    w = matrices(rng, 100, 3)
+    noisy = scattered(space, truth(space, end=40.0)(t), w, 0.05, rng)
+    frames = ss.rotations.velocities(noisy[:, None], np.eye(3))
+    pieces = ss.fit_segments(t, noisy, space, max_gap=5, smooth=True, weights=w, frames=frames)
+    for piece, own in zip(pieces, (slice(50), slice(50, None)), strict=True):
+        alone = ss.make_smoothing_spline(t[own], noisy[own], space, weights=w[own], frames=frames[own])
+        assert np.array_equal(piece.points, alone.points)
+
+
+def test_what_is_wrong_with_them():
+    space = ss.Sphere(2)
+    _, t, noisy, _ = example("sphere:2", n=10)
+    good = np.broadcast_to(np.eye(2), (10, 2, 2)).copy()
+    frames = space.frame(noisy)
+
+    def fails(match, weights=good, **options):
+        with pytest.raises(ss.ValidationError, match=match):
+            ss.make_smoothing_spline(t, noisy, space, weights=weights, **options)
+
+    bad = good.copy()
+    bad[3, 0, 1] = 0.1
+    fails(r"weights\[3\] is not symmetric", bad)
+    bad = good.copy()
+    bad[4, 0, 0] = -1
+    fails(r"weights\[4\] has a negative eigenvalue", bad)
+    bad = good.copy()
+    bad[5, 0, 0] = np.nan
+    fails(r"weights\[5\] is not finite", bad)
+    fails(r"weights has shape \(9, 2, 2\), but matrices for 10 points of Sphere\(2\)", good[:9])
+    fails(r"need \(10,\), or as matrices \(10, 2, 2\)", np.ones((10, 3, 3)))
+    fails(r"frames has shape \(10, 3, 3\), but 2 tangent vectors", frames=np.ones((10, 3, 3)))
+    off = frames.copy()
+    off[6, 0] = noisy[6]
+    fails(r"frames\[6\] are not tangent", frames=off)
+    off[6, 0] = frames[6, 1]
+    fails(r"frames\[6\] do not span", frames=off)
+    fails("frames are for weights that are matrices", np.ones(10), frames=frames)
+    fails("frames are for weights that are matrices", None, frames=frames)
+    fails("lie at one time", good * (np.arange(10) == 3)[:, None, None])
+    with pytest.raises(ss.ValidationError, match="must be a tuple with 2 entries"):
+        ss.make_smoothing_spline(t, (noisy, noisy), "sphere:2 x sphere:2", weights=(good,))
+    large = ss.Sphere(300)
+    with pytest.raises(ss.ValidationError, match="weights must be numbers"):
+        ss.make_smoothing_spline(
+            t, large.random_point(np.random.default_rng(0), 10), large, weights=np.zeros((10, 300, 300))
+        )
