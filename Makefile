@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/config.toml
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 .PHONY: demo check test test-oracles test-torch fuzz bench docs wheel sdist test-wheel crate check-tools clean
 
@@ -31,7 +31,7 @@ test-oracles: .venv-oracles/built
 
 .venv-oracles/built: tests/oracles/requirements.txt | .venv/tools
 	test -x .venv-oracles/bin/python || $(BIN)/python -m venv .venv-oracles
-	.venv-oracles/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	.venv-oracles/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -r $<
 	touch $@
 
 # The adapter for PyTorch, which needs up to 5 GB and is no part of `test`.

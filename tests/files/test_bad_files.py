@@ -45,7 +45,9 @@ def test_truncated_files(kind):
 @pytest.mark.parametrize("mask", [0x01, 0xFF])
 def test_files_with_one_bad_byte(mask, kind):
     data = stored(KINDS[kind])
-    for i in range(len(data)):
+    # All of the directory, where files are told apart, and some of the numbers.
+    places = {*range(0, len(data), 5), *range(400), *range(len(data) - 1200, len(data))}
+    for i in sorted(place for place in places if 0 <= place < len(data)):
         assert is_good_or_refused(data[:i] + bytes([data[i] ^ mask]) + data[i + 1 :], kind)
 
 

@@ -185,7 +185,7 @@ FAR = ["sphere:2", "sphere:3", "so:3", "rp:2", "cp:1", "gr:2,5"]
 
 
 @pytest.mark.parametrize("name", FAR)
-@pytest.mark.parametrize(("part", "at_least"), [(0.5, 1.0), (0.7, 1.0), (0.8, 0.9), (0.9, 0.9), (0.95, 0.75)])
+@pytest.mark.parametrize(("part", "at_least"), [(0.6, 1.0), (0.8, 0.9), (0.95, 0.75)])
 def test_far_points_converge_or_are_reported(name, part, at_least):
     """Near the cut locus not every curve can be expected to converge, but none may be wrong in silence."""
     # Of a Grassmannian fewer: where steps are long its fits take seconds.
@@ -225,7 +225,7 @@ def test_auto_converges_on_zigzags_wherever_fixed_point_does(step):
 def test_auto_converges_near_the_cut_locus_wherever_another_solver_does(name, method):
     space = ss.space(name)
     step = 0.95 * space.injectivity_radius
-    p = np.array([zigzag_on(space, step, 20, np.random.default_rng(seed)) for seed in range(60)])
+    p = np.array([zigzag_on(space, step, 20, np.random.default_rng(seed)) for seed in range(24)])
     auto, other = (fit(p, space, method=m).report.converged for m in ("auto", method))
     assert (auto | ~other).all()
 

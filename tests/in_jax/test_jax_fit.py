@@ -25,8 +25,11 @@ def data(name, step=0.8):
     return space, points, 0.5 * unit_tangent(space, points[0], np.random.default_rng(1))
 
 
-@pytest.mark.parametrize("ends", ["natural", "clamped", "velocity"])
-@pytest.mark.parametrize("name", ["sphere:2", "sphere:3", "so:2", "so:3"])
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [("sphere:2", "natural"), ("sphere:2", "velocity"), ("sphere:3", "clamped"), ("so:2", "natural")]
+    + [("so:3", ends) for ends in ("natural", "clamped", "velocity")],
+)
 def test_velocities_are_those_of_the_core(name, ends):
     space, points, v = data(name)
     bc_type = ((1, v), "natural") if ends == "velocity" else ends
@@ -40,8 +43,8 @@ def test_the_residual_says_when_steps_are_too_few():
     space, points, _ = data("sphere:2", 1.2)
     expected = ss.CubicSpline(T, points, space).velocities
     before = 1.0
-    for steps in (2, 5, 10, 20):
-        u, residual = fit(T, points, space, steps=steps)
+    for steps in (2, 8):
+        u, residual = jax.jit(lambda p, steps=steps: fit(T, p, space, steps=steps))(points)
         error = np.abs(u - expected).max() / np.abs(expected).max()
         assert 0.1 * error < residual < before
         before = residual / 2
@@ -58,10 +61,9 @@ def test_batches_are_curves_one_by_one():
         np.testing.assert_allclose(u, ss.CubicSpline(t, points, space).velocities, atol=1e-11)
 
 
-@pytest.mark.parametrize("name", ["sphere:2", "so:3"])
-def test_gradients_through_fit_and_evaluate_are_those_of_the_core(name):
+def test_gradients_through_fit_and_evaluate_are_those_of_the_core():
     """In all of points, knots and the given velocity."""
-    space, points, v = data(name)
+    space, points, v = data("so:3")
     x, wanted = np.array([0.3, 1.7, 3.1, 4.8]), walk(space, 0.5, 4, np.random.default_rng(5))
 
     def in_jax(t, points, v):

@@ -56,8 +56,12 @@ def test_values_are_those_of_the_spline(name, nu):
     np.testing.assert_array_equal(curve(X, T, points, name, nu=nu), ss.CubicSpline(T, points, name)(X, nu=nu))
 
 
-@pytest.mark.parametrize("nu, dx", [(0, 1.0), (1, 0.0), (1, 1.0), (2, 0.0)])
-@pytest.mark.parametrize("name", [*PLAIN, *QUOTIENTS])
+@pytest.mark.parametrize(
+    ("name", "nu", "dx"),
+    [(name, *one) for name in (*PLAIN, *QUOTIENTS) for one in ((1, 1.0), (2, 0.0))]
+    # What times do to points, and data alone to velocities, is asked of one space each.
+    + [("so:3", 0, 1.0), ("gr:2,5", 0, 1.0), ("spd:2", 1, 0.0)],
+)
 def test_they_follow_their_data_as_arrays(name, nu, dx):
     """The derivative of the arrays, with their normal parts; and its transpose."""
     space, points, steps = data(name)

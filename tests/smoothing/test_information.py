@@ -66,10 +66,9 @@ def test_numbers_solve_the_equations_of_a_dense_matrix(lam):
     assert spline.std(t) == pytest.approx(spline.sigma * np.sqrt(variances), rel=1e-9)
 
 
-@every
+# In SE(n) lengths are those in frames of the curve for numbers, of the data for matrices.
+@pytest.mark.parametrize("name", ["r:3", "sphere:2", "hyperbolic:2", "so:3", "spd:2", "cp:2", "gr:2,5"])
 def test_multiples_of_one_are_numbers(name):
-    if name.startswith("se"):
-        pytest.skip("lengths are those in frames of the curve for numbers, of the data for matrices")
     space, t, noisy, _ = example(name, 0.1, n=30)
     w = np.random.default_rng(0).uniform(0.3, 3, 30)
     information = w[:, None, None] * np.eye(space.dim)

@@ -243,9 +243,8 @@ class Space:
         orthonormal, where the space has a metric. There are many such frames; this one is no continuous function of p.
 
         >>> import symspline as ss
-        >>> ss.Sphere(2).frame([0.0, 0.0, 1.0])
-        array([[1., 0., 0.],
-               [0., 1., 0.]])
+        >>> ss.SpecialOrthogonal(3).frame([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]).shape
+        (3, 3, 3)
         """
         if self._linear and self.point_shape[0] >= LARGE:
             raise ValidationError(f"{self!r} has too many dimensions for frames")
