@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import smoothing
+import smoothing_others as others
 import smoothing_peers as peers
 
 import symspline as ss
@@ -97,3 +98,13 @@ def test_the_page_has_a_place_for_every_table():
     text = smoothing.PAGE.read_text(encoding="utf-8")
     for part in smoothing.PARTS:
         assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1
+
+
+def test_other_programs_are_compared_on_the_same_data():
+    space = ss.Sphere(2)
+    t, noisy, truth = others.path(space, 50, 0.1)
+    found = others.row("none", space, t, noisy, truth, lambda: noisy)
+    assert found.error == pytest.approx(0.1 * np.sqrt(2), rel=0.2) and found.ours < 0.5 * found.error
+    assert others.HEAD.splitlines()[0].count("|") == str(found).count("|") == 7
+    straight, _, line = others.path(space, 50, 0.1, straight=True)
+    assert np.ptp(space.distance(line[1:], line[:-1])) < 1e-14 and len(straight) == 50
