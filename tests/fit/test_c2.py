@@ -34,8 +34,9 @@ KINDS = [
     for method in ("fixed-point", "quasi-newton", "newton")
     for spacing in ("uniform", "random")
     for case in CASES + LARGE
-    if not case.few or (spacing == "random" and (method == "quasi-newton" or ends == "periodic"))
-    if case.space.dim < 15 or method == "quasi-newton"
+    if not case.few or spacing == "random"
+    if not case.few or method == "quasi-newton" or ends == "periodic"
+    if method == "quasi-newton" or (spacing == "random" and case.space.dim < 15)
     if case not in LARGE or method == "quasi-newton"
 ]
 
