@@ -102,3 +102,16 @@ def test_nearly_geodesic_motion_goes_the_exact_way():
     assert spline.df < 6
     straight = ss.make_smoothing_spline(t, noisy, sphere, 1e5, method="newton")
     assert straight.report.converged and straight.report.iterations <= 12
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_both_ways_leave_outliers_out(loss):
+    space, points, noisy = batch("so:3", 0.1)
+    dirty = noisy[0]
+    dirty[5::9] = space.exp(dirty[5::9], 1.2 * space.random_tangent(np.random.default_rng(1), dirty[5::9]))
+    flat, exact = (
+        ss.make_smoothing_spline(T, dirty, space, 0.3, loss=loss, sigma=0.1, method=method, tol=1e-6)
+        for method in ("flat", "newton")
+    )
+    assert exact.report.method == "newton"
+    assert rms(space, flat.points, exact.points) < 5e-3 * exact.std(T).max()
