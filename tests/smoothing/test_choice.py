@@ -106,7 +106,7 @@ def test_nearly_geodesic_motion_goes_the_exact_way():
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
 def test_both_ways_leave_outliers_out(loss):
-    space, points, noisy = batch("so:3", 0.1)
+    space, _, noisy = batch("so:3", 0.1)
     dirty = noisy[0]
     dirty[5::9] = space.exp(dirty[5::9], 1.2 * space.random_tangent(np.random.default_rng(1), dirty[5::9]))
     flat, exact = (
