@@ -250,3 +250,14 @@ def test_few_knots_take_the_same_curve_either_way():
     ]
     # On long segments the linear acceleration of the flat way is further from that of the curve.
     assert rms(space, ways[0](t), ways[1](t)) < 0.06 * rms(space, ways[1](t), points)
+
+
+@pytest.mark.parametrize("name", ["so:3", "spd:2"])
+def test_data_between_few_knots_pull_at_the_nearest(name):
+    """Residuals are carried there in parallel, or the two ways would lead apart."""
+    space, t, noisy, _ = example(name, 0.1, n=60)
+    flat, exact = (
+        ss.make_smoothing_spline(t, noisy, space, 0.1, knots=10, method=method, tol=1e-7, max_iter=200)
+        for method in ("flat", "newton")
+    )
+    assert rms(space, flat.points, exact.points) < 3e-3 * exact.std(t).max()
