@@ -21,6 +21,8 @@ mod information;
 mod loss;
 mod misfit;
 mod path;
+mod progress;
+mod sight;
 mod smooth;
 mod start;
 mod track;
@@ -32,6 +34,9 @@ pub use flat::FlatEnd;
 pub use loss::Loss;
 pub use smooth::smooth;
 pub use variance::variance;
+
+use symspline_core::fit::{End, Ends as FitEnds};
+use symspline_core::scalar::few;
 
 /// Noisy data of one curve.
 #[derive(Clone, Copy)]
@@ -74,6 +79,19 @@ pub enum Ends {
     Open([FlatEnd; 2]),
     /// The last knot is the first again.
     Periodic,
+}
+
+impl Ends {
+    /// The same for the fit of a spline, with the velocities at its ends.
+    fn of_fit(self, velocities: &[Vec<f64>; 2]) -> FitEnds<'_> {
+        match self {
+            Ends::Periodic => FitEnds::Periodic,
+            Ends::Open(kinds) => FitEnds::Open(few(|e| match kinds[e] {
+                FlatEnd::Velocity => End::Velocity(&velocities[e]),
+                _ => End::Natural,
+            })),
+        }
+    }
 }
 
 /// How to smooth.

@@ -65,6 +65,22 @@ impl<'a> Misfit<'a> {
         Misfit::Matrices { seen, gram }
     }
 
+    /// Multiplies what data pull by the factors of a robust loss.
+    pub fn soften(&mut self, factors: &[f64], m: usize) {
+        let soften = |x: &mut [f64]| {
+            for (x, factor) in x.chunks_exact_mut(m).zip(factors) {
+                x.iter_mut().for_each(|x| *x *= factor);
+            }
+        };
+        match self {
+            Misfit::Numbers { residuals, .. } => soften(residuals),
+            Misfit::Matrices { seen, .. } => {
+                soften(&mut seen.residuals);
+                soften(&mut seen.pulls);
+            }
+        }
+    }
+
     /// BᵀWr.
     pub fn pull(&self, flat: &Flat, m: usize) -> Vec<f64> {
         let mut pull = vec![0.0; flat.basis.count() * m];

@@ -4,14 +4,13 @@ use crate::information;
 use crate::loss::{self, Loss};
 use crate::path::{Path, moved, places};
 use crate::start::{Level, levels};
-use crate::track::{Track, end_of};
+use crate::track::Track;
 use crate::turns::{self, Turns};
 use crate::{Data, Ends, Options, Smooth};
 use std::ops::Range;
 use symspline_core::fit::{End, Ends as FitEnds, Method, Options as FitOptions, Problem, Status, fit};
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
-use symspline_core::scalar::few;
 use symspline_core::space::{Ambient, Erased, Origin};
 
 /// Where that is not enough for a spline a shorter step is better than a longer search.
@@ -43,10 +42,7 @@ fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         }
         let ends: Vec<[Vec<f64>; 2]> = running.iter().map(|track| track.end_velocities(space)).collect();
         let ends = [0, 1].map(|e| ends.iter().flat_map(|own| own[e].iter().copied()).collect::<Vec<f64>>());
-        let ends = match options.ends {
-            Ends::Periodic => FitEnds::Periodic,
-            open => FitEnds::Open(few(|e| end_of(open, e, &ends[e]))),
-        };
+        let ends = options.ends.of_fit(&ends);
         let curves = running.iter().map(|track| {
             let Range { start, end } = track.curve();
             (&track.knots[start..end], &track.points[start * len..end * len])

@@ -1,0 +1,156 @@
+//! How the search for a curve goes: its λ, its steps, and when it ends.
+
+use crate::banded::Banded;
+use crate::choice::Linear;
+use crate::{Options, Report, Tier};
+use symspline_core::space::{Erased, Origin};
+
+/// Contraction of the flat tier, known or expected, from which the exact one takes over.
+const SLOW: f64 = 0.5;
+/// The same while λ and the curve are still rough guesses.
+const HOPELESS: f64 = 2.0;
+/// Dimension up to which the exact way is taken by itself.
+const LARGE: usize = 64;
+/// λ moves by less than this between rounds when it is settled, in natural logarithms.
+const SETTLED: f64 = 3e-3;
+/// Rounds of choosing λ, at most.
+const ROUNDS: usize = 12;
+
+/// λ, and how the search goes.
+pub struct Progress {
+    /// λ, with times divided by the mean knot spacing; known once it was given or chosen.
+    pub lam: Option<f64>,
+    /// Whether it is final.
+    pub settled: bool,
+    /// How long the last step was.
+    pub last_step: f64,
+    /// The last step, unless it was lengthened.
+    last: Vec<f64>,
+    /// The size of residuals, by which steps are judged.
+    scale: f64,
+    /// Iterations in a row in which the step hardly shrank.
+    pub slow: usize,
+    /// What is known so far.
+    pub report: Report,
+}
+
+impl Progress {
+    /// To a given λ, unless that is too large, or one to be chosen.
+    pub fn new(lam: Option<f64>, stiffest: f64) -> Self {
+        let report = Report { at_bound: lam.is_some_and(|lam| lam > stiffest), ..Report::default() };
+        Progress {
+            lam: lam.map(|lam| lam.min(stiffest)),
+            settled: lam.is_some(),
+            last_step: f64::INFINITY,
+            last: Vec::new(),
+            scale: f64::NAN,
+            slow: 0,
+            report,
+        }
+    }
+
+    /// How far to go along a step if steps shrink slowly in one direction: the limit of their geometric series (Aitken).
+    pub fn further(&mut self, step: &[f64]) -> f64 {
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let ratio = product(step, &self.last) / product(&self.last, &self.last);
+        if self.last.len() == step.len() && ratio > 0.3 && ratio < 0.9 {
+            self.last.clear();
+            return 1.0 / (1.0 - ratio);
+        }
+        self.last = step.to_vec();
+        1.0
+    }
+
+    /// Whether the exact way is to be taken.
+    pub fn takes_exact_way(&self, space: &Erased, tier: Tier) -> bool {
+        match tier {
+            Tier::Flat => false,
+            Tier::Newton => true,
+            // In flat space the flat way is the exact one; and the blocks of the other have a limit.
+            Tier::Auto if space.curvature() == 0.0 || space.dim() > LARGE => false,
+            Tier::Auto => {
+                let limit = if self.settled { SLOW } else { HOPELESS };
+                let known = self.settled && self.report.exact;
+                known || self.report.kappa > limit || self.slow > 1
+            }
+        }
+    }
+
+    /// A better λ, unless it is given or settled.
+    pub fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
+        if self.settled {
+            return;
+        }
+        let (lam, at_bound) = linear.choose(options.criterion, self.lam.map(|lam| lam / softness));
+        let lam = lam * softness;
+        self.report.rounds += 1;
+        let moved = self.lam.map_or(f64::INFINITY, |before| (lam / before).ln().abs());
+        self.settled = moved < SETTLED || self.report.rounds >= ROUNDS;
+        self.report.at_bound = at_bound;
+        self.lam = Some(lam);
+    }
+
+    /// λ, degrees of freedom and noise of the curve as it is.
+    pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
+        let Linear { flat, m, misfit, .. } = linear;
+        let own = flat.own.data.clone();
+        let count = misfit.count(own.clone(), *m);
+        let rss = misfit.rss_now(own, *m);
+        let unit = flat.basis.spacing.powi(3);
+        let freedom = misfit.freedom(flat, *m, inverse).as_array()[0];
+        // Where λ hardly matters, as for a geodesic, its best value wanders.
+        self.settled |= self.report.rounds > 1 && (freedom - self.report.freedom).abs() < SETTLED * freedom;
+        self.report.freedom = freedom;
+        self.report.lam = lam * softness * unit;
+        self.report.band_lam = lam * unit;
+        // A curve through all data says nothing of noise.
+        let left = count - freedom;
+        self.report.sigma = if left > 1e-9 * count { (rss / (*m as f64 * left)).sqrt() } else { f64::NAN };
+        self.scale = (rss / (*m as f64 * left.max(1.0))).sqrt();
+    }
+
+    /// The contraction that the flat way is expected to have: `K²|γ'|²√(λ/w)`, with the mean
+    /// squared speed and w the weight per time.
+    pub fn expect(&mut self, space: &Erased, speeds: &[f64], weights: &[f64], lam: f64) {
+        let m = space.dim();
+        let knots = speeds.len() / m;
+        let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
+        let density = weights.iter().sum::<f64>() / (knots - 1) as f64;
+        self.report.kappa = space.curvature().powi(2) * square * (lam / density).sqrt();
+    }
+
+    /// Whether a step is small beside the standard deviations of the points.
+    pub fn judge(&mut self, step: &[f64], deviations: &[f64], reach: f64, options: &Options) -> bool {
+        /// Steps that are this part of the path, and no longer shrink, are rounding.
+        const FLOOR: f64 = 1e-8;
+        const STILL: f64 = 1e-13;
+        let lengths: Vec<f64> = step.chunks_exact(step.len() / deviations.len()).map(length).collect();
+        let longest = lengths.iter().copied().fold(0.0, larger);
+        let relative = lengths.iter().zip(deviations).map(|(x, d)| x / (d * self.scale)).fold(0.0, larger);
+        let rate = longest / self.last_step;
+        if self.last_step.is_finite() {
+            self.report.rate = rate;
+            // Steps of new λ are no contraction; but they do not grow.
+            let slow = rate > if self.settled { SLOW } else { 1.0 };
+            self.slow = if slow { self.slow + 1 } else { 0 };
+        }
+        self.last_step = longest;
+        self.report.step = relative;
+        // Squares that are too large or too small for doubles say nothing.
+        let known = self.scale.is_finite() && (longest > 0.0 || step.iter().all(|x| *x == 0.0));
+        known
+            && (relative <= options.tol
+                || longest <= STILL * reach
+                || (longest <= FLOOR * reach && rate > SLOW))
+    }
+}
+
+/// |x|.
+pub fn length(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The larger of two numbers, or NaN.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}

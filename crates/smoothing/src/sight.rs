@@ -1,0 +1,65 @@
+//! What is seen of the data from a curve.
+
+use crate::Data;
+use crate::flat::Flat;
+use crate::frames::Frames;
+use crate::information::{self, Root};
+use crate::misfit::Misfit;
+use crate::path::{Path, Place, pulls};
+use symspline_core::space::{Ambient, Erased, Origin};
+
+/// The data, seen from the curve.
+pub struct Sight<'a> {
+    /// Points of the curve at their times.
+    pub gammas: Vec<f64>,
+    /// `log_γ y`.
+    pub vectors: Vec<f64>,
+    /// Squares of the distances.
+    pub distances: Vec<f64>,
+    /// Where weights are matrices: the frames of the data, carried to the curve.
+    pub carried: Option<Vec<f64>>,
+    /// Squares of the distances, weighed.
+    pub squares: Vec<f64>,
+    /// Residuals in the frames of the knots.
+    pub misfit: Misfit<'a>,
+    /// By what a robust loss multiplies them.
+    pub factors: Vec<f64>,
+}
+
+impl<'a> Sight<'a> {
+    /// From a curve.
+    pub fn new(
+        space: &Erased,
+        path: &Path,
+        frames: &Frames,
+        places: &[Place],
+        flat: &Flat,
+        data: &Data<'a>,
+        roots: &[Root],
+    ) -> Self {
+        let (m, len) = (space.dim(), space.point_len());
+        let gammas = path.at(space, places);
+        let (vectors, distances) = pulls(space, &gammas, data.points);
+        let at_knots = |vectors: &[f64]| path.at_knots(space, frames, places, &gammas, vectors);
+        let residuals = at_knots(&vectors);
+        if roots.is_empty() {
+            let squares = distances.iter().zip(data.weights).map(|(square, w)| square * w).collect();
+            let misfit = Misfit::Numbers { weights: data.weights, residuals };
+            return Sight { gammas, vectors, distances, carried: None, squares, misfit, factors: Vec::new() };
+        }
+        let carried = information::carried_frames(space, &gammas, data.points);
+        let columns: Vec<Vec<f64>> =
+            (0..m).map(|j| at_knots(&information::members(&carried, j, m, len))).collect();
+        let seen = information::at_data(space, roots, &columns, &residuals);
+        let square = |s: &[f64]| s.iter().map(|x| x * x).sum();
+        let squares = seen.residuals.chunks_exact(m).map(square).collect();
+        let misfit = Misfit::matrices(flat, m, seen);
+        Sight { gammas, vectors, distances, carried: Some(carried), squares, misfit, factors: Vec::new() }
+    }
+
+    /// With the factors of a robust loss.
+    pub fn soften(&mut self, factors: Vec<f64>, m: usize) {
+        self.misfit.soften(&factors, m);
+        self.factors = factors;
+    }
+}
