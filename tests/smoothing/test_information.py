@@ -313,8 +313,11 @@ def test_what_is_wrong_with_them():
     fails(r"frames\[6\] are not tangent", frames=off)
     off[6, 0] = frames[6, 1]
     fails(r"frames\[6\] do not span", frames=off)
+    off[6, 0, 0] = np.nan
+    fails(r"frames\[6\] are not finite", frames=off)
     fails("frames are for weights that are matrices", np.ones(10), frames=frames)
     fails("frames are for weights that are matrices", None, frames=frames)
+    fails("all weights of the data are 0", 0 * good)
     fails("lie at one time", good * (np.arange(10) == 3)[:, None, None])
     with pytest.raises(ss.ValidationError, match="must be a tuple with 2 entries"):
         ss.make_smoothing_spline(t, (noisy, noisy), "sphere:2 x sphere:2", weights=(good,))

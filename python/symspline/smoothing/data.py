@@ -121,13 +121,15 @@ def _check_enough(times: Doubles, weights: Doubles, batch: tuple[int, ...], coun
     """Two different times at least."""
     shape = (*batch, count)
     used = np.broadcast_to(weights > 0, shape)
-    own = np.where(used, np.broadcast_to(times, shape), np.nan)
-    good = used.any(axis=-1)
-    first, last = np.where(good, np.nanmin(np.where(used, own, np.inf), -1), 0), np.zeros(batch)
-    last = np.where(good, np.nanmax(np.where(used, own, -np.inf), -1), 0)
+    own = np.broadcast_to(times, shape)
+    first, last = np.where(used, own, np.inf).min(-1), np.where(used, own, -np.inf).max(-1)
     if not np.all(last > first):
         index = np.argwhere(~(last > first))[0].tolist()
         of = f" of curve {','.join(map(str, index))}" if batch else ""
+        if not used[tuple(index)].any():
+            raise ValidationError(
+                f"all weights of the data{of} are 0; a curve needs points at two times at least"
+            )
         raise ValidationError(f"the data{of} lie at one time; a curve needs points at two times at least")
 
 

@@ -144,9 +144,10 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
     return Weighing(np.trace(matrices, axis1=-2, axis2=-1) / m, np.ascontiguousarray(matrices))
 
 
-def _check(good: Any, complaint: str) -> None:
+def _check(good: Any, complaint: str, name: str = "weights", places: Any = None) -> None:
     if not np.all(good):
-        raise ValidationError(f"weights{np.argwhere(~good)[0].tolist()} {complaint}")
+        bad = np.argwhere(~good)[0]
+        raise ValidationError(f"{name}{(bad if places is None else places[bad[0]]).tolist()} {complaint}")
 
 
 def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubles:
@@ -162,6 +163,8 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
     used = np.broadcast_to(used, lead)
     points = space._numbers(data.doubles).reshape(lead + space.point_shape)
     vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]
+    finite = np.isfinite(vectors).all(axis=tuple(range(1, vectors.ndim)))
+    _check(finite, "are not finite", "frames", np.argwhere(used))
     own = space.frame(space.project(points[used]))
 
     def flat(x: Array) -> Doubles:
@@ -172,13 +175,11 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
     coordinates = np.linalg.pinv(flat(own)) @ columns
     off = np.abs(flat(own) @ coordinates - columns).max(axis=(-2, -1))
     size = np.abs(columns).max(axis=(-2, -1))
-    places = np.argwhere(used)
     for bad, complaint in (
         (~(off <= 1e-6 * size), "are not tangent at their point: use space.project_tangent"),
         (np.linalg.cond(coordinates) > 1e8, "do not span the tangent space"),
     ):
-        if bad.any():
-            raise ValidationError(f"frames{places[bad][0].tolist()} {complaint}")
+        _check(~bad, complaint, "frames", np.argwhere(used))
     found = np.broadcast_to(np.eye(m), (*lead, m, m)).copy()
     found[used] = np.linalg.inv(coordinates)
     return found
