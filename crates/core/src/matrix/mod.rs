@@ -3,6 +3,7 @@
 //! An entry is `[S; D]`: a real number for D = 1, real and imaginary part for D = 2. Every formula is
 //! written once for both.
 
+mod compiled;
 mod dense;
 mod eigen;
 mod function;
@@ -13,6 +14,7 @@ mod schur;
 mod series;
 mod storage;
 
+pub use compiled::Compiled;
 pub use dense::{cholesky, determinant, orthonormalise, polar, reorthonormalise, solve_lower};
 pub use eigen::{diagonalise, orthogonalise, sort_columns};
 pub(crate) use function::GAUSS;
@@ -222,8 +224,13 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `A B`.
+    #[inline(always)]
     pub fn times(&self, b: &Self) -> Self {
-        if A::LARGE && b.is_large() {
+        if A::ANY { (A::compiled().times)(self, b) } else { self.times_here(b) }
+    }
+
+    fn times_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
             return large::times(self, b);
         }
         let mut out = Self::zeros(self.rows(), b.cols());
@@ -246,8 +253,13 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `A* B`.
+    #[inline(always)]
     pub fn adjoint_times(&self, b: &Self) -> Self {
-        if A::LARGE && b.is_large() {
+        if A::ANY { (A::compiled().adjoint_times)(self, b) } else { self.adjoint_times_here(b) }
+    }
+
+    fn adjoint_times_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
             return large::times(&self.adjoint(), b);
         }
         let mut out = Self::zeros(self.cols(), b.cols());
@@ -264,8 +276,13 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `A B*`.
+    #[inline(always)]
     pub fn times_adjoint(&self, b: &Self) -> Self {
-        if A::LARGE && b.is_large() {
+        if A::ANY { (A::compiled().times_adjoint)(self, b) } else { self.times_adjoint_here(b) }
+    }
+
+    fn times_adjoint_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
             return large::times(self, &b.adjoint());
         }
         Self::from_fn(self.rows(), b.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
@@ -303,8 +320,25 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `x A`.
+    #[inline(always)]
     pub fn scaled(&self, x: Lane) -> Self {
+        if A::ANY { (A::compiled().scaled)(self, x) } else { self.scaled_here(x) }
+    }
+
+    fn scaled_here(&self, x: Lane) -> Self {
         self.each(|a| a * x)
+    }
+
+    fn select_here(mask: Lane, a: &Self, b: &Self) -> Self {
+        a.zip(b, |a, b| S::select(mask, a, b))
+    }
+
+    fn plus_here(&self, b: &Self) -> Self {
+        self.zip(b, |x, y| x + y)
+    }
+
+    fn minus_here(&self, b: &Self) -> Self {
+        self.zip(b, |x, y| x - y)
     }
 
     /// `x A` with a scalar that may carry derivatives.
@@ -313,7 +347,12 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `(1 + A)(1 + B) − 1`: products of what is near the identity keep their small digits.
+    #[inline(always)]
     pub fn compose(&self, b: &Self) -> Self {
+        if A::ANY { (A::compiled().compose)(self, b) } else { self.compose_here(b) }
+    }
+
+    fn compose_here(&self, b: &Self) -> Self {
         let product = self.times(b);
         let (x, y, z) = (product.entries(), self.entries(), b.entries());
         Self::collected(self.shape, |i| few(|c| x[i][c] + y[i][c] + z[i][c]))
@@ -321,7 +360,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     /// `(1 + A)(1 + A*) − 1`, exactly Hermitian.
     pub fn gram(&self) -> Self {
-        if A::LARGE && self.is_large() {
+        if A::ANY && self.is_large() {
             return (&self.times_adjoint(self) + &(self + &self.adjoint())).hermitian_part();
         }
         Self::hermitian(self.rows(), |i, j| {
@@ -331,8 +370,17 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     }
 
     /// `A B*` where that is Hermitian: one half of it is computed.
+    #[inline(always)]
     pub fn times_adjoint_hermitian(&self, b: &Self) -> Self {
-        if A::LARGE && b.is_large() {
+        if A::ANY {
+            (A::compiled().times_adjoint_hermitian)(self, b)
+        } else {
+            self.times_adjoint_hermitian_here(b)
+        }
+    }
+
+    fn times_adjoint_hermitian_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
             return self.times_adjoint(b).hermitian_part();
         }
         Self::hermitian(self.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
@@ -417,7 +465,7 @@ pub trait Select {
 
 impl<S: Scalar, const D: usize, A: Storage> Select for Matrix<S, D, A> {
     fn select(mask: Lane, a: Self, b: Self) -> Self {
-        a.zip(&b, |a, b| S::select(mask, a, b))
+        if A::ANY { (A::compiled().select)(mask, &a, &b) } else { Self::select_here(mask, &a, &b) }
     }
 }
 
@@ -464,15 +512,17 @@ impl<S: Scalar, const D: usize, A: Storage> IndexMut<(usize, usize)> for Matrix<
 
 impl<S: Scalar, const D: usize, A: Storage> Add for &Matrix<S, D, A> {
     type Output = Matrix<S, D, A>;
+    #[inline(always)]
     fn add(self, b: Self) -> Matrix<S, D, A> {
-        self.zip(b, |x, y| x + y)
+        if A::ANY { (A::compiled().plus)(self, b) } else { self.plus_here(b) }
     }
 }
 
 impl<S: Scalar, const D: usize, A: Storage> Sub for &Matrix<S, D, A> {
     type Output = Matrix<S, D, A>;
+    #[inline(always)]
     fn sub(self, b: Self) -> Matrix<S, D, A> {
-        self.zip(b, |x, y| x - y)
+        if A::ANY { (A::compiled().minus)(self, b) } else { self.minus_here(b) }
     }
 }
 

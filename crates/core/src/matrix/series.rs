@@ -210,7 +210,12 @@ pub(super) fn repeat<R: Select + Clone>(mut x: R, times: Lane, step: impl Fn(&R)
 const TRIG: [f64; 2] = [0.1, 2.5];
 
 /// `s(G) = sin√G/√G` and `k(G) = (cos√G − 1)/G` of a Hermitian G ≥ 0. The cosine is `1 + G k(G)`.
+#[inline(always)]
 pub fn trig<S: Scalar, const D: usize, A: Storage>(g: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {
+    if A::ANY { (A::compiled().trig)(g) } else { trig_here(g) }
+}
+
+pub(super) fn trig_here<S: Scalar, const D: usize, A: Storage>(g: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {
     let inside = |g: &Matrix<S, D, A>, n: usize| {
         let powers = Powers::of(g, 2 * n);
         [powers.sum(terms::<S>(&SINC, n)), -powers.sum(terms::<S>(&VERSINE, n))]
@@ -246,7 +251,14 @@ const EXP: [f64; 25] = {
 };
 
 /// `exp(A) − 1` of a Hermitian matrix.
+#[inline(always)]
 pub fn exp_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    if A::ANY { (A::compiled().exp_minus_one)(a) } else { exp_minus_one_here(a) }
+}
+
+pub(super) fn exp_minus_one_here<S: Scalar, const D: usize, A: Storage>(
+    a: &Matrix<S, D, A>,
+) -> Matrix<S, D, A> {
     exp_by(a, |a, n| Powers::of(a, n))
 }
 
@@ -316,7 +328,14 @@ const LOG: [f64; 29] = [
 ];
 
 /// `log(1 + B)` of a Hermitian B with 1 + B positive definite.
+#[inline(always)]
 pub fn log_one_plus<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    if A::ANY { (A::compiled().log_one_plus)(b) } else { log_one_plus_here(b) }
+}
+
+pub(super) fn log_one_plus_here<S: Scalar, const D: usize, A: Storage>(
+    b: &Matrix<S, D, A>,
+) -> Matrix<S, D, A> {
     by_size(b.size(), &[LOG_LIMIT], |tier| {
         if tier == 0 { Powers::of(b, LOG.len()).sum(&LOG) } else { log_full_range(b) }
     })
@@ -351,7 +370,12 @@ fn log_full_range<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) ->
 }
 
 /// `θ/sin θ` as a function of the Hermitian `Y = 1 − cos θ`; `rest` is `2 − Y`, known to more digits.
+#[inline(always)]
 pub fn arc<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+    if A::ANY { (A::compiled().arc)(y) } else { arc_here(y) }
+}
+
+pub(super) fn arc_here<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     const LIMITS: [f64; 4] = [0.0075, 0.09, 0.3, 0.8];
     by_size(y.size(), &LIMITS, |tier| {
         let n = match tier {

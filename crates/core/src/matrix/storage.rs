@@ -1,13 +1,14 @@
 //! How the entries of a matrix are stored: any size, few of them, or a size that the compiler knows.
 
-use crate::scalar::few;
+use super::Compiled;
+use crate::scalar::{Scalar, few};
 use smallvec::{SmallVec, smallvec};
 use std::ops::{Deref, DerefMut};
 
 /// Where the entries of a matrix are, and how many.
 pub trait Storage: Copy + Send + Sync + 'static {
-    /// Whether matrices may be so large that products pay for another order of work.
-    const LARGE: bool = false;
+    /// Whether matrices may be of any size: then functions of them are compiled once, see [`Compiled`].
+    const ANY: bool = false;
     /// Rows and columns.
     type Shape: Copy;
     /// A container of entries.
@@ -20,6 +21,10 @@ pub trait Storage: Copy + Send + Sync + 'static {
     fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
     /// Entries from their places, row by row. Writes each once, where `filled` and a loop write twice.
     fn collected<T: Copy>(shape: Self::Shape, spare: T, f: impl FnMut(usize) -> T) -> Self::Of<T>;
+    /// Functions of matrices of any size.
+    fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
+        unreachable!("matrices of any size only are stored there")
+    }
 }
 
 /// Any size. Up to sixteen entries live on the stack.
@@ -27,7 +32,7 @@ pub trait Storage: Copy + Send + Sync + 'static {
 pub struct Dynamic;
 
 impl Storage for Dynamic {
-    const LARGE: bool = true;
+    const ANY: bool = true;
     type Shape = (usize, usize);
     type Of<T: Copy> = SmallVec<[T; 16]>;
     fn shape(rows: usize, cols: usize) -> Self::Shape {
@@ -43,6 +48,10 @@ impl Storage for Dynamic {
     #[inline(always)]
     fn collected<T: Copy>((rows, cols): Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
         (0..rows * cols).map(f).collect()
+    }
+    #[inline(always)]
+    fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
+        Compiled::table()
     }
 }
 

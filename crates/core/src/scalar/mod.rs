@@ -28,6 +28,7 @@ pub const LANES: usize = 8;
 /// A number, or a number with derivatives, on eight lanes.
 pub trait Scalar:
     Copy
+    + 'static
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
