@@ -23,7 +23,7 @@ check: .venv/tools
 test: check
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests
 
-# Compares with geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
+# Compares with evo and geomstats, which runs with no NumPy of today, and so in an environment of its own, beside the
 # compiled module of .venv, which every Python from 3.11 on can load. Needs .5 GB; not part of `test`.
 test-oracles: .venv-oracles/built
 	.venv-oracles/bin/python -m pytest tests/oracles -o pythonpath='python tests' \
