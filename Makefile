@@ -6,7 +6,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: demo check test test-oracles test-torch fuzz bench docs wheel sdist test-wheel crate check-tools clean
+.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate check-tools clean
 
 demo: .venv/built
 	$(BIN)/symspline demo --out demo-output
@@ -38,6 +38,16 @@ test-oracles: .venv-oracles/built
 test-torch: .venv/tools
 	$(INSTALL) 'torch>=2'
 	$(BIN)/python -m pytest tests/pytorch -o pythonpath='. tests'
+
+# The Rust tests on a 64-bit ARM processor, which qemu-user plays: about a quarter of an hour. The C library that comes
+# with this target, and the linker that comes with Rust, need no tools of that machine.
+ARM := CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL
+test-aarch64:
+	rustup target add aarch64-unknown-linux-musl
+	$(ARM)_LINKER=rust-lld $(ARM)_RUNNER=qemu-aarch64 \
+		$(ARM)_RUSTFLAGS='-C link-self-contained=yes -C linker-flavor=ld.lld' \
+		cargo test --quiet --workspace --exclude symspline-benches --exclude symspline-python \
+		--lib --tests --target aarch64-unknown-linux-musl
 
 # About ten minutes of random input on two cores; what fails is kept in .hypothesis and tried first the next time.
 fuzz: .venv/tools

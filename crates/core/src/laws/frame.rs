@@ -98,7 +98,7 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
     // An error of the frame goes eightfold into a jump of the acceleration. Frames of motions and of invertible
     // matrices grow on the way.
     let grown = if space.curvature().is_nan() {
-        lane(30.0) * norm(&moving.frame) * norm(&moving.frame)
+        lane(40.0) * norm(&moving.frame) * norm(&moving.frame)
     } else {
         Lane::ONE
     };
