@@ -146,7 +146,7 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
 
 def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
     """The longest time between neighbouring knots, shape of the batch axes."""
-    longest = np.diff(times).max(axis=-1)
+    longest = (times[..., 1:] - times[..., :-1]).max(axis=-1)
     return np.broadcast_to(longest, batch).copy() if batch else float(longest)
 
 

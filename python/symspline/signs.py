@@ -38,7 +38,7 @@ def warn_of_signs(
     if _S3 not in factors:
         return
     looked_at = [
-        factor == _S3 and (steps is None or not np.max(steps[k], initial=0.0) < _NEAR)
+        factor == _S3 and (steps is None or not _longest(steps[k]) < _NEAR)
         for k, factor in enumerate(factors)
     ]
     found = [
@@ -64,6 +64,11 @@ def warn_of_signs(
         UserWarning,
         stacklevel=callers_level(),
     )
+
+
+def _longest(steps: Any) -> Any:
+    """The longest step of some curves, or of one."""
+    return steps if isinstance(steps, float) else np.max(steps, initial=0.0)
 
 
 def _opposite(points: Array) -> NDArray[np.intp]:

@@ -58,8 +58,10 @@ pub fn block(most: usize, len: usize) -> usize {
 /// Calls `work` on every item, on all cores if `parallel` says that this pays. Stops early when the
 /// monitor is cancelled.
 pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
-    let threads = num_threads().min(items.len());
-    let pool = if parallel && threads > 1 { pool(num_threads()) } else { None };
+    // The system reads files to say how many cores there are, which takes longer than a small fit.
+    let cores = if parallel && items.len() > 1 { num_threads() } else { 1 };
+    let threads = cores.min(items.len());
+    let pool = if cores > 1 { pool(cores) } else { None };
     let Some(pool) = pool else {
         for item in items {
             if monitor.poll() {

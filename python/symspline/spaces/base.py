@@ -109,7 +109,7 @@ class Space:
         return f"{type(self).__name__}({', '.join(map(str, self._parameters))})"
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and str(self) == str(other)
+        return self is other or (type(self) is type(other) and str(self) == str(other))
 
     def __hash__(self) -> int:
         return hash(str(self))
