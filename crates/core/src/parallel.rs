@@ -130,6 +130,23 @@ mod tests {
     use std::sync::mpsc;
 
     #[test]
+    fn two_items_are_worked_on_at_once() {
+        set_num_threads(2);
+        let quiet = |_| true;
+        let both = (Mutex::new(0), Condvar::new());
+        let met = AtomicUsize::new(0);
+        // Each waits for the other.
+        for_each(vec![(); 2], true, &Monitor::new(&quiet), |()| {
+            *both.0.lock().unwrap() += 1;
+            both.1.notify_all();
+            let here = both.0.lock().unwrap();
+            let wait = both.1.wait_timeout_while(here, Duration::from_secs(5), |here| *here < 2);
+            met.fetch_add(usize::from(!wait.unwrap().1.timed_out()), Ordering::Relaxed);
+        });
+        assert_eq!(met.into_inner(), 2);
+    }
+
+    #[test]
     fn a_panic_of_a_thread_comes_to_the_caller_at_once() {
         set_num_threads(2);
         let (send, receive) = mpsc::channel();

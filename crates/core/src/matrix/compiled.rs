@@ -13,7 +13,7 @@ type Functions<S, const D: usize, A> = fn(&Matrix<S, D, A>) -> [Matrix<S, D, A>;
 type Product<S, const D: usize, A> = fn(&Matrix<S, D, A>, &Matrix<S, D, A>) -> Matrix<S, D, A>;
 type Choice<S, const D: usize, A> = fn(Lane, &Matrix<S, D, A>, &Matrix<S, D, A>) -> Matrix<S, D, A>;
 
-/// The functions, by their names.
+/// The functions, by their names; those that end with `_here` are compiled where they are called.
 pub struct Compiled<S: Scalar, const D: usize, A: Storage> {
     pub(super) times: Product<S, D, A>,
     pub(super) adjoint_times: Product<S, D, A>,

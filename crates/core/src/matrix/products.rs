@@ -1,0 +1,181 @@
+//! Products of matrices.
+
+use super::large::{self, LARGE};
+use super::{Entry, Matrix, Storage, conjugate};
+use crate::scalar::{Lane, Scalar, few};
+
+/// `a b + c`, or `a b* + c` with `CONJUGATE`.
+#[inline(always)]
+pub(super) fn mul_add<S: Scalar, const D: usize, const CONJUGATE: bool>(
+    a: Entry<S, D>,
+    b: Entry<S, D>,
+    c: Entry<S, D>,
+) -> Entry<S, D> {
+    let mut out = c;
+    if D == 1 {
+        out[0] = a[0].fma(b[0], c[0]);
+    } else {
+        let (ai, bi) = (a[D - 1], if CONJUGATE { -b[D - 1] } else { b[D - 1] });
+        out[0] = a[0].fma(b[0], (-ai).fma(bi, c[0]));
+        out[D - 1] = a[0].fma(bi, ai.fma(b[0], c[D - 1]));
+    }
+    out
+}
+
+/// `a b + c`.
+pub fn multiply_add<const D: usize>(
+    a: Entry<Lane, D>,
+    b: Entry<Lane, D>,
+    c: Entry<Lane, D>,
+) -> Entry<Lane, D> {
+    mul_add::<Lane, D, false>(a, b, c)
+}
+
+/// `Re a*b + c`.
+#[inline(always)]
+pub(super) fn inner_add<S: Scalar, const D: usize>(a: Entry<S, D>, b: Entry<S, D>, c: S) -> S {
+    let c = a[0].fma(b[0], c);
+    if D == 1 { c } else { a[D - 1].fma(b[D - 1], c) }
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
+    /// `A B`.
+    #[inline(always)]
+    pub fn times(&self, b: &Self) -> Self {
+        if A::ANY { (A::compiled().times)(self, b) } else { self.times_here(b) }
+    }
+
+    pub(super) fn times_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
+            return large::times(self, b);
+        }
+        let mut out = Self::zeros(self.rows(), b.cols());
+        for i in 0..self.rows() {
+            for j in 0..b.cols() {
+                let mut sum = [S::constant(Lane::ZERO); D];
+                for k in 0..self.cols() {
+                    sum = mul_add::<S, D, false>(self[(i, k)], b[(k, j)], sum);
+                }
+                out[(i, j)] = sum;
+            }
+        }
+        out
+    }
+
+    /// Whether products with it pay for another order of work.
+    #[inline(always)]
+    fn is_large(&self) -> bool {
+        self.rows() * self.cols() >= LARGE * LARGE
+    }
+
+    /// `A* B`.
+    #[inline(always)]
+    pub fn adjoint_times(&self, b: &Self) -> Self {
+        if A::ANY { (A::compiled().adjoint_times)(self, b) } else { self.adjoint_times_here(b) }
+    }
+
+    pub(super) fn adjoint_times_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
+            return large::times(&self.adjoint(), b);
+        }
+        let mut out = Self::zeros(self.cols(), b.cols());
+        for k in 0..self.rows() {
+            for i in 0..self.cols() {
+                let a = conjugate(self.data[k * self.cols() + i]);
+                let row = &mut out.data[i * b.cols()..][..b.cols()];
+                for (c, b) in row.iter_mut().zip(&b.data[k * b.cols()..][..b.cols()]) {
+                    *c = mul_add::<S, D, false>(a, *b, *c);
+                }
+            }
+        }
+        out
+    }
+
+    /// `A B*`.
+    #[inline(always)]
+    pub fn times_adjoint(&self, b: &Self) -> Self {
+        if A::ANY { (A::compiled().times_adjoint)(self, b) } else { self.times_adjoint_here(b) }
+    }
+
+    pub(super) fn times_adjoint_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
+            return large::times(self, &b.adjoint());
+        }
+        Self::from_fn(self.rows(), b.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
+    }
+
+    /// `(1 + A)(1 + B) − 1`: products of what is near the identity keep their small digits.
+    #[inline(always)]
+    pub fn compose(&self, b: &Self) -> Self {
+        if A::ANY { (A::compiled().compose)(self, b) } else { self.compose_here(b) }
+    }
+
+    pub(super) fn compose_here(&self, b: &Self) -> Self {
+        let product = self.times(b);
+        let (x, y, z) = (product.entries(), self.entries(), b.entries());
+        Self::collected(self.shape, |i| few(|c| x[i][c] + y[i][c] + z[i][c]))
+    }
+
+    /// `(1 + A)(1 + A*) − 1`, exactly Hermitian.
+    pub fn gram(&self) -> Self {
+        if A::ANY && self.is_large() {
+            return (&self.times_adjoint(self) + &(self + &self.adjoint())).hermitian_part();
+        }
+        Self::hermitian(self.rows(), |i, j| {
+            let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
+            self.row_product(i, self, j, few(|c| a[c] + b[c]))
+        })
+    }
+
+    /// `A B*` where that is Hermitian: one half of it is computed.
+    #[inline(always)]
+    pub fn times_adjoint_hermitian(&self, b: &Self) -> Self {
+        if A::ANY {
+            (A::compiled().times_adjoint_hermitian)(self, b)
+        } else {
+            self.times_adjoint_hermitian_here(b)
+        }
+    }
+
+    pub(super) fn times_adjoint_hermitian_here(&self, b: &Self) -> Self {
+        if A::ANY && b.is_large() {
+            return self.times_adjoint(b).hermitian_part();
+        }
+        Self::hermitian(self.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
+    }
+
+    /// From the entries on and above the diagonal, exactly Hermitian.
+    fn hermitian(n: usize, f: impl Fn(usize, usize) -> Entry<S, D>) -> Self {
+        let mut out = Self::zeros(n, n);
+        for i in 0..n {
+            for j in i..n {
+                let x = f(i, j);
+                out[(i, j)] = x;
+                out[(j, i)] = conjugate(x);
+            }
+            if D > 1 {
+                out[(i, i)][D - 1] = S::constant(Lane::ZERO);
+            }
+        }
+        out
+    }
+
+    /// Row i of A times the adjoint of row j of B, added to `sum`.
+    #[inline(always)]
+    fn row_product(&self, i: usize, b: &Self, j: usize, mut sum: Entry<S, D>) -> Entry<S, D> {
+        let (x, y) = (&self.data[i * self.cols()..][..self.cols()], &b.data[j * b.cols()..][..b.cols()]);
+        for (x, y) in x.iter().zip(y) {
+            sum = mul_add::<S, D, true>(*x, *y, sum);
+        }
+        sum
+    }
+
+    /// `Re tr A*B`.
+    pub fn inner(&self, b: &Self) -> S {
+        let mut sum = S::constant(Lane::ZERO);
+        for (a, b) in self.entries().iter().zip(b.entries()) {
+            sum = inner_add(*a, *b, sum);
+        }
+        sum
+    }
+}

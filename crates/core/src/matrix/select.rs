@@ -1,0 +1,41 @@
+//! Picking lane by lane.
+
+use super::{Matrix, Storage};
+use crate::scalar::{Lane, Scalar, lane};
+
+/// What can be picked lane by lane.
+pub trait Select {
+    /// `a` on the lanes of a mask, `b` on the others.
+    fn select(mask: Lane, a: Self, b: Self) -> Self;
+}
+
+impl<S: Scalar, const D: usize, A: Storage> Select for Matrix<S, D, A> {
+    fn select(mask: Lane, a: Self, b: Self) -> Self {
+        if A::ANY { (A::compiled().select)(mask, &a, &b) } else { Self::select_here(mask, &a, &b) }
+    }
+}
+
+impl<T: Select, const F: usize> Select for [T; F] {
+    fn select(mask: Lane, a: Self, b: Self) -> Self {
+        let mut pairs = a.into_iter().zip(b);
+        std::array::from_fn(|_| {
+            let (a, b) = pairs.next().expect("arrays are of one length");
+            T::select(mask, a, b)
+        })
+    }
+}
+
+/// Picks by size: lanes up to `limits[i]` get `f(i)`, larger ones `f(limits.len())`.
+///
+/// What a lane gets depends on its own size only, never on its neighbours'.
+pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -> R) -> R {
+    let within = |i: usize| size.simd_le(lane(limits[i]));
+    let top = (0..limits.len()).find(|&i| within(i).all()).unwrap_or(limits.len());
+    let mut result = f(top);
+    for i in (0..top).rev() {
+        if within(i).any() {
+            result = R::select(within(i), f(i), result);
+        }
+    }
+    result
+}
