@@ -90,8 +90,8 @@ def test_other_threads_run_during_a_fit(threads, n):
     finally:
         stop.set()
         other.join()
-    # About 200 ticks fit in; if the lock were held, all but one or two would come later.
-    assert sum(start < t < end for t in ticks) > 10
+    # About 200 ticks fit in, fewer on a busy machine; if the lock were held, all but one or two would come later.
+    assert sum(start < t < end for t in ticks) > 4
 
 
 # ---- the same bits ----
