@@ -18,6 +18,8 @@ from .arrays import shown
 from .functions import fit_many
 from .places import compass, from_lonlat, to_lonlat
 from .segments import cut
+from .smoothing.many import smooth_many
+from .spaces import Sphere
 from .spline import CubicSpline
 
 if TYPE_CHECKING:
@@ -92,6 +94,7 @@ def resample(
     max_gap: Any,
     min_points: int = 2,
     duplicates: str = "raise",
+    smooth: bool = False,
     radius: float = EARTH_RADIUS,
     **options: Any,
 ) -> pd.DataFrame:
@@ -100,21 +103,23 @@ def resample(
 
     Args:
         frame: a table with times and places; its rows may be in any order.
-        every: the step, as pandas writes it: ``"1min"``, a ``Timedelta``. Times are whole multiples of it.
+        every: the step, as pandas writes it: ``"1min"``, a ``Timedelta``. Times are whole multiples of it, in UTC.
         by: the column that tells tracks apart, such as ``"mmsi"``; None for one track.
         time: the column of times; None for the index.
         columns: those of longitude and latitude, in degrees.
-        max_gap, min_points, duplicates: as for `symspline.fit_segments`, a pause in seconds or as a ``timedelta64``.
-            Between pieces there are no rows; a track without a piece of ``min_points`` has none.
+        max_gap, min_points, duplicates, smooth: as for `symspline.fit_segments`, a pause in seconds or as a
+            ``timedelta64``; ``smooth=True`` for places with noise. Between pieces there are no rows; a track without a
+            piece of ``min_points`` has none.
         radius: of the globe, in metres.
-        options: those of `CubicSpline`.
+        options: those of `CubicSpline`, or of `make_smoothing_spline`.
 
     Returns:
         A table with the column ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog``
         in degrees clockwise from north; times keep their time zone.
 
     Raises:
-        ValidationError: a column is not there, or the places or times are not what `symspline.fit_segments` takes.
+        ValidationError: a column is not there, a row has no place or no name, no track has a piece of ``min_points``,
+            or the places or times are not what `symspline.fit_segments` takes.
     """
     import pandas as pd
 
@@ -131,6 +136,13 @@ def resample(
     )
     if stamps.dtype.kind != "M":
         raise ValidationError(f"the times {name!r} are no dates; make them of texts by pandas.to_datetime")
+    for column in [*([] if by is None else [by]), *columns]:
+        missing = np.flatnonzero(frame[column].isna())
+        if missing.size:
+            raise ValidationError(
+                f"{len(missing)} rows have no {column!r}, the first of them row {missing[0]}; leave them out: "
+                f"frame.dropna(subset=[{column!r}])"
+            )
     step = pd.Timedelta(every)
     zone = stamps.dt.tz
     utc = (stamps.dt.tz_convert("UTC").dt.tz_localize(None) if zone is not None else stamps).to_numpy()
@@ -143,14 +155,19 @@ def resample(
             continue
         own = rows[np.argsort(utc[rows], kind="stable")]
         try:
-            pieces = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates).curves
+            used = np.ones(len(own), bool) if smooth else None
+            pieces = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
         except ValidationError as error:
             of = "" if by is None else f"{by} {label}, rows in the order of time: "
             raise ValidationError(f"{of}{error}") from None
         curves += pieces
         owners += [label] * len(pieces)
+    if not curves and len(frame):
+        raise ValidationError(
+            f"no track has {min_points} places without a pause longer than max_gap={shown(max_gap)}, in seconds"
+        )
     tables = []
-    for spline, label in zip(fit_many(curves, "sphere:2", **options) if curves else [], owners, strict=True):
+    for spline, label in zip(_fitted(curves, smooth, options), owners, strict=True):
         x = pd.date_range(
             pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step
         )
@@ -163,6 +180,14 @@ def resample(
     if not tables:
         return pd.DataFrame(columns=[*([] if by is None else [by]), name, *columns, "sog", "cog"])
     return pd.concat(tables, ignore_index=True)
+
+
+def _fitted(curves: list[tuple[Any, Any]], smooth: bool, options: dict[str, Any]) -> Any:
+    if not curves:
+        return []
+    if smooth:
+        return smooth_many([(*curve, {}) for curve in curves], Sphere(2), **options)
+    return fit_many(curves, Sphere(2), **options)
 
 
 def _check_globe(spline: CubicSpline) -> None:

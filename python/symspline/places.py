@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._core import ValidationError
 from .arrays import as_array
 
 Array = NDArray[np.float64]
@@ -19,10 +20,14 @@ def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
     Returns:
         Shape (..., 3): x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
 
+    Raises:
+        ValidationError: a latitude is beyond a pole, or a longitude ten turns away, as where the two are swapped or a
+            value stands for a missing one.
+
     >>> from_lonlat(90, 0).round(15)
     array([0., 1., 0.])
     """
-    east, north = np.radians(_floats(lon, "lon")), np.radians(_floats(lat, "lat"))
+    east, north = _degrees(lon, "lon", 3600), _degrees(lat, "lat", 90)
     x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
     return np.stack([x, y, z], axis=-1)
 
@@ -52,6 +57,21 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
     cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
     zero = np.zeros_like(x)
     return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)
+
+
+def _degrees(value: ArrayLike, name: str, most: float) -> Array:
+    """An angle in radians, of one in degrees."""
+    angles = _floats(value, name)
+    # Single precision may round up.
+    beyond = np.argwhere(np.abs(angles) > most * (1 + 1e-7))
+    if len(beyond):
+        place = tuple(map(int, beyond[0]))
+        where = name + "".join(f"[{i}]" for i in place)
+        raise ValidationError(
+            f"{where} is {angles[place]}: {name} must be from -{most} to {most} degrees; are lon and lat swapped, or "
+            "does it stand for a missing value?"
+        )
+    return np.radians(angles)
 
 
 def _floats(value: ArrayLike, name: str) -> Array:

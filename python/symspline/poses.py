@@ -69,6 +69,9 @@ def imu(
 ) -> Imu:
     """What a gyroscope and an accelerometer at the origin of the body measure at times x.
 
+    At natural ends a curve has no acceleration: there, and so on both sides of a gap, the accelerometer shows nothing
+    but gravity. Of poses without noise take ``bc_type="not-a-knot"`` for a recording that begins or ends in motion.
+
     Args:
         spline: a curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
         x, extrapolate, per_curve: as for calling the spline.
@@ -79,7 +82,8 @@ def imu(
         A pair `Imu` of arrays of shape batch axes + x.shape + (3,).
 
     Raises:
-        ValidationError: the spline has no poses, or gravity is not three numbers.
+        ValidationError: the spline has no poses, gravity is not three numbers, or times are no seconds but nanoseconds
+            since 1970.
 
     >>> import numpy as np, symspline as ss
     >>> still = ss.CubicSpline(None, [np.eye(4), np.eye(4)], "se:3")
@@ -89,8 +93,17 @@ def imu(
     g = np.asarray(gravity)
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {gravity!r}")
+    _check_seconds(spline.t)
     motion = _Motion(spline, x, extrapolate, per_curve)
     return Imu(motion.turning, motion.in_body(motion.acceleration - g))
+
+
+def _check_seconds(t: Array) -> None:
+    # Beside a year of seconds 3e7, and 1.7e9 of those since 1970.
+    if np.ndim(t) and t.dtype.kind in "iuf" and abs(float(t.flat[0])) > 1e17:
+        raise ValidationError(
+            f"t[0] = {t.flat[0]} can be no seconds; of nanoseconds make dates, t.astype('datetime64[ns]')"
+        )
 
 
 def twist(

@@ -62,7 +62,7 @@ class Report:
         converged = np.asarray(self.converged)
         if converged.size == 0:
             return f"no curves: {self.method}"
-        residual, iterations = np.max(self.residual), np.max(self.iterations)
+        residual, iterations = _worst(self.residual), np.max(self.iterations)
         if converged.ndim == 0:
             state = "converged" if converged else "NOT converged"
             many = ""
@@ -71,7 +71,7 @@ class Report:
             many = "at most " if converged.size > 1 else ""
         return (
             f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
-            f"longest step {np.max(self.max_step):.3g}, contraction {np.max(self.rate):.2g}{self._certificate()}"
+            f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}{self._certificate()}"
         )
 
     def _certificate(self) -> str:
@@ -105,6 +105,11 @@ class Report:
             function(self.rate),
             known(self.alternative_energy),
         )
+
+
+def _worst(values: Any) -> Any:
+    """The largest of those of curves whose points are good, which may be none."""
+    return np.fmax.reduce(np.ravel(values))
 
 
 def _same(a: Any, b: Any) -> bool:

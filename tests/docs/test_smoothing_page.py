@@ -17,13 +17,19 @@ def cells(table):
 
 def test_the_examples_run():
     names = {}
-    first, matrices = re.findall(r"```python\n(.*?)```", smoothing.PAGE.read_text(encoding="utf-8"), re.S)
+    first, matrices, covariances = re.findall(
+        r"```python\n(.*?)```", smoothing.PAGE.read_text(encoding="utf-8"), re.S
+    )
     exec(compile(first, smoothing.PAGE.name, "exec"), names)
     sphere, t, truth = names["sphere"], names["t"], names["truth"]
     errors = [smoothing.rms(sphere, points, truth) for points in (names["s"](t), names["noisy"])]
     assert errors == pytest.approx([0.012, 0.071], abs=5e-4)
     exec(compile(matrices, smoothing.PAGE.name, "exec"), names)
     assert f"s.sigma  # {names['s'].sigma:.2f}:" in matrices
+    exec(compile(covariances, smoothing.PAGE.name, "exec"), names)
+    assert f"# {names['factor']:.2f}\n" in covariances
+    variances = np.trace(names["smooth"](np.arange(200)), axis1=1, axis2=2) / 3
+    assert np.mean(variances) / names["factor"] == pytest.approx(1, abs=0.02)
 
 
 def test_flat_table():

@@ -68,7 +68,7 @@ def test_at_rest_and_at_a_pole():
 
 
 def test_batches():
-    points = np.stack([from_lonlat(LON, LAT), from_lonlat(LAT, LON[::-1])[:, [1, 2, 0]]])
+    points = np.stack([from_lonlat(LON, LAT), from_lonlat(LON[::-1], LAT)[:, [1, 2, 0]]])
     spline = ss.CubicSpline(None, points, S2)
     x = np.linspace(0, 6, 5)
     for quantity in (sog, cog):
@@ -80,6 +80,21 @@ def test_other_spaces():
     for call in (sog, cog):
         with pytest.raises(ss.ValidationError, match=r"points of Sphere\(2\), not of Sphere\(3\)"):
             call(spline, 0.5)
+
+
+@pytest.mark.parametrize(
+    "lon, lat, what",
+    [
+        (40.0, 178.0, "lat is 178.0: lat must be from -90 to 90 degrees; are lon and lat swapped"),
+        ([0, -9999], [0, 0], r"lon\[1\] is -9999.0: lon must be from -3600 to 3600"),
+        ([[0], [1]], [[0], [90.001]], r"lat\[1\]\[0\] is 90.001"),
+    ],
+)
+def test_angles_that_are_no_places(lon, lat, what):
+    with pytest.raises(ss.ValidationError, match=what):
+        ss.geo.from_lonlat(lon, lat)
+    # Unwound tracks, poles in single precision, and gaps.
+    assert np.isnan(ss.geo.from_lonlat([720.0, np.nan], np.float32([90, 90]))).any(axis=1).tolist() == [0, 1]
 
 
 def test_the_old_name_warns():

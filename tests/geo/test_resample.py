@@ -53,8 +53,22 @@ def test_it_is_the_curve_itself():
     np.testing.assert_array_equal(found["lon"], lon)
     np.testing.assert_array_equal(found["lat"], lat)
     assert len(found) == 49 * 60 // 90 + 1
-    none = geo.resample(table, "90min", max_gap=60)
+    none = geo.resample(table[:0], "90min", max_gap=60)
     assert list(none.columns) == ["time", "lon", "lat", "sog", "cog"] and len(none) == 0
+
+
+def test_noisy_tracks_are_smoothed():
+    rng, t = np.random.default_rng(0), np.arange(200)
+    lon, lat = 179 + t / 50, 10 + np.sin(t / 40)
+    noisy = pd.DataFrame(
+        {"lon": lon + 0.02 * rng.standard_normal(200), "lat": lat + 0.02 * rng.standard_normal(200)},
+        index=pd.date_range("2026-01-01", periods=200, freq="10min"),
+    )
+    smooth = geo.resample(noisy, "10min", max_gap=3600, smooth=True)
+    rough = geo.resample(noisy, "10min", max_gap=3600)
+    off = [np.sqrt(np.mean((found["lat"] - lat) ** 2)) for found in (smooth, rough)]
+    assert len(smooth) == 200 and off[0] < 0.4 * off[1]
+    assert smooth["sog"].std() < 0.3 * rough["sog"].std()
 
 
 @pytest.mark.parametrize(
@@ -68,6 +82,16 @@ def test_it_is_the_curve_itself():
             r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both",
         ),
         (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
+        (
+            lambda t: {"max_gap": 6},
+            r"no track has 2 places without a pause longer than max_gap=6, in seconds",
+        ),
+        (
+            lambda t: {"frame": t.assign(mmsi=t["mmsi"].where(t.index != 3))},
+            r"1 rows have no 'mmsi', the first of them row 8; leave them out: frame.dropna\(subset=\['mmsi'\]\)",
+        ),
+        (lambda t: {"frame": t.assign(lat=np.nan)}, "rows have no 'lat', the first of them row 0"),
+        (lambda t: {"frame": t.assign(lat=100.0)}, r"lat\[0\] is 100.0: lat must be from -90 to 90 degrees"),
         (lambda t: {"frame": t.to_numpy()}, "frame must be a table of pandas"),
     ],
 )

@@ -144,6 +144,16 @@ def test_gravity_is_a_vector(gravity):
         poses.imu(curve("se:3"), 0.5, gravity=gravity)
 
 
+def test_nanoseconds_are_no_seconds():
+    given = curve("se:3").points
+    stamps = 1_700_000_000_000_000_000 + 10**9 * np.arange(len(given))
+    with pytest.raises(ss.ValidationError, match=r"can be no seconds; of nanoseconds make dates"):
+        poses.imu(ss.CubicSpline(stamps, given, "se:3"), stamps[0])
+    dated = poses.imu(ss.CubicSpline(stamps.astype("M8[ns]"), given, "se:3"), stamps[1].astype("M8[ns]"))
+    plain = poses.imu(ss.CubicSpline(np.arange(len(given)), given, "se:3"), 1)
+    assert np.abs(dated.specific_force - plain.specific_force).max() < 1e-12
+
+
 @pytest.mark.parametrize(
     ("name", "call", "most"),
     [

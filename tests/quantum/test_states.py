@@ -124,7 +124,7 @@ def test_what_is_no_state(match, call):
 def stand_in(monkeypatch):
     """A module in QuTiP's place, whose objects are arrays and functions."""
     module = ModuleType("qutip")
-    module.Qobj, module.QobjEvo = np.asarray, lambda function: function
+    module.Qobj, module.QobjEvo = lambda matrix, dims=None: np.asarray(matrix), lambda function: function
     monkeypatch.setitem(sys.modules, "qutip", module)
 
 
@@ -149,6 +149,37 @@ def test_curves_that_are_no_qobjevo(stand_in):
     dates = ss.CubicSpline(np.arange("2024-01-01", "2024-01-07", dtype="M8[D]"), curve("cp:2").points, "cp:2")
     with pytest.raises(ss.ValidationError, match="are dates"):
         qobjevo(dates)
+
+
+def test_there_is_no_hamiltonian_before_the_first_knot(stand_in):
+    later = ss.CubicSpline([100, 101, 102], curve("cp:2").points[:3], "cp:2")
+    h = qobjevo(later)
+    with pytest.raises(ss.ValidationError, match=r"the curve begins at 100\.0, and the solver asks for 0\.5"):
+        h(0.5)
+    # What QuTiP asks for at first.
+    assert h(0.0).shape == (3, 3)
+    with pytest.raises(ss.ValidationError, match=r"dims \[2, 2\] are 4 levels, but the curve has 3"):
+        qobjevo(later, [2, 2])
+
+
+def test_composite_systems_in_qutip():
+    qutip = pytest.importorskip("qutip")
+    up, down = qutip.basis(2, 0), qutip.basis(2, 1)
+    kets = [
+        qutip.tensor(up, up),
+        qutip.tensor(up, (up + down).unit()),
+        qutip.tensor(down, (up - down).unit()),
+    ]
+    spline = ss.CubicSpline([3, 4, 6], from_kets([kets[0], kets[1], (kets[1] + kets[2]).unit()]), "cp:3")
+    options = {"atol": 1e-12, "rtol": 1e-12, "nsteps": 100_000}
+    h = qobjevo(spline, [2, 2])
+    assert h.dims == [[2, 2], [2, 2]]
+    found = qutip.sesolve(h, kets[0], [3, 4, 6], options=options).states
+    assert abs(abs(found[1].overlap(kets[1])) - 1) < 1e-10
+    # The error of the solver around it is not ours.
+    with pytest.raises(Exception) as caught:
+        qutip.sesolve(h, kets[0], [0, 4], options=options)
+    assert "the curve begins at 3.0" in str(caught.getrepr(style="native"))
 
 
 def test_without_qutip(monkeypatch):

@@ -172,6 +172,7 @@ def test_dates():
     x = turned(2, 5)
     morph = AffineMorph(dates, x)
     assert np.abs(morph(dates) - x).max() < NEAR
+    assert np.array_equal(morph(str(dates[1])), morph(dates[1]))
 
 
 def mirrored():
@@ -190,7 +191,7 @@ def flat():
     ("match", "call"),
     [
         (
-            r"landmarks\[2\] is mirrored: .* mirror it .* frame='first'",
+            r"landmarks\[2\] is mirrored: .* number its landmarks .* mirror it .* frame='first'",
             lambda: AffineMorph(KNOTS, mirrored()),
         ),
         (r"landmarks\[3\] lies in a hyperplane", lambda: AffineMorph(KNOTS, flat())),

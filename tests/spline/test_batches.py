@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from curves import KNOTS, S2, THREE, every_space, pick, points_on, same, same_curve, with_ends
+from curves import KNOTS, S2, THREE, every_common, every_space, pick, points_on, same, same_curve, with_ends
 
 import symspline as ss
 
@@ -76,3 +76,18 @@ def test_a_slice_may_be_empty():
 @pytest.mark.parametrize("use", [lambda s: str(s.report), lambda s: s.length()], ids=["report", "length"])
 def test_an_empty_slice_can_be_used(use):
     use(ss.CubicSpline(None, [THREE, THREE], S2)[2:])
+
+
+@every_common
+@pytest.mark.parametrize("outside", ["geodesic", True])
+def test_many_curves_at_the_same_times_are_each_the_curve_alone(space, outside):
+    """Eight curves at a time go through their segments together; 19 leave three that do not."""
+    spline = ss.CubicSpline([0, 1, 2.5, 3, 5], points_on(space, 5, (19,), step=0.4), space)
+    x = np.random.default_rng(0).uniform(-0.5, 5.5, 40)
+    for times in (x, np.sort(x)):
+        for nu in range(3):
+            values = spline(times, nu=nu, extrapolate=outside)
+            for k in (0, 7, 8, 18):
+                assert same(pick(values, k), spline[k](times, nu=nu, extrapolate=outside))
+        speed = spline.speed(times, extrapolate=outside)
+        assert same(speed[13], spline[13].speed(times, extrapolate=outside))

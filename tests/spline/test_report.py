@@ -97,6 +97,7 @@ def test_report_says_what_failed():
     p, options = failing("cut locus")
     spline = ss.CubicSpline(None, p, S2, on_failure="ignore", **options)
     assert "2 of 3 curves converged" in str(spline.report)
+    assert "nan" not in str(spline.report)
     assert "NOT converged" in str(spline[1].report)
 
 

@@ -106,6 +106,30 @@ def test_what_is_no_volume(nibabel, tmp_path):
         read_nifti(name, "fsl")
 
 
+def test_masks_that_are_none(nibabel, tmp_path):
+    name, given = str(tmp_path / "tensors.nii"), volume()
+    write_nifti(name, given, "fsl")
+    for value in (np.nan, -1.0):
+        mask = np.where(given.mask, 1.0, value)
+        with pytest.raises(ss.ValidationError, match=rf"mask\[0, 0, 0\] is {value}; it must be 0 or more"):
+            read_nifti(name, "fsl", mask)
+    turned = nibabel.Nifti1Image(given.mask.astype(np.uint8), np.diag([-1.0, 1, 1, 1]) @ AFFINE)
+    nibabel.save(turned, str(tmp_path / "mask.nii"))
+    with pytest.raises(ss.ValidationError, match=r"mask\.nii has another affine map than the tensors"):
+        read_nifti(name, "fsl", str(tmp_path / "mask.nii"))
+
+
+def test_an_order_that_is_not_the_files(nibabel, tmp_path):
+    name = str(tmp_path / "tensors.nii")
+    write_nifti(name, volume(), "itk")
+    with pytest.raises(
+        ss.ValidationError, match="in the order of NIfTI, not in that of 'fsl'; leave order out"
+    ):
+        read_nifti(name, "fsl")
+    for order in (None, "dipy", "itk"):
+        assert np.array_equal(read_nifti(name, order).tensors, volume().tensors)
+
+
 def all_of(given):
     return Volume(given.tensors, np.ones_like(given.mask), AFFINE)
 

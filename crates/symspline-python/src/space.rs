@@ -145,9 +145,14 @@ impl Handle {
 
 /// The error for a point that is off its space.
 pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> PyErr {
-    let size = if off.is_finite() { format!(" by {off:.3e}") } else { String::new() };
+    if !off.is_finite() {
+        // Nor has `space.project` an answer.
+        return invalid(format!(
+            "{which} is off the space: {why}. No point is close to it; mend it or leave it out"
+        ));
+    }
     invalid(format!(
-        "{which} is off the space{size}: {why}. Points within {tol:.0e} are projected; use space.project(x) \
+        "{which} is off the space by {off:.3e}: {why}. Points within {tol:.0e} are projected; use space.project(x) \
          if these are meant to be points"
     ))
 }

@@ -31,7 +31,8 @@ class View:
     @classmethod
     def above(cls, lon: float, lat: float) -> View:
         """The view with a place in the middle."""
-        return cls(from_lonlat(lon + 90, 0), from_lonlat(lon, lat + 90), from_lonlat(lon, lat))
+        east, up = from_lonlat(lon + 90, 0), from_lonlat(lon, lat)
+        return cls(east, np.cross(up, east), up)
 
     def flat(self, points: Array) -> Array:
         """The orthographic projection, shape (..., 2)."""

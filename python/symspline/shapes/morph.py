@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._core import ValidationError
 from ..arrays import as_array, read_only, shown
 from ..convert.reading import refuse
+from ..handed import times_of
 from ..spaces import Euclidean, SpecialOrthogonal, SymmetricPositiveDefinite
 from ..spline import CubicSpline
 from .bases import Bases
@@ -31,10 +32,12 @@ class AffineMorph:
 
     Args:
         t: times of the drawings, as for `CubicSpline`.
-        landmarks: drawings of k + 1 landmarks in Rⁿ, shape (N+1, k + 1, n), n >= 2, k > n.
+        landmarks: drawings of k + 1 landmarks in Rⁿ, shape (N+1, k + 1, n), n >= 2, k > n. Those of one number belong
+            together. From one drawing to the next a film turns by less than half a turn.
         base: as for `from_landmarks`.
         frame: ``"all"`` or ``"first"``.
-        bc_type: the same for all splines: a word, or a pair of words, as for `CubicSpline`.
+        bc_type: the same for all splines: a word, or a pair of words, as for `CubicSpline`. With ``"periodic"`` the
+            last drawing is the first one again.
 
     Raises:
         ValidationError: the landmarks of a drawing lie in a hyperplane; or, with ``frame="all"``, a drawing is
@@ -87,7 +90,7 @@ class AffineMorph:
         Raises:
             ValidationError: a time is outside the knots.
         """
-        times = as_array(x, "x")
+        times = as_array(times_of(x, "x")[0], "x")
         basis = self._bases(times)
         matrix, at = self._affine(times)
         return placed(basis @ matrix, at, self._base)
@@ -169,8 +172,9 @@ class _Between:
             ~(np.linalg.det(matrices) > 0),
             "landmarks",
             lambda i: (
-                "is mirrored: going along the shapes from the first drawing one comes to its mirror image; mirror it "
-                "(change the sign of a coordinate), put drawings between, or take frame='first'"
+                "is mirrored: going along the shapes from the first drawing one comes to its mirror image; number its "
+                "landmarks in the order of the others, mirror it (change the sign of a coordinate), put drawings "
+                "between, or take frame='first'"
             ),
         )
         self._bases, self._group = bases, SpecialOrthogonal(n)
@@ -200,6 +204,6 @@ def _check_closed(moved: Array, places: Array) -> None:
     off = max(np.abs(values[-1] - values[0]).max() for values in (moved, places))
     if not off <= 1e-8 * max(np.abs(moved[0]).max(), np.abs(places[0]).max()):
         raise ValidationError(
-            f"the last drawing of a closed film must be the first, and is {off:.3e} away from it; frame='first' asks "
-            "only for the same shape"
+            f"the last drawing of a closed film must be the first, and is {off:.3e} away from it: repeat the first "
+            "one at the end; frame='first' asks only for the same shape"
         )

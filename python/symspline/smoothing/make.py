@@ -80,8 +80,8 @@ def make_smoothing_spline(
         criterion: how λ is chosen: ``"gcv"`` (generalised cross-validation), ``"gcv1.4"`` (the same with every
             degree of freedom counted 1.4 times, safer where motion is nearly geodesic or noise is correlated),
             ``"reml"``, or ``"cp"`` (Mallows' C_p, which needs ``sigma``).
-        sigma: standard deviation of the noise in a coordinate for weight one, if it is known; also one a curve, or a
-            tuple for a product.
+        sigma: standard deviation of the noise in a coordinate for weight one, if it is known, as a length in the space:
+            radians on the unit sphere. Also one a curve, or a tuple for a product.
         bc_type: conditions at the ends: ``"natural"``, ``"clamped"``, ``(1, velocity)`` at either end, as for
             `CubicSpline`, or ``"periodic"``. Velocities are tangent at the first and the last of the points, and are
             carried from there to the curve in parallel. A closed curve has the period of its knots.

@@ -153,7 +153,8 @@ class SmoothingSpline(CubicSpline):
         """Radius of the ball about the curve at times x that holds the true point with probability ``level``.
 
         The mean coverage over all times is what it says; at the two end points it is less where the truth bends
-        there, since natural ends do not.
+        there, since natural ends do not, and so it is within long gaps. Where λ is at its bound (``report.at_bound``)
+        it means nothing.
 
         Args:
             x: times, any shape.

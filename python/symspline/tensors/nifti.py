@@ -43,20 +43,26 @@ def read_nifti(file: File, order: str | None = None, mask: ArrayLike | File | No
     Args:
         file: shape (X, Y, Z, 6), or (X, Y, Z, 1, 6) with the intent of symmetric matrices, as ITK and ANTs write it.
         order: as for `from_vectors`; not needed where the file says that it holds symmetric matrices, whose order is
-            a part of NIfTI.
-        mask: which voxels to take, shape (X, Y, Z), or a file with such a volume; None for those whose six numbers
-            are finite and not all zero.
+            a part of NIfTI, that of ``"dipy"``.
+        mask: which voxels to take, shape (X, Y, Z), or a file with such a volume: those that are not zero; None for
+            those whose six numbers are finite and not all zero. For several files take the mask of one for all.
 
     Returns:
         The tensors, the mask and the affine map. Single precision stays single.
 
     Raises:
         ImportError: nibabel is not installed.
-        ValidationError: the file or the mask is of another shape, or the order is not given.
+        ValidationError: the file or the mask is of another shape, the mask is not finite, negative, or a file with
+            another affine map, or the order is not given or not what the file says.
     """
     image = _nibabel().load(fspath(file))
     numbers = np.asanyarray(image.dataobj)
     if int(image.header["intent_code"]) == _SYMMATRIX:
+        if order not in (None, "dipy", "itk"):
+            raise ValidationError(
+                f"{fspath(file)} says that it holds symmetric matrices in the order of NIfTI, not in that of "
+                f"{order!r}; leave order out"
+            )
         order = "dipy"
     elif order is None:
         raise ValidationError(
@@ -69,12 +75,15 @@ def read_nifti(file: File, order: str | None = None, mask: ArrayLike | File | No
         raise ValidationError(
             f"{fspath(file)} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)"
         )
-    inside = _mask(mask, numbers)
+    inside = _mask(mask, numbers, image.affine)
     return Volume(from_vectors(numbers[inside], order), inside, np.asarray(image.affine, float))
 
 
 def write_nifti(file: File, volume: Volume, order: str) -> None:
     """Write tensors to a NIfTI file; outside the mask its six numbers are zero.
+
+    The six numbers are put in another order, but stay in the axes in which they were: FSL writes tensors in those of
+    the voxels, MRtrix in those of the scanner. Between such programs turn them by the affine map's rotation yourself.
 
     Args:
         file: its name ends in .nii or .nii.gz.
@@ -102,12 +111,23 @@ def write_nifti(file: File, volume: Volume, order: str) -> None:
     nibabel.save(image, fspath(file))
 
 
-def _mask(mask: Any, numbers: Array) -> NDArray[np.bool_]:
+def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.bool_]:
     if mask is None:
         return np.asarray(np.isfinite(numbers).all(axis=-1) & numbers.any(axis=-1))
     if isinstance(mask, (str, PathLike)):
-        mask = np.asanyarray(_nibabel().load(fspath(mask)).dataobj)
-    inside: NDArray[np.bool_] = as_array(mask, "mask").astype(bool)
+        image = _nibabel().load(fspath(mask))
+        # Headers hold single precision.
+        if not np.allclose(image.affine, affine, rtol=1e-4, atol=1e-4):
+            raise ValidationError(
+                f"the mask {fspath(mask)} has another affine map than the tensors; bring it to their voxels first"
+            )
+        mask = np.asanyarray(image.dataobj)
+    values = as_array(mask, "mask")
+    bad = np.argwhere(~(values >= 0))
+    if len(bad):
+        place = tuple(map(int, bad[0]))
+        raise ValidationError(f"mask[{', '.join(map(str, place))}] is {values[place]}; it must be 0 or more")
+    inside: NDArray[np.bool_] = values.astype(bool)
     if inside.shape != numbers.shape[:3]:
         raise ValidationError(f"the mask has shape {inside.shape}, but the volume {numbers.shape[:3]}")
     return inside

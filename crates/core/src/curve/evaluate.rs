@@ -5,7 +5,7 @@ use super::locate::Locator;
 use super::places::Places;
 use crate::monitor::Monitor;
 use crate::parallel;
-use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter};
+use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter, scatter_apart};
 use crate::space::{Ambient, Covered, Erased, Origin, Space};
 use crate::with_size;
 use std::ops::DerefMut;
@@ -62,6 +62,8 @@ pub enum Outside {
 
 /// Samples evaluated by one thread at a time, at most.
 const BLOCK: usize = 2048;
+/// How much longer a block may be that holds eight curves.
+const TOGETHER: usize = 4;
 /// Samples times numbers from which threads pay.
 const PARALLEL: usize = 1 << 16;
 
@@ -132,11 +134,23 @@ pub fn evaluate(
     let shared = curves.t.len() == curves.nodes;
     let locator = shared.then(|| Locator::new(curves.t, samples > 8 && samples >= curves.nodes / 4));
     let length = parallel::block(BLOCK, len);
-    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * size).enumerate().collect();
+    // Eight curves at a time with knots and times in common go from segment to segment together.
+    let together = LANES * times.count;
+    let groups = if shared && times.x.len() == times.count && together <= TOGETHER * length {
+        samples / together
+    } else {
+        0
+    };
+    let (grouped, rest) = out.split_at_mut(groups * together * size);
+    let long = together * (length / together).max(1);
+    let grouped = grouped.chunks_mut(long * size).enumerate().map(|(k, out)| (k * long, times.count, out));
+    let rest = rest.chunks_mut(length * size).enumerate();
+    let rest = rest.map(|(k, out)| (groups * together + k * length, 1, out));
+    let blocks: Vec<(usize, usize, &mut [f64])> = grouped.chain(rest).collect();
     let parallel = samples * len > PARALLEL;
-    parallel::for_each(blocks, parallel, monitor, |(block, out)| {
+    parallel::for_each(blocks, parallel, monitor, |(first, apart, out)| {
         let locator = locator.as_ref();
-        let job = Job { curves, times, quantity, outside, locator, first: block * length, size, len };
+        let job = Job { curves, times, quantity, outside, locator, first, apart, size, len };
         space.0.samples(&job, out);
         monitor.advance(out.len() / size);
     });
@@ -152,6 +166,8 @@ pub struct Job<'a> {
     pub(super) locator: Option<&'a Locator<'a>>,
     /// The first sample of the block.
     pub(super) first: usize,
+    /// Samples from one lane to the next: 1, or those of a curve.
+    pub(super) apart: usize,
     /// Numbers in a row of the result, and of a point.
     size: usize,
     pub(super) len: usize,
@@ -188,8 +204,8 @@ impl Job<'_> {
             |places, segment, gamma, vectors, out| {
                 let (p, vector) = self.sample(space, places, segment, gamma, vectors, len);
                 match vector {
-                    Some(v) if self.quantity.is_length() => scatter(&[norm(space, p, v)], out),
-                    vector => scatter(vector.unwrap_or(p), out),
+                    Some(v) if self.quantity.is_length() => out.write(&[norm(space, p, v)]),
+                    vector => out.write(vector.unwrap_or(p)),
                 }
             },
         );
@@ -225,14 +241,14 @@ impl Job<'_> {
                 let (p, vector) = self.sample(&cover, places, segment, gamma, vectors, len);
                 let [point, result] = two(&mut result, ambient);
                 if let (true, Some(w)) = (self.quantity.is_of_body(), vector) {
-                    return scatter(space.body(p, w, result), out);
+                    return out.write(space.body(p, w, result));
                 }
                 space.leave(p, vector, result);
                 if self.quantity.is_length() {
                     space.leave(p, None, point);
-                    scatter(&[norm(space, point, result)], out);
+                    out.write(&[norm(space, point, result)]);
                 } else {
-                    scatter(result, out);
+                    out.write(result);
                 }
             },
         );
@@ -245,17 +261,28 @@ impl Job<'_> {
         out: &mut [f64],
         len: usize,
         mut enter: impl FnMut(&Places, &mut Segment<S>),
-        mut write: impl FnMut(&Places, &mut Segment<S>, &mut [S], &mut [Lane], &mut [f64]),
+        mut write: impl FnMut(&Places, &mut Segment<S>, &mut [S], &mut [Lane], Rows),
     ) {
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
         let mut vectors = vec![Lane::ZERO; 3 * len];
         let mut places = Places::new(self, out.len() / self.size);
-        for out in out.chunks_mut(LANES * self.size) {
-            if places.advance() {
-                enter(&places, &mut segment);
+        let stride = self.apart * self.size;
+        for out in out.chunks_mut(LANES * stride) {
+            let mut first = 0;
+            while first < stride {
+                if places.advance() {
+                    enter(&places, &mut segment);
+                }
+                write(
+                    &places,
+                    &mut segment,
+                    &mut gamma,
+                    &mut vectors,
+                    Rows { stride, out: &mut out[first..] },
+                );
+                first += self.size;
             }
-            write(&places, &mut segment, &mut gamma, &mut vectors, out);
         }
     }
 
@@ -311,6 +338,24 @@ impl Job<'_> {
             gather(at.map(|i| &p[i + e * len..][..len]), &mut ends[e][..len]);
             gather(at.map(|i| &u[i + e * len..][..len]), &mut legs[e][..len]);
             legs[e].iter_mut().for_each(|u| *u *= third);
+        }
+    }
+}
+
+/// Where the results of eight samples go.
+struct Rows<'a> {
+    stride: usize,
+    out: &'a mut [f64],
+}
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn write(self, lanes: &[Lane]) {
+        // The length of a row is often known when this is compiled.
+        if self.stride == lanes.len() {
+            scatter(lanes, self.out);
+        } else {
+            scatter_apart(lanes, self.stride, self.out);
         }
     }
 }

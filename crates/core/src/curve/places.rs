@@ -2,9 +2,10 @@
 
 use super::evaluate::{Job, Outside, Times};
 use super::locate::Locator;
-use crate::scalar::{LANES, Lane, few};
+use crate::scalar::{LANES, Lane, few, lane};
 
-/// Where eight samples fall. It goes along the samples of a block in their order.
+/// Where eight samples fall. It goes along the samples of a block in their order, or along the times of eight curves
+/// at once.
 pub struct Places<'a> {
     job: &'a Job<'a>,
     /// The next sample: the i-th time of a curve.
@@ -49,6 +50,9 @@ impl<'a> Places<'a> {
     /// they fall in other segments than those before.
     #[inline(always)]
     pub fn advance(&mut self) -> bool {
+        if self.job.apart > 1 {
+            return self.advance_together();
+        }
         let Times { x, count } = *self.job.times;
         if let Some([from, to]) = self.shared
             && self.left >= LANES
@@ -64,6 +68,29 @@ impl<'a> Places<'a> {
             }
         }
         self.search()
+    }
+
+    /// The next time of eight curves that have knots and times in common.
+    fn advance_together(&mut self) -> bool {
+        let Job { curves, times, outside, locator, len, .. } = self.job;
+        let begins = self.i == 0;
+        let (x, beyond) = inside(times.x[self.i], curves.t, *outside);
+        let k = locator.map_or(0, |locator| locator.find(x, self.segment));
+        let changed = begins || k != self.segment;
+        if changed {
+            self.segment = k;
+            self.at = few(|l| ((self.curve + l) * curves.nodes + k) * len);
+            self.knot = lane(curves.t[k]);
+            self.h = lane(curves.t[k + 1]) - self.knot;
+            self.rate = Lane::ONE / self.h;
+        }
+        self.x = lane(x);
+        self.beyond = [beyond; LANES];
+        self.i += 1;
+        if self.i == times.count {
+            (self.curve, self.i) = (self.curve + LANES, 0);
+        }
+        changed
     }
 
     #[inline(always)]

@@ -15,7 +15,7 @@ pub use dual::Dual;
 pub use few::{Each, few};
 pub use jet::Jet;
 pub use row::{Row, RowMut};
-pub use rows::{gather, scatter};
+pub use rows::{gather, scatter, scatter_apart};
 
 use std::ops::{Add, Mul, Neg, Sub};
 

@@ -29,24 +29,30 @@ pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
 /// Writes lanes as consecutive rows; `out` may hold fewer than eight.
 #[inline(always)]
 pub fn scatter(lanes: &[Lane], out: &mut [f64]) {
+    scatter_apart(lanes, lanes.len(), out);
+}
+
+/// The same as rows that begin `stride` numbers after each other.
+#[inline(always)]
+pub fn scatter_apart(lanes: &[Lane], stride: usize, out: &mut [f64]) {
     let len = lanes.len();
     let mut c = 0;
-    if out.len() == LANES * len {
+    if out.len() >= (LANES - 1) * stride + len {
         while c + 4 <= len {
             let [[a, b], [d, e], [f, g], [h, i]]: [[f64x4; 2]; 4] =
                 [cast(lanes[c]), cast(lanes[c + 1]), cast(lanes[c + 2]), cast(lanes[c + 3])];
             let low = f64x4::transpose([a, d, f, h]);
             let high = f64x4::transpose([b, e, g, i]);
             for l in 0..4 {
-                out[l * len + c..][..4].copy_from_slice(low[l].as_array());
-                out[(l + 4) * len + c..][..4].copy_from_slice(high[l].as_array());
+                out[l * stride + c..][..4].copy_from_slice(low[l].as_array());
+                out[(l + 4) * stride + c..][..4].copy_from_slice(high[l].as_array());
             }
             c += 4;
         }
     }
     while c < len {
         let column = lanes[c].to_array();
-        for (row, x) in out.chunks_exact_mut(len).zip(column) {
+        for (row, x) in out.chunks_mut(stride).zip(column) {
             row[c] = x;
         }
         c += 1;
