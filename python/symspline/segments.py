@@ -70,8 +70,8 @@ def fit_segments(
             zero are left out before the recording is cut, so that many of them are a pause.
 
     Returns:
-        The curves in the order of time, each a `CubicSpline`: ``curve.t[0]`` and ``curve.t[-1]`` are where it begins
-        and ends.
+        The curves in the order of time, each a `CubicSpline` or a `SmoothingSpline`: ``curve.t[0]`` and
+        ``curve.t[-1]`` are where it begins and ends.
 
     Raises:
         ValidationError: the input is not what is described above, times fall or repeat, or no piece has ``min_points``.

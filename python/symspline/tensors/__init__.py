@@ -4,6 +4,15 @@
 >>> t = ss.tensors.from_vectors([[2, 0, 1, 0, 0, 1], [1, 0.5, 2, 0, 0, 1]], order="dipy")
 >>> ss.tensors.to_vectors(ss.CubicSpline(None, t, "spd:3")(0.5), order="mrtrix").shape
 (6,)
+
+Fits of noisy signals leave negative eigenvalues here and there, with which a tensor is no point of ``spd:3``. Raise
+them to a floor well above the noise, since a small floor is far from everything in that space:
+
+>>> import numpy as np
+>>> sizes, axes = np.linalg.eigh(np.diag([1.5e-3, 4e-4, -4e-5]))
+>>> raised = np.einsum("...ij,...j,...kj->...ik", axes, np.maximum(sizes, 1e-4), axes)
+
+or leave such voxels out of the batch, or out of the fit by ``where=``.
 """
 
 from .nifti import Volume, read_nifti, write_nifti
