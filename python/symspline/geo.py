@@ -17,7 +17,7 @@ from ._core import ValidationError
 from .arrays import shown
 from .functions import fit_many
 from .places import compass, from_lonlat, to_lonlat
-from .segments import cut
+from .segments import check_smooth, cut
 from .smoothing.many import smooth_many
 from .spaces import Sphere
 from .spline import CubicSpline
@@ -111,7 +111,7 @@ def resample(
             ``timedelta64``; ``smooth=True`` for places with noise. Between pieces there are no rows; a track without a
             piece of ``min_points`` has none.
         radius: of the globe, in metres.
-        options: those of `CubicSpline`, or of `make_smoothing_spline`.
+        options: those of `CubicSpline`, or those of `make_smoothing_spline` but weights and frames.
 
     Returns:
         A table with the column ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog``
@@ -136,6 +136,12 @@ def resample(
     )
     if stamps.dtype.kind != "M":
         raise ValidationError(f"the times {name!r} are no dates; make them of texts by pandas.to_datetime")
+    check_smooth(smooth, duplicates, options)
+    for option in ("weights", "frames"):
+        if smooth and option in options:
+            raise ValidationError(
+                f"{option} go with rows, and resample takes none; use symspline.fit_segments"
+            )
     for column in [*([] if by is None else [by]), *columns]:
         missing = np.flatnonzero(frame[column].isna())
         if missing.size:

@@ -91,12 +91,9 @@ def fit_segments(
     [0.1, 0.1]
     """
     space = space_named(space)
-    if smooth not in (True, False):
-        raise ValidationError(
-            f"smooth must be True or False, not {shown(smooth)}; lam, criterion and the like are keywords of their own"
-        )
+    check_smooth(smooth, duplicates, options)
     weighing = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
-    used = _used(weighing, options, points, space, duplicates) if smooth else None
+    used = _used(weighing, points, space) if smooth else None
     curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
     if not curves:
         raise ValidationError(
@@ -112,16 +109,24 @@ def fit_segments(
     return smooth_many(own, space, **options)
 
 
-def _used(
-    weighing: dict[str, Any], options: dict[str, Any], points: Any, space: Space, duplicates: str
-) -> NDArray[np.bool_]:
-    """Which noisy points have a weight."""
+def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
+    """Raise unless pieces can be smoothed like that, if they are to be."""
+    if smooth not in (True, False):
+        raise ValidationError(
+            f"smooth must be True or False, not {shown(smooth)}; lam, criterion and the like are keywords of their own"
+        )
+    if not smooth:
+        return
     if duplicates == "mean":
         raise ValidationError("with smooth all points of one time count; leave duplicates='mean' out")
     if np.ndim(options.get("knots", 0)) > 0:
         raise ValidationError(
             "knots: give a number of knots for each piece, or none; pieces have their own times"
         )
+
+
+def _used(weighing: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
+    """Which noisy points have a weight."""
     found = read_weighing(**weighing, space=space, data=read(points, space))
     used: NDArray[np.bool_] = np.any([own.weights > 0 for own in found], axis=0)
     return used

@@ -82,6 +82,9 @@ def test_noisy_tracks_are_smoothed():
             r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both",
         ),
         (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
+        (lambda t: {"smooth": 0.5}, "smooth must be True or False, not 0.5"),
+        (lambda t: {"smooth": True, "duplicates": "mean"}, "leave duplicates='mean' out"),
+        (lambda t: {"smooth": True, "weights": [1]}, "weights go with rows, and resample takes none"),
         (
             lambda t: {"max_gap": 6},
             r"no track has 2 places without a pause longer than max_gap=6, in seconds",

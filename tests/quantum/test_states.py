@@ -160,6 +160,10 @@ def test_there_is_no_hamiltonian_before_the_first_knot(stand_in):
     assert h(0.0).shape == (3, 3)
     with pytest.raises(ss.ValidationError, match=r"dims \[2, 2\] are 4 levels, but the curve has 3"):
         qobjevo(later, [2, 2])
+    with pytest.raises(
+        ss.ValidationError, match=r"dims must be a list of whole numbers, such as \[2, 2\], not 3"
+    ):
+        qobjevo(later, 3)
 
 
 def test_composite_systems_in_qutip():

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from math import prod
 from typing import Any
 
+import numpy as np
+
 from .._core import ValidationError
 from ..arrays import shown
 from ..spline import CubicSpline
@@ -44,6 +46,10 @@ def qobjevo(spline: CubicSpline, dims: Sequence[int] | None = None) -> Any:
         raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
     beyond = "geodesic" if spline._outside == "raise" else None
     first, levels = float(spline.t[0]), spline.space.point_shape[0]
+    if dims is not None and not (
+        isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)
+    ):
+        raise ValidationError(f"dims must be a list of whole numbers, such as [2, 2], not {shown(dims)}")
     if dims is not None and prod(dims) != levels:
         raise ValidationError(f"dims {shown(dims)} are {prod(dims)} levels, but the curve has {levels}")
     both = None if dims is None else [list(dims), list(dims)]
