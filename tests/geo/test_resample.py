@@ -69,6 +69,9 @@ def test_noisy_tracks_are_smoothed():
     off = [np.sqrt(np.mean((found["lat"] - lat) ** 2)) for found in (smooth, rough)]
     assert len(smooth) == 200 and off[0] < 0.4 * off[1]
     assert smooth["sog"].std() < 0.3 * rough["sog"].std()
+    # Two places at one time both count.
+    twice = pd.concat([noisy, noisy[50:60].assign(lon=lon[50:60])])
+    assert len(geo.resample(twice, "10min", max_gap=3600, smooth=True)) == 200
 
 
 @pytest.mark.parametrize(
