@@ -74,6 +74,10 @@ class CubicSpline(Piecewise):
         CutLocusError: the geodesic between two neighbours, or to a control point, is not unique.
         ConvergenceError: the solver did not reach ``tol``.
 
+    Warns:
+        UserWarning: neighbours are within 1e-5 of each other's cut locus: a little more, and the curve would go the
+            other way round. Or points of ``sphere:3`` look like quaternions of which some have the wrong sign.
+
     >>> import symspline as ss
     >>> spline = ss.CubicSpline([0, 1, 3], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
     >>> spline(1).round(12) + 0.0

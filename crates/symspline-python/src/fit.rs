@@ -149,7 +149,19 @@ fn faults(
     let describe = |(c, r): (usize, &Report)| {
         let of = validate::of_curve(c, batch);
         let (kind, message) = match r.status {
-            Status::Converged | Status::Stopped => return None,
+            Status::Stopped => return None,
+            Status::Converged => {
+                let (index, angle) = r.almost_cut?;
+                (
+                    "almost-cut",
+                    format!(
+                        "neighbours almost at the cut locus: between points[{index}] and points[{}]{of} the angle is \
+                         {angle}, limit {limit}; had it been a little more, the curve would go the other way round: put \
+                         a point between them",
+                        index + 1
+                    ),
+                )
+            }
             Status::CutLocus { index, angle } => (
                 "cut-locus",
                 format!(

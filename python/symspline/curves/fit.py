@@ -22,7 +22,7 @@ from .ends import End, ends_in_factors, ends_of
 from .in_span import InSpan, is_large
 from .on_manifold import OnManifold
 from .plain import Plain
-from .solve import Fault, Options, Progress, Solved, Task
+from .solve import Fault, Options, Progress, Solved, Task, failures
 from .together import Together, share
 
 _T = TypeVar("_T")
@@ -219,8 +219,9 @@ def _checked(space: Space, tasks: list[Task], options: Options) -> list[Task]:
 
 
 def first_faults(solved: list[Solved]) -> list[Fault]:
-    """The faults in the first factor that has some."""
-    return next((found.faults for found in solved if found.faults), [])
+    """The faults in the first factor in which curves failed, or else in which there is something to say."""
+    faults = sorted((found.faults for found in solved if found.faults), key=lambda own: not failures(own))
+    return faults[0] if faults else []
 
 
 def _in_factors(space: Space, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:

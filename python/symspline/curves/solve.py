@@ -16,7 +16,14 @@ from .ends import End
 
 Progress = Callable[[int, int], object]
 Fault = tuple[int, str, str]
-"""The number of a curve, ``"cut-locus"`` or ``"unconverged"``, and what there is to say."""
+"""The number of a curve, ``"cut-locus"``, ``"unconverged"`` or `ALMOST_CUT`, and what there is to say."""
+ALMOST_CUT = "almost-cut"
+"""Of a curve that is good, but would go the other way round with a little more."""
+
+
+def failures(faults: list[Fault]) -> list[Fault]:
+    """Those of curves that are not good."""
+    return [fault for fault in faults if fault[1] != ALMOST_CUT]
 
 
 class Options(NamedTuple):

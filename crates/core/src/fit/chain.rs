@@ -8,7 +8,7 @@
 //! long curve.
 
 use super::ends::{ChainEnds, EndKind, of_kind};
-use crate::scalar::{LANES, Lane, Scalar, dot, few, gather, max_or_nan};
+use crate::scalar::{LANES, Lane, Scalar, dot, few, gather, lane, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 use crate::with_size;
 
@@ -17,6 +17,10 @@ use crate::with_size;
 fn tidy_every(dim: usize) -> usize {
     dim.max(8)
 }
+
+/// Nearer to the cut angle than this part of it, what is lost to measuring and rounding decides which way round the
+/// geodesic between two points goes.
+const ALMOST: f64 = 1e-5;
 
 /// What one lane of a chain is made of: a run of nodes of a curve, counted around the curve when
 /// it is closed.
@@ -116,6 +120,8 @@ pub struct Chain {
     pub condition: Lane,
     /// Where neighbours lie at or past the cut locus: the first segment and its deciding angle.
     pub cut: [Option<(usize, f64)>; LANES],
+    /// Where they lie almost there, see [`ALMOST`].
+    pub almost_cut: [Option<(usize, f64)>; LANES],
     walker: Walker,
     /// Frame and point at the first node.
     start: (Vec<Lane>, Vec<Lane>),
@@ -147,8 +153,8 @@ impl Chain {
             vector.resize(size, Lane::ZERO);
         }
         self.u.fill(Lane::ZERO);
-        (self.max_step, self.condition, self.cut) = (Lane::ZERO, Lane::ONE, [None; LANES]);
-        self.pace = Lane::ZERO;
+        (self.max_step, self.condition, self.pace) = (Lane::ZERO, Lane::ONE, Lane::ZERO);
+        (self.cut, self.almost_cut) = ([None; LANES], [None; LANES]);
 
         self.scale = if space.scales() { scale_of(space, runs, n) } else { Lane::ONE };
         self.clock = clock_of(runs);
@@ -175,7 +181,7 @@ impl Chain {
     #[inline(always)]
     fn walk_sized<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize) {
         let (m, keep, limit) = (self.m, space.chord_len(), below(space.cut_angle()));
-        let scales = space.scales();
+        let (scales, clear_of) = (space.scales(), lane(space.cut_angle() * (1.0 - ALMOST)));
         for i in 0..self.n {
             self.h[i] = Lane::new(few(|l| runs[l].h(i))) * self.clock;
             let d = &mut self.chord[i * m..(i + 1) * m];
@@ -188,12 +194,12 @@ impl Chain {
             self.max_step = max_or_nan(self.max_step, length2);
             self.pace = self.pace.max(length2 / (self.h[i] * self.h[i]));
             self.condition = max_or_nan(self.condition, space.condition(d));
-            let inside = angle.simd_lt(limit);
-            if !inside.all() {
-                for l in 0..LANES {
-                    if inside.to_bitmask() >> l & 1 == 0 {
-                        self.cut[l].get_or_insert((i, angle.to_array()[l]));
-                    }
+            let clear = angle.simd_lt(clear_of);
+            if !clear.all() {
+                let inside = angle.simd_lt(limit).to_bitmask();
+                for l in (0..LANES).filter(|l| clear.to_bitmask() >> l & 1 == 0) {
+                    let found = if inside >> l & 1 == 1 { &mut self.almost_cut[l] } else { &mut self.cut[l] };
+                    found.get_or_insert((i, angle.to_array()[l]));
                 }
             }
         }

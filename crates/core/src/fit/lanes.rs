@@ -78,7 +78,7 @@ fn fit_in(
     });
     chain.unroll(space, &runs, nodes - 1, &ends, rows);
     let ends = few_points(space, chain, ends);
-    let cut = chain.cut;
+    let (cut, almost_cut) = (chain.cut, chain.almost_cut);
     let idle = mask_from(|l| cut[l].is_some());
     let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
     let options = Options { tol: pieces_tol, ..*options };
@@ -110,6 +110,7 @@ fn fit_in(
             solver: outcome.solver[l],
             invariant_radius: f64::NAN,
             alternative: alternative[l],
+            almost_cut: almost_cut[l].map(|(index, angle)| (p.first + index, angle)),
         };
         p.end_leg = given[l];
     }

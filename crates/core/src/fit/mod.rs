@@ -180,6 +180,9 @@ pub struct Report {
     pub invariant_radius: f64,
     /// The least energy ∫ |∇γ'|² dt of other C² curves through the points that were found, NaN where none was.
     pub alternative: f64,
+    /// The first point from which the next one lies almost at the cut locus, within 1e-5 of the limit, and the deciding
+    /// angle.
+    pub almost_cut: Option<(usize, f64)>,
 }
 
 impl Default for Report {
@@ -193,6 +196,7 @@ impl Default for Report {
             solver: Solver::FixedPoint,
             invariant_radius: f64::NAN,
             alternative: f64::NAN,
+            almost_cut: None,
         }
     }
 }

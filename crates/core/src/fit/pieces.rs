@@ -148,6 +148,7 @@ fn merge(
             report.max_step = report.max_step.max(r.max_step);
             report.rate = report.rate.max(r.rate);
             report.solver = report.solver.max(r.solver);
+            report.almost_cut = report.almost_cut.or(r.almost_cut);
             if report.status == Status::Converged {
                 report.status = r.status;
             }
@@ -171,7 +172,9 @@ fn merge(
                 differing.push(curve);
             }
         }
-        report.status = report.status.counted(|index| index % problem.segments(curve));
+        let around = |index| index % problem.segments(curve);
+        report.status = report.status.counted(around);
+        report.almost_cut = report.almost_cut.map(|(index, angle)| (around(index), angle));
         let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
         if known && equally_spaced(problem.knots(curve)) {
             let leg = same.iter().map(|p| p.end_leg).fold(0.0, f64::max);
