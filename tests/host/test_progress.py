@@ -196,9 +196,9 @@ def test_ctrl_c_stops_long_work(name, work):
             time.sleep(0.6)
             start = time.perf_counter()
             process.send_signal(signal.SIGINT)
-            out, _ = process.communicate(timeout=1.5)
-            # It takes about 0.05 s.
-            assert time.perf_counter() - start < 1.5
+            # It takes about 0.05 s, with six other programs on two cores up to 2 s.
+            out, _ = process.communicate(timeout=5)
+            assert time.perf_counter() - start < 5
             assert out == "interrupted\nwell\n" and process.returncode == 0
         finally:
             process.kill()
