@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Self
 
 import numpy as np
@@ -10,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from . import archive
 from ._core import ValidationError
-from .curves.chosen import fit_chosen, invalid, mask_of
+from .curves.chosen import fit_sound, fit_wanted, mask_of
 from .curves.curve import Curve
 from .curves.derivatives import places
 from .curves.ends import ends_in_factors, kept, picked
-from .curves.fit import Asked, curve_of, fit, read, read_ends
+from .curves.fit import Asked, curve_of, read, read_ends
 from .curves.gradient import Gradient, Places
-from .curves.solve import Fault, Progress
+from .curves.solve import Progress
 from .curves.together import longest_step
 from .failures import fail
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
@@ -113,24 +112,15 @@ class CubicSpline(Piecewise):
         clock, shown_times, times = knots_of(t, batch, nodes)
         ends = read_ends(bc_type, space, batch)
         mask = None if where is None else mask_of(where, batch)
-        bad: list[Fault] = []
-        if batch and check and on_failure != "raise":
-            wanted = np.arange(math.prod(batch)) if mask is None else np.flatnonzero(mask)
-            bad = invalid(space, data, wanted)
-            if bad:
-                mask = np.ones(batch, bool) if mask is None else mask.copy()
-                mask.flat[[number for number, *_ in bad]] = False
         asked = Asked(space, times, data, ends, options, check)
+        how = fit_sound if batch and check and on_failure != "raise" else fit_wanted
         try:
-            if mask is None or mask.all():
-                curve, reports, faults = fit(asked, progress)
-            else:
-                curve, reports, faults = fit_chosen(asked, progress, np.flatnonzero(mask))
+            curve, reports, faults = how(asked, progress, mask)
         except ValidationError as error:
             raise clock.explain(error) from None
         self._fill(clock, shown_times, curve, kept(bc_type), policy, reports)
-        if bad or faults:
-            fail(sorted(bad + faults), on_failure, self)
+        if faults:
+            fail(faults, on_failure, self)
         warn_of_signs(space, [data], [report.max_step for report in reports])
 
     def _fill(

@@ -3,7 +3,7 @@
 
 use symspline::matrix::{
     Matrix, Unary, arc, diagonalise, exp_minus_one, exp_skew_minus_one, function_of, log_one_plus,
-    orthogonalise, orthonormalise, trig,
+    orthogonalise, orthonormalise, reorthonormalise, trig,
 };
 use symspline::scalar::{Dual, Jet, Lane, Scalar, lane};
 
@@ -163,6 +163,7 @@ fn arc_is_that_of_the_eigenvalues() {
         vec![0.2, 0.29, 0.31],
         vec![0.5, 0.79, 0.2, 0.1],
         vec![1.2, 1.99],
+        vec![0.7, 0.1, 0.3],
     ] {
         let mut f = [arc(&noise.with_eigenvalues::<2>(&values))];
         diagonalise(&mut f);
@@ -193,6 +194,42 @@ fn derivatives_of_arc_are_divided_differences() {
         let f = |y: f64| (1.0 - y).acos() / (y * (2.0 - y)).sqrt();
         let expected = (f(y) - f(x)) / (y - x);
         assert!((found / expected - 1.0).abs() <= 1e-12, "{x}, {y}: {found}, not {expected}");
+    }
+}
+
+/// How far columns are from orthonormal ones.
+fn defect<const D: usize>(q: &Matrix<Lane, D>) -> Lane {
+    q.adjoint_times(q).plus_identity(lane(-1.0)).size()
+}
+
+#[test]
+fn columns_that_are_nearly_parallel_become_orthonormal_to_rounding() {
+    let mut noise = Noise(7);
+    for apart in [1.0, 1e-3, 1e-7, 1e-11] {
+        let x = noise.matrix::<2>(4);
+        let mut q = Matrix::<Lane, 2>::from_fn(4, 4, |i, j| {
+            std::array::from_fn(|c| x[(i, 0)][c] + x[(i, j)][c] * lane(if j > 0 { apart } else { 0.0 }))
+        });
+        orthonormalise(&mut q);
+        for off in defect(&q).to_array() {
+            assert!(off <= 2e-15, "{apart} apart: {off}");
+        }
+    }
+}
+
+#[test]
+fn a_step_squares_the_distance_to_orthonormal_columns() {
+    let mut noise = Noise(8);
+    for size in [1e-2, 1e-4, 1e-6] {
+        let mut q = noise.matrix::<2>(4);
+        orthonormalise(&mut q);
+        q = &q + &noise.matrix::<2>(4).scaled(lane(size));
+        let before = defect(&q);
+        reorthonormalise(&mut q);
+        // Q*Q = 1 + D becomes (1 + D)(1 − D/2)² = 1 − ¾ D² + ¼ D³.
+        for (off, before) in defect(&q).to_array().into_iter().zip(before.to_array()) {
+            assert!(off <= 0.8 * before * before + 2e-15, "{before} off becomes {off}");
+        }
     }
 }
 

@@ -14,7 +14,7 @@ from .._core import ValidationError
 from ..arrays import as_array
 from ..spaces import Array, Space, factors_of
 from .ends import End
-from .fit import Asked, Fit, Points, finished, first_faults, fit_many, solve_factors
+from .fit import Asked, Fit, Points, finished, first_faults, fit, fit_many, solve_factors
 from .solve import Fault, Options, Progress, Solved
 
 Numbers = NDArray[np.int64]
@@ -33,7 +33,7 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> NDArray[np.bool_]:
     return mask
 
 
-def invalid(space: Space, points: list[Points], wanted: Numbers) -> list[Fault]:
+def _invalid(space: Space, points: list[Points], wanted: Numbers) -> list[Fault]:
     """Curves with points that are none, found by halves: the few bad ones of many cost little."""
     found: dict[int, str] = {}
     for factor, part in zip(factors_of(space), points, strict=True):
@@ -59,6 +59,31 @@ def invalid(space: Space, points: list[Points], wanted: Numbers) -> list[Fault]:
         if len(wanted):
             search(wanted)
     return [(number, "invalid", found[number]) for number in sorted(found)]
+
+
+def fit_wanted(asked: Asked, progress: Progress | None, mask: NDArray[np.bool_] | None) -> Fit:
+    """The curves of a batch that are wanted; all without a mask."""
+    if mask is None or mask.all():
+        return fit(asked, progress)
+    return fit_chosen(asked, progress, np.flatnonzero(mask))
+
+
+def fit_sound(asked: Asked, progress: Progress | None, mask: NDArray[np.bool_] | None) -> Fit:
+    """The same, but without those with points that are none, which are among the faults."""
+    batch, refused = asked.points[0].batch, None
+    if mask is None:
+        # Mostly all are good, and a fit looks at them before it begins.
+        try:
+            return fit(asked, progress)
+        except ValidationError as error:
+            refused = error
+    sound = np.ones(batch, bool) if mask is None else mask.copy()
+    bad = _invalid(asked.space, asked.points, np.flatnonzero(sound))
+    if refused and not bad:
+        raise refused
+    sound.flat[[number for number, *_ in bad]] = False
+    found = fit_wanted(asked, progress, sound)
+    return found._replace(faults=sorted(bad + found.faults))
 
 
 def fit_chosen(asked: Asked, progress: Progress | None, chosen: Numbers) -> Fit:
