@@ -361,7 +361,13 @@ def outlier_table(names: Sequence[str] = tuple(SPACES), sigma: float = 0.1, seed
         ratio = f"{found[5] / found[0]:.2f}{f' ({failed} †)' if failed else ''}"
         spared = f"{missed(given, told).mean() / found[0]:.2f}"
         rows.append([name, *(f"{error:.4f}" for error in found), ratio, spared])
-    head = ["space", *losses, *(f"15 %: {loss}" for loss in losses), "cauchy/clean, linear", "left out*/clean"]
+    head = [
+        "space",
+        *losses,
+        *(f"15 %: {loss}" for loss in losses),
+        "cauchy/clean, linear",
+        "left out*/clean",
+    ]
     return table(head, rows)
 
 

@@ -11,9 +11,13 @@ Tensors of all voxels were measured on four days, and are wanted on a day betwee
 # A loop over the voxels, each with a curve of its own: Python is called for each. Instead, all voxels are one batch:
 # one call, on all cores, with the same bits.
 
+import tempfile
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import matplotlib.pyplot as plt
+import nibabel
 import numpy as np
 
 import symspline as ss
@@ -21,10 +25,17 @@ import symspline as ss
 rng = np.random.default_rng(0)
 days = np.array([0.0, 7.0, 21.0, 56.0])
 mask = np.linalg.norm(np.indices((10, 10, 10)) - 4.5, axis=0) < 4
-# With nibabel: np.stack([ss.tensors.read_nifti(name, "fsl", mask).tensors for name in names], axis=1)
-recorded = np.tile([1.5e-3, 1e-4, 0, 6e-4, 0, 4e-4], (mask.sum(), 4, 1))
-recorded *= rng.uniform(0.9, 1.1, (mask.sum(), 4, 1))
-matrices = ss.tensors.from_vectors(recorded, order="fsl")
+recorded = np.zeros((*mask.shape, len(days), 6))
+recorded[mask] = np.array([1.5e-3, 1e-4, 0, 6e-4, 0, 4e-4]) * rng.uniform(
+    0.9, 1.1, (mask.sum(), len(days), 1)
+)
+folder = Path(tempfile.mkdtemp())
+names = [folder / f"day{day:02.0f}.nii.gz" for day in days]
+for i, name in enumerate(names):  # as FSL would have written them
+    nibabel.save(nibabel.Nifti1Image(recorded[..., i, :], np.eye(4)), name)
+
+volumes = [ss.tensors.read_nifti(name, "fsl", mask) for name in names]
+matrices = np.stack([volume.tensors for volume in volumes], axis=1)
 
 start = time.perf_counter()
 one_by_one = np.stack([ss.CubicSpline(days, of_voxel, "spd:3")(30.0) for of_voxel in matrices])
@@ -47,8 +58,7 @@ print(
     f"the same bits: {np.array_equal(tensors, one_by_one)}; loop {1e3 * loop:.1f} ms, batch {1e3 * together:.1f} ms"
 )
 
-volume = np.zeros((*mask.shape, 6))
-volume[mask] = ss.tensors.to_vectors(tensors, order="mrtrix")  # ss.tensors.write_nifti writes files
+ss.tensors.write_nifti(folder / "day30.nii.gz", replace(volumes[0], tensors=tensors), "mrtrix")
 
 figure, axes = plt.subplots(figsize=(5, 4), layout="constrained")
 diffusivity = np.full(mask.shape, np.nan)

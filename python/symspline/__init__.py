@@ -16,7 +16,7 @@ from . import _cpu
 
 _cpu.load(_Path(__file__).parent)
 
-from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
+from . import convert, geo, hurdat, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from .config import show_config  # noqa: E402
 from .curves.gradient import Gradient  # noqa: E402
@@ -112,6 +112,7 @@ __all__ = [
     "fit_many",
     "fit_segments",
     "geo",
+    "hurdat",
     "load",
     "load_many",
     "make_lsq_spline",

@@ -101,3 +101,10 @@ def in_single(values: Any) -> Any:
     if isinstance(values, tuple):
         return tuple(map(in_single, values))
     return cast(values, np.complex64 if values.dtype.kind == "c" else np.float32)
+
+
+def checked_atol(atol: Any) -> float:
+    """How far off a space points may be, if that is a number that makes sense."""
+    if isinstance(atol, bool) or not isinstance(atol, (int, float, np.number)) or not 0 <= atol < 1:
+        raise ValidationError(f"atol must be a number from 0 to 1, not {shown(atol)}")
+    return float(atol)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ._core import ValidationError
 from .arrays import read_only
 from .curves import fit as fitting
-from .curves.chosen import fit_many_chosen, mask_of
+from .curves.chosen import ManyAsked, fit_many_sound, fit_many_wanted, mask_of
 from .curves.curve import Curve, quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
@@ -171,11 +171,11 @@ def fit_many(
             raise ValidationError(f"curve {number}: {error}") from None
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
-    if mask is None:
-        fits, faults = fitting.fit_many(space, times, points, ends, options, check, progress)
+    asked = ManyAsked(space, times, points, ends, options, check)
+    if check and on_failure != "raise":
+        fits, faults = fit_many_sound(asked, progress, mask)
     else:
-        wanted = np.flatnonzero(mask)
-        fits, faults = fit_many_chosen(space, times, points, ends, options, check, progress, wanted)
+        fits, faults = fit_many_wanted(asked, progress, mask)
     ends_kept = kept(bc_type)
     fitted = [
         CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)

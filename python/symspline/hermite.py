@@ -12,8 +12,9 @@ from ._core import CutLocusError, ValidationError
 from .curves.curve import Curve
 from .curves.fit import curve_of, read, read_ends, validated
 from .functions import velocities_of
-from .options import checked_policy, outside
+from .options import checked_policy, outside, within
 from .piecewise import Piecewise
+from .signs import warn_of_signs
 from .spaces import Array, Space, factors_of, parts_of
 from .spaces import space as space_named
 from .times import Clock, knots_of
@@ -35,6 +36,7 @@ class HermiteSpline(Piecewise):
         space: a space or its name.
         extrapolate: what happens outside the knots: None raises, True continues the last segment, ``"geodesic"`` goes
             on with constant velocity, ``"periodic"`` wraps.
+        atol: how far off the space points may be, as for `CubicSpline`.
 
     Raises:
         ValidationError: the input is not what is described above.
@@ -59,10 +61,11 @@ class HermiteSpline(Piecewise):
         space: Space | str,
         *,
         extrapolate: bool | str | None = None,
+        atol: float | None = None,
     ) -> None:
         space = space_named(space)
         policy = checked_policy(extrapolate)
-        data = read(points, space)
+        data = within(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         given = parts_of(velocities, space, "velocities")
         for factor, part, own in zip(factors_of(space), data, given, strict=True):
@@ -79,6 +82,7 @@ class HermiteSpline(Piecewise):
         curve = curve_of(space, times, arrays, fitted=False)
         _check_legs(curve)
         self._fill(clock, shown_times, curve, policy)
+        warn_of_signs(space, [data])
 
     def _fill(self, clock: Clock, t: Array, curve: Curve, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate

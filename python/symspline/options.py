@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ._core import ValidationError
-from .arrays import shown, whole_number
+from .arrays import checked_atol, shown, whole_number
 from .curves.ends import is_closed
 from .curves.fit import Points
 from .curves.solve import Options
@@ -24,9 +22,8 @@ def within(data: list[Points], atol: float | None) -> list[Points]:
     """Points that may be off the space by ``atol``; None leaves what their type allows."""
     if atol is None:
         return data
-    if isinstance(atol, bool) or not isinstance(atol, (int, float, np.number)) or not 0 <= atol < 1:
-        raise ValidationError(f"atol must be a number from 0 to 1, not {shown(atol)}")
-    return [part._replace(tol=float(atol)) for part in data]
+    tol = checked_atol(atol)
+    return [part._replace(tol=tol) for part in data]
 
 
 def checked_policy(extrapolate: Any) -> Any:

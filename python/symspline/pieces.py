@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .functions import evaluate
+from .manifolds import Manifold
 from .spaces import Space
 from .spline import CubicSpline
 
@@ -70,7 +71,10 @@ class Pieces:
             flat = places.reshape(*places.shape[:2], -1)
             return Jumps(self.space.distance(end, start), float(np.linalg.norm(flat, axis=-1).max()))
         vectors = self.at(self.t, nu)
-        carried = self.space.transport(end, start, vectors[:last, 1])
+        carried = vectors[:last, 1]
+        # Points of a manifold that was made without it have one array each.
+        if not isinstance(self.space, Manifold) or self.space.functions.transport is not None:
+            carried = self.space.transport(end, start, carried)
         size = self.space.norm(start, carried - _next(vectors)[:last])
         return Jumps(size, float(self.space.norm(places, vectors).max()))
 

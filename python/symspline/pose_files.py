@@ -16,6 +16,7 @@ from .archive import replacing
 from .arrays import as_array, brief
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert.reading import length, off_one, refuse
+from .handed import times_of
 from .spaces import Array, SpecialEuclidean, SpecialOrthogonal
 
 Doubles = NDArray[np.float64]
@@ -25,6 +26,10 @@ TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 _SO3, _SE3 = SpecialOrthogonal(3), SpecialEuclidean(3)
 # Files have rounded numbers, some with three decimals.
 _ROUNDED = 5e-3
+# The year 5138 in seconds since 1970, and 1973 in milliseconds.
+_FAR = 1e11
+# The last second whose nanoseconds are a number of 64 bits.
+_LAST = 9.2e9
 _EUROC = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []"
 
 
@@ -48,6 +53,7 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
         OSError: the file cannot be read.
     """
     rows, place = tum_rows(file)
+    check_seconds(rows[:, 0], f"{_name(file)}: time")
     r = _rotations(rows[:, [7, 4, 5, 6]], lambda i: f"{_name(file)}, {place(i)}")
     return rows[:, 0].copy(), join(r, rows[:, 1:4])
 
@@ -195,12 +201,11 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
         poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
     """
     r, x = split(_checked(poses))
-    times = as_array(t, "t")
+    times = _moments(t, len(x))
     if times.dtype.kind != "M":
-        times = np.rint(1e9 * _seconds(times, len(x))).astype(np.int64)
+        refuse(np.abs(times.astype(np.float64)) > _LAST, "t", lambda i: f"is {times[i]}, after the year 2262")
+        times = np.rint(1e9 * times.astype(np.float64)).astype(np.int64)
     ns = times.astype("datetime64[ns]").astype(np.int64).tolist()
-    if np.shape(ns) != (len(x),):
-        raise ValidationError(f"t has shape {times.shape}, but there are {len(x)} poses")
     values = np.concatenate([x, _quaternions(r, scalar_first=True)], axis=1).tolist()
     _write(file, ([time, *row] for time, row in zip(ns, values, strict=True)), ",", _EUROC)
 
@@ -256,15 +261,35 @@ def _quaternions(r: Array, scalar_first: bool) -> Array:
     return matrix_to_quaternion(r, scalar_first=scalar_first)
 
 
-def _seconds(t: ArrayLike, count: int) -> Doubles:
-    times = as_array(t, "t")
+def _moments(t: ArrayLike, count: int) -> Array:
+    """Times to write: numbers of seconds, or dates."""
+    times = as_array(times_of(t, "t")[0], "t")
     if times.shape != (count,):
         raise ValidationError(f"t has shape {times.shape}, but there are {count} poses")
+    if times.dtype.kind not in "Miuf":
+        raise ValidationError(f"t must be numbers or datetime64, not {times.dtype}")
+    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}, which is no time")
+    check_seconds(times, "t")
+    return times
+
+
+def _seconds(t: ArrayLike, count: int) -> Doubles:
+    times = _moments(t, count)
     if times.dtype.kind == "M":
         return (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
-    if times.dtype.kind not in "iuf":
-        raise ValidationError(f"t must be numbers or datetime64, not {times.dtype}")
     return times.astype(np.float64)
+
+
+def check_seconds(times: Array, name: str) -> None:
+    """Raise if numbers look like milliseconds since 1970, or smaller parts, where seconds are meant."""
+    if times.dtype.kind in "iuf":
+        refuse(
+            np.abs(times.astype(np.float64)) > _FAR,
+            name,
+            lambda i: (
+                f"is {times[i]}, which can be no seconds; of nanoseconds make dates, .astype('datetime64[ns]')"
+            ),
+        )
 
 
 # ---- lines ----
@@ -306,7 +331,7 @@ class Line(NamedTuple):
 def _lines(file: Any) -> list[Line]:
     """The lines that are no comments."""
     if hasattr(file, "read"):
-        text = file.read()
+        text = file.read().removeprefix("\ufeff")
     else:
         opener: Any = gzip.open if str(file).endswith(".gz") else open
         try:

@@ -24,7 +24,17 @@ from numpy.typing import ArrayLike
 from ._core import ValidationError
 from .curves.curve import Curve
 from .piecewise import evaluated
-from .pose_files import join, read_euroc, read_kitti, read_tum, split, write_euroc, write_kitti, write_tum
+from .pose_files import (
+    check_seconds,
+    join,
+    read_euroc,
+    read_kitti,
+    read_tum,
+    split,
+    write_euroc,
+    write_kitti,
+    write_tum,
+)
 from .rotations import Spline, attitude, check_frame, turned
 from .spaces import Array, Euclidean, SpecialEuclidean
 
@@ -93,17 +103,9 @@ def imu(
     g = np.asarray(gravity)
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {gravity!r}")
-    _check_seconds(spline.t)
+    check_seconds(spline.t, "t")
     motion = _Motion(spline, x, extrapolate, per_curve)
     return Imu(motion.turning, motion.in_body(motion.acceleration - g))
-
-
-def _check_seconds(t: Array) -> None:
-    # Beside a year of seconds 3e7, and 1.7e9 of those since 1970.
-    if np.ndim(t) and t.dtype.kind in "iuf" and abs(float(t.flat[0])) > 1e17:
-        raise ValidationError(
-            f"t[0] = {t.flat[0]} can be no seconds; of nanoseconds make dates, t.astype('datetime64[ns]')"
-        )
 
 
 def twist(

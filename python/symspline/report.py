@@ -24,7 +24,7 @@ class Report:
 
     Attributes:
         method: the solver that was used: ``"auto"`` tries quasi-newton, then newton, then the homotopy; of
-            a batch the last that any curve needed.
+            a batch the last that any curve needed. Where these fail, or points are far apart, ``"trust-region"``.
         converged: whether the residual is below the tolerance, or at the rounding floor (256 ε times
             the condition of the data), and all control legs are inside the cut locus. It is true of the curve:
             across the seam of a closed curve, too.
@@ -44,7 +44,7 @@ class Report:
         rate: mean contraction of the residual per iteration.
         alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
             found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
-            batch.
+            batch, and always in a product.
     """
 
     method: str

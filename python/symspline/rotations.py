@@ -329,17 +329,20 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     return matrix_to_quaternion(_given(rotations), scalar_first=scalar_first)
 
 
-def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None) -> Array:
+def from_quaternions(
+    quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
+) -> Array:
     """The rotations of unit quaternions: q and −q are the same one.
 
     Args:
         quaternions: unit vectors, shape (..., 4).
         scalar_first: True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS. It must be given.
+        atol: how far from 1 lengths may be, such as 1e-5 for numbers of six decimals; None for 1e-8 of doubles.
 
     Returns:
         Points of ``so:3``, shape (..., 3, 3).
     """
-    return quaternion_to_matrix(quaternions, scalar_first=scalar_first)
+    return quaternion_to_matrix(quaternions, scalar_first=scalar_first, atol=atol)
 
 
 def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:

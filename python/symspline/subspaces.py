@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from ._core import ValidationError
 from .arrays import as_array, shown, whole_number
 from .convert.reading import Array, adjoint, numbers, refuse
+from .handed import times_of
 from .spaces import ComplexGrassmannian, Grassmannian
 from .spline import CubicSpline
 
@@ -107,8 +108,8 @@ def reduced_operator(
     n, k = space.point_shape
     if not callable(operator) or hasattr(operator, "shape"):
         _check_operator(operator, n)
-    parameters = as_array(x, "x")
-    bases: Array = spline.lift(parameters, start=start)
+    parameters = as_array(times_of(x, "x")[0], "x")
+    bases: Array = spline.lift(x, start=start)
     flat = bases.reshape(-1, n, k)
     if callable(operator) and not hasattr(operator, "shape"):
         made = map(operator, parameters.ravel())

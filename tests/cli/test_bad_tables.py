@@ -139,3 +139,15 @@ def test_archives_with_a_damaged_list_of_entries(fails):
 def test_messages_are_short(fails):
     write("a.csv", "t,x\n0,1\n1," + "9" * 5000 + "x\n")
     assert 1000 < len(fails("fit a.csv --space r:1 -o a.npz")) < 1100
+
+
+def test_a_line_of_units(fails):
+    write("a.csv", "time,lon,lat\n,degrees_east,degrees_north\n0,1,2\n1,2,3\n")
+    problem = fails("fit a.csv --lonlat -o a.npz")
+    assert "line 2: column" in problem
+    write("a.csv", "time,lon,lat\n0,degrees_east,degrees_north\n0,1,2\n1,2,3\n")
+    problem = fails("fit a.csv --lonlat -o a.npz")
+    assert (
+        "line 2: column 'lon' holds 'degrees_east', which is not a number; if this line holds units"
+        in problem
+    )

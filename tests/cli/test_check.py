@@ -137,3 +137,12 @@ def test_curves_with_given_velocities_are_named(fails):
     ss.HermiteSpline(None, np.eye(3), np.roll(np.eye(3), 1, axis=1), "s:2").save("hermite.npz")
     for command in ("check hermite.npz", "sample hermite.npz -n 3 -o a.csv", "plot hermite.npz -o a.png"):
         assert "hermite.npz is a HermiteSpline, whose acceleration jumps" in fails(command)
+
+
+def test_check_of_a_manifold_that_has_no_transport(run):
+    space, rng = ss.Stiefel(2, 4), np.random.default_rng(1)
+    p = [space.random_point(rng)]
+    for _ in range(5):
+        p.append(space.exp(p[-1], 0.4 * space.project_tangent(p[-1], rng.standard_normal((4, 2)))))
+    ss.CubicSpline(None, p, space).save("a.npz")
+    run("check a.npz")

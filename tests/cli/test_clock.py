@@ -154,3 +154,17 @@ def test_dates_that_cannot_be_counted():
     for knots in (far + np.timedelta64(10**9), long):
         with pytest.raises(Problem, match="cannot be counted in units of 1 microseconds"):
             times.spread(3, knots)
+
+
+@pytest.mark.parametrize("zone, other", [("", "+05:00"), ("Z", ""), ("+01:00", "")])
+def test_times_with_and_without_a_zone_do_not_mix(run, fails, zone, other):
+    dated([f"2021-08-{day}T00:00{zone}" for day in (28, 29, 30)])
+    run("fit a.csv --space r:1 -o a.npz")
+    write("at.csv", f"time\n2021-08-28T12:00{other}\n")
+    problem = fails("sample a.npz --at at.csv -o b.csv")
+    assert problem.startswith("at.csv: its times have ") and "which time is meant is in doubt" in problem
+    write("at.csv", f"time\n2021-08-28T12:00{zone}\n")
+    run("sample a.npz --at at.csv -o b.csv")
+    # Arrays of NumPy know of no zone.
+    np.savez("at.npz", time=np.array(["2021-08-28T12:00"], "M8[s]"))
+    run("sample a.npz --at at.npz -o b.csv")

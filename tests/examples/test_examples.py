@@ -13,7 +13,8 @@ FOLDER = Path(__file__).parents[2] / "examples"
 SAYS = {
     "attitude": r"at 6.5 minutes: \[",
     "imu_from_a_recording": "",
-    "qubit_control": r"the same .* 1\.\d\d of 1\.57 apart\nmissed by (\d\.\de-1[4-7]|0\.0e\+00), strongest field",
+    "qubit_control": r"the same .* 1\.\d\d of 1\.57 apart\nmissed by (\d\.\de-1[4-7]|0\.0e\+00), strongest field "
+    r".*\nQuTiP comes through all six, up to (-?\de-1\d|0e\+00)",
     "tensor_volume": r"280 voxels, mean diffusivity 8.\d\de-04 mm²/s, all positive: True",
     "pod_over_a_parameter": r"4 numbers in place of 80: off by 0\.\d%; with interpolated numbers by \d\d\.\d%",
     "storms_from_a_table": "37 storms, 946 fixes, 5900 hours; fastest: Martin 2022",

@@ -10,6 +10,7 @@ from cases import EPS, base_point, compact, steep_tangent, unit_tangent, walk
 from truth import truth
 
 import symspline as ss
+from symspline.pieces import spline_pieces
 
 # Spaces of few dimensions, so that Newton's method is quick; all kinds of pages and of cut loci.
 SPACES = [
@@ -314,3 +315,67 @@ def test_hyperbolic_points_that_doubles_cannot_tell_apart_are_an_error(r):
         ss.ValidationError, match=rf"points\[3\] .*distance {r:.1f}.* from \(1, 0, .*transvection"
     ):
         ss.CubicSpline(None, p, "h:2")
+
+
+@pytest.mark.parametrize("r", [16.0, 18.0])
+def test_complex_hyperbolic_points_that_doubles_cannot_tell_apart_are_an_error(r):
+    turn = np.exp(1j * np.exp(-r) * np.arange(4))
+    p = np.stack([np.full(4, np.cosh(r)) + 0j, np.sinh(r) * turn], axis=-1)
+    with pytest.raises(ss.ValidationError, match=rf"points\[0\] .*distance {r:.1f}.* from \(1, 0, "):
+        ss.CubicSpline(None, p, "ch:1")
+
+
+@pytest.mark.parametrize("name", ["h:2", "h:3", "ch:1", "ch:2", "spd:2", "hpd:2", "sspd:2"])
+def test_what_rounding_leaves_of_long_steps_is_said(name):
+    """Geodesics multiply rounding errors by the exponential of their length, however right the velocities are."""
+    space, rng = ss.space(name), seeded(name)
+    converged = 0
+    middle = base_point(space, rng)
+    for radius in np.linspace(0.5, 13, 26):
+        p = np.stack([space.exp(middle, radius * unit_tangent(space, middle, rng)) for _ in range(3)])
+        spline = ss.CubicSpline([0, 1, 2.5], p, space, on_failure="ignore")
+        if not spline.report.converged:
+            continue
+        converged += 1
+        pieces = spline_pieces(spline)
+        missed = space.distance(pieces.at(pieces.t)[:, 1], p[1:]).max() / max(
+            space.norm(p, spline.velocities)
+        )
+        assert missed <= 2e-8, radius
+        assert pieces.jumps(1).relative <= 2e-8, radius
+    assert 5 <= converged <= 25
+
+
+WITHOUT_METRIC = ["gl:2", "gl:3", "cgl:2", "aff:2", "sim:3", "sl:3", "sp:4", "so:1,3", "se:2", "se:3"]
+
+
+@pytest.mark.parametrize("name", WITHOUT_METRIC)
+def test_the_longest_step_without_an_invariant_metric(name):
+    """Frames that are carried along do not keep lengths there."""
+    space, rng = ss.space(name), seeded(name)
+    p = [base_point(space, rng)]
+    for _ in range(11):
+        p.append(space.project(space.exp(p[-1], rng.uniform(0.3, 1) * unit_tangent(space, p[-1], rng))))
+    p = np.stack(p)
+    longest = space.distance(p[:-1], p[1:]).max()
+    assert ss.CubicSpline(None, p, space).report.max_step == pytest.approx(longest, rel=1e-11)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+@pytest.mark.parametrize("name", ["se:2", "se:3", "aff:3", "gl:4"])
+def test_long_ways_are_not_far_apart(name, unit):
+    """It is angles that come near the cut locus, whatever the unit of length."""
+    n, rng = (3 if name == "se:2" else 4), np.random.default_rng(3)
+    space = ss.SpecialEuclidean(n - 1)
+    p = [np.eye(n)]
+    for _ in range(11):
+        v = unit * rng.standard_normal(n - 1)
+        p.append(space.exp(p[-1], space.project_tangent(p[-1], p[-1] @ _twist(n, 0.2, v))))
+    found = [ss.CubicSpline(None, p, name, method=method).report for method in ("auto", "quasi-newton")]
+    assert found[0].method == "quasi-newton" and found[0].iterations == found[1].iterations
+
+
+def _twist(n, turn, velocity):
+    xi = np.zeros((n, n))
+    xi[0, 1], xi[1, 0], xi[:-1, -1] = -turn, turn, velocity
+    return xi

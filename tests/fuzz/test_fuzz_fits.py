@@ -162,6 +162,10 @@ def test_fit_many(data):
         own = {key: more[key] for key in more if key in ("method", "tol", "max_iter", "check")}
         own |= {"bc_type": bc_type, "on_failure": "ignore"}
         alone = attempt(lambda t=t, p=p, own=own: ss.CubicSpline(t, p, space, **own))
+        if isinstance(alone, Refusal):
+            # One of its points is none, which among many is a curve that failed.
+            assert more.get("on_failure") in ("warn", "ignore") and not spline.report.converged
+            continue
         assert alone == spline and alone.report == spline.report
 
 

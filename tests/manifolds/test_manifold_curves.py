@@ -189,3 +189,28 @@ def test_points_near_each_other_and_equal():
         spline = ss.CubicSpline(None, near, ST52)
         assert spline.report.converged
         assert np.abs(spline([0.5, 2.5]) - p).max() <= 10 * size + 1e-14
+
+
+@pytest.mark.parametrize("ends", ["not-a-knot", "clamped", "acceleration"])
+def test_functions_may_return_arrays_that_cannot_be_written_to(ends):
+    def frozen(function):
+        def call(*arguments):
+            found = np.array(function(*arguments))
+            found.flags.writeable = False
+            return found
+
+        return call
+
+    names = ("exp", "log", "project_tangent", "inner", "dlog")
+    made = {name: getattr(ST52.functions, name) for name in names}
+    space = ss.Manifold(point_shape=ST52.point_shape, **{k: f and frozen(f) for k, f in made.items()})
+    p = walk(ST52, 0.3, 5, 1)
+    bc = ends_on(ends, ST52, p)
+    curves = [ss.CubicSpline(None, p, one, bc_type=bc) for one in (ST52, space)]
+    assert np.abs(curves[0](1.3) - curves[1](1.3)).max() <= 1e-9
+
+
+@pytest.mark.parametrize("method", ["homotopy", "newton", "fixed-point"])
+def test_solvers_that_are_not_made_for_functions(method):
+    with pytest.raises(ss.ValidationError, match=f"method '{method}' is not made on a manifold"):
+        ss.CubicSpline(None, walk(ST52, 0.3, 5, 1), ST52, method=method)

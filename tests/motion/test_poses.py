@@ -5,6 +5,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from curves import points_on
 from scipy.spatial.transform import Rotation
@@ -313,7 +314,8 @@ def test_bad_files(read, text, match):
             lambda f: poses.write_tum(f, [0.0], np.stack([np.eye(4)] * 2)),
             r"t has shape \(1,\), but there are 2 poses",
         ),
-        (lambda f: poses.write_tum(f, ["a", "b"], np.stack([np.eye(4)] * 2)), "numbers or datetime64"),
+        (lambda f: poses.write_tum(f, ["a", "b"], np.stack([np.eye(4)] * 2)), r"t\[0\] is 'a', no date"),
+        (lambda f: poses.write_tum(f, [True, False], np.stack([np.eye(4)] * 2)), "numbers or datetime64"),
         (lambda f: poses.write_tum(f, [0.0], 2 * np.eye(4)[None]), "off the space"),
         (lambda f: poses.write_kitti(f, np.eye(4)), r"\(n, 4, 4\)"),
         (lambda f: poses.join(np.eye(3), np.zeros((2, 3))), r"\(3, 3\) and \(2, 3\)"),
@@ -324,3 +326,40 @@ def test_bad_poses(tmp_path, call, match):
     with pytest.raises(ss.ValidationError, match=match):
         call(tmp_path / "a.txt")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("write", [poses.write_tum, poses.write_euroc])
+@pytest.mark.parametrize("scale", [10**9, 1e9, 1e3])
+def test_files_take_no_parts_of_seconds_for_seconds(write, scale):
+    given = curve("se:3").points
+    t = scale * (1_700_000_000 + np.arange(len(given)))
+    with pytest.raises(
+        ss.ValidationError, match=r"t\[0\] is 1.*, which can be no seconds; of nanoseconds make"
+    ):
+        write(io.StringIO(), t, given)
+
+
+def test_a_tum_file_of_nanoseconds():
+    line = "1403636579763555584 0 0 0 0 0 0 1\n"
+    with pytest.raises(ss.ValidationError, match=r"time\[0\] is 1.4036.*e\+18, which can be no seconds"):
+        poses.read_tum(io.StringIO(line))
+    # With the mark that Windows puts at the start of a file.
+    assert poses.read_tum(io.StringIO("\ufeff0 0 0 0 0 0 0 1\n"))[0] == [0]
+
+
+@pytest.mark.parametrize("write", [poses.write_tum, poses.write_euroc])
+def test_times_to_write_in_any_form(write):
+    given = curve("se:3").points[:2]
+    texts = []
+    for t in (
+        ["2023-11-14T22:13:20Z", "2023-11-14T22:13:21Z"],
+        pd.to_datetime(["2023-11-14T22:13:20", "2023-11-14T22:13:21"], utc=True),
+        np.array(["2023-11-14T22:13:20", "2023-11-14T22:13:21"], "M8[s]"),
+        [1_700_000_000, 1_700_000_001],
+    ):
+        file = io.StringIO()
+        write(file, t, given)
+        texts.append(file.getvalue())
+    assert len(set(texts)) == 1
+    with pytest.raises(ss.ValidationError, match=r"t\[1\] is nan, which is no time"):
+        write(io.StringIO(), [0, np.nan], given)

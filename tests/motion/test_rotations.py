@@ -332,3 +332,19 @@ def test_other_spaces_are_refused():
             rotations.angular_velocity(spline, 0.5)
     with pytest.raises(TypeError, match="a spline is needed"):
         rotations.angular_velocity(Rotation.identity(3), 0.5)
+
+
+def test_quaternions_that_were_rounded():
+    rounded = np.array([0.577350, 0.577350, 0.577350, 0.0])
+    with pytest.raises(ss.ValidationError, match="its length is"):
+        rotations.from_quaternions(rounded, scalar_first=True)
+    found = rotations.from_quaternions(rounded, scalar_first=True, atol=1e-5)
+    assert np.abs(found.T @ found - np.eye(3)).max() < 1e-15
+    with pytest.raises(ss.ValidationError, match="atol must be a number from 0 to 1, not -1"):
+        rotations.from_quaternions(rounded, scalar_first=True, atol=-1)
+    points, still = np.stack([rounded, rounded]), np.zeros((2, 4))
+    with pytest.raises(ss.ValidationError, match="is off"):
+        ss.HermiteSpline(None, points, still, "sphere:3")
+    assert np.linalg.norm(ss.HermiteSpline(None, points, still, "sphere:3", atol=1e-5)(0.5)) == pytest.approx(
+        1
+    )

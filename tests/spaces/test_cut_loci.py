@@ -23,6 +23,9 @@ def test_geodesics_between_nearly_opposite_points(gap, rng):
     ray = space.exp(p, t[:, None] * space.log(p, q))
     # Between opposite points every direction is as good.
     assert np.abs(space.geodesic(p, q, t) - ray).max() <= 20 * EPS / gap
+    # Between control points geodesics are weighted sums of the two.
+    curve = ss.BezierCurve(np.stack([p, q]), space)
+    assert np.abs(curve(t[1:]) - ray[1:]).max() <= 20 * EPS / gap
 
 
 @pytest.mark.parametrize("n", [8, 9, 12])
@@ -56,6 +59,7 @@ def test_half_turns_about_each_axis(name, axis, gap, rng):
     assert np.abs(space.exp(p, space.log(p, q)) - q).max() <= 50 * EPS
 
 
+@pytest.mark.filterwarnings("ignore:neighbours almost at the cut locus")
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
 @pytest.mark.parametrize("gap", [0.1, 1e-3, 1e-8, 1e-12, 1e-13, 1e-14])
 def test_the_last_digits_before_the_antipode(n, gap):
@@ -256,3 +260,46 @@ def test_a_fault_of_a_long_closed_curve_is_named_where_it_is(rng):
     p[6] = -p[5]
     with pytest.raises(ss.CutLocusError, match=r"points\[5\] and points\[6\]"):
         ss.CubicSpline(None, p, "sphere:2", bc_type="periodic")
+
+
+def turned(n, planes):
+    """Half turns in so many planes."""
+    return np.diag([-1.0] * 2 * planes + [1.0] * (n - 2 * planes))
+
+
+def columns(n, k, shared=0):
+    """Two subspaces at right angles but for what they share."""
+    e = np.eye(n)
+    return e[:, :k], np.hstack([e[:, :shared], e[:, k : 2 * k - shared]])
+
+
+@pytest.mark.parametrize(
+    "name, p, q, distance",
+    [
+        ("sphere:2", np.eye(3)[0], -np.eye(3)[0], np.pi),
+        ("rp:2", *np.eye(3)[:2], np.pi / 2),
+        ("cp:3", *np.eye(4)[:2], np.pi / 2),
+        ("gr:1,2", *columns(2, 1), np.pi / 2),
+        ("gr:2,4", *columns(4, 2), np.pi / np.sqrt(2)),
+        ("gr:2,4", *columns(4, 2, 1), np.pi / 2),
+        ("cgr:3,7", *columns(7, 3, 1), np.pi / np.sqrt(2)),
+        ("gr:10,40", *columns(40, 10, 1), 3 * np.pi / 2),
+        ("so:2", np.eye(2), turned(2, 1), np.pi),
+        ("so:3", np.eye(3), turned(3, 1), np.pi),
+        ("so:4", np.eye(4), turned(4, 1), np.pi),
+        ("so:4", np.eye(4), turned(4, 2), np.sqrt(2) * np.pi),
+        ("o:5", turned(5, 1), turned(5, 2), np.pi),
+        ("so:12", np.eye(12), turned(12, 3), np.sqrt(3) * np.pi),
+        ("u:2", np.eye(2), turned(2, 1), np.sqrt(2) * np.pi),
+        ("se:3", np.eye(4), turned(4, 1), np.pi),
+    ],
+)
+def test_points_at_the_cut_locus_have_a_distance(name, p, q, distance, rng):
+    space = ss.space(name)
+    with pytest.raises(ss.CutLocusError):
+        space.log(p, q)
+    assert space.distance(p, q) == pytest.approx(distance, abs=8 * EPS)
+    # Beside others, which have a logarithm.
+    near = space.exp(p, 0.1 * unit_tangent(space, p, rng))
+    found = space.distance(np.stack([p, p, p]), np.stack([near, q, near]))
+    assert found == pytest.approx([0.1, distance, 0.1], abs=20 * EPS)

@@ -151,6 +151,16 @@ def test_given_velocities_stay_near_the_cut_locus(part, rng):
     assert np.abs(spline.velocities[0] - v).max() <= 1e-12 * np.abs(v).max()
 
 
+@pytest.mark.parametrize("part", [0.97, 0.995])
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "homotopy"])
+def test_every_solver_keeps_given_velocities_near_the_cut_locus(method, part, rng):
+    """Legs that they find themselves are kept a little further from it while they iterate."""
+    p = walk(ss.Sphere(2), 0.3, 5, rng)
+    v = 3 * part * np.pi * unit_tangent(ss.Sphere(2), p[0], rng)
+    spline = ss.CubicSpline(None, p, "sphere:2", bc_type=((1, v), "natural"), method=method)
+    assert spline.report.converged
+
+
 # ---- bad end conditions ----
 
 

@@ -207,3 +207,24 @@ def test_legs_that_doubles_cannot_hold_are_an_error():
     with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[0\] has length 30\.0, .*times"):
         ss.CubicSpline(None, p, "h:2", bc_type=((1, v), (1, v)))
     assert np.isfinite(ss.CubicSpline(None, p, "h:2", bc_type=((1, v / 10), (1, v / 10)))(0.5)).all()
+
+
+def test_legs_that_doubles_cannot_hold_in_complex_hyperbolic_space():
+    p = np.array([[1, 0], [np.cosh(1), np.sinh(1)]], dtype=complex)
+    v = 57 * np.array([[0, 1j], [np.sinh(1), np.cosh(1)]])
+    with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[0\] has length 19\.0"):
+        ss.CubicSpline(None, p, "ch:1", bc_type=((1, v[0]), (1, v[1])))
+    assert np.isfinite(ss.CubicSpline(None, p, "ch:1", bc_type=((1, v[0] / 10), (1, v[1] / 10)))(0.5)).all()
+
+
+@pytest.mark.parametrize("where", [None, [True, True, True, False]])
+def test_bad_points_of_one_of_many_curves(where):
+    good = points_on(S2)
+    curves = [(None, good), (None, good[:4] * 1.5), (None, good[:3]), (None, good)]
+    with pytest.raises(ss.ValidationError, match=r"points\[0\] of curve 1"):
+        ss.fit_many(curves, S2, where=where)
+    with pytest.warns(ss.ConvergenceWarning, match=r"curve 1: points\[0\] is off"):
+        found = ss.fit_many(curves, S2, where=where, on_failure="warn")
+    assert [s.report.converged for s in found] == [True, False, True, where is None]
+    assert np.isnan(found[1].velocities).all()
+    assert same_curve(found[2], ss.CubicSpline(None, good[:3], S2))

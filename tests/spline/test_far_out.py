@@ -61,9 +61,10 @@ def test_huge_and_tiny_flat_data(size):
     assert np.abs(spline.velocities - flat(t, 1)).max() < 1e-13 * size
 
 
-@pytest.mark.parametrize(("name", "step"), [("hyperbolic:2", 12.0), ("spd:3", 14.0)])
+@pytest.mark.parametrize(("name", "step"), [("hyperbolic:2", 11.0), ("spd:3", 14.0)])
 def test_very_far_points_converge_to_their_rounding(name, step):
-    """What rounding does to a residual grows with the length of chords, and is no failure."""
+    """What rounding does to a residual grows with the length of chords, and is no failure until the curve shows it,
+    see test_report_is_true."""
     space = ss.space(name)
     origin = np.eye(*(3,) * 2) if name == "spd:3" else np.array([1.0, 0, 0])
     for seed in range(20):

@@ -101,3 +101,14 @@ def test_errors_come_before_it():
     far[3] = -far[2]
     with pytest.raises(ss.CutLocusError):
         silent(lambda: ss.CubicSpline(None, far, "sphere:3"))
+
+
+def test_noisy_quaternions_and_those_with_velocities():
+    for make in (
+        lambda q: ss.make_smoothing_spline(None, q, "sphere:3"),
+        lambda q: ss.HermiteSpline(None, q, 0 * q, "sphere:3"),
+    ):
+        silent(lambda make=make: make(motion()))
+        with pytest.warns(UserWarning, match=r"points\[3\] and points\[4\] have") as caught:
+            make(flipped(4))
+        assert caught[0].filename == __file__

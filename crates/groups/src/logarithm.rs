@@ -25,17 +25,27 @@ pub fn numbers<const D: usize>(m: &Matrix<Lane, 2>) -> Vec<Lane> {
     m.entries().iter().flat_map(|x| x[..D].iter().copied()).collect()
 }
 
+/// The angles θ of the eigenvalues e^{iθ} of Q = 1 + E, and the eigenvectors.
+fn eigen(e: &Matrix<Lane, 2>) -> (Vec<Lane>, Matrix<Lane, 2>) {
+    let q = e.clone().plus_identity(Lane::ONE);
+    let mut both = [q.hermitian_part(), times_minus_i(q.skew_part())];
+    let v = diagonalise(&mut both);
+    let [cosine, sine] = &both;
+    ((0..q.rows()).map(|i| sine[(i, i)][0].atan2(cosine[(i, i)][0])).collect(), v)
+}
+
+/// The angles of 1 + E, at the cut locus too.
+pub fn angles(e: &Matrix<Lane, 2>) -> Vec<Lane> {
+    eigen(e).0
+}
+
 /// The logarithm of Q = 1 + E by eigenvectors, with its derivatives, and its deciding angle: every angle is known
 /// to rounding, also near π. For SU(n) the angles add up to zero.
 ///
 /// Derivatives of T with Q = e^{iT} solve `Q' = e^{iT}'`, with the divided differences of `e^{iθ}`.
 pub fn principal(parts: &[Matrix<Lane, 2>], su: bool, real: bool) -> (Vec<Matrix<Lane, 2>>, Lane) {
     let n = parts[0].rows();
-    let q = parts[0].clone().plus_identity(Lane::ONE);
-    let mut both = [q.hermitian_part(), times_minus_i(q.skew_part())];
-    let mut v = diagonalise(&mut both);
-    let [cosine, sine] = &both;
-    let mut theta: Vec<Lane> = (0..n).map(|i| sine[(i, i)][0].atan2(cosine[(i, i)][0])).collect();
+    let (mut theta, mut v) = eigen(&parts[0]);
     let angle = if su {
         sort_columns(&mut theta, &mut [&mut v]);
         spread_phases(&mut theta)

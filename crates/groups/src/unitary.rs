@@ -4,7 +4,7 @@
 //! A tangent vector at p is v = pΩ with skew-Hermitian Ω; its transvection is
 //! `E_p(v)x = p e^{Ω/2} p⁻¹ x e^{Ω/2}`. Angles are the arguments of eigenvalues.
 
-use crate::logarithm::{SERIES, complex, numbers, principal, su_limit, times_minus_i};
+use crate::logarithm::{SERIES, angles, complex, numbers, principal, su_limit, times_minus_i};
 use std::f64::consts::{PI, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
@@ -12,7 +12,7 @@ use symspline_core::matrix::{
     orthonormalise, parts_of, polar, reorthonormalise,
 };
 use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
-use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
+use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space, below};
 
 /// Matrices with p*p = 1: real for D = 1, complex for D = 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,8 +150,16 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         let (omega, _) = self.log_one_plus(&p.adjoint_times(&(&q - &p)));
         (&p.times(&exp_skew_minus_one(&omega.times_scalar(t))) + &p).write(out);
     }
-    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
-        let length = max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt();
+    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane {
+        let mut length = max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt();
+        let half_turn = !angle.simd_lt(below(PI));
+        if D == 1 && half_turn.any() {
+            // A real logarithm has pairs of eigenvectors, which it finds up to the cut locus only.
+            let e = self.read(p).adjoint_times(&(&self.read(q) - &self.read(p)));
+            let angles = angles(&complex::<D>(self.n, e.entries().as_flattened()));
+            let squares = angles.iter().fold(Lane::ZERO, |sum, x| x.mul_add(*x, sum));
+            length = half_turn.select((squares * Self::metric()).sqrt(), length);
+        }
         if self.is_connected() {
             return length;
         }

@@ -6,7 +6,7 @@
 
 use symspline_core::matrix::Matrix;
 use symspline_core::scalar::{Each, Lane, Scalar, dot, lane};
-use symspline_core::space::Model;
+use symspline_core::space::{Model, far_out};
 use symspline_core::special::{Trig, theta_over_sin};
 
 /// Complex hyperbolic space of n complex dimensions.
@@ -57,8 +57,7 @@ impl Model for ComplexHyperbolic {
         f64::INFINITY
     }
     fn longest_leg(&self) -> f64 {
-        // ε cosh²(18) ≈ 1: of points this far apart rounding leaves nothing.
-        18.0
+        18.0 // ε cosh²(18) ≈ 1: of points this far apart rounding leaves nothing.
     }
     fn dim(&self) -> usize {
         2 * self.n
@@ -89,8 +88,7 @@ impl Model for ComplexHyperbolic {
     }
     fn exp<S: Scalar>(&self, p: &[S], v: &[S], q: &mut [S]) {
         let (p, v) = (read(p), read(v));
-        // cosh θ and sinh θ/θ of the length θ of v.
-        let Trig { c, s, .. } = Trig::new(-form(&v, &v)[(0, 0)][0]);
+        let Trig { c, s, .. } = Trig::new(-form(&v, &v)[(0, 0)][0]); // cosh θ and sinh θ/θ, θ = |v|
         (&p.times_scalar(c) + &v.times_scalar(s)).write(q);
     }
     fn log<S: Scalar>(&self, p: &[S], q: &[S], v: &mut [S]) -> Lane {
@@ -102,8 +100,7 @@ impl Model for ComplexHyperbolic {
         let f = theta_over_sin(versine, || lane(2.0) - versine.value());
         let log = rest.times_adjoint(&top).times_scalar(f);
         log.write(v);
-        // Any number: there is no cut locus.
-        log.size()
+        log.size() // any number: there is no cut locus
     }
     fn transvect<S: Scalar>(&self, p: &[S], v: &[S], x: &mut [S]) {
         let (p, v) = (read(p), read(v));
@@ -124,9 +121,8 @@ impl Model for ComplexHyperbolic {
         horizontal(&read(gamma), &read(d)).write(d);
     }
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
-        // Without what the phase of the array does.
         let (p, d) = (read(gamma), read(d));
-        let turn = d.times(&form(&p, &d)).scaled(lane(2.0));
+        let turn = d.times(&form(&p, &d)).scaled(lane(2.0)); // what the phase of the array does
         horizontal(&p, &(&read(dd) + &turn)).write(dd);
     }
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
@@ -145,8 +141,10 @@ impl Model for ComplexHyperbolic {
         let square = x[2..].iter().map(|x| x * x).sum::<f64>() - x[0].hypot(x[1]).powi(2);
         format!("its square -|x0|^2 + |x1|^2 + ... is {square}, not -1 (off by {:.3e})", (square + 1.0).abs())
     }
-    /// At distance r from the origin |p|² ≈ e²ʳ/2.
+    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
+        far_out(points, 2 * self.n + 2)
+    }
     fn rounding(&self, p: &[Lane]) -> Lane {
-        dot(p, p)
+        dot(p, p) // ≈ e²ʳ/2 at distance r from the origin
     }
 }

@@ -9,7 +9,8 @@ use crate::logarithm::log_from;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Moved, Storage, diagonalise, orthonormalise, polar, reorthonormalise, trig,
+    Dynamic, Matrix, Moved, Storage, diagonalise, orthogonalise, orthonormalise, polar, reorthonormalise,
+    trig,
 };
 use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Ambient, Frame, Origin, Space, stretch_series};
@@ -165,6 +166,23 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         let (log, angle) = self.log_between(&self.read(p), &self.read(q));
         log.write(out);
         angle
+    }
+    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
+        let length = max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt();
+        if !length.is_nan().any() {
+            return length;
+        }
+        // At the cut locus itself the logarithm has no direction, but there are angles. Beside a right one the others
+        // need no digits where they are small.
+        let mut cosines = self.read::<Lane>(q).adjoint_times(&self.read(p));
+        orthogonalise(&mut cosines, None);
+        let squares = (0..self.k).fold(Lane::ZERO, |sum, j| {
+            let square =
+                (0..self.k).flat_map(|i| cosines[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum));
+            let angle = max_or_nan(Lane::ONE - square, Lane::ZERO).sqrt().atan2(square.sqrt());
+            angle.mul_add(angle, sum)
+        });
+        length.is_nan().select(squares.sqrt(), length)
     }
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         let (x, y) = (self.read(p), self.read(q));

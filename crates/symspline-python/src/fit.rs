@@ -8,7 +8,7 @@ use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use symspline::fit::{End, Ends, Method, Options, Problem, Report, Status, fit as solve};
+use symspline::fit::{End, Ends, Method, Options, Problem, Report, Solver, Status, fit as solve};
 use symspline::space::Ambient;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -126,6 +126,11 @@ pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
     })
 }
 
+/// A length in a message, of so many digits that it is read.
+fn length(x: f64) -> String {
+    if x < 1e6 { format!("{x:.3}") } else { format!("{x:.3e}") }
+}
+
 /// The report's columns: converged, iterations, residual, max_step, rate, solver, invariant_radius, alternative.
 fn arrays<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyTuple>> {
     let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
@@ -193,20 +198,34 @@ fn faults(
                     index + 1
                 ),
             ),
+            Status::Unconverged if r.residual.is_infinite() && r.solver == Solver::Homotopy => (
+                "unconverged",
+                format!(
+                    "no convergence{of}: after {} iterations the homotopy had not come to these points (longest step \
+                     {}); try another method, put more points where steps are long, or choose times that suit the \
+                     distances",
+                    r.iterations,
+                    length(r.max_step)
+                ),
+            ),
             Status::Unconverged if !r.residual.is_finite() => (
                 "unconverged",
                 format!(
                     "no convergence{of}: after {} iterations the numbers were too large for doubles (longest step \
-                     {:.3}); put more points where steps are long, or choose times that suit the distances",
-                    r.iterations, r.max_step
+                     {}); put more points where steps are long, or choose times that suit the distances",
+                    r.iterations,
+                    length(r.max_step)
                 ),
             ),
             Status::Unconverged => (
                 "unconverged",
                 format!(
-                    "no convergence{of}: residual {:.3e} after {} iterations (tol {:.1e}, longest step {:.3}); \
+                    "no convergence{of}: residual {:.3e} after {} iterations (tol {:.1e}, longest step {}); \
                      put more points where steps are long, choose times that suit the distances, or raise max_iter",
-                    r.residual, r.iterations, options.tol, r.max_step
+                    r.residual,
+                    r.iterations,
+                    options.tol,
+                    length(r.max_step)
                 ),
             ),
         };

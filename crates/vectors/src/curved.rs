@@ -3,7 +3,7 @@
 use crate::constant_curvature as cc;
 use crate::{hyperbolic, sphere};
 use symspline_core::scalar::{Lane, Scalar, max_or_nan};
-use symspline_core::space::{Ambient, Frame, Origin, Space};
+use symspline_core::space::{Ambient, Frame, Origin, Space, far_out};
 
 /// The sphere (K = 1) or hyperbolic space (K = −1) of dimension n.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl<const K: i32> Ambient for Curved<K> {
         if K > 0 { sphere::complaint(x) } else { hyperbolic::complaint(x) }
     }
     fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
-        if K > 0 { None } else { hyperbolic::beyond_doubles(points, self.point_len()) }
+        if K > 0 { None } else { far_out(points, self.point_len()) }
     }
     fn rounding(&self, p: &[Lane]) -> Lane {
         if K > 0 { Lane::ONE } else { hyperbolic::rounding(p) }

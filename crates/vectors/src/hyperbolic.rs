@@ -17,9 +17,6 @@ impl Hyperbolic {
 
 /// A ray's ambient vectors grow like e^d, and so do errors at its start.
 pub const LONGEST_RAY: f64 = 2.0;
-/// The largest |p|² of a point, at a distance of 15.25 from (1, 0, …): beyond, rounding errors ε|p|² are above
-/// 0.2 %, and twice as far there are no points any more.
-const FARTHEST: f64 = (1_u64 << 43) as f64;
 
 /// The point with the same space-like coordinates.
 pub fn project(x: &mut [Lane]) -> Lane {
@@ -27,19 +24,6 @@ pub fn project(x: &mut [Lane]) -> Lane {
     let off = (x[0] - height).abs() / height;
     x[0] = height;
     off
-}
-
-/// The first point so far out that too few digits are left.
-pub fn beyond_doubles(points: &[f64], len: usize) -> Option<(usize, String)> {
-    let far = |p: &[f64]| !(p.iter().map(|x| x * x).sum::<f64>() <= FARTHEST);
-    let row = points.chunks_exact(len).position(far)?;
-    let why = format!(
-        "lies at distance {:.1} from (1, 0, …), where rounding errors, ε|p|², leave too few digits (farthest: {:.1}); \
-         move all points by one isometry, space.transvection, so that their middle is (1, 0, …)",
-        points[row * len].acosh(),
-        (0.5 * FARTHEST).sqrt().acosh()
-    );
-    Some((row, why))
 }
 
 pub fn project_tangent(p: &[Lane], v: &mut [Lane]) -> Lane {

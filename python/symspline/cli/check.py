@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..curves.ends import is_closed
+from ..manifolds import Manifold
 from ..pieces import spline_pieces
 from ..spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from ..spline import CubicSpline
@@ -32,14 +33,15 @@ multiplied by h^k instead, where h is the shorter of the two segments.
 Lengths are those of the space, so that it does not matter which array of a line or subspace stands for it; of
 poses those of the rates in the body, the angle and the way together. A jump of the k-th derivative may be
 1e-12 of the largest value, and 100 eps / h^k for rounding; |p| as much where points p have large numbers, in
-hyperbolic spaces |p|^2 as much, for positive definite matrices cond(p). With a larger one the check fails, and
-the exit code is 1."""
+hyperbolic spaces |p|^2 as much, for positive definite matrices cond(p); on Stiefel manifolds, whose logarithms
+are found by iterations, 1e-7 of the largest value. With a larger one the check fails, and the exit code is 1."""
 EPILOG = """\
 example:
   symspline check storms.npz"""
 
 MEASURES = ("distance", "position", "velocity", "acceleration")
 _RELATIVE = 1e-12
+_OF_FUNCTIONS = 1e-7
 _ROUNDING = 100 * float(np.finfo(np.float64).eps)
 # Lengths of their metric are relative to the matrices as they are: 1 m² or 10⁶ mm² is the same.
 _POSITIVE = (SymmetricPositiveDefinite, HermitianPositiveDefinite)
@@ -104,15 +106,16 @@ def _measure(spline: CubicSpline) -> Found:
     closed = is_closed(spline.bc_type)
     steps = np.diff(spline._times)
     shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
+    relative = _OF_FUNCTIONS if isinstance(spline.space, Manifold) else _RELATIVE
     floor = _ROUNDING * float(spline.space.rounding(spline.points).max())
     distance = float(spline.space.distance(pieces.at(pieces.t), pieces.points).max())
-    values, excess = [distance], [distance / (_RELATIVE + floor)]
+    values, excess = [distance], [distance / (relative + floor)]
     for nu in range(3):
         jumps = pieces.jumps(nu, closed)
         if nu == 0 and isinstance(spline.space, _POSITIVE):
             jumps = replace(jumps, largest=1.0)
         rounding = floor / shorter**nu
-        allowed = _RELATIVE * jumps.largest + rounding
+        allowed = relative * jumps.largest + rounding
         # Zero is no measure of zero.
         is_rounding = jumps.largest <= rounding.max(initial=0.0)
         values.append(float((jumps.size * shorter**nu).max(initial=0.0)) if is_rounding else jumps.relative)

@@ -109,6 +109,8 @@ class CsvTable(Table):
             except ValueError:
                 i = next(i for i, text in enumerate(texts) if not is_number(text))
                 found = f"holds {texts[i]!r}, which is not a number" if texts[i].strip() else "is empty"
+                if i == 0 and texts[i].strip():
+                    found += "; if this line holds units, remove it"
                 raise self._fail(name, place)(i, found) from None
             self._finite(column, name, place)
         return table

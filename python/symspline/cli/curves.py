@@ -33,7 +33,7 @@ class Columns:
         points: of the numbers of a point; those of complex ones without their endings.
         time, curve: of times and of names of curves.
         lonlat: whether points are longitude and latitude in degrees.
-        utc: whether times are written with a Z.
+        utc: whether the dates had a time zone, and are written with a Z; None where that is not known.
         quaternion: of rotations as quaternions, which column holds which number, see `quaternions.places_of`.
     """
 
@@ -41,7 +41,7 @@ class Columns:
     time: str = "time"
     curve: str = "curve"
     lonlat: bool = False
-    utc: bool = False
+    utc: bool | None = None
     quaternion: list[int] | None = None
 
 
@@ -137,7 +137,7 @@ def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
         and len(names) == wanted
         and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
         and isinstance(columns.lonlat, bool)
-        and isinstance(columns.utc, bool)
+        and (columns.utc is None or isinstance(columns.utc, bool))
     )
     if not good or (columns.lonlat and (space != GLOBE or columns.quaternion is not None)):
         raise Problem(f"{path} is damaged: its names of columns do not suit {space}")

@@ -56,7 +56,7 @@ EPILOG = """\
 examples:
   symspline fit track.csv --lonlat -o track.npz
   symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
-  symspline fit attitude.parquet --space sphere:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
+  symspline fit attitude.parquet --space so:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
 

@@ -105,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         columns.insert(1, np.repeat(list(times), [len(x) for x in times.values()]))
     if rows is not None:
         columns = [column[np.argsort(rows)] for column in columns]
-    write_table(options.output, dict(zip(names, columns, strict=True)), curves.columns.utc)
+    write_table(options.output, dict(zip(names, columns, strict=True)), bool(curves.columns.utc))
     print(f"{options.output}: {len(values)} rows")
     return 0
 
@@ -158,6 +158,12 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
         kinds = "dates", "numbers"
         wanted, found = kinds if knots.dtype.kind == "M" else kinds[::-1]
         raise Problem(f"{path}: the times of {curves.called(name)} are {wanted}, but these are {found}")
+    if knots.dtype.kind == "M" and {rows.utc, curves.columns.utc} == {True, False}:
+        these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
+        raise Problem(
+            f"{path}: its times have {these}, but those that {curves.called(name)} was fitted to have {those}: which "
+            "time is meant is in doubt; write both with a zone, or both without"
+        )
     if spline.extrapolate is not None or is_closed(spline.bc_type):
         return
     outside = np.flatnonzero((times < knots[0]) | (times > knots[-1]))

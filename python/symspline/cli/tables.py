@@ -29,14 +29,14 @@ class Rows:
     Attributes:
         numbers: shape (rows, columns).
         times: numbers or ``datetime64``; empty if no column of times was asked for.
-        utc: whether the times had a Z or an offset; they are UTC then.
+        utc: whether the times had a Z or an offset; they are UTC then. None where that is not known.
         labels: names of the curves, None if no such column was asked for.
         place: where a row is, such as ``"line 7"``.
     """
 
     numbers: Doubles
     times: Array
-    utc: bool
+    utc: bool | None
     labels: list[str] | None
     place: Place
 
@@ -107,8 +107,8 @@ class ArrayTable(Table):
     def _column(self, name: str) -> Array:
         """One column, as whatever it holds."""
 
-    def _is_utc(self, name: str) -> bool:
-        return False
+    def _is_utc(self, name: str) -> bool | None:
+        return None
 
     def read(self, numbers: Sequence[str], time: str | None, label: str | None, progress: Progress) -> Rows:
         columns = []
@@ -131,7 +131,7 @@ class ArrayTable(Table):
             raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
         return self._finite(array.astype(np.float64), name, _row)
 
-    def _times(self, name: str) -> tuple[Array, bool]:
+    def _times(self, name: str) -> tuple[Array, bool | None]:
         array = self._column(name)
         if array.dtype.kind in "OUT":
             return parse_times(array.astype(np.str_).tolist(), self._fail(name, _row))

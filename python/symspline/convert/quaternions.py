@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._core import ValidationError
+from ..arrays import checked_atol
 from .reading import Array, length, off_one, real_numbers, refuse, unit_vectors, unmoved_by_underflow
 
 
@@ -50,12 +51,15 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
 
 
 @unmoved_by_underflow
-def quaternion_to_matrix(quaternion: ArrayLike, *, scalar_first: bool | None = None) -> Array:
+def quaternion_to_matrix(
+    quaternion: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
+) -> Array:
     """The rotation matrices of unit quaternions.
 
     Args:
         quaternion: unit vectors, shape (..., 4).
         scalar_first: True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS. It must be given.
+        atol: how far from 1 lengths may be, such as 1e-5 for numbers of six decimals; None for 1e-8 of doubles.
 
     Returns:
         Rotations, points of ``SpecialOrthogonal(3)``, shape (..., 3, 3).
@@ -70,6 +74,7 @@ def quaternion_to_matrix(quaternion: ArrayLike, *, scalar_first: bool | None = N
     """
     first = checked_order(scalar_first)
     q, tol = real_numbers(quaternion, "quaternion", (4,))
+    tol = tol if atol is None else checked_atol(atol)
     q = unit_vectors(q, tol, "quaternion", "a unit quaternion")
     w, x, y, z = np.moveaxis(q if first else np.roll(q, 1, axis=-1), -1, 0)
     return _matrices(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def _invalid(space: Space, points: list[Points], wanted: Numbers) -> list[Fault]
                     search(own[: len(own) // 2])
                     search(own[len(own) // 2 :])
                     return
-                of = f" of curve {_place(int(own[0]), part.batch)}"
+                of = f" of curve {_place(int(own[0]), part.batch)}" if part.batch else ""
                 found.setdefault(int(own[0]), re.sub(r"^point (\d+)", rf"points[\1]{of}", str(error)))
 
         if len(wanted):
@@ -109,17 +109,46 @@ def fit_chosen(asked: Asked, progress: Progress | None, chosen: Numbers) -> Fit:
     return finished(asked, spread)._replace(faults=faults)
 
 
+class ManyAsked(NamedTuple):
+    """What to fit: single curves of different lengths, with one entry a curve in ``times`` and ``points``, and one a
+    factor in ``ends``."""
+
+    space: Space
+    times: list[NDArray[np.float64]]
+    points: list[list[Points]]
+    ends: list[list[End] | None]
+    options: Options
+    check: bool
+
+
+def fit_many_wanted(
+    asked: ManyAsked, progress: Progress | None, mask: NDArray[np.bool_] | None
+) -> tuple[list[Fit], list[Fault]]:
+    """The curves that are wanted; all without a mask."""
+    if mask is None:
+        return fit_many(*asked, progress)
+    return fit_many_chosen(asked, progress, np.flatnonzero(mask))
+
+
+def fit_many_sound(
+    asked: ManyAsked, progress: Progress | None, mask: NDArray[np.bool_] | None
+) -> tuple[list[Fit], list[Fault]]:
+    """The same, but without those with points that are none, which are among the faults."""
+    sound = np.ones(len(asked.times), bool) if mask is None else mask.copy()
+    bad: list[Fault] = []
+    for number in np.flatnonzero(sound).tolist():
+        for _, kind, why in _invalid(asked.space, asked.points[number], np.zeros(1, np.int64)):
+            bad.append((number, kind, f"curve {number}: {why}"))
+            sound[number] = False
+    fits, faults = fit_many_wanted(asked, progress, sound if bad else mask)
+    return fits, sorted(bad + faults)
+
+
 def fit_many_chosen(
-    space: Space,
-    times: list[NDArray[np.float64]],
-    points: list[list[Points]],
-    ends: list[list[End] | None],
-    options: Options,
-    check: bool,
-    progress: Progress | None,
-    chosen: Numbers,
+    asked: ManyAsked, progress: Progress | None, chosen: Numbers
 ) -> tuple[list[Fit], list[Fault]]:
     """The same of single curves of different lengths."""
+    space, times, points, ends, options, check = asked
     found: list[Fit] = []
     faults: list[Fault] = []
     if len(chosen):

@@ -1,7 +1,7 @@
 """From points to curves: the same for one curve, a batch, and many of different lengths, in any space.
 
 A space has its kind of curve: plain, in the span of its points, on a manifold that is made of functions, or, for a
-product, one in every factor. A further kind is a class with the methods of `Plain`, and its line in `kind_of`.
+product, one in every factor. A further kind is a class with the methods of `Plain`, and its name in `kind_of`.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from ..manifolds import Manifold
 from ..report import Report, shaped
 from ..spaces import Array, Product, Space, factors_of, parts_of, point_tol
 from .curve import Curve
 from .ends import End, ends_in_factors, ends_of
-from .in_span import InSpan, is_large
+from .in_span import InSpan
 from .on_manifold import OnManifold
 from .plain import Plain
 from .solve import Fault, Options, Progress, Solved, Task, failures
@@ -71,9 +70,7 @@ class Fit(NamedTuple):
 
 def kind_of(space: Space) -> type[Plain]:
     """How curves are made in a space that is no product."""
-    if isinstance(space, Manifold):
-        return OnManifold
-    return InSpan if is_large(space) else Plain
+    return next(kind for kind in (OnManifold, InSpan, Plain) if kind.suits(space))
 
 
 def read(points: Any, space: Space) -> list[Points]:

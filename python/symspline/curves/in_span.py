@@ -22,14 +22,9 @@ from .solve import Options, Progress, Solved, Task, one_by_one, solve
 from .span import Span, span_of
 
 
-def is_large(space: Space) -> bool:
-    """Whether curves in a space are made in the span of their points."""
-    return space._linear and space.point_shape[0] >= _LARGE
-
-
 def reduced(space: Space, points: Array) -> tuple[Space, Array, Span | None]:
     """A space, and points in it, to compute with; and the span to lift results from, if they lie in one."""
-    if not is_large(space):
+    if not InSpan.suits(space):
         return space, points, None
     span = span_of(space, points)
     return span.space, span.down(points), span
@@ -50,6 +45,10 @@ class InSpan(Plain):
     ) -> None:
         super().__init__(space, times, points, velocities)
         self._fitted = fitted
+
+    @staticmethod
+    def suits(space: Space) -> bool:
+        return space._linear and space.point_shape[0] >= _LARGE
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:

@@ -21,7 +21,7 @@ def checked(task: Task, options: Options) -> Task:
     assert isinstance(space, Manifold)
     shape = space._doubles_shape
     width = math.prod(shape)
-    if options.method in ("newton", "fixed-point"):
+    if options.method not in _METHODS:
         raise ValidationError(
             f"method {options.method!r} is not made on a manifold that is made of functions, {space!r}; "
             f"use {' or '.join(map(repr, _METHODS))}"

@@ -14,7 +14,7 @@ from .._core import ValidationError
 from ..manifolds import Manifold
 from ..manifolds.condition import Legs, legs_of
 from ..manifolds.evaluation import Rows, derivative, points
-from ..spaces import Array, Euclidean
+from ..spaces import Array, Euclidean, Space
 from .curve import NORMS, REAL, Doubles
 from .gradient import Places
 from .manifold_checks import checked
@@ -33,6 +33,10 @@ class OnManifold(Plain):
     # Derivatives are differences.
     exact = 1e-9
     _compiled = False
+
+    @staticmethod
+    def suits(space: Space) -> bool:
+        return isinstance(space, Manifold)
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:

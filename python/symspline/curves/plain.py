@@ -31,6 +31,11 @@ class Plain(Curve):
         points.flags.writeable = velocities.flags.writeable = False
 
     @staticmethod
+    def suits(space: Space) -> bool:
+        """Whether curves in a space are of this kind, if they are of no other one."""
+        return True
+
+    @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
         """The velocities that make the curve C²; only plain curves are checked on the way."""
         return solve(task, options, progress)

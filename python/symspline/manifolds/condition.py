@@ -110,7 +110,8 @@ def defects(problem: Problem, u: Array) -> Doubles:
         jumps = np.concatenate([starts[:, :1] - stops[:, -1:], starts[:, 1:] - stops[:, :-1]], axis=1)
         return problem.coordinates(jumps, slice(0, h.shape[1]))
     jumps = np.concatenate([starts[:, :1], starts[:, 1:] - stops[:, :-1], -stops[:, -1:]], axis=1)
-    found = problem.coordinates(jumps, slice(None))
+    # A copy: inner products of other libraries may be read-only arrays.
+    found = np.array(problem.coordinates(jumps, slice(None)))
     for which, end in enumerate(problem.ends):
         sign, node = (1, 0) if which == 0 else (-1, h.shape[1])
         if end.kind == "velocity":

@@ -18,9 +18,10 @@ def hamiltonian(
 ) -> Array:
     """The Hamiltonian H(x) with iψ' = Hψ that drives states along a curve, or its derivative.
 
-    Of states and subspaces it is the one of least norm at every time: its spectral norm is the speed of the
-    curve, its Frobenius norm √2 times that. It does not depend on phases or bases of the points. H is as smooth
-    as the velocity: C¹, and ∫ ‖H'‖² dt is twice `CubicSpline.bending_energy`. Of gates it is iU'U*, the only one.
+    Of states and subspaces it is the one of least norm at every time: its Frobenius norm is √2 times the speed of the
+    curve, and of single states its spectral norm is the speed. It does not depend on phases or bases of the points. H
+    is as smooth as the velocity: C¹, and ∫ ‖H'‖² dt is twice `CubicSpline.bending_energy`. Of gates it is iU'U*, the
+    only one.
 
     A solver of differential equations may try times past the last knot, where the curve raises an error: give it
     ``extrapolate="geodesic"``, with which H goes on as it was at the end.

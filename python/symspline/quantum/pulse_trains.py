@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .._core import ValidationError
 from ..arrays import as_array, shown
 from ..convert.reading import Array, adjoint, largest, refuse, square_matrices
+from ..handed import times_of
 from ..spline import CubicSpline
 from .generators import generator, hamiltonian, quantum_space
 
@@ -64,12 +65,12 @@ def pulses(
 
 def _edges(spline: CubicSpline, edges: ArrayLike) -> tuple[Array, Array]:
     """The edges as they are given, and the times between them."""
-    times = as_array(edges, "edges")
+    times = as_array(times_of(edges, "edges")[0], "edges")
     if times.ndim != 1 or len(times) < 2:
         raise ValidationError(
             f"edges must be two or more times in a row, not an array of shape {times.shape}"
         )
-    spacing = np.diff(spline._clock.at(times, spline._batch, False)[0])
+    spacing = np.diff(spline._clock.at(edges, spline._batch, False)[0])
     refuse(
         ~(spacing > 0),
         "edges",

@@ -17,6 +17,7 @@ from ..curves.solve import Fault, Options, Progress
 from ..failures import fail
 from ..manifolds import refuse_functions
 from ..options import check_on_failure, check_progress, checked_policy
+from ..signs import warn_of_signs
 from ..spaces import Product, Space, factors_of
 from ..spaces import space as space_named
 from .data import Knots, Noisy, knots_for, points_of, read_noisy, some, sparse
@@ -169,6 +170,11 @@ def make_smoothing_spline(
     faults: list[Fault] = next((faults for _, _, faults in found if faults), [])
     if faults:
         fail(faults, on_failure, spline)
+    nodes = noisy.times.shape[-1]
+    warn_of_signs(
+        space,
+        [[Points(one._as_doubles(own), 0.0, noisy.batch, nodes) for one, own in points_of(noisy, space)]],
+    )
     return spline
 
 

@@ -9,7 +9,9 @@ use crate::monitor::Monitor;
 use crate::scalar::Lane;
 use crate::space::Erased;
 
-/// Sweeps after which the quasi-Newton iteration hands over, and steps of Newton's method.
+/// Sweeps of the quasi-Newton iteration by itself.
+pub const PATIENT: usize = 300;
+/// Sweeps after which it hands over, and steps of Newton's method.
 const QUICK: usize = 120;
 const NEWTON: usize = 50;
 
@@ -46,7 +48,7 @@ pub fn run(
             return outcome;
         }
         Method::FixedPoint => (Solver::FixedPoint, 2000),
-        Method::QuasiNewton => (Solver::QuasiNewton, 300),
+        Method::QuasiNewton => (Solver::QuasiNewton, PATIENT),
         Method::Newton => (Solver::Newton, 100),
     };
     let limits = Limits { tol: options.tol, max_iter: options.max_iter.unwrap_or(most) };

@@ -1,16 +1,17 @@
 //! Which of several curves: where points are far apart, and where none was found, more ways are tried, and of the
 //! curves that they lead to the one that bends least is kept.
 
+use super::auto::PATIENT;
 use super::chain::Chain;
 use super::ends::ChainEnds;
 use super::energy::bending;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{Options, Solver, homotopy, trust_region};
 use crate::monitor::Monitor;
-use crate::scalar::{Lane, few, lane, mask_from};
+use crate::scalar::{LANES, Lane, few, lane, mask_from};
 use crate::space::{Ambient, Erased};
 
-/// Steps beyond this part of the distance to the cut locus may have several curves.
+/// Steps beyond this part of the way to the cut locus may have several curves.
 const FAR: f64 = 0.6;
 /// Energies that differ by no more than this part are those of one curve.
 const SAME: f64 = 1e-6;
@@ -29,6 +30,7 @@ const FEW_SWEEPS: usize = 200;
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
     Homotopy,
+    QuasiNewton,
     Newton,
     FromZero,
     FromAlgorithm1,
@@ -46,8 +48,7 @@ pub fn settle(
     monitor: &Monitor,
     outcome: &mut Outcome,
 ) {
-    let radius = space.injectivity_radius();
-    let far = chain.max_step.simd_gt(lane(FAR * radius)) & lane(radius).simd_lt(lane(f64::INFINITY));
+    let far = chain.widest.simd_gt(lane(FAR * space.cut_angle()));
     let lanes = (far | !outcome.settled(idle)) & !idle;
     if lanes.none() {
         return;
@@ -59,7 +60,10 @@ pub fn settle(
     let energy = |chain: &mut Chain, on: Lane| on.select(bending(space, chain), infinity);
     let mut least = energy(chain, outcome.settled(idle) & lanes);
     let mut second = infinity;
-    for way in [Way::Homotopy, Way::Newton, Way::FromZero, Way::FromAlgorithm1, Way::FromBest] {
+    let quick: [bool; LANES] = few(|l| outcome.converged[l] && outcome.solver[l] == Solver::QuasiNewton);
+    for way in
+        [Way::Homotopy, Way::QuasiNewton, Way::Newton, Way::FromZero, Way::FromAlgorithm1, Way::FromBest]
+    {
         let left = options.max_iter.map(|n| n.saturating_sub(outcome.used()));
         if left == Some(0) || monitor.poll() {
             break;
@@ -67,6 +71,8 @@ pub fn settle(
         let on = lanes
             & match way {
                 Way::Homotopy => mask_from(|l| outcome.solver[l] != Solver::Homotopy),
+                // Before, it had to be quick.
+                Way::QuasiNewton => mask_from(|l| !quick[l]),
                 Way::Newton | Way::FromZero | Way::FromAlgorithm1 if enough => lanes,
                 _ => !outcome.settled(idle),
             };
@@ -88,6 +94,9 @@ pub fn settle(
                 let options = Options { max_iter: left, ..*options };
                 homotopy::follow(space, chain, ends, &options, !on, work, monitor, &mut found);
                 found
+            }
+            Way::QuasiNewton => {
+                solve(space, chain, ends, Solver::QuasiNewton, limits(PATIENT), !on, work, monitor)
             }
             Way::Newton => solve(space, chain, ends, Solver::Newton, limits(steps), !on, work, monitor),
             Way::FromZero | Way::FromBest => {

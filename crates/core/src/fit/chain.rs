@@ -22,6 +22,11 @@ fn tidy_every(dim: usize) -> usize {
 /// geodesic between two points goes.
 const ALMOST: f64 = 1e-5;
 
+/// Whether the group that carries frames keeps lengths.
+fn has_metric<M: Origin>(space: &M) -> bool {
+    !space.curvature().is_nan()
+}
+
 /// What one lane of a chain is made of: a run of nodes of a curve, counted around the curve when
 /// it is closed.
 #[derive(Clone, Copy)]
@@ -85,6 +90,14 @@ impl Walker {
         }
         angle
     }
+
+    /// The squared length of the chord that led to where it stands, at the point itself.
+    fn measured<M: Space>(&mut self, space: &M, len: usize, chord: &[Lane]) -> Lane {
+        // The point before is not needed any more.
+        let Walker { frame, p, q: v, .. } = self;
+        space.tangent(frame, &p[..len], chord, &mut v[..len]);
+        space.inner(&p[..len], &v[..len], &v[..len])
+    }
 }
 
 /// Eight unrolled polygons and everything the solvers keep of them. Reused from fit to fit.
@@ -112,8 +125,12 @@ pub struct Chain {
     scale: Lane,
     /// What times are multiplied by.
     clock: Lane,
-    /// The longest chord of each lane.
+    /// D of (21): the longest step of each lane.
     pub max_step: Lane,
+    /// The longest chord of each lane. Without an invariant metric coordinates do not keep lengths, and it is not D.
+    pub longest: Lane,
+    /// The largest deciding angle of a step of each lane, or a bound where it is small.
+    pub widest: Lane,
     /// The largest |dᵢ|/hᵢ of each lane.
     pub pace: Lane,
     /// By how much rounding errors may grow in each lane, see [`Origin::condition`].
@@ -153,7 +170,8 @@ impl Chain {
             vector.resize(size, Lane::ZERO);
         }
         self.u.fill(Lane::ZERO);
-        (self.max_step, self.condition, self.pace) = (Lane::ZERO, Lane::ONE, Lane::ZERO);
+        (self.condition, self.pace) = (Lane::ONE, Lane::ZERO);
+        (self.max_step, self.longest, self.widest) = (Lane::ZERO, Lane::ZERO, Lane::ZERO);
         (self.cut, self.almost_cut) = ([None; LANES], [None; LANES]);
 
         self.scale = if space.scales() { scale_of(space, runs, n) } else { Lane::ONE };
@@ -163,7 +181,8 @@ impl Chain {
         self.start.1.clone_from(&self.walker.p);
         self.read_end(space, 0, ends, values[0]);
         space.0.walk(self, runs);
-        self.max_step = self.max_step.sqrt() / self.scale;
+        self.longest = self.longest.sqrt() / self.scale;
+        self.max_step = if has_metric(space) { self.longest } else { self.max_step.sqrt() };
         self.pace = self.pace.sqrt();
         self.read_end(space, 1, ends, values[1]);
     }
@@ -181,17 +200,22 @@ impl Chain {
     #[inline(always)]
     fn walk_sized<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize) {
         let (m, keep, limit) = (self.m, space.chord_len(), below(space.cut_angle()));
+        let keeps_lengths = has_metric(space);
         let (scales, clear_of) = (space.scales(), lane(space.cut_angle() * (1.0 - ALMOST)));
         for i in 0..self.n {
             self.h[i] = Lane::new(few(|l| runs[l].h(i))) * self.clock;
             let d = &mut self.chord[i * m..(i + 1) * m];
             let angle = self.walker.advance(space, runs, len, d);
+            self.widest = max_or_nan(self.widest, angle);
+            if !keeps_lengths {
+                self.max_step = max_or_nan(self.max_step, self.walker.measured(space, len, d));
+            }
             if scales {
                 d.iter_mut().for_each(|x| *x *= self.scale);
             }
             space.prepare(d, &mut self.prepared[i * keep..(i + 1) * keep]);
             let length2 = dot(d, d);
-            self.max_step = max_or_nan(self.max_step, length2);
+            self.longest = max_or_nan(self.longest, length2);
             self.pace = self.pace.max(length2 / (self.h[i] * self.h[i]));
             self.condition = max_or_nan(self.condition, space.condition(d));
             let clear = angle.simd_lt(clear_of);

@@ -117,3 +117,27 @@ fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], places: [Lane; 2], goal: Lan
         *u = goal * (n + weight * (n - b));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is predicted for λ = `goal` from the curves at two λ, 0 where there is none yet.
+    fn predicted(curve: impl Fn(f64) -> f64, places: [f64; 2], goal: f64) -> f64 {
+        let mut u = [lane(0.0)];
+        predict(&mut u, &places.map(|at| vec![lane(curve(at))]), places.map(lane), lane(goal));
+        u[0].to_array()[0]
+    }
+
+    #[test]
+    fn the_secant_of_velocities_over_lambda_is_followed() {
+        let quadratic = |at: f64| at * (3.0 - 2.0 * at);
+        for (places, goal) in [([0.25, 0.625], 1.0), ([0.25, 0.3], 0.31), ([0.5, 0.75], 1.0)] {
+            let found = predicted(quadratic, places, goal);
+            assert!((found - quadratic(goal)).abs() < 1e-14, "{places:?}, {goal}: {found}");
+        }
+        // One curve is a line through zero, and none is zero.
+        assert!((predicted(quadratic, [0.0, 0.25], 0.625) - 2.5 * quadratic(0.25)).abs() < 1e-15);
+        assert_eq!(predicted(quadratic, [0.0, 0.0], 0.25), 0.0);
+    }
+}

@@ -88,6 +88,7 @@ fn fit_in(
     let noisy = noisy_legs(space, chain, &runs, outcome.leg);
     let steps = chain.max_step.to_array();
     let given = given_legs(chain, &ends);
+    let condition = chain.condition.to_array();
     for (l, p) in group.iter_mut().enumerate() {
         let status = if let Some((index, angle)) = cut[l] {
             Status::CutLocus { index, angle }
@@ -111,6 +112,7 @@ fn fit_in(
             invariant_radius: f64::NAN,
             alternative: alternative[l],
             almost_cut: almost_cut[l].map(|(index, angle)| (p.first + index, angle)),
+            condition: condition[l],
         };
         p.end_leg = given[l];
     }

@@ -36,7 +36,7 @@ pub fn long_legs(space: &Erased, chain: &mut Chain, longest: Lane, lanes: Lane) 
     let mut found = [None; LANES];
     let radius = lane(space.injectivity_radius());
     // The middle leg is no longer than the way around: most curves need no closer look.
-    let around = chain.max_step + longest * lane(2.0);
+    let around = chain.longest + longest * lane(2.0);
     if (longest.simd_lt(lane(space.longest_leg())) & around.simd_lt(radius) | !lanes).all() {
         return found;
     }

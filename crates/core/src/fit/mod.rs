@@ -17,6 +17,7 @@ mod line_search;
 mod newton;
 mod pieces;
 mod quasi_newton;
+mod rounded;
 mod solve;
 mod tridiagonal;
 mod trust_region;
@@ -183,6 +184,8 @@ pub struct Report {
     /// The first point from which the next one lies almost at the cut locus, within 1e-5 of the limit, and the deciding
     /// angle.
     pub almost_cut: Option<(usize, f64)>,
+    /// By how much rounding errors may grow over its chords.
+    condition: f64,
 }
 
 impl Default for Report {
@@ -197,6 +200,7 @@ impl Default for Report {
             invariant_radius: f64::NAN,
             alternative: f64::NAN,
             almost_cut: None,
+            condition: 1.0,
         }
     }
 }
@@ -220,7 +224,7 @@ pub fn fit(
         overlap *= 2;
     }
     let len = space.point_len();
-    for (curve, report) in reports.iter().enumerate() {
+    for (curve, report) in reports.iter_mut().enumerate() {
         let own = &mut velocities[problem.offsets[curve] * len..problem.offsets[curve + 1] * len];
         if report.status.is_fault() {
             own.fill(f64::NAN);
@@ -228,6 +232,11 @@ pub fn fit(
             // Pieces agree to the tolerance; first and last velocity are one.
             let carried = problem.across_seam(space, curve, &own[..len]);
             own[problem.segments(curve) * len..].copy_from_slice(&carried);
+        }
+        if report.status == Status::Converged
+            && let Some(missed) = rounded::missed(space, problem, curve, own, report.condition)
+        {
+            (report.status, report.residual) = (Status::Unconverged, missed);
         }
     }
     reports

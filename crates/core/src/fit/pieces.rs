@@ -148,6 +148,7 @@ fn merge(
             report.max_step = report.max_step.max(r.max_step);
             report.rate = report.rate.max(r.rate);
             report.solver = report.solver.max(r.solver);
+            report.condition = report.condition.max(r.condition);
             report.almost_cut = report.almost_cut.or(r.almost_cut);
             if report.status == Status::Converged {
                 report.status = r.status;

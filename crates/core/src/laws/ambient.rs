@@ -20,6 +20,49 @@ pub fn points(space: &Erased, draw: &mut Draw) -> Verdict {
     Ok(())
 }
 
+pub fn projection(space: &Erased, draw: &mut Draw) -> Verdict {
+    for size in [1e-6, 0.02] {
+        let p = draw.point(space);
+        let noise = draw.noise(p.len());
+        let largest = p.iter().fold(Lane::ONE, |m, x| m.max(x.abs()));
+        let mut x: Vec<Lane> = p.iter().zip(&noise).map(|(p, n)| lane(size).mul_add(*n, *p)).collect();
+        let off = space.project(&mut x);
+        // Farther off a few steps of Newton's method do not end at a point.
+        let near = off.simd_le(lane(0.05));
+        let mut again = x.clone();
+        let left = near.select(space.project(&mut again), Lane::ZERO);
+        let change = near.select(norm(&minus(&again, &x)), Lane::ZERO);
+        let allowed = rounding(space, 100.0 * p.len() as f64, &[&p, &x], &[]);
+        within(left, allowed, &format!("off after noise of {size} was taken away"))?;
+        within(change, allowed * largest, &format!("change of a point that was off by noise of {size}"))?;
+    }
+    Ok(())
+}
+
+pub fn tangent_projection(space: &Erased, draw: &mut Draw) -> Verdict {
+    let p = draw.point(space);
+    let noise = draw.noise(p.len());
+    let mut v = noise.clone();
+    let off = space.project_tangent(&p, &mut v);
+    let allowed = rounding(space, 200.0 * p.len() as f64, &[&p], &[]);
+    let mut again = v.clone();
+    within(space.project_tangent(&p, &mut again), allowed, "off after the first projection")?;
+    within(norm(&minus(&again, &v)), allowed * norm(&v), "change by a second projection")?;
+    for scale in [1e-3, 1e3] {
+        // What is off is a part of the vector, whatever the unit, down to the size that counts as rounding.
+        let mut w = scaled(&noise, scale);
+        let part = space.project_tangent(&p, &mut w);
+        within(
+            (part - off).abs(),
+            allowed + off * lane(1e-3),
+            &format!("part that is off at {scale} of the size"),
+        )?;
+    }
+    let mut zero = scaled(&noise, 0.0);
+    space.project_tangent(&p, &mut zero);
+    within(norm(&zero), Lane::ZERO, "projection of zero")
+}
+
 /// Goes a way of coordinates x from a random point, and to another representative of its end.
 fn way(space: &Erased, draw: &mut Draw, part: f64) -> [Vec<Lane>; 4] {
     let p = draw.point(space);
@@ -169,10 +212,58 @@ pub fn transport(space: &Erased, draw: &mut Draw) -> Verdict {
     Ok(())
 }
 
+pub fn turning(space: &Erased, draw: &mut Draw) -> Verdict {
+    let (k, d) = (space.fibre(), if space.is_complex() { 2 } else { 1 });
+    if k == 0 {
+        return Ok(());
+    }
+    // A geodesic X at t = 0, and the same lines at X e^{tA} with a skew-Hermitian A.
+    let p = draw.point(space);
+    let v = draw.vector(space, &p, 0.3);
+    let mut gamma: Vec<Jet> = p.iter().map(|&v| Jet { v, d: Lane::ZERO, dd: Lane::ZERO }).collect();
+    space.ray(&p, &v, Jet { v: Lane::ZERO, d: Lane::ONE, dd: Lane::ZERO }, &mut gamma);
+    let noise = draw.noise(k * k * d);
+    let entry = |m: &[Lane], i: usize, j: usize| -> [Lane; 2] {
+        let at = (i * k + j) * d;
+        [m[at], if d == 2 { m[at + 1] } else { Lane::ZERO }]
+    };
+    let times_a = |x: &[Lane]| -> Vec<Lane> {
+        let mut out = vec![Lane::ZERO; x.len()];
+        for (i, j, l) in (0..x.len() / d * k).map(|c| (c / k / k, c / k % k, c % k)) {
+            let ([a, b], [e, f], [x, y]) = (entry(&noise, l, j), entry(&noise, j, l), entry(x, i, l));
+            let (re, im) = (a - e, b + f);
+            out[(i * k + j) * d] += x * re - y * im;
+            if d == 2 {
+                out[(i * k + j) * d + 1] += x * im + y * re;
+            }
+        }
+        out
+    };
+    let part = |f: fn(&Jet) -> Lane| -> Vec<Lane> { gamma.iter().map(f).collect() };
+    let (x, dx, ddx) = (part(|x| x.v), part(|x| x.d), part(|x| x.dd));
+    let xa = times_a(&x);
+    let raw = combined(&dx, 1.0, &xa);
+    let mut turned = combined(&combined(&ddx, 2.0, &times_a(&dx)), 1.0, &times_a(&xa));
+    let size = norm(&turned).max(Lane::ONE);
+    let mut velocity = raw.clone();
+    space.velocity(&x, &mut velocity);
+    space.acceleration(&x, &raw, &mut turned);
+    let allowed = rounding(space, 100.0, &[&p], &[]) * size;
+    within(norm(&minus(&velocity, &v)), allowed, "velocity at a representative that turns")?;
+    within(norm(&turned), allowed, "acceleration at a representative that turns")
+}
+
 pub fn derivatives(space: &Erased, draw: &mut Draw) -> Verdict {
+    // Also where logarithms are no power series; there the differences are less exact.
+    derivatives_at(space, draw, 0.3, 1.0)?;
+    derivatives_at(space, draw, 0.7, 100.0)
+}
+
+fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Verdict {
     // Between points that move, the second derivative of the array by differences of the first.
-    let (p, part) = (draw.point(space), 0.3);
-    let [u, v, w] = [(); 3].map(|()| draw.vector(space, &p, part));
+    let p = draw.point(space);
+    let [u, v] = [(); 2].map(|()| draw.vector(space, &p, 0.3));
+    let w = draw.vector(space, &p, part);
     let q = exp(space, &p, &w);
     let carried = {
         let mut out = vec![Lane::ZERO; p.len()];
@@ -203,7 +294,7 @@ pub fn derivatives(space: &Erased, draw: &mut Draw) -> Verdict {
         }
     }
     let scale = norm(&here.iter().map(|x| x.v).collect::<Vec<_>>());
-    let allowed = rounding(space, 3000.0 / STEP, &[&p, &q], &[]) * scale.max(Lane::ONE);
+    let allowed = rounding(space, loose * 3000.0 / STEP, &[&p, &q], &[]) * scale.max(Lane::ONE);
     within(
         norm(&minus(&d, &here.iter().map(|x| x.d).collect::<Vec<_>>())),
         allowed,

@@ -44,6 +44,9 @@ pub static LAWS: &[(&str, Law)] = &[
     ("the triple product is the curvature", algebra::holonomy),
     ("K is the largest curvature", algebra::largest_curvature),
     ("the stretch is the derivative of exp", algebra::stretch),
+    ("what is beside the space is projected to a point", ambient::projection),
+    ("any array is projected to a tangent vector", ambient::tangent_projection),
+    ("acceleration does not see how a representative turns", ambient::turning),
 ];
 
 /// Runs all laws; returns what was found wrong.

@@ -11,11 +11,13 @@
 
 mod algebra;
 mod erased;
+mod far_out;
 mod model;
 mod registry;
 
 pub use algebra::{Algebra, stretch_series};
 pub use erased::{Erased, Table};
+pub use far_out::far_out;
 pub use model::Model;
 pub use registry::{Entry, Made, table};
 

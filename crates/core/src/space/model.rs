@@ -81,6 +81,10 @@ pub trait Model: Copy + Send + Sync {
     }
     /// See [`Ambient::complaint`].
     fn complaint(&self, x: &[f64]) -> String;
+    /// See [`Ambient::beyond_doubles`].
+    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
+        None
+    }
     /// See [`Ambient::rounding`].
     fn rounding(&self, _p: &[Lane]) -> Lane {
         Lane::ONE
@@ -169,6 +173,9 @@ impl<M: Model> Ambient for M {
     }
     fn complaint(&self, x: &[f64]) -> String {
         Model::complaint(self, x)
+    }
+    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
+        Model::beyond_doubles(self, points)
     }
     fn rounding(&self, p: &[Lane]) -> Lane {
         Model::rounding(self, p)

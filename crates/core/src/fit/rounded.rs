@@ -1,0 +1,68 @@
+//! Whether rounding leaves of a curve what its velocities say.
+//!
+//! Where spaces open up exponentially, velocities that are right to the last digit make a curve that is not: a
+//! segment's geodesics multiply rounding errors at its start by the exponential of its length.
+
+use super::Problem;
+use crate::curve::Segment;
+use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, max_or_nan};
+use crate::space::{Ambient, Erased};
+
+/// What may be missed for rounding.
+const MOST: f64 = 1e-8;
+/// Up to this condition of the chords, steps of five to seven, curves need no look.
+const SMALL: f64 = 1e3;
+
+/// What a curve misses at the ends of its segments, relative to its speed, if that is no rounding; `condition` is that
+/// of its chords.
+pub fn missed(
+    space: &Erased,
+    problem: &Problem,
+    curve: usize,
+    velocities: &[f64],
+    condition: f64,
+) -> Option<f64> {
+    if condition <= SMALL {
+        return None;
+    }
+    let (len, count, t) = (space.point_len(), problem.segments(curve), problem.knots(curve));
+    let first = problem.offsets[curve];
+    let rows = |all: &[f64], at: [usize; LANES], out: &mut [Lane]| {
+        gather(at.map(|i| &all[i * len..(i + 1) * len]), out);
+    };
+    let mut segment = Segment::<Dual>::new(len);
+    let mut gamma = vec![Dual::constant(Lane::ZERO); len];
+    let [mut p, mut u, mut v, mut apart] = [(); 4].map(|_| vec![Lane::ZERO; len]);
+    let (mut far, mut off, mut speed) = (Lane::ZERO, Lane::ZERO, Lane::ZERO);
+    for group in 0..count.div_ceil(LANES) {
+        let at: [usize; LANES] = few(|l| (group * LANES + l).min(count - 1));
+        let h = Lane::new(at.map(|i| t[i + 1] - t[i]));
+        for e in 0..2 {
+            rows(problem.points, at.map(|i| first + i + e), &mut segment.ends[e]);
+            rows(velocities, at.map(|i| i + e), &mut segment.legs[e]);
+            segment.legs[e].iter_mut().for_each(|x| *x *= h / 3.0);
+        }
+        segment.prepare(space, len);
+        segment.at(space, len, Dual::from_parts([Lane::ONE, Lane::ONE, Lane::ZERO]), &mut gamma);
+        for (i, x) in gamma.iter().enumerate() {
+            let [value, rate, _] = x.parts();
+            (p[i], v[i]) = (value, rate / h);
+        }
+        space.velocity(&p, &mut v);
+        space.log(&p, &segment.ends[1], &mut apart);
+        far = max_or_nan(far, space.inner(&p, &apart, &apart).abs().sqrt() / h);
+        // As a vector at the array that stands for the next point.
+        let still = vec![Lane::ZERO; len];
+        space.carry(&p, &segment.ends[1], &still, &v, &mut apart);
+        rows(velocities, at.map(|i| i + 1), &mut u);
+        apart.iter_mut().zip(&u).for_each(|(v, u)| *v -= *u);
+        let length = |v: &[Lane]| space.inner(&segment.ends[1], v, v).abs().sqrt();
+        off = max_or_nan(off, length(&apart));
+        speed = max_or_nan(speed, length(&u));
+    }
+    let most = |x: Lane| {
+        x.to_array().into_iter().fold(0.0, |most: f64, x| if x > most || x.is_nan() { x } else { most })
+    };
+    let missed = most(max_or_nan(far, off)) / most(speed);
+    (!(missed <= MOST)).then_some(missed)
+}

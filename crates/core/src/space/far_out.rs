@@ -1,0 +1,20 @@
+//! Hyperbolic spaces: how far out doubles have digits.
+
+/// The largest |p|² of a point, at a distance of 15.25 from (1, 0, …): beyond, rounding errors ε|p|² are above
+/// 0.2 %, and twice as far there are no points any more.
+const FARTHEST: f64 = (1_u64 << 43) as f64;
+
+/// The first point of hyperbolic space, real or complex, so far out that too few digits are left, and that in words.
+pub fn far_out(points: &[f64], len: usize) -> Option<(usize, String)> {
+    let square = |p: &[f64]| p.iter().map(|x| x * x).sum::<f64>();
+    let row = points.chunks_exact(len).position(|p| !(square(p) <= FARTHEST))?;
+    // |p|² = cosh² r + sinh² r
+    let distance = |square: f64| 0.5 * square.acosh();
+    let why = format!(
+        "lies at distance {:.1} from (1, 0, …), where rounding errors, ε|p|², leave too few digits (farthest: {:.1}); \
+         move all points by one isometry, space.transvection, so that their middle is (1, 0, …)",
+        distance(square(&points[row * len..(row + 1) * len])),
+        distance(FARTHEST)
+    );
+    Some((row, why))
+}
