@@ -38,7 +38,7 @@ KINDS: dict[str, Callable[[ss.Space, int, np.random.Generator], Array]] = {
     "random points": lambda space, n, rng: space.random_point(rng, n),
     **{
         f"walks of {part:g}": lambda s, n, rng, part=part: _walk(s, part, n, rng)
-        for part in (0.5, 0.7, 0.9, 0.97)
+        for part in (0.5, 0.7, 0.9, 0.97, 0.999)
     },
     **{
         f"zigzags of {part:g}": lambda s, n, rng, part=part: _zigzag(s, part, n, rng)

@@ -50,7 +50,7 @@ class CubicSpline(Piecewise):
             Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
         method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1), ``"homotopy"`` (the
             curve that is continued from near points), or ``"auto"``: quasi-Newton, for curves that it leaves Newton's
-            method, and then the homotopy. Points far apart (steps beyond 0.6 of the injectivity radius) may have
+            method, and then the homotopy. Points far apart (steps beyond 0.6 of the way to the cut locus) may have
             several C² curves: of those that it, the homotopy and a trust region lead to, it keeps the one that bends
             least. `Report.method` says which was used.
         tol: largest relative C² defect that counts as converged, see `Report.residual`.
