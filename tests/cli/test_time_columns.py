@@ -115,6 +115,17 @@ def test_days_as_one_number_are_refused(run, fails):
     run("fit a.csv --space r:1 --time date -o a.npz")
 
 
+def test_days_as_one_number_are_found_under_any_name(run, fails):
+    tabled(seen=[20210829, 20210831, 20210901])
+    assert "seen may hold the times; say --time seen" in fails("fit a.csv --space r:1 --columns x -o a.npz")
+    assert "which is a day but no number" in fails("fit a.csv --space r:1 --columns x --time seen -o a.npz")
+    run("fit a.csv --space r:1 --columns x --time none -o a.npz")
+    # No days: of another century, or with numbers that no month has.
+    for cells in ([18990829, 18990830, 18990831], [20211329, 20211330, 20211331], [0.5, 20210829, 20210830]):
+        tabled(seen=cells)
+        run("fit a.csv --space r:1 --columns x -o a.npz")
+
+
 def test_a_column_called_none_is_a_column(run):
     tabled(none=[3, 4, 5])
     run("fit a.csv --space r:1 --time none -o a.npz")

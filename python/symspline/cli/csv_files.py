@@ -19,7 +19,7 @@ from .numbers import is_number
 from .numbers import numbers as as_numbers
 from .progress import Progress
 from .tables import Array, Rows, Table
-from .times import is_date_like, parse_times
+from .times import is_date_like, is_packed_day, parse_times
 
 # Few enough rows to stay in the processor's cache: three times faster than many.
 _CHUNK = 2000
@@ -136,9 +136,10 @@ class CsvTable(Table):
 
 
 def _dated(rows: list[list[str]], column: int) -> bool:
-    """Whether the first cell of a column that looks like a date or a number looks like a date."""
+    """Whether the first cell of a column that looks like a date or a number looks like a date, 20210829 too."""
     cells = (row[column] for row in rows if column < len(row))
-    return next((not is_number(cell) for cell in cells if is_number(cell) or is_date_like(cell)), False)
+    found = (cell for cell in cells if is_number(cell) or is_date_like(cell))
+    return next((not is_number(cell) or is_packed_day(cell) for cell in found), False)
 
 
 def write_csv(file: BinaryIO, columns: Mapping[str, Array], utc: bool) -> None:

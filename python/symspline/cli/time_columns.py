@@ -33,8 +33,9 @@ _PARTS = {
 }
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
-# A day as one number: 20210829.
+# A day as one number, 20210829, in a column that is called a date, and in any other one.
 _PACKED = 10_000_101, 99_991_231
+_PACKED_NOW = 19_000_101, 20_991_231
 
 
 def time_column(table: Table, given: str | None, others: Sequence[str | None]) -> str | None:
@@ -76,10 +77,11 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
 def check_days(table: Table, name: str | None, rows: Rows) -> None:
     """Raise `Problem` if days are written as one number, such as 20210829, which is no number of days."""
     times = rows.times
-    if name is None or "date" not in _words(name) or times.dtype.kind == "M":
+    if name is None or times.dtype.kind == "M":
         return
+    first, last = _PACKED if "date" in _words(name) else _PACKED_NOW
     whole = times.astype(np.int64) if np.all(np.abs(times) < 2.0**62) else np.zeros(1, np.int64)
-    if (whole < _PACKED[0]).any() or (whole > _PACKED[1]).any() or (whole != times).any():
+    if (whole < first).any() or (whole > last).any() or (whole != times).any():
         return
     month, day = whole // 100 % 100, whole % 100
     if ((month >= 1) & (month <= 12) & (day >= 1) & (day <= 31)).all():

@@ -44,6 +44,7 @@ _NANOSECONDS = {
     "h": 3600 * 10**9,
     "d": 86400 * 10**9,
 }
+_PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
 _DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
 _MOST = 10**9
 # Exponents of doubles are smaller.
@@ -115,6 +116,11 @@ def _zone(shape: str, shapes: list[str], cells: list[str], fail: Fail) -> int:
 def _style(match: re.Match[str]) -> tuple[Any, ...]:
     """What the dates of a column have in common; fractions and offsets may differ."""
     return match["mark"], match["seconds"] is None, match["zone"] is None
+
+
+def is_packed_day(cell: str) -> bool:
+    """Whether a number looks like a day of these centuries: 20210829."""
+    return _PACKED_DAY.fullmatch(cell.strip()) is not None
 
 
 def is_date_like(text: str) -> bool:
