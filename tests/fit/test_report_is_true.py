@@ -380,3 +380,15 @@ def _twist(n, turn, velocity):
     xi = np.zeros((n, n))
     xi[0, 1], xi[1, 0], xi[:-1, -1] = -turn, turn, velocity
     return xi
+
+
+@pytest.mark.parametrize("name", ["h:2", "spd:2", "ch:1"])
+def test_there_and_back_over_a_long_way(name):
+    """At every knot such a curve stands still, and rounding is all that there is of its velocities."""
+    space, rng = ss.space(name), seeded(name)
+    p = base_point(space, rng)
+    # Of curvature -4, where lengths count twice.
+    way = 4.0 if name == "ch:1" else 8.0
+    p = [p, space.exp(p, way * unit_tangent(space, p, rng)), p]
+    spline = ss.CubicSpline([0, 1, 2], p, space, bc_type="periodic")
+    assert spline.report.converged and space.norm(spline.points, spline.velocities).max() < 1e-6

@@ -13,8 +13,8 @@ const MOST: f64 = 1e-8;
 /// Up to this condition of the chords, steps of five to seven, curves need no look.
 const SMALL: f64 = 1e3;
 
-/// What a curve misses at the ends of its segments, relative to its speed, if that is no rounding; `condition` is that
-/// of its chords.
+/// What a curve misses at the ends of its segments, relative to the largest speed at a knot or between neighbours, if
+/// that is no rounding; `condition` is that of its chords.
 pub fn missed(
     space: &Erased,
     problem: &Problem,
@@ -58,7 +58,9 @@ pub fn missed(
         apart.iter_mut().zip(&u).for_each(|(v, u)| *v -= *u);
         let length = |v: &[Lane]| space.inner(&segment.ends[1], v, v).abs().sqrt();
         off = max_or_nan(off, length(&apart));
-        speed = max_or_nan(speed, length(&u));
+        // At every knot a curve that goes there and back may stand still.
+        space.log(&segment.ends[1], &segment.ends[0], &mut apart);
+        speed = max_or_nan(speed, length(&u).max(length(&apart) / h));
     }
     let most = |x: Lane| {
         x.to_array().into_iter().fold(0.0, |most: f64, x| if x > most || x.is_nan() { x } else { most })
