@@ -392,3 +392,11 @@ def test_there_and_back_over_a_long_way(name):
     p = [p, space.exp(p, way * unit_tangent(space, p, rng)), p]
     spline = ss.CubicSpline([0, 1, 2], p, space, bc_type="periodic")
     assert spline.report.converged and space.norm(spline.points, spline.velocities).max() < 1e-6
+
+
+def test_phases_do_not_matter_over_a_long_way():
+    space, rng = ss.space("ch:2"), seeded("phases")
+    middle = base_point(space, rng)
+    p = np.stack([space.exp(middle, 2.85 * unit_tangent(space, middle, rng)) for _ in range(3)])
+    for turn in (np.zeros((3, 1)), rng.uniform(0, 6, (3, 1))):
+        assert ss.CubicSpline([0, 1, 2.5], np.exp(1j * turn) * p, space).report.converged
