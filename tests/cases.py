@@ -51,6 +51,8 @@ CASES = [
     Case("cp:7", far=1.0, few=True, face=True),
     Case("ch:1", far=0.75, few=True),
     Case("ch:2", far=0.75, face=True),
+    Case("hp:1", far=1.4, few=True),
+    Case("hp:2", far=1.4, few=True, face=True),
     Case("gr:1,3", far=1.2, few=True, face=True),
     Case("gr:2,3", far=1.2, few=True),
     Case("gr:2,5", far=1.2, face=True),
@@ -73,6 +75,8 @@ CASES = [
     Case("spd:2", far=1.5, face=True),
     Case("spd:3", far=1.5),
     Case("sspd:3", far=1.5, few=True, face=True),
+    Case("siegel:1", far=1.5, few=True),
+    Case("siegel:2", far=1.5, few=True, face=True),
     Case("hpd:1", far=1.5, smooth=False, few=True, face=True),
     Case("hpd:2", far=1.5, face=True),
     Case("hpd:5", far=1.5, few=True),
@@ -112,7 +116,12 @@ LOOPS = [*CURVED, "se:3"]
 # The names of every space in the library, one row a family.
 FAMILIES = Handle.names()
 
-POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite, ss.SpecialPositiveDefinite)
+POSITIVE = (
+    ss.SymmetricPositiveDefinite,
+    ss.HermitianPositiveDefinite,
+    ss.SpecialPositiveDefinite,
+    ss.Siegel,
+)
 HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
 LINEAR = (
     ss.GeneralLinear,
@@ -127,6 +136,7 @@ QUOTIENTS = (
     ss.RealProjective,
     ss.ComplexProjective,
     ss.ComplexHyperbolic,
+    ss.QuaternionicProjective,
     ss.Grassmannian,
     ss.ComplexGrassmannian,
 )

@@ -16,7 +16,7 @@ from symspline.pieces import spline_pieces
 SPACES = [
     *("r:2", "sphere:1", "sphere:2", "sphere:3", "h:2", "rp:2", "cp:1", "cp:2", "gr:2,4", "cgr:1,2"),
     *("so:2", "so:3", "o:3", "so:4", "u:1", "u:2", "su:2", "spd:2", "hpd:2", "se:2", "se:3"),
-    "sspd:2",
+    *("sspd:2", "siegel:1", "hp:1"),
 ]
 ENDS = ("natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed")
 METHODS = ("auto", "fixed-point", "quasi-newton", "newton")

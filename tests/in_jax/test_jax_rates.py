@@ -12,8 +12,8 @@ from symspline.jax import curve
 X = np.array([0.3, 1.7, 3.1])
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
 LATER = 0.1 * np.arange(5.0)
-PLAIN = ["r:2", "sphere:2", "h:2", "so:3", "u:2", "spd:2", "hpd:2", "se:3"]
-QUOTIENTS = ["rp:2", "cp:2", "gr:2,5", "cgr:2,4", "ch:2"]
+PLAIN = ["r:2", "sphere:2", "h:2", "so:3", "u:2", "spd:2", "hpd:2", "siegel:1", "se:3"]
+QUOTIENTS = ["rp:2", "cp:2", "gr:2,5", "cgr:2,4", "hp:1", "ch:2"]
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ import symspline as ss
 
 NAMES = [
     "r:3", "sphere:1", "sphere:2", "sphere:4", "hyperbolic:2", "so:3", "so:4", "o:3", "u:2", "su:3", "spd:2",
-    "spd:3", "hpd:2", "gr:2,5", "cgr:1,3", "rp:2", "cp:2", "ch:2", "se:2", "se:3",
+    "spd:3", "hpd:2", "gr:2,5", "cgr:1,3", "rp:2", "cp:2", "ch:2", "hp:2", "siegel:2", "se:2", "se:3",
 ]  # fmt: skip
 every = pytest.mark.parametrize("name", NAMES)
 # Steps of the search that end it, in standard deviations; the flat way stagnates at rounding.

@@ -175,6 +175,8 @@ def shortest_loop(space):
         case ss.Grassmannian() | ss.ComplexGrassmannian():
             n, k = space.point_shape
             p, v = np.eye(n, k), np.eye(n)[:, [k]] * np.eye(k)[0]
+        case ss.QuaternionicProjective():
+            p, v = np.eye(space.point_shape[0], 2), np.eye(space.point_shape[0])[:, 2:4]
         case ss.SpecialOrthogonal() | ss.Orthogonal():
             n = space.point_shape[0]
             p, v = np.eye(n), unit(n, 1, 0) - unit(n, 0, 1)

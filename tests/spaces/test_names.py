@@ -111,6 +111,7 @@ DIMENSIONS = {
     "rp": lambda n: n,
     "cp": lambda n: 2 * n,
     "ch": lambda n: 2 * n,
+    "hp": lambda n: 4 * n,
     "gr": lambda k, n: k * (n - k),
     "cgr": lambda k, n: 2 * k * (n - k),
     "so": lambda n: n * (n - 1) // 2,
@@ -120,6 +121,7 @@ DIMENSIONS = {
     "spd": lambda n: n * (n + 1) // 2,
     "hpd": lambda n: n * n,
     "sspd": lambda n: n * (n + 1) // 2 - 1,
+    "siegel": lambda n: n * (n + 1),
     "se": lambda n: n * (n + 1) // 2,
     "gl": lambda n: n * n,
     "cgl": lambda n: 2 * n * n,
@@ -131,7 +133,7 @@ DIMENSIONS = {
 }
 
 
-COMPLEX_FAMILIES = {"cp", "ch", "cgr", "u", "su", "hpd", "cgl"}
+COMPLEX_FAMILIES = {"cp", "ch", "hp", "cgr", "u", "su", "hpd", "cgl"}
 
 
 @every_single

@@ -99,11 +99,17 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("bc_type", ["natural", "not-a-knot"])
+@pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", "clamped", "periodic", "given"])
 def test_curves_stay(name, bc_type):
     space, step, start, defect = CASES[name]
     p = walk_in(step, start)
     assert np.abs(defect(p)).max() <= 1e-13
+    if bc_type == "periodic":
+        p[-1] = p[0]
+    elif bc_type == "given":
+        # Velocities of geodesics between points of the part.
+        v = ss.space(space).log(p[[0, -1]], p[[2, -3]])
+        bc_type = ((1, v[0]), (1, -v[1]))
     values = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type)(X)
     size = max(1.0, float(np.abs(values).max()) ** 2)
     assert np.abs(defect(values)).max() <= 100 * EPS * size
@@ -177,14 +183,102 @@ def hopf(q):
     return np.concatenate([2 * product, height], axis=-1)
 
 
-def test_special_positive_definite_is_a_part_of_positive_definite():
-    p = points_on(ss.space("sspd:3"), 6, step=0.6)
-    a, b = (ss.CubicSpline(KNOTS, p, name, bc_type="not-a-knot", tol=1e-14) for name in ("sspd:3", "spd:3"))
+@pytest.mark.parametrize(
+    ("part", "whole", "step"),
+    [("sspd:3", "spd:3", 0.6), ("siegel:2", "spd:4", 0.6), ("hp:2", "cgr:2,6", 0.4)],
+)
+@pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", "clamped"])
+def test_a_part_has_the_curves_of_the_whole(part, whole, step, bc_type):
+    p = points_on(ss.space(part), 6, step=step)
+    a, b = (ss.CubicSpline(KNOTS, p, name, bc_type=bc_type, tol=1e-14) for name in (part, whole))
     for nu in range(3):
-        np.testing.assert_allclose(a(X, nu), b(X, nu), rtol=0, atol=1e-12 * max(1.0, np.abs(b(X, nu)).max()))
-    assert np.abs(np.linalg.det(a(X)) - 1).max() <= 1e-14 * np.abs(p).max() ** 3
+        scale = max(1.0, np.abs(b(X, nu)).max())
+        np.testing.assert_allclose(a(X, nu), b(X, nu), rtol=0, atol=1e-12 * scale)
+    assert a.report.residual <= 1e-13
+
+
+def test_complex_hyperbolic_in_positive_definite():
+    # The line of z becomes the positive definite matrix η + 2zz* of U(1, 2).
+    z = points_on(ss.ComplexHyperbolic(2), 6, step=0.4)
+
+    def definite(z):
+        return SIGNS + 2 * z[..., :, None] * z[..., None, :].conj()
+
+    for bc_type in ("natural", "not-a-knot"):
+        lines = ss.CubicSpline(KNOTS, z, "ch:2", bc_type=bc_type)(X)
+        matrices = ss.CubicSpline(KNOTS, definite(z), "hpd:3", bc_type=bc_type)(X)
+        np.testing.assert_allclose(
+            definite(lines), matrices, rtol=0, atol=1e-13 * np.abs(matrices).max() ** 2
+        )
+
+
+def test_quaternionic_projective_space_is_blind_to_units():
+    # A unit quaternion on the right of a vector, here j, is another basis of the plane.
+    p = points_on(ss.QuaternionicProjective(2), 6, step=0.4)
+    q = convert.subspace_to_quaternions(p)
+    turned_q = np.stack([-q[..., 2], -q[..., 3], q[..., 0], q[..., 1]], axis=-1)
+    other = convert.quaternions_to_subspace(turned_q)
+    assert np.abs(other - p).max() > 0.1
+    projectors = [
+        convert.basis_to_projector(ss.CubicSpline(KNOTS, x, "hp:2")(X))
+        for x in (p, convert.quaternions_to_subspace(q), other)
+    ]
+    np.testing.assert_allclose(projectors[1], projectors[0], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(projectors[2], projectors[0], rtol=0, atol=1e-14)
+
+
+def test_distances_of_parts():
+    rng = np.random.default_rng(6)
+    q = rng.standard_normal((2, 3, 4))
+    q /= np.linalg.norm(q, axis=(-2, -1), keepdims=True)
+    p = convert.quaternions_to_subspace(q)
+    # |⟨p, q⟩| of vectors of quaternions is the size of one complex block of p*q.
+    size = np.linalg.norm(turned(p[0].conj()) @ p[1]) / np.sqrt(2)
+    distance = ss.QuaternionicProjective(2).distance(*p)
+    np.testing.assert_allclose(distance, np.sqrt(2) * np.arccos(size), rtol=1e-14)
+    # Siegel (1943), §2: with the eigenvalues r of the cross-ratio, d² = Σ log²((1 + √r)/(1 − √r)).
+    x, y = rng.standard_normal((2, 2, 3, 3))
+    z, w = x + turned(x) + 1j * (y @ turned(y) + 0.3 * np.eye(3))
+    ratio = (z - w) @ np.linalg.inv(z - w.conj()) @ (z.conj() - w.conj()) @ np.linalg.inv(z.conj() - w)
+    r = np.sqrt(np.linalg.eigvals(ratio).real)
+    expected = np.sqrt(2 * np.sum(np.log((1 + r) / (1 - r)) ** 2))
+    found = ss.Siegel(3).distance(*convert.siegel_to_positive_definite(np.array([z, w])))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_vectors_that_leave_a_part_are_refused():
+    p = convert.siegel_to_positive_definite([[[1j]], [[1 + 2j]]])
+    with pytest.raises(ss.ValidationError, match="not tangent"):
+        ss.CubicSpline(None, p, "siegel:1", bc_type=((1, np.eye(2)), "natural"))
+    q = convert.quaternions_to_subspace([[[1.0, 0, 0, 0], [0, 0, 0, 0]], [[0.6, 0, 0, 0], [0, 0, 0.8, 0]]])
+    v = np.zeros((4, 2), complex)
+    v[2, 0] = 1.0
+    with pytest.raises(ss.ValidationError, match="not tangent"):
+        ss.CubicSpline(None, q, "hp:1", bc_type=((1, v), "natural"))
+    v[3, 1] = 1.0
+    assert ss.CubicSpline(None, q, "hp:1", bc_type=((1, v), "natural")).report.converged
+
+
+def test_special_tensors_have_determinant_one():
+    p = points_on(ss.space("sspd:3"), 6, step=0.6)
+    curve = ss.CubicSpline(KNOTS, p, "sspd:3")
+    assert np.abs(np.linalg.det(curve(X)) - 1).max() <= 1e-14 * np.abs(p).max() ** 3
     with pytest.raises(ss.ValidationError, match=r"points\[1\].*its determinant is 2.0+e0, not 1"):
         ss.CubicSpline(None, [np.eye(2), np.diag([2.0, 1.0])], "sspd:2")
+
+
+@pytest.mark.parametrize(
+    ("space", "points", "why"),
+    [
+        ("siegel:1", [np.eye(2), np.diag([2.0, 1.0])], r"points\[1\] is off .* it is not symplectic"),
+        ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite makes them"),
+        ("hp:1", [np.eye(4)[:, :2], np.eye(4)[:, ::2]], r"points\[1\] is off .* no quaternionic line"),
+        ("hp:1", np.eye(4)[:2] * np.ones((3, 1, 1)), "looks like vectors of quaternions"),
+    ],
+)
+def test_points_that_are_none_are_told(space, points, why):
+    with pytest.raises(ss.ValidationError, match=why):
+        ss.CubicSpline(None, points, space)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import symspline as ss
 
-NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "ch:2"]
+NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "hp:2", "ch:2"]
 ORTHONORMAL = NAMES[:-1]
 KNOTS = np.array([0.0, 0.4, 1.9, 2.3, 3.6, 4.0, 5.1])
 

@@ -1,11 +1,13 @@
 //! Positive definite matrices.
 
 mod positive_definite;
+mod siegel;
 
 pub use positive_definite::PositiveDefinite;
+pub use siegel::Siegel;
 
 use symspline_core::matrix::Known;
-use symspline_core::space::{Entry, Made, table};
+use symspline_core::space::{Entry, Made, Within, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
@@ -16,6 +18,7 @@ pub static FAMILY: &[Entry] = &[
         make: |p| table(PositiveDefinite::<2>::new(p[0], false)),
     },
     Entry { names: &["sspd", "special-positive-definite"], parameters: &["n"], make: |p| real(p, true) },
+    Entry { names: &["siegel"], parameters: &["n"], make: |p| table(Siegel::new(p[0]).map(Within)) },
 ];
 
 /// In code of its own where the size is known to the compiler.

@@ -55,7 +55,7 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
         &v - &p.scaled(mean)
     }
 
-    fn algebra(&self) -> Algebra<D, A> {
+    pub(crate) fn algebra(&self) -> Algebra<D, A> {
         Algebra { n: self.n, skew: false, traceless: self.special, storage: PhantomData }
     }
 

@@ -3,12 +3,14 @@
 mod complex_hyperbolic;
 mod grassmannian;
 mod logarithm;
+mod quaternionic;
 
 pub use complex_hyperbolic::ComplexHyperbolic;
 pub use grassmannian::Subspaces;
+pub use quaternionic::QuaternionicProjective;
 
 use symspline_core::matrix::Small;
-use symspline_core::space::{Entry, Made, table};
+use symspline_core::space::{Entry, Made, Within, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
@@ -22,6 +24,11 @@ pub static FAMILY: &[Entry] = &[
         names: &["cp", "complex-projective"],
         parameters: &["n"],
         make: |p| complex(Subspaces::lines(p[0])),
+    },
+    Entry {
+        names: &["hp", "quaternionic-projective"],
+        parameters: &["n"],
+        make: |p| table(QuaternionicProjective::new(p[0]).map(Within)),
     },
     Entry {
         names: &["gr", "grassmannian"],

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use symspline_core::space::{Entry, Erased, Table};
 
-pub use symspline_forms::PositiveDefinite;
+pub use symspline_forms::{PositiveDefinite, Siegel};
 pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
 pub use symspline_linear::{GeneralLinear, Members};
-pub use symspline_subspaces::{ComplexHyperbolic, Subspaces};
+pub use symspline_subspaces::{ComplexHyperbolic, QuaternionicProjective, Subspaces};
 pub use symspline_vectors::{Curved, Euclidean, Hyperbolic, Sphere};
 
 /// Every kind of space.

@@ -21,7 +21,7 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
         z: complex symmetric matrices whose imaginary part is positive definite, shape (..., n, n).
 
     Returns:
-        Points of ``spd:2n`` of determinant 1, shape (..., 2n, 2n).
+        Points of ``siegel:n``, shape (..., 2n, 2n).
 
     Raises:
         ValidationError: a matrix is not symmetric, or its imaginary part is not positive definite.
@@ -92,8 +92,8 @@ def quaternions_to_subspace(q: ArrayLike) -> Array:
     """Points of quaternionic projective space HPⁿ as planes of C²ⁿ⁺².
 
     A unit vector of n + 1 quaternions a + bi + cj + dk, up to a unit quaternion on its right, spans a line; with
-    (a + bi, c + di; −c + di, a − bi) for every quaternion it is a point of ``cgr:2,2n+2``, where curves through such
-    points stay among them.
+    (a + bi, c + di; −c + di, a − bi) for every quaternion it is a plane of C²ⁿ⁺²: a point of ``hp:n`` and of
+    ``cgr:2,2n+2``, where curves through such points stay among them.
 
     Source: Besse, Manifolds all of whose geodesics are closed (1978), §3.
 
@@ -101,7 +101,7 @@ def quaternions_to_subspace(q: ArrayLike) -> Array:
         q: unit vectors of quaternions, shape (..., n + 1, 4), real part first.
 
     Returns:
-        Bases, shape (..., 2n + 2, 2).
+        Points of ``hp:n``, bases of planes, shape (..., 2n + 2, 2).
 
     Raises:
         ValidationError: a vector does not have length 1.

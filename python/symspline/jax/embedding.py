@@ -13,13 +13,14 @@ from ..spaces import (
     Euclidean,
     Grassmannian,
     Hyperbolic,
+    QuaternionicProjective,
     RealProjective,
     Space,
     Sphere,
 )
 
 _COLUMN = (Sphere, RealProjective, ComplexProjective)
-_COLUMNS = (Grassmannian, ComplexGrassmannian)
+_COLUMNS = (Grassmannian, ComplexGrassmannian, QuaternionicProjective)
 _LORENTZ = (Hyperbolic, ComplexHyperbolic)
 
 

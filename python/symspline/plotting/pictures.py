@@ -65,7 +65,7 @@ _PICTURES = {
     "se:2": Picture(draw_flat_poses),
     "se:3": Picture(draw_poses, 6.2, 5.8),
 }
-_FAMILIES = dict.fromkeys(("rp", "cp", "gr", "cgr"), Picture(draw_principal_angles, 10.5, 3.8))
+_FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(draw_principal_angles, 10.5, 3.8))
 _FAMILIES["ch"] = Picture(draw_ratios, 10.5, 3.8)
 _OTHERS = Picture(draw_components, 10.5, 3.8)
 

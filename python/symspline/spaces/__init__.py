@@ -12,9 +12,16 @@ from .linear import (
     Symplectic,
 )
 from .named import space
-from .positive import HermitianPositiveDefinite, SpecialPositiveDefinite, SymmetricPositiveDefinite
+from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, together
-from .subspaces import ComplexGrassmannian, ComplexHyperbolic, ComplexProjective, Grassmannian, RealProjective
+from .subspaces import (
+    ComplexGrassmannian,
+    ComplexHyperbolic,
+    ComplexProjective,
+    Grassmannian,
+    QuaternionicProjective,
+    RealProjective,
+)
 from .tolerance import POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
 
@@ -34,7 +41,9 @@ __all__ = [
     "Lorentz",
     "Orthogonal",
     "Product",
+    "QuaternionicProjective",
     "RealProjective",
+    "Siegel",
     "Similarity",
     "Space",
     "SpecialEuclidean",

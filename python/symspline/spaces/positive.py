@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from .base import Space
+from typing import Any
+
+import numpy as np
+
+from .._core import ValidationError
+from .base import Array, Space
 
 
 class SymmetricPositiveDefinite(Space):
@@ -49,3 +54,33 @@ class HermitianPositiveDefinite(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+
+class Siegel(Space):
+    """Siegel's upper half space Sp(2n, R)/U(n) of complex symmetric n × n matrices X + iY with positive definite Y:
+    points are the symplectic positive definite matrices (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) of 2n rows, which
+    `symspline.convert.siegel_to_positive_definite` makes. A totally geodesic part of `SymmetricPositiveDefinite`,
+    with its metric: distances are √2 times those of Siegel's metric tr Y⁻¹dZ Y⁻¹dZ̄.
+
+    For n = 1 it is the hyperbolic plane with √2 times its distances.
+
+    >>> import numpy as np, symspline as ss
+    >>> p, q = ss.convert.siegel_to_positive_definite([[[1j]], [[1 + 2j]]])
+    >>> middle = ss.Siegel(1).geodesic(p, q, 0.5)
+    >>> ss.convert.positive_definite_to_siegel(middle).round(8)
+    array([[0.33333333+1.49071198j]])
+    """
+
+    _name = "siegel"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+    def _array(self, value: Any, name: str) -> Array:
+        array = super()._array(value, name)
+        if np.iscomplexobj(array) and name in ("points", "p", "q"):
+            raise ValidationError(
+                f"{name} has complex numbers, but points of {self!r} are real matrices of shape {self.point_shape}; "
+                "symspline.convert.siegel_to_positive_definite makes them of complex symmetric ones"
+            )
+        return array

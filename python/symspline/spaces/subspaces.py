@@ -167,3 +167,33 @@ class ComplexGrassmannian(_Subspaces):
 
     def __init__(self, k: int, n: int) -> None:
         super().__init__(k, n)
+
+
+class QuaternionicProjective(Space):
+    """Quaternionic projective space HPⁿ, lines of n + 1 quaternions: points are the planes of C²ⁿ⁺² that such lines
+    become, any basis of one, a complex (2n + 2) × 2 matrix with orthonormal columns, which
+    `symspline.convert.quaternions_to_subspace` makes. A totally geodesic part of `ComplexGrassmannian`, with its
+    metric: distances are √2 times the angles between lines, arccos |⟨p, q⟩|.
+
+    HP¹ is the sphere S⁴ of radius 1/√2.
+
+    >>> import symspline as ss
+    >>> p, q = ss.convert.quaternions_to_subspace([[[1, 0, 0, 0], [0, 0, 0, 0]], [[0.6, 0, 0, 0], [0, 0, 0.8, 0]]])
+    >>> (ss.QuaternionicProjective(1).distance(p, q) / 2**0.5).round(8)
+    np.float64(0.92729522)
+    """
+
+    _name = "hp"
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
+    def _array(self, value: Any, name: str) -> Array:
+        array = super()._array(value, name)
+        lines = (self._parameters[0] + 1, 4)
+        if name in ("points", "p", "q") and array.shape[-2:] == lines and not np.iscomplexobj(array):
+            raise ValidationError(
+                f"{name} has shape {array.shape} and looks like vectors of quaternions, but points of {self!r} are "
+                f"complex matrices of shape {self.point_shape}, which symspline.convert.quaternions_to_subspace makes"
+            )
+        return array

@@ -13,12 +13,14 @@ mod algebra;
 mod erased;
 mod far_out;
 mod model;
+mod part;
 mod registry;
 
 pub use algebra::{Algebra, stretch_series};
 pub use erased::{Erased, Table};
 pub use far_out::far_out;
 pub use model::Model;
+pub use part::{Part, Within};
 pub use registry::{Entry, Made, table};
 
 use crate::curve::Job;

@@ -1,0 +1,244 @@
+//! A totally geodesic part of a space: what an isometry of order two leaves where it is.
+//!
+//! Geodesics between points of the part stay there, so all formulas are those of the whole. A page of a part says
+//! which points and coordinates are its own.
+
+use super::{Ambient, Frame, Origin, Space};
+use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
+
+/// The points of a space that an isometry of order two, the mirror, leaves where they are.
+pub trait Part: Copy + Send + Sync {
+    /// The space that it is a part of.
+    type Whole: Space;
+    /// The space that it is a part of.
+    fn whole(&self) -> Self::Whole;
+    /// See [`Origin::dim`].
+    fn dim(&self) -> usize;
+    /// See [`Origin::curvature`].
+    fn curvature(&self) -> f64;
+    /// See [`Ambient::injectivity_radius`].
+    fn injectivity_radius(&self) -> f64;
+    /// Coordinates in the whole of a vector with coordinates x in the part; keeps lengths.
+    fn widen<S: Scalar>(&self, x: &[S], wide: &mut [S]);
+    /// Coordinates in the part of the nearest vector there.
+    fn narrow<S: Scalar>(&self, wide: &[S], x: &mut [S]);
+    /// The image of a point.
+    fn mirror(&self, p: &[Lane], image: &mut [Lane]);
+    /// The image of a tangent vector at a point of the part, at the same representative.
+    fn mirror_vector(&self, p: &[Lane], v: &[Lane], image: &mut [Lane]);
+    /// A frame of the whole at a point of the part that takes the part at the origin to the part.
+    fn lift(&self, p: &[Lane], frame: &mut [Lane]);
+    /// Says in words and numbers why a point of the whole is none of the part.
+    fn complaint(&self, p: &[Lane]) -> String;
+}
+
+/// A part as a space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Within<P>(pub P);
+
+/// How far a point may be off the whole that is off the part.
+const OFF: Lane = lane(1e-8);
+
+impl<P: Part> Within<P> {
+    fn zeros<S: Scalar>(&self) -> Vec<S> {
+        vec![S::constant(Lane::ZERO); self.0.whole().dim()]
+    }
+
+    fn wide<S: Scalar>(&self, x: &[S]) -> Vec<S> {
+        let mut wide = self.zeros();
+        self.0.widen(x, &mut wide);
+        wide
+    }
+
+    /// What is rounding of an array of size one at p.
+    fn rounding_at(&self, p: &[Lane]) -> Lane {
+        lane(4.0 * p.len() as f64 * f64::EPSILON) * self.0.whole().rounding(p)
+    }
+
+    /// Replaces a vector by the half of itself and its image, which is what is along the part. What is so up to
+    /// rounding stays as it is.
+    fn along(&self, p: &[Lane], v: &mut [Lane]) {
+        let mut image = v.to_vec();
+        self.0.mirror_vector(p, v, &mut image);
+        let size = dot(v, v).sqrt();
+        let off =
+            image.iter().zip(&*v).fold(Lane::ZERO, |sum, (i, v)| (*i - *v).mul_add(*i - *v, sum)).sqrt();
+        let keep = off.simd_le(size * self.rounding_at(p));
+        v.iter_mut().zip(&image).for_each(|(v, image)| *v = keep.select(*v, lane(0.5) * (*v + *image)));
+    }
+
+    /// Replaces a point of the whole by the nearest of the part, half way to its image; returns how far that was.
+    fn nearest(&self, x: &mut [Lane]) -> Lane {
+        let whole = self.0.whole();
+        let (mut image, mut way, mut middle) = (x.to_vec(), x.to_vec(), x.to_vec());
+        self.0.mirror(x, &mut image);
+        let off = whole.log(x, &image, &mut way) * lane(0.5);
+        whole.ray(x, &way, lane(0.5), &mut middle);
+        // What is a point up to rounding stays as it is.
+        let keep = off.simd_le(self.rounding_at(x));
+        x.iter_mut().zip(&middle).for_each(|(x, middle)| *x = keep.select(*x, *middle));
+        off
+    }
+}
+
+impl<P: Part> Ambient for Within<P> {
+    fn point_len(&self) -> usize {
+        self.0.whole().point_len()
+    }
+    fn point_shape(&self) -> Vec<usize> {
+        self.0.whole().point_shape()
+    }
+    fn is_complex(&self) -> bool {
+        self.0.whole().is_complex()
+    }
+    fn fibre(&self) -> usize {
+        self.0.whole().fibre()
+    }
+    fn cut_angle(&self) -> f64 {
+        self.0.whole().cut_angle()
+    }
+    fn longest_leg(&self) -> f64 {
+        self.0.whole().longest_leg()
+    }
+    fn injectivity_radius(&self) -> f64 {
+        self.0.injectivity_radius()
+    }
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        self.0.whole().ray(p, v, t, out);
+    }
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        let whole = self.0.whole();
+        let angle = whole.log(p, q, out);
+        let square = whole.inner(p, out, out);
+        // Points are off the part by rounding errors, which are much beside a short way.
+        self.along(p, out);
+        if self.cut_angle().is_finite() {
+            // Almost at the cut locus rounding turns the vector, but the length is right.
+            let grown = square / whole.inner(p, out, out);
+            let factor = grown.simd_lt(lane(1.01)).select(grown.sqrt(), Lane::ONE);
+            out.iter_mut().for_each(|x| *x *= factor);
+        }
+        angle
+    }
+    fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane {
+        self.0.whole().distance(p, q, log, angle)
+    }
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        self.0.whole().geodesic(p, q, t, out);
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        self.0.whole().transvect(p, v, x, out);
+    }
+    fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        self.0.whole().carry(p, q, v, x, out);
+    }
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        self.0.whole().velocity(gamma, d);
+        self.along(gamma, d);
+    }
+    fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
+        self.0.whole().acceleration(gamma, d, dd);
+        self.along(gamma, dd);
+    }
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        self.0.whole().inner(p, u, v)
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        let off = self.0.whole().project(x);
+        max_or_nan(off, self.nearest(x))
+    }
+    fn scatter(&self, noise: &mut [Lane]) {
+        self.0.whole().scatter(noise);
+        self.nearest(noise);
+    }
+    fn complaint(&self, x: &[f64]) -> String {
+        let mut p: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
+        if self.0.whole().project(&mut p).simd_le(OFF).all() {
+            self.0.complaint(&p)
+        } else {
+            self.0.whole().complaint(x)
+        }
+    }
+    fn rounding(&self, p: &[Lane]) -> Lane {
+        self.0.whole().rounding(p)
+    }
+}
+
+impl<P: Part> Frame for Within<P> {
+    fn frame_len(&self) -> usize {
+        self.0.whole().frame_len()
+    }
+    fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
+        self.0.lift(p, frame);
+    }
+    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        let mut wide = self.zeros();
+        let angle = self.0.whole().step(frame, p, q, &mut wide);
+        self.0.narrow(&wide, chord);
+        angle
+    }
+    fn tidy(&self, frame: &mut [Lane], p: &[Lane]) {
+        self.0.whole().tidy(frame, p);
+    }
+    fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        let mut wide = self.zeros();
+        self.0.whole().coordinates(frame, p, v, &mut wide);
+        self.0.narrow(&wide, x);
+    }
+    fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        self.0.whole().tangent(frame, p, &self.wide(x), v);
+        self.along(p, v);
+    }
+}
+
+impl<P: Part> Origin for Within<P> {
+    fn dim(&self) -> usize {
+        self.0.dim()
+    }
+    fn chord_len(&self) -> usize {
+        self.0.whole().chord_len()
+    }
+    fn curvature(&self) -> f64 {
+        self.0.curvature()
+    }
+    fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
+        self.0.whole().prepare(&self.wide(chord), prepared);
+    }
+    fn legs<S: Scalar>(
+        &self,
+        chord: &[Lane],
+        prepared: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    ) {
+        let (mut plus, mut minus) = (self.zeros(), self.zeros());
+        let whole = self.0.whole();
+        whole.legs(&self.wide(chord), prepared, &self.wide(a), &self.wide(b), &mut plus, &mut minus);
+        self.0.narrow(&plus, w_plus);
+        self.0.narrow(&minus, w_minus);
+    }
+    fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
+        let mut wide = self.zeros();
+        self.0.whole().triple(&self.wide(a), &self.wide(b), &self.wide(c), &mut wide);
+        self.0.narrow(&wide, out);
+    }
+    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
+        let mut wide = self.wide(x);
+        self.0.whole().stretch(&self.wide(v), &mut wide);
+        self.0.narrow(&wide, x);
+    }
+    fn angle(&self, v: &[Lane]) -> Lane {
+        self.0.whole().angle(&self.wide(v))
+    }
+    fn condition(&self, chord: &[Lane]) -> Lane {
+        self.0.whole().condition(&self.wide(chord))
+    }
+}
+
+impl<P: Part> Space for Within<P> {
+    fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
+        self.0.whole().angle_at(p, v)
+    }
+}
