@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._core import ValidationError
 from .arrays import in_single, is_single, read_only, shown
 from .curves.curve import Curve, Doubles, quantity_of
+from .curves.energy import bending_energy
 from .curves.integrals import integrate
 from .curves.noise import Noise
 from .curves.solve import Progress
@@ -247,21 +248,7 @@ class Piecewise(ABC):
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
-        times = self._times
-        unit = np.broadcast_to(times[..., -1:] - times[..., :1], (*self._batch, 1))
-
-        def power(x: NDArray[np.float64]) -> Array:
-            bend: Array = self._curve.evaluate(x, "bend", self._outside, True) * unit * unit
-            return bend * bend / unit
-
-        with np.errstate(all="ignore"):
-            return (
-                integrate(times, power, self._batch, self._curve.exact)
-                / unit[..., 0]
-                / unit[..., 0]
-                / unit[..., 0]
-            )
+        return bending_energy(self._curve, self._outside)
 
     # ---- what it is made of ----
 

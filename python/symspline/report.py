@@ -44,7 +44,7 @@ class Report:
         rate: mean contraction of the residual per iteration.
         alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
             found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
-            batch, and always in a product.
+            batch. Through the points of a product another curve has the alternative of one factor.
     """
 
     method: str
@@ -122,8 +122,11 @@ def _same(a: Any, b: Any) -> bool:
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
 
 
-def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Report:
-    """The report of curves in a product, from those in its factors: the worst of each field."""
+def combined(
+    reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None
+) -> Report:
+    """The report of curves in a product, from those in its factors: the worst of each field, and what is of the
+    whole."""
 
     def largest(name: str) -> Any:
         result: NDArray[Any] = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
@@ -144,8 +147,7 @@ def combined(reports: Sequence[Report], max_step: Any, curvature: float) -> Repo
         curvature=curvature,
         invariant_radius=radius,
         rate=largest("rate"),
-        # Nor are curves of one factor alternatives to the whole.
-        alternative_energy=None,
+        alternative_energy=alternative_energy,
     )
 
 

@@ -13,6 +13,7 @@ from .curves.chosen import fit_sound, fit_wanted, mask_of
 from .curves.curve import Curve
 from .curves.derivatives import places
 from .curves.ends import ends_in_factors, kept, picked
+from .curves.energy import alternative_energy
 from .curves.fit import Asked, curve_of, read, read_ends
 from .curves.gradient import Gradient, Places
 from .curves.solve import Progress
@@ -135,9 +136,11 @@ class CubicSpline(Piecewise):
         self._clock, self._t, self._curve = clock, t, curve
         self._bc_type, self._extrapolate, self._reports = bc_type, extrapolate, reports
         self._outside = outside(extrapolate, bc_type)
-        self._report = (
-            reports[0] if len(reports) == 1 else combined(reports, longest_step(curve), curve.space.curvature)
-        )
+        if len(reports) == 1:
+            self._report = reports[0]
+        else:
+            other = alternative_energy(curve, reports, self._outside)
+            self._report = combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @classmethod
     def _of(cls, *parts: Any) -> Self:

@@ -61,16 +61,33 @@ def test_the_sphere_of_geomstats():
     assert np.abs(spline(x) - core(x)).max() <= 1e-9
 
 
+@pytest.mark.parametrize("ends", ["natural", "not-a-knot", "clamped"])
 @pytest.mark.parametrize("spacing", ["equal", "unequal"])
-def test_a_space_that_is_not_symmetric(spacing):
+def test_a_space_that_is_not_symmetric(spacing, ends):
     """Covariances with the Bures–Wasserstein metric, that of transport between normal distributions."""
     space = bures()
     p = walk(space, 0.4, 7, MIDDLE)
     t = np.arange(7.0) if spacing == "equal" else np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 7))
-    spline = ss.CubicSpline(t, p, space)
+    spline = ss.CubicSpline(t, p, space, bc_type=ends)
     assert spline.report.converged and spline.report.iterations <= 15
     assert jump(spline) <= 1e-8
     assert np.linalg.eigvalsh(spline(np.linspace(t[0], t[-1], 50))).min() > 0
+
+
+def test_not_a_knot_is_of_order_four():
+    space = bures()
+
+    def truth(t):
+        a, b, c = 9 + np.sin(t), 1 + np.cos(2 * t), 6 + 0.5 * np.sin(1.5 * t)
+        return np.stack([np.stack([a, b], -1), np.stack([b, c], -1)], -2)
+
+    x = np.linspace(0, 2, 301)
+    errors = []
+    for n in (9, 17, 33):
+        t = np.linspace(0, 2, n)
+        errors.append(np.abs(ss.CubicSpline(t, truth(t), space, bc_type="not-a-knot")(x) - truth(x)).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all((orders > 3.6) & (orders < 4.8)), (errors, orders)
 
 
 def test_the_suite_of_laws():

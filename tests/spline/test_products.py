@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import zigzag
 from curves import KNOTS, S2, found, points_on, same, shaped
 from refused import TWO, P, changed, fit_error
 
@@ -37,6 +38,26 @@ def test_max_step_of_a_product():
     p = np.array([[0.0], [3], [3]]), np.array([[0.0], [0], [4]])
     # The steps are 3 and 4; no two neighbours are 5 apart.
     assert ss.CubicSpline(None, p, space).report.max_step == pytest.approx(4)
+
+
+@pytest.mark.parametrize("batch", [False, True])
+def test_another_curve_of_a_product_is_another_curve_of_a_factor(batch):
+    far, near = zigzag(2.5), points_on(S2, len(zigzag(2.5)))
+    p = np.array([far, near]) if batch else far
+    factors = [
+        ss.CubicSpline(None, x, S2) for x in (p, p[..., ::-1, :], np.broadcast_to([0, 0, 1.0], p.shape))
+    ]
+    report = ss.CubicSpline(None, tuple(f.points for f in factors), "s:2 x s:2 x s:2").report
+    total = sum(f.bending_energy() for f in factors)
+    other = total + np.minimum(*(f.report.alternative_energy - f.bending_energy() for f in factors[:2]))
+    assert factors[0].report.alternative_energy is not None and factors[2].report.alternative_energy is None
+    np.testing.assert_allclose(report.alternative_energy, other, rtol=1e-12)
+    assert np.isnan(other[1]) if batch else other > total
+
+
+def test_a_product_of_near_points_has_no_other_curve():
+    p = points_on(S2, 5)
+    assert ss.CubicSpline(None, (p, p), "s:2 x s:2").report.alternative_energy is None
 
 
 # ---- bad input ----
