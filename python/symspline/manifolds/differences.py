@@ -22,6 +22,7 @@ _WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 # Of order eight: weights of the values at 1, 2, 3, 4 steps; behind them they are minus and plus the same.
 _FIRST = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
 _SECOND = np.array([8 / 5, -1 / 5, 8 / 315, -1 / 560])
+_EIGHTH = np.array([-56.0, 28.0, -8.0, 1.0])
 STEPS = np.concatenate([np.arange(-4.0, 0.0), np.arange(1.0, 5.0)])
 
 
@@ -52,3 +53,8 @@ def second_derivative(values: Array, step: Array) -> Array:
     """The second derivative of a function that is zero in the middle."""
     even = values[4:] + values[3::-1]
     return np.asarray(np.tensordot(_SECOND, even, 1) / step / step)
+
+
+def eighth_difference(values: Array) -> Array:
+    """What polynomials of degree seven have none of: large where a function is not smooth on the scale of the steps."""
+    return np.asarray(np.tensordot(_EIGHTH, values[4:] + values[3::-1], 1))

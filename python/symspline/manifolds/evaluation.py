@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..spaces import Array
 from .condition import Legs
-from .differences import STEPS, first_derivative, second_derivative
+from .differences import STEPS, eighth_difference, first_derivative, second_derivative
 from .operations import Operations
 
 Doubles = NDArray[np.float64]
@@ -17,6 +17,10 @@ Doubles = NDArray[np.float64]
 # Of the length of a segment. Errors of order eight of a segment that turns by a radian, and rounding, are some 1e-12
 # of its squared speed in its acceleration.
 STEP = 1 / 64
+# Eighth differences beyond this part of the way, and this part of the size of arrays, show that a segment is not
+# smooth on that scale: de Casteljau's inner geodesics jump where their ends pass each other's cut locus. Then steps
+# are halved, this often at most.
+ROUGH, NOISE, HALVINGS = 1e-8, 1e-9, 7
 
 
 class Rows(NamedTuple):
@@ -34,7 +38,7 @@ class Rows(NamedTuple):
     legs: Legs
     straight: NDArray[np.bool_]
 
-    def at(self, chosen: slice) -> Rows:
+    def at(self, chosen: NDArray[np.int64]) -> Rows:
         """Some of the rows."""
         legs = Legs(*(part[:, chosen] for part in self.legs))
         return Rows(self.tau[chosen], self.h[chosen], legs, self.straight[chosen])
@@ -74,10 +78,28 @@ def _geodesic(operations: Operations, tau: Doubles, legs: Legs) -> Array:
 
 def derivative(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Array]:
     """Points, and there the velocity or the covariant acceleration, by differences of order eight in normal
-    coordinates. Beyond its ends a segment goes on, so that they are those of one segment everywhere."""
+    coordinates. Beyond its ends a segment goes on, so that they are those of one segment everywhere; where it goes
+    over a cut locus soon, steps are shorter."""
     here = points(operations, rows)
+    vectors = np.empty_like(here)
+    left, step = np.arange(len(here)), STEP
+    for _ in range(HALVINGS + 1):
+        moved = _around(operations, rows.at(left), here[left], step)
+        difference = first_derivative if nu == 1 else second_derivative
+        vectors[left] = difference(moved, (step * rows.h[left]).reshape(-1, *[1] * (here.ndim - 1)))
+        axes = tuple(range(1, here.ndim))
+        jump, size = (np.abs(x).max(axis=axes) for x in (eighth_difference(moved), here[left]))
+        smooth = jump <= ROUGH * np.abs(moved).max(axis=(0, *(a + 1 for a in axes))) + NOISE * size
+        left, step = left[~smooth], step / 2
+        if not left.size:
+            break
+    return here, vectors
+
+
+def _around(operations: Operations, rows: Rows, here: Array, step: float) -> Array:
+    """The logarithms of the curve at `STEPS` from places `here`."""
     shape = (len(STEPS), *here.shape)
-    tau = rows.tau + np.multiply.outer(STEPS * STEP, np.ones_like(rows.tau))
+    tau = rows.tau + np.multiply.outer(STEPS * step, np.ones_like(rows.tau))
 
     def repeated(x: Array) -> Array:
         return np.broadcast_to(x[:, None], (2, *shape)).reshape(2, -1, *here.shape[1:])
@@ -89,7 +111,4 @@ def derivative(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Arra
         Legs(*map(repeated, rows.legs)),
         np.tile(rows.straight, len(STEPS)),
     )
-    there = points(operations, around).reshape(shape)
-    moved = operations.log(np.broadcast_to(here, shape), there)
-    step = (STEP * rows.h).reshape(-1, *[1] * (here.ndim - 1))
-    return here, (first_derivative if nu == 1 else second_derivative)(moved, step)
+    return operations.log(np.broadcast_to(here, shape), points(operations, around).reshape(shape))
