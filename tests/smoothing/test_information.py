@@ -129,7 +129,7 @@ def test_the_exact_way_leads_to_the_minimum(name):
     flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=w, method="flat", **TIGHT)
     assert flat.report.converged
     # What the estimating equation is off by, more than usual over steps that are so long.
-    assert rms(space, flat.points, exact.points) < 1.5e-2 * exact.std(t).max()
+    assert rms(space, flat.points, exact.points) < 1.1e-2 * np.sqrt(space.dim) * exact.std(t).max()
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "so:3", "spd:2", "se:3", "gr:2,5"])

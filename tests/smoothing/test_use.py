@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from noisy import example
+from noisy import example, rms
 
 import symspline as ss
 
@@ -169,3 +169,29 @@ def test_squares_beyond_doubles_are_no_result(size):
     data = size * np.random.default_rng(0).standard_normal((20, 2))
     with pytest.raises(ss.ConvergenceError):
         ss.make_smoothing_spline(np.arange(20.0), data, "r:2")
+
+
+@pytest.mark.parametrize(("name", "seed"), [("sphere:2", 4), ("so:3", 0), ("rp:2", 4), ("sphere:2 x r:1", 4)])
+def test_data_all_over_a_space_are_told(name, seed):
+    space, rng = ss.space(name), np.random.default_rng(seed)
+    points = space.random_point(rng, 200)
+    with pytest.warns(
+        UserWarning, match=r"half of the data are \d.* half of random points of .* would be \d"
+    ):
+        spline = ss.make_smoothing_spline(None, points, space, lam=1e6)
+    # Of a batch the curve is named; weights of zero do not count.
+    if name == "sphere:2":
+        good = spline(np.full(200, 99.5))
+        batch = np.array([good, points, points])
+        with pytest.warns(UserWarning, match=r"data of curve 1 are .* \(and 1 more curves\)"):
+            ss.make_smoothing_spline(None, batch, space, lam=1e6)
+        mixed = np.concatenate([points, good])
+        ss.make_smoothing_spline(None, mixed, space, lam=1e6, weights=np.repeat([0.0, 1.0], 200))
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "so:3", "rp:2", "so:4", "u:2"])
+def test_noise_of_half_a_radian_is_no_reason_to_warn(name):
+    for seed in range(3):
+        space, t, noisy, points = example(name, 0.5, seed=seed)
+        spline = ss.make_smoothing_spline(t, noisy, space)
+        assert rms(space, spline(t), points) < 0.5 * rms(space, noisy, points)

@@ -23,6 +23,7 @@ from ..spaces import space as space_named
 from .data import Knots, Noisy, knots_for, points_of, read_noisy, some, sparse
 from .solve import Asked, enough, one_a_curve, smoothed
 from .spline import SmoothingSpline
+from .spread import warn_of_spread
 
 _FIT = Options("auto", 1e-12, None)
 # Knots from which fewer are tried first, and how many.
@@ -99,6 +100,9 @@ def make_smoothing_spline(
         ValidationError: the input is not what is described above.
         ConvergenceError: the search did not end, or no spline goes through the points that it led to.
 
+    Warns:
+        UserWarning: data are about as far from their curve as random points of a compact space would be.
+
     >>> import numpy as np
     >>> import symspline as ss
     >>> sphere, rng = ss.Sphere(2), np.random.default_rng(0)
@@ -170,6 +174,7 @@ def make_smoothing_spline(
     faults: list[Fault] = next((faults for _, _, faults in found if faults), [])
     if faults:
         fail(faults, on_failure, spline)
+    warn_of_spread(space, curve, noisy, [part.report.df for _, part, _ in found])
     nodes = noisy.times.shape[-1]
     warn_of_signs(
         space,

@@ -1,0 +1,61 @@
+"""Data that are spread over all of a compact space, where a smooth curve through them means little."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from ..curves.curve import Curve
+from ..failures import callers_level
+from ..spaces import Array, Space
+from .data import Noisy, points_of
+
+# Of squared distances. With noise of half a radian on spaces of two to six dimensions smoothing still finds the curve
+# and the quotient is below; of random points it is above, but where the curve follows them.
+_FAR = 0.5
+# So many data of a curve tell.
+_ENOUGH = 1000
+
+
+def warn_of_spread(space: Space, curve: Curve, noisy: Noisy, dfs: list[Any]) -> None:
+    """Warn once if data of a curve are about as far from it as random points of the space would be, but for what it
+    follows them with its degrees of freedom."""
+    every = -(-noisy.times.shape[-1] // _ENOUGH)
+    at = np.ascontiguousarray(noisy.times[..., ::every])
+    chosen = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
+    for part, (factor, own), weighing, df in zip(
+        curve.parts, points_of(noisy, space), noisy.weighing, dfs, strict=True
+    ):
+        # Elsewhere no points are random ones, or none are far.
+        if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
+            continue
+        x = part.evaluate(at, "point", "raise", at.ndim > 1)
+        found = _median_distance(factor, x, own[chosen], weighing.weights[..., ::every] > 0)
+        random = factor.random_point(np.random.default_rng(0), (2, _ENOUGH))
+        expected = float(np.median(factor._apply("distance", p=random[0], q=random[1])))
+        count = np.sum(np.broadcast_to(weighing.weights > 0, (*noisy.batch, noisy.times.shape[-1])), axis=-1)
+        far = np.argwhere(found**2 * count > _FAR * expected**2 * (count - df))
+        if len(far):
+            index = tuple(far[0])
+            of = f" of curve {','.join(map(str, index))}" if index else ""
+            more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
+            warnings.warn(
+                f"half of the data{of} are {found[index]:.2g} or more from their smooth curve{more}, and half of "
+                f"random points of {factor!r} would be {expected:.2g}: data so spread have hardly a mean, and the "
+                "curve means little. Check units and signs of the data",
+                UserWarning,
+                stacklevel=callers_level(),
+            )
+            return
+
+
+def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
+    """The median distance of the data y that count from the curve at their times; 0 of a curve that was not found."""
+    lead = x.shape[: x.ndim - len(space.point_shape)]
+    used = np.broadcast_to(counts, lead) & np.isfinite(x).all(axis=tuple(range(len(lead), x.ndim)))
+    distances = np.full(lead, np.nan)
+    distances[used] = space._apply("distance", p=x[used], q=y[used])
+    distances[~used.any(axis=-1)] = 0.0
+    return np.asarray(np.nanmedian(distances, axis=-1))
