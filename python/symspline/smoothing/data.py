@@ -204,10 +204,13 @@ def sparse(knots: Knots, noisy: Noisy, lam: float | None) -> Knots:
     least = min(mean * (ratio / most) ** (1 / 3), span / 15)
     if np.diff(times).min() >= least:
         return knots
-    kept = [0]
-    for i in range(1, len(times) - 1):
-        if times[i] - times[kept[-1]] >= least and times[-1] - times[i] >= least:
-            kept.append(i)
+    # From each knot to the first that is far enough.
+    following = np.searchsorted(times, times + least).tolist()
+    stop = int(np.searchsorted(times, times[-1] - least, side="right"))
+    kept, i = [], 0
+    while i < max(stop, 1):
+        kept.append(i)
+        i = following[i]
     return _picked(knots, np.array([*kept, len(times) - 1]))
 
 
