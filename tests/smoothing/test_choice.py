@@ -90,18 +90,66 @@ def test_robust_curves_of_numbers_are_where_their_loss_is_least(loss):
         assert bend > 0 and abs(slope / bend) < 1e-6
 
 
-def test_nearly_geodesic_motion_goes_the_exact_way():
-    """Two turns of a great circle."""
+TURNS = np.linspace(0, 4 * np.pi, 200)
+CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS), 0 * TURNS], -1)
+
+
+@pytest.mark.parametrize(("criterion", "most"), [("gcv", 1.2), ("gcv1.4", 1.1), ("reml", 1.1), ("cp", 1.2)])
+def test_geodesic_motion_is_seen_to_be_geodesic(criterion, most):
+    """Two turns of a great circle: errors are hardly larger than that of the best geodesic."""
     sphere = ss.Sphere(2)
-    t = np.linspace(0, 4 * np.pi, 200)
-    circle = np.stack([np.cos(t), np.sin(t), 0 * t], -1)
-    noisy = beside(sphere, circle, 0.1)
-    spline = ss.make_smoothing_spline(t, noisy, sphere)
-    assert spline.report.converged and spline.report.method == "newton"
-    assert rms(sphere, spline(t), circle) < 0.03
-    assert spline.df < 6
-    straight = ss.make_smoothing_spline(t, noisy, sphere, 1e5, method="newton")
-    assert straight.report.converged and straight.report.iterations <= 12
+    noisy = np.array([beside(sphere, CIRCLE, 0.1, seed) for seed in range(12)])
+    chosen = ss.make_smoothing_spline(TURNS, noisy, sphere, criterion=criterion, sigma=0.1)
+    straight = ss.make_smoothing_spline(TURNS, noisy, sphere, 1e5)
+    assert np.all(chosen.report.converged) and np.max(chosen.report.iterations) <= 8
+    assert rms(sphere, chosen(TURNS), CIRCLE).mean() < most * rms(sphere, straight(TURNS), CIRCLE).mean()
+
+
+@pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e8])
+def test_both_ways_lead_to_stiff_curves(lam):
+    sphere = ss.Sphere(2)
+    flat, exact = (
+        ss.make_smoothing_spline(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam, method=method)
+        for method in ("flat", "newton")
+    )
+    for spline in (flat, exact):
+        assert spline.report.converged and spline.report.iterations <= 10
+    assert rms(sphere, flat(TURNS), exact(TURNS)) < 2e-3 * rms(sphere, exact(TURNS), CIRCLE)
+
+
+@pytest.mark.parametrize(
+    ("name", "length", "lam"),
+    [
+        ("sphere:2", 4.0, 0.1),
+        ("sphere:2", 4.0, 1.0),
+        ("so:3", 5.0, 1.0),
+        ("hyperbolic:2", 3.0, 0.1),
+        ("cp:2", 3.0, 0.01),
+        ("spd:2", 3.0, 1.0),
+        ("gr:2,4", 2.0, 0.1),
+    ],
+)
+def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
+    """By how much each coordinate of the curve follows its datum, by differences of curves of the exact way; the data
+    lie on a geodesic, where the influence is that of small changes."""
+    space, rng = ss.space(name), np.random.default_rng(1)
+    p = space.random_point(rng)
+    v = space.random_tangent(rng, p)
+    t = np.linspace(0, 1, 25)
+    data = space.exp(p, (length / space.norm(p, v)) * np.multiply.outer(t, v))
+    frame = space.frame(data)
+    step = 1e-4
+    moved = np.broadcast_to(data, (25, space.dim, 2, *data.shape)).copy()
+    for k in range(25):
+        for way, sign in enumerate((step, -step)):
+            moved[k, :, way, k] = space.exp(data[k], sign * frame[k])
+    curves = ss.make_smoothing_spline(t, moved, space, lam, tol=1e-9, max_iter=100, method="newton")
+    ends = np.stack([curves(t)[k, :, :, k] for k in range(25)])
+    logs = space.log(data[:, None, None], ends)
+    followed = space.inner(data[:, None], logs[:, :, 0] - logs[:, :, 1], frame) / (2 * step)
+    # The flat matrix has the curvature at knots only: an error of second order in their distance.
+    found = ss.make_smoothing_spline(t, data, space, lam).df
+    assert found == pytest.approx(np.sum(followed) / space.dim, rel=5e-4)
 
 
 def test_where_lambda_hardly_matters_it_is_not_sought_for_long():

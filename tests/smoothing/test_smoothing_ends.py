@@ -113,8 +113,8 @@ def test_closed_curves(name, far):
 @pytest.mark.parametrize("name", ["r:2", "sphere:1", "sphere:2", "so:3", "spd:2", "gr:2,5", "cp:2"])
 def test_the_exact_way_closes_curves(name):
     space, t, noisy, _ = ring(name, 20)
-    # A datum where the curve ends, too.
-    t, noisy = np.append(t, 10.0), np.append(noisy, noisy[:1], axis=0)
+    # A datum where the curve ends, too, which is not the first one again.
+    t, noisy = np.append(t, 10.0), np.append(noisy, beside(space, noisy[:1], 0.05), axis=0)
     knots = np.r_[0:8:1.0, 8.5, 10.0]
     flat, exact = (
         ss.make_smoothing_spline(
@@ -140,9 +140,10 @@ def test_orbits_are_closed_curves_too():
     for lam in (100.0, 1000.0):
         with pytest.raises(ss.ConvergenceError, match="method='newton'"):
             ss.make_smoothing_spline(t, noisy, space, lam, method="flat", **options)
-    spline = ss.make_smoothing_spline(t, noisy, space, 100.0, **options, **TIGHT)
-    assert spline.report.converged and spline.report.method == "newton"
-    assert flatness(space, t, noisy, spline, 100.0, lambda _: "periodic", True) < 1e-7
+        spline = ss.make_smoothing_spline(t, noisy, space, lam, **options, **TIGHT)
+        assert spline.report.converged and spline.report.method == "newton"
+        assert spline.report.iterations <= 12
+        assert flatness(space, t, noisy, spline, lam, lambda _: "periodic", True) < 1e-7
     chosen = ss.make_smoothing_spline(t, noisy, space, **options)
     assert chosen.report.converged
     assert np.sqrt(np.mean(space.distance(chosen(t), truth) ** 2)) < 0.02
@@ -184,3 +185,23 @@ def test_their_deviations_come_back_from_files(bc_type, tmp_path):
         t, np.stack([noisy] * 2), space, 0.1, knots=np.append(t, 10.0), bc_type=bc_type
     )
     assert np.array_equal(batch[1].std(t), spline.std(t)) and np.array_equal(batch.std(t)[0], spline.std(t))
+
+
+def test_the_first_point_repeated_at_the_end_counts_once():
+    # Cross-validation would take the two for data without noise, and the curve through all data for the best.
+    t = np.linspace(0, 1, 101)
+    truth = np.stack([0.8 * np.cos(2 * np.pi * t), 0.8 * np.sin(2 * np.pi * t), 0.6 + 0 * t], -1)
+    space = ss.Sphere(2)
+    noisy = beside(space, truth, 0.05)
+    noisy[-1] = noisy[0]
+    closed = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic")
+    once = ss.make_smoothing_spline(
+        t, noisy, space, bc_type="periodic", weights=np.where(t < 1, 1.0, 0.0), knots=t
+    )
+    assert not closed.report.at_bound and closed.sigma == pytest.approx(0.05, rel=0.2)
+    assert closed.lam == pytest.approx(once.lam, rel=1e-12)
+    np.testing.assert_allclose(closed.points, once.points, rtol=0, atol=1e-13)
+    # What differs is another datum, and so is the same point at another time.
+    noisy[-1] = beside(space, truth[:1], 0.05, 7)[0]
+    apart = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic")
+    assert apart.report.converged and np.abs(apart.points - closed.points).max() > 1e-4

@@ -4,6 +4,7 @@
 //! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`. Its residuals and degrees of freedom for eight λ at
 //! a time cost one banded solve.
 
+use crate::curved::Curved;
 use crate::flat::{Flat, times_mass};
 use crate::misfit::{Factors, Misfit};
 use symspline_core::scalar::{LANES, Lane, few, lane};
@@ -30,6 +31,8 @@ pub struct Linear<'a> {
     pub m: usize,
     /// Residuals at the data, and their weights.
     pub misfit: &'a Misfit<'a>,
+    /// Jacobi's operator, where it is not left out.
+    pub curved: Option<&'a Curved>,
     /// Accelerations at the knots.
     pub bends: &'a [f64],
     /// The standard deviation of the noise, for [`Criterion::Cp`].
@@ -46,16 +49,21 @@ impl<'a> Linear<'a> {
         flat: &'a Flat,
         m: usize,
         misfit: &'a Misfit<'a>,
+        curved: Option<&'a Curved>,
         bends: &'a [f64],
         curvature: &[f64],
         sigma: f64,
     ) -> Self {
         let mut pull = misfit.pull(flat, m);
         let mut stiffness = vec![0.0; pull.len()];
-        for (rows, vectors) in [(&flat.bends, bends), (&flat.values, curvature)] {
-            let mass = times_mass(&flat.basis, vectors, m);
-            for (row, x) in rows.iter().zip(mass.chunks_exact(m)) {
-                row.spread(x, &mut stiffness);
+        if let Some(curved) = curved {
+            stiffness = curved.pull(flat, bends);
+        } else {
+            for (rows, vectors) in [(&flat.bends, bends), (&flat.values, curvature)] {
+                let mass = times_mass(&flat.basis, vectors, m);
+                for (row, x) in rows.iter().zip(mass.chunks_exact(m)) {
+                    row.spread(x, &mut stiffness);
+                }
             }
         }
         if flat.own.knots.len() < flat.basis.count() {
@@ -66,7 +74,7 @@ impl<'a> Linear<'a> {
                 stiffness[at].fill(0.0);
             }
         }
-        Linear { flat, m, misfit, bends, sigma, pull, stiffness }
+        Linear { flat, m, misfit, curved, bends, sigma, pull, stiffness }
     }
 
     /// The step of the coefficients for one λ, given the factors of A.
@@ -76,10 +84,15 @@ impl<'a> Linear<'a> {
         factors.solve_one(self.m, &right)
     }
 
+    /// A for eight λ.
+    pub fn factored(&self, lam: Lane) -> Factors {
+        self.misfit.factored(self.flat, self.m, self.curved, lam)
+    }
+
     /// What eight λ come to.
     pub fn look(&self, lam: Lane) -> Look {
         let (m, flat) = (self.m, self.flat);
-        let factors = self.misfit.factored(flat, m, lam);
+        let factors = self.factored(lam);
         let mut x: Vec<Lane> = self
             .pull
             .iter()
@@ -87,11 +100,14 @@ impl<'a> Linear<'a> {
             .map(|(pull, stiffness)| (-lam).mul_add(lane(*stiffness), lane(*pull)))
             .collect();
         factors.solve(m, &mut x);
-        let freedom = self.misfit.freedom(flat, m, &factors.inverse_band());
+        let freedom = self.misfit.freedom(flat, &factors.inverse_band());
         let rss = self.misfit.rss(flat, m, &x);
         // (a + Sδ)ᵀM(a + Sδ)
         let mut energy = Lane::ZERO;
-        let bend = |i: usize, c: usize| lane(self.bends[i * m + c]) + flat.bends[i].of_lanes(&x, m, c);
+        let bend = |i: usize, c: usize| {
+            let turned = self.curved.map_or(Lane::ZERO, |curved| curved.of_lanes(flat, i, &x, c));
+            lane(self.bends[i * m + c]) + flat.bends[i].of_lanes(&x, m, c) + turned
+        };
         for c in 0..m {
             let mut left = bend(flat.own.segments.start, c);
             for i in flat.own.segments.clone() {

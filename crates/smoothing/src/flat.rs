@@ -80,7 +80,8 @@ pub struct Basis {
     tau: Vec<f64>,
     /// The mean knot spacing.
     pub spacing: f64,
-    ends: [FlatEnd; 2],
+    /// What happens at the ends.
+    pub ends: [FlatEnd; 2],
 }
 
 impl Basis {

@@ -8,12 +8,13 @@
 //! points of the curve at its knots are the unknowns; every iteration fits the spline through them.
 //!
 //! Two ways lead to the minimum. The *flat* one solves the problem of numbers in frames that go along the curve, where
-//! curvature is in the gradient only: an iteration costs little more than the fit, and their number depends on
-//! `K²|γ'|²√(λ/w)`, the contraction. The *exact* one is the Gauss–Newton method.
+//! curvature is in the gradient only, as long as `K²|γ'|²√(λ/w)`, the contraction, is small: an iteration costs little
+//! more than the fit. Where it is not curvature is in the matrix, too. The *exact* one is the Gauss–Newton method.
 
 mod banded;
 pub mod chi;
 mod choice;
+mod curved;
 mod exact;
 mod flat;
 mod frames;

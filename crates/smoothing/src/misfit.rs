@@ -1,9 +1,11 @@
 //! How far the data are from a curve, weighed, and the problem of numbers that makes of it: A = BᵀWB + λΩ.
 //!
 //! Weights that are numbers weigh all coordinates alike, and A is the same for each of them. Weights that are matrices
-//! couple the coordinates: A is one matrix of all, with the width of a band of blocks.
+//! couple the coordinates: A is one matrix of all, with the width of a band of blocks. So does the curvature of the
+//! space, where it is not left out: see [`Curved`].
 
 use crate::banded::Banded;
+use crate::curved::Curved;
 use crate::flat::{Flat, Row, WIDTH};
 use crate::information::Seen;
 use std::ops::Range;
@@ -99,25 +101,25 @@ impl<'a> Misfit<'a> {
     }
 
     /// A for eight λ.
-    pub fn factored(&self, flat: &Flat, m: usize, lam: Lane) -> Factors {
+    pub fn factored(&self, flat: &Flat, m: usize, curved: Option<&Curved>, lam: Lane) -> Factors {
         let count = flat.basis.count();
-        let (mut banded, coupled) = match self {
-            Misfit::Numbers { .. } => {
-                let entry = |at: usize| lam.mul_add(lane(flat.penalty[at]), lane(flat.gram[at]));
-                (Banded::of(count, WIDTH, entry), 1)
-            }
-            Misfit::Matrices { gram, .. } => {
-                let stride = stride(m);
-                let entry = |at: usize| {
-                    let (i, d) = (at / stride, at % stride);
-                    let stiff = if d % m == 0 { flat.penalty[i / m * (WIDTH + 1) + d / m] } else { 0.0 };
-                    lam.mul_add(lane(stiff), lane(gram[at]))
-                };
-                (Banded::of(count * m, stride - 1, entry), m)
-            }
+        let coupled = if curved.is_some() || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
+        let entry = |at: usize| {
+            let stiff =
+                curved.map_or_else(|| of_each(&flat.penalty, coupled, at), |curved| curved.penalty[at]);
+            lam.mul_add(lane(stiff), lane(self.gram(flat, coupled, at)))
         };
+        let mut banded = Banded::of(count * coupled, stride(coupled) - 1, entry);
         banded.factor();
         Factors { banded, coupled }
+    }
+
+    /// An entry of BᵀWB, which is that of every coordinate by itself or that of all.
+    fn gram(&self, flat: &Flat, coupled: usize, at: usize) -> f64 {
+        match self {
+            Misfit::Numbers { .. } => of_each(&flat.gram, coupled, at),
+            Misfit::Matrices { gram, .. } => gram[at],
+        }
     }
 
     /// What is left of a datum when the coefficients have moved by x, squared and weighed.
@@ -167,26 +169,28 @@ impl<'a> Misfit<'a> {
     }
 
     /// tr A⁻¹BᵀWB over the number of coordinates, given the band of A⁻¹: the degrees of freedom of one.
-    pub fn freedom(&self, flat: &Flat, m: usize, inverse: &Banded) -> Lane {
-        let (gram, size) = match self {
-            Misfit::Numbers { .. } => (&flat.gram, 1),
-            Misfit::Matrices { gram, .. } => (gram, m),
-        };
-        let stride = inverse.width + 1;
+    pub fn freedom(&self, flat: &Flat, inverse: &Banded) -> Lane {
+        let (stride, coupled) = (inverse.width + 1, inverse.size / flat.basis.count());
         let own = &flat.own.knots;
         let mut sum = Lane::ZERO;
-        for i in own.start * size..own.end * size {
+        for i in own.start * coupled..own.end * coupled {
             for j in i.saturating_sub(inverse.width)..(i + stride).min(inverse.size) {
-                sum += inverse.at(i, j) * lane(gram[i.max(j) * stride + i.abs_diff(j)]);
+                sum += inverse.at(i, j) * lane(self.gram(flat, coupled, i.max(j) * stride + i.abs_diff(j)));
             }
         }
-        sum * lane(1.0 / size as f64)
+        sum * lane(1.0 / coupled as f64)
     }
 }
 
 /// Places of a row of the band of coupled coordinates.
-fn stride(m: usize) -> usize {
-    (WIDTH + 1) * m
+pub fn stride(coupled: usize) -> usize {
+    (WIDTH + 1) * coupled
+}
+
+/// The entry `at` of a matrix that is the same for every coordinate, and couples none.
+fn of_each(band: &[f64], coupled: usize, at: usize) -> f64 {
+    let (i, d) = (at / stride(coupled), at % stride(coupled));
+    if d % coupled == 0 { band[i / coupled * (WIDTH + 1) + d / coupled] } else { 0.0 }
 }
 
 impl Factors {

@@ -2,15 +2,18 @@
 
 use crate::banded::Banded;
 use crate::choice::Linear;
-use crate::{Options, Report, Tier};
+use crate::{Ends, Options, Report, Tier};
 use symspline_core::space::{Erased, Origin};
 
-/// Contraction of the flat tier, known or expected, from which the exact one takes over.
+/// Contraction of the flat tier, known or expected, from which it takes curvature into its matrix, or the exact one
+/// takes over.
 const SLOW: f64 = 0.5;
 /// The same while λ and the curve are still rough guesses.
 const HOPELESS: f64 = 2.0;
 /// Dimension up to which the exact way is taken by itself.
 const LARGE: usize = 64;
+/// Dimension up to which the flat tier may take curvature into its matrix: coupled coordinates cost its square each.
+const COUPLED: usize = 12;
 /// λ moves by less than this between rounds when it is settled, in natural logarithms.
 const SETTLED: f64 = 3e-3;
 /// Rounds of choosing λ, at most.
@@ -30,6 +33,8 @@ pub struct Progress {
     scale: f64,
     /// Iterations in a row in which the step hardly shrank.
     pub slow: usize,
+    /// Whether curvature is in the matrix of the flat way.
+    pub curved: bool,
     /// What is known so far.
     pub report: Report,
 }
@@ -45,6 +50,7 @@ impl Progress {
             last: Vec::new(),
             scale: f64::NAN,
             slow: 0,
+            curved: false,
             report,
         }
     }
@@ -62,7 +68,7 @@ impl Progress {
     }
 
     /// Whether the exact way is to be taken.
-    pub fn takes_exact_way(&self, space: &Erased, tier: Tier) -> bool {
+    pub fn takes_exact_way(&self, space: &Erased, tier: Tier, ends: Ends) -> bool {
         match tier {
             Tier::Flat => false,
             Tier::Newton => true,
@@ -71,16 +77,35 @@ impl Progress {
             Tier::Auto => {
                 let limit = if self.settled { SLOW } else { HOPELESS };
                 let known = self.settled && self.report.exact;
-                known || self.report.kappa > limit || self.slow > 1
+                // With curvature in its matrix the flat way contracts. But a stiff closed curve feels from one turn what
+                // happens at the ends of three.
+                let contracts = self.curved && ends != Ends::Periodic;
+                known || (!contracts && self.report.kappa > limit) || self.slow > 1
             }
         }
     }
 
-    /// A better λ, unless it is given or settled.
-    pub fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
-        if self.settled {
-            return;
+    /// λ of the pseudo-data at a curve: a better one, unless it is given or settled; and what is expected of the flat way
+    /// with it.
+    pub fn weigh(
+        &mut self,
+        space: &Erased,
+        linear: &Linear,
+        speeds: &[f64],
+        weights: &[f64],
+        options: &Options,
+        softness: f64,
+    ) -> f64 {
+        if !self.settled {
+            self.choose(linear, options, softness);
         }
+        // The pseudo-data have the original weights, and their λ is softer by their slope.
+        let lam = self.lam.unwrap_or(0.0) / softness;
+        self.expect(space, speeds, weights, lam);
+        lam
+    }
+
+    fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
         let (lam, at_bound) = linear.choose(options.criterion, self.lam.map(|lam| lam / softness));
         let lam = lam * softness;
         self.report.rounds += 1;
@@ -90,6 +115,17 @@ impl Progress {
         self.lam = Some(lam);
     }
 
+    /// The contraction that the flat way is expected to have if it leaves curvature out: `K²|γ'|²√(λ/w)`, with the mean
+    /// squared speed and w the weight per time.
+    fn expect(&mut self, space: &Erased, speeds: &[f64], weights: &[f64], lam: f64) {
+        let m = space.dim();
+        let knots = speeds.len() / m;
+        let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
+        let density = weights.iter().sum::<f64>() / (knots - 1) as f64;
+        self.report.kappa = space.curvature().powi(2) * square * (lam / density).sqrt();
+        self.curved |= self.report.kappa > SLOW && m <= COUPLED;
+    }
+
     /// λ, degrees of freedom and noise of the curve as it is.
     pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
         let Linear { flat, m, misfit, .. } = linear;
@@ -97,7 +133,7 @@ impl Progress {
         let count = misfit.count(own.clone(), *m);
         let rss = misfit.rss_now(own, *m);
         let unit = flat.basis.spacing.powi(3);
-        let freedom = misfit.freedom(flat, *m, inverse).as_array()[0];
+        let freedom = misfit.freedom(flat, inverse).as_array()[0];
         // Where λ hardly matters, as for a geodesic, its best value wanders.
         self.settled |= self.report.rounds > 1 && (freedom - self.report.freedom).abs() < SETTLED * freedom;
         self.report.freedom = freedom;
@@ -107,16 +143,6 @@ impl Progress {
         let left = count - freedom;
         self.report.sigma = if left > 1e-9 * count { (rss / (*m as f64 * left)).sqrt() } else { f64::NAN };
         self.scale = (rss / (*m as f64 * left.max(1.0))).sqrt();
-    }
-
-    /// The contraction that the flat way is expected to have: `K²|γ'|²√(λ/w)`, with the mean
-    /// squared speed and w the weight per time.
-    pub fn expect(&mut self, space: &Erased, speeds: &[f64], weights: &[f64], lam: f64) {
-        let m = space.dim();
-        let knots = speeds.len() / m;
-        let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
-        let density = weights.iter().sum::<f64>() / (knots - 1) as f64;
-        self.report.kappa = space.curvature().powi(2) * square * (lam / density).sqrt();
     }
 
     /// Whether a step is small beside the standard deviations of the points.

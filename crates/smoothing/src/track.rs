@@ -2,6 +2,7 @@
 
 use crate::banded::Banded;
 use crate::choice::Linear;
+use crate::curved::Curved;
 use crate::exact::{self, Pull};
 use crate::flat::{Basis, Flat, FlatEnd, Own};
 use crate::frames::{Frames, curvature_terms};
@@ -200,12 +201,18 @@ impl<'a> Track<'a> {
         bends.iter_mut().for_each(|x| *x *= spacing * spacing);
         speeds.iter_mut().for_each(|x| *x *= spacing);
         let curvature = curvature_terms(space, &speeds, &bends);
-        let linear = Linear::new(flat, m, misfit, &bends, &curvature, data.sigma.unwrap_or(f64::NAN));
-
-        self.progress.choose(&linear, options, softness);
-        // The pseudo-data have the original weights, and their λ is softer by their slope.
-        let lam = self.progress.lam.unwrap_or(0.0) / softness;
-        let system = misfit.factored(flat, m, lane(lam));
+        let sigma = data.sigma.unwrap_or(f64::NAN);
+        let seen_with = |curved| Linear::new(flat, m, misfit, curved, &bends, &curvature, sigma);
+        let (curved, later);
+        curved = self.progress.curved.then(|| Curved::new(space, flat, &speeds));
+        let mut linear = seen_with(curved.as_ref());
+        let mut lam = self.progress.weigh(space, &linear, &speeds, weights, options, softness);
+        if self.progress.curved && linear.curved.is_none() {
+            later = Curved::new(space, flat, &speeds);
+            linear = seen_with(Some(&later));
+            lam = self.progress.weigh(space, &linear, &speeds, weights, options, softness);
+        }
+        let system = linear.factored(lane(lam));
         if !(system.least_pivot().as_array()[0] > 0.0) {
             self.progress.report.state = State::Undetermined;
             return;
@@ -213,9 +220,8 @@ impl<'a> Track<'a> {
         let band = system.inverse_band();
         let inverse = system.mean(&band);
         self.progress.note(&linear, &band, lam, softness);
-        self.progress.expect(space, &speeds, weights, lam);
 
-        let exact = self.progress.takes_exact_way(space, options.tier);
+        let exact = self.progress.takes_exact_way(space, options.tier, options.ends);
         if exact && !self.progress.report.exact {
             // What is known of steps is of the other way.
             (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);

@@ -107,6 +107,17 @@ pub fn smooth<'py>(
                 }
                 before = Some(i);
             }
+            // So would the first point of a closed curve, repeated at its end as splines through points have it.
+            let (last, knots) = (rows[0].len().saturating_sub(1), &k[own(k, count, c)..][..count]);
+            if ends.is_none()
+                && last > 0
+                && rows[0][last] - rows[0][0] == knots[count - 1] - knots[0]
+                && rows[1][last * len..] == rows[1][..len]
+            {
+                for (row, size) in rows.iter_mut().zip([1, len, 1, entries]) {
+                    row.truncate(last * size);
+                }
+            }
             rows
         })
         .collect();

@@ -88,10 +88,10 @@ def make_smoothing_spline(
             `CubicSpline`, or ``"periodic"``. Velocities are tangent at the first and the last of the points, and are
             carried from there to the curve in parallel. A closed curve has the period of its knots.
         loss: ``"linear"`` for least squares; ``"huber"`` or ``"cauchy"`` if there are outliers.
-        method: ``"flat"`` solves the problem of numbers in frames along the curve, again and again; its result is
-            within about 1e-4 of the error of the minimum. ``"newton"`` is the Gauss-Newton method for the minimum
-            itself, and much slower. ``"auto"`` takes the first, and the second where it converges slowly: where
-            curves are nearly geodesic over long distances.
+        method: ``"flat"`` solves the problem of numbers in frames along the curve, again and again, with the curvature
+            of the space in its matrix where curves are nearly geodesic over long distances; its result is within
+            about 1e-4 of the error of the minimum. ``"newton"`` is the Gauss-Newton method for the minimum itself,
+            and much slower. ``"auto"`` takes the first, and the second where it converges slowly.
         tol: the search ends when no point moves by more than this part of its standard deviation.
         max_iter: most splines that are fitted.
         extrapolate, on_failure, atol, progress: as for `CubicSpline`.

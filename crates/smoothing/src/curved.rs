@@ -1,0 +1,112 @@
+//! Energy with curvature: if a curve moves by ξ its acceleration moves by `ξ'' + Rξ`, `Rξ = −[u, [u, ξ]]` at the velocity
+//! u (Jacobi's operator). The flat problem leaves R out, which says too little of curves that are nearly geodesic over
+//! long distances: of a great circle it takes `ξ'' + ξ` for `ξ''`, and a wave around it, which costs nothing, for bent.
+
+use crate::flat::{Flat, FlatEnd, times_mass};
+use crate::frames::curvature_terms;
+use crate::misfit::stride;
+use symspline_core::scalar::{Lane, lane};
+use symspline_core::space::{Erased, Origin};
+
+/// Jacobi's operator along a curve, in coordinates of frames.
+pub struct Curved {
+    m: usize,
+    /// R at every knot, m × m numbers row by row.
+    turns: Vec<f64>,
+    /// (S + RP)ᵀM(S + RP), as the entries (i, i − d) at i · 4m + d, coordinates of a coefficient side by side.
+    pub penalty: Vec<f64>,
+}
+
+impl Curved {
+    /// For velocities at the knots, in units of the mean knot spacing.
+    pub fn new(space: &Erased, flat: &Flat, speeds: &[f64]) -> Self {
+        let m = space.dim();
+        let knots = flat.basis.count();
+        let mut turns = vec![0.0; knots * m * m];
+        for column in 0..m {
+            let unit: Vec<f64> = (0..knots * m).map(|i| f64::from(i % m == column)).collect();
+            let found = curvature_terms(space, speeds, &unit);
+            for (knot, x) in found.chunks_exact(m).enumerate() {
+                (0..m).for_each(|row| turns[(knot * m + row) * m + column] = x[row]);
+            }
+        }
+        // Natural ends have no acceleration, and so none to change.
+        for (end, knot) in [(0, 0), (1, knots - 1)] {
+            if flat.basis.ends[end] == FlatEnd::Natural {
+                turns[knot * m * m..][..m * m].fill(0.0);
+            }
+        }
+        let mut curved = Curved { m, turns, penalty: vec![0.0; knots * m * stride(m)] };
+        for i in 0..knots - 1 {
+            let sixth = flat.basis.h(i) / 6.0;
+            for (left, right, factor) in [(i, i, 2.0), (i + 1, i + 1, 2.0), (i, i + 1, 1.0), (i + 1, i, 1.0)]
+            {
+                curved.add(flat, left, right, factor * sixth);
+            }
+        }
+        curved
+    }
+
+    /// How much coordinate `row` of the acceleration at a knot has of coordinate `column` of its four coefficients.
+    fn factors(&self, flat: &Flat, knot: usize, row: usize, column: usize) -> [(usize, f64); 8] {
+        let turn = self.turns[(knot * self.m + row) * self.m + column];
+        let (bend, value) = (&flat.bends[knot], &flat.values[knot]);
+        std::array::from_fn(|at| {
+            let k = at % 4;
+            if at >= 4 {
+                (value.first + k, turn * value.factors[k])
+            } else if row == column {
+                (bend.first + k, bend.factors[k])
+            } else {
+                (bend.first + k, 0.0)
+            }
+        })
+    }
+
+    /// Adds `factor · (row of one knot)ᵀ(row of another)`.
+    fn add(&mut self, flat: &Flat, left: usize, right: usize, factor: f64) {
+        let (m, stride) = (self.m, stride(self.m));
+        for row in 0..m {
+            for a in 0..m {
+                for b in 0..m {
+                    for (p, x) in self.factors(flat, left, row, a) {
+                        if x == 0.0 {
+                            continue;
+                        }
+                        for (q, y) in self.factors(flat, right, row, b) {
+                            let (i, j) = (p * m + a, q * m + b);
+                            if i >= j && y != 0.0 {
+                                self.penalty[i * stride + i - j] += factor * x * y;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a.
+    pub fn pull(&self, flat: &Flat, bends: &[f64]) -> Vec<f64> {
+        let mass = times_mass(&flat.basis, bends, self.m);
+        let mut out = vec![0.0; mass.len()];
+        for (knot, x) in mass.chunks_exact(self.m).enumerate() {
+            for row in 0..self.m {
+                for column in 0..self.m {
+                    for (at, factor) in self.factors(flat, knot, row, column) {
+                        if factor != 0.0 {
+                            out[at * self.m + column] += factor * x[row];
+                        }
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// RPx: what curvature adds to coordinate c of the acceleration at a knot when coefficients move by x.
+    pub fn of_lanes(&self, flat: &Flat, knot: usize, x: &[Lane], c: usize) -> Lane {
+        let turns = &self.turns[(knot * self.m + c) * self.m..][..self.m];
+        let of = |(column, turn): (usize, &f64)| flat.values[knot].of_lanes(x, self.m, column) * lane(*turn);
+        turns.iter().enumerate().fold(Lane::ZERO, |sum, each| sum + of(each))
+    }
+}
