@@ -8,6 +8,7 @@ from matplotlib.path import Path
 
 import symspline as ss
 from symspline.plotting import disk, sphere
+from symspline.plotting.curves import curves_of
 from symspline.plotting.pictures import _PICTURES
 
 T = np.linspace(0, 10, 40)
@@ -216,3 +217,13 @@ def test_unconverged_curves_say_so():
 
 def test_it_is_what_notebooks_show():
     assert smooth("sphere:2")._repr_html_().startswith("<pre>&lt;SmoothingSpline")
+
+
+def test_a_long_gap_has_samples_of_its_own():
+    # Drawn by a few chords the curve and its band were beside themselves.
+    t = np.r_[np.linspace(0, 4, 60), np.linspace(7, 10, 50)]
+    points = np.stack([np.cos(t), np.sin(t), 0.2 * t], -1)
+    points = points + 0.05 * np.random.default_rng(0).standard_normal(points.shape)
+    (curve,), _ = curves_of(ss.make_smoothing_spline(t, points, "r:3"))
+    assert np.diff(curve.x).max() <= 10 / 1200 * (1 + 1e-12)
+    assert np.array_equal(curve.x[curve.knots], t)

@@ -151,10 +151,10 @@ class Curve:
             first = (first - self.start) / _SECOND
         return np.asarray(float(first) + since)
 
-    @property
-    def knots(self) -> slice:
+    @cached_property
+    def knots(self) -> NDArray[np.intp]:
         """Where the knots are among the times x."""
-        return slice(None, None, (len(self.x) - 1) // (self.data.times.size - 1))
+        return np.searchsorted(self.x, self.data.times)
 
     @cached_property
     def gaps(self) -> Doubles:
@@ -178,7 +178,7 @@ class Curve:
             some = self.given_x[self.picked_data(number)]
             wanted = some if len(some) else np.linspace(self.x[0], self.x[-1], number)
             return np.unique(self._nearest(wanted)), np.empty(0, np.intp)
-        knots = np.arange(len(self.x))[self.knots]
+        knots = self.knots
         bold = knots[np.unique(np.linspace(0, len(knots) - 1, min(len(knots), number)).astype(int))]
         even = np.linspace(self.x[0], self.x[-1], number)
         gap = np.abs(even[:, None] - self.x[bold]).min(axis=1)
@@ -288,8 +288,10 @@ def _pick(data: Data, index: Sequence[Any]) -> Data:
 
 
 def _samples(knots: Doubles) -> Doubles:
-    """Times that divide every segment evenly."""
-    segments = len(knots) - 1
-    number = max(1200 // segments, 16 if segments <= 10_000 else 1)
-    inner = knots[:-1, None] + np.diff(knots)[:, None] * np.arange(number) / number
-    return np.append(inner.ravel(), knots[-1])
+    """Times that divide every segment evenly, long ones more finely."""
+    segments, lengths = len(knots) - 1, np.diff(knots)
+    least = max(1200 // segments, 16 if segments <= 10_000 else 1)
+    numbers = np.maximum(least, np.ceil(1200 * lengths / np.ptp(knots))).astype(int)
+    segment = np.repeat(np.arange(segments), numbers)
+    step = np.arange(len(segment)) - np.repeat(np.cumsum(numbers) - numbers, numbers)
+    return np.append(knots[segment] + lengths[segment] * step / numbers[segment], knots[-1])
