@@ -62,6 +62,7 @@ docs: .venv/tools
 	$(INSTALL) $$($(BIN)/python -c 'import tomllib; \
 		print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
+	$(BIN)/python docs/links.py build/docs
 
 # One wheel for every processor of this architecture, in dist/: on x86-64 with two compiled modules, so two builds.
 wheel: .venv/maturin

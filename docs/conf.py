@@ -167,8 +167,16 @@ def _links(app: Any, docname: str, source: list[str]) -> None:
     source[0] = source[0].replace("](../benchmarks/README.md)", "](benchmarks.md)")
 
 
+def _with_source(app: Any) -> list[Any]:
+    """The list of pages of source has none of the compiled module."""
+    modules = getattr(app.env, "_viewcode_modules", {})
+    app.env._viewcode_modules = {name: found for name, found in modules.items() if found}
+    return []
+
+
 def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", _escape, priority=100)
     app.connect("autodoc-process-docstring", _restore, priority=900)
     app.connect("missing-reference", _public)
     app.connect("source-read", _links)
+    app.connect("html-collect-pages", _with_source, priority=100)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .manifolds import refuse_functions
+from .manifolds.manifold import refuse_functions
 from .piecewise import Piecewise
 from .report import Report
 from .spaces import Product, Space

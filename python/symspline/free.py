@@ -13,7 +13,7 @@ from .arrays import as_array, cast, whole_number
 from .curves.control import checked_knots, checked_points, control_array
 from .curves.curve import quantity_of
 from .curves.in_span import reduced
-from .manifolds import refuse_functions
+from .manifolds.manifold import refuse_functions
 from .spaces import Array, Product, Space
 from .spaces import space as space_named
 

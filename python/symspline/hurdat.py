@@ -19,7 +19,8 @@ class Storm:
         key: basin, number and year, e.g. ``"AL092021"``.
         name: e.g. ``"Ida"``.
         times: of the fixes, ``datetime64[m]``, UTC.
-        lon, lat: degrees east and north, which the database rounds to 0.1.
+        lon: degrees east, which the database rounds to 0.1.
+        lat: degrees north, likewise.
     """
 
     key: str

@@ -9,7 +9,7 @@ import torch
 
 from .adapters import fitted, movable, split
 from .curves.ends import ends_in_factors
-from .manifolds import refuse_functions
+from .manifolds.manifold import refuse_functions
 from .spaces import Product, Space, parts_of
 from .spaces import space as space_named
 

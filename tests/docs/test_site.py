@@ -6,6 +6,7 @@ import re
 import types
 from pathlib import Path
 
+import links
 import pytest
 
 import symspline as ss
@@ -129,3 +130,17 @@ def test_links_to_files_lead_somewhere():
         text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
         for link in re.findall(r"\]\((?!https?:|#|gallery/)([^)#]+)", text):
             assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_dead_links_are_found(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top"></h1><a href="sub/b.html#place"></a><a href="#top"></a><a href="https://x.y/none"></a>'
+        '<a href="sub/b.html#none"></a><img src="none.png">'
+    )
+    (tmp_path / "sub/b.html").write_text('<a name="place"></a><a href="../a.html"></a><a href="c.html"></a>')
+    assert links.dead_links(tmp_path) == [
+        "c.html on sub/b.html",
+        "none.png on a.html",
+        "sub/b.html#none on a.html",
+    ]

@@ -13,7 +13,7 @@ from .._core import ValidationError
 from ..adapters import split
 from ..arrays import shown
 from ..curves.ends import ends_in_factors
-from ..manifolds import refuse_functions
+from ..manifolds.manifold import refuse_functions
 from ..spaces import Product, Space, parts_of
 from ..spaces import space as space_named
 from .embedding import bent

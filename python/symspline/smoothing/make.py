@@ -15,7 +15,7 @@ from ..curves.fit import Asked as Fitted
 from ..curves.fit import Points, fit
 from ..curves.solve import Fault, Options, Progress
 from ..failures import fail
-from ..manifolds import refuse_functions
+from ..manifolds.manifold import refuse_functions
 from ..options import check_on_failure, check_progress, checked_policy
 from ..signs import warn_of_signs
 from ..spaces import Product, Space, factors_of
