@@ -276,13 +276,14 @@ def _check(space: Space, points: Array, velocities: Array, converged: Any) -> No
     if not (finite | ~np.asarray(converged)).all():
         raise ValidationError("points or velocities are not finite")
     off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
-    allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max())
+    allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max(initial=1.0))
     if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):
         raise ValidationError("velocities are not tangent")
 
 
 # Of the report, what need not be known.
 _MAYBE = ("invariant_radius", "alternative_energy")
+_DTYPES = {"b": np.bool_, "i": np.int64, "f": np.float64}
 
 
 def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int, ...]) -> Report:
@@ -293,7 +294,9 @@ def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int,
         if key not in kinds or (key in _MAYBE and value is None):
             return value
         shape = () if key == "curvature" else batch
-        array = np.asarray(value)
+        # Of no curves a list does not tell what it is of.
+        none = isinstance(value, list) and np.size(value) == 0 and 0 in shape
+        array = np.zeros(shape, _DTYPES[kinds[key]]) if none else np.asarray(value)
         if array.shape != shape or array.dtype.kind != kinds[key]:
             raise ValidationError(f"the report's {key} is {shown(value)}")
         return array if shape else value

@@ -106,7 +106,7 @@ def clock_of(knots: ArrayLike | Moments) -> tuple[Clock, NDArray[Any]]:
     """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
     given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
     array = as_array(given, "t")
-    if array.size == 0:
+    if array.size == 0 and (array.ndim < 2 or array.shape[-1] == 0):
         raise ValidationError("t is empty; a curve needs at least two points")
     first = array[..., :1] if array.ndim > 1 else array.flat[0]
     if array.dtype.kind == "M":
@@ -116,7 +116,7 @@ def clock_of(knots: ArrayLike | Moments) -> tuple[Clock, NDArray[Any]]:
         return Clock(np.array(first)[()], dates=True, zone=zone), array.copy()
     if array.dtype.kind == "m":
         return Clock(durations=True), _durations(array, "t")
-    if array.dtype.kind in "iu" and (int(array.max()) > _EXACT or int(array.min()) < -_EXACT):
+    if array.dtype.kind in "iu" and array.size and (int(array.max()) > _EXACT or int(array.min()) < -_EXACT):
         return Clock(np.array(first)[()]), array.copy()
     if array.dtype.kind not in "iufb":
         raise ValidationError(f"t must be numbers or datetime64, not {array.dtype}")

@@ -2,7 +2,20 @@
 
 import numpy as np
 import pytest
-from curves import KNOTS, S2, THREE, every_common, every_space, pick, points_on, same, same_curve, with_ends
+from curves import (
+    KNOTS,
+    S2,
+    THREE,
+    every_common,
+    every_space,
+    found,
+    pick,
+    points_on,
+    same,
+    same_curve,
+    shaped,
+    with_ends,
+)
 
 import symspline as ss
 
@@ -91,3 +104,20 @@ def test_many_curves_at_the_same_times_are_each_the_curve_alone(space, outside):
                 assert same(pick(values, k), spline[k](times, nu=nu, extrapolate=outside))
         speed = spline.speed(times, extrapolate=outside)
         assert same(speed[13], spline[13].speed(times, extrapolate=outside))
+
+
+@pytest.mark.parametrize("name", ["s:2", "so:3", "cp:2", "gr:2,400", "s:2 x r:1"])
+def test_a_batch_may_have_no_curves(name, tmp_path):
+    """As blocks of a selection are."""
+    space = ss.space(name)
+    points = space.random_point(np.random.default_rng(0), (2, 0, 5))
+    x = np.linspace(0, 4, 7)
+    spline = ss.CubicSpline(None, points, space)
+    assert str(spline.report).startswith("no curves") and spline.length().shape == (2, 0)
+    spline.save(tmp_path / "none.npz")
+    for each in (spline, ss.load(tmp_path / "none.npz"), ss.CubicSpline(np.zeros((2, 0, 5)), points, space)):
+        for nu in range(3):
+            assert found(each(x, nu)) == shaped(space, (2, 0, 7))
+    with pytest.raises(ss.ValidationError, match="the batch has no curves"):
+        spline.plot()
+    assert ss.make_smoothing_spline(None, points, space).report is not None

@@ -86,7 +86,9 @@ def read(points: Any, space: Space) -> list[Points]:
 
 def _read(space: Space, points: Any) -> Points:
     array = space._array(points, "points")
-    if array.ndim == 0 or array.size == 0:
+    # A batch may be empty, as blocks of a selection are.
+    axis = array.ndim - len(space._point_shape) - 1
+    if array.ndim == 0 or (array.size == 0 and (axis < 1 or array.shape[axis] == 0)):
         raise ValidationError("no points given; a curve needs at least two")
     doubles = space._doubles(array, "points")
     lead = doubles.shape[: doubles.ndim - len(space._point_shape)]

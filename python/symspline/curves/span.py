@@ -59,7 +59,8 @@ def _columns(space: Space, x: Array) -> tuple[Array | None, Array, tuple[int, ..
         time, rest = (x[..., :1], x[..., 1:]) if isinstance(space, Hyperbolic) else (None, x)
         return time, np.swapaxes(rest, -1, -2), x.shape
     moved = np.moveaxis(x, -3, -2)
-    return None, moved.reshape(*moved.shape[:-2], -1), x.shape
+    *lead, knots, width = moved.shape
+    return None, moved.reshape(*lead, knots * width), x.shape
 
 
 def _uncolumns(space: Space, time: Array | None, columns: Array, shape: tuple[int, ...]) -> Array:

@@ -250,6 +250,8 @@ def curves_of(spline: Spline) -> tuple[list[Curve], str]:
     batch = spline._curve.batch
     everything = int(np.prod(batch))
     good = np.flatnonzero(_finite(spline._curve))
+    if not everything:
+        raise ValidationError("there is nothing to plot: the batch has no curves")
     if not good.size:
         raise ValidationError(
             "there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)"
