@@ -111,3 +111,25 @@ def test_geodesics_are_those_of_the_inner_product():
 def test_an_inner_product_is_positive():
     with pytest.raises(ss.ValidationError, match="inner must be positive"):
         check(twin(S2, inner=negative))
+
+
+def test_short_steps_are_looked_at():
+    """A cut-off that takes short vectors for none is seen, and points that no spline joins break a law, too."""
+    sphere = ss.Sphere(2)
+
+    def exp(p, v):
+        short = np.linalg.norm(v, axis=-1, keepdims=True) < 1e-8
+        return np.where(short, p, sphere.exp(p, v))
+
+    parts = {"project_tangent": sphere.project_tangent, "inner": sphere.inner, "project": sphere.project}
+    cut = ss.Manifold(exp=exp, log=sphere.log, point_shape=(3,), injectivity_radius=np.pi, **parts)
+    with pytest.raises(AssertionError, match="log inverts exp"):
+        ss.testing.check(cut)
+    noise = np.random.default_rng(0)
+
+    def log(p, q):
+        return sphere.project_tangent(p, sphere.log(p, q) + 1e-10 * noise.standard_normal(np.shape(p)))
+
+    noisy = ss.Manifold(exp=sphere.exp, log=log, point_shape=(3,), injectivity_radius=np.pi, **parts)
+    with pytest.raises(AssertionError, match="breaks the law that"):
+        ss.testing.check(noisy, tol=1e-9)

@@ -276,3 +276,23 @@ def test_what_a_manifold_has_not():
             call()
     assert np.isinf(space.injectivity_radius) and np.isnan(space.curvature)
     assert "exp=Stiefel._exp" in repr(space) == str(space)
+
+
+@pytest.mark.parametrize(("digits", "allowed"), [(9, 1e-4), (10, 1e-5), (11, 1e-6), (12, 1e-7)])
+def test_noise_of_a_logarithm_is_no_reason_for_short_steps(digits, allowed):
+    """Noise does not shrink with the steps of differences, and the shortest make most of it."""
+    sphere = ss.Sphere(2)
+    noisy = ss.Manifold(
+        exp=sphere.exp,
+        log=lambda p, q: sphere.project_tangent(p, np.round(sphere.log(p, q), digits)),
+        project_tangent=sphere.project_tangent,
+        inner=sphere.inner,
+        project=sphere.project,
+        injectivity_radius=np.pi,
+        point_shape=(3,),
+    )
+    points = ss.geo.from_lonlat([0, 20, 40, 60], [0, 10, -5, 10])
+    core = ss.CubicSpline(None, points, sphere)
+    spline = ss.HermiteSpline(None, points, core.velocities, noisy)
+    x = np.linspace(0, 3, 31)
+    assert np.abs(spline(x, 2) - core(x, 2)).max() <= allowed * np.abs(core(x, 2)).max()

@@ -271,6 +271,17 @@ def test_special_tensors_have_determinant_one():
     ("space", "points", "why"),
     [
         ("siegel:1", [np.eye(2), np.diag([2.0, 1.0])], r"points\[1\] is off .* it is not symplectic"),
+        (
+            "siegel:1",
+            convert.siegel_to_positive_definite(np.array([[[1e5 + 1j]], [[1e5 + 2j]]])),
+            "doubles do not tell at its condition of 1.0e20: move all points by one isometry",
+        ),
+        # Curves through such points had values that are no numbers.
+        (
+            "spd:2",
+            convert.siegel_to_positive_definite(np.array([[[1e7 + 1j]], [[1e7 + 2j]]])),
+            "smallest eigenvalue is .* which is rounding beside the others",
+        ),
         ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite makes them"),
         ("hp:1", [np.eye(4)[:, :2], np.eye(4)[:, ::2]], r"points\[1\] is off .* no quaternionic line"),
         ("hp:1", np.eye(4)[:2] * np.ones((3, 1, 1)), "looks like vectors of quaternions"),
@@ -288,6 +299,10 @@ def test_points_that_are_none_are_told(space, points, why):
         (convert.siegel_to_positive_definite, [[1.0]], "imaginary part that is not positive definite"),
         (convert.siegel_to_positive_definite, [[1j, 0]], "square matrices"),
         (convert.positive_definite_to_siegel, np.diag([2.0, 1.0]), "not symplectic"),
+        (convert.positive_definite_to_siegel, np.diag([1e6, 5e-6]), "not symplectic"),
+        (convert.positive_definite_to_siegel, -np.eye(2), "not positive definite: its smallest .* -1"),
+        (convert.positive_definite_to_siegel, [[1.0, 0.5], [0, 1]], "not symmetric: entries differ by 5"),
+        (convert.positive_definite_to_siegel, [[0.0, 1], [-1, 0]], "not symmetric"),
         (convert.positive_definite_to_siegel, np.eye(3), "2n, 2n"),
         (convert.quaternions_to_subspace, [[1.0, 0, 0, 1]], "has length 1.41421356, not 1"),
         (convert.quaternions_to_subspace, [[1.0, 0, 0]], "must be real, of shape"),

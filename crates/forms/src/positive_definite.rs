@@ -23,6 +23,8 @@ pub struct PositiveDefinite<const D: usize, A = Dynamic> {
 
 /// Size of L⁻¹(q − p)L⁻* up to which the logarithm works on the difference; beyond, on factors.
 const NEAR: f64 = 0.35;
+/// With ones on the diagonal, the smallest eigenvalue over n of what is no point.
+const SINGULAR: f64 = 1e-13;
 
 impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
     /// The n × n matrices, or those of determinant one.
@@ -85,7 +87,8 @@ fn whiten<const D: usize, A: Storage>(l: &Matrix<Lane, D, A>, x: &Matrix<Lane, D
 }
 
 /// The lanes on which p is positive definite to more than rounding, whatever the units of rows and columns:
-/// with ones on the diagonal, the smallest eigenvalue is above n rounding errors.
+/// with ones on the diagonal, the smallest eigenvalue is well above rounding. What is computed of points loses as many
+/// digits as that has zeros, and below there would be none left.
 fn positive_definite<const D: usize, A: Storage>(p: &Matrix<Lane, D, A>) -> Lane {
     let (l, n) = (cholesky(p), p.rows());
     // Pivots that are no small part of the diagonal tell without eigenvalues.
@@ -106,7 +109,7 @@ fn positive_definite<const D: usize, A: Storage>(p: &Matrix<Lane, D, A>) -> Lane
     })];
     diagonalise(&mut scaled);
     let least = (0..n).map(|i| scaled[0][(i, i)][0]).fold(lane(f64::INFINITY), |m, x| m.min(x));
-    sure | (doubtful & least.simd_gt(lane(n as f64 * f64::EPSILON)))
+    sure | (doubtful & least.simd_gt(lane(n as f64 * SINGULAR)))
 }
 
 /// `g x g*` for a Hermitian x.

@@ -6,7 +6,7 @@ use crate::PositiveDefinite;
 use std::f64::consts::FRAC_1_SQRT_2;
 use symspline_core::matrix::{Matrix, cholesky, solve_lower};
 use symspline_core::scalar::{Each, Lane, Scalar, lane};
-use symspline_core::space::{Origin, Part};
+use symspline_core::space::{Ambient, Origin, Part};
 
 /// Siegel's upper half space of n × n matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,6 +112,13 @@ impl Part for Siegel {
         of([&c_adjoint, &minus, &zero, &back]).write(inverse);
     }
     fn complaint(&self, p: &[Lane]) -> String {
+        let rounding = self.whole.rounding(p).to_array()[0];
+        if rounding * f64::EPSILON > 1e-9 {
+            return format!(
+                "it is not symplectic, of which doubles do not tell at its condition of {rounding:.1e}: move all points \
+                 by one isometry, such as z - x for a symmetric x"
+            );
+        }
         let p = self.read(p);
         let off = p.times(&self.turned(&p)).plus_identity(lane(-1.0)).size().to_array()[0];
         format!(

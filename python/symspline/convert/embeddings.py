@@ -68,7 +68,7 @@ def positive_definite_to_siegel(p: ArrayLike) -> Array:
         Complex symmetric matrices, shape (..., n, n).
 
     Raises:
-        ValidationError: a matrix is not symplectic.
+        ValidationError: a matrix is not symmetric, not positive definite or not symplectic.
 
     >>> positive_definite_to_siegel([[2.5, 0.5], [0.5, 0.5]])
     array([[1.+2.j]])
@@ -79,10 +79,21 @@ def positive_definite_to_siegel(p: ArrayLike) -> Array:
         raise ValidationError(
             f"p must be real, of shape (..., 2n, 2n), not {given.dtype} of shape {given.shape}"
         )
+    off = largest(given - np.swapaxes(given, -1, -2))
+    refuse(~(off <= tol * largest(given)), "p", lambda i: f"is not symmetric: entries differ by {off[i]:.3e}")
+    values, vectors = np.linalg.eigh(given)
+    refuse(
+        ~(values[..., 0] > 0),
+        "p",
+        lambda i: f"is not positive definite: its smallest eigenvalue is {values[i][0]:.6e}",
+    )
+    # Seen from p^½ the symplectic p is its image Jp⁻¹Jᵀ, to rounding times its condition.
     j = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
-    off = largest(np.swapaxes(given, -1, -2) @ j @ given - j)
-    allowed = tol * np.maximum(1.0, largest(given) ** 2)
-    refuse(~(off <= allowed), "p", lambda i: f"is not symplectic: |pᵀJp - J| is {off[i]:.3e}")
+    back = vectors / np.sqrt(values)[..., None, :]
+    seen = np.swapaxes(back, -1, -2) @ j @ back
+    off = largest(np.swapaxes(seen, -1, -2) @ seen - np.eye(2 * n))
+    allowed = tol + 100 * np.finfo(np.float64).eps * values[..., -1] / values[..., 0]
+    refuse(~(off <= allowed), "p", lambda i: f"is not symplectic: p and Jp⁻¹Jᵀ are {off[i]:.3e} apart")
     y = np.linalg.inv(given[..., n:, n:])
     z = given[..., :n, n:] @ y + 1j * y
     return 0.5 * (z + np.swapaxes(z, -1, -2))

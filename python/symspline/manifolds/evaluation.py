@@ -81,14 +81,19 @@ def derivative(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Arra
     coordinates. Beyond its ends a segment goes on, so that they are those of one segment everywhere; where it goes
     over a cut locus soon, steps are shorter."""
     here = points(operations, rows)
-    vectors = np.empty_like(here)
+    vectors, least = np.empty_like(here), np.full(len(here), np.inf)
+    axes = tuple(range(1, here.ndim))
     left, step = np.arange(len(here)), STEP
-    for _ in range(HALVINGS + 1):
+    for halvings in range(HALVINGS + 1):
         moved = _around(operations, rows.at(left), here[left], step)
         difference = first_derivative if nu == 1 else second_derivative
-        vectors[left] = difference(moved, (step * rows.h[left]).reshape(-1, *[1] * (here.ndim - 1)))
-        axes = tuple(range(1, here.ndim))
+        found = difference(moved, (step * rows.h[left]).reshape(-1, *[1] * (here.ndim - 1)))
         jump, size = (np.abs(x).max(axis=axes) for x in (eighth_difference(moved), here[left]))
+        # What the jump may have done to the derivative: where it is noise of the logarithm, longer steps are better.
+        harm = jump / step**nu
+        better = (harm < least[left]) | (halvings == 0)
+        vectors[left[better]], least[left[better]] = found[better], harm[better]
+        least[np.isnan(least)] = np.inf
         smooth = jump <= ROUGH * np.abs(moved).max(axis=(0, *(a + 1 for a in axes))) + NOISE * size
         left, step = left[~smooth], step / 2
         if not left.size:
