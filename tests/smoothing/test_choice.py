@@ -173,3 +173,80 @@ def test_both_ways_leave_outliers_out(loss):
     )
     assert exact.report.method == "newton"
     assert rms(space, flat.points, exact.points) < 5e-3 * exact.std(T).max()
+
+
+def agree(space, t, noisy, criterion="gcv", **options):
+    """λ and degrees of freedom are the same whichever way is taken."""
+    ways = [
+        ss.make_smoothing_spline(t, noisy, space, criterion=criterion, method=method, **options)
+        for method in ("auto", "newton")
+    ]
+    assert all(way.report.converged for way in ways)
+    return ways[0].df == pytest.approx(ways[1].df, rel=0.02)
+
+
+@pytest.mark.parametrize("ratio", [3, 30])
+@pytest.mark.parametrize("criterion", ["gcv", "reml"])
+def test_light_data_say_how_stiff_a_curve_is(ratio, criterion):
+    """A geodesic whose second half is noisier: the mean weight would be that of the first one."""
+    sphere, t = ss.Sphere(2), np.linspace(0, 1, 80)
+    truth = np.stack([np.cos(9 * t), np.sin(9 * t), 0 * t], -1)
+    deviations = np.where(t < 0.5, 0.01, 0.01 * ratio)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        noisy = sphere.exp(truth, deviations[:, None] * sphere.random_tangent(rng, truth))
+        assert agree(sphere, t, noisy, criterion, weights=1 / deviations**2)
+
+
+@pytest.mark.parametrize(("name", "length"), [("sphere:2", 6.3), ("so:3", 5.0), ("cp:2", 3.0)])
+def test_light_directions_do_too(name, length):
+    space, rng = ss.space(name), np.random.default_rng(0)
+    t, p = np.linspace(0, 1, 60), space.random_point(rng)
+    v = space.random_tangent(rng, p)
+    truth = space.exp(p, np.multiply.outer(length * t / space.norm(p, v), v))
+    deviations = np.linspace(0.01, 0.2, space.dim)
+    frame = space.frame(truth)
+    noise = rng.standard_normal((60, space.dim)) * deviations
+    noisy = space.exp(truth, np.einsum("nm,nm...->n...", noise, frame))
+    frames = space.transport(truth[:, None], noisy[:, None], frame)
+    weights = np.tile(np.diag(1 / deviations**2), (60, 1, 1))
+    assert agree(space, t, noisy, weights=weights, frames=frames)
+
+
+def test_many_dimensions_are_coupled_too():
+    space, rng = ss.space("gr:4,8"), np.random.default_rng(1)
+    t, p = np.linspace(0, 1, 40), space.random_point(rng)
+    v = space.random_tangent(rng, p)
+    truth = space.exp(p, np.multiply.outer(2.5 * t / space.norm(p, v), v))
+    noisy = space.exp(truth, 0.02 * space.random_tangent(rng, truth))
+    spline = ss.make_smoothing_spline(t, noisy, space, 10.0)
+    assert spline.report.method == "flat" and spline.df == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e9])
+def test_stiff_curves_of_poses_are_found(lam):
+    space = ss.space("se:3")
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        t, p = np.linspace(0, 1, 80), [space.random_point(rng)]
+        for _ in range(5):
+            p.append(space.exp(p[-1], 0.6 * space.random_tangent(rng, p[-1])))
+        truth = ss.CubicSpline(np.linspace(0, 1, 6), np.array(p), space)(t)
+        noisy = space.exp(truth, 0.05 * space.random_tangent(rng, truth))
+        spline = ss.make_smoothing_spline(t, noisy, space, lam)
+        assert spline.report.converged and spline.report.iterations <= 10
+    assert lam < 1e9 or np.abs(spline(t, 2)).max() < 1e-3 * np.abs(spline(t, 1)).max()
+
+
+def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
+    rng, sphere = np.random.default_rng(0), ss.Sphere(2)
+    t = np.sort(rng.uniform(0, 10, 2000))
+    height = 0.5 * np.sin(6 * t)
+    wavy = np.stack([np.cos(t) * np.cos(height), np.sin(t) * np.cos(height), np.sin(height)], -1)
+    straight = np.stack([np.cos(t / 5), np.sin(t / 5), 0 * t], -1)
+    noisy = np.array([beside(sphere, curve, 0.05) for curve in (wavy, straight)])
+    alone = ss.make_smoothing_spline(t, noisy[0], sphere)
+    for stiff in (1e9, 1e12):
+        both = ss.make_smoothing_spline(t, noisy, sphere, np.array([alone.lam, stiff]))
+        assert both.df[0] == pytest.approx(alone.df, rel=0.01) and both.df[1] == pytest.approx(2, abs=0.05)
+        assert sphere.distance(both(t)[0], alone(t)).max() < 0.1 * alone.std(5.0)

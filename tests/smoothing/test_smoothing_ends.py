@@ -205,3 +205,28 @@ def test_the_first_point_repeated_at_the_end_counts_once():
     noisy[-1] = beside(space, truth[:1], 0.05, 7)[0]
     apart = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic")
     assert apart.report.converged and np.abs(apart.points - closed.points).max() > 1e-4
+
+
+@pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
+@pytest.mark.parametrize("n", [3, 4, 6, 20])
+@pytest.mark.parametrize("repeated", [True, False])
+def test_closed_curves_through_all_data(name, n, repeated):
+    space, t, noisy, _ = ring(name, n)
+    knots = np.append(t, 10.0)
+    if repeated:
+        t, noisy = knots, np.append(noisy, noisy[:1], axis=0)
+    for lam in (0.0, 1e-4, 1.0):
+        spline = ss.make_smoothing_spline(t, noisy, space, lam, knots=knots, bc_type="periodic")
+        assert spline.report.converged
+        if lam == 0:
+            assert space.distance(spline(t), noisy).max() <= 1e-10
+
+
+def test_a_repeated_end_may_differ_by_rounding():
+    space, t, noisy, _ = ring("sphere:2", 60)
+    t, noisy = np.append(t, 10.0), np.append(noisy, noisy[:1], axis=0)
+    once = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic")
+    noisy[-1] = space.project(noisy[0] + 1e-11 * np.array([1.0, 2.0, 3.0]))
+    assert ss.make_smoothing_spline(t, noisy, space, bc_type="periodic").df == pytest.approx(
+        once.df, rel=1e-9
+    )

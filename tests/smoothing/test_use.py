@@ -195,3 +195,10 @@ def test_noise_of_half_a_radian_is_no_reason_to_warn(name):
         space, t, noisy, points = example(name, 0.5, seed=seed)
         spline = ss.make_smoothing_spline(t, noisy, space)
         assert rms(space, spline(t), points) < 0.5 * rms(space, noisy, points)
+
+
+def test_a_curve_through_all_data_is_no_reason_to_warn():
+    for n in (80, 81, 160):
+        _, t, noisy, _ = example("sphere:2", 0.1, n=n)
+        spline = ss.make_smoothing_spline(t, noisy, "sphere:2", 0.0)
+        assert S2.distance(spline(t), noisy).max() < 1e-12

@@ -68,8 +68,8 @@ impl<'a> Linear<'a> {
         }
         if flat.own.knots.len() < flat.basis.count() {
             // Where the turns of a closed curve end, splines end that should go on.
-            let rows = flat.basis.count();
-            for at in [0..4 * m, (rows - 4) * m..rows * m] {
+            let (rows, edge) = (flat.basis.count(), 4.min(flat.own.knots.start));
+            for at in [0..edge * m, (rows - edge) * m..rows * m] {
                 pull[at.clone()].fill(0.0);
                 stiffness[at].fill(0.0);
             }

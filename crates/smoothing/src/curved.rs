@@ -47,36 +47,47 @@ impl Curved {
         curved
     }
 
-    /// How much coordinate `row` of the acceleration at a knot has of coordinate `column` of its four coefficients.
-    fn factors(&self, flat: &Flat, knot: usize, row: usize, column: usize) -> [(usize, f64); 8] {
-        let turn = self.turns[(knot * self.m + row) * self.m + column];
-        let (bend, value) = (&flat.bends[knot], &flat.values[knot]);
-        std::array::from_fn(|at| {
-            let k = at % 4;
-            if at >= 4 {
-                (value.first + k, turn * value.factors[k])
-            } else if row == column {
-                (bend.first + k, bend.factors[k])
-            } else {
-                (bend.first + k, 0.0)
-            }
-        })
+    fn turn(&self, knot: usize) -> &[f64] {
+        &self.turns[knot * self.m * self.m..][..self.m * self.m]
     }
 
-    /// Adds `factor · (row of one knot)ᵀ(row of another)`.
+    /// Adds `factor · (row of one knot)ᵀ(row of another)`: with s and v of the rows of S and P the blocks
+    /// `s s' + s v' R' + v s' Rᵀ + v v' RᵀR'`.
     fn add(&mut self, flat: &Flat, left: usize, right: usize, factor: f64) {
         let (m, stride) = (self.m, stride(self.m));
+        let (r, other) = (self.turn(left), self.turn(right));
+        let mut square = vec![0.0; m * m];
         for row in 0..m {
             for a in 0..m {
                 for b in 0..m {
-                    for (p, x) in self.factors(flat, left, row, a) {
-                        if x == 0.0 {
+                    square[a * m + b] += r[row * m + a] * other[row * m + b];
+                }
+            }
+        }
+        let (transposed, other): (Vec<f64>, Vec<f64>) =
+            ((0..m * m).map(|at| r[at % m * m + at / m]).collect(), other.to_vec());
+        let rows = |knot: usize| [(&flat.bends[knot], false), (&flat.values[knot], true)];
+        for (x, turns) in rows(left) {
+            for (y, turns_too) in rows(right) {
+                for (p, f) in x.factors.iter().enumerate() {
+                    for (q, g) in y.factors.iter().enumerate() {
+                        let product = factor * f * g;
+                        if product == 0.0 {
                             continue;
                         }
-                        for (q, y) in self.factors(flat, right, row, b) {
-                            let (i, j) = (p * m + a, q * m + b);
-                            if i >= j && y != 0.0 {
-                                self.penalty[i * stride + i - j] += factor * x * y;
+                        for a in 0..m {
+                            for b in 0..m {
+                                let (i, j) = ((x.first + p) * m + a, (y.first + q) * m + b);
+                                if i < j {
+                                    continue;
+                                }
+                                let block = match (turns, turns_too) {
+                                    (false, false) => f64::from(a == b),
+                                    (false, true) => other[a * m + b],
+                                    (true, false) => transposed[a * m + b],
+                                    (true, true) => square[a * m + b],
+                                };
+                                self.penalty[i * stride + i - j] += product * block;
                             }
                         }
                     }
@@ -87,18 +98,15 @@ impl Curved {
 
     /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a.
     pub fn pull(&self, flat: &Flat, bends: &[f64]) -> Vec<f64> {
-        let mass = times_mass(&flat.basis, bends, self.m);
+        let m = self.m;
+        let mass = times_mass(&flat.basis, bends, m);
         let mut out = vec![0.0; mass.len()];
-        for (knot, x) in mass.chunks_exact(self.m).enumerate() {
-            for row in 0..self.m {
-                for column in 0..self.m {
-                    for (at, factor) in self.factors(flat, knot, row, column) {
-                        if factor != 0.0 {
-                            out[at * self.m + column] += factor * x[row];
-                        }
-                    }
-                }
-            }
+        for (knot, x) in mass.chunks_exact(m).enumerate() {
+            let turn = self.turn(knot);
+            let turned: Vec<f64> =
+                (0..m).map(|c| (0..m).map(|row| turn[row * m + c] * x[row]).sum()).collect();
+            flat.bends[knot].spread(x, &mut out);
+            flat.values[knot].spread(&turned, &mut out);
         }
         out
     }

@@ -122,6 +122,8 @@ pub enum State {
     Converged,
     /// It is not.
     Unconverged,
+    /// λ went on moving.
+    Unsettled,
     /// No spline goes through the points that were reached.
     NoCurve,
     /// The data do not determine the curve: without λ every knot needs some beside it.

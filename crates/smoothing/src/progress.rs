@@ -12,10 +12,13 @@ const SLOW: f64 = 0.5;
 const HOPELESS: f64 = 2.0;
 /// Dimension up to which the exact way is taken by itself.
 const LARGE: usize = 64;
-/// Dimension up to which the flat tier may take curvature into its matrix: coupled coordinates cost its square each.
-const COUPLED: usize = 12;
+/// Knots times the cube of the dimension up to which the flat tier may take curvature into its matrix, where coordinates
+/// are coupled.
+const COUPLED: usize = 10_000_000;
 /// λ moves by less than this between rounds when it is settled, in natural logarithms.
 const SETTLED: f64 = 3e-3;
+/// λ that still moves by more after the last round was not found.
+const UNSETTLED: f64 = 0.7;
 /// Rounds of choosing λ, at most.
 const ROUNDS: usize = 12;
 
@@ -35,13 +38,19 @@ pub struct Progress {
     pub slow: usize,
     /// Whether curvature is in the matrix of the flat way.
     pub curved: bool,
+    /// Whether the search for λ came to no end.
+    pub unsettled: bool,
+    /// Whether the flat way was given up.
+    pub forced: bool,
+    density: f64,
     /// What is known so far.
     pub report: Report,
 }
 
 impl Progress {
-    /// To a given λ, unless that is too large, or one to be chosen.
-    pub fn new(lam: Option<f64>, stiffest: f64) -> Self {
+    /// To a given λ, unless that is too large, or one to be chosen. `density` is the weight of a knot where there is
+    /// little.
+    pub fn new(lam: Option<f64>, stiffest: f64, density: f64) -> Self {
         let report = Report { at_bound: lam.is_some_and(|lam| lam > stiffest), ..Report::default() };
         Progress {
             lam: lam.map(|lam| lam.min(stiffest)),
@@ -51,6 +60,9 @@ impl Progress {
             scale: f64::NAN,
             slow: 0,
             curved: false,
+            unsettled: false,
+            forced: false,
+            density,
             report,
         }
     }
@@ -69,20 +81,20 @@ impl Progress {
 
     /// Whether the exact way is to be taken.
     pub fn takes_exact_way(&self, space: &Erased, tier: Tier, ends: Ends) -> bool {
-        match tier {
-            Tier::Flat => false,
-            Tier::Newton => true,
-            // In flat space the flat way is the exact one; and the blocks of the other have a limit.
-            Tier::Auto if space.curvature() == 0.0 || space.dim() > LARGE => false,
-            Tier::Auto => {
-                let limit = if self.settled { SLOW } else { HOPELESS };
-                let known = self.settled && self.report.exact;
-                // With curvature in its matrix the flat way contracts. But a stiff closed curve feels from one turn what
-                // happens at the ends of three.
-                let contracts = self.curved && ends != Ends::Periodic;
-                known || (!contracts && self.report.kappa > limit) || self.slow > 1
-            }
-        }
+        let limit = if self.settled { SLOW } else { HOPELESS };
+        let known = self.forced || (self.settled && self.report.exact);
+        // With curvature in its matrix the flat way contracts. But a stiff closed curve feels from one turn what happens
+        // at the ends of three.
+        let contracts = self.curved && ends != Ends::Periodic;
+        let hopeless = known || (!contracts && self.report.kappa > limit) || self.slow > 1;
+        tier == Tier::Newton || (hopeless && self.may_be_exact(space, tier, ends))
+    }
+
+    /// Whether there is the exact way to be taken.
+    pub fn may_be_exact(&self, space: &Erased, tier: Tier, ends: Ends) -> bool {
+        // In flat space the flat way is the exact one, but for closed curves; and the blocks of the other have a limit.
+        let other = space.curvature() != 0.0 || ends == Ends::Periodic;
+        tier == Tier::Auto && other && space.dim() <= LARGE
     }
 
     /// λ of the pseudo-data at a curve: a better one, unless it is given or settled; and what is expected of the flat way
@@ -92,7 +104,6 @@ impl Progress {
         space: &Erased,
         linear: &Linear,
         speeds: &[f64],
-        weights: &[f64],
         options: &Options,
         softness: f64,
     ) -> f64 {
@@ -101,29 +112,35 @@ impl Progress {
         }
         // The pseudo-data have the original weights, and their λ is softer by their slope.
         let lam = self.lam.unwrap_or(0.0) / softness;
-        self.expect(space, speeds, weights, lam);
+        self.expect(space, speeds, lam);
         lam
     }
 
     fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
         let (lam, at_bound) = linear.choose(options.criterion, self.lam.map(|lam| lam / softness));
-        let lam = lam * softness;
+        let mut lam = lam * softness;
         self.report.rounds += 1;
         let moved = self.lam.map_or(f64::INFINITY, |before| (lam / before).ln().abs());
+        // What goes to and fro meets half way.
+        if let Some(before) = self.lam.filter(|_| self.report.rounds > ROUNDS / 2 && !at_bound) {
+            lam = (lam * before).sqrt();
+        }
         self.settled = moved < SETTLED || self.report.rounds >= ROUNDS;
+        self.unsettled = moved > UNSETTLED && self.settled;
         self.report.at_bound = at_bound;
         self.lam = Some(lam);
     }
 
     /// The contraction that the flat way is expected to have if it leaves curvature out: `K²|γ'|²√(λ/w)`, with the mean
-    /// squared speed and w the weight per time.
-    fn expect(&mut self, space: &Erased, speeds: &[f64], weights: &[f64], lam: f64) {
+    /// squared speed and w the weight per time, where there is little.
+    fn expect(&mut self, space: &Erased, speeds: &[f64], lam: f64) {
         let m = space.dim();
         let knots = speeds.len() / m;
         let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
-        let density = weights.iter().sum::<f64>() / (knots - 1) as f64;
-        self.report.kappa = space.curvature().powi(2) * square * (lam / density).sqrt();
-        self.curved |= self.report.kappa > SLOW && m <= COUPLED;
+        // Groups without a metric have no K.
+        let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
+        self.report.kappa = k * k * square * (lam / self.density).sqrt();
+        self.curved |= self.report.kappa > SLOW && m.pow(3).saturating_mul(knots) <= COUPLED;
     }
 
     /// λ, degrees of freedom and noise of the curve as it is.

@@ -26,6 +26,8 @@ const RETREATS: usize = 6;
 /// Steps of the flat way that are longer than they may be, with a final λ, before it is given up: it does not contract,
 /// and what it comes to in the end, if it does, is a minimum near other curves.
 const ASTRAY: usize = 8;
+/// Of data with unequal weights the weight that one in so many does not reach says how stiff a curve is.
+const LIGHT: usize = 10;
 /// J is known to this part of it.
 const ROUNDING: f64 = 1e-12;
 
@@ -43,6 +45,8 @@ pub struct Track<'a> {
     corner: f64,
     /// Whether that has its final size.
     rescaled: bool,
+    /// Points at the knots to begin with.
+    first: Vec<f64>,
     /// Points at the knots.
     pub points: Vec<f64>,
     /// Velocities of the spline through them.
@@ -76,8 +80,16 @@ impl<'a> Track<'a> {
         let balance = flat.balance();
         // From here on curves are geodesics; with larger λ rounding would make A forget the data.
         let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
+        let roots = information::roots(data.information, m);
+        let mut weights: Vec<f64> = roots.iter().map(|root| root.weight).collect();
+        if weights.is_empty() {
+            weights.extend_from_slice(data.weights);
+        }
+        let count = weights.len();
+        let light = *weights.select_nth_unstable_by(count / LIGHT, f64::total_cmp).1;
+        let density = light * count as f64 / (knots.len() - 1) as f64;
         Track {
-            roots: information::roots(data.information, m),
+            roots,
             data,
             places,
             flat,
@@ -85,6 +97,7 @@ impl<'a> Track<'a> {
             corner,
             rescaled: corner.is_infinite() || data.sigma.is_some(),
             velocities: vec![0.0; points.len()],
+            first: points.clone(),
             points,
             knots,
             before: None,
@@ -92,7 +105,7 @@ impl<'a> Track<'a> {
             strays: 0,
             objective: f64::INFINITY,
             inverse: None,
-            progress: Progress::new(lam.map(|lam| lam / unit), stiffest),
+            progress: Progress::new(lam.map(|lam| lam / unit), stiffest, density),
         }
     }
 
@@ -179,7 +192,7 @@ impl<'a> Track<'a> {
     pub fn advance(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) {
         let velocities = self.end_velocities(space);
         let (data, flat) = (&self.data, &self.flat);
-        let (m, spacing, weights) = (space.dim(), flat.basis.spacing, data.weights);
+        let (m, spacing) = (space.dim(), flat.basis.spacing);
         self.progress.report.iterations += 1;
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
         let frames = Frames::new(space, &self.points);
@@ -206,11 +219,11 @@ impl<'a> Track<'a> {
         let (curved, later);
         curved = self.progress.curved.then(|| Curved::new(space, flat, &speeds));
         let mut linear = seen_with(curved.as_ref());
-        let mut lam = self.progress.weigh(space, &linear, &speeds, weights, options, softness);
+        let mut lam = self.progress.weigh(space, &linear, &speeds, options, softness);
         if self.progress.curved && linear.curved.is_none() {
             later = Curved::new(space, flat, &speeds);
             linear = seen_with(Some(&later));
-            lam = self.progress.weigh(space, &linear, &speeds, weights, options, softness);
+            lam = self.progress.weigh(space, &linear, &speeds, options, softness);
         }
         let system = linear.factored(lane(lam));
         if !(system.least_pivot().as_array()[0] > 0.0) {
@@ -222,6 +235,9 @@ impl<'a> Track<'a> {
         self.progress.note(&linear, &band, lam, softness);
 
         let exact = self.progress.takes_exact_way(space, options.tier, options.ends);
+        if exact && self.strays > 0 {
+            return self.begin_again();
+        }
         if exact && !self.progress.report.exact {
             // What is known of steps is of the other way.
             (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
@@ -249,7 +265,8 @@ impl<'a> Track<'a> {
             if !self.rescaled {
                 return self.rescale(options, &sight.squares, m);
             }
-            self.progress.report.state = State::Converged;
+            self.progress.report.state =
+                if self.progress.unsettled { State::Unsettled } else { State::Converged };
             return;
         }
         // Farther than the data are nothing is known.
@@ -258,6 +275,9 @@ impl<'a> Track<'a> {
         let further = if self.progress.settled { self.progress.further(&step) } else { 1.0 };
         let limited = longest * further > farthest;
         self.strays += usize::from(limited && self.progress.settled && !exact);
+        if self.strays > ASTRAY && self.progress.may_be_exact(space, options.tier, options.ends) {
+            return self.begin_again();
+        }
         if self.progress.report.iterations >= options.max_iter || self.strays > ASTRAY {
             self.progress.report.state = State::Unconverged;
             return;
@@ -268,6 +288,17 @@ impl<'a> Track<'a> {
         let before = self.points.clone();
         self.go(space, &before, &ambient);
         self.before = Some((before, ambient));
+    }
+
+    /// From the beginning by the exact way: to where the flat way went astray the exact one may go astray, too.
+    fn begin_again(&mut self) {
+        (self.strays, self.before, self.retreats) = (0, None, 0);
+        (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
+        self.progress.forced = true;
+        if self.data.lam.is_none() {
+            (self.progress.settled, self.progress.lam, self.progress.report.rounds) = (false, None, 0);
+        }
+        self.points = self.first.clone();
     }
 
     /// J of the curve as it is.

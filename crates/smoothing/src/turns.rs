@@ -18,11 +18,16 @@ impl Turns {
     /// Of a curve whose last knot is the first again.
     pub fn of(data: &Data) -> Self {
         let period = data.knots[data.knots.len() - 1] - data.knots[0];
+        let count = data.times.len();
+        // Where the last turn ends the next one begins, so that no knot is without data that has some.
+        let with_next = |x: &[f64]| [&x.repeat(3)[..], &x[..x.len() / count]].concat();
+        let mut times = turns(data.times, period);
+        times.push(data.times[0] + 2.0 * period);
         Turns {
-            times: turns(data.times, period),
-            points: data.points.repeat(3),
-            weights: data.weights.repeat(3),
-            information: data.information.repeat(3),
+            times,
+            points: with_next(data.points),
+            weights: with_next(data.weights),
+            information: with_next(data.information),
             knots: knots(data.knots),
         }
     }

@@ -91,7 +91,7 @@ pub fn smooth<'py>(
             let mut before = None;
             for i in (0..n).filter(|&i| weights[i] > 0.0) {
                 match before {
-                    Some(k) if times[k] == times[i] && point(k) == point(i) => {
+                    Some(k) if times[k] == times[i] && same(point(k), point(i)) => {
                         if let Some(weight) = rows[2].last_mut() {
                             *weight += weights[i];
                         }
@@ -112,8 +112,9 @@ pub fn smooth<'py>(
             if ends.is_none()
                 && last > 0
                 && rows[0][last] - rows[0][0] == knots[count - 1] - knots[0]
-                && rows[1][last * len..] == rows[1][..len]
+                && same(&rows[1][last * len..], &rows[1][..len])
             {
+                rows[2][0] = rows[2][0].max(rows[2][last]);
                 for (row, size) in rows.iter_mut().zip([1, len, 1, entries]) {
                     row.truncate(last * size);
                 }
@@ -141,6 +142,13 @@ pub fn smooth<'py>(
         gathered(py, &[batch, &[count, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
     ))
+}
+
+/// Whether two arrays are copies, maybe written and read again.
+fn same(p: &[f64], q: &[f64]) -> bool {
+    const COPY: f64 = 1e-9;
+    let size = p.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    p.iter().zip(q).all(|(p, q)| (p - q).abs() <= COPY * size)
 }
 
 fn kind((name, _): &EndOf) -> PyResult<FlatEnd> {
@@ -192,6 +200,7 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
         State::Running | State::Unconverged => 1,
         State::NoCurve => 2,
         State::Undetermined => 3_i64,
+        State::Unsettled => 4,
     });
     let iterations = PyArray1::from_iter(py, reports.iter().map(|r| r.iterations as i64));
     let [lam, band_lam, freedom] = [column(|r| r.lam), column(|r| r.band_lam), column(|r| r.freedom)];

@@ -90,8 +90,9 @@ def make_smoothing_spline(
         loss: ``"linear"`` for least squares; ``"huber"`` or ``"cauchy"`` if there are outliers.
         method: ``"flat"`` solves the problem of numbers in frames along the curve, again and again, with the curvature
             of the space in its matrix where curves are nearly geodesic over long distances; its result is within
-            about 1e-4 of the error of the minimum. ``"newton"`` is the Gauss-Newton method for the minimum itself,
-            and much slower. ``"auto"`` takes the first, and the second where it converges slowly.
+            about 1e-4 of the error of the minimum, more where segments are long. ``"newton"`` is the Gauss-Newton
+            method for the minimum itself, and much slower. ``"auto"`` takes the first, and the second where it
+            converges slowly.
         tol: the search ends when no point moves by more than this part of its standard deviation.
         max_iter: most splines that are fitted.
         extrapolate, on_failure, atol, progress: as for `CubicSpline`.
@@ -233,16 +234,15 @@ def _with_enough(
     whole: Knots, noisy: Noisy, lams: list[Any], run: Callable[[Knots], list[Any]]
 ) -> tuple[list[Any], Knots]:
     """What is found with as many of the knots as λ and the degrees of freedom ask for; and these knots."""
-    given = [lam for lam in lams if np.isfinite(lam).any()]
-    at = sparse(whole, noisy, max((float(np.nanmax(lam)) for lam in given), default=None))
+    given = all(np.isfinite(lam).all() for lam in lams)
+    at = sparse(whole, noisy, _of_all(lams) if given else None)
     if at.times.shape[-1] > _MANY:
         at = some(at, _FIRST)
     for tries in range(_TRIES):
         found = run(at)
         count = at.times.shape[-1]
         known = [np.asarray(part.report.lam) for _, part, _ in found]
-        largest = max((float(np.nanmax(lam, initial=0.0)) for lam in known), default=0.0)
-        better = sparse(whole, noisy, largest)
+        better = sparse(whole, noisy, _of_all(known))
         most = 2 * max(enough(part.report.df) for _, part, _ in found)
         if better.times.shape[-1] > max(_MANY, most):
             better = some(better, max(_FIRST, most))
@@ -252,6 +252,14 @@ def _with_enough(
             break
         at = better
     return found, at
+
+
+def _of_all(lams: list[Any]) -> float:
+    """The λ by which knots are thinned that all curves have: as many as the roughest needs, if they are not too many
+    for the stiffest."""
+    flat = np.concatenate([np.ravel(lam) for lam in lams])
+    flat = flat[np.isfinite(flat)]
+    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
 
 
 def _carried(ends: list[End] | None, space: Space, data: Any, points: Any, noisy: Noisy) -> list[End] | None:

@@ -20,7 +20,7 @@ from .weighing import Weighing
 
 Doubles = NDArray[np.float64]
 
-_STATES = ("converged", "unconverged", "no curve", "undetermined")
+_STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
 class Smoothed(NamedTuple):
@@ -124,6 +124,11 @@ def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingRe
         )
     if state == "undetermined":
         return f"the data{of} do not determine the curve: with lam = 0 there are knots without data; give fewer knots"
+    if state == "unsettled":
+        return (
+            f"the smoothing{of} found no lam: it still moved after many rounds, last to "
+            f"{np.ravel(report.lam)[number]:.3g}; give lam, or another criterion"
+        )
     step = np.ravel(report.step)[number]
     return (
         f"no convergence of the smoothing{of}: a last step of {step:.1e} standard deviations after "

@@ -12,8 +12,8 @@ from ..failures import callers_level
 from ..spaces import Array, Space
 from .data import Noisy, points_of
 
-# Of squared distances. With noise of half a radian on spaces of two to six dimensions smoothing still finds the curve
-# and the quotient is below; of random points it is above, but where the curve follows them.
+# Of squared distances. Where smoothing still finds the curve, as with noise of half a radian on S², SO(3) or RP², the
+# quotient is below; of random points it is above, but where the curve follows them.
 _FAR = 0.5
 # So many data of a curve tell.
 _ENOUGH = 1000
@@ -32,11 +32,14 @@ def warn_of_spread(space: Space, curve: Curve, noisy: Noisy, dfs: list[Any]) -> 
         if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
             continue
         x = part.evaluate(at, "point", "raise", at.ndim > 1)
-        found = _median_distance(factor, x, own[chosen], weighing.weights[..., ::every] > 0)
+        found = _median_distance(factor, x, own[chosen], _counts(weighing.weights)[..., ::every])
         random = factor.random_point(np.random.default_rng(0), (2, _ENOUGH))
         expected = float(np.median(factor._apply("distance", p=random[0], q=random[1])))
-        count = np.sum(np.broadcast_to(weighing.weights > 0, (*noisy.batch, noisy.times.shape[-1])), axis=-1)
-        far = np.argwhere(found**2 * count > _FAR * expected**2 * (count - df))
+        count = np.sum(
+            np.broadcast_to(_counts(weighing.weights), (*noisy.batch, noisy.times.shape[-1])), axis=-1
+        )
+        # A curve through all data says nothing of noise.
+        far = np.argwhere((found**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1))
         if len(far):
             index = tuple(far[0])
             of = f" of curve {','.join(map(str, index))}" if index else ""
@@ -49,6 +52,11 @@ def warn_of_spread(space: Space, curve: Curve, noisy: Noisy, dfs: list[Any]) -> 
                 stacklevel=callers_level(),
             )
             return
+
+
+def _counts(weights: Array) -> Any:
+    """Which data have a weight beside that of others."""
+    return weights > 1e-6 * weights.max(axis=-1, keepdims=True)
 
 
 def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
