@@ -107,6 +107,42 @@ fn times_pure(q: Quaternion<Lane>, [x, y, z]: Vector<Lane>) -> Quaternion<Lane> 
     multiply(q, [Lane::ZERO, x, y, z])
 }
 
+/// pᵀp − 1
+fn defect(p: &[Lane; 9]) -> [Lane; 9] {
+    let square = transposed_times(p, p);
+    few(|i| if i.is_multiple_of(4) { square[i] - Lane::ONE } else { square[i] })
+}
+
+/// Replaces a matrix by the nearest rotation; returns how far it was. What is near takes the steps of Newton's method
+/// that [`polar`](symspline_core::matrix::polar) takes, and anything else the general page.
+pub fn nearest(general: &UnitaryGroup<1>, x: &mut [Lane]) -> Lane {
+    /// Up to here three steps are enough.
+    const NEAR: Lane = lane(1e-3);
+    let p: [Lane; 9] = matrix(x);
+    let d = defect(&p);
+    let mut off = dot(&d, &d).sqrt() * HALF;
+    let near = off.simd_le(NEAR);
+    let exact = off.simd_le(lane(6.0 * f64::EPSILON));
+    let mut q = p;
+    if !exact.all() {
+        for _ in 0..3 {
+            let step = times(&q, &defect(&q).each(|x| x * -HALF));
+            q = few(|i| q[i] + step[i]);
+        }
+    }
+    // A reflection is far from every rotation.
+    let reflection = dot(&p[..3], &cross([p[3], p[4], p[5]], [p[6], p[7], p[8]])).simd_lt(Lane::ZERO);
+    q = few(|i| reflection.select(lane(f64::NAN), exact.select(p[i], q[i])));
+    off = reflection.select(lane(f64::INFINITY), off);
+    if !near.all() {
+        let far = general.project(x);
+        q = few(|i| near.select(q[i], x[i]));
+        off = near.select(off, far);
+    }
+    x.copy_from_slice(&q);
+    off
+}
+
 impl Ambient for Rotations {
     fn point_len(&self) -> usize {
         9
@@ -153,7 +189,7 @@ impl Ambient for Rotations {
         self.general.inner(p, u, v)
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
-        self.general.project(x)
+        nearest(&self.general, x)
     }
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         self.general.project_tangent(p, v)

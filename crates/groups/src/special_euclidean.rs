@@ -6,6 +6,7 @@
 //! quaternion and a translation; the plane is that of x and y.
 
 use crate::rigid::{Motion, Twist, bracket, of_matrix, to_matrix};
+use crate::rotations;
 use crate::unitary::special_orthogonal;
 use std::f64::consts::PI;
 use symspline_core::matrix::Matrix;
@@ -193,7 +194,9 @@ impl Ambient for SpecialEuclidean {
     fn project(&self, x: &mut [Lane]) -> Lane {
         let n = self.n;
         let mut r: Vec<Lane> = (0..n * n).map(|c| x[c / n * (n + 1) + c % n]).collect();
-        let mut off = special_orthogonal(n).map_or(Lane::ZERO, |group| group.project(&mut r));
+        let mut off = special_orthogonal(n).map_or(Lane::ZERO, |group| {
+            if n == 3 { rotations::nearest(&group, &mut r) } else { group.project(&mut r) }
+        });
         for (c, r) in r.iter().enumerate() {
             x[c / n * (n + 1) + c % n] = *r;
         }
