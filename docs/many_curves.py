@@ -108,6 +108,7 @@ def seconds(call: Callable[[], Any]) -> tuple[float, float]:
 
 WAYS = (
     "one thread",
+    "one thread, block by block",
     "one thread of dask",
     "one worker process",
     "two threads",
@@ -121,8 +122,9 @@ def rates_table(count: int = 5 * CHUNK, rounds: int = 4, chunk: int = CHUNK) -> 
     with cluster(2) as client:
         columns = [_rates(work, make, count, rounds, chunk, client) for work, make in WORK.values()]
     rows = [[way, *(spaced(count / column[way][0]) for column in columns)] for way in WAYS]
-    costs = (column[WAYS[1]][1] / column[WAYS[0]][1] for column in columns)
-    rows.append(["processor time of dask's one thread : of one thread", *(f"{cost:.2f}" for cost in costs)])
+    blocks, of_dask = WAYS[1:3]
+    costs = (column[of_dask][1] / column[blocks][1] for column in columns)
+    rows.append([f"processor time of {of_dask} : of {blocks}", *(f"{cost:.2f}" for cost in costs)])
     return table(["curves per second", *WORK], rows)
 
 
@@ -153,6 +155,15 @@ def _rates(
         finally:
             ss.set_num_threads(0)
 
+    def block_by_block() -> None:
+        ss.set_num_threads(1)
+        try:
+            # As dask does, all curves are kept until the last are there.
+            kept = [work(plain.isel(curve=slice(i, i + chunk))) for i in range(0, count, chunk)]
+            kept.clear()
+        finally:
+            ss.set_num_threads(0)
+
     def threads(n: int) -> None:
         # As on the way to a store, blocks are not put together to one array.
         work(blocks).persist(scheduler="threads", num_workers=n)
@@ -161,6 +172,7 @@ def _rates(
         wait(client.persist(work(there[n - 1]), workers=crews[n - 1]))
 
     calls = [partial(call, n) for n in (1, 2) for call in (alone, threads, workers)]
+    calls.insert(1, block_by_block)
     found = [[seconds(call) for call in calls] for _ in range(rounds)]
     return {
         way: tuple(map(min, zip(*times, strict=True)))
