@@ -301,3 +301,22 @@ def test_double_precision_is_not_excused_by_single_precision_beside_it():
     with pytest.raises(ss.ValidationError, match=r"curve 1: .*off the space by"):
         ss.fit_many(curves, "sphere:2")
     assert len(ss.fit_many([(None, off.astype(np.float32)), (None, good)], "sphere:2")) == 2
+
+
+def test_the_nearest_rotation_is_the_factor_of_the_polar_decomposition():
+    """By the singular value decomposition (Kabsch 1976), near and far, whatever the neighbours are."""
+    rng, space = np.random.default_rng(3), ss.space("so:3")
+    rotations = space.random_point(rng, 60)
+    sizes = np.repeat([1e-15, 1e-12, 1e-8, 1e-5, 3e-4, 2e-3, 1e-2, 0.1, 0.3, 0.5], 6)
+    given = rotations + sizes[:, None, None] * rng.uniform(-1, 1, (60, 3, 3))
+    given = given[rng.permutation(60)]
+    u, _, v = np.linalg.svd(given)
+    found = space.project(given)
+    np.testing.assert_allclose(found, u @ v, rtol=0, atol=4e-15)
+    alone = np.stack([space.project(x) for x in given])
+    np.testing.assert_array_equal(alone, found)
+    poses = np.zeros((60, 4, 4))
+    poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = given, rng.normal(size=(60, 3)), 1
+    np.testing.assert_array_equal(ss.space("se:3").project(poses)[:, :3, :3], found)
+    with pytest.raises(ss.ValidationError, match="reflection"):
+        space.check_point(-rotations[0])
