@@ -1,8 +1,8 @@
 //! How smooth: λ from the data.
 //!
 //! At a curve with residuals r and accelerations a the smoothing problem in frames is one of numbers, whose solution
-//! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`. Its residuals and degrees of freedom for eight λ at
-//! a time cost one banded solve.
+//! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`, or with [`Curved`] energy by the same with
+//! `(S + RP)ᵀMa`. Its residuals and degrees of freedom for eight λ at a time cost one banded solve.
 
 use crate::curved::Curved;
 use crate::flat::{Flat, times_mass};
@@ -102,7 +102,7 @@ impl<'a> Linear<'a> {
         factors.solve(m, &mut x);
         let freedom = self.misfit.freedom(flat, &factors.inverse_band());
         let rss = self.misfit.rss(flat, m, &x);
-        // (a + Sδ)ᵀM(a + Sδ)
+        // (a + Sδ)ᵀM(a + Sδ), with Jacobi's operator (a + (S + RP)δ)ᵀM(a + (S + RP)δ).
         let mut energy = Lane::ZERO;
         let bend = |i: usize, c: usize| {
             let turned = self.curved.map_or(Lane::ZERO, |curved| curved.of_lanes(flat, i, &x, c));

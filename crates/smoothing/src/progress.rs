@@ -140,7 +140,7 @@ impl Progress {
         // Groups without a metric have no K.
         let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
         self.report.kappa = k * k * square * (lam / self.density).sqrt();
-        self.curved |= self.report.kappa > SLOW && m.pow(3).saturating_mul(knots) <= COUPLED;
+        self.curved |= self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
     }
 
     /// λ, degrees of freedom and noise of the curve as it is.

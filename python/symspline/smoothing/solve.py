@@ -123,7 +123,10 @@ def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingRe
             "give a larger lam, fewer knots, or check units and signs of the data"
         )
     if state == "undetermined":
-        return f"the data{of} do not determine the curve: with lam = 0 there are knots without data; give fewer knots"
+        return (
+            f"the data{of} do not determine the curve: with lam = 0 each knot needs some beside it, give fewer knots; "
+            "else weights differ by more than doubles can add"
+        )
     if state == "unsettled":
         return (
             f"the smoothing{of} found no lam: it still moved after many rounds, last to "
