@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 MARKERS = ("o", "^", "s")
-SEA, RED = "#bcd9ee", "#c0392b"
+SEA, SAND, RED = "#bcd9ee", "#f3c98b", "#c0392b"
 COLOURS = {"fixed-point": "#1f5fa8", "quasi-newton": "#2f8f5b", "newton": RED}
 
 
@@ -35,6 +35,14 @@ def roots(kd: Array, kv: Array) -> tuple[Array, Array, Array]:
     return kd[some], kv[first[some]], kv[last[some]]
 
 
+def contraction(kd: Array, kv: Array) -> Array:
+    """The bound of the contraction of Algorithm 1 where legs are at most V (docs/convergence.md)."""
+    ku = kd + 2 * kv
+    stretch = np.sinh(kv) / kv
+    own = (2 - ku / np.tan(ku)) * stretch - 1 + ku * (np.cosh(kv) - 1) / kv
+    return np.where(ku < np.pi, (ku / np.sin(ku) * stretch + own) / 2, np.inf)
+
+
 def region(found: Mapping[str, Points]) -> Figure:
     """The paper's Figure 10 with measurements: near the region of (38), and everywhere."""
     figure = Figure(figsize=(10, 4.6), layout="constrained")
@@ -43,17 +51,20 @@ def region(found: Mapping[str, Points]) -> Figure:
     for ax in (near, everywhere):
         ax.fill_between(kd, low, high, color=SEA, linewidth=0, zorder=0)
         ax.plot(kd, low, color="#31688e", linewidth=1, zorder=1)
+        grid = np.meshgrid(np.linspace(1e-4, 0.75, 300), np.linspace(1e-4, 0.6, 300))
+        ax.contourf(*grid, contraction(*grid), levels=[0, 1], colors=[SAND], alpha=0.6, zorder=0)
         for points, marker in zip(found.values(), MARKERS, strict=False):
             dots = _draw(ax, points, marker)
         ax.set(xlabel="K D", ylabel="K V")
         ax.spines[["top", "right"]].set_visible(False)
     near.set(xlim=(0, 0.36), ylim=(0, 1), title="Where Theorem 3.1 speaks")
-    near.text(0.04, 0.6, "(38) holds", fontsize=10, color="#31688e")
+    near.text(0.04, 0.6, "(38) holds: legs stay below V", fontsize=10, color="#31688e")
+    near.text(0.2, 0.12, "α < 1: sweeps contract", fontsize=10, color="#9a5b00")
     near.text(0.12, 0.01, "longest legs of the solutions", fontsize=9, color="#333333")
     everywhere.set(xlim=(0, 3.1), ylim=(0, 2.1), title="Everywhere")
     for name, marker in zip(found, MARKERS, strict=False):
         everywhere.scatter([], [], marker=marker, s=18, color="#777777", label=name)
-    everywhere.scatter([], [], marker="x", s=22, color=RED, label="not in 2000 sweeps")
+    everywhere.scatter([], [], marker="x", s=22, color=RED, label="not in 10 000 sweeps")
     everywhere.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(0.1, 1.0))
     figure.colorbar(dots, ax=[near, everywhere], label="contraction of the residual per sweep", shrink=0.9)
     return figure

@@ -95,9 +95,11 @@ def _measured(space, t, p, u, controls, residual, closed):
     pace = space.distance(ends[:, :, 0], ends[:, :, 1]) / h
     speed = np.maximum(space.norm(p, u).max(axis=1), 1e-3 * pace.max(axis=1))
     velocity = np.zeros(len(t))
-    for at, vectors in ((ends, legs), (place, rate)):
+    # At its end a segment's velocity has the derivative of a logarithm, which grows once more near the cut locus.
+    rounding_of_rates = rounding * np.maximum(near[:, before], near[:, behind])
+    for at, vectors, noise in ((ends, legs, rounding), (place, rate, rounding_of_rates)):
         jump = jumps(space, at, vectors, before, behind)
-        allowed = 1e-12 * space.norm(at, vectors).max(axis=(1, 2))[:, None] + rounding / shorter
+        allowed = 1e-12 * space.norm(at, vectors).max(axis=(1, 2))[:, None] + noise / shorter
         velocity = np.maximum(velocity, (jump / allowed).max(axis=1, initial=0.0))
     found.append(velocity)
     # What the residual is defined by: the jump is six times it, times the speed and 1/h + 1/h, and S(v)⁻¹
@@ -106,9 +108,9 @@ def _measured(space, t, p, u, controls, residual, closed):
     at = stretch[:, before, 1] * stretch[:, behind, 0]
     weight = speed[:, None] * (1 / h[:, before] + 1 / h[:, behind]) * at
     jump = jumps(space, place, bend, before, behind)
-    # And so does the acceleration, once more.
-    rounding = rounding * np.maximum(near[:, before], near[:, behind])
-    allowed = 12 * np.maximum(residual, 64 * EPS)[:, None] * weight + at * rounding / shorter**2
+    # The acceleration has its second derivative.
+    noise = rounding_of_rates * np.maximum(near[:, before], near[:, behind])
+    allowed = 12 * np.maximum(residual, 64 * EPS)[:, None] * weight + at * noise / shorter**2
     found.append((jump / allowed).max(axis=1, initial=0.0))
     found.append(_bezier(space, t, p, u, controls) / (100 * EPS * inner).max(axis=1))
     return found

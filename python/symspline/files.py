@@ -17,7 +17,7 @@ from .curves.fit import curve_of, read_ends
 from .handed import NO_ZONE, UTC_ZONE
 from .hermite import HermiteSpline
 from .options import checked_policy
-from .report import Report, longest_gap
+from .report import OPTIONAL, Report, longest_gap
 from .smoothing import SmoothingSpline
 from .smoothing.stored import read_stored
 from .spaces import Array, Product, Space, factors_of
@@ -281,17 +281,17 @@ def _check(space: Space, points: Array, velocities: Array, converged: Any) -> No
         raise ValidationError("velocities are not tangent")
 
 
-# Of the report, what need not be known.
-_MAYBE = ("invariant_radius", "alternative_energy")
 _DTYPES = {"b": np.bool_, "i": np.int64, "f": np.float64}
 
 
 def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int, ...]) -> Report:
-    numbers = dict.fromkeys(("residual", "max_step", "curvature", "rate", *_MAYBE), "f")
+    numbers = dict.fromkeys(("residual", "max_step", "curvature", "rate", *OPTIONAL), "f")
     kinds = {"converged": "b", "iterations": "i"} | numbers
+    if not batch:
+        kinds["guaranteed_sweeps"] = "i"
 
     def column(key: str, value: Any) -> Any:
-        if key not in kinds or (key in _MAYBE and value is None):
+        if key not in kinds or (key in OPTIONAL and value is None):
             return value
         shape = () if key == "curvature" else batch
         # Of no curves a list does not tell what it is of.
@@ -304,4 +304,5 @@ def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int,
     if not isinstance(plain["method"], str):
         raise ValidationError(f"the report's method is {shown(plain['method'])}")
     columns = {key: column(key, value) for key, value in plain.items()}
+    columns["skipped"] = tuple(map(str, plain.get("skipped", ())))
     return Report(max_gap=longest_gap(times, batch), **columns)

@@ -37,14 +37,23 @@ class Report:
         max_gap: the longest time between neighbouring points, in seconds for dates.
         curvature: K of (22).
         invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so
-            (Theorem 3.1). None where the theorem says nothing, which is normal for points far apart, for
+            (Theorem 3.1). None where the theorem does not apply, which is normal for points far apart, for
             unequal knots and other ends than natural ones and given velocities; NaN for such a curve of a
             batch. In a product the legs in every factor stay below the radius there, and together below the root
             of the sum of their squares, which is this.
+        contraction_bound: a bound α < 1 on the contraction of Algorithm 1 per sweep in that region, in the largest
+            length of a velocity. With it the region holds exactly one C² curve, and Algorithm 1 converges to it from
+            zero velocities. None (NaN in a batch) where the theorem does not apply, or K D > 0.26058. Of a product, the
+            largest of its factors.
+        guaranteed_sweeps: the number of sweeps of Algorithm 1 after which all ‖h u/3‖ are, by this bound, within
+            ``tol`` times ``invariant_radius`` of those of the curve. None (NaN in a batch) where there is no bound.
         rate: mean contraction of the residual per iteration.
         alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
             found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
             batch. Through the points of a product another curve has the alternative of one factor.
+        skipped: solvers that ``"auto"`` left out, or stopped early, because they would have cost too much; of a batch
+            those of any curve. The search for other curves costs at most a few times what the first curve cost, or a
+            fixed budget that is generous up to ten dimensions. With ``method=`` any solver runs to its end.
     """
 
     method: str
@@ -57,6 +66,9 @@ class Report:
     invariant_radius: Number | None
     rate: Number
     alternative_energy: Number | None = None
+    contraction_bound: Number | None = None
+    guaranteed_sweeps: Number | None = None
+    skipped: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -104,6 +116,9 @@ class Report:
             known(self.invariant_radius),
             function(self.rate),
             known(self.alternative_energy),
+            known(self.contraction_bound),
+            _count(known(self.guaranteed_sweeps)),
+            self.skipped,
         )
 
 
@@ -121,6 +136,23 @@ def _same(a: Any, b: Any) -> bool:
 # As the compiled core numbers them, in the order in which they are tried.
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
 
+Columns = dict[str, NDArray[Any]]
+"""The fields of a report as arrays over the curves, ``"solver"`` as a number in `SOLVERS`, ``"skipped"`` as a set of
+bits."""
+_INTEGERS = ("iterations", "solver", "skipped")
+_NUMBERS = ("residual", "max_step", "rate")
+# NaN where they are not known.
+OPTIONAL = ("invariant_radius", "contraction_bound", "guaranteed_sweeps", "alternative_energy")
+
+
+def empty_columns(count: int) -> Columns:
+    """The columns of so many curves that were not fitted."""
+    return {
+        "converged": np.zeros(count, bool),
+        **{name: np.zeros(count, np.int64) for name in _INTEGERS},
+        **{name: np.full(count, np.nan) for name in (*_NUMBERS, *OPTIONAL)},
+    }
+
 
 def combined(
     reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None
@@ -132,11 +164,13 @@ def combined(
         result: NDArray[Any] = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
         return result.item() if result.ndim == 0 else result
 
-    # The theorem is about each factor by itself.
-    radii = [report.invariant_radius for report in reports if report.invariant_radius is not None]
-    together = len(radii) == len(reports)
-    radius: Any = np.sqrt(np.sum(np.square(np.stack(radii)), axis=0))[()] if together else None
+    def of_all(name: str, whole: Any) -> Any:
+        # The theorem is about each factor by itself.
+        each = [getattr(report, name) for report in reports]
+        return None if any(one is None for one in each) else whole(np.stack(each))[()]
+
     converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
+    skipped = {name for report in reports for name in report.skipped}
     return Report(
         method=max((report.method for report in reports), key=SOLVERS.index),
         converged=bool(converged) if np.ndim(converged) == 0 else converged,
@@ -145,9 +179,12 @@ def combined(
         max_step=max_step,
         max_gap=largest("max_gap"),
         curvature=curvature,
-        invariant_radius=radius,
+        invariant_radius=of_all("invariant_radius", lambda own: np.sqrt(np.sum(np.square(own), axis=0))),
         rate=largest("rate"),
         alternative_energy=alternative_energy,
+        contraction_bound=of_all("contraction_bound", lambda own: np.max(own, axis=0)),
+        guaranteed_sweeps=_count(of_all("guaranteed_sweeps", lambda own: np.max(own, axis=0))),
+        skipped=tuple(name for name in SOLVERS if name in skipped),
     )
 
 
@@ -158,29 +195,32 @@ def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
 
 
 def shaped(
-    columns: tuple[NDArray[Any], ...],
-    times: NDArray[np.float64],
-    batch: tuple[int, ...],
-    curvature: float,
-    method: str,
+    columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], curvature: float, method: str
 ) -> Report:
-    """A report from the compiled core's columns, of curves with these knots; ``method`` is what was asked for."""
+    """A report from the columns of curves with these knots; ``method`` is what was asked for."""
     gap = longest_gap(times, batch)
     if batch == ():
-        converged, iterations, residual, max_step, rate, last, radius, other = [c.item() for c in columns]
-        return Report(
-            SOLVERS[last],
-            converged,
-            iterations,
-            residual,
-            max_step,
-            gap,
-            curvature,
-            None if math.isnan(radius) else radius,
-            rate,
-            None if math.isnan(other) else other,
-        )
-    converged, iterations, residual, max_step, rate, solvers, *rest = [c.reshape(batch) for c in columns]
+        one = {name: column.item() for name, column in columns.items()}
+        solver, bits = one.pop("solver"), one.pop("skipped")
+        for name in OPTIONAL:
+            if math.isnan(one[name]):
+                one[name] = None
+        one["guaranteed_sweeps"] = _count(one["guaranteed_sweeps"])
+        return Report(method=SOLVERS[solver], max_gap=gap, curvature=curvature, skipped=_skipped(bits), **one)
+    many: dict[str, Any] = {name: column.reshape(batch) for name, column in columns.items()}
+    solvers, sets = many.pop("solver"), many.pop("skipped")
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
-    radius, other = (None if np.isnan(column).all() else column for column in rest)
-    return Report(used, converged, iterations, residual, max_step, gap, curvature, radius, rate, other)
+    for name in OPTIONAL:
+        if np.isnan(many[name]).all():
+            many[name] = None
+    bits = int(np.bitwise_or.reduce(sets, axis=None))
+    return Report(method=used, max_gap=gap, curvature=curvature, skipped=_skipped(bits), **many)
+
+
+def _count(value: Any) -> Any:
+    """A whole number of one curve; arrays, which may hold NaN, stay floats."""
+    return value if value is None or np.ndim(value) else int(value)
+
+
+def _skipped(bits: int) -> tuple[str, ...]:
+    return tuple(name for i, name in enumerate(SOLVERS) if bits >> i & 1) if bits else ()

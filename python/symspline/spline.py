@@ -49,19 +49,21 @@ class CubicSpline(Piecewise):
             pair with one of ``"natural"``, ``"clamped"``, ``"not-a-knot"``, ``(1, velocity)``,
             ``(2, acceleration)`` for either end. The paper's clamped spline is ``((1, v0), (1, vN))``.
             Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
-        method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1), ``"homotopy"`` (the
-            curve that is continued from near points), or ``"auto"``: quasi-Newton, for curves that it leaves Newton's
-            method, and then the homotopy. Points far apart (steps beyond 0.6 of the way to the cut locus) may have
-            several C² curves: of those that it, the homotopy and a trust region lead to, it keeps the one that bends
-            least. `Report.method` says which was used.
+        method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1, literally), ``"homotopy"``
+            (the curve that is continued from near points), or ``"auto"``: quasi-Newton, then Newton's method and the
+            homotopy for curves that did not converge. Points far apart (steps beyond 0.6 of the way to the cut locus,
+            or beyond 0.4 where quasi-Newton is slow) may have several C² curves. Then ``"auto"`` also runs Algorithm 1,
+            all other solvers and a trust region within a budget, and keeps the solution with the lowest bending energy.
+            `Report.method` names the solver that found it.
         tol: largest relative C² defect that counts as converged, see `Report.residual`.
         max_iter: largest number of iterations; None for the method's own.
         extrapolate: what happens outside the knots: None raises (and wraps for periodic curves), True
             continues the last segment, ``"geodesic"`` goes on with constant velocity, ``"periodic"`` wraps.
         on_failure: what happens when a curve does not converge or meets a cut locus: ``"raise"``,
             ``"warn"`` or ``"ignore"``. The exception's ``.spline`` holds all good curves; an unconverged
-            curve keeps its best iterate, a curve with a cut-locus fault is NaN. With the last two a curve of a batch
-            with an invalid point (NaN, not positive definite, off the space) is NaN, too, and the others are fitted.
+            curve keeps its best iterate (with ``method="fixed-point"`` its last one), a curve with a cut-locus fault
+            is NaN. With ``"warn"`` and ``"ignore"``, a curve of a batch with an invalid point (NaN, not positive
+            definite, off the space) is NaN, too, and the others are fitted.
         where: True for the curves of a batch that are wanted, shape of the batch axes: the others are NaN, whatever
             their points are, and no work is done for them.
         check: whether to validate the input.

@@ -17,7 +17,7 @@ def cells(table):
 def test_zigzag_table():
     (near, far) = cells(solvers.zigzag_table((0.2, 2.5)))
     assert near[0] == "0.2" and near[-1] == "quasi-newton" and near[2] == near[4]
-    assert far[2] == "none in 300" and far[-1] == "trust-region"
+    assert far[2] == "none in 300" and far[-1] == "fixed-point"
 
 
 def test_walk_table_counts_walks(monkeypatch):
@@ -37,6 +37,13 @@ def test_calm_table(monkeypatch):
     (row,) = cells(solvers_calm.calm_table(3))
     # Of no set of points another method finds a calmer curve.
     assert row[0] == "walks of 0.5" and row[2] == "0" and row[3].startswith("0 of ") and float(row[4]) <= 1.05
+
+
+def test_spaces_table(monkeypatch):
+    monkeypatch.setattr(solvers_calm, "SPACES", ("gr:2,4", "spd:3"))
+    for row in cells(solvers_calm.spaces_table(4)):
+        # Where Algorithm 1 converges, so does auto, and to no curve that bends more.
+        assert int(row[1]) <= int(row[5]) and row[6] == "0" and float(row[7]) <= 1.001
 
 
 def test_uneven_table(monkeypatch):
@@ -84,7 +91,7 @@ def test_figures_are_drawn(tmp_path):
 
 def test_the_page_has_a_place_for_every_table():
     text = solvers.PAGE.read_text(encoding="utf-8")
-    for part in ("zigzags", "walks", "calm", "uneven", "knots", "time"):
+    for part in ("zigzags", "walks", "calm", "spaces", "uneven", "knots", "time"):
         assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1
     for name in ("solvers_region.png", "solvers_residuals.png"):
         assert name in text and (solvers.HERE / name).stat().st_size < 200_000

@@ -1,4 +1,4 @@
-"""The region of Theorem 3.1 that Algorithm 1 does not leave: what a report says of it, and whether it holds."""
+"""Theorem 3.1 with numbers: the region that Algorithm 1 does not leave, and its contraction there."""
 
 import pickle
 
@@ -95,6 +95,112 @@ def test_algorithm_1_stays_within(name, kd, ends, rng):
         assert done.report.converged and done.report.rate < 0.6
         assert done.report.invariant_radius == radius
         assert longest_leg(space, p, done.velocities) <= radius
+
+
+# ---- the contraction ----
+
+
+def alpha(kd, kv):
+    """The bound of the contraction, written anew from the derivation in docs/convergence.md."""
+    ku = kd + 2 * kv
+    stretch = np.sinh(kv) / kv
+    neighbours = ku / np.sin(ku) * stretch
+    own = (2 - ku / np.tan(ku)) * stretch - 1 + ku * (np.cosh(kv) - 1) / kv
+    return (neighbours + own) / 2
+
+
+@pytest.mark.parametrize("kd", [1e-3, 0.1, 0.2, 0.25, 0.2605])
+def test_bound_of_the_contraction(kd, rng):
+    report = ss.CubicSpline(None, steps(S2, kd, rng), S2).report
+    assert report.contraction_bound == pytest.approx(
+        alpha(report.max_step, report.invariant_radius), rel=1e-12
+    )
+    expected = {0.1: 0.533, 0.2: 0.665, 0.25: 0.857}.get(kd)
+    assert expected is None or report.contraction_bound == pytest.approx(expected, abs=1e-3)
+    assert report.guaranteed_sweeps == np.ceil(np.log(1e-12) / np.log(report.contraction_bound))
+
+
+def test_bound_ends_before_the_region_does(rng):
+    # α = 1 at KD = 0.26058, and (38) has a solution up to 0.26109.
+    report = ss.CubicSpline(None, steps(S2, 0.2608, rng), S2).report
+    assert report.invariant_radius is not None
+    assert report.contraction_bound is None and report.guaranteed_sweeps is None
+
+
+def row_of_jacobian(space, p, v, step=1e-5):
+    """Operator norms of the derivatives of φ₁ of (17) by v₀, v₁ and v₂, by central differences."""
+    frames = space.frame(p)
+    e = space.transvection
+
+    def phi(v):
+        ahead = space.log(p[1], e(p[1], -v[1], e(p[2], -v[2], p[2])))
+        behind = space.log(p[1], e(p[1], v[1], e(p[0], v[0], p[0])))
+        return (ahead - behind) / 4 + v[1] / 2
+
+    norms = []
+    for j in range(3):
+        columns = []
+        for k in range(space.dim):
+            moved = [np.array(v), np.array(v)]
+            moved[0][j] = moved[0][j] + step * frames[j, k]
+            moved[1][j] = moved[1][j] - step * frames[j, k]
+            change = (phi(moved[0]) - phi(moved[1])) / (2 * step)
+            columns.append([space.inner(p[1], frames[1, i], change) for i in range(space.dim)])
+        norms.append(np.linalg.norm(np.array(columns).T, 2))
+    return norms
+
+
+@pytest.mark.parametrize("name", ["sphere:3", "su:3", "cgr:2,4", "spd:3", "gr:2,4", "cp:1", *CURVED])
+@pytest.mark.parametrize("kd", [0.02, 0.2, 0.26])
+def test_jacobian_is_within_the_bound(name, kd, rng):
+    space = ss.space(name)
+    d = kd / space.curvature
+    report = ss.CubicSpline(None, steps(space, kd, rng), space).report
+    radius, bound = report.invariant_radius, report.contraction_bound
+    largest = 0.0
+    for trial in range(8):
+        p0 = base_point(space, rng)
+        u = unit_tangent(space, p0, rng)
+        middle = space.exp(p0, d * u)
+        # Every other time straight on, with velocities along the chord or across it, where curvature counts most.
+        straight = space.transport(p0, middle, u)
+        turn = straight if trial % 2 else unit_tangent(space, middle, rng)
+        p = np.array([p0, middle, space.exp(middle, d * turn)])
+        v = np.array([radius * unit_tangent(space, q, rng) for q in p])
+        if trial % 4 == 1:
+            v = radius * np.array([-u, straight, -space.transport(p[1], p[2], turn)])
+        norms = row_of_jacobian(space, p, v)
+        largest = max(largest, sum(norms))
+        ends = 0.5 * (2 * kd) / np.sin(2 * kd)
+        assert norms[0] <= bound and norms[2] <= bound and ends < 1
+    assert largest <= bound * (1 + 1e-8)
+    assert largest >= 0.48
+
+
+def test_bound_is_nearly_attained_on_the_sphere(rng):
+    # Velocities along a great circle, against its direction, make both ω as long as D + 2V.
+    d = 0.2
+    report = ss.CubicSpline(None, steps(S2, d, rng), S2).report
+    v, bound = report.invariant_radius, report.contraction_bound
+    p = np.array([[np.cos(d * i), np.sin(d * i), 0.0] for i in (-1, 0, 1)])
+    along = np.array([[-np.sin(d * i), np.cos(d * i), 0.0] for i in (-1, 0, 1)])
+    best = 0.0
+    for signs in np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T:
+        best = max(best, sum(row_of_jacobian(S2, p, v * signs[:, None] * along)))
+    assert 0.86 * bound <= best <= bound
+
+
+@pytest.mark.parametrize("name", CURVED)
+@pytest.mark.parametrize("kd", [0.01, 0.2, 0.255])
+def test_guaranteed_sweeps_are_enough(name, kd, rng):
+    space = ss.space(name)
+    p = steps(space, kd, rng)
+    exact = ss.CubicSpline(None, p, space).velocities
+    for tol in (1e-3, 1e-7):
+        report = ss.CubicSpline(None, p, space, tol=tol).report
+        options = {"method": "fixed-point", "tol": 0.0, "on_failure": "ignore"}
+        spline = ss.CubicSpline(None, p, space, max_iter=report.guaranteed_sweeps + 1, **options)
+        assert longest_leg(space, p, spline.velocities - exact) <= tol * report.invariant_radius
 
 
 # ---- when there is one ----

@@ -30,6 +30,9 @@ FIELDS = [
     "invariant_radius",
     "rate",
     "alternative_energy",
+    "contraction_bound",
+    "guaranteed_sweeps",
+    "skipped",
 ]
 
 

@@ -7,7 +7,7 @@ use crate::validate;
 use crate::watch::watched;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::PyDict;
 use symspline::fit::{End, Ends, Method, Options, Problem, Report, Solver, Status, fit as solve};
 use symspline::space::Ambient;
 
@@ -15,12 +15,12 @@ type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A kind, and the vectors that it prescribes: one a curve.
 pub type EndOf<'py> = (String, Option<Array<'py>>);
 
-/// What a fit gives back: points on the space, velocities, the arrays of the report, and per failed
+/// What a fit gives back: points on the space, velocities, the columns of the report, and per failed
 /// curve (index, kind, message).
 type Fitted<'py> = (
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyTuple>,
+    Bound<'py, PyDict>,
     Vec<(usize, &'static str, String)>,
 );
 
@@ -107,13 +107,13 @@ pub fn fit<'py>(
     }
     if dry {
         drop((out_write, velocities_write));
-        return Ok((out, velocities, arrays(py, &[])?, Vec::new()));
+        return Ok((out, velocities, columns(py, &[])?, Vec::new()));
     }
     let reports =
         watched(py, progress, nodes, |monitor| solve(&handle.space.get(), &problem, &options, monitor, u))?;
     let faults = faults(handle, &options, &reports, &batch);
     drop((out_write, velocities_write));
-    Ok((out, velocities, arrays(py, &reports)?, faults))
+    Ok((out, velocities, columns(py, &reports)?, faults))
 }
 
 pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
@@ -131,15 +131,33 @@ fn length(x: f64) -> String {
     if x < 1e6 { format!("{x:.3}") } else { format!("{x:.3e}") }
 }
 
-/// The report's columns: converged, iterations, residual, max_step, rate, solver, invariant_radius, alternative.
-fn arrays<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyTuple>> {
-    let column = |f: fn(&Report) -> f64| PyArray1::from_iter(py, reports.iter().map(f));
-    let converged = PyArray1::from_iter(py, reports.iter().map(|r| r.status == Status::Converged));
-    let iterations = PyArray1::from_iter(py, reports.iter().map(|r| r.iterations as i64));
-    let solver = PyArray1::from_iter(py, reports.iter().map(|r| r.solver as i64));
-    let [residual, step, rate] = [column(|r| r.residual), column(|r| r.max_step), column(|r| r.rate)];
-    let [radius, alternative] = [column(|r| r.invariant_radius), column(|r| r.alternative)];
-    (converged, iterations, residual, step, rate, solver, radius, alternative).into_pyobject(py)
+/// The columns of the report by name, one number for each curve.
+fn columns<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyDict>> {
+    let columns = PyDict::new(py);
+    let converged = reports.iter().map(|r| r.status == Status::Converged);
+    columns.set_item("converged", PyArray1::from_iter(py, converged))?;
+    type Column<T> = (&'static str, fn(&Report) -> T);
+    let integers: [Column<i64>; 3] = [
+        ("iterations", |r| r.iterations as i64),
+        ("solver", |r| r.solver as i64),
+        ("skipped", |r| i64::from(r.skipped.0)),
+    ];
+    for (name, column) in integers {
+        columns.set_item(name, PyArray1::from_iter(py, reports.iter().map(column)))?;
+    }
+    let numbers: [Column<f64>; 7] = [
+        ("residual", |r| r.residual),
+        ("max_step", |r| r.max_step),
+        ("rate", |r| r.rate),
+        ("invariant_radius", |r| r.invariant_radius),
+        ("contraction_bound", |r| r.contraction_bound),
+        ("guaranteed_sweeps", |r| r.guaranteed_sweeps),
+        ("alternative_energy", |r| r.alternative),
+    ];
+    for (name, column) in numbers {
+        columns.set_item(name, PyArray1::from_iter(py, reports.iter().map(column)))?;
+    }
+    Ok(columns)
 }
 
 fn faults(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from ..arrays import as_array
+from ..report import empty_columns
 from ..spaces import Array, Space, factors_of
 from .ends import End
 from .fit import Asked, Fit, Points, finished, first_faults, fit, fit_many, solve_factors
@@ -204,19 +205,15 @@ def _left_out(space: Space, points: Points) -> Solved:
     count = math.prod(points.batch)
     shape = (*points.batch, points.nodes, *space.point_shape)
     places, velocities = (np.full(shape, np.nan, space.dtype) for _ in range(2))
-    # As the core writes them: converged, iterations, residual, longest step, rate, solver, radius,
-    # energy of another curve.
-    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(8)]
-    columns[0], columns[1], columns[5] = (np.zeros(count, kind) for kind in (bool, np.int64, np.int64))
-    return Solved(places, velocities, tuple(columns), [])
+    return Solved(places, velocities, empty_columns(count), [])
 
 
 def _place_some(whole: Solved, found: Solved, chosen: Numbers) -> None:
     """Curves at their places in the whole batch."""
     for all_rows, rows in ((whole.points, found.points), (whole.velocities, found.velocities)):
         all_rows.reshape(-1, *rows.shape[1:])[chosen] = rows
-    for column, own in zip(whole.columns, found.columns, strict=True):
-        column[chosen] = own
+    for name, column in whole.columns.items():
+        column[chosen] = found.columns[name]
 
 
 def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:

@@ -180,7 +180,11 @@ def fit_many(
         own = slice(start, stop)
         reports = [
             shaped(
-                tuple(c[i : i + 1] for c in found.columns), times[i], (), task.space.curvature, options.method
+                {name: column[i : i + 1] for name, column in found.columns.items()},
+                times[i],
+                (),
+                task.space.curvature,
+                options.method,
             )
             for task, found in zip(tasks, solved, strict=True)
         ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from ..manifolds import Manifold
 from ..manifolds.condition import End, Legs, Problem, legs_of, not_a_knot
 from ..manifolds.frames import frames_along
 from ..manifolds.iteration import FLOOR, iterate
-from ..report import SOLVERS
+from ..report import SOLVERS, Columns, empty_columns
 from ..spaces import Array
 from .curve import Doubles
 from .solve import Options, Progress, Solved, Task
@@ -37,8 +36,9 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
     faults = _far(space, lengths, "points[{0}] and points[{1}]", batch)
     good = np.array([i for i in range(count) if i not in faults], np.int64)
     velocities = np.full(p.shape, np.nan, space.dtype)
-    columns = _no_columns(count)
-    columns[3][good] = lengths[good].max(axis=1)
+    columns = empty_columns(count)
+    columns["residual"][:], columns["solver"][:] = np.inf, SOLVERS.index("quasi-newton")
+    columns["max_step"][good] = lengths[good].max(axis=1)
     if good.size:
         ends = _ends(task, h, p)
         problem = Problem(operations, h, p, frames_along(operations, p), ends).some(good)
@@ -48,41 +48,30 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
                 node = 0 if which == 0 else nodes - 1
                 start[:, node] = problem.coordinates(end.vector[:, None], slice(node, node + 1))[:, 0]
         scale = np.abs(p[good]).reshape(good.size, -1).max(axis=1)
-        longest = columns[3][good]
+        longest = columns["max_step"][good]
         floor = np.maximum(FLOOR, _ROUNDING * scale / np.where(longest > 0, longest, 1.0))
         pace = (lengths[good] / h[good]).max(axis=1)
         advance = None if progress is None else partial(_report, progress, nodes, count)
         found = iterate(problem, start, pace, floor, options.tol, options.max_iter, advance)
         velocities[good] = found.velocities
-        for column, own in zip(
-            (0, 1, 2, 4), (found.converged, found.iterations, found.residual, found.rate), strict=True
-        ):
-            columns[column][good] = own
+        for name in ("converged", "iterations", "residual", "rate"):
+            columns[name][good] = getattr(found, name)
         legs = legs_of(operations, problem.h, problem.p, found.velocities)
         faults |= _unfit(space, problem, legs, good, found.converged, columns, options, batch)
         for i in faults:
             if faults[i][0] == "cut-locus":
                 velocities[i] = np.nan
-                columns[0][i], columns[2][i] = False, np.inf
+                columns["converged"][i], columns["residual"][i] = False, np.inf
     return Solved(
         points,
         velocities.reshape(points.shape),
-        tuple(columns),
+        columns,
         [(i, *faults[i]) for i in sorted(faults)],
     )
 
 
 def _report(progress: Progress, nodes: int, count: int, finished: int) -> object:
     return progress(finished * nodes, count * nodes)
-
-
-def _no_columns(count: int) -> list[NDArray[Any]]:
-    """As the compiled core writes them: converged, iterations, residual, longest step, rate, solver, radius."""
-    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(8)]
-    columns[0], columns[1] = np.zeros(count, bool), np.zeros(count, np.int64)
-    columns[2] = np.full(count, np.inf)
-    columns[5] = np.full(count, SOLVERS.index("quasi-newton"))
-    return columns
 
 
 def _ends(task: Task, h: Doubles, p: Array) -> list[End] | None:
@@ -128,7 +117,7 @@ def _unfit(
     legs: Legs,
     good: NDArray[np.int64],
     converged: NDArray[np.bool_],
-    columns: list[NDArray[Any]],
+    columns: Columns,
     options: Options,
     batch: tuple[int, ...],
 ) -> dict[int, tuple[str, str]]:
@@ -148,8 +137,9 @@ def _unfit(
         elif not converged[number]:
             faults[i] = (
                 "unconverged",
-                f"no convergence{_of(i, batch)}: residual {columns[2][i]:.3e} after {columns[1][i]} iterations (tol "
-                f"{options.tol:.1e}, longest step {columns[3][i]:.3f}); put more points where steps are long, choose "
+                f"no convergence{_of(i, batch)}: residual {columns['residual'][i]:.3e} after "
+                f"{columns['iterations'][i]} iterations (tol {options.tol:.1e}, longest step "
+                f"{columns['max_step'][i]:.3f}); put more points where steps are long, choose "
                 "times that suit the distances, or raise max_iter; exp, log and dlog must fit each other",
             )
     return faults

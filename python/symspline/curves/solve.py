@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..report import Columns
 from ..spaces import Array, Space
 from .ends import End
 
@@ -59,7 +60,7 @@ class Solved(NamedTuple):
 
     points: Array
     velocities: Array
-    columns: tuple[NDArray[Any], ...]
+    columns: Columns
     faults: list[Fault]
 
 
@@ -102,11 +103,10 @@ def one_by_one(
         for i, found in enumerate(each)
         for _, kind, why in found.faults
     ]
-    columns = zip(*(found.columns for found in each), strict=True)
     return Solved(
         task.space._numbers(task.points),
         np.concatenate([found.velocities[0] for found in each]),
-        tuple(map(np.concatenate, columns)),
+        {name: np.concatenate([found.columns[name] for found in each]) for name in each[0].columns},
         faults,
     )
 

@@ -1,19 +1,20 @@
 //! Which solver runs: the one asked for, or one after the other until one converges.
 
+use super::budget::{self, Costs, left};
 use super::chain::Chain;
 use super::ends::ChainEnds;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use super::{Method, Options, Solver};
-use super::{calm, homotopy};
+use super::{calm, fixed_point, homotopy};
 use crate::monitor::Monitor;
-use crate::scalar::Lane;
+use crate::scalar::{Lane, few, lane};
 use crate::space::Erased;
 
-/// Sweeps of the quasi-Newton iteration by itself.
-pub const PATIENT: usize = 300;
-/// Sweeps after which it hands over, and steps of Newton's method.
-const QUICK: usize = 120;
-const NEWTON: usize = 50;
+/// Residuals after which the quasi-Newton iteration hands over, and steps of Newton's method.
+const QUICK: f64 = 120.0;
+pub const NEWTON: f64 = 50.0;
+/// Steps of Newton's method by itself.
+const NEWTON_ALONE: f64 = 100.0;
 
 /// Where Newton's method starts.
 #[derive(Clone, Copy)]
@@ -33,62 +34,76 @@ pub fn run(
     work: &mut Workspace,
     monitor: &Monitor,
 ) -> Outcome {
-    let (solver, most) = match options.method {
+    let limits =
+        |most: f64| Limits { tol: options.tol, max_iter: lane(options.max_iter.map_or(most, |n| n as f64)) };
+    match options.method {
         Method::Auto => {
-            let mut outcome = in_turn(space, chain, ends, options, idle, work, monitor);
+            let costs = Costs::of(space, chain, ends);
+            let (mut outcome, first) = in_turn(space, chain, ends, options, &costs, idle, work, monitor);
             // Pieces of one curve must not choose apart.
             if whole {
-                calm::settle(space, chain, ends, options, idle, work, monitor, &mut outcome);
+                calm::settle(space, chain, ends, options, &costs, first, idle, work, monitor, &mut outcome);
             }
-            return outcome;
+            outcome
         }
         Method::Homotopy => {
             let mut outcome = Outcome::none(Solver::Homotopy);
-            homotopy::follow(space, chain, ends, options, idle, work, monitor, &mut outcome);
-            return outcome;
+            homotopy::follow(space, chain, ends, limits(f64::INFINITY), idle, work, monitor, &mut outcome);
+            outcome
         }
-        Method::FixedPoint => (Solver::FixedPoint, 2000),
-        Method::QuasiNewton => (Solver::QuasiNewton, PATIENT),
-        Method::Newton => (Solver::Newton, 100),
-    };
-    let limits = Limits { tol: options.tol, max_iter: options.max_iter.unwrap_or(most) };
-    solve(space, chain, ends, solver, limits, idle, work, monitor)
+        Method::FixedPoint => {
+            fixed_point::solve(space, chain, ends, limits(budget::SWEEPS_ALONE), idle, work, monitor)
+        }
+        Method::QuasiNewton => {
+            let limits = limits(budget::PATIENT);
+            solve(space, chain, ends, Solver::QuasiNewton, limits, idle, work, monitor)
+        }
+        Method::Newton => {
+            solve(space, chain, ends, Solver::Newton, limits(NEWTON_ALONE), idle, work, monitor)
+        }
+    }
 }
 
 /// Quasi-Newton, then Newton from its iterate, then the homotopy from flat space, each on the lanes that the one
-/// before left.
+/// before left. Also returns the work on each lane.
 fn in_turn(
     space: &Erased,
     chain: &mut Chain,
     ends: &ChainEnds,
     options: &Options,
+    costs: &Costs,
     idle: Lane,
     work: &mut Workspace,
     monitor: &Monitor,
-) -> Outcome {
-    let left = |used: usize| options.max_iter.map(|n| n.saturating_sub(used));
-    let within = |most: usize, used: usize| Limits {
-        tol: options.tol,
-        max_iter: left(used).map_or(most, |n| n.min(most)).max(1),
+) -> (Outcome, Lane) {
+    let within = |rest: Lane, most: f64| Limits { tol: options.tol, max_iter: rest.min(lane(most)) };
+    // Where Newton's method costs too much, there is nothing to hand over to.
+    let most = if costs.can_rescue(NEWTON) { QUICK } else { budget::PATIENT };
+    let limits = within(left(options, &Default::default()), most);
+    let mut outcome = solve(space, chain, ends, Solver::QuasiNewton, limits, idle, work, monitor);
+    let quick = outcome.iterations;
+    let spent = |outcome: &Outcome| {
+        Lane::new(few(|l| quick[l] as f64 + (outcome.iterations[l] - quick[l]) as f64 * costs.step))
     };
-    let mut outcome = solve(space, chain, ends, Solver::QuasiNewton, within(QUICK, 0), idle, work, monitor);
-    let over =
-        |o: &Outcome| o.settled(idle).all() || left(o.used()).is_some_and(|n| n == 0) || monitor.poll();
     // From where that came to, and from zero: near the cut locus either may lead away.
     for start in [Start::Here, Start::Zero] {
-        if over(&outcome) {
-            return outcome;
+        let rest = left(options, &outcome.iterations);
+        let done = outcome.settled(idle) | rest.simd_le(Lane::ZERO);
+        if done.all() || !costs.can_rescue(NEWTON) || monitor.poll() {
+            return (outcome.clone(), spent(&outcome));
         }
-        let (before, settled) = (chain.unknowns().to_vec(), outcome.settled(idle));
+        let before = chain.unknowns().to_vec();
         if let Start::Zero = start {
-            chain.update(space, |_, u| u.iter_mut().for_each(|u| *u = settled.select(*u, Lane::ZERO)));
+            chain.update(space, |_, u| u.iter_mut().for_each(|u| *u = done.select(*u, Lane::ZERO)));
         }
-        let limits = within(NEWTON, outcome.used());
-        let tried = solve(space, chain, ends, Solver::Newton, limits, settled, work, monitor);
-        outcome.take(space, chain, &before, &tried, !settled);
+        let limits = within(rest, NEWTON);
+        let tried = solve(space, chain, ends, Solver::Newton, limits, done, work, monitor);
+        outcome.take(space, chain, &before, &tried, !done);
     }
-    if !over(&outcome) {
-        homotopy::follow(space, chain, ends, options, idle, work, monitor, &mut outcome);
+    if !outcome.settled(idle).all() && !monitor.poll() {
+        let limits = within(left(options, &outcome.iterations), (costs.for_rescue() / costs.step).floor());
+        homotopy::follow(space, chain, ends, limits, idle, work, monitor, &mut outcome);
     }
-    outcome
+    let spent = spent(&outcome);
+    (outcome, spent)
 }

@@ -1,4 +1,6 @@
-//! What Theorem 3.1 proves: a region that Algorithm 1 does not leave.
+//! Theorem 3.1 with numbers: a region that Algorithm 1 does not leave, and by how much it contracts there.
+//!
+//! `docs/convergence.md` derives both bounds.
 
 /// Spacings whose quotients are this close to one are equal.
 const EQUAL: f64 = 1e-9;
@@ -24,6 +26,32 @@ pub fn invariant_radius(step: f64, curvature: f64, v: f64) -> Option<f64> {
     }
     let largest = root(d, 0.5 * (std::f64::consts::PI - d) * (1.0 - 1e-9), -1.0)?;
     (v <= largest).then_some(v / curvature)
+}
+
+/// A bound α < 1 of the contraction of Algorithm 1 per sweep, in the largest length of a velocity, on the region
+/// ‖v‖ ≤ V for steps up to D and the curvature K of (22); `None` where there is none.
+///
+/// With K = 1 and U = D + 2V ≥ ‖ω‖, (37), the derivatives of φᵢ by its two neighbours are at most
+/// ½ (U/sin U)(sinh V/V) together (Proposition C.3). By Lemma C.5 those by ξᵢ are the two operators
+/// ¼ (1 − ad_ω coth(ad_ω) sinh(ad_ξ)/ad_ξ − ad_ω (cosh(ad_ξ) − 1)/ad_ξ), and the series with the absolute values of the
+/// coefficients of x coth x is 2 − x cot x. Natural ends (20) have ½ (2V/sin 2V)(sinh V/V), which is less.
+pub fn contraction_bound(step: f64, curvature: f64, radius: f64) -> Option<f64> {
+    let (v, u) = (curvature * radius, curvature * (step + 2.0 * radius));
+    if u >= std::f64::consts::PI {
+        return None;
+    }
+    // x/sin x and x cot x; sinh x/x and (cosh x − 1)/x.
+    let (over_sin, cot) = if u == 0.0 { (1.0, 1.0) } else { (u / u.sin(), u / u.tan()) };
+    let (sinh, cosh) = if v == 0.0 { (1.0, 0.0) } else { (v.sinh() / v, 2.0 * (0.5 * v).sinh().powi(2) / v) };
+    let neighbours = over_sin * sinh;
+    let own = (2.0 - cot) * sinh - 1.0 + u * cosh;
+    Some(0.5 * (neighbours + own)).filter(|&alpha| alpha < 1.0)
+}
+
+/// The sweeps of Algorithm 1 from zero velocities after which all control legs are within `tol` times V of those of the
+/// spline, which are at most V: the first k with αᵏ ≤ `tol`, which is taken to be no less than rounding.
+pub fn guaranteed_sweeps(alpha: f64, tol: f64) -> f64 {
+    (tol.clamp(f64::EPSILON, 1.0).ln() / alpha.ln()).ceil()
 }
 
 /// A root x = KV of ½ u/sin u (d + x) − x with u = d + 2x, by Newton's method. The function is convex: from
@@ -56,7 +84,7 @@ fn root(d: f64, mut x: f64, side: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::invariant_radius;
+    use super::{contraction_bound, guaranteed_sweeps, invariant_radius};
 
     #[test]
     fn the_largest_step_is_that_of_the_literature() {
@@ -79,6 +107,20 @@ mod tests {
             };
             assert!(excess(v) <= 1e-14 * v && excess(v * (1.0 - 1e-6)) > 0.0);
         }
+    }
+
+    #[test]
+    fn the_contraction_is_that_of_the_derivation() {
+        let alpha = |d: f64| contraction_bound(d, 1.0, invariant_radius(d, 1.0, 0.0).unwrap());
+        for (d, expected) in [(0.1, 0.533), (0.2, 0.665), (0.25, 0.857)] {
+            assert!((alpha(d).unwrap() - expected).abs() < 1e-3);
+        }
+        // The bound reaches 1 a little before the region ends.
+        assert!(alpha(0.26058).is_some() && alpha(0.26059).is_none());
+        // In flat space the iteration contracts by one half.
+        assert_eq!(contraction_bound(3.0, 0.0, 3.0), Some(0.5));
+        assert_eq!(guaranteed_sweeps(0.5, 1e-12), 40.0);
+        assert_eq!(guaranteed_sweeps(0.5, 0.0), 52.0);
     }
 
     #[test]

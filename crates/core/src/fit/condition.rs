@@ -33,8 +33,8 @@ pub struct Defect {
 pub struct NodeVectors<S> {
     pub(super) a: Vec<S>,
     pub(super) b: Vec<S>,
-    left: Vec<S>,
-    right: Vec<S>,
+    pub(super) left: Vec<S>,
+    pub(super) right: Vec<S>,
     next_left: Vec<S>,
 }
 
@@ -45,7 +45,7 @@ impl<S> Default for NodeVectors<S> {
 }
 
 impl<S: Scalar> NodeVectors<S> {
-    fn resize(&mut self, m: usize) {
+    pub(super) fn resize(&mut self, m: usize) {
         for vector in [&mut self.a, &mut self.b, &mut self.left, &mut self.right, &mut self.next_left] {
             vector.resize(m, S::constant(Lane::ZERO));
         }

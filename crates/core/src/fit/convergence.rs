@@ -122,9 +122,12 @@ impl Best {
     }
 
     /// Keeps iterates that are better than what was kept; near the start only if there is no more to come.
-    pub fn keep(&mut self, iteration: usize, max_iter: usize, unknowns: &[Lane], state: &Convergence) {
-        let better = state.now.simd_lt(self.residual) & !state.done;
-        if (iteration <= EASY && max_iter > EASY) || better.none() {
+    pub fn keep(&mut self, iteration: usize, max_iter: Lane, unknowns: &[Lane], state: &Convergence) {
+        let mut better = state.now.simd_lt(self.residual) & !state.done;
+        if iteration <= EASY {
+            better &= max_iter.simd_le(lane(EASY as f64));
+        }
+        if better.none() {
             return;
         }
         if self.u.is_empty() {

@@ -71,15 +71,15 @@ impl<'a> End<'a> {
 }
 
 /// One of the ends of a chain of n segments: its node and the neighbour, the segment between them, and the next one.
-struct Place {
-    node: usize,
-    next: usize,
-    near: usize,
-    far: usize,
+pub(super) struct Place {
+    pub node: usize,
+    pub next: usize,
+    pub near: usize,
+    pub far: usize,
 }
 
 impl Place {
-    fn of(which: usize, n: usize) -> Self {
+    pub fn of(which: usize, n: usize) -> Self {
         if which == 0 {
             Place { node: 0, next: 1, near: 0, far: 1.min(n - 1) }
         } else {
@@ -192,7 +192,7 @@ impl<S: Scalar> NotAKnot<S> {
 
 impl NotAKnot<Lane> {
     /// `S(d₀) c'(t₀)`
-    fn velocity<S: Scalar>(&self, space: &Erased, d0: &[Lane], d1: &[Lane], u1: &[S], out: &mut [S]) {
+    pub fn velocity<S: Scalar>(&self, space: &Erased, d0: &[Lane], d1: &[Lane], u1: &[S], out: &mut [S]) {
         for c in 0..u1.len() {
             out[c] = u1[c] * self.u + (self.near * d0[c] + self.far * d1[c]);
         }

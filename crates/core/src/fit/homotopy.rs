@@ -4,10 +4,10 @@
 //! λ = 1 it is the one asked for; Newton's method follows it in between. Points that are far apart have
 //! several splines; this one is continued from points that are near.
 
+use super::Solver;
 use super::chain::Chain;
 use super::ends::ChainEnds;
 use super::solve::{Limits, Outcome, Workspace, solve};
-use super::{Options, Solver};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, lane, mask_from};
 use crate::space::{Erased, Origin};
@@ -25,14 +25,18 @@ pub fn follow(
     space: &Erased,
     chain: &mut Chain,
     ends: &ChainEnds,
-    options: &Options,
+    limits: Limits,
     idle: Lane,
     work: &mut Workspace,
     monitor: &Monitor,
     outcome: &mut Outcome,
 ) {
     let idle = outcome.settled(idle);
-    let left = options.max_iter.map(|n| n.saturating_sub(outcome.used()));
+    // On the way curves need not be exact.
+    let within = |used: Lane, most: usize, tol: f64| Limits {
+        tol: limits.tol.max(tol),
+        max_iter: (limits.max_iter - used).min(lane(most as f64)),
+    };
     let (chords, values) = (chain.chord.clone(), chain.end_values.clone());
     let best = chain.unknowns().to_vec();
     // Where each lane is, how far it goes next, and the last two curves with their λ.
@@ -40,20 +44,19 @@ pub fn follow(
     let mut curves = [vec![Lane::ZERO; best.len()], vec![Lane::ZERO; best.len()]];
     let mut places = [Lane::ZERO; 2];
     let mut lost = Lane::ZERO;
-    let mut used = 0;
+    let mut used = Lane::ZERO;
     loop {
+        lost |= limits.max_iter.simd_le(used) & !idle;
         let done = idle | lost | at.simd_ge(Lane::ONE);
-        let budget = left.map_or(CORRECTIONS, |n| n.saturating_sub(used).min(CORRECTIONS));
-        if done.all() || budget == 0 || monitor.poll() {
+        if done.all() || monitor.poll() {
             break;
         }
         let goal = (at + ahead).min(Lane::ONE);
         scale(space, chain, &chords, &values, goal);
         chain.update(space, |_, u| predict(u, &curves, places, goal));
-        // On the way curves need not be exact.
-        let limits = Limits { tol: options.tol.max(LOOSE), max_iter: budget };
-        let found = solve(space, chain, ends, Solver::Homotopy, limits, done, work, monitor);
-        used += found.iterations.iter().max().copied().unwrap_or(0);
+        let within = within(used, CORRECTIONS, LOOSE);
+        let found = solve(space, chain, ends, Solver::Homotopy, within, done, work, monitor);
+        used += done.select(Lane::ZERO, Lane::new(found.iterations.map(|n| n as f64)));
         let reached = mask_from(|l| found.converged[l]) & !done;
         let failed = !reached & !done;
         for (i, u) in chain.unknowns().iter().enumerate() {
@@ -70,18 +73,17 @@ pub fn follow(
     }
     // The end of the way to the tolerance asked for, from what was reached.
     scale(space, chain, &chords, &values, Lane::ONE);
-    let arrived = at.simd_ge(Lane::ONE) & !idle;
+    let arrived = at.simd_ge(Lane::ONE) & limits.max_iter.simd_gt(used) & !idle;
     chain.update(space, |_, u| {
         for ((u, b), c) in u.iter_mut().zip(&best).zip(&curves[1]) {
             *u = arrived.select(*c, *b);
         }
     });
-    let budget = left.map_or(2 * CORRECTIONS, |n| n.saturating_sub(used).min(2 * CORRECTIONS));
-    if arrived.none() || budget == 0 {
+    if arrived.none() {
         return;
     }
-    let limits = Limits { tol: options.tol, max_iter: budget };
-    let last = solve(space, chain, ends, Solver::Homotopy, limits, !arrived, work, monitor);
+    let within = within(used, 2 * CORRECTIONS, 0.0);
+    let last = solve(space, chain, ends, Solver::Homotopy, within, !arrived, work, monitor);
     outcome.take(space, chain, &best, &last, arrived);
 }
 

@@ -109,10 +109,11 @@ fn fit_in(
             max_step: steps[l],
             rate: rate[l],
             solver: outcome.solver[l],
-            invariant_radius: f64::NAN,
             alternative: alternative[l],
             almost_cut: almost_cut[l].map(|(index, angle)| (p.first + index, angle)),
+            skipped: outcome.skipped[l],
             condition: condition[l],
+            ..Report::default()
         };
         p.end_leg = given[l];
     }

@@ -2,6 +2,7 @@
 
 mod auto;
 mod blocks;
+mod budget;
 mod calm;
 mod certificate;
 mod chain;
@@ -26,6 +27,7 @@ pub use blocks::Blocks;
 pub use chain::{Chain, Run, Visit};
 pub use condition::{Defect, NodeVectors, sweep, sweep_by_table};
 pub use ends::{ChainEnds, EndKind, NotAKnot};
+pub use solve::SolverSet;
 
 use crate::monitor::Monitor;
 use crate::scalar::{Lane, lane};
@@ -179,11 +181,17 @@ pub struct Report {
     pub solver: Solver,
     /// The smallest V of (38), NaN where Theorem 3.1 says nothing.
     pub invariant_radius: f64,
+    /// A bound of the contraction of Algorithm 1 per sweep on that region, NaN where there is none.
+    pub contraction_bound: f64,
+    /// After so many sweeps Algorithm 1 is within the tolerance, NaN where there is no bound.
+    pub guaranteed_sweeps: f64,
     /// The least energy ∫ |∇γ'|² dt of other C² curves through the points that were found, NaN where none was.
     pub alternative: f64,
     /// The first point from which the next one lies almost at the cut locus, within 1e-5 of the limit, and the deciding
     /// angle.
     pub almost_cut: Option<(usize, f64)>,
+    /// Solvers that `auto` left out because they would have cost too much.
+    pub skipped: SolverSet,
     /// By how much rounding errors may grow over its chords.
     condition: f64,
 }
@@ -198,8 +206,11 @@ impl Default for Report {
             rate: 0.0,
             solver: Solver::FixedPoint,
             invariant_radius: f64::NAN,
+            contraction_bound: f64::NAN,
+            guaranteed_sweeps: f64::NAN,
             alternative: f64::NAN,
             almost_cut: None,
+            skipped: SolverSet::default(),
             condition: 1.0,
         }
     }

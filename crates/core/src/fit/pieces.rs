@@ -4,7 +4,7 @@
 //! 0.27 a node on equal knots, and ½ at worst on any, so that a piece is exact to rounding a few dozen nodes from
 //! its ends. That neighbouring pieces agree is checked; where they do not, the overlap grows.
 
-use super::certificate::{equally_spaced, invariant_radius};
+use super::certificate::{contraction_bound, equally_spaced, guaranteed_sweeps, invariant_radius};
 use super::lanes::fit_lanes;
 use super::{End, Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
@@ -150,6 +150,7 @@ fn merge(
             report.solver = report.solver.max(r.solver);
             report.condition = report.condition.max(r.condition);
             report.almost_cut = report.almost_cut.or(r.almost_cut);
+            report.skipped = report.skipped.union(r.skipped);
             if report.status == Status::Converged {
                 report.status = r.status;
             }
@@ -179,8 +180,14 @@ fn merge(
         let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
         if known && equally_spaced(problem.knots(curve)) {
             let leg = same.iter().map(|p| p.end_leg).fold(0.0, f64::max);
-            let radius = invariant_radius(report.max_step, space.curvature(), leg);
-            report.invariant_radius = radius.unwrap_or(f64::NAN);
+            let curvature = space.curvature();
+            if let Some(radius) = invariant_radius(report.max_step, curvature, leg) {
+                report.invariant_radius = radius;
+                if let Some(alpha) = contraction_bound(report.max_step, curvature, radius) {
+                    report.contraction_bound = alpha;
+                    report.guaranteed_sweeps = guaranteed_sweeps(alpha, options.tol);
+                }
+            }
         }
         reports[curve] = report;
     }

@@ -1,4 +1,4 @@
-//! The iteration that the solvers share: residual, convergence lane by lane, step.
+//! The iteration that quasi-Newton and Newton share: residual, convergence lane by lane, step.
 
 use super::chain::Chain;
 use super::condition::{NodeVectors, residual};
@@ -9,7 +9,7 @@ use super::line_search::{LineSearch, halve};
 use super::newton::{self, Newton};
 use super::quasi_newton::{self, Anderson};
 use super::tridiagonal::Tridiagonal;
-use super::{Solver, Status, fixed_point};
+use super::{Solver, Status};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, few, lane, mask_bits, mask_from};
 use crate::space::{Ambient, Erased};
@@ -22,8 +22,15 @@ const LEG_LIMIT: f64 = 0.95;
 pub struct Limits {
     /// Largest residual that counts as converged.
     pub tol: f64,
-    /// Largest number of residual evaluations.
-    pub max_iter: usize,
+    /// Largest number of residual evaluations of each lane.
+    pub max_iter: Lane,
+}
+
+impl Limits {
+    /// The lanes that may not go on after so many residual evaluations.
+    pub fn reached(&self, iteration: usize) -> Lane {
+        self.max_iter.simd_le(lane(iteration as f64))
+    }
 }
 
 /// How eight iterations ended.
@@ -45,12 +52,26 @@ pub struct Outcome {
     pub solver: [Solver; LANES],
     /// The least energy of other curves that were found, in the units of the chain; NaN where none was.
     pub alternative: Lane,
+    /// Solvers that would have cost too much.
+    pub skipped: [SolverSet; LANES],
+}
+
+/// A set of solvers, one bit for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SolverSet(pub u8);
+
+impl SolverSet {
+    /// The solvers of either set.
+    pub fn union(self, other: Self) -> Self {
+        SolverSet(self.0 | other.0)
+    }
 }
 
 impl Outcome {
     /// How an iteration ended, whose last iterate the chain has.
-    pub fn of(space: &Erased, chain: &mut Chain, state: &Convergence, solver: Solver) -> Self {
-        let fault = long_legs(space, chain, state.leg, state.converged);
+    /// Control points are checked on the lanes of `suspect`.
+    pub fn of(space: &Erased, chain: &mut Chain, state: &Convergence, solver: Solver, suspect: Lane) -> Self {
+        let fault = long_legs(space, chain, state.leg, suspect);
         let converged = mask_bits(state.converged);
         Outcome {
             iterations: state.iterations,
@@ -61,6 +82,7 @@ impl Outcome {
             rate: state.rate(),
             solver: [solver; LANES],
             alternative: lane(f64::NAN),
+            skipped: Default::default(),
         }
     }
 
@@ -87,6 +109,7 @@ impl Outcome {
             rate: Lane::ZERO,
             solver: [solver; LANES],
             alternative: lane(f64::NAN),
+            skipped: Default::default(),
         }
     }
 
@@ -95,9 +118,11 @@ impl Outcome {
         idle | mask_from(|l| self.converged[l])
     }
 
-    /// The most residual evaluations of any lane.
-    pub fn used(&self) -> usize {
-        self.iterations.iter().max().copied().unwrap_or(0)
+    /// Notes a solver that would cost too much on some lanes.
+    pub fn leave_out(&mut self, solver: Solver, lanes: Lane) {
+        for (skipped, _) in self.skipped.iter_mut().zip(mask_bits(lanes)).filter(|(_, on)| *on) {
+            skipped.0 |= 1 << solver as u8;
+        }
     }
 
     /// Takes over what a further solver found on some lanes, or goes back to what was there where that is
@@ -140,7 +165,7 @@ impl Outcome {
 /// Memory of a solve, reused from fit to fit.
 #[derive(Default)]
 pub struct Workspace {
-    t: Tridiagonal,
+    pub(super) t: Tridiagonal,
     pub(super) vectors: NodeVectors<Lane>,
     anderson: Anderson,
     pub(super) newton: Newton,
@@ -149,7 +174,8 @@ pub struct Workspace {
     best: Best,
 }
 
-/// Iterates on the unknowns of a chain until every lane is done. Lanes in `idle` are left alone.
+/// Iterates on the unknowns of a chain until every lane is done: Newton's method, or with `Solver::QuasiNewton` the
+/// quasi-Newton iteration. Lanes in `idle` are left alone.
 pub fn solve(
     space: &Erased,
     chain: &mut Chain,
@@ -173,26 +199,24 @@ pub fn solve(
     for iteration in 1.. {
         let found = residual(space, chain, ends, vectors);
         state.note(iteration, found, chain.pace);
-        if state.done.all() || iteration >= limits.max_iter || monitor.poll() {
+        best.keep(iteration, limits.max_iter, chain.unknowns(), &state);
+        state.leave(limits.reached(iteration));
+        if state.done.all() || monitor.poll() {
             state.end();
             break;
         }
-        best.keep(iteration, limits.max_iter, chain.unknowns(), &state);
 
         let done = state.done;
         let worse = search.judge(iteration, found.defect, anderson.active(), done);
         if !worse.all() {
             match solver {
-                Solver::FixedPoint => fixed_point::update(chain, t, next_step),
-                Solver::Newton | Solver::Homotopy | Solver::TrustRegion => {
-                    newton::update(space, chain, ends, newton, next_step);
-                }
                 Solver::QuasiNewton => {
                     quasi_newton::update(space, chain, ends, t, next_step);
                     if iteration > 1 {
                         anderson.mix(search.contraction, worse, chain.unknowns(), next_step);
                     }
                 }
+                _ => newton::update(space, chain, ends, newton, next_step),
             }
         }
         if worse.any() {
@@ -212,5 +236,6 @@ pub fn solve(
         });
     }
     best.restore(space, chain, idle, &mut state);
-    Outcome::of(space, chain, &state, solver)
+    let converged = state.converged;
+    Outcome::of(space, chain, &state, solver, converged)
 }

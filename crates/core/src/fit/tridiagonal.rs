@@ -13,7 +13,7 @@ use crate::with_size;
 /// which are safe too: their first pivot is 1/h₀ + 1/h₁).
 #[derive(Default)]
 pub struct Tridiagonal {
-    /// Diagonal, also what Algorithm 1 divides by.
+    /// Diagonal, also the divisor of Algorithm 1.
     pub diagonal: Vec<Lane>,
     lower: Vec<Lane>,
     upper: Vec<Lane>,

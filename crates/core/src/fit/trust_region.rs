@@ -76,8 +76,8 @@ pub fn solve(
         let grown = part.simd_gt(lane(GOOD)) & length.simd_gt(radius * lane(0.99));
         radius = shrunk.select(length * lane(POOR), grown.select(radius * lane(2.0), radius));
         state.note(iteration, defect, chain.pace);
-        state.leave(radius.simd_le(least));
-        if state.done.all() || iteration >= limits.max_iter || monitor.poll() {
+        state.leave(radius.simd_le(least) | limits.reached(iteration));
+        if state.done.all() || monitor.poll() {
             state.end();
             break;
         }
@@ -96,7 +96,8 @@ pub fn solve(
         });
     }
     chain.update(space, |_, u| u.copy_from_slice(&here));
-    Outcome::of(space, chain, &state, Solver::TrustRegion)
+    let converged = state.converged;
+    Outcome::of(space, chain, &state, Solver::TrustRegion, converged)
 }
 
 /// What the defect of a node is multiplied by to make it a velocity.
