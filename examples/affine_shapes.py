@@ -4,8 +4,8 @@ Affine shapes without coordinates (Figs. 7–9)
 
 §4.3 of the paper: four sets of four landmarks in the plane. Up to affine maps each is a point of the Grassmannian
 Gr(2, 3), and a closed spline goes through (A)–(B)–(C)–(D)–(A). The paper gives the method and draws the
-landmarks, but not their coordinates. We chose these so that, as there, the landmarks 0, 1 and 3 of (C) lie on a line, and
-so that the curve crosses the rim of the disc in Fig. 8.
+landmarks, but not their coordinates. We chose these so that, as there, the landmarks 0, 1 and 3 of (C) lie on a line,
+and so that the curve crosses the rim of the disc in Fig. 8.
 """
 
 import matplotlib.pyplot as plt

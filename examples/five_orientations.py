@@ -53,7 +53,7 @@ out = ss.rotations.quaternion(spline, x, scalar_first=False)
 print(f"largest step of a component: {np.abs(np.diff(out, axis=0)).max():.3f}")
 
 # %%
-# The paper fits unit quaternions on S³ itself. That needs signs such that neighbours are near: then it is the same curve,
+# The paper fits unit quaternions on S³ itself. With signs such that neighbours are near it is the same curve,
 # up to the sign of the quaternions, because S³ covers SO(3) twice and geodesics go to geodesics.
 
 wxyz = np.roll(quaternions, 1, axis=1)

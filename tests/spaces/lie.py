@@ -30,8 +30,7 @@ class Lie:
     def __init__(self, space):
         self.space = space
         form = np.ones(space.point_shape[0])
-        if isinstance(space, (ss.Hyperbolic, ss.ComplexHyperbolic)):
-            form[0] = -1.0
+        form[list(getattr(space, "_negative", ()))] = -1.0
         self.form = np.diag(form)
 
     def noise(self, rng, *shape):

@@ -310,6 +310,30 @@ def test_lemma_a6_distance_of_logarithms(name, size, rng):
         assert ratios[-1] >= 0.999
 
 
+# ---- appendix B ----
+
+
+@every
+def test_equation_29_is_the_c2_condition(name, rng):
+    """T I_p(log_{q⁺} q⁻_{i+1}) = −log_{q⁻} q⁺_{i−1} − 2 log_{q⁻} p at the knots of a spline, by its control points."""
+    s = Setting(name, rng)
+    space, points = s.space, [s.p]
+    for _ in range(2):
+        points.append(space.exp(points[-1], 0.3 * s.scale * s.vector(points[-1])))
+    controls = ss.CubicSpline(None, points, space, tol=1e-14).control_points
+    p, (before, minus), (plus, after) = points[1], controls[0, 1:3], controls[1, 1:3]
+
+    def image(h):
+        x = space.symmetry(p, space.exp(plus, h * space.log(plus, after)))
+        return space.exp(minus, space.log(minus, x)) if h else minus
+
+    left = derivative(image, space, 0.3)
+    right = -space.log(minus, before) - 2 * space.log(minus, p)
+    assert space.norm(minus, left - right) <= DIFFERENCES * s.scale
+    # The curve bends at its middle point.
+    assert space.dim == 1 or space.norm(minus, left) > 1e-3 * s.scale
+
+
 # ---- appendix C ----
 
 

@@ -70,7 +70,7 @@ class Preserving(Space):
     # Entries of J that are −1; the others are 1.
     _negative: tuple[int, ...] = ()
 
-    def _form(self) -> NDArray[np.float64]:
+    def _signs(self) -> NDArray[np.float64]:
         signs = np.ones(self.point_shape[0])
         signs[list(self._negative)] = -1.0
         return signs
@@ -78,7 +78,7 @@ class Preserving(Space):
     def _reflected(self, p: Array, x: Array) -> Any:
         # 2P − 1 with the projection P = p (p*Jp)⁻¹ p*J onto p; p*Jp is 1, −1 or the unit matrix.
         if len(self.point_shape) == 1:
-            dual = p.conj() * self._form()
+            dual = p.conj() * self._signs()
             square = np.sign(np.sum(dual * p, axis=-1, keepdims=True).real)
             return 2 * square * np.sum(dual * x, axis=-1, keepdims=True) * p - x
         return 2 * p @ (adjoint(p) @ x) - x
@@ -87,10 +87,10 @@ class Preserving(Space):
         size = self.point_shape[0]
         g, tol = matrices(self, g, size, self._dtype)
         if self._negative:
-            remedy = "Pass a matrix with g*Jg = J, J = diag(−1, 1, …, 1)."
+            remedy = f"Pass a matrix with g*Jg = J, J = diag({'−1, ' * len(self._negative)}1, …, 1)."
         else:
             remedy = "Pass a matrix with orthonormal columns, such as numpy.linalg.qr(g)[0]."
-        preserves(self, g, np.diag(self._form()), tol, remedy)
+        preserves(self, g, np.diag(self._signs()), tol, remedy)
         return g
 
     def _moved(self, g: Array, x: Array) -> Any:
