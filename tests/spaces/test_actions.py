@@ -165,6 +165,8 @@ INVALID = [
     ("sphere:2", [TURN, 2 * TURN], r"^g\[1\] is not in the group"),
     ("sphere:2", np.eye(2), r"^g has shape \(2, 2\), .* Pass an array of shape \(\.\.\., 3, 3\)"),
     ("sphere:2", np.full((3, 3), np.nan), r"^g has entries that are not finite\. Pass"),
+    ("sphere:2", 1e200 * TURN, "is not in the group|is not finite"),
+    ("spd:2", 1e200 * np.eye(2), "act of row .* is not finite"),
     ("sphere:2", [TURN] * 3, "do not broadcast"),
     ("rp:2", 1j * TURN, "needs real numbers"),
     ("cp:2", 2j * TURN, r"\|g\*g − 1\| is 3"),
@@ -190,7 +192,7 @@ INVALID = [
 def test_invalid_elements_raise(name, g, message, rng):
     space = ss.space(name)
     x = space.random_point(rng, 2) if isinstance(g, list) else space.random_point(rng)
-    with pytest.raises(ss.ValidationError, match=message):
+    with np.errstate(all="raise"), pytest.raises(ss.ValidationError, match=message):
         space.act(g, x)
 
 

@@ -39,7 +39,7 @@ def matrices(space: Space, g: ArrayLike, size: int, dtype: Any) -> tuple[Array, 
 
 def require(space: Space, defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
     """Raise ValidationError for the first matrix whose defect exceeds what is allowed."""
-    bad = np.argwhere(~(defects <= allowed))
+    bad = np.argwhere(~(np.isfinite(defects) & (defects <= allowed)))
     if len(bad):
         index = bad[0].tolist()
         limit = np.broadcast_to(allowed, defects.shape)[tuple(index)]
@@ -57,8 +57,7 @@ def largest(x: Array) -> NDArray[np.float64]:
 
 def preserves(space: Space, g: Array, form: Array, tol: float, remedy: str) -> None:
     """Raise ValidationError unless g*Jg = J for the form J, to a tolerance relative to the squared size of g."""
-    with np.errstate(all="ignore"):
-        defects = largest(adjoint(g) @ form @ g - form)
+    defects = largest(adjoint(g) @ form @ g - form)
     star = "*" if np.iscomplexobj(g) else "ᵀ"
     what = f"|g{star}g − 1|" if np.array_equal(form, np.eye(len(form))) else f"|g{star}Jg − J|"
     require(space, defects, tol * np.maximum(1.0, largest(g)) ** 2, what, remedy)
@@ -108,9 +107,9 @@ class Congruent(Space):
     def _element(self, g: Any) -> Any:
         g, tol = matrices(self, g, self.point_shape[0], self._dtype)
         sizes = np.linalg.svd(g, compute_uv=False)
-        with np.errstate(all="ignore"):
-            condition = sizes[..., 0] / sizes[..., -1]
-        require(self, condition, 1e14, "its condition number", "Pass an invertible matrix.")
+        require(
+            self, sizes[..., 0] / sizes[..., -1], 1e14, "its condition number", "Pass an invertible matrix."
+        )
         self._require_subgroup(g, tol)
         return g
 

@@ -282,7 +282,9 @@ class Space:
         >>> ss.SpecialOrthogonal(3).act((quarter_turn, np.eye(3)), np.eye(3)).shape
         (3, 3)
         """
-        element = self._element(g)
+        # Of matrices that are too large or singular the checks make an error of their own.
+        with np.errstate(all="ignore"):
+            element = self._element(g)
         return self._isometric("act", lambda x: self._moved(element, x), x=x)
 
     def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> Array:
