@@ -201,12 +201,12 @@ class Space:
         The symmetry is :math:`2p - x` in flat space; the reflection :math:`2P - 1` in the line or subspace p, with
         its orthogonal projection P, on spheres, hyperbolic and projective spaces and Grassmannians; and
         :math:`p x^{-1} p` for groups and positive definite matrices. It is the function :math:`I_p` of Lemma A.3
-        of [1]_, and :math:`E_p(v) = \\sigma_m \\sigma_p` with the midpoint :math:`m = \\exp_p(v/2)`.
+        of the paper, and :math:`E_p(v) = \\sigma_m \\sigma_p` with the midpoint :math:`m = \\exp_p(v/2)`.
 
         References
         ----------
-        .. [1] G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J.
-           Numer. Anal. 56 (2018), Appendix A.
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J.
+        Numer. Anal. 56 (2018), Appendix A.
 
         Examples
         --------
@@ -248,7 +248,7 @@ class Space:
 
         Notes
         -----
-        The groups are those of Table 1 of [1]_:
+        The groups are those of Table 1 of the paper:
 
         ==================================================  ===========================================  =========
         space                                               g                                            g · x
@@ -269,8 +269,8 @@ class Space:
 
         References
         ----------
-        .. [1] G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J.
-           Numer. Anal. 56 (2018), Table 1 and equation (9).
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J.
+        Numer. Anal. 56 (2018), Table 1 and equation (9).
 
         Examples
         --------
