@@ -243,7 +243,7 @@ class Space:
 
         See Also
         --------
-        symmetry : The geodesic symmetry, which is in the group or normalises it.
+        symmetry : Apply the geodesic symmetry at a point.
         transvection : The group element that moves points along a geodesic.
 
         Notes
@@ -260,8 +260,8 @@ class Space:
                                                             quaternions, as 2 × 2 complex blocks
         `Hyperbolic`, `ComplexHyperbolic`                   g*Jg = J, J = diag(−1, 1, …, 1); for         g x
                                                             `Hyperbolic` with g₀₀ > 0
-        `SymmetricPositiveDefinite`,                        invertible matrix                            g x g*
-        `HermitianPositiveDefinite`
+        `SymmetricPositiveDefinite`                         invertible matrix                            g x gᵀ
+        `HermitianPositiveDefinite`                         invertible matrix                            g x g*
         `SpecialPositiveDefinite`                           matrix of determinant ±1                     g x gᵀ
         `Siegel`                                            symplectic matrix                            g x gᵀ
         all groups                                          pair (a, b) of elements of the group         a x b⁻¹
