@@ -3,8 +3,9 @@ Affine shapes without coordinates (Figs. 7–9)
 =============================================
 
 §4.3 of the paper: four sets of four landmarks in the plane. Up to affine maps each is a point of the Grassmannian
-Gr(2, 3), and a closed spline goes through (A)–(B)–(C)–(D)–(A). The paper does not give coordinates of its landmarks;
-these are drawn so that, as there, in (C) the landmarks 0, 1 and 3 lie on a line.
+Gr(2, 3), and a closed spline goes through (A)–(B)–(C)–(D)–(A). The paper gives the method and draws the
+landmarks, but not their coordinates. We chose these so that, as there, the landmarks 0, 1 and 3 of (C) lie on a line,
+and so that the curve crosses the rim of the disc in Fig. 8.
 """
 
 import matplotlib.pyplot as plt
@@ -12,10 +13,10 @@ import numpy as np
 
 import symspline as ss
 
-A = [[0, 0], [1, 0], [1.1, 1], [0, 1]]
-B = [[0, 0], [1, 0.1], [0.6, 1.2], [-0.3, 0.7]]
-C = [[0, 0], [1, 0], [0.2, 0.9], [-0.8, 0]]
-D = [[0, 0], [1, -0.3], [0.7, 0.9], [-0.2, 0.5]]
+A = [[0, 0], [1, 0], [1.1, 0.3], [0, 1]]
+B = [[0, 0], [1, 0.1], [0.75, 1.0], [-0.4, 0.6]]
+C = [[0, 0], [1, 0], [0.3, 0.9], [-0.4, 0]]
+D = [[0, 0], [1, -0.2], [0.75, 0.5], [-0.5, -0.6]]
 
 fig7, axes = plt.subplots(1, 4, figsize=(9, 2.6), layout="constrained")
 for ax, drawing, name in zip(axes, (A, B, C, D), "ABCD", strict=True):
@@ -23,7 +24,7 @@ for ax, drawing, name in zip(axes, (A, B, C, D), "ABCD", strict=True):
     for number, place in enumerate(drawing):
         ax.plot(*place, "o", color="#0b559f")
         ax.annotate(f"$p_{number}$", place, (4, 4), textcoords="offset points")
-    ax.set(aspect="equal", xlim=(-1.1, 1.4), ylim=(-0.5, 1.5), title=f"({name})")
+    ax.set(aspect="equal", xlim=(-1.1, 1.4), ylim=(-0.8, 1.3), title=f"({name})")
     ax.set_axis_off()
 
 # %%
@@ -57,10 +58,43 @@ ax.set(
 ax.legend(frameon=False)
 
 # %%
-# Gr(2, 3) is a half sphere, opposite points of whose rim are the same: the normals of the planes draw the closed spline
-# (Fig. 8).
+# The kernel of the 2 × 3 matrix of a shape is the normal of its plane. It meets the half sphere (24) once, and the
+# stereographic projection (25) draws it in the unit disc (Fig. 8). Opposite points of the rim are the same shape: the
+# curve leaves at one of the two marked points, comes back at the other, and is closed.
 
-fig8 = spline.plot()
-print(f"largest speed {spline.speed(x).max():.2f}, also near (C)")
+
+def normals(shapes):
+    """Unit normals of the planes, in the half sphere z ≤ 0 of (24)."""
+    vectors = np.cross(shapes[..., 0], shapes[..., 1])
+    return np.where(vectors[..., 2:] > 0, -vectors, vectors)
+
+
+def on_disc(shapes):
+    """The stereographic projection (25) from (0, 0, 1)."""
+    x, y, z = np.moveaxis(normals(shapes), -1, 0)
+    return np.stack([x / (1 - z), y / (1 - z)], axis=-1)
+
+
+fig8, ax = plt.subplots(figsize=(4.6, 4.6), layout="constrained")
+disc = on_disc(spline(x))
+(crossings,) = np.nonzero(np.linalg.norm(np.diff(disc, axis=0), axis=1) > 1)
+ax.add_patch(plt.Circle((0, 0), 1, facecolor="#0b559f11", edgecolor="0.4"))
+ax.plot(*np.insert(disc, crossings + 1, np.nan, axis=0).T, color="#0b559f")
+for i in crossings:
+    rim = disc[i] / np.linalg.norm(disc[i])
+    ax.plot(*np.transpose([rim, -rim]), "o", color="#c1440e", markerfacecolor="white")
+for place, name in zip(on_disc(shapes[:4]), "ABCD", strict=True):
+    ax.plot(*place, "o", color="#0b559f")
+    ax.annotate(f"({name})", place, (6, 4), textcoords="offset points")
+ax.set(aspect="equal", title="Fig. 8: opposite points of the rim are the same")
+ax.set_axis_off()
+print(
+    f"the curve crosses the rim {len(crossings)} time; largest speed {spline.speed(x).max():.2f}, also near (C)"
+)
+
+# %%
+# ``plot`` draws the half sphere itself.
+
+dome = spline.plot()
 plt.show()
 # sphinx_gallery_thumbnail_number = 3

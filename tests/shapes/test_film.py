@@ -100,6 +100,24 @@ def test_the_figures_of_the_page(tmp_path, monkeypatch):
     assert made == set(re.findall(r"\((shapes_\w+\.png)\)", PAGE.read_text("utf-8")))
 
 
+def test_equations_24_and_25_draw_the_curve_in_the_unit_disc():
+    spline = figures.shape_spline()
+    x = np.linspace(0, 4, 2001)
+    disc = figures.on_disc(spline(x))
+    assert np.linalg.norm(disc, axis=1).max() <= 1
+    # The kernel of the 2 × 3 matrix of landmarks, by a singular value decomposition.
+    landmarks = figures.CLOSED[:, 1:] - figures.CLOSED[:, :1]
+    kernels = np.linalg.svd(np.swapaxes(landmarks, 1, 2)).Vh[:, 2]
+    kernels = np.where(kernels[:, 2:] > 0, -kernels, kernels)
+    expected = kernels[:, :2] / (1 - kernels[:, 2:])
+    assert np.abs(figures.on_disc(spline.points) - expected).max() < 1e-14
+    # The curve crosses the rim once, to the opposite point.
+    (crossings,) = np.nonzero(np.linalg.norm(np.diff(disc, axis=0), axis=1) > 0.1)
+    assert len(crossings) == 1
+    leaving, returning = disc[crossings[0]], disc[crossings[0] + 1]
+    assert np.linalg.norm(leaving) > 0.99 and np.linalg.norm(leaving + returning) < 0.01
+
+
 def test_local_coordinates_are_infinite_at_one_shape():
     spline = figures.shape_spline()
     near = np.array([1.9, 1.99, 1.999, 2.001, 2.01, 2.1])

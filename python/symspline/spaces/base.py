@@ -169,6 +169,156 @@ class Space:
         """
         return self._finite("transport", p=p, q=q, v=v)
 
+    def symmetry(self, p: ArrayLike, x: ArrayLike) -> Array:
+        """Apply the geodesic symmetry at p to points x.
+
+        The symmetry reverses every geodesic through p. It is computed without a logarithm, so that it is also
+        defined where x is at the cut locus of p.
+
+        Parameters
+        ----------
+        p, x : array_like, shape (..., *point_shape)
+            Points. Leading axes broadcast. On a `Product`, tuples of such arrays.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The points :math:`\\sigma_p(x) = \\exp_p(-\\log_p(x))`. On a `Product`, a tuple of arrays.
+
+        Raises
+        ------
+        ValidationError
+            If the arrays do not have the shape of points, or if the space is a `Manifold`, which need not be
+            symmetric.
+
+        See Also
+        --------
+        transvection : The composition of two symmetries.
+        act : Apply an element of the group of the space.
+
+        Notes
+        -----
+        The symmetry is :math:`2p - x` in flat space; the reflection :math:`2P - 1` in the line or subspace p, with
+        its orthogonal projection P, on spheres, hyperbolic and projective spaces and Grassmannians; and
+        :math:`p x^{-1} p` for groups and positive definite matrices. It is the function :math:`I_p` of Lemma A.3
+        of the paper, and :math:`E_p(v) = \\sigma_m \\sigma_p` with the midpoint :math:`m = \\exp_p(v/2)`.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J.
+        Numer. Anal. 56 (2018), Appendix A.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).symmetry([0, 0, 1], [0.6, 0.0, 0.8])
+        array([-0.6,  0. ,  0.8])
+        """
+        return self._isometric("symmetry", self._reflected, p=p, x=x)
+
+    def act(self, g: Any, x: ArrayLike) -> Array:
+        """Apply an element g of the group of the space to points x.
+
+        Every element is an isometry, or on groups without a metric an automorphism of the connection: the spline
+        through the points ``space.act(g, points)`` is the image of the spline through ``points``.
+
+        Parameters
+        ----------
+        g : array_like, or tuple of array_like
+            Element of the group, in the form that Notes gives for each space. Leading axes of matrices broadcast
+            against those of x. On a `Product`, a tuple with one element per factor.
+        x : array_like, shape (..., *point_shape)
+            Points. On a `Product`, a tuple of such arrays.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The points g · x. On a `Product`, a tuple of arrays.
+
+        Raises
+        ------
+        ValidationError
+            If g does not have the required form or is not in the group, within the same tolerance as for points
+            (1e-8, or 1e-4 for float32), or if the space is a `Manifold`.
+
+        See Also
+        --------
+        symmetry : Apply the geodesic symmetry at a point.
+        transvection : The group element that moves points along a geodesic.
+
+        Notes
+        -----
+        The groups are those of Table 1 of the paper:
+
+        ==================================================  ===========================================  =========
+        space                                               g                                            g · x
+        ==================================================  ===========================================  =========
+        `Euclidean`                                         (A, b; 0, 1), A orthogonal                   A x + b
+        `Sphere`, `RealProjective`, `Grassmannian`          orthogonal matrix                            g x
+        `ComplexProjective`, `ComplexGrassmannian`          unitary matrix                               g x
+        `QuaternionicProjective`                            unitary matrix of n + 1 by n + 1             g x
+                                                            quaternions, as 2 × 2 complex blocks
+        `Hyperbolic`, `ComplexHyperbolic`                   g*Jg = J, J = diag(−1, 1, …, 1); for         g x
+                                                            `Hyperbolic` with g₀₀ > 0
+        `SymmetricPositiveDefinite`                         invertible matrix                            g x gᵀ
+        `HermitianPositiveDefinite`                         invertible matrix                            g x g*
+        `SpecialPositiveDefinite`                           matrix of determinant ±1                     g x gᵀ
+        `Siegel`                                            symplectic matrix                            g x gᵀ
+        all groups                                          pair (a, b) of elements of the group         a x b⁻¹
+        ==================================================  ===========================================  =========
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J.
+        Numer. Anal. 56 (2018), Table 1 and equation (9).
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> quarter_turn = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+        >>> ss.Sphere(2).act(quarter_turn, [[1, 0, 0], [0, 0, 1]]) + 0.0
+        array([[0., 1., 0.],
+               [0., 0., 1.]])
+        >>> ss.SpecialOrthogonal(3).act((quarter_turn, np.eye(3)), np.eye(3)).shape
+        (3, 3)
+        """
+        # Of matrices that are too large or singular the checks make an error of their own.
+        with np.errstate(all="ignore"):
+            element = self._element(g)
+        return self._isometric("act", lambda x: self._moved(element, x), x=x)
+
+    def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> Array:
+        """Points that a formula makes of arrays of points, on the space to rounding."""
+        arrays = {key: self._numbers(self._doubles(value, key)) for key, value in inputs.items()}
+        self._leads({key: array.shape for key, array in arrays.items()})
+        try:
+            with np.errstate(all="ignore"):
+                result = self._apply("project", x=function(*arrays.values()))
+        except np.linalg.LinAlgError as error:
+            raise ValidationError(f"{name} failed: a matrix is not a point of {self!r} ({error})") from None
+        except ValueError as error:
+            if isinstance(error, ValidationError):
+                raise
+            raise ValidationError(
+                f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast"
+            ) from None
+        return self._require_finite(name, result)
+
+    # What every kind of symmetric space has to define for `symmetry` and `act`: see `actions`.
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        raise self._not_symmetric("geodesic symmetries")
+
+    def _element(self, g: Any) -> Any:
+        """The argument of `act` as checked arrays."""
+        raise self._not_symmetric("group")
+
+    def _moved(self, g: Any, x: Array) -> Any:
+        raise self._not_symmetric("group")
+
+    def _not_symmetric(self, what: str) -> ValidationError:
+        return ValidationError(f"{self!r} is not known to be symmetric: it has no {what}")
+
     def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
         """Inner product of two tangent vectors at p; shape of the leading axes."""
         return self._finite("inner", p=p, u=u, v=v)
@@ -346,7 +496,9 @@ class Space:
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
         """The same, but with an error where it is not finite."""
-        result = self._apply(operation, t, **inputs)
+        return self._require_finite(operation, self._apply(operation, t, **inputs))
+
+    def _require_finite(self, operation: str, result: Array) -> Array:
         if not np.isfinite(result).all():
             axes = () if operation in _NUMBERS else self._point_axes(result)
             bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from .base import Array, Space
+from .actions import Group
+from .base import Array
 from .two_parts import TwoParts
 
 
-class SpecialOrthogonal(Space):
+class SpecialOrthogonal(Group):
     """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
     In SO(3) distance is the angle of the rotation from one to the other, and a SciPy ``Rotation`` of any shape,
     or a list of them, is taken wherever points are.
@@ -20,6 +21,7 @@ class SpecialOrthogonal(Space):
     """
 
     _name = "so"
+    _unitary = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -38,7 +40,7 @@ def _matrices(value: Any) -> Any:
     return value
 
 
-class Orthogonal(TwoParts):
+class Orthogonal(TwoParts, Group):
     """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
     of the two parts.
 
@@ -48,12 +50,13 @@ class Orthogonal(TwoParts):
     """
 
     _name = "o"
+    _unitary = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
 
-class SpecialUnitary(Space):
+class SpecialUnitary(Group):
     """Unitary n × n matrices of determinant 1, with ⟨u, v⟩ = Re tr u*v.
 
     >>> import symspline as ss
@@ -62,12 +65,13 @@ class SpecialUnitary(Space):
     """
 
     _name = "su"
+    _unitary = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
 
-class Unitary(Space):
+class Unitary(Group):
     """Unitary n × n matrices, with ⟨u, v⟩ = Re tr u*v.
 
     >>> import symspline as ss
@@ -76,12 +80,13 @@ class Unitary(Space):
     """
 
     _name = "u"
+    _unitary = True
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
 
-class SpecialEuclidean(Space):
+class SpecialEuclidean(Group):
     """Rigid motions of n = 2 or 3 dimensions, poses: homogeneous (n+1) × (n+1) matrices [[R, t], [0, 1]].
 
     Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .base import Space
+from .actions import Group
 from .two_parts import TwoParts
 
 
-class GeneralLinear(TwoParts):
+class GeneralLinear(TwoParts, Group):
     """GL(n), invertible real matrices, with the symmetries x ↦ p x⁻¹ p.
 
     Geodesics are p exp(tΩ), and ``log(p, q) = p log(p⁻¹q)`` with the principal logarithm, which exists while no
@@ -26,7 +26,7 @@ class GeneralLinear(TwoParts):
         super().__init__(n)
 
 
-class ComplexGeneralLinear(Space):
+class ComplexGeneralLinear(Group):
     """GL(n, C), invertible complex matrices; see `GeneralLinear`.
 
     >>> import symspline as ss
@@ -40,7 +40,7 @@ class ComplexGeneralLinear(Space):
         super().__init__(n)
 
 
-class Affine(TwoParts):
+class Affine(TwoParts, Group):
     """Affine maps x ↦ Ax + b of n dimensions as matrices (A, b; 0, 1); see `GeneralLinear`.
 
     >>> import symspline as ss
@@ -54,7 +54,7 @@ class Affine(TwoParts):
         super().__init__(n)
 
 
-class Similarity(Space):
+class Similarity(Group):
     """Similarities x ↦ sRx + b, with a rotation R and s > 0, as matrices (sR, b; 0, 1): poses whose scale
     drifts. See `GeneralLinear`.
 
@@ -69,7 +69,7 @@ class Similarity(Space):
         super().__init__(n)
 
 
-class SpecialLinear(Space):
+class SpecialLinear(Group):
     """SL(n), real matrices of determinant one: homographies of the plane for n = 3. See `GeneralLinear`.
 
     >>> import symspline as ss
@@ -83,7 +83,7 @@ class SpecialLinear(Space):
         super().__init__(n)
 
 
-class Symplectic(Space):
+class Symplectic(Group):
     """Sp(n, R), real n × n matrices with XᵀJX = J for J = (0, 1; -1, 0), n even: linear canonical transformations of
     n/2 positions and n/2 momenta. See `GeneralLinear`.
 
@@ -98,7 +98,7 @@ class Symplectic(Space):
         super().__init__(n)
 
 
-class Lorentz(Space):
+class Lorentz(Group):
     """The Lorentz group of n dimensions of space, SO⁺(1, n): (1 + n) × (1 + n) matrices that preserve -t² + x², the
     orientation and the direction of time, which is the first coordinate. See `GeneralLinear`.
 

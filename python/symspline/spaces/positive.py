@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from .._core import ValidationError
-from .base import Array, Space
+from .actions import Congruent, preserves, require
+from .base import Array
 
 
-class SymmetricPositiveDefinite(Space):
+class SymmetricPositiveDefinite(Congruent):
     """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
     covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
 
@@ -26,7 +27,7 @@ class SymmetricPositiveDefinite(Space):
         super().__init__(n)
 
 
-class SpecialPositiveDefinite(Space):
+class SpecialPositiveDefinite(Congruent):
     """Symmetric positive definite n × n matrices of determinant 1, SL(n)/SO(n): the shape of a tensor without its
     size. A totally geodesic part of `SymmetricPositiveDefinite`, with its metric.
 
@@ -41,8 +42,12 @@ class SpecialPositiveDefinite(Space):
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
+    def _require_subgroup(self, g: Array, tol: float) -> None:
+        defects = np.abs(np.abs(np.linalg.det(g)) - 1)
+        require(self, defects, tol, "|det g| − 1", "Divide g by abs(numpy.linalg.det(g)) ** (1 / n).")
 
-class HermitianPositiveDefinite(Space):
+
+class HermitianPositiveDefinite(Congruent):
     """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
 
     >>> import symspline as ss
@@ -56,7 +61,7 @@ class HermitianPositiveDefinite(Space):
         super().__init__(n)
 
 
-class Siegel(Space):
+class Siegel(Congruent):
     """Siegel's upper half space Sp(2n, R)/U(n) of complex symmetric n × n matrices X + iY with positive definite Y:
     points are the symplectic positive definite matrices (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) of 2n rows, which
     `symspline.convert.siegel_to_positive_definite` makes. A totally geodesic part of `SymmetricPositiveDefinite`,
@@ -75,6 +80,10 @@ class Siegel(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+    def _require_subgroup(self, g: Array, tol: float) -> None:
+        form = np.kron([[0.0, 1.0], [-1.0, 0.0]], np.eye(self._parameters[0]))
+        preserves(self, g, form, tol, "Pass a symplectic matrix: gᵀJg = J, J = (0, 1; −1, 0).")
 
     def _array(self, value: Any, name: str) -> Array:
         array = super()._array(value, name)

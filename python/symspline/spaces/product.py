@@ -78,6 +78,17 @@ class Product(Space):
     def project(self, x: Any) -> Any:
         return self._each("project", x)
 
+    def symmetry(self, p: Any, x: Any) -> Any:
+        return self._each("symmetry", p, x)
+
+    def act(self, g: Any, x: Any) -> Any:
+        if not isinstance(g, (tuple, list)) or len(g) != len(self.factors):
+            raise ValidationError(
+                f"g must be a tuple of {len(self.factors)} group elements, one per factor of {self!r}. "
+                "Pass one element for each factor, in the same order."
+            )
+        return self._each("act", g, x)
+
     def rounding(self, p: Any) -> Any:
         return np.max(np.stack(np.broadcast_arrays(*self._each("rounding", p))), axis=0)[()]
 

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
-from .base import LARGE, Array, Space
+from .actions import Preserving, largest, require
+from .base import LARGE, Array
+from .tolerance import point_tol
 
 # No more than a hint is made of it: rows of such matrices are no unit vectors, whatever the rounding.
 _NEAR = 1e-4
 
 
-class _Projective(Space):
+class _Projective(Preserving):
     """Lines, of which people also hold the projectors."""
 
     # The space of positive definite matrices of the same numbers.
@@ -95,7 +97,7 @@ class ComplexProjective(_Projective):
         super().__init__(n)
 
 
-class ComplexHyperbolic(Space):
+class ComplexHyperbolic(Preserving):
     """Complex hyperbolic space CHⁿ: points are complex arrays (z₀, z₁, …, zₙ) with
     −|z₀|² + |z₁|² + … + |zₙ|² = −1 up to a phase, with the metric of curvature −4 along complex lines:
     distance is arcosh |⟨p, q⟩|.
@@ -108,12 +110,13 @@ class ComplexHyperbolic(Space):
     """
 
     _name = "ch"
+    _negative = (0,)
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
 
-class _Subspaces(Space):
+class _Subspaces(Preserving):
     """Subspaces. What joins two of them lies in their span, where large ones cost less."""
 
     _linear = True
@@ -169,7 +172,7 @@ class ComplexGrassmannian(_Subspaces):
         super().__init__(k, n)
 
 
-class QuaternionicProjective(Space):
+class QuaternionicProjective(Preserving):
     """Quaternionic projective space HPⁿ, lines of n + 1 quaternions: points are the planes of C²ⁿ⁺² that such lines
     become, any basis of one, a complex (2n + 2) × 2 matrix with orthonormal columns, which
     `symspline.convert.quaternions_to_subspace` makes. A totally geodesic part of `ComplexGrassmannian`, with its
@@ -187,6 +190,14 @@ class QuaternionicProjective(Space):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+    def _element(self, g: Any) -> Any:
+        g = super()._element(g)
+        # Multiplication by the quaternion j is x ↦ J x̄, and matrices of quaternions commute with it.
+        j = np.kron(np.eye(self._parameters[0] + 1), [[0.0, -1.0], [1.0, 0.0]])
+        remedy = "Pass a matrix of quaternions a + bi + cj + dk as blocks (a + bi, c + di; −c + di, a − bi)."
+        require(self, largest(g @ j - j @ g.conj()), point_tol(np.asarray(g).dtype), "|gJ − Jḡ|", remedy)
+        return g
 
     def _array(self, value: Any, name: str) -> Array:
         array = super()._array(value, name)

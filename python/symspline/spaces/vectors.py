@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .actions import Preserving, homogeneous, require
 from .base import Array, Space
 
 
@@ -21,8 +24,17 @@ class Euclidean(Space):
     def __init__(self, n: int) -> None:
         super().__init__(n)
 
+    def _reflected(self, p: Array, x: Array) -> Any:
+        return 2 * p - x
 
-class Sphere(Space):
+    def _element(self, g: Any) -> Any:
+        return homogeneous(self, g, self.dim)
+
+    def _moved(self, g: Array, x: Array) -> Any:
+        return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
+
+
+class Sphere(Preserving):
     """The unit sphere Sⁿ: points are unit vectors of n + 1 numbers.
 
     S² are directions or places on a globe, S³ unit quaternions: q and −q are two points here, and for curves of
@@ -40,7 +52,7 @@ class Sphere(Space):
         super().__init__(n)
 
 
-class Hyperbolic(Space):
+class Hyperbolic(Preserving):
     """Hyperbolic space Hⁿ: points are arrays (x₀, x₁, …, xₙ) on the hyperboloid
     −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first. Rounding errors of a point p are ε|p|²;
     curves are made as far as distance 15 from (1, 0, …), where they are 10⁻³.
@@ -52,9 +64,16 @@ class Hyperbolic(Space):
 
     _name = "hyperbolic"
     _linear = True
+    _negative = (0,)
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
+
+    def _element(self, g: Any) -> Any:
+        g = super()._element(g)
+        # The other matrices swap the two sheets.
+        require(self, -g[..., 0, 0], 0.0, "−g[0, 0]", "Pass −g, which keeps the sheet x₀ > 0.")
+        return g
 
     def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
         # Only at the middle is the metric that of the ambient numbers.

@@ -1,0 +1,526 @@
+"""Makes the table of ``paper.md``: every item of the paper, its function, its tests and its page.
+
+``python docs/paper_table.py`` writes the table anew. `problems` checks that all that it names exists.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+PAGE = DOCS / "paper.md"
+BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
+
+# Names that the table has already, of functions, tests and pages that are not there yet.
+PENDING: list[str] = [
+    "symspline.Report.contraction_bound",
+    "symspline.DeSitter",
+    "symspline.AntiDeSitter",
+    "symspline.IndefiniteGrassmannian",
+    "tests/fit/test_algorithm_1.py",
+    "theorem.md",
+    "convergence.md",
+]
+
+
+class Row(NamedTuple):
+    """One item of the paper."""
+
+    item: str
+    what: str
+    # Importable names, without the leading "symspline.".
+    functions: str
+    # A file and the name of a test function in it; the file alone where all of it is meant.
+    tests: str
+    # Pages of the documentation, below `docs`, with the anchor of a heading; "gallery/…" are examples.
+    pages: str
+
+
+LEMMAS = "tests/spaces/test_lemmas.py::"
+LAWS = "tests/spaces/test_laws.py::"
+C2 = "tests/fit/test_c2.py::test_the_curve_is_c2"
+ISOMETRY = "tests/spaces/test_actions.py::test_elements_are_isometries"
+EXAMPLES = "tests/examples/test_examples.py::test_a_recipe_draws_a_picture"
+CERTIFICATE = "tests/spline/test_certificate.py::"
+SPACES = f"{ISOMETRY} {LAWS}test_exp_and_log_are_inverse {C2}"
+REGION = "solvers.md#what-theorem-31-says"
+
+ROWS = [
+    Row("Problem 1.1", "C² curve through points", "CubicSpline", C2, "start.md#ten-lines"),
+    Row(
+        "(1)",
+        "energy that Riemannian cubics minimise",
+        "CubicSpline.bending_energy",
+        "tests/spline/test_lengths.py::test_length_and_energy_by_adaptive_quadrature "
+        "tests/docs/test_comparisons.py::test_spline_is_close_to_the_cubic_and_bends_more",
+        "comparisons.md#how-close-to-riemannian-cubics",
+    ),
+    Row(
+        "Introduction, parallelism",
+        "each iteration is parallel",
+        "set_num_threads",
+        "tests/host/test_threads.py::test_one_thread_and_two_give_the_same_bits",
+        "guide/batches.md#threads",
+    ),
+    Row("Table 1, row 1", "Euclidean space ℝⁿ = SE(n)/SO(n)", "Euclidean", SPACES, "notation.md"),
+    Row("Table 1, row 2", "n-sphere Sⁿ = O(n+1)/O(n)", "Sphere", SPACES, "notation.md"),
+    Row("Table 1, row 3", "hyperbolic space Hⁿ = O(n,1)/O(n)", "Hyperbolic", SPACES, "notation.md"),
+    Row(
+        "Table 1, row 4",
+        "real Grassmannian Gr(k,n) = O(n)/(O(k) × O(n−k))",
+        "Grassmannian",
+        SPACES,
+        "notation.md",
+    ),
+    Row(
+        "Table 1, row 5",
+        "orthogonal group O(n) = (O(n) × O(n))/O(n)",
+        "Orthogonal SpecialOrthogonal",
+        SPACES,
+        "notation.md",
+    ),
+    Row(
+        "Table 1, row 6",
+        "complex projective space ℂPⁿ = U(n+1)/(U(n) × U(1))",
+        "ComplexProjective",
+        SPACES,
+        "notation.md",
+    ),
+    Row(
+        "Table 1, row 7",
+        "complex Grassmannian U(n)/(U(k) × U(n−k))",
+        "ComplexGrassmannian",
+        SPACES,
+        "notation.md",
+    ),
+    Row("Table 1, row 8", "unitary group U(n) = (U(n) × U(n))/U(n)", "Unitary", SPACES, "notation.md"),
+    Row(
+        "Table 1, row 9",
+        "covariance matrices P(n) = GL(n)/O(n)",
+        "SymmetricPositiveDefinite",
+        SPACES,
+        "notation.md",
+    ),
+    Row(
+        "(2), (9)",
+        "action of the group",
+        "Space.act",
+        f"{ISOMETRY} tests/spaces/test_actions.py::test_elements_act_as_a_group",
+        "notation.md",
+    ),
+    Row(
+        "(3), (4)",
+        "splitting of the Lie algebra",
+        "Space.symmetry",
+        f"{LEMMAS}test_equations_3_and_4_symmetric_splitting",
+        "notation.md",
+    ),
+    Row(
+        "(5), (6)",
+        "geodesics as orbits of the group",
+        "Space.geodesic",
+        f"{LEMMAS}test_equations_6_and_10_geodesics_are_orbits",
+        "notation.md",
+    ),
+    Row(
+        "(7)",
+        "ends of a geodesic",
+        "Space.geodesic",
+        f"{LAWS}test_geodesic_divides_the_distance",
+        "notation.md",
+    ),
+    Row(
+        "(8)",
+        "De Casteljau's construction; its last geodesic is from q₁ to p₁",
+        "BezierCurve CubicSpline.control_points",
+        "tests/free/test_free_curves.py::test_a_cubic_is_a_segment_of_the_spline",
+        "gallery/de_casteljau.rst",
+    ),
+    Row(
+        "(10)",
+        "movement E",
+        "Space.transvection Space.exp",
+        f"{LEMMAS}test_equations_6_and_10_geodesics_are_orbits "
+        f"{LAWS}test_transvection_is_the_product_of_two_symmetries",
+        "notation.md",
+    ),
+    Row("(11)", "logarithm", "Space.log", f"{LAWS}test_exp_and_log_are_inverse", "notation.md"),
+    Row("(12)", "C¹ condition", "CubicSpline.control_points", C2, "gallery/c2_condition.rst"),
+    Row("(13)", "C² condition", "Report.residual", C2, "gallery/c2_condition.rst"),
+    Row("Theorem 2.2", "(12) and (13) make the curve C²", "CubicSpline", C2, "theorem.md"),
+    Row(
+        "Remark 2.3, (14), (15)",
+        "differences in Euclidean space",
+        "CubicSpline",
+        "tests/fit/test_curve_laws.py::test_flat_space_is_scipy",
+        "theorem.md",
+    ),
+    Row(
+        "(16)–(18)",
+        'iteration map: `method="fixed-point"`',
+        "CubicSpline",
+        "tests/fit/test_algorithm_1.py",
+        "solvers.md",
+    ),
+    Row(
+        "(19)",
+        "clamped spline: `bc_type=((1, v), (1, w))`",
+        "CubicSpline",
+        "tests/spline/test_ends.py::test_a_given_velocity_is_kept_to_the_last_bits",
+        "guide/ends.md",
+    ),
+    Row(
+        "(20)",
+        'natural spline: `bc_type="natural"`',
+        "CubicSpline",
+        "tests/spline/test_ends.py::test_every_pair_of_end_conditions",
+        "guide/ends.md",
+    ),
+    Row("(21)", "D", "Report.max_step", f"{CERTIFICATE}test_radius_is_the_smallest_of_38", REGION),
+    Row(
+        "(22)",
+        "K",
+        "Space.curvature",
+        f"{LEMMAS}test_equation_22_curvature_bounds_double_brackets "
+        "tests/spaces/test_curvature.py::test_curvature_is_the_largest_triple_product",
+        "notation.md",
+    ),
+    Row(
+        "Algorithm 1",
+        'control points: `method="fixed-point"`',
+        "CubicSpline",
+        "tests/fit/test_algorithm_1.py "
+        "tests/fit/test_solvers.py::test_fixed_point_is_linear_with_a_rate_of_one_half",
+        "solvers.md",
+    ),
+    Row(
+        "Theorem 3.1",
+        "linear convergence of Algorithm 1",
+        "Report.invariant_radius Report.contraction_bound",
+        f"{CERTIFICATE}test_algorithm_1_stays_within",
+        "convergence.md",
+    ),
+    Row(
+        "Section 4.1, (23)",
+        "unit quaternions on S³ and on SO(3)",
+        "Sphere rotations.from_quaternions",
+        "tests/spaces/test_identities.py::test_rotations_have_two_quaternions",
+        "gallery/five_orientations.rst",
+    ),
+    Row(
+        "Section 4.1, compact groups",
+        "the structure (G × G)/G of any compact group",
+        "SpecialOrthogonal SpecialUnitary Unitary",
+        "tests/spaces/test_identities.py::test_so4_is_two_quaternions",
+        "totally-geodesic.md",
+    ),
+    Row(
+        "Section 4.2, step 1",
+        "curve through quantum states",
+        "ComplexProjective",
+        "tests/quantum/test_hamiltonian.py::test_the_schroedinger_equation_goes_through_every_point",
+        "gallery/qubit_control.rst",
+    ),
+    Row(
+        "Section 4.2, step 2",
+        "lift to the group, and the Hamiltonian of least change",
+        "CubicSpline.lift quantum.hamiltonian quantum.propagator",
+        "tests/quantum/test_hamiltonian.py::test_changes_cost_twice_the_bending_energy "
+        "tests/quantum/test_propagator.py::test_it_is_unitary_and_follows_the_curve",
+        "gallery/qubit_control.rst",
+    ),
+    Row(
+        "Section 4.3",
+        "affine shapes as points of a Grassmannian",
+        "shapes.from_landmarks",
+        "tests/shapes/test_landmarks.py::test_affine_images_have_one_shape "
+        "tests/shapes/test_landmarks.py::test_kernels_are_the_other_way_to_say_it",
+        "shapes.md",
+    ),
+    Row(
+        "(24), (25)",
+        "half sphere and its stereographic projection",
+        "CubicSpline.plot",
+        "tests/shapes/test_film.py::test_equations_24_and_25_draw_the_curve_in_the_unit_disc",
+        "shapes.md",
+    ),
+    Row(
+        "Outlook 1",
+        "symmetric spaces that are not Riemannian",
+        "SpecialEuclidean GeneralLinear Lorentz DeSitter AntiDeSitter IndefiniteGrassmannian",
+        f"{C2} tests/spaces/test_actions.py::test_the_spline_commutes_with_the_group",
+        "theorem.md totally-geodesic.md#groups-of-matrices-without-a-metric",
+    ),
+    Row(
+        "Outlook 2",
+        "Lie groups and Stiefel manifolds",
+        "GeneralLinear Stiefel",
+        "tests/manifolds/test_manifold_curves.py::test_equation_13_is_not_enough "
+        "tests/manifolds/test_manifold_curves.py::test_all_ends_on_a_stiefel_manifold",
+        "manifolds.md#the-condition",
+    ),
+    Row(
+        "Outlook 3",
+        "Riemannian manifolds by the condition of Popiel and Noakes",
+        "Manifold",
+        "tests/manifolds/test_manifold_curves.py::test_acceleration_is_continuous "
+        "tests/manifolds/test_manifold_curves.py::test_on_a_symmetric_space_it_is_the_same_curve",
+        "manifolds.md",
+    ),
+    Row(
+        "Outlook 4",
+        'Newton iteration: `method="newton"`',
+        "CubicSpline",
+        "tests/fit/test_solvers.py::test_newton_takes_one_step_in_flat_space "
+        "tests/fit/test_solvers.py::test_newton_converges_quadratically",
+        "solvers.md",
+    ),
+    Row(
+        "(26)",
+        "connection",
+        "Space.transport",
+        f"{LEMMAS}test_equation_26_connection_is_consistent_and_equivariant",
+        "notation.md",
+    ),
+    Row(
+        "Lemma A.1",
+        "derivative of ξ ↦ exp(ξ) · p",
+        "Space.act",
+        f"{LEMMAS}test_lemma_a1_derivative_of_the_orbit_map",
+        "notation.md",
+    ),
+    Row(
+        "Lemma A.2",
+        "π dexp = sinh(ad)/ad",
+        "Space.exp Space.transvection",
+        f"{LEMMAS}test_lemma_a2_dexp_is_sinh_ad_over_ad",
+        "notation.md",
+    ),
+    Row(
+        "Lemma A.3",
+        "derivative of the symmetry",
+        "Space.symmetry",
+        f"{LEMMAS}test_lemma_a3_derivative_of_the_symmetry",
+        "notation.md",
+    ),
+    Row(
+        "Lemma A.4",
+        "equivariance of the logarithm",
+        "Space.log Space.act",
+        f"{LEMMAS}test_lemma_a4_logarithm_is_equivariant",
+        "notation.md",
+    ),
+    Row(
+        "Lemma A.5",
+        "bounds of sinh(ad)/ad and its inverse",
+        "Space.curvature",
+        f"{LEMMAS}test_lemma_a5_bounds_of_dexp",
+        "convergence.md",
+    ),
+    Row(
+        "Lemma A.6, (27), (28)",
+        "logarithms and distances",
+        "Space.log Space.distance",
+        f"{LEMMAS}test_lemma_a6_distance_of_logarithms",
+        "convergence.md",
+    ),
+    Row(
+        "(29)–(31)",
+        "C² condition of Popiel and Noakes",
+        "Space.symmetry Manifold",
+        f"{LEMMAS}test_equation_29_is_the_c2_condition",
+        "theorem.md",
+    ),
+    Row(
+        "(32), (33)",
+        "ends as parts of the iteration map",
+        "CubicSpline",
+        f"{LEMMAS}test_proposition_c6_clamped_ends_stay",
+        "convergence.md",
+    ),
+    Row(
+        "(34)–(37)",
+        "ω, φ, and their norms",
+        "Space.log Space.transvection",
+        f"{LEMMAS}test_equations_34_to_37 {LEMMAS}test_equation_37_is_attained_on_a_geodesic_there_and_back",
+        "convergence.md",
+    ),
+    Row(
+        "(38)",
+        "V; U − V stands for D + V",
+        "Report.invariant_radius",
+        f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
+        REGION,
+    ),
+    Row(
+        "Proposition C.1",
+        "invariant region",
+        "Report.invariant_radius",
+        f"{LEMMAS}test_proposition_c1_invariant_region {CERTIFICATE}test_algorithm_1_stays_within",
+        REGION,
+    ),
+    Row(
+        "Lemma C.2",
+        "bounds of φ⁺ and φ⁻",
+        "Report.invariant_radius",
+        f"{LEMMAS}test_lemma_c2_bounds_of_the_halves {LEMMAS}test_lemma_c2_is_sharp_for_short_steps",
+        "convergence.md",
+    ),
+    Row(
+        "Proposition C.3, (39)",
+        "∂φᵢ/∂ξᵢ₊₁",
+        "Report.contraction_bound",
+        f"{LEMMAS}test_proposition_c3_derivative_by_a_neighbour",
+        "convergence.md",
+    ),
+    Row(
+        "Proposition C.4, (41), (42)",
+        "∂φᵢ/∂ξᵢ",
+        "Report.contraction_bound",
+        f"{LEMMAS}test_proposition_c4_derivative_by_itself",
+        "convergence.md",
+    ),
+    Row(
+        "Lemma C.5, (40)",
+        "∂ωᵢ/∂ξᵢ",
+        "Report.contraction_bound",
+        f"{LEMMAS}test_lemma_c5_derivative_of_omega",
+        "convergence.md",
+    ),
+    Row(
+        "Proposition C.6",
+        "derivatives of the ends",
+        "Report.contraction_bound",
+        f"{LEMMAS}test_proposition_c6_derivative_of_a_natural_end "
+        f"{LEMMAS}test_proposition_c6_clamped_ends_stay",
+        "convergence.md",
+    ),
+    Row("Figures 1, 4", "De Casteljau's construction", "BezierCurve", EXAMPLES, "gallery/de_casteljau.rst"),
+    Row(
+        "Figures 2, 3",
+        "movement and C² condition",
+        "Space.transvection",
+        EXAMPLES,
+        "gallery/c2_condition.rst",
+    ),
+    Row("Figure 5", "five orientations", "CubicSpline.plot", EXAMPLES, "gallery/five_orientations.rst"),
+    Row("Figure 6", "six states of a qubit", "CubicSpline.plot", EXAMPLES, "gallery/qubit_control.rst"),
+    Row(
+        "Figures 7, 8, 9",
+        "affine shapes",
+        "shapes.from_landmarks",
+        f"{EXAMPLES} tests/shapes/test_film.py::test_the_figures_of_the_page",
+        "gallery/affine_shapes.rst shapes.md",
+    ),
+    Row(
+        "Figure 10",
+        "region of Theorem 3.1",
+        "Report.invariant_radius",
+        EXAMPLES,
+        "gallery/where_the_iteration_converges.rst",
+    ),
+    Row(
+        "Appendix D",
+        "the authors' package",
+        "CubicSpline",
+        "tests/reference/test_authors.py::test_the_authors_package_makes_the_same_curve "
+        "tests/fit/test_c2.py::test_the_three_points_of_the_paper",
+        "notation.md#the-package-of-the-paper",
+    ),
+]
+
+
+def has_function(name: str) -> bool:
+    """Whether a dotted name can be imported, as a module, an attribute of one, or a field of a class."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        try:
+            thing = importlib.import_module(".".join(parts[:count]))
+        except ImportError:
+            continue
+        for part in parts[count:]:
+            if part in getattr(thing, "__annotations__", {}):
+                return part == parts[-1]
+            if not hasattr(thing, part):
+                return False
+            thing = getattr(thing, part)
+        return True
+    return False
+
+
+def has_test(name: str) -> bool:
+    """Whether a file has a test function of a name."""
+    file, _, function = name.partition("::")
+    path = ROOT / file
+    if not path.is_file():
+        return False
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    names = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    return function in names if function else any(found.startswith("test_") for found in names)
+
+
+def anchors(text: str) -> set[str]:
+    """The anchors of the headings of a Markdown page, as MyST and GitHub make them."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
+
+
+def has_page(name: str) -> bool:
+    """Whether a page is there, and has the heading of the anchor."""
+    file, _, anchor = name.partition("#")
+    if file.startswith("gallery/"):
+        # Its pages are made of the examples.
+        return (ROOT / "examples" / Path(file).with_suffix(".py").name).is_file()
+    path = DOCS / file
+    return path.is_file() and (not anchor or anchor in anchors(path.read_text(encoding="utf-8")))
+
+
+def problems() -> list[str]:
+    """Every function, test and page of the table that does not exist."""
+    missing = []
+    for row in ROWS:
+        missing += [
+            name for name in (f"symspline.{part}" for part in row.functions.split()) if not has_function(name)
+        ]
+        missing += [name for name in row.tests.split() if not has_test(name)]
+        missing += [name for name in row.pages.split() if not has_page(name)]
+    return sorted(set(missing))
+
+
+def _linked(page: str) -> str:
+    """A link, or the name alone of a page that is not there yet."""
+    title = Path(page.partition("#")[0]).stem.replace("_", " ")
+    return f"[{title}]({page})" if has_page(page) else f"`{page}`"
+
+
+def table() -> str:
+    """The table in Markdown."""
+    lines = ["| item | what | function | test | page |", "|---|---|---|---|---|"]
+    for row in ROWS:
+        functions = ", ".join(f"`{name}`" for name in row.functions.split())
+        tests = ", ".join(f"`{name.removeprefix('tests/')}`" for name in row.tests.split())
+        pages = ", ".join(map(_linked, row.pages.split()))
+        lines.append(f"| {row.item} | {row.what} | {functions} | {tests} | {pages} |")
+    return "\n".join(lines) + "\n"
+
+
+def written(text: str) -> str:
+    """A page with the table between its two marks."""
+    before, _, rest = text.partition(BEGIN)
+    return before + BEGIN + "\n" + table() + "\n" + END + rest.partition(END)[2]
+
+
+def main() -> None:
+    """Writes the table into the page."""
+    PAGE.write_text(written(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for name in problems():
+        print(f"missing: {name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""The table of ``docs/paper.md`` is complete, up to date, and names only what exists."""
+
+import re
+
+import paper_table
+import pytest
+
+TEXT = paper_table.PAGE.read_text(encoding="utf-8")
+
+
+def labels(item):
+    """ "(16)–(18)" has the labels (16), (17) and (18); "Figures 1, 4" Figure 1 and Figure 4."""
+    for first, last in re.findall(r"\((\d+)\)–\((\d+)\)", item):
+        yield from (f"({number})" for number in range(int(first), int(last) + 1))
+    yield from re.findall(r"\(\d+\)", item)
+    for kind, numbers in re.findall(r"(Figure)s? ([\d, ]+)", item):
+        yield from (f"{kind} {number}" for number in re.findall(r"\d+", numbers))
+    yield item
+    yield item.partition(", (")[0]
+
+
+WANTED = [
+    *("Problem 1.1", "Theorem 2.2", "Theorem 3.1", "Algorithm 1", "Appendix D", "Introduction, parallelism"),
+    *(f"({number})" for number in range(1, 43)),
+    *(f"Table 1, row {row}" for row in range(1, 10)),
+    *(f"Lemma A.{number}" for number in range(1, 7)),
+    *(f"Proposition C.{number}" for number in (1, 3, 4, 6)),
+    *("Lemma C.2", "Lemma C.5"),
+    *(f"Figure {number}" for number in range(1, 11)),
+    *("Section 4.1", "Section 4.2, step 1", "Section 4.2, step 2", "Section 4.3"),
+    *(f"Outlook {number}" for number in range(1, 5)),
+]
+
+
+def test_every_item_of_the_paper_has_a_row():
+    found = {label for row in paper_table.ROWS for label in labels(row.item)}
+    assert [item for item in WANTED if item not in found] == []
+
+
+def test_everything_that_the_table_names_exists():
+    assert [name for name in paper_table.problems() if name not in paper_table.PENDING] == []
+
+
+def test_the_page_has_the_table():
+    assert paper_table.written(TEXT) == TEXT
+
+
+@pytest.mark.parametrize(
+    ("check", "there", "missing"),
+    [
+        (paper_table.has_function, "symspline.Space.exp", "symspline.Space.exponential"),
+        (paper_table.has_function, "symspline.Report.residual", "symspline.Report.residuals"),
+        (paper_table.has_function, "symspline.quantum.hamiltonian", "symspline.quanta.hamiltonian"),
+        (
+            paper_table.has_test,
+            "tests/docs/test_paper.py::test_the_page_has_the_table",
+            "tests/docs/test_paper.py::test_the_page",
+        ),
+        (paper_table.has_test, "tests/docs/test_paper.py", "tests/docs/test_papers.py"),
+        (paper_table.has_page, "paper.md", "papers.md"),
+        (
+            paper_table.has_page,
+            "notation.md#the-package-of-the-paper",
+            "notation.md#the-package",
+        ),
+        (paper_table.has_page, "gallery/affine_shapes.rst", "gallery/shapes.rst"),
+    ],
+)
+def test_missing_names_are_found(check, there, missing):
+    assert check(there) and not check(missing)
