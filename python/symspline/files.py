@@ -282,7 +282,7 @@ def _check(space: Space, points: Array, velocities: Array, converged: Any) -> No
 
 
 # Of the report, what need not be known.
-_MAYBE = ("invariant_radius", "alternative_energy")
+_MAYBE = ("invariant_radius", "alternative_energy", "velocity_error")
 _DTYPES = {"b": np.bool_, "i": np.int64, "f": np.float64}
 
 

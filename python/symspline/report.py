@@ -45,6 +45,10 @@ class Report:
         alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
             found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
             batch. Through the points of a product another curve has the alternative of one factor.
+        velocity_error: on a `Manifold` a bound for the distance of the velocities at the knots from those of the exact
+            C² curve, the largest norm of all knots, in units of velocity (per second for dates): see
+            :doc:`/manifolds`. inf where there is no bound. None on symmetric spaces. In a product of manifolds the
+            root of the sum of squares.
     """
 
     method: str
@@ -57,6 +61,7 @@ class Report:
     invariant_radius: Number | None
     rate: Number
     alternative_energy: Number | None = None
+    velocity_error: Number | None = None
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -71,7 +76,8 @@ class Report:
             many = "at most " if converged.size > 1 else ""
         return (
             f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
-            f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}{self._certificate()}"
+            f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}"
+            f"{self._certificate()}{self._accuracy()}"
         )
 
     def _certificate(self) -> str:
@@ -79,6 +85,9 @@ class Report:
         if radius is None or np.isnan(radius).any():
             return ""
         return f", control legs stay below {np.max(radius):.3g} (Theorem 3.1)"
+
+    def _accuracy(self) -> str:
+        return "" if self.velocity_error is None else f", velocities within {_worst(self.velocity_error):.1e}"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Report):
@@ -104,6 +113,7 @@ class Report:
             known(self.invariant_radius),
             function(self.rate),
             known(self.alternative_energy),
+            known(self.velocity_error),
         )
 
 
@@ -136,6 +146,10 @@ def combined(
     radii = [report.invariant_radius for report in reports if report.invariant_radius is not None]
     together = len(radii) == len(reports)
     radius: Any = np.sqrt(np.sum(np.square(np.stack(radii)), axis=0))[()] if together else None
+    errors = [report.velocity_error for report in reports if report.velocity_error is not None]
+    error: Any = (
+        np.sqrt(np.sum(np.square(np.stack(errors)), axis=0))[()] if len(errors) == len(reports) else None
+    )
     converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
     return Report(
         method=max((report.method for report in reports), key=SOLVERS.index),
@@ -148,6 +162,7 @@ def combined(
         invariant_radius=radius,
         rate=largest("rate"),
         alternative_energy=alternative_energy,
+        velocity_error=error,
     )
 
 
@@ -164,10 +179,11 @@ def shaped(
     curvature: float,
     method: str,
 ) -> Report:
-    """A report from the compiled core's columns, of curves with these knots; ``method`` is what was asked for."""
+    """A report from the compiled core's columns, of curves with these knots; ``method`` is what was asked for. Curves
+    on manifolds made of functions have one column more, `Report.velocity_error`."""
     gap = longest_gap(times, batch)
     if batch == ():
-        converged, iterations, residual, max_step, rate, last, radius, other = [c.item() for c in columns]
+        converged, iterations, residual, max_step, rate, last, *rest = [c.item() for c in columns]
         return Report(
             SOLVERS[last],
             converged,
@@ -176,11 +192,11 @@ def shaped(
             max_step,
             gap,
             curvature,
-            None if math.isnan(radius) else radius,
+            None if math.isnan(rest[0]) else rest[0],
             rate,
-            None if math.isnan(other) else other,
+            *(None if math.isnan(value) else value for value in rest[1:]),
         )
     converged, iterations, residual, max_step, rate, solvers, *rest = [c.reshape(batch) for c in columns]
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
-    radius, other = (None if np.isnan(column).all() else column for column in rest)
-    return Report(used, converged, iterations, residual, max_step, gap, curvature, radius, rate, other)
+    radius, *others = (None if np.isnan(column).all() else column for column in rest)
+    return Report(used, converged, iterations, residual, max_step, gap, curvature, radius, rate, *others)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from ..arrays import as_array
+from ..manifolds import Manifold
 from ..spaces import Array, Space, factors_of
 from .ends import End
 from .fit import Asked, Fit, Points, finished, first_faults, fit, fit_many, solve_factors
@@ -205,8 +206,10 @@ def _left_out(space: Space, points: Points) -> Solved:
     shape = (*points.batch, points.nodes, *space.point_shape)
     places, velocities = (np.full(shape, np.nan, space.dtype) for _ in range(2))
     # As the core writes them: converged, iterations, residual, longest step, rate, solver, radius,
-    # energy of another curve.
-    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(8)]
+    # energy of another curve; on manifolds made of functions also the error of the velocities.
+    columns: list[NDArray[Any]] = [
+        np.full(count, np.nan) for _ in range(9 if isinstance(space, Manifold) else 8)
+    ]
     columns[0], columns[1], columns[5] = (np.zeros(count, kind) for kind in (bool, np.int64, np.int64))
     return Solved(places, velocities, tuple(columns), [])
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..manifolds import Manifold
+from ..manifolds.certificate import velocity_errors
 from ..manifolds.condition import End, Legs, Problem, legs_of, not_a_knot
 from ..manifolds.frames import frames_along
 from ..manifolds.iteration import FLOOR, iterate
@@ -58,12 +59,15 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
             (0, 1, 2, 4), (found.converged, found.iterations, found.residual, found.rate), strict=True
         ):
             columns[column][good] = own
+        unknowns = slice(0, start.shape[1])
+        coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
+        columns[8][good] = velocity_errors(problem, coordinates, pace)
         legs = legs_of(operations, problem.h, problem.p, found.velocities)
         faults |= _unfit(space, problem, legs, good, found.converged, columns, options, batch)
         for i in faults:
             if faults[i][0] == "cut-locus":
                 velocities[i] = np.nan
-                columns[0][i], columns[2][i] = False, np.inf
+                columns[0][i], columns[2][i], columns[8][i] = False, np.inf, np.nan
     return Solved(
         points,
         velocities.reshape(points.shape),
@@ -77,8 +81,9 @@ def _report(progress: Progress, nodes: int, count: int, finished: int) -> object
 
 
 def _no_columns(count: int) -> list[NDArray[Any]]:
-    """As the compiled core writes them: converged, iterations, residual, longest step, rate, solver, radius."""
-    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(8)]
+    """As the compiled core writes them: converged, iterations, residual, longest step, rate, solver, radius, energy of
+    another curve; and the error of the velocities."""
+    columns: list[NDArray[Any]] = [np.full(count, np.nan) for _ in range(9)]
     columns[0], columns[1] = np.zeros(count, bool), np.zeros(count, np.int64)
     columns[2] = np.full(count, np.inf)
     columns[5] = np.full(count, SOLVERS.index("quasi-newton"))
