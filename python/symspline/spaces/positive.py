@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,20 @@ import numpy as np
 from .._core import ValidationError
 from .base import Array, Space
 
+# Beyond this size random exponents are scaled so that they do not grow with the size: exp of a random symmetric matrix
+# has a condition of e^√(8n) and more, and is not positive definite in floating-point numbers from n = 200 on.
+_FREE_SIZE = 20
 
-class SymmetricPositiveDefinite(Space):
+
+class _PositiveDefinite(Space):
+    """Matrices whose random points are exponentials."""
+
+    @property
+    def _scatter_scale(self) -> float:
+        return min(1.0, math.sqrt(_FREE_SIZE / self.point_shape[0]))
+
+
+class SymmetricPositiveDefinite(_PositiveDefinite):
     """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
     covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
 
@@ -26,7 +39,7 @@ class SymmetricPositiveDefinite(Space):
         super().__init__(n)
 
 
-class SpecialPositiveDefinite(Space):
+class SpecialPositiveDefinite(_PositiveDefinite):
     """Symmetric positive definite n × n matrices of determinant 1, SL(n)/SO(n): the shape of a tensor without its
     size. A totally geodesic part of `SymmetricPositiveDefinite`, with its metric.
 
@@ -42,7 +55,7 @@ class SpecialPositiveDefinite(Space):
         super().__init__(n)
 
 
-class HermitianPositiveDefinite(Space):
+class HermitianPositiveDefinite(_PositiveDefinite):
     """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
 
     >>> import symspline as ss
@@ -56,7 +69,7 @@ class HermitianPositiveDefinite(Space):
         super().__init__(n)
 
 
-class Siegel(Space):
+class Siegel(_PositiveDefinite):
     """Siegel's upper half space Sp(2n, R)/U(n) of complex symmetric n × n matrices X + iY with positive definite Y:
     points are the symplectic positive definite matrices (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) of 2n rows, which
     `symspline.convert.siegel_to_positive_definite` makes. A totally geodesic part of `SymmetricPositiveDefinite`,
