@@ -71,7 +71,7 @@ def propagator(spline: CubicSpline, x: ArrayLike) -> Array:
         # What is orthogonal to all points stays.
         q = basis.reshape(curves, 1, *basis.shape[-2:])
         result = np.eye(q.shape[-2]) + q @ (result - np.eye(q.shape[-1])) @ adjoint(q)
-    return result.reshape(*spline._batch, *times.shape, *result.shape[-2:])
+    return np.asarray(result.reshape(*spline._batch, *times.shape, *result.shape[-2:]))
 
 
 def _in_span(spline: CubicSpline) -> tuple[Curve, Array | None]:
