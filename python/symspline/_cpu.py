@@ -7,7 +7,6 @@ A wheel for x86-64 holds two: ``_core``, which runs on all of them, and ``_core_
 import ctypes
 import os
 import platform
-import subprocess
 import sys
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
@@ -31,14 +30,23 @@ def _has_v3() -> bool:
                 flags = next((line for line in file if line.startswith("flags")), "")
             return not flags or set(flags.split()) >= _NEEDED
         if sys.platform == "darwin":
-            names = ["sysctl", "-n", "hw.optional.avx2_0", "hw.optional.fma"]
-            return "0" not in subprocess.run(names, capture_output=True, text=True).stdout.split()
+            return all(_sysctl(name) != 0 for name in (b"hw.optional.avx2_0", b"hw.optional.fma"))
         if sys.platform == "win32":
             avx2_available = 40  # PF_AVX2_INSTRUCTIONS_AVAILABLE
             return bool(ctypes.windll.kernel32.IsProcessorFeaturePresent(avx2_available))
     except OSError:
         pass
     return True
+
+
+def _sysctl(name: bytes) -> int | None:
+    """A number that macOS knows of the processor; None if it does not know this one."""
+    value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
+    # man 3 sysctl; the C library is part of every process.
+    ask = ctypes.CDLL(None).sysctlbyname
+    if ask(name, ctypes.byref(value), ctypes.byref(size), None, ctypes.c_size_t(0)) != 0:
+        return None
+    return value.value
 
 
 def _says_v3(plain: Path) -> bool:

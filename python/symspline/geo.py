@@ -8,13 +8,17 @@
 
 from __future__ import annotations
 
+import re
+import warnings
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._core import ValidationError
+from ._core import ConvergenceError, CutLocusError, ValidationError
 from .arrays import shown
+from .failures import callers_level
 from .functions import fit_many
 from .places import compass, from_lonlat, to_lonlat
 from .segments import check_smooth, cut
@@ -88,7 +92,7 @@ def resample(
     frame: pd.DataFrame,
     every: Any = "1min",
     *,
-    by: str | None = None,
+    by: str | Sequence[str] | None = None,
     time: str | None = None,
     columns: tuple[str, str] = ("lon", "lat"),
     max_gap: Any,
@@ -104,7 +108,7 @@ def resample(
     Args:
         frame: a table with times and places; its rows may be in any order.
         every: the step, as pandas writes it: ``"1min"``, a ``Timedelta``. Times are whole multiples of it, in UTC.
-        by: the column that tells tracks apart, such as ``"mmsi"``; None for one track.
+        by: the column that tells tracks apart, such as ``"mmsi"``, or several; None for one track.
         time: the column of times; None for the index.
         columns: those of longitude and latitude, in degrees.
         max_gap, min_points, duplicates, smooth: as for `symspline.fit_segments`, a pause in seconds or as a
@@ -114,18 +118,22 @@ def resample(
         options: those of `CubicSpline`, or those of `make_smoothing_spline` but weights and frames.
 
     Returns:
-        A table with the column ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog``
-        in degrees clockwise from north; times keep their time zone.
+        A table with the columns ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and
+        ``cog`` in degrees clockwise from north; times keep their time zone. With ``on_failure="warn"`` or ``"ignore"``
+        the numbers of a piece whose curve did not converge are NaN.
 
     Raises:
         ValidationError: a column is not there, a row has no place or no name, no track has a piece of ``min_points``,
             or the places or times are not what `symspline.fit_segments` takes.
+        ConvergenceError, CutLocusError: as for `CubicSpline` or `make_smoothing_spline`; the message names the track.
     """
     import pandas as pd
 
+    keys: list[Any] = [] if by is None else list(by) if isinstance(by, (list, tuple)) else [by]
+
     if not isinstance(frame, pd.DataFrame):
         raise ValidationError(f"frame must be a table of pandas, not {shown(frame)}")
-    for name in (by, time, *columns):
+    for name in (*keys, time, *columns):
         if name is not None and name not in frame.columns:
             raise ValidationError(
                 f"there is no column {name!r}; the columns are {', '.join(map(str, frame.columns))}"
@@ -142,7 +150,7 @@ def resample(
             raise ValidationError(
                 f"{option} go with rows, and resample takes none; use symspline.fit_segments"
             )
-    for column in [*([] if by is None else [by]), *columns]:
+    for column in [*keys, *columns]:
         missing = np.flatnonzero(frame[column].isna())
         if missing.size:
             raise ValidationError(
@@ -152,7 +160,12 @@ def resample(
     step = pd.Timedelta(every)
     zone = stamps.dt.tz
     utc = (stamps.dt.tz_convert("UTC").dt.tz_localize(None) if zone is not None else stamps).to_numpy()
-    tracks = {None: np.arange(len(frame))} if by is None else frame.groupby(by, sort=False).indices
+    tracks: Any = {(): np.arange(len(frame))}
+    if keys:
+        tracks = {
+            label if len(keys) > 1 else (label,): rows
+            for label, rows in frame.groupby(keys if len(keys) > 1 else keys[0], sort=False).indices.items()
+        }
     vectors = from_lonlat(*(frame[column].to_numpy() for column in columns))
     curves, owners = [], []
     for label, rows in tracks.items():
@@ -164,7 +177,7 @@ def resample(
             used = np.ones(len(own), bool) if smooth else None
             pieces = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
         except ValidationError as error:
-            of = "" if by is None else f"{by} {label}, rows in the order of time: "
+            of = f"{_named(keys, label)}, rows in the order of time: " if keys else ""
             raise ValidationError(f"{of}{error}") from None
         curves += pieces
         owners += [label] * len(pieces)
@@ -172,8 +185,12 @@ def resample(
         raise ValidationError(
             f"no track has {min_points} places without a pause longer than max_gap={shown(max_gap)}, in seconds"
         )
+    names = [
+        f"{_named(keys, label)}{', ' if keys else ''}the piece from {np.datetime_as_string(t[0][0], 's')} on"
+        for (t, _), label in zip(curves, owners, strict=True)
+    ]
     tables = []
-    for spline, label in zip(_fitted(curves, smooth, options), owners, strict=True):
+    for spline, label in zip(_fitted(curves, names, smooth, options), owners, strict=True):
         x = pd.date_range(
             pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step
         )
@@ -182,18 +199,42 @@ def resample(
         shown_times = x if zone is None else x.tz_localize("UTC").tz_convert(zone)
         values = {name: shown_times, columns[0]: lon, columns[1]: lat}
         values |= {"sog": sog(spline, at, radius=radius), "cog": cog(spline, at)}
-        tables.append(pd.DataFrame(values if by is None else {by: label, **values}))
+        if not spline.report.converged:
+            values |= dict.fromkeys((*columns, "sog", "cog"), np.nan)
+        tables.append(pd.DataFrame(dict(zip(keys, label, strict=True)) | values))
     if not tables:
-        return pd.DataFrame(columns=[*([] if by is None else [by]), name, *columns, "sog", "cog"])
+        return pd.DataFrame(columns=[*keys, name, *columns, "sog", "cog"])
     return pd.concat(tables, ignore_index=True)
 
 
-def _fitted(curves: list[tuple[Any, Any]], smooth: bool, options: dict[str, Any]) -> Any:
+def _named(keys: list[Any], label: tuple[Any, ...]) -> str:
+    """A track in messages."""
+    return ", ".join(f"{key} {value}" for key, value in zip(keys, label, strict=True))
+
+
+def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: dict[str, Any]) -> Any:
+    """The curves; messages about them have their names."""
     if not curves:
         return []
-    if smooth:
-        return smooth_many([(*curve, {}) for curve in curves], Sphere(2), **options)
-    return fit_many(curves, Sphere(2), **options)
+
+    def renamed(message: object) -> str:
+        return re.sub(r"\bcurve (\d+)\b", lambda found: names[int(found[1])], str(message))
+
+    caught: list[warnings.WarningMessage] = []
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            if smooth:
+                found: Any = smooth_many([(*curve, {}) for curve in curves], Sphere(2), **options)
+            else:
+                found = fit_many(curves, Sphere(2), **options)
+    except (ValidationError, ConvergenceError, CutLocusError) as error:
+        own: Any = type(error)(renamed(error))
+        vars(own).update(vars(error))
+        raise own from None
+    for warning in caught:
+        warnings.warn(renamed(warning.message), warning.category, stacklevel=callers_level())
+    return found
 
 
 def _check_globe(spline: CubicSpline) -> None:

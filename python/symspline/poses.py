@@ -103,8 +103,8 @@ def imu(
     g = np.asarray(gravity)
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {gravity!r}")
-    check_seconds(spline.t, "t")
     motion = _Motion(spline, x, extrapolate, per_curve)
+    check_seconds(spline.t, "t")
     return Imu(motion.turning, motion.in_body(motion.acceleration - g))
 
 

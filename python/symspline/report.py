@@ -54,6 +54,10 @@ class Report:
         skipped: solvers that ``"auto"`` left out, or stopped early, because they would have cost too much; of a batch
             those of any curve. The search for other curves costs at most a few times what the first curve cost, or a
             fixed budget that is generous up to ten dimensions. With ``method=`` any solver runs to its end.
+        velocity_error: on a `Manifold` a bound for the distance of the velocities at the knots from those of the exact
+            C² curve, the largest norm of all knots, in units of velocity (per second for dates): see
+            :doc:`/manifolds`. inf where there is no bound. None on symmetric spaces. In a product of manifolds the
+            root of the sum of squares.
     """
 
     method: str
@@ -69,6 +73,7 @@ class Report:
     contraction_bound: Number | None = None
     guaranteed_sweeps: Number | None = None
     skipped: tuple[str, ...] = ()
+    velocity_error: Number | None = None
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -83,7 +88,8 @@ class Report:
             many = "at most " if converged.size > 1 else ""
         return (
             f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
-            f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}{self._certificate()}"
+            f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}"
+            f"{self._certificate()}{self._accuracy()}"
         )
 
     def _certificate(self) -> str:
@@ -91,6 +97,9 @@ class Report:
         if radius is None or np.isnan(radius).any():
             return ""
         return f", control legs stay below {np.max(radius):.3g} (Theorem 3.1)"
+
+    def _accuracy(self) -> str:
+        return "" if self.velocity_error is None else f", velocities within {_worst(self.velocity_error):.1e}"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Report):
@@ -119,6 +128,7 @@ class Report:
             known(self.contraction_bound),
             _count(known(self.guaranteed_sweeps)),
             self.skipped,
+            known(self.velocity_error),
         )
 
 
@@ -142,7 +152,13 @@ bits."""
 _INTEGERS = ("iterations", "solver", "skipped")
 _NUMBERS = ("residual", "max_step", "rate")
 # NaN where they are not known.
-OPTIONAL = ("invariant_radius", "contraction_bound", "guaranteed_sweeps", "alternative_energy")
+OPTIONAL = (
+    "invariant_radius",
+    "contraction_bound",
+    "guaranteed_sweeps",
+    "alternative_energy",
+    "velocity_error",
+)
 
 
 def empty_columns(count: int) -> Columns:
@@ -169,6 +185,9 @@ def combined(
         each = [getattr(report, name) for report in reports]
         return None if any(one is None for one in each) else whole(np.stack(each))[()]
 
+    def root(own: Any) -> Any:
+        return np.sqrt(np.sum(np.square(own), axis=0))
+
     converged: Any = np.all(np.stack([np.asarray(report.converged) for report in reports]), axis=0)
     skipped = {name for report in reports for name in report.skipped}
     return Report(
@@ -179,12 +198,13 @@ def combined(
         max_step=max_step,
         max_gap=largest("max_gap"),
         curvature=curvature,
-        invariant_radius=of_all("invariant_radius", lambda own: np.sqrt(np.sum(np.square(own), axis=0))),
+        invariant_radius=of_all("invariant_radius", root),
         rate=largest("rate"),
         alternative_energy=alternative_energy,
         contraction_bound=of_all("contraction_bound", lambda own: np.max(own, axis=0)),
         guaranteed_sweeps=_count(of_all("guaranteed_sweeps", lambda own: np.max(own, axis=0))),
         skipped=tuple(name for name in SOLVERS if name in skipped),
+        velocity_error=of_all("velocity_error", root),
     )
 
 
@@ -203,7 +223,7 @@ def shaped(
         one = {name: column.item() for name, column in columns.items()}
         solver, bits = one.pop("solver"), one.pop("skipped")
         for name in OPTIONAL:
-            if math.isnan(one[name]):
+            if math.isnan(one.get(name, math.nan)):
                 one[name] = None
         one["guaranteed_sweeps"] = _count(one["guaranteed_sweeps"])
         return Report(method=SOLVERS[solver], max_gap=gap, curvature=curvature, skipped=_skipped(bits), **one)
@@ -211,7 +231,7 @@ def shaped(
     solvers, sets = many.pop("solver"), many.pop("skipped")
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
     for name in OPTIONAL:
-        if np.isnan(many[name]).all():
+        if name not in many or np.isnan(many[name]).all():
             many[name] = None
     bits = int(np.bitwise_or.reduce(sets, axis=None))
     return Report(method=used, max_gap=gap, curvature=curvature, skipped=_skipped(bits), **many)

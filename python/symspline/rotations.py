@@ -205,7 +205,9 @@ def attitude(spline: Spline) -> Curve:
         ValidationError: the spline has none, or several.
     """
     if not isinstance(getattr(spline, "_curve", None), Curve):
-        raise TypeError(f"a spline is needed, not {shown(spline)}")
+        raise TypeError(
+            f"a curve through points is needed, a CubicSpline, HermiteSpline or SmoothingSpline, not {shown(spline)}"
+        )
     found = [part for part in spline._curve.parts if part.space in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(

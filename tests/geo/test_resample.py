@@ -112,3 +112,43 @@ def test_what_cannot_be_resampled_is_refused(change, what):
     } | change(table)
     with pytest.raises(ss.ValidationError, match=what):
         geo.resample(**arguments)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_rows_of_curves_that_did_not_converge_are_nan(smooth):
+    rng = np.random.default_rng(2)
+    table = pd.DataFrame(
+        {
+            "mmsi": np.repeat([211, 244], 12),
+            "lon": np.concatenate([np.arange(12) * 1e-3, rng.uniform(0, 60, 12)]),
+            "lat": np.concatenate([np.zeros(12), rng.uniform(-60, 60, 12)]),
+        },
+        index=np.tile(pd.date_range("2026-01-01", periods=12, freq="1h"), 2),
+    )
+    options = {"by": "mmsi", "max_gap": 86400, "smooth": smooth, "max_iter": 1 if smooth else 2}
+    found = geo.resample(table, "1h", on_failure="ignore", **options)
+    wild = found["mmsi"] == 244
+    assert found.loc[wild, ["lon", "lat", "sog", "cog"]].isna().all(axis=None)
+    whose = "mmsi 244, the piece from 2026-01-01T00:00:00 on"
+    with pytest.raises(ss.ConvergenceError, match=whose) as error:
+        geo.resample(table[12:], "1h", **options)
+    assert len(error.value.spline) == 1
+    with pytest.warns(ss.ConvergenceWarning, match=whose) as warned:
+        geo.resample(table[12:], "1h", on_failure="warn", **options)
+    assert warned[0].filename == __file__
+
+
+def test_several_columns_tell_tracks_apart():
+    table = ais().assign(trip=1)
+    table = pd.concat([table, table.assign(trip=2, lat=table["lat"] + 1)])
+    options = {"time": "when", "max_gap": 600, "duplicates": "first"}
+    found = geo.resample(table, "1min", by=["mmsi", "trip"], **options)
+    assert list(found.columns) == ["mmsi", "trip", "when", "lon", "lat", "sog", "cog"]
+    for trip in (1, 2):
+        alone = geo.resample(table[table["trip"] == trip], "1min", by="mmsi", **options)
+        own = found[found["trip"] == trip].drop(columns="trip").reset_index(drop=True)
+        pd.testing.assert_frame_equal(own, alone)
+    with pytest.raises(ss.ValidationError, match="mmsi 211, trip 1, rows in the order of time"):
+        geo.resample(table, by=("mmsi", "trip"), **options | {"duplicates": "raise"})
+    one = geo.resample(ais(), "1min", by=["mmsi"], **options)
+    pd.testing.assert_frame_equal(one, geo.resample(ais(), "1min", by="mmsi", **options))

@@ -363,3 +363,11 @@ def test_times_to_write_in_any_form(write):
     assert len(set(texts)) == 1
     with pytest.raises(ss.ValidationError, match=r"t\[1\] is nan, which is no time"):
         write(io.StringIO(), [0, np.nan], given)
+
+
+def test_curves_with_control_points_have_no_readings():
+    curve = ss.BezierCurve(np.stack([np.eye(4)] * 4), "se:3")
+    with pytest.raises(
+        TypeError, match=r"a curve through points is needed, a CubicSpline, .*not <BezierCurve"
+    ):
+        ss.poses.imu(curve, 0.5)

@@ -165,5 +165,5 @@ def test_what_has_no_hamiltonian():
     ):
         hamiltonian(sphere, 0.5)
     for nu in (2, True, -1, "1", None):
-        with pytest.raises(ss.ValidationError, match="nu must be 0 for H or 1"):
+        with pytest.raises(ss.ValidationError, match="nu must be 0 or 1, not"):
             hamiltonian(curve("cp:1"), 0.5, nu=nu)

@@ -1,6 +1,7 @@
 """Propagators and pulses: where they bring the states."""
 
 import re
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -249,3 +250,32 @@ def test_edges_too_far_apart():
         pulses(there, [0, 2])
     # The generator at the middle does not mind.
     assert np.abs(pulses(there, [0, 2], "midpoint", operators=PAULI) - [0, np.pi / 4, 0]).max() < 1e-14
+
+
+@pytest.mark.parametrize("name", ["cp:31", "cgr:2,24"])
+@pytest.mark.parametrize("ends", ["natural", "velocity"])
+def test_in_the_span_of_the_points_it_is_the_same(name, ends, monkeypatch):
+    space = ss.space(name)
+    p = points_on(space, 4, batch=(2,), seed=3)
+    v = 0.3 * space.log(p[..., 0, *[slice(None)] * len(space.point_shape)], p[:, 1])
+    # A velocity that leaves the span.
+    v = v + 0.1 * space.random_tangent(np.random.default_rng(4), p[:, 0])
+    spline = ss.CubicSpline(None, p, space, bc_type=((1, v), "natural") if ends == "velocity" else ends)
+    x = np.linspace(0, 3, 7)
+    u = propagator(spline, x)
+    monkeypatch.setattr(propagation, "_in_span", lambda spline: (spline._curve, None))
+    assert np.abs(propagator(spline, x) - u).max() < 4e-15
+    assert off_one(u) < 4e-15
+
+
+def test_eight_qubits_are_quick():
+    """In all 256 dimensions eight stages are systems of 2048 equations, and gigabytes."""
+    rng = np.random.default_rng(5)
+    states = rng.standard_normal((4, 256)) + 1j * rng.standard_normal((4, 256))
+    spline = ss.CubicSpline(None, states / np.linalg.norm(states, axis=1)[:, None], "cp:255")
+    tracemalloc.start()
+    u = propagator(spline, [0.5, 3.0])
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2e7
+    assert off_one(u) < 4e-15 and reaches(spline, u, np.array([0.5, 3.0])) < 1e-13

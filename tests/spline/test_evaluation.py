@@ -216,3 +216,24 @@ def test_single_precision_in_a_product_and_of_one_time():
     for dtype in ("int", "f2", "nonsense", 3):
         with pytest.raises(ss.ValidationError, match="dtype must be 'float32' or 'float64', not"):
             spline(0.5, dtype=dtype)
+
+
+@pytest.mark.parametrize("nu", [1.0, np.float64(1), np.int64(1)])
+def test_orders_of_derivatives_are_whole_numbers_of_any_type(nu):
+    spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+    moved = [[0.0], [1.0], [0.0]]
+    assert spline(0.5, nu=nu) == spline(0.5, nu=1)
+    assert spline.jvp(0.5, points=moved, nu=nu) == spline.jvp(0.5, points=moved, nu=1)
+    assert np.array_equal(spline.vjp(0.5, [1.0], nu=nu).points, spline.vjp(0.5, [1.0], nu=1).points)
+
+
+@pytest.mark.parametrize("nu", [True, 0.5, np.nan, 3, -1, "1", None, [1]])
+def test_other_orders_of_derivatives_are_refused(nu):
+    spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+    for call in (
+        lambda: spline(0.5, nu=nu),
+        lambda: spline.jvp(0.5, points=[[0.0], [1.0], [0.0]], nu=nu),
+        lambda: spline.vjp(0.5, [1.0], nu=nu),
+    ):
+        with pytest.raises(ss.ValidationError, match="nu must be 0, 1 or 2, not"):
+            call()

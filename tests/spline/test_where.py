@@ -146,3 +146,15 @@ def test_a_background_costs_no_more_memory_than_it_fills(part):
     assert spline.report.converged.sum() == mask.sum()
     output = spline.points.nbytes + spline.velocities.nbytes
     assert p.nbytes + peak < 1.2 * (p.nbytes + output)
+
+
+@pytest.mark.parametrize("name", ["se:2", "se:3", "aff:2", "sim:3", "so:3"])
+def test_matrices_of_curves_that_are_left_out_are_nan_throughout(name):
+    space = ss.space(name)
+    p = points_on(space, 4, batch=(3,), step=0.2)
+    spline = ss.CubicSpline(None, p, space, where=[True, False, True])
+    for nu in (0, 1, 2):
+        for values in (spline(0.5, nu=nu), spline(0.5, nu=nu, out=np.empty_like(spline(0.5)))):
+            assert np.isnan(values[1]).all() and np.isfinite(values[[0, 2]]).all()
+    many = ss.fit_many([(None, own) for own in p], space, where=[True, False, True])
+    assert np.isnan(many[1]([0.5, 1.0])).all()

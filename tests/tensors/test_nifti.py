@@ -1,5 +1,6 @@
 """Volumes of tensors in NIfTI files; where nibabel is not installed, with a stand-in that keeps images in memory."""
 
+import dataclasses
 import sys
 from types import ModuleType
 
@@ -19,9 +20,9 @@ def nibabel(request, monkeypatch):
     images = {}
 
     class Image:
-        def __init__(self, data, affine):
-            self.dataobj, self.affine = np.array(data), np.array(affine)
-            self.header = {"intent_code": 0, "intent_p1": 0.0}
+        def __init__(self, data, affine, header=None, dtype=None):
+            self.dataobj, self.affine = np.array(data, dtype), np.array(affine)
+            self.header = dict(header or {"intent_code": 0, "intent_p1": 0.0})
 
     module = ModuleType("nibabel")
     module.Nifti1Image = Image
@@ -138,3 +139,28 @@ def test_without_nibabel(monkeypatch):
     monkeypatch.setitem(sys.modules, "nibabel", None)
     with pytest.raises(ImportError, match="pip install nibabel"):
         read_nifti("tensors.nii", "fsl")
+
+
+@pytest.mark.parametrize("order", ["fsl", "itk"])
+def test_the_header_of_the_volume_that_was_read_is_kept(order, tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    first, second = str(tmp_path / "first.nii.gz"), str(tmp_path / "second.nii.gz")
+    given = volume(np.float64)
+    numbers = np.zeros((4, 3, 2, 1, 6), np.float32)
+    numbers[given.mask, 0] = to_vectors(given.tensors, "dipy")
+    image = nibabel.Nifti1Image(numbers, AFFINE)
+    image.header.set_xyzt_units("mm", "sec")
+    image.header["descrip"] = b"tensors of one subject"
+    image.header["intent_code"], image.header["intent_p1"] = 1005, 3
+    image.set_qform(AFFINE, 1)
+    image.set_sform(AFFINE, 4)
+    nibabel.save(image, first)
+    read = read_nifti(first)
+    write_nifti(second, dataclasses.replace(read, tensors=read.tensors.astype(float) + np.eye(3) / 3), order)
+    header = nibabel.load(second).header
+    assert header.get_xyzt_units() == ("mm", "sec") and header["descrip"].item() == b"tensors of one subject"
+    assert (int(header["qform_code"]), int(header["sform_code"])) == (1, 4)
+    assert int(header["intent_code"]) == (1005 if order == "itk" else 0)
+    # Numbers are not rounded to the type of the first file.
+    back = read_nifti(second, order)
+    assert np.array_equal(back.tensors, read.tensors.astype(float) + np.eye(3) / 3)

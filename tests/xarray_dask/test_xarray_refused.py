@@ -119,3 +119,34 @@ def test_the_package_does_not_import_xarray():
 import sys, symspline
 assert not {"xarray", "dask", "zarr", "pandas"} & set(sys.modules)
 """)
+
+
+@pytest.mark.parametrize(
+    "coords, names",
+    [
+        ({"time": (("traj", "obs"), [[0.0, 1, 5], [0, 2, 3]])}, r"'time' with dimensions \('traj', 'obs'\)"),
+        ({"when": ("obs", np.array(["2021-08-28", "2021-08-29", "2021-09-03"], "datetime64[ns]"))}, "'when'"),
+        ({"s": ("obs", [0.0, 1, 5], {"units": "seconds since 2021-08-28"})}, "'s'"),
+        ({"s": ("obs", [0.0, 1, 5], {"standard_name": "time"})}, "'s'"),
+    ],
+)
+def test_times_under_another_name_are_not_left_out(coords, names):
+    """As in files of trajectories by the CF conventions; they were replaced by 0, 1, 2."""
+    points = np.broadcast_to(np.eye(3), (2, 3, 3))
+    da = xr.DataArray(points, dims=("traj", "obs", "q"), coords=coords)
+    for call in (
+        lambda: sx.fit(da, "sphere:2", dim="obs"),
+        lambda: sx.resample(da, "sphere:2", [0.5], dim="obs"),
+    ):
+        with pytest.raises(ss.ValidationError, match=f"other coordinates look like times: {names}"):
+            call()
+    if "time" not in coords:
+        (name,) = coords
+        ds = sx.fit(da.swap_dims(obs=name), "sphere:2", dim=name)
+        assert ds.max_gap[0] > 1
+    assert (sx.fit(da.drop_vars(list(coords)), "sphere:2", dim="obs").max_gap == 1).all()
+
+
+def test_coordinates_that_are_no_times_do_not_matter():
+    da = xr.DataArray(np.eye(3), dims=("obs", "q"), coords={"depth": ("obs", [3.0, 1.0, 2.0])})
+    assert sx.fit(da, "sphere:2", dim="obs").max_gap == 1

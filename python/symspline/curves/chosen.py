@@ -212,8 +212,8 @@ def _place_some(whole: Solved, found: Solved, chosen: Numbers) -> None:
     """Curves at their places in the whole batch."""
     for all_rows, rows in ((whole.points, found.points), (whole.velocities, found.velocities)):
         all_rows.reshape(-1, *rows.shape[1:])[chosen] = rows
-    for name, column in whole.columns.items():
-        column[chosen] = found.columns[name]
+    for name, column in found.columns.items():
+        whole.columns[name][chosen] = column
 
 
 def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:

@@ -25,10 +25,20 @@ _QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
 
 def quantity_of(nu: Any) -> str:
     """What the core calls a derivative of order nu."""
-    try:
-        return _QUANTITIES[nu]
-    except (KeyError, TypeError):
-        raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}") from None
+    return _QUANTITIES[order_of(nu)]
+
+
+def order_of(nu: Any, most: int = 2) -> int:
+    """The order of a derivative as a whole number, at most ``most``; 1.0 is one, too.
+
+    Raises:
+        ValidationError: it is none.
+    """
+    number = isinstance(nu, (int, float, np.integer, np.floating)) and not isinstance(nu, bool)
+    if not number or nu not in range(most + 1):
+        words = "0, 1 or 2" if most == 2 else "0 or 1"
+        raise ValidationError(f"nu must be {words}, not {shown(nu)}")
+    return int(nu)
 
 
 class Curve(ABC):

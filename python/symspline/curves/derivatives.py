@@ -12,7 +12,7 @@ from .. import _core
 from .._core import ValidationError
 from ..arrays import as_array, shown
 from ..spaces import Array
-from .curve import Curve
+from .curve import Curve, order_of
 from .ends import End, ends_of
 from .gradient import Gradient, Places
 
@@ -23,8 +23,7 @@ def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: 
     Raises:
         ValidationError: a time is outside the knots.
     """
-    if isinstance(nu, bool) or nu not in (0, 1, 2):
-        raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}")
+    nu = order_of(nu)
     shape = x.shape if per_curve else batch + x.shape
     own = np.broadcast_to(x, shape).reshape(math.prod(batch), math.prod(shape[len(batch) :]))
     rows = _per_curve(knots, batch)

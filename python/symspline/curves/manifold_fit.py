@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..manifolds import Manifold
+from ..manifolds.certificate import velocity_errors
 from ..manifolds.condition import End, Legs, Problem, legs_of, not_a_knot
 from ..manifolds.frames import frames_along
 from ..manifolds.iteration import FLOOR, iterate
@@ -56,12 +57,16 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
         velocities[good] = found.velocities
         for name in ("converged", "iterations", "residual", "rate"):
             columns[name][good] = getattr(found, name)
+        unknowns = slice(0, start.shape[1])
+        coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
+        columns["velocity_error"][good] = velocity_errors(problem, coordinates, pace)
         legs = legs_of(operations, problem.h, problem.p, found.velocities)
         faults |= _unfit(space, problem, legs, good, found.converged, columns, options, batch)
         for i in faults:
             if faults[i][0] == "cut-locus":
                 velocities[i] = np.nan
                 columns["converged"][i], columns["residual"][i] = False, np.inf
+                columns["velocity_error"][i] = np.nan
     return Solved(
         points,
         velocities.reshape(points.shape),

@@ -9,13 +9,25 @@ import numpy as np
 
 from .. import _core
 from .._core import ValidationError
-from ..spaces import Array, Space
+from ..spaces import Affine, Array, Similarity, Space, SpecialEuclidean
 from . import derivatives
 from .curve import REAL, Curve, Doubles
 from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
 from .out import check_out, is_room
 from .solve import Options, Progress, Solved, Task, checked, solve
+
+# Their matrices have the same last row everywhere, which the core writes of curves that were not found, too.
+_CONSTANT_ROW = (SpecialEuclidean, Similarity, Affine)
+
+
+def _all_nan(space: Space, values: Array) -> Array:
+    """The same values, in place, with NaN in all of a matrix of which there is one."""
+    if isinstance(space, _CONSTANT_ROW):
+        missing = np.isnan(values[..., 0, 0])
+        if missing.any():
+            values[missing] = np.nan
+    return values
 
 
 class Plain(Curve):
@@ -62,7 +74,7 @@ class Plain(Curve):
     ) -> Any:
         self._check_times(x, per_curve)
         values = _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress)
-        return values if quantity in REAL else self.space._numbers(values)
+        return values if quantity in REAL else _all_nan(self.space, self.space._numbers(values))
 
     def write(
         self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
@@ -74,6 +86,7 @@ class Plain(Curve):
             _core.evaluate(
                 *self._core_curve, x, quantity, outside, per_curve, progress, space._as_doubles(out)
             )
+            _all_nan(space, out)
         else:
             np.copyto(out, self.evaluate(x, quantity, outside, per_curve, progress), casting="same_kind")
         return out

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from .._core import ValidationError
-from ..arrays import shown
+from ..curves.curve import order_of
 from ..spaces import Product, Space, parts_of
 from ..spaces import space as space_named
 from .embedding import bent
@@ -53,8 +53,7 @@ def evaluate(t: Any, points: Any, velocities: Any, x: Any, space: Space | str, n
     >>> jax.jacfwd(jax.jacfwd(curve))(0.5).shape
     (3,)
     """
-    if isinstance(nu, bool) or nu not in (0, 1, 2):
-        raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}")
+    nu = order_of(nu)
     space = space_named(space)
     if isinstance(space, Product):
         pieces = zip(

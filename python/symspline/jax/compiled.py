@@ -9,9 +9,8 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from .._core import ValidationError
 from ..adapters import split
-from ..arrays import shown
+from ..curves.curve import order_of
 from ..curves.ends import ends_in_factors
 from ..manifolds.manifold import refuse_functions
 from ..spaces import Product, Space, parts_of
@@ -62,8 +61,7 @@ def curve(
     Raises:
         NotImplementedError: ∇γ' is to be differentiated in x, or something a second time.
     """
-    if isinstance(nu, bool) or nu not in (0, 1, 2):
-        raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}")
+    nu = order_of(nu)
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):

@@ -102,10 +102,15 @@ def legs_of(operations: Operations, h: Doubles, p: Array, u: Array) -> Legs:
 def defects(problem: Problem, u: Array) -> Doubles:
     """By how much velocities miss the conditions at every node, as coordinates: a sixth of the jump of acceleration,
     and at an end with not-a-knot the error of the velocity there."""
-    operations, h = problem.operations, problem.h
-    legs = legs_of(operations, h, problem.p, u)
+    legs = legs_of(problem.operations, problem.h, problem.p, u)
+    return defects_of(problem, u, legs, problem.operations.dlog(*legs))
+
+
+def defects_of(problem: Problem, u: Array, legs: Legs, dlog: Array) -> Doubles:
+    """The same with the control polygon and D log, which were computed before."""
+    h = problem.h
     square = (h * h).reshape(*h.shape, *[1] * (u.ndim - 2))
-    starts, stops = (operations.dlog(*legs) - legs.v) / square
+    starts, stops = (dlog - legs.v) / square
     if problem.ends is None:
         jumps = np.concatenate([starts[:, :1] - stops[:, -1:], starts[:, 1:] - stops[:, :-1]], axis=1)
         return problem.coordinates(jumps, slice(0, h.shape[1]))

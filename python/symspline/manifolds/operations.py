@@ -72,6 +72,8 @@ class Operations:
         # Formulas that divide by the distance have nothing to say of equal points.
         same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
         if same.any():
+            # A copy: logarithms of other libraries may be read-only arrays.
+            found = found.copy()
             found[same] = 0.0
         return found
 

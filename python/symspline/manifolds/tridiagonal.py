@@ -58,6 +58,19 @@ class Tridiagonal:
         x = self.solved(self._right[:, :, None] * found)
         return x if self._seam is None else self._seam.corrected(x)
 
+    def largest_step(self, sizes: Doubles) -> Doubles:
+        """The longest step that defects of these sizes, shape (curves, unknowns), can ask for at a knot; per curve.
+
+        Open curves have a matrix with positive pivots and positive entries, whose inverse therefore has alternating
+        signs: it is an M-matrix but for the signs of every other row and column. Closed curves have a matrix that is
+        dominant by ``weight`` in every row, since holonomies preserve lengths.
+        """
+        if self._seam is not None:
+            result: Doubles = (self._right * sizes / self.weight).max(axis=1)
+            return result
+        signs = (-1.0) ** np.arange(sizes.shape[1])
+        return np.asarray(np.abs(self.solved((signs * self._right * sizes)[:, :, None])).max(axis=(1, 2)))
+
     def solved(self, right: Doubles) -> Doubles:
         """The solution without the seam."""
         x = right.copy()

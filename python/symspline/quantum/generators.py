@@ -7,8 +7,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from .._core import ValidationError
-from ..arrays import shown
 from ..convert.reading import Array, adjoint
+from ..curves.curve import order_of
 from ..spaces import ComplexGrassmannian, ComplexProjective, Space, SpecialUnitary, Unitary
 from ..spline import CubicSpline
 
@@ -48,8 +48,7 @@ def hamiltonian(
            [0.+1.j, 0.+0.j]])
     """
     space = quantum_space(spline)
-    if isinstance(nu, bool) or nu not in (0, 1):
-        raise ValidationError(f"nu must be 0 for H or 1 for its derivative H', not {shown(nu)}")
+    nu = order_of(nu, 1)
     point, vector = (spline(x, nu=order, extrapolate=extrapolate) for order in (0, nu + 1))
     return generator(space, point, vector)
 

@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
 from ..convert.reading import Array, adjoint, refuse
+from ..curves.curve import Curve
+from ..curves.plain import Plain
+from ..curves.span import span_of
 from ..spaces import ComplexGrassmannian, ComplexProjective
 from ..spline import CubicSpline
 from .generators import generator, quantum_space
@@ -27,7 +30,8 @@ def propagator(spline: CubicSpline, x: ArrayLike) -> Array:
 
     U(x) moves the first point along the curve, and all that is orthogonal to it without turning. Its error is
     rounding: Gauss's collocation of order 16 inside every segment, where the curve is analytic. It does not
-    depend on what other times are asked for.
+    depend on what other times are asked for. States or subspaces that span few of many dimensions cost little more than
+    in their span.
 
     Source: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), §II.1.3 and §IV.2.1: Gauss's methods
     keep U*U.
@@ -55,15 +59,31 @@ def propagator(spline: CubicSpline, x: ArrayLike) -> Array:
         gates = spline._curve.evaluate(times.ravel(), "point", "raise", False)
         moved: Array = gates.reshape(curves, times.size, *space.point_shape) @ adjoint(first)
         return moved.reshape(*spline._batch, *times.shape, *space.point_shape)
-    edges = _edges(spline).reshape(curves, -1)
-    at_edges = _products(_steps(spline, edges[:, :-1], np.diff(edges)))
+    curve, basis = _in_span(spline)
+    edges = _edges(curve).reshape(curves, -1)
+    at_edges = _products(_steps(curve, edges[:, :-1], np.diff(edges)))
     flat = np.broadcast_to(times.ravel(), (curves, times.size))
     place = np.stack([np.searchsorted(own, times.ravel(), "right") for own in edges[:, :-1]]) - 1
     start = np.take_along_axis(edges, place, axis=1)
-    result = _steps(spline, start, flat - start) @ np.take_along_axis(
-        at_edges, place[..., None, None], axis=1
-    )
-    return _unitary(result).reshape(*spline._batch, *times.shape, *result.shape[-2:])
+    result = _steps(curve, start, flat - start) @ np.take_along_axis(at_edges, place[..., None, None], axis=1)
+    result = _unitary(result)
+    if basis is not None:
+        # What is orthogonal to all points stays.
+        q = basis.reshape(curves, 1, *basis.shape[-2:])
+        result = np.eye(q.shape[-2]) + q @ (result - np.eye(q.shape[-1])) @ adjoint(q)
+    return np.asarray(result.reshape(*spline._batch, *times.shape, *result.shape[-2:]))
+
+
+def _in_span(spline: CubicSpline) -> tuple[Curve, Array | None]:
+    """The curve in the coordinates of an orthonormal basis of the span of its points and end vectors, in which the
+    Hamiltonian acts, and that basis; the curve as it is, and None, where they span the whole space."""
+    curve: Curve = spline._curve
+    width = 1 if isinstance(curve.space, ComplexProjective) else curve.space.point_shape[1]
+    if (curve.times.shape[-1] + 2) * width >= curve.space.point_shape[0]:
+        return curve, None
+    span = span_of(curve.space, curve.points, np.take(curve.velocities, [0, -1], axis=len(curve.batch)))
+    small = Plain(span.space, curve.times, span.down(curve.points), span.down(curve.velocities))
+    return small, span.basis
 
 
 def _times(spline: CubicSpline, x: ArrayLike) -> Doubles:
@@ -85,12 +105,12 @@ def _times(spline: CubicSpline, x: ArrayLike) -> Doubles:
     return times
 
 
-def _edges(spline: CubicSpline) -> Doubles:
+def _edges(curve: Curve) -> Doubles:
     """The knots with as many times between them as make legs short enough, shape batch axes + (m,)."""
-    knots = np.broadcast_to(spline._times, (*spline._batch, spline._times.shape[-1]))
+    knots = np.broadcast_to(curve.times, (*curve.batch, curve.times.shape[-1]))
     lengths = np.diff(knots)
     inner = knots[..., :-1, None] + lengths[..., None] * np.linspace(0, 1, 9)
-    speed = spline._curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
+    speed = curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
     legs = speed.reshape(inner.shape).max(axis=-1) * lengths
     # The same number in all curves, so that they are one array.
     number = np.maximum(1, np.ceil(legs.reshape(-1, legs.shape[-1]).max(axis=0) / _LEG)).astype(int)
@@ -107,25 +127,25 @@ def _products(steps: Array) -> Array:
     return np.stack(products, axis=1)
 
 
-def _steps(spline: CubicSpline, start: Doubles, length: Doubles) -> Array:
+def _steps(curve: Curve, start: Doubles, length: Doubles) -> Array:
     """The propagators from times to times a little later in the same segment, shape (curves, m, n, n)."""
-    n = spline.space.point_shape[0]
+    n = curve.space.point_shape[0]
     block = max(1, _BLOCK // (start.shape[0] * (STAGES * n) ** 2 * 16))
     pieces = [
-        _step(spline, start[:, i : i + block], length[:, i : i + block])
+        _step(curve, start[:, i : i + block], length[:, i : i + block])
         for i in range(0, start.shape[1], block)
     ]
     return np.concatenate(pieces, axis=1) if pieces else np.zeros((*start.shape, n, n), complex)
 
 
-def _step(spline: CubicSpline, start: Doubles, length: Doubles) -> Array:
+def _step(curve: Curve, start: Doubles, length: Doubles) -> Array:
     nodes, weights, matrix = gauss()
     times = start[..., None] + length[..., None] * nodes
     point, velocity = (
-        spline._curve.evaluate(times.reshape(*spline._batch, -1), quantity, "raise", True)
+        curve.evaluate(times.reshape(*curve.batch, -1), quantity, "raise", True)
         for quantity in ("point", "velocity")
     )
-    h = generator(spline.space, point, velocity)
+    h = generator(curve.space, point, velocity)
     n = h.shape[-1]
     rates = -1j * length[..., None, None, None] * h.reshape(*times.shape, n, n)
     # Kᵢ = rateᵢ (1 + Σ aᵢⱼ Kⱼ), for all stages at once.

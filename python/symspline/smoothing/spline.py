@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from .._core import ValidationError
-from ..curves.curve import Curve
+from ..curves.curve import Curve, order_of
 from ..curves.ends import fixed_velocities
 from ..curves.noise import Noise
 from ..report import Report
@@ -118,8 +118,7 @@ class SmoothingSpline(CubicSpline):
         >>> bool(0.02 < s.std(0.5) < s.std(0.0) < 0.1)
         True
         """
-        if nu not in (0, 1):
-            raise ValidationError(f"nu must be 0 or 1 here, not {nu!r}")
+        nu = order_of(nu, 1)
         times, per_curve = self._clock.at(x, self._batch, False)
         if not np.isfinite(times).all():
             raise ValidationError("x must be finite")

@@ -410,7 +410,13 @@ class Space:
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
         """Random points, shape ``shape + point_shape``: uniform on a compact space."""
         sizes = (shape,) if isinstance(shape, (int, np.integer)) else tuple(shape)
-        return self._apply("scatter", x=self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes)))
+        noise = self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes))
+        return self._apply("scatter", x=self._scatter_scale * noise)
+
+    @property
+    def _scatter_scale(self) -> float:
+        """What random points multiply standard normal numbers by."""
+        return 1.0
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
         """Standard normal tangent vectors at the points p."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,20 @@ from .._core import ValidationError
 from .actions import Congruent, preserves, require
 from .base import Array
 
+# Beyond this size random exponents are scaled so that they do not grow with the size: exp of a random symmetric matrix
+# has a condition of e^√(8n) and more, and is not positive definite in floating-point numbers from n = 200 on.
+_FREE_SIZE = 20
 
-class SymmetricPositiveDefinite(Congruent):
+
+class _PositiveDefinite(Congruent):
+    """Matrices whose random points are exponentials."""
+
+    @property
+    def _scatter_scale(self) -> float:
+        return min(1.0, math.sqrt(_FREE_SIZE / self.point_shape[0]))
+
+
+class SymmetricPositiveDefinite(_PositiveDefinite):
     """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
     covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
 
@@ -27,7 +40,7 @@ class SymmetricPositiveDefinite(Congruent):
         super().__init__(n)
 
 
-class SpecialPositiveDefinite(Congruent):
+class SpecialPositiveDefinite(_PositiveDefinite):
     """Symmetric positive definite n × n matrices of determinant 1, SL(n)/SO(n): the shape of a tensor without its
     size. A totally geodesic part of `SymmetricPositiveDefinite`, with its metric.
 
@@ -47,7 +60,7 @@ class SpecialPositiveDefinite(Congruent):
         require(self, defects, tol, "|det g| − 1", "Divide g by abs(numpy.linalg.det(g)) ** (1 / n).")
 
 
-class HermitianPositiveDefinite(Congruent):
+class HermitianPositiveDefinite(_PositiveDefinite):
     """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
 
     >>> import symspline as ss
@@ -61,7 +74,7 @@ class HermitianPositiveDefinite(Congruent):
         super().__init__(n)
 
 
-class Siegel(Congruent):
+class Siegel(_PositiveDefinite):
     """Siegel's upper half space Sp(2n, R)/U(n) of complex symmetric n × n matrices X + iY with positive definite Y:
     points are the symplectic positive definite matrices (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) of 2n rows, which
     `symspline.convert.siegel_to_positive_definite` makes. A totally geodesic part of `SymmetricPositiveDefinite`,

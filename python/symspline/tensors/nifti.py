@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike, fspath
 from typing import Any
 
@@ -27,11 +27,13 @@ class Volume:
         tensors: shape (V, 3, 3), voxels in the order of the mask's True entries.
         mask: shape (X, Y, Z).
         affine: from voxels to millimetres, shape (4, 4).
+        header: that of the file that was read, whose units, codes and texts `write_nifti` keeps; None for a new one.
     """
 
     tensors: Array
     mask: NDArray[np.bool_]
     affine: NDArray[np.float64]
+    header: Any = field(default=None, compare=False, repr=False)
 
 
 def read_nifti(file: File, order: str | None = None, mask: ArrayLike | File | None = None) -> Volume:
@@ -76,7 +78,7 @@ def read_nifti(file: File, order: str | None = None, mask: ArrayLike | File | No
             f"{fspath(file)} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)"
         )
     inside = _mask(mask, numbers, image.affine)
-    return Volume(from_vectors(numbers[inside], order), inside, np.asarray(image.affine, float))
+    return Volume(from_vectors(numbers[inside], order), inside, np.asarray(image.affine, float), image.header)
 
 
 def write_nifti(file: File, volume: Volume, order: str) -> None:
@@ -87,7 +89,8 @@ def write_nifti(file: File, volume: Volume, order: str) -> None:
 
     Args:
         file: its name ends in .nii or .nii.gz.
-        volume: tensors of the voxels in a mask, and the affine map.
+        volume: tensors of the voxels in a mask, the affine map, and the header of the file that they came from, whose
+            units, codes and texts are kept; for new tensors use ``dataclasses.replace(volume, tensors=...)``.
         order: as for `from_vectors`: the program that will read the file. For ``"itk"`` the file has five axes, the
             intent of symmetric matrices, and their order.
 
@@ -105,9 +108,16 @@ def write_nifti(file: File, volume: Volume, order: str) -> None:
     inside = to_vectors(volume.tensors, "dipy" if order == "itk" else order)
     numbers = np.zeros((*mask.shape, 6), inside.dtype)
     numbers[mask] = inside
-    image = nibabel.Nifti1Image(numbers[:, :, :, None] if order == "itk" else numbers, volume.affine)
-    if order == "itk":
-        image.header["intent_code"], image.header["intent_p1"] = _SYMMATRIX, 3
+    shaped = numbers[:, :, :, None] if order == "itk" else numbers
+    if volume.header is None:
+        image = nibabel.Nifti1Image(shaped, volume.affine)
+    else:
+        # Its type of numbers would round these.
+        image = nibabel.Nifti1Image(shaped, volume.affine, volume.header, dtype=numbers.dtype)
+    was = int(image.header["intent_code"]) == _SYMMATRIX
+    if order == "itk" or was:
+        code, rows = (_SYMMATRIX, 3) if order == "itk" else (0, 0)
+        image.header["intent_code"], image.header["intent_p1"] = code, rows
     nibabel.save(image, fspath(file))
 
 

@@ -45,7 +45,7 @@ def fit(
         da: the points. Of a dask array nothing is computed before it is asked for.
         space: the space or its name; not a `Product`, whose factors are fitted each by itself.
         dim: the dimension along the curves. Its coordinate holds the knots, numbers or ``datetime64`` (rates are then
-            per second); without one they are 0, 1, …, N.
+            per second); without one they are 0, 1, …, N, and another coordinate that looks like times is an error.
         point_dims: the dimensions of a point's array, in their order: for matrices rows and columns.
         bc_type: as for `CubicSpline`. Vectors have the shape of a point, or are DataArrays.
         method, tol, max_iter, extrapolate, atol: as for `CubicSpline`.

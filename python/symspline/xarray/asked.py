@@ -50,6 +50,8 @@ def asked_of(
     # Its type is refused or taken with the points.
     space._doubles(np.zeros(space.point_shape, da.dtype), "da")
     kinds, vectors = split(bc_type)
+    if dim not in da.coords:
+        _refuse_other_times(da, dim)
     t = da[dim].values if dim in da.coords else None
     still = np.zeros((da.sizes[dim], 1))
     CubicSpline(
@@ -106,6 +108,32 @@ def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[st
                 f"{name!r} is cut into {len(parts)} chunks, but {what} at once; pass da.chunk({{{name!r}: -1}}), with "
                 "smaller chunks along other dimensions"
             )
+
+
+def _refuse_other_times(da: xr.DataArray, dim: str) -> None:
+    """Raise ValidationError if another coordinate along the curves holds times, which would be left out."""
+    found = [name for name, c in da.coords.items() if dim in c.dims and _are_times(name, c)]
+    if not found:
+        return
+    names = ", ".join(f"{name!r} with dimensions {da.coords[name].dims}" for name in found)
+    raise ValidationError(
+        f"{dim!r} has no coordinate of its own, which would hold the knots, but other coordinates look like times: "
+        f"{names}. If all curves have the same times, pass da.swap_dims({{{dim!r}: name}}) with dim=name. If every "
+        "curve has its own, call symspline.CubicSpline with one row of times per curve. For the knots 0, 1, 2, ... "
+        "pass da.drop_vars(names)."
+    )
+
+
+def _are_times(name: Hashable, coordinate: xr.DataArray) -> bool:
+    """Whether a coordinate holds times, by its type, its name, or its attributes of the CF conventions (4.4)."""
+    words = coordinate.attrs
+    return (
+        coordinate.dtype.kind in "mM"
+        or str(name).lower() in ("t", "time", "times")
+        or words.get("standard_name") == "time"
+        or words.get("axis") == "T"
+        or " since " in str(words.get("units", ""))
+    )
 
 
 def _vector(
