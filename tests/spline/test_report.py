@@ -33,6 +33,7 @@ FIELDS = [
     "contraction_bound",
     "guaranteed_sweeps",
     "skipped",
+    "velocity_error",
 ]
 
 
