@@ -181,20 +181,25 @@ def compact(space):
     return np.isfinite(space.injectivity_radius) and has_metric(space)
 
 
+def centre_of(space):
+    """A point of whole numbers."""
+    if isinstance(space, ss.IndefiniteGrassmannian):
+        a, b, p, q = (int(x) for x in str(space).partition(":")[2].split(","))
+        return np.diag(np.repeat([-1, 1, -1, 1], [p - a, a, q - b, b]))
+    if len(space.point_shape) == 2:
+        return np.eye(*space.point_shape, dtype=int)
+    return np.eye(*space.point_shape, dtype=int)[1 if isinstance(space, QUADRICS) else 0]
+
+
 def base_point(space, rng):
     """A random point that is not far from the middle of a non-compact space."""
     p = space.random_point(rng)
     if compact(space):
         return p
-    centre = np.zeros(space.point_shape)
     if isinstance(space, INDEFINITE):
         # Not every two points are joined by a geodesic.
-        if isinstance(space, QUADRICS):
-            centre[1] = 1.0
-        else:
-            a, b, p, q = (int(x) for x in str(space).partition(":")[2].split(","))
-            centre = np.diag(np.repeat([-1.0, 1, -1, 1], [p - a, a, q - b, b]))
-        return space.exp(centre, 0.2 * space.random_tangent(rng, centre))
+        return space.exp(centre_of(space), 0.2 * space.random_tangent(rng, centre_of(space)))
+    centre = np.zeros(space.point_shape)
     if isinstance(space, HYPERBOLIC):
         centre[0] = 1.0
     if len(space.point_shape) == 2:

@@ -4,7 +4,7 @@ and the spaces of definite metric that lie in them."""
 import mpmath
 import numpy as np
 import pytest
-from cases import EPS, condition
+from cases import EPS, centre_of, condition
 from scipy.linalg import expm
 
 import symspline as ss
@@ -50,11 +50,7 @@ def act(name, g, x):
 
 
 def origin(name):
-    space = ss.space(name)
-    if name.startswith("igr"):
-        a, b, p, q = map(int, name.partition(":")[2].split(","))
-        return np.diag(np.repeat([-1.0, 1, -1, 1], [p - a, a, q - b, b]))
-    return np.eye(space.point_shape[0])[1]
+    return centre_of(ss.space(name)).astype(float)
 
 
 def data(name, rng, n=6, step=0.2):
