@@ -4,7 +4,7 @@ and the spaces of definite metric that lie in them."""
 import mpmath
 import numpy as np
 import pytest
-from cases import EPS, centre_of, condition
+from cases import EPS, base_point, centre_of, condition, jumps
 from scipy.linalg import expm
 
 import symspline as ss
@@ -248,6 +248,47 @@ def test_a_definite_form_gives_the_grassmannian(rng):
         curve = ss.CubicSpline(KNOTS, points, name, tol=1e-14)(np.linspace(0, 5, 41))
         y = ss.CubicSpline(KNOTS, p / [2.0, 1.0], space, tol=1e-14)(np.linspace(0, 5, 41))
         np.testing.assert_allclose(curve, ss.convert.basis_to_reflection(y, bases), rtol=0, atol=1e-12)
+
+
+# ---- steps of every kind ----
+
+KINDS = {"space-like": (0.3, 1.0), "time-like": (1.0, 0.3), "nearly null": (1.0, 1.0 + 1e-9)}
+
+
+def walk_of_kind(space, kind, rng, n=8, step=0.4):
+    """Points whose steps have a direction in which the metric has a given sign, or is all but zero."""
+    p = [base_point(space, rng)]
+    e = space.frame(p[0])
+    direction = KINDS[kind][0] * e[0] + KINDS[kind][1] * e[1]
+    for k in range(n - 1):
+        turn = 0.0 if kind == "nearly null" else 0.05 * (-1) ** k
+        q = space.exp(p[-1], step * direction + turn * space.random_tangent(rng, p[-1]))
+        direction = space.transport(p[-1], q, direction)
+        p.append(q)
+    return np.array(p)
+
+
+@quadrics
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "homotopy", "auto"])
+def test_curves_are_c2_along_steps_of_every_kind(name, kind, method, rng):
+    space = ss.space(name)
+    p = walk_of_kind(space, kind, rng)
+    steps = space.log(p[:-1], p[1:])
+    square = space.invariant_form(p[:-1], steps, steps) / np.sum(steps**2, axis=-1)
+    expected = {"space-like": 1, "time-like": -1, "nearly null": 0}[kind]
+    assert (np.where(np.abs(square) < 1e-6, 0, np.sign(square)) == expected).all()
+    t = np.cumsum(rng.uniform(0.8, 1.25, len(p)))
+    closed = np.concatenate([p[:5], p[3::-1]])
+    v, w = 0.8 * space.log(p[0], p[1]), 0.3 * space.log(p[-1], p[-2])
+    ends = ["natural", "clamped", "not-a-knot", ((1, v), (1, w)), ((2, v), (2, w)), ("not-a-knot", (1, w))]
+    for bc_type, points, times in [*((e, p, t) for e in ends), ("periodic", closed, np.arange(9.0))]:
+        spline = ss.CubicSpline(
+            times, points, space, bc_type=bc_type, method=method, tol=1e-14, on_failure="ignore"
+        )
+        # Rounding may leave a little more than the tolerance.
+        assert np.max(spline.report.residual) < 1e-13, bc_type
+        assert np.max(jumps(spline)) <= 1.0, (bc_type, jumps(spline))
 
 
 # ---- null curves ----
