@@ -42,7 +42,7 @@ templates_path = ["_templates"]
 
 # ---- pages ----
 
-myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 # Links to headings.
 myst_heading_anchors = 3
 suppress_warnings: list[str] = []

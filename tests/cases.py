@@ -43,6 +43,10 @@ CASES = [
     Case("hyperbolic:1", far=1.5, smooth=False),
     Case("hyperbolic:2", far=1.5, face=True),
     Case("hyperbolic:5", far=1.5),
+    Case("ds:2", far=1.2),
+    Case("ds:3", far=1.5, few=True, face=True),
+    Case("ads:2", far=1.5, few=True),
+    Case("ads:4", far=1.5, face=True),
     Case("rp:1", far=1.2, smooth=False, few=True),
     Case("rp:2", far=1.2, face=True),
     Case("rp:7", far=1.2, few=True, face=True),
@@ -90,6 +94,8 @@ CASES = [
     Case("sl:3", far=1.5, few=True, face=True),
     Case("sp:4", far=1.5, few=True, face=True),
     Case("lorentz:3", far=1.5, few=True, face=True),
+    Case("igr:0,1,1,2", far=1.5, few=True),
+    Case("igr:1,1,2,2", far=1.5, few=True, face=True),
 ]
 
 # Matrices so long that a law takes seconds: they obey three, of the space, of the curve and of its derivatives.
@@ -132,6 +138,8 @@ LINEAR = (
     ss.Symplectic,
     ss.Lorentz,
 )
+QUADRICS = (ss.DeSitter, ss.AntiDeSitter)
+INDEFINITE = (*QUADRICS, ss.IndefiniteGrassmannian)
 QUOTIENTS = (
     ss.RealProjective,
     ss.ComplexProjective,
@@ -143,15 +151,15 @@ QUOTIENTS = (
 
 
 def condition(space, points):
-    """By how much rounding of points near these counts: |p|² on the hyperboloid, |p| cond(p) for positive
-    definite and for invertible matrices, |p| otherwise."""
-    if isinstance(space, HYPERBOLIC):
+    """By how much rounding of points near these counts: |p|² on quadrics, |p| cond(p) for positive definite and for
+    invertible matrices, |p| otherwise."""
+    if isinstance(space, (*HYPERBOLIC, *QUADRICS)):
         return float(np.max(np.sum(np.square(np.abs(points)), axis=-1)))
     if len(space.point_shape) == 2:
         largest = max(1.0, float(np.max(np.linalg.norm(points, axis=(-2, -1)))))
     else:
         largest = max(1.0, float(np.max(np.abs(points))))
-    if isinstance(space, (*POSITIVE, *LINEAR)):
+    if isinstance(space, (*POSITIVE, *LINEAR, ss.IndefiniteGrassmannian)):
         return largest * float(np.max(np.linalg.cond(np.asarray(points))))
     return largest
 
@@ -165,7 +173,7 @@ def apart(space, p, q):
 
 
 def has_metric(space):
-    """Whether lengths mean anything; K is NaN where they do not."""
+    """Whether lengths mean anything; K is NaN where no metric, or none that is definite, belongs to the space."""
     return not np.isnan(space.curvature)
 
 
@@ -173,11 +181,24 @@ def compact(space):
     return np.isfinite(space.injectivity_radius) and has_metric(space)
 
 
+def centre_of(space):
+    """A point of whole numbers."""
+    if isinstance(space, ss.IndefiniteGrassmannian):
+        a, b, p, q = (int(x) for x in str(space).partition(":")[2].split(","))
+        return np.diag(np.repeat([-1, 1, -1, 1], [p - a, a, q - b, b]))
+    if len(space.point_shape) == 2:
+        return np.eye(*space.point_shape, dtype=int)
+    return np.eye(*space.point_shape, dtype=int)[1 if isinstance(space, QUADRICS) else 0]
+
+
 def base_point(space, rng):
     """A random point that is not far from the middle of a non-compact space."""
     p = space.random_point(rng)
     if compact(space):
         return p
+    if isinstance(space, INDEFINITE):
+        # Not every two points are joined by a geodesic.
+        return space.exp(centre_of(space), 0.2 * space.random_tangent(rng, centre_of(space)))
     centre = np.zeros(space.point_shape)
     if isinstance(space, HYPERBOLIC):
         centre[0] = 1.0
@@ -233,7 +254,10 @@ def _walk(space, step, n, rng, turn):
         q = space.project(space.exp(p[-1], step * direction))
         direction = space.project_tangent(q, space.transport(p[-1], q, direction))
         direction = direction + turn * unit_tangent(space, q, rng)
-        if not compact(space) and space.distance(p[0], q) * max(1.0, space.curvature) > 2.0:
+        if isinstance(space, INDEFINITE):
+            if np.linalg.norm(q - p[0]) > 2.0:
+                direction = space.project_tangent(q, p[0] - q) + 0.5 * direction
+        elif not compact(space) and space.distance(p[0], q) * max(1.0, space.curvature) > 2.0:
             direction = space.log(q, p[0]) + 0.5 * direction
         size = space.norm(q, direction)
         direction = direction / size if size > 0.1 else unit_tangent(space, q, rng)

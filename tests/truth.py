@@ -4,7 +4,7 @@ geodesics and transport of the space, and every segment evaluated by itself."""
 from dataclasses import dataclass
 
 import numpy as np
-from cases import EPS, LINEAR, POSITIVE, QUOTIENTS
+from cases import EPS, LINEAR, POSITIVE, QUADRICS, QUOTIENTS
 
 import symspline as ss
 
@@ -142,7 +142,7 @@ def jumps(space, place, vectors, before, behind):
 
 def conditions(space, controls):
     """By how much rounding of the control points of each curve counts, in lengths of the space."""
-    if isinstance(space, ss.Hyperbolic):
+    if isinstance(space, (ss.Hyperbolic, *QUADRICS)):
         return np.square(controls).sum(axis=-1).max(axis=(1, 2))
     if isinstance(space, POSITIVE):
         # Also of one seen from the next.
@@ -161,7 +161,11 @@ def margin(space, p, q):
             p, q = p[..., None], q[..., None]
         cosines = np.linalg.svd(np.swapaxes(p.conj(), -1, -2) @ q, compute_uv=False)
         return np.arcsin(np.minimum(1.0, cosines.min(axis=-1))), np.pi / 2
-    if isinstance(space, LINEAR):
+    if isinstance(space, QUADRICS):
+        # p + q has the square 2κ(1 + cos θ), whose root is 2 cos(θ/2).
+        rest = space.invariant_form(p, p + q, p + q) * (1 if isinstance(space, ss.DeSitter) else -1)
+        return 2 * np.arcsin(np.minimum(1.0, np.sqrt(np.maximum(rest, 0.0)) / 2)), np.pi
+    if isinstance(space, (*LINEAR, ss.IndefiniteGrassmannian)):
         phases = np.angle(np.linalg.eigvals(np.linalg.solve(p, q)))
         return np.pi - np.abs(phases).max(axis=-1), np.pi
     if isinstance(space, GROUPS):

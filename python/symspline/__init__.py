@@ -35,15 +35,18 @@ from .smoothing import (  # noqa: E402
 )
 from .spaces import (  # noqa: E402
     Affine,
+    AntiDeSitter,
     ComplexGeneralLinear,
     ComplexGrassmannian,
     ComplexHyperbolic,
     ComplexProjective,
+    DeSitter,
     Euclidean,
     GeneralLinear,
     Grassmannian,
     HermitianPositiveDefinite,
     Hyperbolic,
+    IndefiniteGrassmannian,
     Lorentz,
     Orthogonal,
     Product,
@@ -70,6 +73,7 @@ from .version import VERSION  # noqa: E402
 __version__ = VERSION
 __all__ = [
     "Affine",
+    "AntiDeSitter",
     "BSpline",
     "BezierCurve",
     "ComplexGeneralLinear",
@@ -80,6 +84,7 @@ __all__ = [
     "ConvergenceWarning",
     "CubicSpline",
     "CutLocusError",
+    "DeSitter",
     "Euclidean",
     "GeneralLinear",
     "Gradient",
@@ -87,6 +92,7 @@ __all__ = [
     "HermiteSpline",
     "HermitianPositiveDefinite",
     "Hyperbolic",
+    "IndefiniteGrassmannian",
     "Lorentz",
     "Manifold",
     "Orthogonal",

@@ -241,6 +241,8 @@ SINGLE = [
     (convert.projector_to_basis, [[0.36, 0.48], [0.48, 0.64]], {}),
     (convert.state_to_density, [0.6, 0.8], {}),
     (convert.density_to_state, [[0.36, 0.48], [0.48, 0.64]], {}),
+    (convert.basis_to_reflection, [[0.75], [1.25]], {"negative": 1}),
+    (convert.reflection_to_basis, [[-2.125, 1.875], [-1.875, 2.125]], {"negative": 1}),
     (convert.matrix_to_quaternion, np.eye(3), {"scalar_first": True}),
     (convert.quaternion_to_matrix, [1.0, 0.0, 0.0, 0.0], {"scalar_first": True}),
 ]
@@ -265,7 +267,7 @@ def test_leading_axes_stay(call, value, order):
     assert many.shape == (2, 3, *one.shape)
     # BLAS may add in another order for stacks.
     assert np.abs(many - one).max() <= 4 * EPS
-    if call is not convert.projector_to_basis:
+    if call not in (convert.projector_to_basis, convert.reflection_to_basis):
         assert call(np.broadcast_to(value, (0, *np.shape(value))), **order).shape == (0, *one.shape)
 
 

@@ -214,7 +214,7 @@ def test_no_injectivity_radius(case, rng):
     space = case.space
     if not has_metric(space):
         # Half a turn, of real matrices in a plane at least; translations and stretches have no cut locus.
-        plane = isinstance(space, LINEAR) and space.dtype == float
+        plane = isinstance(space, (*LINEAR, ss.IndefiniteGrassmannian)) and space.dtype == float
         assert space.injectivity_radius == (np.sqrt(2) * np.pi if plane else np.pi)
         return
     assert space.injectivity_radius == np.inf

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from cases import COMMON, FAMILIES, LINEAR, SINGLE, SPACES
+from cases import COMMON, FAMILIES, INDEFINITE, LINEAR, SINGLE, SPACES
 from curves import S2, every_single, every_space, points_on
 from refused import INF, fit_error
 
@@ -130,6 +130,9 @@ DIMENSIONS = {
     "sl": lambda n: n * n - 1,
     "sp": lambda n: n * (n + 1) // 2,
     "lorentz": lambda n: n * (n + 1) // 2,
+    "ds": lambda n: n,
+    "ads": lambda n: n,
+    "igr": lambda a, b, p, q: (a + b) * (p + q - a - b),
 }
 
 
@@ -142,8 +145,9 @@ def test_what_a_space_says_of_itself(space):
     assert space.dim == DIMENSIONS[family](*map(int, size.split(",")))
     assert space.dtype == (np.complex128 if family in COMPLEX_FAMILIES else np.float64)
     assert space.injectivity_radius > 0
-    # Poses and invertible matrices have no invariant metric, and so no K.
-    assert np.isnan(space.curvature) if family == "se" or isinstance(space, LINEAR) else space.curvature >= 0
+    # Without an invariant metric that is positive definite there is no K.
+    without = family == "se" or isinstance(space, (*LINEAR, *INDEFINITE))
+    assert np.isnan(space.curvature) if without else space.curvature >= 0
     assert points_on(space).shape[1:] == space.point_shape
 
 

@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from cases import CASES, EPS
+from cases import CASES, EPS, centre_of
 from curves import (
     KNOTS,
     S2,
@@ -57,16 +57,10 @@ def test_points_of_any_number_type(dtype):
     assert spline == ss.CubicSpline(None, THREE, S2)
 
 
-def origin(space):
-    """A point of whole numbers."""
-    shape = space.point_shape
-    return np.eye(*shape, dtype=int) if len(shape) == 2 else np.eye(1, *shape, dtype=int)[0]
-
-
 @every_single
 @pytest.mark.parametrize("dtype", ["i8", "i1", "f2", "f4", "f8"])
 def test_whole_numbers(space, dtype):
-    p = np.stack([origin(space)] * 3).astype(dtype)
+    p = np.stack([centre_of(space)] * 3).astype(dtype)
     spline = ss.CubicSpline(None, p, space)
     assert spline.points.dtype == spline.velocities.dtype == spline(0.5).dtype == space.dtype
     assert same(spline.points, p.astype(space.dtype))

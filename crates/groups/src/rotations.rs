@@ -245,7 +245,7 @@ impl Origin for Rotations {
     }
     #[inline(always)]
     fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
-        cc::prepare::<1>(&[chord[0], chord[1], chord[2]].each(|x| x * HALF), prepared);
+        cc::prepare::<1, false>(&[chord[0], chord[1], chord[2]].each(|x| x * HALF), prepared);
     }
     #[inline(always)]
     fn legs<S: Scalar>(
@@ -259,17 +259,17 @@ impl Origin for Rotations {
     ) {
         let half = |x: &[S]| [x[0], x[1], x[2]].each(|x| x * HALF);
         let d = [d[0], d[1], d[2]].each(|x| x * HALF);
-        cc::legs::<1, true, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
+        cc::legs::<1, false, true, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
         w_plus.iter_mut().chain(w_minus).for_each(|w| *w = *w * TWO);
     }
     #[inline(always)]
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
         let half = |x: &[S]| [x[0], x[1], x[2]].each(|x| x * HALF);
-        cc::triple::<1, S>(&half(a), &half(b), c, out);
+        cc::triple::<1, false, S>(&half(a), &half(b), c, out);
     }
     #[inline(always)]
     fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
-        cc::stretch::<1, S>(&[v[0], v[1], v[2]].each(|x| x * HALF), x);
+        cc::stretch::<1, false, S>(&[v[0], v[1], v[2]].each(|x| x * HALF), x);
     }
 }
 

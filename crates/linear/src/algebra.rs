@@ -123,9 +123,12 @@ fn basis(d: usize, n: usize, members: Members) -> Vec<Element> {
                 .flat_map(|(i, j)| [two((i, m + j), (j, m + i), 1.0), two((m + i, j), (m + j, i), 1.0)]);
             first.chain(diagonal).chain(beside).collect()
         }
-        Members::Lorentz => {
-            let boosts = (1..n).map(|i| two((0, i), (i, 0), 1.0));
-            boosts.chain(pairs(1, n).map(|(i, j)| two((i, j), (j, i), -1.0))).collect()
+        Members::Lorentz | Members::PseudoOrthogonal(_) => {
+            // A boost joins two axes of different signs.
+            let p = members.negative();
+            pairs(0, n)
+                .map(|(i, j)| two((i, j), (j, i), if (i < p) == (j < p) { -1.0 } else { 1.0 }))
+                .collect()
         }
     }
 }

@@ -1,13 +1,16 @@
-//! GL(n) and what lies in it: groups of invertible matrices, to which no metric belongs.
+//! GL(n) and what lies in it: groups of invertible matrices, to which no metric belongs, and the subspaces of an indefinite
+//! form as reflections.
 
 mod algebra;
 mod general_linear;
+mod indefinite_grassmannian;
 mod members;
 
 pub use general_linear::GeneralLinear;
+pub use indefinite_grassmannian::IndefiniteGrassmannian;
 pub use members::Members;
 
-use symspline_core::space::{Entry, Made, table};
+use symspline_core::space::{Entry, Made, Within, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
@@ -22,6 +25,11 @@ pub static FAMILY: &[Entry] = &[
     Entry { names: &["sl", "special-linear"], parameters: &["n"], make: |p| real(p, Members::Special) },
     Entry { names: &["sp", "symplectic"], parameters: &["n"], make: |p| real(p, Members::Symplectic) },
     Entry { names: &["lorentz"], parameters: &["n"], make: |p| real(p, Members::Lorentz) },
+    Entry {
+        names: &["igr", "indefinite-grassmannian"],
+        parameters: &["a", "b", "p", "q"],
+        make: |p| table(IndefiniteGrassmannian::new([p[0], p[1]], [p[2], p[3]]).map(Within)),
+    },
 ];
 
 fn real(p: &[usize], members: Members) -> Made {

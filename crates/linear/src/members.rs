@@ -18,6 +18,8 @@ pub enum Members {
     Symplectic,
     /// XᵀηX = η with η = diag(−1, 1, …, 1), of determinant one and keeping the direction of time.
     Lorentz,
+    /// O(p, q): XᵀηX = η with η = diag(−1, …, −1, 1, …, 1) and so many negative numbers.
+    PseudoOrthogonal(usize),
 }
 
 /// Condition from which on a matrix is singular as far as doubles can tell.
@@ -35,6 +37,7 @@ impl Members {
             Members::Special => ("SpecialLinear", 2),
             Members::Symplectic => ("Symplectic", 2),
             Members::Lorentz => ("Lorentz", 1),
+            Members::PseudoOrthogonal(_) => ("PseudoOrthogonal", 1),
         };
         if n < least {
             return Err(format!("{name}(n) needs n >= {least}, not {n}"));
@@ -56,8 +59,17 @@ impl Members {
         matches!(self, Members::All | Members::Affine)
     }
 
+    /// Numbers of η that are negative.
+    pub fn negative(self) -> usize {
+        match self {
+            Members::Lorentz => 1,
+            Members::PseudoOrthogonal(p) => p,
+            _ => 0,
+        }
+    }
+
     /// The adjoint X* for which X*X = 1 on the group; for similarities on their linear parts, up to their scale.
-    fn adjoint<const D: usize>(self, x: &Point<D>) -> Option<Point<D>> {
+    pub fn adjoint<const D: usize>(self, x: &Point<D>) -> Option<Point<D>> {
         let n = x.rows();
         let entry = |i: usize, j: usize, minus: bool| {
             let x = x[(i, j)];
@@ -69,7 +81,10 @@ impl Members {
                 let other = |i: usize| (i + m) % n;
                 Some(Matrix::from_fn(n, n, |i, j| entry(other(j), other(i), (i < m) != (j < m))))
             }
-            Members::Lorentz => Some(Matrix::from_fn(n, n, |i, j| entry(j, i, (i == 0) != (j == 0)))),
+            Members::Lorentz | Members::PseudoOrthogonal(_) => {
+                let p = self.negative();
+                Some(Matrix::from_fn(n, n, |i, j| entry(j, i, (i < p) != (j < p))))
+            }
             Members::Similarity => Some(Matrix::from_fn(n - 1, n - 1, |i, j| entry(j, i, false))),
             _ => None,
         }
@@ -160,6 +175,11 @@ impl Members {
             Members::Lorentz => "it turns time round: its first number is negative".into(),
             Members::Similarity if off > 1e-8 => {
                 format!("its linear part is not a multiple of a rotation: |rᵀr/s² - 1| = {off:.3e}")
+            }
+            Members::PseudoOrthogonal(p) => {
+                format!(
+                    "it does not preserve the form with {p} negative squares first: |ηxᵀηx - 1| = {off:.3e}"
+                )
             }
             Members::Similarity => "its linear part is a reflection, not a rotation".into(),
             Members::All | Members::Affine => String::new(),

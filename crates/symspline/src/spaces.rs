@@ -5,9 +5,9 @@ use symspline_core::space::{Entry, Erased, Table};
 
 pub use symspline_forms::{PositiveDefinite, Siegel};
 pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
-pub use symspline_linear::{GeneralLinear, Members};
+pub use symspline_linear::{GeneralLinear, IndefiniteGrassmannian, Members};
 pub use symspline_subspaces::{ComplexHyperbolic, QuaternionicProjective, Subspaces};
-pub use symspline_vectors::{Curved, Euclidean, Hyperbolic, Sphere};
+pub use symspline_vectors::{AntiDeSitter, Curved, DeSitter, Euclidean, Hyperbolic, Sphere};
 
 /// Every kind of space.
 pub fn all() -> impl Iterator<Item = &'static Entry> {

@@ -3,6 +3,11 @@
 //! Sphere and hyperboloid are {x : ⟨x,x⟩ = κ} for ⟨x,y⟩ = κ x₀y₀ + Σ xᵢyᵢ, and in both
 //! ⟨p,q⟩ = κ cos θ with cos θ read as cosh d at κ = −1. At κ = 0 they become the flat formulas,
 //! which `euclidean.rs` spells out.
+//!
+//! With one more negative square, ⟨x,y⟩ = −x₀y₀ + κ x₁y₁ + Σ xᵢyᵢ, {x : ⟨x,x⟩ = κ} is de Sitter space for κ = 1 and
+//! anti-de Sitter space for κ = −1 (O'Neill, Semi-Riemannian Geometry, 1983, chapter 4). The origin is then the second
+//! axis, the inner product of coordinates is −x₀y₀ + Σ xᵢyᵢ, and the formulas are the same. The parameter `L` selects
+//! them; without it nothing is added to the loops of the sphere and of hyperbolic space.
 
 use symspline_core::scalar::{Lane, Scalar, dot, lane};
 use symspline_core::special::{Trig, slerp, theta_over_sin};
@@ -12,41 +17,70 @@ const fn kappa<const K: i32>() -> Lane {
     lane(K as f64)
 }
 
+/// Whether the square of the i-th number of a point is negative in ⟨x,x⟩.
+const fn negative<const K: i32, const L: bool>(i: usize) -> bool {
+    if L { i == 0 || (K < 0 && i == 1) } else { K < 0 && i == 0 }
+}
+
+/// How many numbers at the start of a point may have negative squares.
+const fn heads<const L: bool>() -> usize {
+    if L { 2 } else { 1 }
+}
+
 /// ⟨a, b⟩, Minkowski's for κ = −1.
 #[inline(always)]
-pub fn product<const K: i32, S: Scalar>(a: &[S], b: &[S]) -> S {
-    let rest = dot(&a[1..], &b[1..]);
-    if K < 0 { (-a[0]).fma(b[0], rest) } else { a[0].fma(b[0], rest) }
+pub fn product<const K: i32, const L: bool, S: Scalar>(a: &[S], b: &[S]) -> S {
+    let mut sum = dot(&a[heads::<L>()..], &b[heads::<L>()..]);
+    for i in (0..heads::<L>()).rev() {
+        sum = if negative::<K, L>(i) { (-a[i]).fma(b[i], sum) } else { a[i].fma(b[i], sum) };
+    }
+    sum
+}
+
+/// The inner product of coordinates.
+#[inline(always)]
+pub fn at_origin<const L: bool, S: Scalar>(x: &[S], y: &[S]) -> S {
+    if L { (-x[0]).fma(y[0], dot(&x[1..], &y[1..])) } else { dot(x, y) }
+}
+
+/// ⟨e, e⟩ of the i-th vector of a frame.
+const fn sign<const L: bool>(i: usize) -> f64 {
+    if L && i == 0 { -1.0 } else { 1.0 }
+}
+
+/// The place in a point of the i-th coordinate at the origin.
+const fn place<const L: bool>(i: usize) -> usize {
+    if L && i == 0 { 0 } else { i + 1 }
 }
 
 /// y = 1 − cos θ = κ ⟨q−p, q−p⟩/2: no cancellation for near points.
 #[inline(always)]
-fn versine<const K: i32, S: Scalar>(p: &[S], q: &[S]) -> S {
+fn versine<const K: i32, const L: bool, S: Scalar>(p: &[S], q: &[S]) -> S {
     let d = q[0] - p[0];
-    let mut sum = if K < 0 { -(d * d) } else { d * d };
+    let mut sum = if negative::<K, L>(0) { -(d * d) } else { d * d };
     for i in 1..p.len() {
         let d = q[i] - p[i];
-        sum = d.fma(d, sum);
+        sum = if negative::<K, L>(i) { (-d).fma(d, sum) } else { d.fma(d, sum) };
     }
     sum * lane(0.5 * K as f64)
 }
 
 /// 2 − y = 1 + cos θ = κ ⟨q+p, q+p⟩/2: no cancellation near the antipode.
 #[inline(always)]
-fn versine_rest<const K: i32, S: Scalar>(p: &[S], q: &[S]) -> Lane {
+fn versine_rest<const K: i32, const L: bool, S: Scalar>(p: &[S], q: &[S]) -> Lane {
     let s = q[0].value() + p[0].value();
-    let mut sum = if K < 0 { -(s * s) } else { s * s };
+    let mut sum = if negative::<K, L>(0) { -(s * s) } else { s * s };
     for i in 1..p.len() {
         let s = q[i].value() + p[i].value();
-        sum = s.mul_add(s, sum);
+        sum = if negative::<K, L>(i) { s.mul_neg_add(s, sum) } else { s.mul_add(s, sum) };
     }
     sum * lane(0.5 * K as f64)
 }
 
 /// cos(tθ) p + t sin(tθ)/(tθ) v.
 #[inline(always)]
-pub fn ray<const K: i32, S: Scalar>(p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-    let square = product::<K, _>(v, v) * kappa::<K>();
+pub fn ray<const K: i32, const L: bool, S: Scalar>(p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+    let square = product::<K, L, _>(v, v) * kappa::<K>();
     let tv = t.value();
     let Trig { c, s, .. } = Trig::new(tv * tv * square);
     // With α = cos(tθ) and β = t sin(tθ)/(tθ): α' = −θ²β, β' = α.
@@ -60,8 +94,8 @@ pub fn ray<const K: i32, S: Scalar>(p: &[Lane], v: &[Lane], t: S, out: &mut [S])
 
 /// [p, q]_t by the slerp weights.
 #[inline(always)]
-pub fn geodesic<const K: i32, S: Scalar>(p: &[S], q: &[S], t: S, out: &mut [S]) {
-    let [from, to] = slerp(t, versine::<K, S>(p, q), || versine_rest::<K, S>(p, q));
+pub fn geodesic<const K: i32, const L: bool, S: Scalar>(p: &[S], q: &[S], t: S, out: &mut [S]) {
+    let [from, to] = slerp(t, versine::<K, L, S>(p, q), || versine_rest::<K, L, S>(p, q));
     for i in 0..p.len() {
         out[i] = to.fma(q[i], from * p[i]);
     }
@@ -78,8 +112,8 @@ fn angle(y: Lane, rest: Lane, f: Lane) -> Lane {
 
 /// (θ/sin θ)(q − cos θ p); returns θ.
 #[inline(always)]
-pub fn log<const K: i32>(p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
-    let (y, rest) = (versine::<K, Lane>(p, q), versine_rest::<K, Lane>(p, q));
+pub fn log<const K: i32, const L: bool>(p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+    let (y, rest) = (versine::<K, L, Lane>(p, q), versine_rest::<K, L, Lane>(p, q));
     let f = theta_over_sin(y, || rest);
     let near = y.simd_le(Lane::ONE);
     for i in 0..p.len() {
@@ -88,10 +122,22 @@ pub fn log<const K: i32>(p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         out[i] = f * v;
     }
     let theta = angle(y, rest, f);
-    if K > 0 && near_antipode(rest).any() {
-        refine(p, theta, near_antipode(rest), out);
+    if (K > 0 || L) && near_antipode(rest).any() {
+        refine::<K, L>(p, theta, near_antipode(rest), out);
     }
-    theta
+    deciding::<L>(y, theta)
+}
+
+/// The deciding angle: a geodesic of an indefinite metric along which y is negative meets no cut locus.
+#[inline(always)]
+fn deciding<const L: bool>(y: Lane, theta: Lane) -> Lane {
+    if L { y.simd_lt(Lane::ZERO).select(Lane::ZERO, theta) } else { theta }
+}
+
+/// κ⟨a, b⟩ where κ is 1 or the metric indefinite.
+#[inline(always)]
+fn round<const K: i32, const L: bool>(a: &[Lane], b: &[Lane]) -> Lane {
+    if L { product::<K, L, Lane>(a, b) * kappa::<K>() } else { dot(a, b) }
 }
 
 /// Where sin θ is so small that θ/sin θ makes much of rounding errors.
@@ -103,13 +149,17 @@ fn near_antipode(rest: Lane) -> Lane {
 /// Makes a logarithm near the antipode tangent again, and of length θ.
 #[cold]
 #[inline(never)]
-fn refine(p: &[Lane], theta: Lane, lanes: Lane, v: &mut [Lane]) {
+fn refine<const K: i32, const L: bool>(p: &[Lane], theta: Lane, lanes: Lane, v: &mut [Lane]) {
     for _ in 0..2 {
-        let along = dot(p, v);
-        let length2 = v.iter().zip(p).fold(Lane::ZERO, |sum, (v, p)| {
-            let x = along.mul_neg_add(*p, *v);
-            x.mul_add(x, sum)
-        });
+        let along = round::<K, L>(p, v);
+        let length2 = if L {
+            round::<K, L>(v, v) - along * along
+        } else {
+            v.iter().zip(p).fold(Lane::ZERO, |sum, (v, p)| {
+                let x = along.mul_neg_add(*p, *v);
+                x.mul_add(x, sum)
+            })
+        };
         // At the antipode itself there is no direction.
         let scale = length2.simd_gt(Lane::ZERO).select(theta / length2.sqrt(), Lane::ONE);
         for (v, p) in v.iter_mut().zip(p) {
@@ -120,12 +170,12 @@ fn refine(p: &[Lane], theta: Lane, lanes: Lane, v: &mut [Lane]) {
 
 /// E_p(v) x for any x of the ambient space.
 #[inline(always)]
-pub fn transvect<const K: i32>(p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+pub fn transvect<const K: i32, const L: bool>(p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
     let k = kappa::<K>();
-    let theta2 = product::<K, _>(v, v) * k;
+    let theta2 = product::<K, L, _>(v, v) * k;
     let trig = Trig::new(theta2);
-    let along_p = product::<K, _>(p, x) * k;
-    let along_v = product::<K, _>(v, x);
+    let along_p = product::<K, L, _>(p, x) * k;
+    let along_v = product::<K, L, _>(v, x);
     let to_p = theta2 * trig.k * along_p - k * trig.s * along_v;
     let to_v = trig.s * along_p + k * trig.k * along_v;
     for i in 0..p.len() {
@@ -135,8 +185,8 @@ pub fn transvect<const K: i32>(p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [La
 
 /// Removes from v its part along p; returns the coefficient of that part.
 #[inline(always)]
-pub fn tangential<const K: i32>(p: &[Lane], v: &mut [Lane]) -> Lane {
-    let along = product::<K, Lane>(p, v) * kappa::<K>();
+pub fn tangential<const K: i32, const L: bool>(p: &[Lane], v: &mut [Lane]) -> Lane {
+    let along = product::<K, L, Lane>(p, v) * kappa::<K>();
     for i in 0..v.len() {
         v[i] = along.mul_neg_add(p[i], v[i]);
     }
@@ -147,62 +197,70 @@ pub fn tangential<const K: i32>(p: &[Lane], v: &mut [Lane]) -> Lane {
 
 /// The basis that a rotation (boost) from the first axis, or its opposite, carries to p.
 #[inline(always)]
-pub fn lift<const K: i32>(p: &[Lane], frame: &mut [Lane]) {
+pub fn lift<const K: i32, const L: bool>(p: &[Lane], frame: &mut [Lane]) {
     let n = p.len();
-    let sign = p[0].simd_lt(Lane::ZERO).select(lane(-1.0), Lane::ONE);
+    let o = usize::from(L);
+    let side = p[o].simd_lt(Lane::ZERO).select(lane(-1.0), Lane::ONE);
     // E x = x − ⟨q,x⟩ (o+q)/(κ + ⟨o,q⟩), the transvection from o to q, for x at o.
-    let denominator = kappa::<K>() * (Lane::ONE + sign * p[0]);
+    let denominator = kappa::<K>() * (Lane::ONE + side * p[o]);
     for (j, row) in frame.chunks_exact_mut(n).enumerate() {
-        let factor = -p[j + 1] / denominator;
+        let axis = place::<L>(j);
+        let factor = if negative::<K, L>(axis) { p[axis] } else { -p[axis] } / denominator;
         for i in 0..n {
             row[i] = factor * p[i];
         }
-        row[0] += factor * sign;
-        row[j + 1] += Lane::ONE;
+        row[o] += factor * side;
+        row[axis] += Lane::ONE;
     }
 }
 
 /// Coordinates of log_p(q), and the frame carried to q.
 #[inline(always)]
-pub fn step<const K: i32>(frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+pub fn step<const K: i32, const L: bool>(
+    frame: &mut [Lane],
+    p: &[Lane],
+    q: &[Lane],
+    chord: &mut [Lane],
+) -> Lane {
     let n = p.len();
-    let (y, rest) = (versine::<K, Lane>(p, q), versine_rest::<K, Lane>(p, q));
+    let (y, rest) = (versine::<K, L, Lane>(p, q), versine_rest::<K, L, Lane>(p, q));
     let f = theta_over_sin(y, || rest);
     let scale = kappa::<K>() / rest;
     let theta = angle(y, rest, f);
     let far = near_antipode(rest);
-    let before = if K > 0 && far.any() { frame.to_vec() } else { Vec::new() };
+    let before = if (K > 0 || L) && far.any() { frame.to_vec() } else { Vec::new() };
     for (j, row) in frame.chunks_exact_mut(n).enumerate() {
         // ⟨e, q − p⟩ is exact for near points. The frame moves by ⟨e, q⟩, the same number for e
         // orthogonal to p, because that makes the new e orthogonal to q whatever e was.
         let d = q[0] - p[0];
-        let mut along = if K < 0 { -row[0] * d } else { row[0] * d };
-        let mut reach = if K < 0 { -row[0] * q[0] } else { row[0] * q[0] };
+        let mut along = if negative::<K, L>(0) { -row[0] * d } else { row[0] * d };
+        let mut reach = if negative::<K, L>(0) { -row[0] * q[0] } else { row[0] * q[0] };
         for i in 1..n {
-            along = row[i].mul_add(q[i] - p[i], along);
-            reach = row[i].mul_add(q[i], reach);
+            let e = if negative::<K, L>(i) { -row[i] } else { row[i] };
+            along = e.mul_add(q[i] - p[i], along);
+            reach = e.mul_add(q[i], reach);
         }
-        chord[j] = f * along;
+        chord[j] = if sign::<L>(j) < 0.0 { -f * along } else { f * along };
         let factor = reach * scale;
         for i in 0..n {
             row[i] -= factor * (p[i] + q[i]);
         }
         // One step of Newton's method for 1/|e|: an error of the norm would go into the velocity,
         // and from there eightfold into a jump of the acceleration.
-        let shorten = lane(-0.5).mul_add(product::<K, Lane>(row, row), lane(1.5));
+        let shorten = lane(-0.5 * sign::<L>(j)).mul_add(product::<K, L, Lane>(row, row), lane(1.5));
         row.iter_mut().for_each(|x| *x *= shorten);
     }
     if !before.is_empty() {
-        step_far(&before, frame, p, q, theta, far, chord);
+        step_far::<K, L>(&before, frame, p, q, theta, far, chord);
     }
-    theta
+    deciding::<L>(y, theta)
 }
 
 /// The same near the antipode, by the direction of the geodesic: a basis is moved in the plane of p and the
 /// direction only.
 #[cold]
 #[inline(never)]
-fn step_far(
+fn step_far<const K: i32, const L: bool>(
     before: &[Lane],
     frame: &mut [Lane],
     p: &[Lane],
@@ -213,13 +271,14 @@ fn step_far(
 ) {
     let n = p.len();
     let mut v = vec![Lane::ZERO; n];
-    log::<1>(p, q, &mut v);
+    log::<K, L>(p, q, &mut v);
     let inverse = Lane::ONE / theta;
     v.iter_mut().for_each(|v| *v *= inverse);
     let (sin, cos) = theta.sin_cos();
     for (j, (row, old)) in frame.chunks_exact_mut(n).zip(before.chunks_exact(n)).enumerate() {
-        let along = dot(old, &v);
-        chord[j] = lanes.select(along * theta, chord[j]);
+        let along = round::<K, L>(old, &v);
+        let factor = if L { lane(sign::<L>(j)) * kappa::<K>() } else { Lane::ONE };
+        chord[j] = lanes.select(along * theta * factor, chord[j]);
         for i in 0..n {
             let moved = old[i] + along * ((cos - Lane::ONE) * v[i] - sin * p[i]);
             row[i] = lanes.select(moved, row[i]);
@@ -229,28 +288,29 @@ fn step_far(
 
 /// Gram–Schmidt against p and the rows before.
 #[inline(always)]
-pub fn tidy<const K: i32>(frame: &mut [Lane], p: &[Lane]) {
+pub fn tidy<const K: i32, const L: bool>(frame: &mut [Lane], p: &[Lane]) {
     let n = p.len();
     for j in 0..n - 1 {
         let (before, row) = frame.split_at_mut(j * n);
         let row = &mut row[..n];
-        tangential::<K>(p, row);
-        for other in before.chunks_exact(n) {
-            let along = product::<K, _>(other, row);
+        tangential::<K, L>(p, row);
+        for (k, other) in before.chunks_exact(n).enumerate() {
+            let along = product::<K, L, _>(other, row) * lane(sign::<L>(k));
             for i in 0..n {
                 row[i] -= along * other[i];
             }
         }
-        let scale = Lane::ONE / product::<K, Lane>(row, row).sqrt();
+        let scale = Lane::ONE / (product::<K, L, Lane>(row, row) * lane(sign::<L>(j))).sqrt();
         row.iter_mut().for_each(|x| *x *= scale);
     }
 }
 
 /// Coordinates of a tangent vector in the basis.
 #[inline(always)]
-pub fn coordinates<const K: i32>(frame: &[Lane], v: &[Lane], x: &mut [Lane]) {
-    for (x, row) in x.iter_mut().zip(frame.chunks_exact(v.len())) {
-        *x = product::<K, Lane>(row, v);
+pub fn coordinates<const K: i32, const L: bool>(frame: &[Lane], v: &[Lane], x: &mut [Lane]) {
+    for (j, (x, row)) in x.iter_mut().zip(frame.chunks_exact(v.len())).enumerate() {
+        let along = product::<K, L, Lane>(row, v);
+        *x = if sign::<L>(j) < 0.0 { -along } else { along };
     }
 }
 
@@ -265,15 +325,15 @@ pub fn tangent(frame: &[Lane], x: &[Lane], v: &mut [Lane]) {
     }
 }
 
-// At the origin o = (1, 0), a point is (cos θ, sin θ · unit vector).
+// At the origin, o = (1, 0) or with `L` (0, 1, 0), a point is (cos θ, sin θ · unit vector).
 
 /// What the transvection along a chord needs: sin θ/θ and κ(cos θ − 1)/θ², and |d|².
 pub const CHORD_LEN: usize = 3;
 
 /// Computes those for a chord.
 #[inline(always)]
-pub fn prepare<const K: i32>(chord: &[Lane], prepared: &mut [Lane]) {
-    let square = dot(chord, chord);
+pub fn prepare<const K: i32, const L: bool>(chord: &[Lane], prepared: &mut [Lane]) {
+    let square = at_origin::<L, _>(chord, chord);
     let trig = Trig::new(square * kappa::<K>());
     prepared.copy_from_slice(&[trig.s, trig.k * kappa::<K>(), square]);
 }
@@ -281,7 +341,7 @@ pub fn prepare<const K: i32>(chord: &[Lane], prepared: &mut [Lane]) {
 /// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only. With `PAIRS`
 /// x and −x are one point, and the nearer one is meant.
 #[inline(always)]
-pub fn legs<const K: i32, const PAIRS: bool, S: Scalar>(
+pub fn legs<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
     d: &[Lane],
     prepared: &[Lane],
     a: &[S],
@@ -292,11 +352,12 @@ pub fn legs<const K: i32, const PAIRS: bool, S: Scalar>(
     let zero = S::constant(Lane::ZERO);
     let (mut aa, mut bb, mut ab, mut ad, mut bd) = (zero, zero, zero, zero, zero);
     for i in 0..d.len() {
-        aa = a[i].fma(a[i], aa);
-        bb = b[i].fma(b[i], bb);
-        ab = a[i].fma(b[i], ab);
-        ad = a[i].fma_lane(d[i], ad);
-        bd = b[i].fma_lane(d[i], bd);
+        let (ai, bi) = if sign::<L>(i) < 0.0 { (-a[i], -b[i]) } else { (a[i], b[i]) };
+        aa = ai.fma(a[i], aa);
+        bb = bi.fma(b[i], bb);
+        ab = ai.fma(b[i], ab);
+        ad = ai.fma_lane(d[i], ad);
+        bd = bi.fma_lane(d[i], bd);
     }
     let (ta, tb) = (Trig::new(aa * kappa::<K>()), Trig::new(bb * kappa::<K>()));
     let &[sd, kd, dd] = prepared else { unreachable!("prepared has CHORD_LEN numbers") };
@@ -338,9 +399,9 @@ fn leg<const K: i32, S: Scalar>(
 
 /// S(v) x: x shrinks by sin θ/θ across v and stays along it.
 #[inline(always)]
-pub fn stretch<const K: i32, S: Scalar>(v: &[S], x: &mut [S]) {
-    let vv = dot(v, v);
-    let vx = dot(v, x);
+pub fn stretch<const K: i32, const L: bool, S: Scalar>(v: &[S], x: &mut [S]) {
+    let vv = at_origin::<L, _>(v, v);
+    let vx = at_origin::<L, _>(v, x);
     let j = Trig::new(vv * kappa::<K>()).j * kappa::<K>();
     let (to_x, to_v) = (-(j * vv) + Lane::ONE, j * vx);
     for i in 0..v.len() {
@@ -350,8 +411,8 @@ pub fn stretch<const K: i32, S: Scalar>(v: &[S], x: &mut [S]) {
 
 /// `[a, [b, c]] = κ (⟨a,c⟩ b − ⟨a,b⟩ c)`.
 #[inline(always)]
-pub fn triple<const K: i32, S: Scalar>(a: &[S], b: &[S], c: &[S], out: &mut [S]) {
-    let (ab, ac) = (dot(a, b) * kappa::<K>(), dot(a, c) * kappa::<K>());
+pub fn triple<const K: i32, const L: bool, S: Scalar>(a: &[S], b: &[S], c: &[S], out: &mut [S]) {
+    let (ab, ac) = (at_origin::<L, _>(a, b) * kappa::<K>(), at_origin::<L, _>(a, c) * kappa::<K>());
     for i in 0..a.len() {
         out[i] = ac.fma(b[i], -(ab * c[i]));
     }

@@ -1,94 +1,122 @@
-//! Sphere and hyperbolic space as spaces: the formulas of `constant_curvature` for κ = 1 and −1.
+//! The spaces of constant curvature κ = 1 and −1: the formulas of `constant_curvature`.
 
 use crate::constant_curvature as cc;
-use crate::{hyperbolic, sphere};
-use symspline_core::scalar::{Lane, Scalar, max_or_nan};
+use crate::{hyperbolic, lorentzian, sphere};
+use symspline_core::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 use symspline_core::space::{Ambient, Frame, Origin, Space, far_out};
 
-/// The sphere (K = 1) or hyperbolic space (K = −1) of dimension n.
+/// The sphere (K = 1) or hyperbolic space (K = −1) of dimension n; with `L`, de Sitter (K = 1) or anti-de Sitter space
+/// (K = −1), whose metric has one negative square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Curved<const K: i32> {
+pub struct Curved<const K: i32, const L: bool> {
     pub(crate) n: usize,
 }
 
-impl<const K: i32> Ambient for Curved<K> {
+impl<const K: i32, const L: bool> Curved<K, L> {
+    /// Whether geodesics of some direction return: those with κ⟨v,v⟩ > 0.
+    const ROUND: bool = K > 0 || L;
+    /// Whether those of some direction run apart exponentially: those with κ⟨v,v⟩ < 0.
+    const OPEN: bool = K < 0 || L;
+}
+
+impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
     fn point_len(&self) -> usize {
         self.n + 1
     }
     fn cut_angle(&self) -> f64 {
-        if K > 0 { std::f64::consts::PI } else { f64::INFINITY }
+        if Self::ROUND { std::f64::consts::PI } else { f64::INFINITY }
     }
     fn longest_ray(&self) -> f64 {
-        if K > 0 { f64::INFINITY } else { hyperbolic::LONGEST_RAY }
+        if Self::OPEN { hyperbolic::LONGEST_RAY } else { f64::INFINITY }
     }
     #[inline(always)]
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        cc::ray::<K, S>(p, v, t, out);
+        cc::ray::<K, L, S>(p, v, t, out);
     }
     #[inline(always)]
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
-        cc::log::<K>(p, q, out)
+        cc::log::<K, L>(p, q, out)
     }
-    fn distance(&self, _p: &[Lane], _q: &[Lane], _log: &[Lane], angle: Lane) -> Lane {
-        angle
+    fn distance(&self, _p: &[Lane], _q: &[Lane], log: &[Lane], angle: Lane) -> Lane {
+        // An indefinite metric has no distance; this is the size of the array, for reporting.
+        if L { dot(log, log).sqrt() } else { angle }
     }
     #[inline(always)]
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
-        cc::geodesic::<K, S>(p, q, t, out);
+        cc::geodesic::<K, L, S>(p, q, t, out);
     }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        cc::transvect::<K>(p, v, x, out);
+        cc::transvect::<K, L>(p, v, x, out);
     }
     #[inline(always)]
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
-        cc::tangential::<K>(gamma, d);
+        cc::tangential::<K, L>(gamma, d);
     }
     #[inline(always)]
     fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
-        cc::tangential::<K>(gamma, dd);
+        cc::tangential::<K, L>(gamma, dd);
     }
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
-        cc::product::<K, Lane>(u, v)
+        // What belongs to an indefinite metric is no measure of size; see `distance`.
+        if L { dot(u, v) } else { cc::product::<K, L, Lane>(u, v) }
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
-        if K > 0 { sphere::project(x) } else { hyperbolic::project(x) }
+        if L {
+            lorentzian::project::<K>(x)
+        } else if K > 0 {
+            sphere::project(x)
+        } else {
+            hyperbolic::project(x)
+        }
     }
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        if K > 0 { sphere::project_tangent(p, v) } else { hyperbolic::project_tangent(p, v) }
+        if Self::OPEN { hyperbolic::project_tangent::<K, L>(p, v) } else { sphere::project_tangent(p, v) }
     }
     fn scatter(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
     fn complaint(&self, x: &[f64]) -> String {
-        if K > 0 { sphere::complaint(x) } else { hyperbolic::complaint(x) }
+        if L {
+            lorentzian::complaint::<K>(x)
+        } else if K > 0 {
+            sphere::complaint(x)
+        } else {
+            hyperbolic::complaint(x)
+        }
     }
     fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
-        if K > 0 { None } else { far_out(points, self.point_len()) }
+        if L {
+            lorentzian::beyond_doubles(points, self.point_len())
+        } else if K > 0 {
+            None
+        } else {
+            far_out(points, self.point_len())
+        }
     }
     fn rounding(&self, p: &[Lane]) -> Lane {
-        if K > 0 { Lane::ONE } else { hyperbolic::rounding(p) }
+        if Self::OPEN { hyperbolic::rounding(p) } else { Lane::ONE }
     }
 }
 
-impl<const K: i32> Frame for Curved<K> {
+impl<const K: i32, const L: bool> Frame for Curved<K, L> {
     fn frame_len(&self) -> usize {
         self.n * (self.n + 1)
     }
     #[inline(always)]
     fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
-        cc::lift::<K>(p, frame);
+        cc::lift::<K, L>(p, frame);
     }
     #[inline(always)]
     fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
-        cc::step::<K>(frame, p, q, chord)
+        cc::step::<K, L>(frame, p, q, chord)
     }
     #[inline(always)]
     fn tidy(&self, frame: &mut [Lane], p: &[Lane]) {
-        cc::tidy::<K>(frame, p);
+        cc::tidy::<K, L>(frame, p);
     }
     #[inline(always)]
     fn coordinates(&self, frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
-        cc::coordinates::<K>(frame, v, x);
+        cc::coordinates::<K, L>(frame, v, x);
     }
     #[inline(always)]
     fn tangent(&self, frame: &[Lane], _p: &[Lane], x: &[Lane], v: &mut [Lane]) {
@@ -96,7 +124,7 @@ impl<const K: i32> Frame for Curved<K> {
     }
 }
 
-impl<const K: i32> Origin for Curved<K> {
+impl<const K: i32, const L: bool> Origin for Curved<K, L> {
     fn dim(&self) -> usize {
         self.n
     }
@@ -104,12 +132,18 @@ impl<const K: i32> Origin for Curved<K> {
         cc::CHORD_LEN
     }
     fn curvature(&self) -> f64 {
-        // One dimension is flat.
-        if self.n == 1 { 0.0 } else { 1.0 }
+        // An indefinite metric bounds no bracket; one dimension is flat.
+        if L {
+            f64::NAN
+        } else if self.n == 1 {
+            0.0
+        } else {
+            1.0
+        }
     }
     #[inline(always)]
     fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
-        cc::prepare::<K>(chord, prepared);
+        cc::prepare::<K, L>(chord, prepared);
     }
     #[inline(always)]
     fn legs<S: Scalar>(
@@ -121,27 +155,41 @@ impl<const K: i32> Origin for Curved<K> {
         w_plus: &mut [S],
         w_minus: &mut [S],
     ) {
-        cc::legs::<K, false, S>(d, prepared, a, b, w_plus, w_minus);
+        cc::legs::<K, L, false, S>(d, prepared, a, b, w_plus, w_minus);
     }
     #[inline(always)]
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
-        cc::triple::<K, S>(a, b, c, out);
+        cc::triple::<K, L, S>(a, b, c, out);
     }
     #[inline(always)]
     fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
-        cc::stretch::<K, S>(v, x);
+        cc::stretch::<K, L, S>(v, x);
     }
     #[inline(always)]
     fn condition(&self, chord: &[Lane]) -> Lane {
-        if K > 0 { Lane::ONE } else { hyperbolic::condition(chord) }
+        if L {
+            lorentzian::condition::<K>(chord)
+        } else if K > 0 {
+            Lane::ONE
+        } else {
+            hyperbolic::condition(chord)
+        }
+    }
+    fn angle(&self, v: &[Lane]) -> Lane {
+        if L {
+            max_or_nan(cc::at_origin::<L, _>(v, v) * lane(K.into()), Lane::ZERO).sqrt()
+        } else {
+            dot(v, v).sqrt()
+        }
     }
 }
 
-impl<const K: i32> Space for Curved<K> {
-    const HOT: bool = true;
+impl<const K: i32, const L: bool> Space for Curved<K, L> {
+    const HOT: bool = !L;
     const VECTORS: bool = true;
 
-    fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
-        max_or_nan(self.inner(p, v, v), Lane::ZERO).sqrt()
+    fn angle_at(&self, _p: &[Lane], v: &[Lane]) -> Lane {
+        let square = cc::product::<K, L, Lane>(v, v);
+        max_or_nan(if L { square * lane(K.into()) } else { square }, Lane::ZERO).sqrt()
     }
 }

@@ -6,7 +6,7 @@ use symspline_core::scalar::{Lane, dot, lane};
 use symspline_core::space::ROUNDING_SIZE;
 
 /// Hyperbolic space of dimension n, as the hyperboloid with its time-like coordinate first.
-pub type Hyperbolic = Curved<-1>;
+pub type Hyperbolic = Curved<-1, false>;
 
 impl Hyperbolic {
     /// The hyperboloid in n + 1 dimensions.
@@ -26,10 +26,10 @@ pub fn project(x: &mut [Lane]) -> Lane {
     off
 }
 
-pub fn project_tangent(p: &[Lane], v: &mut [Lane]) -> Lane {
+pub fn project_tangent<const K: i32, const L: bool>(p: &[Lane], v: &mut [Lane]) -> Lane {
     // Relative to |p||v|, which is what rounding of v amounts to in ⟨p,v⟩.
     let size = (dot(v, v) * dot(p, p)).sqrt();
-    let off = cc::tangential::<-1>(p, v).abs();
+    let off = cc::tangential::<K, L>(p, v).abs();
     off / (size + ROUNDING_SIZE)
 }
 

@@ -1,14 +1,16 @@
-//! Spaces whose points are vectors: flat space, spheres and hyperbolic space.
+//! Spaces whose points are vectors: flat space, spheres, hyperbolic, de Sitter and anti-de Sitter space.
 
 pub mod constant_curvature;
 mod curved;
 mod euclidean;
 mod hyperbolic;
+mod lorentzian;
 mod sphere;
 
 pub use curved::Curved;
 pub use euclidean::Euclidean;
 pub use hyperbolic::Hyperbolic;
+pub use lorentzian::{AntiDeSitter, DeSitter};
 pub use sphere::Sphere;
 
 use symspline_core::space::{Entry, table};
@@ -18,4 +20,6 @@ pub static FAMILY: &[Entry] = &[
     Entry { names: &["euclidean", "r"], parameters: &["n"], make: |p| table(Euclidean::new(p[0])) },
     Entry { names: &["sphere", "s"], parameters: &["n"], make: |p| table(Sphere::new(p[0])) },
     Entry { names: &["hyperbolic", "h"], parameters: &["n"], make: |p| table(Hyperbolic::new(p[0])) },
+    Entry { names: &["ds", "de-sitter"], parameters: &["n"], make: |p| table(DeSitter::new(p[0])) },
+    Entry { names: &["ads", "anti-de-sitter"], parameters: &["n"], make: |p| table(AntiDeSitter::new(p[0])) },
 ];

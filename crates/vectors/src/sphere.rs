@@ -6,7 +6,7 @@ use symspline_core::scalar::{Lane, dot, lane};
 use symspline_core::space::ROUNDING_SIZE;
 
 /// The unit sphere of dimension n.
-pub type Sphere = Curved<1>;
+pub type Sphere = Curved<1, false>;
 
 impl Sphere {
     /// The sphere in n + 1 dimensions.
@@ -27,7 +27,7 @@ pub fn project(x: &mut [Lane]) -> Lane {
 
 pub fn project_tangent(p: &[Lane], v: &mut [Lane]) -> Lane {
     let size = dot(v, v).sqrt();
-    let off = cc::tangential::<1>(p, v).abs();
+    let off = cc::tangential::<1, false>(p, v).abs();
     off / (size + ROUNDING_SIZE)
 }
 

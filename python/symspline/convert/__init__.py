@@ -1,5 +1,5 @@
-"""Other coordinates of points: models of hyperbolic space, projectors, density matrices, quaternions, spaces that lie
-in others.
+"""Other coordinates of points: models of hyperbolic space, projectors, reflections, density matrices, quaternions,
+spaces that lie in others.
 
 Every function works on arrays of points: leading axes stay as they are. Input of double precision may be
 off by 1e-8, of single precision by 1e-4; what comes out is exact to rounding.
@@ -25,11 +25,13 @@ from .models import (
 )
 from .projectors import basis_to_projector, density_to_state, projector_to_basis, state_to_density
 from .quaternions import matrix_to_quaternion, quaternion_to_matrix
+from .reflections import basis_to_reflection, reflection_to_basis
 
 __all__ = [
     "ball_to_half_space",
     "ball_to_hyperboloid",
     "basis_to_projector",
+    "basis_to_reflection",
     "density_to_state",
     "half_space_to_ball",
     "half_space_to_hyperboloid",
@@ -40,6 +42,7 @@ __all__ = [
     "projector_to_basis",
     "quaternion_to_matrix",
     "quaternions_to_subspace",
+    "reflection_to_basis",
     "siegel_to_positive_definite",
     "state_to_density",
     "subspace_to_quaternions",

@@ -2,6 +2,7 @@
 
 from .base import Array, Space
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
+from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
 from .linear import (
     Affine,
     ComplexGeneralLinear,
@@ -28,16 +29,19 @@ from .vectors import Euclidean, Hyperbolic, Sphere
 __all__ = [
     "POINT_TOL_FLOAT32",
     "Affine",
+    "AntiDeSitter",
     "Array",
     "ComplexGeneralLinear",
     "ComplexGrassmannian",
     "ComplexHyperbolic",
     "ComplexProjective",
+    "DeSitter",
     "Euclidean",
     "GeneralLinear",
     "Grassmannian",
     "HermitianPositiveDefinite",
     "Hyperbolic",
+    "IndefiniteGrassmannian",
     "Lorentz",
     "Orthogonal",
     "Product",

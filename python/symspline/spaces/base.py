@@ -93,8 +93,8 @@ class Space:
 
     @property
     def curvature(self) -> float:
-        """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r; NaN for poses, which have no
-        invariant metric."""
+        """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r; NaN for poses and other
+        spaces without an invariant metric that is positive definite."""
         return self._handle.curvature()
 
     @property
@@ -522,7 +522,7 @@ class Space:
 
 def example_of(cls: type[Space]) -> str:
     """How one of a family of spaces is written."""
-    numbers = "2, 4" if cls._name in ("gr", "cgr", "stiefel") else "2"
+    numbers = {"gr": "2, 4", "cgr": "2, 4", "stiefel": "2, 4", "igr": "0, 1, 1, 2"}.get(cls._name, "2")
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 

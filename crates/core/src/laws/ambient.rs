@@ -115,7 +115,6 @@ pub fn tangent(space: &Erased, draw: &mut Draw) -> Verdict {
 pub fn geodesics(space: &Erased, draw: &mut Draw) -> Verdict {
     for part in STEPS {
         let [p, x, v, q] = way(space, draw, part);
-        let speed = length(space, &p, &v);
         let allowed = rounding(space, 300.0, &[&p, &q], &x) * lane(1.0 / (1.0 - part));
         let mut at = vec![Lane::ZERO; p.len()];
         for t in [0.0, 0.3, 0.5, 1.0] {
@@ -128,28 +127,30 @@ pub fn geodesics(space: &Erased, draw: &mut Draw) -> Verdict {
                 &format!("[p, q]_{t} at {part} of the largest step"),
             )?;
         }
-        // Constant speed and no acceleration, by jets in t.
+        // It carries its velocity and has no acceleration, by jets in t.
         let t = Jet { v: lane(0.3), d: Lane::ONE, dd: Lane::ZERO };
         let jets = |x: &[Lane]| -> Vec<Jet> {
             x.iter().map(|&v| Jet { v, d: Lane::ZERO, dd: Lane::ZERO }).collect()
         };
         let mut gamma = jets(&p);
         space.geodesic(&jets(&p), &jets(&q), t, &mut gamma);
-        motion(space, &gamma, speed, allowed, "a geodesic")?;
+        motion(space, &gamma, [&p, &v], allowed, "a geodesic")?;
         space.ray(&p, &v, t, &mut gamma);
-        motion(space, &gamma, speed, allowed, "a ray")?;
+        motion(space, &gamma, [&p, &v], allowed, "a ray")?;
     }
     Ok(())
 }
 
-/// A curve through a jet has a speed and no acceleration.
-fn motion(space: &Erased, gamma: &[Jet], speed: Lane, allowed: Lane, what: &str) -> Verdict {
+/// A curve through a jet at t = 0.3 has the velocity v of its start, carried along, and no acceleration.
+fn motion(space: &Erased, gamma: &[Jet], [start, v]: [&[Lane]; 2], allowed: Lane, what: &str) -> Verdict {
     let part = |f: fn(&Jet) -> Lane| -> Vec<Lane> { gamma.iter().map(f).collect() };
     let (p, raw, mut dd) = (part(|x| x.v), part(|x| x.d), part(|x| x.dd));
     let mut d = raw.clone();
     space.velocity(&p, &mut d);
     space.acceleration(&p, &raw, &mut dd);
-    within((length(space, &p, &d) - speed).abs(), allowed, &format!("speed of {what}"))?;
+    let mut carried = v.to_vec();
+    space.carry(start, &p, &scaled(v, 0.3), v, &mut carried);
+    within(length(space, &p, &minus(&d, &carried)), allowed, &format!("velocity of {what}"))?;
     within(length(space, &p, &dd), allowed * lane(10.0), &format!("acceleration of {what}"))
 }
 
@@ -263,7 +264,8 @@ fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Ver
     // Between points that move, the second derivative of the array by differences of the first.
     let p = draw.point(space);
     let [u, v] = [(); 2].map(|()| draw.vector(space, &p, 0.3));
-    let w = draw.vector(space, &p, part);
+    let x = draw.coordinates(space, part);
+    let w = tangent_at(space, &p, &x);
     let q = exp(space, &p, &w);
     let carried = {
         let mut out = vec![Lane::ZERO; p.len()];
@@ -282,7 +284,7 @@ fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Ver
         out
     };
     // Differences of order eight.
-    const STEP: f64 = 0.01;
+    const STEP: f64 = 0.005;
     const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
     let here = at(0.0);
     let (mut d, mut dd) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; p.len()]);
@@ -294,7 +296,7 @@ fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Ver
         }
     }
     let scale = norm(&here.iter().map(|x| x.v).collect::<Vec<_>>());
-    let allowed = rounding(space, loose * 3000.0 / STEP, &[&p, &q], &[]) * scale.max(Lane::ONE);
+    let allowed = rounding(space, loose * 3000.0 / STEP, &[&p, &q], &x) * scale.max(Lane::ONE);
     within(
         norm(&minus(&d, &here.iter().map(|x| x.d).collect::<Vec<_>>())),
         allowed,

@@ -81,13 +81,13 @@ pub fn parallel(space: &Erased, draw: &mut Draw) -> Verdict {
 }
 
 pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
-    let mut p = draw.point(space);
-    let start = p.clone();
+    let home = draw.point(space);
+    let mut p = home.clone();
     let mut moving = Moving::at(space, &p);
     for knot in 1..=607 {
-        // Home from time to time: a walk in a space without end would leave the range of doubles.
-        let v = if knot % 6 == 0 { log(space, &p, &start).0 } else { draw.vector(space, &p, 0.15) };
-        p = exp(space, &p, &v);
+        // Around one point: a walk in a space without end would leave the range of doubles, and in a space with an
+        // indefinite metric no geodesic may lead home.
+        p = exp(space, &home, &draw.vector(space, &home, 0.1));
         space.project(&mut p);
         moving.step(&p);
         // As often as the fit does.

@@ -27,7 +27,7 @@ pub static LAWS: &[(&str, Law)] = &[
     ("points are projected to themselves", ambient::points),
     ("exp and log are inverse", ambient::exp_and_log),
     ("log is tangent at any representative", ambient::tangent),
-    ("geodesics join their ends at constant speed", ambient::geodesics),
+    ("geodesics join their ends and carry their velocity", ambient::geodesics),
     ("a transvection is the product of two symmetries", ambient::transvections),
     ("transport preserves the inner product", ambient::transport),
     ("derivatives are those of the arrays", ambient::derivatives),

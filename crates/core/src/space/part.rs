@@ -1,4 +1,4 @@
-//! A totally geodesic part of a space: what an isometry of order two leaves where it is.
+//! A totally geodesic part of a space: what an isometry of order two leaves where it is, or a component of that.
 //!
 //! Geodesics between points of the part stay there, so all formulas are those of the whole. A page of a part says
 //! which points and coordinates are its own.
@@ -28,6 +28,15 @@ pub trait Part: Copy + Send + Sync {
     fn mirror_vector(&self, p: &[Lane], v: &[Lane], image: &mut [Lane]);
     /// A frame of the whole at a point of the part that takes the part at the origin to the part.
     fn lift(&self, p: &[Lane], frame: &mut [Lane]);
+    /// In which lanes a point that the mirror leaves where it is belongs to the part; with several components, it may
+    /// be a point of another one.
+    fn contains(&self, _p: &[Lane]) -> Lane {
+        Lane::ZERO.simd_eq(Lane::ZERO)
+    }
+    /// See [`Ambient::scatter`].
+    fn scatter(&self, noise: &mut [Lane]) {
+        self.whole().scatter(noise);
+    }
     /// Says in words and numbers why a point of the whole is none of the part.
     fn complaint(&self, p: &[Lane]) -> String;
 }
@@ -145,10 +154,11 @@ impl<P: Part> Ambient for Within<P> {
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
         let off = self.0.whole().project(x);
-        max_or_nan(off, self.nearest(x))
+        let off = max_or_nan(off, self.nearest(x));
+        self.0.contains(x).select(off, lane(f64::NAN))
     }
     fn scatter(&self, noise: &mut [Lane]) {
-        self.0.whole().scatter(noise);
+        self.0.scatter(noise);
         self.nearest(noise);
     }
     fn complaint(&self, x: &[f64]) -> String {

@@ -1,0 +1,368 @@
+"""De Sitter and anti-de Sitter space and the subspaces of an indefinite form: closed forms at fifty digits, isometries,
+and the spaces of definite metric that lie in them."""
+
+import mpmath
+import numpy as np
+import pytest
+from cases import EPS, base_point, centre_of, condition, jumps
+from scipy.linalg import expm
+
+import symspline as ss
+
+QUADRICS = ["ds:2", "ds:3", "ads:2", "ads:3"]
+NAMES = [*QUADRICS, "igr:0,1,1,2", "igr:1,0,2,1", "igr:1,1,2,2"]
+quadrics = pytest.mark.parametrize("name", QUADRICS)
+every = pytest.mark.parametrize("name", NAMES)
+KNOTS = np.array([0.0, 0.7, 2.0, 2.4, 3.9, 5.0])
+ENDS = ["natural", "clamped", "not-a-knot"]
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(8)
+
+
+def signs(name):
+    """The diagonal of the form."""
+    family, _, numbers = name.partition(":")
+    *_, p, q = [0, *map(int, numbers.split(","))]
+    if family != "igr":
+        p, q = (1, q) if family == "ds" else (2, q - 1)
+    return np.repeat([-1.0, 1.0], [p, q])
+
+
+def kappa(name):
+    return 1 if name.startswith("ds") else -1
+
+
+def group_element(eta, rng, size=0.4):
+    """A random element of O(p, q), of any determinant."""
+    x = size * rng.standard_normal((len(eta), len(eta)))
+    flips = np.diag(rng.choice([-1.0, 1.0], len(eta)))
+    return flips @ expm(eta[:, None] * (x - x.T))
+
+
+def act(name, g, x):
+    """An isometry on points, or on tangent vectors."""
+    if name.startswith("igr"):
+        return g @ x @ np.linalg.inv(g)
+    return x @ g.T
+
+
+def origin(name):
+    return centre_of(ss.space(name)).astype(float)
+
+
+def data(name, rng, n=6, step=0.2):
+    """Points around one of the space, with steps of every kind."""
+    space, o = ss.space(name), origin(name)
+    return act(
+        name,
+        group_element(signs(name), rng, 0.3),
+        space.exp(o, step * space.random_tangent(rng, np.array([o] * n))),
+    )
+
+
+# ---- exponential and logarithm ----
+
+
+def null_vector(name, p, rng):
+    """A tangent vector at p on which the form is zero."""
+    space = ss.space(name)
+    e = space.frame(p)
+    return 0.8 * (e[0] + e[1])
+
+
+@quadrics
+@pytest.mark.parametrize("kind", ["positive", "negative", "null", "nearly null"])
+@pytest.mark.parametrize("size", [1e-8, 1e-3, 0.3, 1.0, 2.5])
+def test_exp_and_log_at_fifty_digits(name, kind, size, rng):
+    space, eta = ss.space(name), signs(name)
+    p = space.exp(origin(name), 0.3 * space.random_tangent(rng, origin(name)))
+    e = space.frame(p)
+    v = (
+        size
+        * {
+            "positive": e[1] + 0.3 * e[0],
+            "negative": e[0] - 0.4 * e[1],
+            "null": e[0] + e[1],
+            "nearly null": e[0] + (1 + 1e-9) * e[1],
+        }[kind]
+    )
+    with mpmath.workdps(50):
+        point, vector = [mpmath.mpf(float(x)) for x in p], [mpmath.mpf(float(x)) for x in v]
+        square = kappa(name) * sum(s * x * x for s, x in zip(eta, vector, strict=True))
+        root = mpmath.sqrt(square)
+        sinc = 1 if square == 0 else mpmath.sin(root) / root
+        q = [(mpmath.cos(root) * x + sinc * y).real for x, y in zip(point, vector, strict=True)]
+        q = np.array(q, dtype=float)
+    allowed = 50 * EPS * condition(space, [p, q])
+    assert np.abs(space.exp(p, v) - q).max() <= allowed
+    # The logarithm's condition is θ/sin θ on closed geodesics.
+    theta = float(abs(root)) if square > 0 else 0.0
+    assert np.abs(space.log(p, q) - v).max() <= allowed / max(np.sinc(theta / np.pi), 0.05)
+    np.testing.assert_allclose(
+        space.invariant_form(p, v, v), (eta * v * v).sum(), rtol=0, atol=10 * EPS * np.sum(v * v)
+    )
+
+
+@quadrics
+@pytest.mark.parametrize("gap", [1e-1, 1e-3, 1e-6, 1e-9])
+def test_the_logarithm_up_to_the_antipode(name, gap, rng):
+    space = ss.space(name)
+    p = origin(name)
+    e = space.frame(p)
+    round_, open_ = (e[1], e[0]) if kappa(name) > 0 else (e[0], e[1])
+    v = (np.pi - gap) * (1.25 * round_ + 0.75 * open_)
+    q = space.exp(p, v)
+    # Rounding of q turns the direction by so much.
+    assert np.abs(space.log(p, q) - v).max() <= 100 * EPS / gap
+    assert np.abs(space.exp(p, space.log(p, q)) - q).max() <= 200 * EPS
+
+
+@quadrics
+def test_points_that_no_geodesic_joins(name):
+    space = ss.space(name)
+    p = origin(name)
+    e = space.frame(p)
+    q = -space.exp(p, 0.5 * (e[0] if kappa(name) > 0 else e[1]))
+    assert kappa(name) * (signs(name) * p * q).sum() < -1.1
+    for operation in (space.log, space.distance):
+        with pytest.raises(ss.CutLocusError):
+            operation(p, q)
+    with pytest.raises(ss.CutLocusError, match=r"points\[1\]"):
+        ss.CubicSpline(None, [p, p, q], space)
+
+
+# ---- isometries ----
+
+
+@every
+def test_transport_preserves_the_invariant_form(name, rng):
+    space = ss.space(name)
+    p = data(name, rng)
+    u, v = (space.random_tangent(rng, p[:-1]) for _ in range(2))
+    moved = [space.transport(p[:-1], p[1:], x) for x in (u, v)]
+    before, after = space.invariant_form(p[:-1], u, v), space.invariant_form(p[1:], *moved)
+    np.testing.assert_allclose(after, before, rtol=0, atol=1e-12 * np.abs(p).max() ** 2)
+    # Frames are orthonormal for the form.
+    e = space.frame(p[0])
+    gram = space.invariant_form(p[0], e[:, None], e[None])
+    if name.startswith("igr"):
+        gram = gram * 8
+    np.testing.assert_allclose(np.abs(gram), np.eye(space.dim), rtol=0, atol=1e-12)
+    assert np.linalg.eigvalsh(gram).min() < -0.9 and (np.linalg.eigvalsh(gram).max() > 0.9)
+
+
+@every
+@pytest.mark.parametrize("bc_type", ENDS)
+def test_splines_commute_with_isometries(name, bc_type, rng):
+    space = ss.space(name)
+    p = data(name, rng)
+    g = group_element(signs(name), rng)
+    x = np.linspace(KNOTS[0], KNOTS[-1], 51)
+    spline = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type, tol=1e-14)
+    moved = ss.CubicSpline(KNOTS, act(name, g, p), space, bc_type=bc_type, tol=1e-14)
+    for nu in range(3):
+        expected = act(name, g, spline(x, nu))
+        allowed = 1e-11 * max(1.0, np.abs(expected).max()) * np.linalg.cond(g) ** 2
+        np.testing.assert_allclose(moved(x, nu), expected, rtol=0, atol=allowed)
+
+
+# ---- spaces in each other ----
+
+
+def line_reflection(name, x):
+    """1 on the line of x and −1 on its complement."""
+    eta = signs(name)
+    dual = x * eta
+    square = (x * dual).sum(axis=-1)[..., None, None]
+    return 2 * x[..., :, None] * dual[..., None, :] / square - np.eye(len(eta))
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [("ds:2", "igr:0,1,1,2"), ("ads:2", "igr:1,0,2,1"), ("ds:3", "igr:0,1,1,3"), ("ads:3", "igr:1,0,2,2")],
+)
+@pytest.mark.parametrize("bc_type", ENDS)
+def test_quadrics_are_lines_of_an_indefinite_form(name, lines, bc_type, rng):
+    p = data(name, rng, step=0.15)
+    x = np.linspace(KNOTS[0], KNOTS[-1], 51)
+    spline = ss.CubicSpline(KNOTS, p, name, bc_type=bc_type, tol=1e-14)
+    other = ss.CubicSpline(KNOTS, line_reflection(name, p), lines, bc_type=bc_type, tol=1e-14)
+    expected = line_reflection(name, spline(x))
+    np.testing.assert_allclose(other(x), expected, rtol=0, atol=1e-12 * np.abs(expected).max() ** 2)
+    # The metric of lines is ⟨v, v⟩/⟨x, x⟩.
+    found = other.space.invariant_form(other(x), other(x, 1), other(x, 1))
+    metric = spline.space.invariant_form(spline(x), spline(x, 1), spline(x, 1)) * kappa(name)
+    np.testing.assert_allclose(found, metric, rtol=0, atol=1e-11 * np.abs(expected).max() ** 2)
+
+
+@pytest.mark.parametrize("bc_type", [*ENDS, "periodic"])
+def test_de_sitter_space_without_time_is_a_sphere(bc_type, rng):
+    p = ss.Sphere(2).random_point(rng, 8)
+    p = ss.Sphere(2).project(p[0] + 0.5 * p)
+    p[-1] = p[0] if bc_type == "periodic" else p[-1]
+    wide = np.concatenate([np.zeros((8, 1)), p], axis=1)
+    x = np.linspace(0, 7, 57)
+    sphere, own = (
+        ss.CubicSpline(None, y, s, bc_type=bc_type, tol=1e-14) for y, s in ((p, "sphere:2"), (wide, "ds:3"))
+    )
+    for nu in range(3):
+        assert np.abs(own(x, nu)[:, 0]).max() == 0
+        np.testing.assert_allclose(own(x, nu)[:, 1:], sphere(x, nu), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["ds:2", "ads:3"])
+@pytest.mark.parametrize("bc_type", [*ENDS, "periodic"])
+def test_hyperbolic_slices(name, bc_type, rng):
+    """x₂ = 0 of dS² is a line with coordinates (x₁, x₀); x₁ = 0 of AdSⁿ is hyperbolic space."""
+    h = ss.Hyperbolic(1 if name == "ds:2" else 2)
+    p = h.exp(
+        np.eye(1, h.point_shape[0])[0], 0.6 * np.insert(rng.standard_normal((8, h.dim)), 0, 0.0, axis=1)
+    )
+    p[-1] = p[0] if bc_type == "periodic" else p[-1]
+
+    def wide(y):
+        if name == "ds:2":
+            return np.stack([y[..., 1], y[..., 0], 0 * y[..., 0]], axis=-1)
+        return np.insert(y, 1, 0.0, axis=-1)
+
+    x = np.linspace(0, 7, 57)
+    own = ss.CubicSpline(None, wide(p), name, bc_type=bc_type, tol=1e-14)
+    plane = ss.CubicSpline(None, p, h, bc_type=bc_type, tol=1e-14)
+    for nu in range(3):
+        expected = wide(plane(x, nu))
+        np.testing.assert_allclose(
+            own(x, nu), expected, rtol=0, atol=2e-11 * max(1.0, np.abs(expected).max())
+        )
+
+
+def test_a_definite_form_gives_the_grassmannian(rng):
+    space = ss.Grassmannian(2, 4)
+    p = space.random_point(rng, 6)
+    p = np.array([space.geodesic(p[0], q, 0.3) for q in p])
+    p = p @ np.diag([2.0, -1.0])
+    for name, bases in (("igr:0,2,0,4", 0), ("igr:2,0,4,0", 4)):
+        points = ss.convert.basis_to_reflection(p, bases)
+        curve = ss.CubicSpline(KNOTS, points, name, tol=1e-14)(np.linspace(0, 5, 41))
+        y = ss.CubicSpline(KNOTS, p / [2.0, 1.0], space, tol=1e-14)(np.linspace(0, 5, 41))
+        np.testing.assert_allclose(curve, ss.convert.basis_to_reflection(y, bases), rtol=0, atol=1e-12)
+
+
+# ---- steps of every kind ----
+
+KINDS = {"space-like": (0.3, 1.0), "time-like": (1.0, 0.3), "nearly null": (1.0, 1.0 + 1e-9)}
+
+
+def walk_of_kind(space, kind, rng, n=8, step=0.4):
+    """Points whose steps have a direction in which the metric has a given sign, or is all but zero."""
+    p = [base_point(space, rng)]
+    e = space.frame(p[0])
+    direction = KINDS[kind][0] * e[0] + KINDS[kind][1] * e[1]
+    for k in range(n - 1):
+        turn = 0.0 if kind == "nearly null" else 0.05 * (-1) ** k
+        q = space.exp(p[-1], step * direction + turn * space.random_tangent(rng, p[-1]))
+        direction = space.transport(p[-1], q, direction)
+        p.append(q)
+    return np.array(p)
+
+
+@quadrics
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "homotopy", "auto"])
+def test_curves_are_c2_along_steps_of_every_kind(name, kind, method, rng):
+    space = ss.space(name)
+    p = walk_of_kind(space, kind, rng)
+    steps = space.log(p[:-1], p[1:])
+    square = space.invariant_form(p[:-1], steps, steps) / np.sum(steps**2, axis=-1)
+    expected = {"space-like": 1, "time-like": -1, "nearly null": 0}[kind]
+    assert (np.where(np.abs(square) < 1e-6, 0, np.sign(square)) == expected).all()
+    t = np.cumsum(rng.uniform(0.8, 1.25, len(p)))
+    closed = np.concatenate([p[:5], p[3::-1]])
+    v, w = 0.8 * space.log(p[0], p[1]), 0.3 * space.log(p[-1], p[-2])
+    ends = ["natural", "clamped", "not-a-knot", ((1, v), (1, w)), ((2, v), (2, w)), ("not-a-knot", (1, w))]
+    for bc_type, points, times in [*((e, p, t) for e in ends), ("periodic", closed, np.arange(9.0))]:
+        spline = ss.CubicSpline(
+            times, points, space, bc_type=bc_type, method=method, tol=1e-14, on_failure="ignore"
+        )
+        # Rounding may leave a little more than the tolerance.
+        assert np.max(spline.report.residual) < 1e-13, bc_type
+        assert np.max(jumps(spline)) <= 1.0, (bc_type, jumps(spline))
+
+
+# ---- null curves ----
+
+
+@quadrics
+def test_points_on_a_null_geodesic(name, rng):
+    """The spline through them is the null geodesic, at the speed of a cubic spline in R."""
+    space = ss.space(name)
+    p = space.exp(origin(name), 0.3 * space.random_tangent(rng, origin(name)))
+    v = null_vector(name, p, rng)
+    s = np.array([0.0, 0.4, 0.5, 1.3, 1.1, 2.0])
+    spline = ss.CubicSpline(KNOTS, p + s[:, None] * v, space, tol=1e-14)
+    flat = ss.CubicSpline(KNOTS, s[:, None], "r:1", tol=1e-14)
+    x = np.linspace(0, 5, 41)
+    np.testing.assert_allclose(spline(x), p + flat(x) * v, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(spline(x, 2), flat(x, 2) * v, rtol=0, atol=1e-10)
+
+
+# ---- points, and conversions ----
+
+
+@pytest.mark.parametrize("name", ["igr:1,1,2,2", "igr:0,2,1,3", "igr:1,2,2,3"])
+def test_bases_and_reflections(name, rng):
+    a, b, p, _ = map(int, name.partition(":")[2].split(","))
+    space, eta = ss.space(name), signs(name)
+    points = space.random_point(rng, 20)
+    basis = ss.convert.reflection_to_basis(points, p)
+    gram = np.swapaxes(basis, -1, -2) @ (eta[:, None] * basis)
+    np.testing.assert_allclose(gram, [np.diag(np.repeat([-1.0, 1.0], [a, b]))] * 20, rtol=0, atol=1e-13)
+    mixed = basis @ rng.standard_normal((a + b, a + b))
+    np.testing.assert_allclose(ss.convert.basis_to_reflection(mixed, p), points, rtol=0, atol=1e-11)
+
+
+def test_invalid_subspaces_raise(rng):
+    null = [[1.0], [1.0], [0.0]]
+    with pytest.raises(ss.ValidationError, match="the form is degenerate on it"):
+        ss.convert.basis_to_reflection(null, 1)
+    with pytest.raises(ss.ValidationError, match="linearly independent columns"):
+        ss.convert.basis_to_reflection(np.ones((3, 2)), 1)
+    with pytest.raises(ss.ValidationError, match="negative must be a whole number from 0 to 3, not 4"):
+        ss.convert.basis_to_reflection(null, 4)
+    with pytest.raises(ss.ValidationError, match="does not preserve the form"):
+        ss.convert.reflection_to_basis([[0.0, 1.0], [1.0, 0.0]], 1)
+    for name in ("igr:1,0,1,2", "igr:1,1,1,2", "igr:0,2,1,2"):
+        point = ss.space("igr:0,1,1,2").random_point(rng)
+        with pytest.raises(ss.ValidationError, match="form has another signature than"):
+            ss.space(name).check_point(point)
+    with pytest.raises(ss.ValidationError, match="it is not a reflection"):
+        ss.space("igr:0,1,1,2").check_point(group_element(np.array([-1.0, 1, 1]), rng))
+    with pytest.raises(ss.ValidationError, match="does not preserve the form with 1 negative squares first"):
+        ss.space("igr:0,1,1,2").check_point(2 * np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("space", "match"),
+    [
+        ("ds:1", r"DeSitter\(n\) needs n >= 2, not 1"),
+        ("ads:1", r"AntiDeSitter\(n\) needs n >= 2, not 1"),
+        ("igr:2,0,1,2", r"needs a <= p, b <= q and 0 < a \+ b < p \+ q, not \(2, 0, 1, 2\)"),
+        ("igr:1,2,1,2", "0 < a"),
+        ("igr:0,0,1,2", "0 < a"),
+    ],
+)
+def test_invalid_dimensions_raise(space, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        ss.space(space)
+
+
+def test_invalid_points_raise():
+    with pytest.raises(ss.ValidationError, match=r"-x0² \+ x1² \+ … is 2, not 1"):
+        ss.DeSitter(2).check_point([0.0, 1.0, 1.0])
+    with pytest.raises(ss.ValidationError, match=r"-x0² - x1² \+ x2² \+ … is 1, not -1"):
+        ss.AntiDeSitter(2).check_point([0.0, 0.0, 1.0])
+    far = [[np.sinh(16.0), np.cosh(16.0), 0.0]] * 2
+    with pytest.raises(ss.ValidationError, match="move all points by one isometry"):
+        ss.CubicSpline(None, far, "ds:2")
