@@ -16,18 +16,6 @@ ROOT = DOCS.parent
 PAGE = DOCS / "paper.md"
 BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
 
-# Names that the table has already, of functions, tests and pages that are not there yet.
-PENDING: list[str] = [
-    "symspline.Report.contraction_bound",
-    "symspline.DeSitter",
-    "symspline.AntiDeSitter",
-    "symspline.IndefiniteGrassmannian",
-    "tests/fit/test_algorithm_1.py",
-    "theorem.md",
-    "convergence.md",
-]
-
-
 class Row(NamedTuple):
     """One item of the paper."""
 
@@ -48,7 +36,7 @@ ISOMETRY = "tests/spaces/test_actions.py::test_elements_are_isometries"
 EXAMPLES = "tests/examples/test_examples.py::test_a_recipe_draws_a_picture"
 CERTIFICATE = "tests/spline/test_certificate.py::"
 SPACES = f"{ISOMETRY} {LAWS}test_exp_and_log_are_inverse {C2}"
-REGION = "solvers.md#what-theorem-31-says"
+REGION = "solvers.md#theorem-31-and-measurements"
 
 ROWS = [
     Row("Problem 1.1", "C² curve through points", "CubicSpline", C2, "start.md#ten-lines"),

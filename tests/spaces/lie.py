@@ -30,6 +30,8 @@ class Lie:
     def __init__(self, space):
         self.space = space
         form = np.ones(space.point_shape[0])
+        if isinstance(space, ss.IndefiniteGrassmannian):
+            form[: space._parameters[2]] = -1.0
         form[list(getattr(space, "_negative", ()))] = -1.0
         self.form = np.diag(form)
 
@@ -91,6 +93,8 @@ class Lie:
         space = self.space
         if isinstance(space, ss.Euclidean):
             return g[:-1, :-1] @ v
+        if isinstance(space, ss.IndefiniteGrassmannian):
+            return g @ v @ np.linalg.inv(g)
         if isinstance(space, Group):
             return g[0] @ v @ np.linalg.inv(g[1])
         if isinstance(space, Congruent):

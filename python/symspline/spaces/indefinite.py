@@ -3,9 +3,12 @@ indefinite form."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .actions import Preserving, adjoint, matrices, preserves
 from .base import Array, Space
 
 
@@ -61,7 +64,7 @@ class Indefinite(Space):
         raise NotImplementedError
 
 
-class DeSitter(Indefinite):
+class DeSitter(Indefinite, Preserving):
     """De Sitter space dSⁿ, n ≥ 2: arrays (x₀, x₁, …, xₙ) with −x₀² + x₁² + … + xₙ² = 1, the time-like coordinate first.
 
     The metric ⟨u, v⟩ = −u₀v₀ + u₁v₁ + … + uₙvₙ has one negative square, the group of isometries is O(1, n), and the
@@ -80,6 +83,7 @@ class DeSitter(Indefinite):
     """
 
     _name = "ds"
+    _negative = (0,)
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -88,7 +92,7 @@ class DeSitter(Indefinite):
         return np.asarray((u[..., 1:] * v[..., 1:]).sum(axis=-1) - u[..., 0] * v[..., 0])
 
 
-class AntiDeSitter(Indefinite):
+class AntiDeSitter(Indefinite, Preserving):
     """Anti-de Sitter space AdSⁿ, n ≥ 2: arrays (x₀, x₁, …, xₙ) with −x₀² − x₁² + x₂² + … + xₙ² = −1, the two
     time-like coordinates first.
 
@@ -106,6 +110,7 @@ class AntiDeSitter(Indefinite):
     """
 
     _name = "ads"
+    _negative = (0, 1)
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
@@ -141,6 +146,20 @@ class IndefiniteGrassmannian(Indefinite):
 
     def __init__(self, a: int, b: int, p: int, q: int) -> None:
         super().__init__(a, b, p, q)
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        return p @ x @ p
+
+    def _element(self, g: Any) -> Any:
+        _, _, negative, positive = self._parameters
+        array, tol = matrices(self, g, negative + positive, np.float64)
+        form = np.diag([-1.0] * negative + [1.0] * positive)
+        preserves(self, array, form, tol, "Pass a matrix with gᵀJg = J, J = diag(−1, …, −1, 1, …, 1).")
+        return array
+
+    def _moved(self, g: Array, x: Array) -> Any:
+        # g x g⁻¹.
+        return adjoint(np.linalg.solve(adjoint(g), adjoint(g @ x)))
 
     def _form(self, u: Array, v: Array) -> Array:
         return np.asarray(np.einsum("...ij,...ji->...", u, v) / 8)
