@@ -22,7 +22,7 @@ from .curves.noise import Noise
 from .curves.solve import Progress
 from .options import check_progress, checked_policy, outside
 from .spaces import Array, Product, Space, parts_of
-from .times import Clock
+from .times import Clock, onto_ends
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -187,7 +187,7 @@ class Piecewise(ABC):
         if np.ndim(x0) or np.ndim(x1):
             raise ValidationError("x0 and x1 must be single times, from when to when")
         pair = np.asarray([x0, x1])
-        times, _ = self._clock.at(pair, self._batch, False)
+        times, own = self._clock.at(pair, self._batch, False, self._times)
         where = "periodic" if self._outside == "periodic" else "raise"
         try:
             at = evaluated(self._curve, self._clock, pair, "point", where, False, None)
@@ -206,6 +206,14 @@ class Piecewise(ABC):
             given = np.broadcast_to(given, first.shape)
             part.space.check_tangent(first[good], given[good])
             vectors.append(given)
+        if own:
+            # Curves that count time from first knots of their own are carried along one by one.
+            product = isinstance(self.space, Product)
+            each = [
+                self[i].transport(x0, x1, tuple(v[i] for v in vectors) if product else vectors[0][i])
+                for i in range(len(self))
+            ]
+            return tuple(map(np.stack, zip(*each, strict=True))) if product else np.stack(each)
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
         return self._curve.transport((float(times[0]), float(times[1])), where, moved)
 
@@ -412,9 +420,11 @@ def timed(
     """What a curve has at times as the user gives them."""
     if clock.plain and type(x) is float:
         # A single time is worth a short way.
-        times = np.array(x)
+        times, knots = np.array(x), curve.times
+        if knots.ndim > 1 or not knots[0] <= x <= knots[-1]:
+            times, per_curve = onto_ends(times, knots, curve.batch, per_curve)
     else:
-        times, per_curve = clock.at(x, curve.batch, per_curve)
+        times, per_curve = clock.at(x, curve.batch, per_curve, curve.times)
     try:
         return call(curve, times, per_curve)
     except ValidationError as error:

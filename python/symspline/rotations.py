@@ -165,7 +165,7 @@ def quaternion(
     where = spline._where(extrapolate)
     ends = curve.points[..., 0, :], curve.points[..., -1, :]
     if where == "periodic" and np.any(_dot(*ends) < 0):
-        times, per_curve = spline._clock.at(x, curve.batch, per_curve)
+        times, per_curve = spline._clock.at(x, curve.batch, per_curve, curve.times)
         times, turns = _wrapped(curve, times, per_curve)
         q = curve.evaluate(times, "point", "raise", True)
         flipped = (_dot(*ends) < 0).reshape(curve.batch + (1,) * (turns.ndim - len(curve.batch)))

@@ -228,7 +228,7 @@ class CubicSpline(Piecewise):
 
     def _places(self, x: ArrayLike, nu: int) -> Places:
         curve = self._curve
-        times, per_curve = self._clock.at(x, curve.batch, False)
+        times, per_curve = self._clock.at(x, curve.batch, False, curve.times)
         try:
             return places(curve.times, curve.batch, times, per_curve, nu)
         except ValidationError as error:

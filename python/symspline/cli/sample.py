@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..curves.ends import is_closed
 from ..smoothing import SmoothingSpline
 from ..spline import CubicSpline
+from ..times import onto_ends
 from .curves import Columns, Curves, read_curves
 from .data import Groups, group
 from .errors import Problem, check_target, did_you_mean, first_twice
@@ -166,7 +167,10 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
         )
     if spline.extrapolate is not None or is_closed(spline.bc_type):
         return
-    outside = np.flatnonzero((times < knots[0]) | (times > knots[-1]))
+    inside = times
+    if times.dtype.kind == knots.dtype.kind == "f":
+        inside, _ = onto_ends(times, knots, (), False)
+    outside = np.flatnonzero((inside < knots[0]) | (inside > knots[-1]))
     if outside.size:
         raise Problem(
             f"{path}, {rows.place(own[outside[0]])}: time {times[outside[0]]} is outside {curves.called(name)}, "

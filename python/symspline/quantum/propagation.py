@@ -11,6 +11,7 @@ from .._core import ValidationError
 from ..convert.reading import Array, adjoint, refuse
 from ..spaces import ComplexGrassmannian, ComplexProjective
 from ..spline import CubicSpline
+from ..times import onto_ends
 from .generators import generator, quantum_space
 
 Doubles = NDArray[np.float64]
@@ -75,6 +76,7 @@ def _times(spline: CubicSpline, x: ArrayLike) -> Doubles:
             "propagator(spline[i], x)"
         )
     first, last = spline._times[..., 0].max(), spline._times[..., -1].min()
+    times, _ = onto_ends(times, np.array([first, last]), (), False)
     refuse(
         ~((times >= first) & (times <= last)),
         "x",
@@ -90,6 +92,8 @@ def _edges(spline: CubicSpline) -> Doubles:
     knots = np.broadcast_to(spline._times, (*spline._batch, spline._times.shape[-1]))
     lengths = np.diff(knots)
     inner = knots[..., :-1, None] + lengths[..., None] * np.linspace(0, 1, 9)
+    # By rounding the last of them may lie behind the last knot.
+    inner = np.minimum(inner, knots[..., 1:, None])
     speed = spline._curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
     legs = speed.reshape(inner.shape).max(axis=-1) * lengths
     # The same number in all curves, so that they are one array.
