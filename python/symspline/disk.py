@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import secrets
 import stat
@@ -17,7 +18,7 @@ from .arrays import shown
 _TAIL = 32
 
 
-def path_of(file: Any, name: str = "file", *, method: str) -> Path | None:
+def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -> Path | None:
     """The path that an argument names, or None if it is an open file.
 
     Numbers are refused: Python opens 0, 1 and 2 as the standard streams.
@@ -30,6 +31,8 @@ def path_of(file: Any, name: str = "file", *, method: str) -> Path | None:
         What the caller calls the argument.
     method : {"read", "write"}
         What an open file must have.
+    text : bool
+        Whether an open file must be open as text.
 
     Raises
     ------
@@ -39,23 +42,26 @@ def path_of(file: Any, name: str = "file", *, method: str) -> Path | None:
         It is a text that cannot be the name of a file.
     """
     if callable(getattr(file, method, None)):
+        if isinstance(file, (io.RawIOBase, io.BufferedIOBase) if text else io.TextIOBase):
+            mode = "as text, without 'b' in its mode" if text else "in binary mode, with 'b'"
+            raise TypeError(f"{name} must be open {mode}; pass its name, or open it so")
         return None
     if not isinstance(file, (str, os.PathLike)):
         raise TypeError(f"{name} must be a path or an open file with a method {method}, not {shown(file)}")
-    text = os.fspath(file)
-    if not isinstance(text, str):
-        raise TypeError(f"{name} must be a path of text, not {shown(text)}")
-    if not text:
+    path = os.fspath(file)
+    if not isinstance(path, str):
+        raise TypeError(f"{name} must be a path of text, not {shown(path)}")
+    if not path:
         raise ValidationError(f"{name} is an empty text, which names no file")
     try:
-        os.fsencode(text)
+        os.fsencode(path)
     except UnicodeEncodeError:
         raise ValidationError(
-            f"{name} = {shown(text)} is not the name of a file: it is not Unicode"
+            f"{name} = {shown(path)} is not the name of a file: it is not Unicode"
         ) from None
-    if "\0" in text:
-        raise ValidationError(f"{name} = {shown(text)} is not the name of a file: it holds a null character")
-    return Path(text)
+    if "\0" in path:
+        raise ValidationError(f"{name} = {shown(path)} is not the name of a file: it holds a null character")
+    return Path(path)
 
 
 class replacing:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
-from .arrays import as_array, brief
+from .arrays import as_array, brief, shown
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert.reading import length, off_one, refuse
 from .disk import path_of, replacing
@@ -330,12 +330,12 @@ class Line(NamedTuple):
 
 def _lines(file: Any, name: str = "file") -> list[Line]:
     """The lines that are no comments; ``name`` is the argument's."""
-    path = path_of(file, name, method="read")
+    path = path_of(file, name, method="read", text=True)
     if path is None:
         text = file.read()
         if not isinstance(text, str):
             raise TypeError(
-                f"{name} must be open as text, not as bytes: open it without 'b', or pass its name"
+                f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so"
             )
         text = text.removeprefix("\ufeff")
     else:
@@ -359,8 +359,18 @@ def _parsed(lines: list[Line], file: Any, form: str, **options: Any) -> Any:
         return np.zeros((0, 0))
     try:
         return np.loadtxt([line.text for line in lines], **options)
-    except ValueError as error:
-        raise ValidationError(f"{_name(file)}: {form}; {brief(error)}") from None
+    except ValueError:
+        raise ValidationError(_bad_row(lines, _name(file), form, options)) from None
+
+
+def _bad_row(lines: list[Line], name: str, form: str, options: dict[str, Any]) -> str:
+    """What is wrong with the first line that is none of this form."""
+    for line in lines:
+        try:
+            np.loadtxt([line.text], **options)
+        except ValueError:
+            return f"{name}, line {line.number}: {form}; this line is {shown(line.text)}"
+    return f"{name}: {form}; its lines differ in how many numbers they have"
 
 
 def _name(file: Any) -> str:
@@ -372,7 +382,7 @@ def _write(file: Any, rows: Iterable[list[Any]], separator: str, head: str = "")
     # The shortest text that reads back as the same double.
     text = "".join(f"{separator.join(map(repr, row))}\n" for row in rows)
     text = f"{head}\n{text}" if head else text
-    path = path_of(file, method="write")
+    path = path_of(file, method="write", text=True)
     if path is None:
         file.write(text)
         return

@@ -29,7 +29,7 @@ from .convert.reading import length, real_numbers, refuse
 from .curves.curve import Curve, Doubles
 from .curves.fit import curve_of
 from .hermite import HermiteSpline
-from .piecewise import evaluated
+from .piecewise import check_curve, evaluated
 from .spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
 from .spline import CubicSpline
 
@@ -204,8 +204,7 @@ def attitude(spline: Spline) -> Curve:
     Raises:
         ValidationError: the spline has none, or several.
     """
-    if not isinstance(getattr(spline, "_curve", None), Curve):
-        raise TypeError(f"a spline is needed, not {shown(spline)}")
+    check_curve(spline)
     found = [part for part in spline._curve.parts if part.space in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(

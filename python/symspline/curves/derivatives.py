@@ -13,7 +13,7 @@ from .._core import ValidationError
 from ..arrays import as_array, cast, shown
 from ..spaces import Array
 from ..times import onto_ends
-from .curve import Curve
+from .curve import Curve, quantity_of
 from .ends import End, ends_of
 from .gradient import Gradient, Places
 
@@ -24,8 +24,9 @@ def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: 
     Raises:
         ValidationError: a time is outside the knots.
     """
-    if isinstance(nu, bool) or nu not in (0, 1, 2):
+    if isinstance(nu, bool):
         raise ValidationError(f"nu must be 0, 1 or 2, not {shown(nu)}")
+    quantity_of(nu)
     dtype = x.dtype if x.dtype.kind == "f" else np.dtype(np.float64)
     x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
     shape = x.shape if per_curve else batch + x.shape

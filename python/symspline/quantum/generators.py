@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .._core import ValidationError
 from ..arrays import shown
 from ..convert.reading import Array, adjoint
+from ..piecewise import check_curve
 from ..spaces import ComplexGrassmannian, ComplexProjective, Space, SpecialUnitary, Unitary
 from ..spline import CubicSpline
 
@@ -48,7 +50,7 @@ def hamiltonian(
            [0.+1.j, 0.+0.j]])
     """
     space = quantum_space(spline)
-    if isinstance(nu, bool) or nu not in (0, 1):
+    if isinstance(nu, bool) or not isinstance(nu, (int, np.integer)) or nu not in (0, 1):
         raise ValidationError(f"nu must be 0 for H or 1 for its derivative H', not {shown(nu)}")
     point, vector = (spline(x, nu=order, extrapolate=extrapolate) for order in (0, nu + 1))
     return generator(space, point, vector)
@@ -56,6 +58,7 @@ def hamiltonian(
 
 def quantum_space(spline: Any) -> Space:
     """The space of a curve that has a Hamiltonian."""
+    check_curve(spline)
     space: Space = spline.space
     if isinstance(space, (ComplexProjective, ComplexGrassmannian, Unitary, SpecialUnitary)):
         return space
