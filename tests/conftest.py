@@ -19,6 +19,7 @@
     docs, bench  what they show runs
     examples     the recipes run
     fuzz         random input; `make fuzz` runs it at length
+    raw_data     data as people bring them: gaps, repeats, missing samples, huge offsets, over every entry
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Beside this file lies what they share: `cases` is the list of spaces and data on them, `curves` has arrays and

@@ -10,7 +10,7 @@ ROOT = Path(symspline.__file__).parent
 # From below. A folder stands for all that is in it.
 LAYERS = [
     ["_core", "_cpu"],
-    ["arrays", "config", "handed", "places", "report", "threads", "times", "version"],
+    ["arrays", "config", "disk", "handed", "places", "report", "threads", "times", "version"],
     ["spaces"],
     ["manifolds"],
     ["curves"],

@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._core import ValidationError
+from .arrays import cast
 from .curves.curve import Curve
 from .curves.derivatives import places
 from .spaces import Array, Space
 from .spline import CubicSpline
+from .times import onto_ends
 
 # End conditions without their vectors: a word, or a pair of words and orders.
 Kinds = str | tuple[str | int, str | int]
@@ -77,7 +79,9 @@ class Movable(NamedTuple):
         return along.reshape(-1, *x.shape).sum(axis=0), gradient.t, gradient.points, gradient.ends
 
     def _velocity(self, x: Array) -> Array:
-        velocity: Array = self.curve.evaluate(x, "velocity", "raise", False)
+        curve = self.curve
+        times, per_curve = onto_ends(cast(x), curve.times, curve.batch, False, x.dtype)
+        velocity: Array = curve.evaluate(times, "velocity", "raise", per_curve)
         return velocity
 
 

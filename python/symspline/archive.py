@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
 import os
-import secrets
-from contextlib import suppress
-from pathlib import Path
+import re
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._core import ValidationError
+from .arrays import brief
+from .disk import path_of, replacing
 from .manifolds.manifold import refuse_functions
 from .piecewise import Piecewise
 from .report import Report
@@ -24,6 +29,12 @@ SMOOTHING = "symspline-smoothing"
 MANY = "symspline-curves"
 LISTS = ("bc_type", "extrapolate", "report", "noise")
 VERSION = 1
+_KNOWN = re.compile(
+    r"format|version|space|t|t_unit|bc_type|extrapolate|report|names|knots|samples|noise|data_t|data_t_unit"
+    r"|(?:points|velocities|data|data_weights|data_information|band)(?:_\d{1,9})?"
+)
+# What is compressed is at most this much larger than the file, or of this size.
+_RATIO, _SMALL = 100, 2**24
 
 
 def fitted_arrays(spline: Piecewise, reports: list[Report]) -> dict[str, Any]:
@@ -62,34 +73,127 @@ def times_arrays(name: str, t: NDArray[Any], clock: Clock) -> dict[str, Any]:
 
 
 def write(file: Any, arrays: dict[str, Any]) -> None:
-    """Write arrays to an open file, or to one with a name when all of it has been written."""
-    if hasattr(file, "write"):
+    """Write arrays to an open file, or replace a file by its name (`disk.replacing`)."""
+    path = path_of(file, method="write")
+    if path is None:
         np.savez(file, **arrays)
         return
-    with replacing(Path(file)) as temporary, open(temporary, "wb") as out:
+    with replacing(path) as temporary, open(temporary, "wb") as out:
         np.savez(out, **arrays)
 
 
-class replacing:
-    """A temporary file beside ``path``, with the same ending, that takes its place if all goes well, and is
-    gone if not."""
+# ---- reading ----
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
 
-    def __enter__(self) -> Path:
-        self.temporary = self.path.with_name(f".{self.path.stem}.{secrets.token_hex(8)}{self.path.suffix}")
-        # Created here, with the rights of any new file, so that a later open finds it.
-        os.close(os.open(self.temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        return self.temporary
+class Entries(dict[str, NDArray[Any]]):
+    """Arrays of an archive by name; one that is missing is an error of the file."""
 
-    def __exit__(self, kind: Any, *_: object) -> None:
-        try:
-            if kind is None:
-                self.temporary.replace(self.path)
-        finally:
-            with suppress(FileNotFoundError):
-                self.temporary.unlink()
+    def __missing__(self, name: str) -> NDArray[Any]:
+        raise ValidationError(f"entry {name!r} is missing")
+
+
+def read(file: Any, wanted: Callable[[str], object]) -> Entries:
+    """The arrays of an NPZ file whose names are wanted; of the others nothing is read.
+
+    Sizes are taken from the archive's index before any array is read: compression makes a file of any size from a few
+    kilobytes.
+
+    Parameters
+    ----------
+    file : open file
+        In binary mode, one that can seek.
+    wanted : function
+        Says of a name whether its array is wanted.
+
+    Raises
+    ------
+    ValidationError
+        An array is too large for the size of the file, or does not have the size that its header says.
+    Exception
+        Damage shows as errors of zipfile, of its decompressors and of NumPy.
+    """
+    length = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    with zipfile.ZipFile(file) as archive:
+        members = {
+            member.filename.removesuffix(".npy"): member
+            for member in archive.infolist()
+            if member.filename.endswith(".npy") and wanted(member.filename.removesuffix(".npy"))
+        }
+        most, total = max(_SMALL, _RATIO * length), 0
+        for name, member in members.items():
+            total += member.file_size
+            if total > most:
+                raise ValidationError(
+                    f"entry {name!r} would take {member.file_size} bytes of memory, but the file has {length}: a file "
+                    f"may hold {_RATIO} times its own size; write it without compression"
+                )
+        return Entries((name, _array_in(archive, name, member)) for name, member in members.items())
+
+
+def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> NDArray[Any]:
+    with archive.open(member) as entry:
+        header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+        shape, _, dtype = header[np.lib.format.read_magic(entry)](entry)
+        size = member.file_size - entry.tell()
+    # NumPy makes an array of this shape before it reads the numbers.
+    if dtype.hasobject:
+        raise ValidationError(
+            f"entry {name!r} holds Python objects, which are not read; save numbers or texts"
+        )
+    if math.prod(shape) * dtype.itemsize != size:
+        raise ValidationError(
+            f"entry {name!r} is damaged: it has {size} bytes, not those of {dtype} in shape {shape}"
+        )
+    with archive.open(member) as entry:
+        array: NDArray[Any] = np.lib.format.read_array(entry, allow_pickle=False)
+    return array
+
+
+def is_curve(name: str) -> bool:
+    """Whether a curve has an entry of this name."""
+    return _KNOWN.fullmatch(name) is not None
+
+
+def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
+    """An entry that is one text.
+
+    Raises
+    ------
+    ValidationError
+        It is something else.
+    """
+    array = arrays[name]
+    if array.ndim or array.dtype.kind != "U":
+        raise ValidationError(f"entry {name!r} is not a text: it holds {array.dtype} of shape {array.shape}")
+    return str(array)
+
+
+def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
+    """An entry that is a text in JSON.
+
+    Raises
+    ------
+    ValidationError
+        It is something else.
+    """
+    try:
+        return json.loads(text_in(arrays, name))
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, ValidationError):
+            raise
+        raise ValidationError(f"entry {name!r} is not JSON: {brief(error)}") from None
+
+
+@contextmanager
+def entry(name: str) -> Iterator[None]:
+    """Says in which entry something is wrong."""
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
+        # Of values of other types than those that are written anything may be found wrong.
+        what = error if isinstance(error, ValidationError) else f"{type(error).__name__}: {error}"
+        raise ValidationError(f"entry {name!r}: {brief(what, 500)}") from None
 
 
 def _unit(dtype: np.dtype[Any], zone: str | None) -> str:

@@ -24,8 +24,10 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
         )
     try:
         array = np.asarray(value)
-    except ValueError as error:
-        raise ValidationError(f"{name} is not an array of equally long rows: {error}") from None
+    except ValueError:
+        raise ValidationError(
+            f"{name} is not an array of equally long rows: rows differ in length or shape; give all of them the same"
+        ) from None
     if array.dtype.kind == "O":
         refuse_objects(array, name)
     return array
@@ -56,7 +58,10 @@ def shown(value: Any) -> str:
 
 def brief(text: object, most: int = 150) -> str:
     """A text on one line, and not too long."""
-    line = " ".join(str(text).split())
+    # More than is shown is not looked at, except for a space at its end.
+    line = " ".join(str(text)[: 4 * most].split())
+    # What a terminal would obey, such as an escape character of a name in a file, is written out.
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
     return line if len(line) <= most else f"{line[:most]}…"
 
 
@@ -86,9 +91,17 @@ def whole_number(value: Any, name: str, least: int) -> int:
     return int(value)
 
 
+def checked_flag(value: Any, name: str) -> bool:
+    """True or False; of an array neither would be meant."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValidationError(f"{name} must be True or False, not {shown(value)}")
+    return bool(value)
+
+
 def is_single(dtype: Any) -> bool:
     """Whether a type of results is single precision; it may be double precision, too."""
-    with suppress(TypeError):
+    # Texts are read as Python is, and may be no Python.
+    with suppress(TypeError, ValueError, SyntaxError):
         if np.dtype(dtype) in (np.float32, np.complex64):
             return True
         if np.dtype(dtype) in (np.float64, np.complex128):

@@ -3,21 +3,37 @@
 from __future__ import annotations
 
 import json
-import os
+import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import archive
 from ._core import ValidationError
-from .archive import FORMAT, HERMITE, LISTS, MANY, SMOOTHING, VERSION, rich, write
+from .archive import (
+    FORMAT,
+    HERMITE,
+    LISTS,
+    MANY,
+    SMOOTHING,
+    VERSION,
+    Entries,
+    entry,
+    json_in,
+    rich,
+    text_in,
+    write,
+)
 from .arrays import brief, shown
 from .curves.fit import curve_of, read_ends
+from .disk import path_of
 from .handed import NO_ZONE, UTC_ZONE
 from .hermite import HermiteSpline
 from .options import checked_policy
-from .report import OPTIONAL, Report, longest_gap
+from .report import OPTIONAL, SOLVERS, Report, longest_gap
 from .smoothing import SmoothingSpline
 from .smoothing.stored import read_stored
 from .spaces import Array, Product, Space, factors_of
@@ -114,14 +130,13 @@ def load_many(file: Any) -> dict[str, CubicSpline]:
     return _opened(file, _read_many)
 
 
-def _opened(file: Any, read: Callable[[dict[str, NDArray[Any]]], _T]) -> _T:
-    name = getattr(file, "name", file if isinstance(file, (str, os.PathLike)) else "the file")
-    if not hasattr(file, "read") and not isinstance(file, (str, os.PathLike)):
-        raise TypeError(f"a path or an open file is needed, not {file!r}")
+def _opened(file: Any, read: Callable[[Entries], _T]) -> _T:
+    path = path_of(file, method="read")
+    name = getattr(file, "name", "the file") if path is None else path
     try:
-        if hasattr(file, "read"):
+        if path is None:
             return read(_arrays_of(file))
-        with open(file, "rb") as opened:
+        with open(path, "rb") as opened:
             return read(_arrays_of(opened))
     except (OSError, MemoryError):
         raise
@@ -132,46 +147,64 @@ def _opened(file: Any, read: Callable[[dict[str, NDArray[Any]]], _T]) -> _T:
         raise ValidationError(f"{name} is damaged or not a symspline curve: {brief(error)}") from None
 
 
-def _arrays_of(file: Any) -> dict[str, NDArray[Any]]:
-    archive = np.load(file, allow_pickle=False)
-    if not isinstance(archive, np.lib.npyio.NpzFile) or "format" not in archive:
+def _arrays_of(file: Any) -> Entries:
+    try:
+        arrays = archive.read(file, archive.is_curve)
+    except zipfile.BadZipFile:
+        raise ValidationError("this is damaged or not a symspline curve: it is not an NPZ file") from None
+    if "format" not in arrays:
         raise ValidationError("this is not a symspline curve")
-    with archive:
-        return {key: archive[key] for key in archive.files}
+    return arrays
 
 
-def _read_many(arrays: dict[str, NDArray[Any]]) -> dict[str, CubicSpline]:
-    if str(arrays["format"]) in (FORMAT, SMOOTHING):
-        raise ValidationError("this file holds no collection of curves; read it with symspline.load")
-    if str(arrays["format"]) != MANY:
-        raise ValidationError(f"format {str(arrays['format'])!r}, expected {MANY!r}")
-    names, own = json.loads(str(arrays["names"])), _slices(arrays, "knots", "t")
+def _read_many(arrays: Entries) -> dict[str, CubicSpline]:
+    kind = text_in(arrays, "format")
+    if kind in (FORMAT, SMOOTHING, HERMITE):
+        raise ValidationError("this file holds one curve or a batch; read it with symspline.load")
+    if kind != MANY:
+        raise ValidationError(f"entry 'format' is {shown(kind)}, but must be {MANY!r}")
+    names, own = json_in(arrays, "names"), _slices(arrays, "knots", "t")
     smooth = "samples" in arrays
     data = _slices(arrays, "samples", "data_t") if smooth else own
-    lists = {key: json.loads(str(arrays[key])) for key in LISTS if key in arrays}
+    lists = {key: json_in(arrays, key) for key in LISTS if key in arrays}
+    for key, values in {"names": names, **lists}.items():
+        if not isinstance(values, list) or len(values) != len(own):
+            raise ValidationError(
+                f"entry {key!r} must be a list with one value for each of {len(own)} curves"
+            )
+    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        raise ValidationError("entry 'names' must hold texts, none of them twice")
     curves = {}
     for i, (name, knots, samples) in enumerate(zip(names, own, data, strict=True)):
-        one = {
-            key: array[samples if key.startswith("data") else knots] if array.ndim else array
+        one = Entries(
+            (key, array[samples if key.startswith("data") else knots] if array.ndim else array)
             for key, array in arrays.items()
-        }
+        )
         one |= {key: np.array(json.dumps(values[i])) for key, values in lists.items()}
-        curves[str(name)] = _smoothing(one) if smooth else _cubic(one)
+        try:
+            curves[name] = _smoothing(one) if smooth else _cubic(one)
+        except ValidationError as error:
+            raise ValidationError(f"curve {shown(name)}: {error}") from None
     return curves
 
 
-def _slices(arrays: dict[str, NDArray[Any]], counts: str, times: str) -> list[slice]:
+def _slices(arrays: Entries, counts: str, times: str) -> list[slice]:
     """Which part of the arrays belongs to which curve."""
-    ends = np.cumsum(arrays[counts])
+    numbers = arrays[counts]
+    if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or (numbers.astype(np.int64) < 1).any():
+        raise ValidationError(f"entry {counts!r} must hold the number of {counts} of every curve")
+    if arrays[times].ndim != 1:
+        raise ValidationError(f"entry {times!r} has shape {arrays[times].shape}, but must have one axis")
+    ends = np.cumsum(numbers)
     if ends[-1:].tolist() != [len(arrays[times])]:
         raise ValidationError(
-            f"the curves have {arrays[counts].sum()} {counts}, but {times} has {len(arrays[times])}"
+            f"entry {counts!r} adds up to {numbers.sum()}, but entry {times!r} has {len(arrays[times])}"
         )
     return [slice(end - count, end) for end, count in zip(ends, arrays[counts], strict=True)]
 
 
-def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
-    kind = str(arrays["format"])
+def _read(arrays: Entries) -> CubicSpline | HermiteSpline:
+    kind = text_in(arrays, "format")
     if kind == MANY:
         raise ValidationError("this file holds several curves; read them with symspline.load_many")
     if kind == FORMAT:
@@ -180,28 +213,35 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
         return _smoothing(arrays)
     if kind == HERMITE:
         return _hermite(arrays)
-    raise ValidationError(f"format {kind!r}, expected {FORMAT!r}, {SMOOTHING!r} or {HERMITE!r}")
+    raise ValidationError(
+        f"entry 'format' is {shown(kind)}, but must be {FORMAT!r}, {SMOOTHING!r} or {HERMITE!r}"
+    )
 
 
-def _smoothing(arrays: dict[str, NDArray[Any]]) -> SmoothingSpline:
+def _smoothing(arrays: Entries) -> SmoothingSpline:
     clock, t = _times(arrays, "data_t")
     spline = _cubic(arrays, clock)
     return SmoothingSpline._like(spline, *read_stored(arrays, clock, t, spline._curve))
 
 
-def _cubic(arrays: dict[str, NDArray[Any]], counted: Clock | None = None) -> CubicSpline:
+def _cubic(arrays: Entries, counted: Clock | None = None) -> CubicSpline:
     space, clock, knots, found, extrapolate = _piecewise(arrays, counted)
     times = clock.knots(knots)
     curve = curve_of(space, times, found)
-    bc_type = rich(json.loads(str(arrays["bc_type"])), space)
-    read_ends(bc_type, space, curve.batch)
-    reports = [_report(plain, times, curve.batch) for plain in json.loads(str(arrays["report"]))]
+    plain_ends, plain_reports = json_in(arrays, "bc_type"), json_in(arrays, "report")
+    with entry("bc_type"):
+        bc_type = rich(plain_ends, space)
+        read_ends(bc_type, space, curve.batch)
+    with entry("report"):
+        if not isinstance(plain_reports, list) or len(plain_reports) != len(found):
+            raise ValidationError(f"it must be a list with one report for each of {len(found)} factors")
+        reports = [_report(plain, times, curve.batch) for plain in plain_reports]
     for factor, pair, report in zip(factors_of(space), found, reports, strict=True):
         _check(factor, *pair, report.converged)
     return CubicSpline._of(clock, knots, curve, bc_type, extrapolate, reports)
 
 
-def _hermite(arrays: dict[str, NDArray[Any]]) -> HermiteSpline:
+def _hermite(arrays: Entries) -> HermiteSpline:
     space, clock, knots, found, extrapolate = _piecewise(arrays)
     for factor, pair in zip(factors_of(space), found, strict=True):
         _check(factor, *pair, True)
@@ -210,7 +250,7 @@ def _hermite(arrays: dict[str, NDArray[Any]]) -> HermiteSpline:
 
 
 def _piecewise(
-    arrays: dict[str, NDArray[Any]], counted: Clock | None = None
+    arrays: Entries, counted: Clock | None = None
 ) -> tuple[Space, Clock, NDArray[Any], list[tuple[Array, Array]], Any]:
     """What curves of every kind have: space, clock, knots as shown, points and velocities in every factor, and what
     happens outside the knots.
@@ -218,13 +258,17 @@ def _piecewise(
     Args:
         counted: the clock, if times are not counted from the first knot.
     """
-    version = int(arrays["version"])
-    if version != VERSION:
+    version = arrays["version"]
+    if version.ndim or version.dtype.kind not in "iu" or int(version) != VERSION:
         raise ValidationError(
-            f"version {version}; this symspline reads version {VERSION}, a newer one may read it"
+            f"entry 'version' is {shown(version.tolist())}; this symspline reads version {VERSION}, a newer one may "
+            "read this file"
         )
-    space = space_named(str(arrays["space"]))
-    extrapolate = checked_policy(json.loads(str(arrays["extrapolate"])))
+    with entry("space"):
+        space = space_named(text_in(arrays, "space"))
+    policy = json_in(arrays, "extrapolate")
+    with entry("extrapolate"):
+        extrapolate = checked_policy(policy)
     clock, knots = _times(arrays, "t")
     if counted is not None:
         if counted.dates != clock.dates:
@@ -232,7 +276,7 @@ def _piecewise(
         clock = counted
     times = clock.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
-        raise ValidationError("the knots do not increase")
+        raise ValidationError("entry 't': the knots do not increase")
     found = [
         _arrays_in(factor, arrays, f"_{i}" if isinstance(space, Product) else "", times)
         for i, factor in enumerate(factors_of(space))
@@ -240,17 +284,21 @@ def _piecewise(
     return space, clock, knots, found, extrapolate
 
 
-def _times(arrays: dict[str, NDArray[Any]], name: str) -> tuple[Clock, NDArray[Any]]:
+def _times(arrays: Entries, name: str) -> tuple[Clock, NDArray[Any]]:
     """Times as shown, and how they are counted."""
-    unit, _, zone = str(arrays[f"{name}_unit"]).partition(" ")
-    if zone not in ("", UTC_ZONE, NO_ZONE):
-        raise ValidationError(f"the zone of the times is {shown(zone)}")
-    t = arrays[name].astype(f"datetime64[{unit}]") if unit else arrays[name]
-    return clock_of(Moments(t, zone or None))
+    unit, _, zone = text_in(arrays, f"{name}_unit").partition(" ")
+    with entry(f"{name}_unit"):
+        if zone not in ("", UTC_ZONE, NO_ZONE):
+            raise ValidationError(f"the zone of the times is {shown(zone)}, but must be UTC or none")
+        kind = np.dtype(f"datetime64[{unit}]") if unit else None
+    with entry(name):
+        if kind is not None and arrays[name].dtype.kind not in "iu":
+            raise ValidationError(f"dates are counted in whole numbers, not in {arrays[name].dtype}")
+        return clock_of(Moments(arrays[name] if kind is None else arrays[name].astype(kind), zone or None))
 
 
 def _arrays_in(
-    factor: Space, arrays: dict[str, NDArray[Any]], suffix: str, times: NDArray[np.float64]
+    factor: Space, arrays: Entries, suffix: str, times: NDArray[np.float64]
 ) -> tuple[Array, Array]:
     """Points and velocities in a factor."""
     points, velocities = (
@@ -271,14 +319,15 @@ def _check(space: Space, points: Array, velocities: Array, converged: Any) -> No
     """Points are on the space, velocities tangent; only curves that failed, or were left out, may be NaN."""
     axes = tuple(range(-1 - len(space.point_shape), 0))
     there, finite = (np.isfinite(array).all(axis=axes) for array in (points, velocities))
-    space.check_point(points[there])
+    with entry("points"):
+        space.check_point(points[there])
     finite &= there
     if not (finite | ~np.asarray(converged)).all():
-        raise ValidationError("points or velocities are not finite")
+        raise ValidationError("entries 'points' and 'velocities' must be finite")
     off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
     allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max(initial=1.0))
     if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):
-        raise ValidationError("velocities are not tangent")
+        raise ValidationError("entry 'velocities': the vectors are not tangent at the points")
 
 
 _DTYPES = {"b": np.bool_, "i": np.int64, "f": np.float64}
@@ -298,11 +347,16 @@ def _report(plain: dict[str, Any], times: NDArray[np.float64], batch: tuple[int,
         none = isinstance(value, list) and np.size(value) == 0 and 0 in shape
         array = np.zeros(shape, _DTYPES[kinds[key]]) if none else np.asarray(value)
         if array.shape != shape or array.dtype.kind != kinds[key]:
-            raise ValidationError(f"the report's {key} is {shown(value)}")
+            raise ValidationError(f"{key} is {shown(value)}")
         return array if shape else value
 
-    if not isinstance(plain["method"], str):
-        raise ValidationError(f"the report's method is {shown(plain['method'])}")
+    unknown = set(plain) - {field.name for field in fields(Report)} | {"max_gap"} & set(plain)
+    if unknown:
+        raise ValidationError(f"there is no field {shown(min(unknown))}")
+    if plain["method"] not in SOLVERS:
+        raise ValidationError(
+            f"the method is {shown(plain['method'])}, but must be one of {', '.join(SOLVERS)}"
+        )
     columns = {key: column(key, value) for key, value in plain.items()}
     columns["skipped"] = tuple(map(str, plain.get("skipped", ())))
     return Report(max_gap=longest_gap(times, batch), **columns)

@@ -16,6 +16,7 @@ from .curves.in_span import reduced
 from .manifolds.manifold import refuse_functions
 from .spaces import Array, Product, Space
 from .spaces import space as space_named
+from .times import onto_ends
 
 
 class BSpline:
@@ -86,8 +87,8 @@ class BSpline:
         times = as_array(x, "x")
         if times.dtype.kind not in "biuf":
             raise ValidationError(f"x must be real numbers, not {times.dtype}")
-        times = cast(times)
         start, end = self.domain
+        times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
         outside = ~((times >= start) & (times <= end))
         if outside.any():
             index = np.argwhere(outside)[0].tolist()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._core import ValidationError
-from .arrays import read_only
+from .arrays import checked_flag, read_only, shown
 from .curves import fit as fitting
 from .curves.chosen import ManyAsked, fit_many_sound, fit_many_wanted, mask_of
 from .curves.curve import Curve, quantity_of
@@ -148,7 +148,10 @@ def fit_many(
     >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
     [4, 2]
     """
-    space, pairs = space_named(space), list(curves)
+    space, check = space_named(space), checked_flag(check, "check")
+    if not isinstance(curves, Iterable):
+        raise ValidationError(f"curves must be pairs (t, points), not {shown(curves)}")
+    pairs = list(curves)
     policy = checked_policy(extrapolate)
     check_on_failure(on_failure)
     check_progress(progress)

@@ -20,6 +20,7 @@ from ._core import ConvergenceError, CutLocusError, ValidationError
 from .arrays import shown
 from .failures import callers_level
 from .functions import fit_many
+from .piecewise import check_curve
 from .places import compass, from_lonlat, to_lonlat
 from .segments import check_smooth, cut
 from .smoothing.many import smooth_many
@@ -56,6 +57,8 @@ def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> A
     np.float64(18.532488)
     """
     _check_globe(spline)
+    if isinstance(radius, bool) or not isinstance(radius, (int, float, np.number)) or not 0 < radius < np.inf:
+        raise ValidationError(f"radius must be a number above 0, not {shown(radius)}")
     return radius * spline.speed(x)
 
 
@@ -238,5 +241,6 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
 
 
 def _check_globe(spline: CubicSpline) -> None:
+    check_curve(spline)
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"places on a globe are points of Sphere(2), not of {spline.space!r}")

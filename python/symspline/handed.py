@@ -167,7 +167,7 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
     for i, cell in enumerate(cells):
         if not isinstance(cell, wanted) or cell != cell:
             raise ValidationError(
-                f"{name}{_index(i, array)} is {cell!r}, but {first!r} before; write all times alike"
+                f"{name}{_index(i, array)} is {_short(cell)}, but {_short(first)} before; write all times alike"
             )
     if wanted is timedelta:
         durations = [getattr(cell, "asm8", cell) for cell in cells]
@@ -177,8 +177,16 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
     if len(set(zones)) > 1:
         i = zones.index(next(zone for zone in zones if zone != zones[0]))
         has = ["no time zone", "a time zone"][zones[0]]
-        raise ValidationError(f"{name}{_index(i, array)} is {cells[i]}, but {first} before has {has}")
+        raise ValidationError(
+            f"{name}{_index(i, array)} is {_short(cells[i])}, but {_short(first)} before has {has}"
+        )
     return np.array([moment for moment, _ in pairs]).reshape(array.shape), UTC_ZONE if zones[0] else NO_ZONE
+
+
+def _short(cell: Any) -> str:
+    """A value in a message."""
+    text = repr(cell) if isinstance(cell, str) else str(cell)
+    return text if len(text) <= 80 else f"{text[:80]}…"
 
 
 def _moment(cell: Any, name: str, i: int, array: NDArray[Any]) -> tuple[Any, bool]:
@@ -190,7 +198,7 @@ def _moment(cell: Any, name: str, i: int, array: NDArray[Any]) -> tuple[Any, boo
             moment = np.datetime64(match["body"])
         except ValueError:
             raise ValidationError(
-                f"{name}{_index(i, array)} is {cell!r}, no date such as 2021-08-29 or 2021-08-29T16:55:00Z"
+                f"{name}{_index(i, array)} is {_short(cell)}, no date such as 2021-08-29 or 2021-08-29T16:55:00Z"
             ) from None
         zone = match["zone"]
         return (moment if zone is None else moment - np.timedelta64(minutes_of(zone), "m")), zone is not None

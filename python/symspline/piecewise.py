@@ -14,15 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
-from .arrays import in_single, is_single, read_only, shown
+from .arrays import as_array, checked_flag, in_single, is_single, read_only, shown
 from .curves.curve import Curve, Doubles, quantity_of
 from .curves.energy import bending_energy
 from .curves.integrals import integrate
 from .curves.noise import Noise
 from .curves.solve import Progress
+from .handed import times_of
 from .options import check_progress, checked_policy, outside
 from .spaces import Array, Product, Space, parts_of
-from .times import Clock
+from .times import Clock, onto_ends
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -184,10 +185,13 @@ class Piecewise(ABC):
         >>> quarter.transport(0, 1, [0.0, 1.0, 2.0]).round(12) + 0.0  # a vector ahead, and one across
         array([-1.,  0.,  2.])
         """
-        if np.ndim(x0) or np.ndim(x1):
+        ends = [as_array(times_of(x, name)[0], name) for name, x in (("x0", x0), ("x1", x1))]
+        if any(end.ndim for end in ends):
             raise ValidationError("x0 and x1 must be single times, from when to when")
-        pair = np.asarray([x0, x1])
-        times, _ = self._clock.at(pair, self._batch, False)
+        pair = (
+            times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
+        )
+        times, own = self._clock.at(pair, self._batch, False, self._times)
         where = "periodic" if self._outside == "periodic" else "raise"
         try:
             at = evaluated(self._curve, self._clock, pair, "point", where, False, None)
@@ -203,9 +207,22 @@ class Piecewise(ABC):
             good = np.isfinite(first).all(axis=tuple(range(-len(part.space.point_shape), 0)))
             given = part.space._array(one, "v")
             part.space._doubles(given, "v")
-            given = np.broadcast_to(given, first.shape)
+            try:
+                given = np.broadcast_to(given, first.shape)
+            except ValueError:
+                raise ValidationError(
+                    f"v has shape {given.shape}, which does not broadcast to {first.shape}"
+                ) from None
             part.space.check_tangent(first[good], given[good])
             vectors.append(given)
+        if own:
+            # Curves that count time from first knots of their own are carried along one by one.
+            product = isinstance(self.space, Product)
+            each = [
+                self[i].transport(x0, x1, tuple(v[i] for v in vectors) if product else vectors[0][i])
+                for i in range(len(self))
+            ]
+            return tuple(map(np.stack, zip(*each, strict=True))) if product else np.stack(each)
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
         return self._curve.transport((float(times[0]), float(times[1])), where, moved)
 
@@ -305,7 +322,9 @@ class Piecewise(ABC):
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
         if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(f"a curve is picked by a whole number or a slice, not {shown(index)}")
+            raise TypeError(f"a curve is picked by a whole number or a slice as index, not {shown(index)}")
+        if not isinstance(index, slice) and not -len(self) <= index < len(self):
+            raise IndexError(f"index {shown(index)} is out of range: there are {len(self)} curves")
         t = self._t[index] if self._times.ndim > 1 else self._t
         return self._with(self._clock.picked(index), t, self._curve.picked(index), index)
 
@@ -386,6 +405,12 @@ class Piecewise(ABC):
         return plot(self, file)
 
 
+def check_curve(spline: Any, name: str = "spline") -> None:
+    """Raise TypeError unless an argument is a curve that was fitted."""
+    if not isinstance(spline, Piecewise):
+        raise TypeError(f"{name} must be a curve, such as a symspline.CubicSpline, not {shown(spline)}")
+
+
 def evaluated(
     curve: Curve,
     clock: Clock,
@@ -410,11 +435,14 @@ def timed(
     curve: Curve, clock: Clock, x: ArrayLike, per_curve: bool, call: Callable[[Curve, Doubles, bool], Any]
 ) -> Any:
     """What a curve has at times as the user gives them."""
+    per_curve = checked_flag(per_curve, "per_curve")
     if clock.plain and type(x) is float:
         # A single time is worth a short way.
-        times = np.array(x)
+        times, knots = np.array(x), curve.times
+        if knots.ndim > 1 or not knots[0] <= x <= knots[-1]:
+            times, per_curve = onto_ends(times, knots, curve.batch, per_curve)
     else:
-        times, per_curve = clock.at(x, curve.batch, per_curve)
+        times, per_curve = clock.at(x, curve.batch, per_curve, curve.times)
     try:
         return call(curve, times, per_curve)
     except ValidationError as error:

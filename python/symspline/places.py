@@ -28,6 +28,12 @@ def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
     array([0., 1., 0.])
     """
     east, north = _degrees(lon, "lon", 3600), _degrees(lat, "lat", 90)
+    try:
+        east, north = np.broadcast_arrays(east, north)
+    except ValueError:
+        raise ValidationError(
+            f"lon of shape {east.shape} and lat of shape {north.shape} do not go together; give one of each per place"
+        ) from None
     x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
     return np.stack([x, y, z], axis=-1)
 
@@ -39,7 +45,7 @@ def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
     >>> float(lon), float(lat)
     (90.0, 0.0)
     """
-    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
+    x, y, z = np.moveaxis(_vectors(points), -1, 0)
     return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
@@ -51,7 +57,7 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
     >>> east + 0.0, north + 0.0
     (array([0., 1., 0.]), array([0., 0., 1.]))
     """
-    x, y, z = np.moveaxis(_floats(points, "points"), -1, 0)
+    x, y, z = np.moveaxis(_vectors(points), -1, 0)
     horizontal = np.hypot(x, y)
     pole = horizontal == 0
     cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
@@ -74,5 +80,15 @@ def _degrees(value: ArrayLike, name: str, most: float) -> Array:
     return np.radians(angles)
 
 
+def _vectors(points: ArrayLike) -> Array:
+    array = _floats(points, "points")
+    if array.shape[-1:] != (3,):
+        raise ValidationError(f"points must be unit vectors of shape (..., 3), not {array.shape}")
+    return array
+
+
 def _floats(value: ArrayLike, name: str) -> Array:
-    return np.asarray(as_array(value, name), dtype=float)
+    array = as_array(value, name)
+    if array.dtype.kind not in "iuf":
+        raise ValidationError(f"{name} must be real numbers, not {array.dtype}")
+    return array.astype(float)

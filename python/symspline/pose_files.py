@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import gzip
 import os
+import zlib
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
-from .archive import replacing
-from .arrays import as_array, brief
+from .arrays import as_array, brief, shown
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert.reading import length, off_one, refuse
+from .disk import path_of, replacing
 from .handed import times_of
 from .spaces import Array, SpecialEuclidean, SpecialOrthogonal
 
@@ -146,7 +146,7 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     )
     t = np.arange(len(rows), dtype=float)
     if times is not None:
-        t = _numbers(times, 1, "times of KITTI are one number a line")[:, 0].copy()
+        t = _numbers(times, 1, "times of KITTI are one number a line", "times")[:, 0].copy()
     if len(t) != len(rows):
         raise ValidationError(f"{_name(times)} has {len(t)} times, but {_name(file)} {len(rows)} poses")
     return t, join(_SO3.project(r), rows[:, :, 3])
@@ -306,8 +306,8 @@ def _rotations(q: Doubles, place: Callable[[int], str]) -> Array:
     return quaternion_to_matrix(q / sizes[:, None], scalar_first=True)
 
 
-def _numbers(file: Any, columns: int, form: str) -> Doubles:
-    rows: Doubles = _parsed(_lines(file), file, form, ndmin=2)
+def _numbers(file: Any, columns: int, form: str, name: str = "file") -> Doubles:
+    rows: Doubles = _parsed(_lines(file, name), file, form, ndmin=2)
     if rows.size and rows.shape[1] != columns:
         raise ValidationError(f"{_name(file)}: {form}, not of {rows.shape[1]} numbers")
     _check_rows(rows, file, form)
@@ -328,17 +328,28 @@ class Line(NamedTuple):
     text: str
 
 
-def _lines(file: Any) -> list[Line]:
-    """The lines that are no comments."""
-    if hasattr(file, "read"):
-        text = file.read().removeprefix("\ufeff")
+def _lines(file: Any, name: str = "file") -> list[Line]:
+    """The lines that are no comments; ``name`` is the argument's."""
+    path = path_of(file, name, method="read", text=True)
+    if path is None:
+        text = file.read()
+        if not isinstance(text, str):
+            raise TypeError(
+                f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so"
+            )
+        text = text.removeprefix("\ufeff")
     else:
-        opener: Any = gzip.open if str(file).endswith(".gz") else open
+        opener: Any = gzip.open if path.suffix == ".gz" else open
         try:
-            with opener(file, "rt", encoding="utf-8-sig") as opened:
+            with opener(path, "rt", encoding="utf-8-sig") as opened:
                 text = opened.read()
-        except UnicodeDecodeError:
-            raise ValidationError(f"{_name(file)} is not text in UTF-8") from None
+        except (UnicodeDecodeError, EOFError, zlib.error) as error:
+            what = (
+                "not text in UTF-8"
+                if isinstance(error, UnicodeDecodeError)
+                else "damaged: it cannot be decompressed"
+            )
+            raise ValidationError(f"{_name(file)} is {what}") from None
     lines = (Line(number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
     return [line for line in lines if line.text and not line.text.startswith("#")]
 
@@ -348,8 +359,18 @@ def _parsed(lines: list[Line], file: Any, form: str, **options: Any) -> Any:
         return np.zeros((0, 0))
     try:
         return np.loadtxt([line.text for line in lines], **options)
-    except ValueError as error:
-        raise ValidationError(f"{_name(file)}: {form}; {brief(error)}") from None
+    except ValueError:
+        raise ValidationError(_bad_row(lines, _name(file), form, options)) from None
+
+
+def _bad_row(lines: list[Line], name: str, form: str, options: dict[str, Any]) -> str:
+    """What is wrong with the first line that is none of this form."""
+    for line in lines:
+        try:
+            np.loadtxt([line.text], **options)
+        except ValueError:
+            return f"{name}, line {line.number}: {form}; this line is {shown(line.text)}"
+    return f"{name}: {form}; its lines differ in how many numbers they have"
 
 
 def _name(file: Any) -> str:
@@ -361,8 +382,9 @@ def _write(file: Any, rows: Iterable[list[Any]], separator: str, head: str = "")
     # The shortest text that reads back as the same double.
     text = "".join(f"{separator.join(map(repr, row))}\n" for row in rows)
     text = f"{head}\n{text}" if head else text
-    if hasattr(file, "write"):
+    path = path_of(file, method="write", text=True)
+    if path is None:
         file.write(text)
         return
-    with replacing(Path(file)) as temporary:
+    with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._core import ValidationError
+from .arrays import as_array, shown
 from .curves.curve import Curve
-from .piecewise import evaluated
+from .piecewise import check_curve, evaluated
 from .pose_files import (
     check_seconds,
     join,
@@ -100,11 +101,12 @@ def imu(
     >>> imu(still, 0.5).specific_force
     array([0.  , 0.  , 9.81])
     """
-    g = np.asarray(gravity)
+    check_curve(spline)
+    g = as_array(gravity, "gravity")
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
-        raise ValidationError(f"gravity must be three numbers, a vector in the world, not {gravity!r}")
-    motion = _Motion(spline, x, extrapolate, per_curve)
+        raise ValidationError(f"gravity must be three numbers, a vector in the world, not {shown(gravity)}")
     check_seconds(spline.t, "t")
+    motion = _Motion(spline, x, extrapolate, per_curve)
     return Imu(motion.turning, motion.in_body(motion.acceleration - g))
 
 

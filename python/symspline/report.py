@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Number = float | NDArray[np.float64]
+# So many times the median is a long gap between points.
+_LONG = 10
 
 
 class ConvergenceWarning(UserWarning):
@@ -206,6 +208,12 @@ def combined(
         skipped=tuple(name for name in SOLVERS if name in skipped),
         velocity_error=of_all("velocity_error", root),
     )
+
+
+def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which steps between the knots of one curve are far longer than most."""
+    steps = np.diff(times)
+    return np.asarray(steps > _LONG * np.median(steps))
 
 
 def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:

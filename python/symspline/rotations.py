@@ -29,7 +29,7 @@ from .convert.reading import length, real_numbers, refuse
 from .curves.curve import Curve, Doubles
 from .curves.fit import curve_of
 from .hermite import HermiteSpline
-from .piecewise import evaluated
+from .piecewise import check_curve, evaluated
 from .spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
 from .spline import CubicSpline
 
@@ -165,7 +165,7 @@ def quaternion(
     where = spline._where(extrapolate)
     ends = curve.points[..., 0, :], curve.points[..., -1, :]
     if where == "periodic" and np.any(_dot(*ends) < 0):
-        times, per_curve = spline._clock.at(x, curve.batch, per_curve)
+        times, per_curve = spline._clock.at(x, curve.batch, per_curve, curve.times)
         times, turns = _wrapped(curve, times, per_curve)
         q = curve.evaluate(times, "point", "raise", True)
         flipped = (_dot(*ends) < 0).reshape(curve.batch + (1,) * (turns.ndim - len(curve.batch)))
@@ -204,10 +204,7 @@ def attitude(spline: Spline) -> Curve:
     Raises:
         ValidationError: the spline has none, or several.
     """
-    if not isinstance(getattr(spline, "_curve", None), Curve):
-        raise TypeError(
-            f"a curve through points is needed, a CubicSpline, HermiteSpline or SmoothingSpline, not {shown(spline)}"
-        )
+    check_curve(spline)
     found = [part for part in spline._curve.parts if part.space in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(

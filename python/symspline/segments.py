@@ -111,7 +111,7 @@ def fit_segments(
 
 def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
     """Raise unless pieces can be smoothed like that, if they are to be."""
-    if smooth not in (True, False):
+    if not isinstance(smooth, (bool, np.bool_)):
         raise ValidationError(
             f"smooth must be True or False, not {shown(smooth)}; lam, criterion and the like are keywords of their own"
         )

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from . import archive
 from ._core import ValidationError
+from .arrays import checked_flag
 from .curves.chosen import fit_sound, fit_wanted, mask_of
 from .curves.curve import Curve
 from .curves.derivatives import places
@@ -105,7 +106,7 @@ class CubicSpline(Piecewise):
         where: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> None:
-        space = space_named(space)
+        space, check = space_named(space), checked_flag(check, "check")
         policy = checked_policy(extrapolate)
         check_on_failure(on_failure)
         options = options_of(method, tol, max_iter)
@@ -230,7 +231,7 @@ class CubicSpline(Piecewise):
 
     def _places(self, x: ArrayLike, nu: int) -> Places:
         curve = self._curve
-        times, per_curve = self._clock.at(x, curve.batch, False)
+        times, per_curve = self._clock.at(x, curve.batch, False, curve.times)
         try:
             return places(curve.times, curve.batch, times, per_curve, nu)
         except ValidationError as error:

@@ -22,6 +22,7 @@ from ._core import ValidationError
 from .arrays import as_array, shown, whole_number
 from .convert.reading import Array, adjoint, numbers, refuse
 from .handed import times_of
+from .piecewise import check_curve
 from .spaces import ComplexGrassmannian, Grassmannian
 from .spline import CubicSpline
 
@@ -102,6 +103,7 @@ def reduced_operator(
     Raises:
         ValidationError: the curve is in another space or a batch, or the operator is of another shape.
     """
+    check_curve(spline)
     space = spline.space
     if not isinstance(space, (Grassmannian, ComplexGrassmannian)) or spline._batch:
         raise ValidationError(f"reduced bases are one curve on a Grassmannian, not {spline!r}")

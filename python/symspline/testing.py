@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ConvergenceError, CutLocusError, ValidationError
+from .arrays import shown, whole_number
 from .functions import evaluate
 from .manifolds import Manifold
 from .spaces import Array, Product, Space
@@ -66,6 +67,12 @@ class Conformance:
             )
 
 
+def _check_number(name: str, value: Any) -> None:
+    number = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
+    if not number or not 0 < value < np.inf:
+        raise ValidationError(f"{name} must be a number above 0, not {shown(value)}")
+
+
 def check(
     space: Space | str,
     *,
@@ -100,7 +107,10 @@ def check(
     space = space_named(space)
     if isinstance(space, Product):
         raise ValidationError("a product is checked factor by factor")
-    rng = np.random.default_rng(seed)
+    _check_number("tol", tol)
+    if length is not None:
+        _check_number("length", length)
+    rng = np.random.default_rng(whole_number(seed, "seed", 0))
     if point is None:
         base = space.random_point(rng)
     else:

@@ -21,6 +21,9 @@ _SECONDS = {
     "W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0,
     "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "fs": 1e15, "as": 1e18,
 }  # fmt: skip
+_DOUBLE = np.dtype(np.float64)
+# Units in the last place that are rounding of one sum or difference and of the end itself.
+_ROUNDING = 4
 _MULTIPLES = ("W", "D", "h", "m", "s")
 
 
@@ -59,8 +62,22 @@ class Clock:
         """Knots as the core counts them."""
         return self._doubles(knots, self.origin, "t")
 
-    def at(self, x: ArrayLike, batch: tuple[int, ...], per_curve: bool) -> tuple[Doubles, bool]:
-        """Times to evaluate at, and whether every curve now has its own."""
+    def at(
+        self, x: ArrayLike, batch: tuple[int, ...], per_curve: bool, knots: Doubles | None = None
+    ) -> tuple[Doubles, bool]:
+        """Times to evaluate at, and whether every curve now has its own.
+
+        Parameters
+        ----------
+        x : array_like
+            Times as a user gives them.
+        batch : tuple of int
+            The batch axes of the curves.
+        per_curve : bool
+            Whether the leading axes of x are the batch axes.
+        knots : ndarray, optional
+            Knots as the core counts them. Numbers that lie beyond the first or last one by rounding become that knot.
+        """
         given, zone = times_of(x, "x")
         array = as_array(given, "x")
         if {zone, self.zone} == {UTC_ZONE, NO_ZONE}:
@@ -75,11 +92,15 @@ class Clock:
             wanted = "dates, so x must be datetime64" if self.dates else "numbers, so x must be numbers"
             raise ValidationError(f"the knots are {wanted}, not {array.dtype}")
         if np.ndim(self.origin) == 0:
-            return self._doubles(array, self.origin, "x"), per_curve
-        # Every curve counts from its own first knot.
-        own = array.shape[len(batch) :] if per_curve else array.shape
-        origin = self.origin.reshape(batch + (1,) * len(own))
-        return self._doubles(np.broadcast_to(array, batch + own), origin, "x"), True
+            times = self._doubles(array, self.origin, "x")
+        else:
+            # Every curve counts from its own first knot.
+            own = array.shape[len(batch) :] if per_curve else array.shape
+            origin = self.origin.reshape(batch + (1,) * len(own))
+            times, per_curve = self._doubles(np.broadcast_to(array, batch + own), origin, "x"), True
+        if knots is None or array.dtype.kind != "f":
+            return times, per_curve
+        return onto_ends(times, knots, batch, per_curve, array.dtype, 0.0 if self.dates else self.origin)
 
     def picked(self, index: Any) -> Clock:
         """The clock of part of a batch."""
@@ -133,6 +154,67 @@ def knots_of(t: ArrayLike | None, batch: tuple[int, ...], nodes: int) -> tuple[C
         own = f" or {(*batch, nodes)}" if batch else ""
         raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
     return clock, shown, clock.knots(shown)
+
+
+def onto_ends(
+    x: Doubles,
+    knots: Doubles,
+    batch: tuple[int, ...],
+    per_curve: bool,
+    dtype: np.dtype[Any] = _DOUBLE,
+    origin: Any = None,
+) -> tuple[Doubles, bool]:
+    """Times, where those beyond the first or last knot by rounding are that knot.
+
+    The last of ``t0 + (t1 - t0) * np.linspace(0, 1, n)`` is often one unit in the last place after ``t1``. A few units
+    of the larger end are taken as rounding, in the precision in which the times were given.
+
+    Parameters
+    ----------
+    x, knots : ndarray
+        Times and knots as the core counts them.
+    batch, per_curve
+        As for `Clock.at`.
+    dtype : dtype
+        The type in which the times were given.
+    origin : array_like, optional
+        What was subtracted of times and knots.
+
+    Returns
+    -------
+    times : ndarray
+        They have the batch axes if the curves have ends of their own and one of them was met.
+    per_curve : bool
+        Whether they do.
+    """
+    ends = knots[..., 0], knots[..., -1]
+    if (
+        not (x.size and knots.size)
+        or (x.min() >= ends[0].max() and x.max() <= ends[1].min())
+        or np.isnan(x).any()
+    ):
+        return x, per_curve
+    own = x.shape[len(batch) :] if per_curve else x.shape
+    if per_curve and x.shape[: len(batch)] != batch:
+        # An error that is found elsewhere.
+        return x, per_curve
+    if knots.ndim > 1:
+        first, last = (end.reshape(batch + (1,) * len(own)) for end in ends)
+        shift = np.reshape(origin, batch + (1,) * len(own)) if np.ndim(origin) else origin
+    else:
+        (first, last), shift = ends, origin
+    size = np.maximum(np.abs(first), np.abs(last))
+    if shift is not None:
+        size = size + np.abs(np.asarray(shift, np.float64))
+    # Of types wider than doubles only what doubles hold is left.
+    kind = dtype.type if dtype.itemsize < 8 else np.float64
+    with np.errstate(over="ignore", invalid="ignore"):
+        reach = _ROUNDING * np.spacing(size.astype(kind)).astype(np.float64)
+        before, behind = (x < first) & (x >= first - reach), (x > last) & (x <= last + reach)
+    if not (before.any() or behind.any()):
+        return x, per_curve
+    found = np.where(before, first, np.where(behind, last, x))
+    return np.asarray(found, order="C"), per_curve or found.ndim > x.ndim
 
 
 def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:

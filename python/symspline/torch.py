@@ -59,9 +59,11 @@ class _Curve(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Any, t: Any, points: Any, start: Any, end: Any, fixed: Any) -> Any:
         space, kinds, options = fixed
-        arrays = [None if a is None else a.detach().numpy() for a in (x, t, points, start, end)]
-        ctx.x = np.array(arrays[0], float)
-        spline = fitted(arrays[1], arrays[2], (arrays[3], arrays[4]), space, kinds, options)
+        arrays = [None if a is None else a.detach().numpy() for a in (t, points, start, end)]
+        # What is rounding beyond the last knot depends on the precision of the times.
+        at = x.detach().numpy()
+        ctx.x = at if at.dtype.kind == "f" else at.astype(float)
+        spline = fitted(arrays[0], arrays[1], (arrays[2], arrays[3]), space, kinds, options)
         ctx.movable = movable(spline)
         ctx.like = [None if a is None else (a.dtype, a.shape) for a in (x, t, points, start, end)]
         return torch.as_tensor(spline(ctx.x)).to(points.dtype)

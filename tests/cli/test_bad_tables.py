@@ -1,5 +1,6 @@
 """Tables and files of curves that are wrong, damaged or not there."""
 
+import datetime
 import os
 from pathlib import Path
 
@@ -151,3 +152,23 @@ def test_a_line_of_units(fails):
         "line 2: column 'lon' holds 'degrees_east', which is not a number; if this line holds units"
         in problem
     )
+
+
+@pytest.mark.parametrize("kind", ["binary", "time", "list", "record", "duration"])
+@pytest.mark.parametrize("option", ["--time", "--columns", "--curve"])
+def test_columns_of_parquet_that_hold_other_things(fails, kind, option):
+    pa = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as parquet
+
+    cells = {
+        "binary": [b"\xff\xfe", b"a", b""],
+        "time": [datetime.time(hour) for hour in (6, 7, 8)],
+        "list": [[1.0], [2.0], [3.0]],
+        "record": [{"a": 1}] * 3,
+        "duration": [datetime.timedelta(days) for days in (1, 2, 3)],
+    }
+    table = pa.table({"x": [1.0, 2.0, 4.0], "odd": pa.array(cells[kind])})
+    parquet.write_table(table, "a.parquet")
+    more = "" if option == "--columns" else "--columns x"
+    problem = fails(f"fit a.parquet --space r:1 {option} odd {more} -o a.npz")
+    assert "a.parquet" in problem and ("'odd'" in problem or "of curve" in problem)

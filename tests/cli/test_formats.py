@@ -68,7 +68,7 @@ def test_t_and_points_of_an_npz_file(run, fails):
     np.savez("c.npz", t=[0, 1], points=np.array([["a"], ["b"]]))
     assert "not numbers" in fails("fit c.npz --space r:1 -o d.npz")
     np.savez("c.npz", t=np.array([{}, {}]))
-    assert "c.npz is damaged" in fails("fit c.npz --space r:1 -o d.npz")
+    assert "c.npz: entry 't' holds Python objects" in fails("fit c.npz --space r:1 -o d.npz")
     assert "was fitted already" in fails("fit curve.npz --space s:2 -o d.npz")
     write("e.npz", "no zip")
     assert fails("fit e.npz --space s:2 -o d.npz") == "e.npz is not an NPZ file"

@@ -148,3 +148,19 @@ def test_progress_on_a_terminal(curves, capsys, monkeypatch):
     shown = capsys.readouterr().err
     assert "\rsampling: 100 %" in shown and "\rwriting: 40 %" in shown
     assert shown.endswith(" \r") and "\n" not in shown
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and pipes as on POSIX systems")
+def test_links_are_followed_and_pipes_refused(run, fails):
+    write("a.csv", AXES)
+    os.mkdir("kept")
+    os.symlink("kept/curve.npz", "a.npz")
+    run("fit a.csv --space s:2 -o a.npz")
+    assert os.path.islink("a.npz") and os.listdir("kept") == ["curve.npz"]
+    os.mkfifo("pipe.npz")
+    assert fails("fit a.csv --space s:2 -o pipe.npz") == (
+        "cannot write pipe.npz: it is a device, a pipe or a socket; give the name of a regular file"
+    )
+    os.chmod("kept/curve.npz", 0o600)
+    run("fit a.csv --space s:2 -o a.npz")
+    assert os.stat("a.npz").st_mode & 0o777 == 0o600

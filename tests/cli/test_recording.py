@@ -40,7 +40,7 @@ def test_sort_within_every_curve(run):
 def test_dedup(run, fails):
     line([0, 0, 1, 2, 2, 2], [1, 3, 5, 1, 2, 6])
     out = run("fit a.csv --space r:1 --dedup first -o a.npz")
-    assert out.endswith("; 3 rows with a time that another had\n")
+    assert out.endswith("; 3 rows left out, whose time an earlier row has (--dedup first)\n")
     assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[1], [5], [1]], "r:1")
     run("fit a.csv --space r:1 --dedup mean -o a.npz")
     assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[2], [5], [3]], "r:1")

@@ -4,6 +4,7 @@ import contextlib
 import gc
 import io
 import json
+import tracemalloc
 import warnings
 import zipfile
 from pathlib import Path
@@ -141,7 +142,8 @@ class Bomb:
 def test_files_are_read_without_pickle(tmp_path, name):
     bomb = Bomb()
     bomb.path = str(tmp_path / "exploded")
-    with pytest.raises(ss.ValidationError):
+    # Of an entry that curves do not have nothing is read.
+    with contextlib.nullcontext() if name == "something" else pytest.raises(ss.ValidationError):
         load(with_arrays(**{name: np.array([bomb], object)}))
     with pytest.raises(ss.ValidationError):
         load(npy(np.array([bomb], object)))
@@ -229,7 +231,7 @@ def test_files_with_a_wrong_array_that_are_read_all_the_same(changes):
 
 
 def test_newer_files_say_so():
-    with pytest.raises(ss.ValidationError, match=r"version 99; this symspline reads version 1"):
+    with pytest.raises(ss.ValidationError, match=r"entry 'version' is 99; this symspline reads version 1"):
         load(with_arrays(version=99))
 
 
@@ -259,3 +261,132 @@ def test_messages_quote_no_large_part_of_a_file():
     with pytest.raises(ss.ValidationError, match="damaged or not a symspline curve") as caught:
         ss.load(io.BytesIO(data + bytes(5000)))
     assert len(str(caught.value)) < 300
+
+
+# ---- what is read of a file ----
+
+
+def bomb(name, method, size=2**26, **more):
+    """A small archive with an entry of 64 MiB, zeros all of them."""
+    file = io.BytesIO(with_arrays(**{name: None} | more))
+    with zipfile.ZipFile(file, "a", method) as target, target.open(f"{name}.npy", "w") as entry:
+        np.lib.format.write_array_header_1_0(
+            entry, {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
+        )
+        for _ in range(size // 2**20):
+            entry.write(bytes(2**20))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("name", ["points", "t", "report", "format"])
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2])
+def test_archives_that_unpack_to_far_more_than_their_size(name, method):
+    data = bomb(name, method)
+    tracemalloc.start()
+    try:
+        with pytest.raises(
+            ss.ValidationError, match=rf"the file: entry '{name}' would take 671\d+ bytes of memory"
+        ):
+            load(data)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+    finally:
+        tracemalloc.stop()
+
+
+def test_unknown_entries_are_not_read():
+    data = bomb("surprise", zipfile.ZIP_BZIP2)
+    tracemalloc.start()
+    try:
+        assert load(data) == ss.CubicSpline(None, P, S2)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+    finally:
+        tracemalloc.stop()
+
+
+def test_arrays_that_are_smaller_than_their_header_says():
+    file = io.BytesIO(with_arrays(points=None))
+    with zipfile.ZipFile(file, "a") as target, target.open("points.npy", "w") as entry:
+        np.lib.format.write_array_header_1_0(
+            entry, {"descr": "<f8", "fortran_order": False, "shape": (2**40, 3)}
+        )
+    with pytest.raises(ss.ValidationError, match="entry 'points' is damaged: it has 0 bytes"):
+        load(file.getvalue())
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"format": "other"}, "entry 'format' is 'other', but must be 'symspline-curve'"),
+        ({"format": 3}, "entry 'format' is not a text: it holds int64"),
+        ({"version": 1.5}, "entry 'version' is 1.5; this symspline reads version 1"),
+        ({"version": 0}, "entry 'version' is 0; this symspline reads version 1"),
+        ({"version": [1, 1]}, r"entry 'version' is \[1, 1\]"),
+        ({"version": True}, "entry 'version' is True"),
+        ({"space": "klein:2"}, "entry 'space': unknown space 'klein"),
+        ({"space": 5.0}, "entry 'space': entry 'space' is not a text|entry 'space' is not a text"),
+        (
+            {"extrapolate": '"wrap"'},
+            "entry 'extrapolate': extrapolate must be None, True, 'geodesic' or 'periodic'",
+        ),
+        ({"extrapolate": "{"}, "entry 'extrapolate' is not JSON"),
+        ({"bc_type": '"foo"'}, "entry 'bc_type': bc_type is 'natural'"),
+        ({"bc_type": "5"}, "entry 'bc_type': "),
+        ({"bc_type": '[[1, "x"], "natural"]'}, "entry 'bc_type': "),
+        ({"report": "5"}, "entry 'report': it must be a list with one report for each of 1 factors"),
+        ({"report": "[5]"}, "entry 'report': "),
+        (
+            {"report": report_with(method="magic")},
+            "entry 'report': the method is 'magic', but must be one of fixed",
+        ),
+        ({"report": report_with(method=5)}, "entry 'report': the method is 5"),
+        ({"report": report_with(surprise=5)}, "entry 'report': there is no field 'surprise'"),
+        ({"report": report_with(max_gap=5)}, "entry 'report': there is no field 'max_gap'"),
+        ({"report": report_with(rate="fast")}, "entry 'report': rate is 'fast'"),
+        ({"points": None}, "entry 'points' is missing"),
+        ({"points": 2 * P}, "entry 'points': point"),
+        ({"velocities": P}, "entry 'velocities': the vectors are not tangent"),
+        ({"t": [0.0, 2, 1]}, "entry 't': the knots do not increase"),
+        ({"t_unit": "parsec"}, "entry 't_unit': "),
+        ({"t_unit": "s CET"}, "entry 't_unit': the zone of the times is 'CET', but must be UTC or none"),
+        ({"t_unit": "s"}, "entry 't': dates are counted in whole numbers, not in float64"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_messages_name_the_file_and_the_entry(changes, message, tmp_path):
+    (tmp_path / "a.npz").write_bytes(with_arrays(**changes))
+    with pytest.raises(ss.ValidationError, match=rf"a\.npz: {message}"):
+        ss.load(tmp_path / "a.npz")
+
+
+def many_with(**changes):
+    file = io.BytesIO()
+    curve = ss.CubicSpline(None, P, S2)
+    ss.save_many({"a": curve, "b": curve}, file)
+    arrays = dict(np.load(io.BytesIO(file.getvalue()))) | changes
+    file = io.BytesIO()
+    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    return io.BytesIO(file.getvalue())
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        (
+            {"format": "symspline-hermite"},
+            "this file holds one curve or a batch; read it with symspline.load",
+        ),
+        ({"format": "other"}, "entry 'format' is 'other', but must be 'symspline-curves'"),
+        ({"names": '["a"]'}, "entry 'names' must be a list with one value for each of 2 curves"),
+        ({"names": '["a", "a"]'}, "entry 'names' must hold texts, none of them twice"),
+        ({"names": '["a", 5]'}, "entry 'names' must hold texts"),
+        ({"knots": [3, 4]}, "entry 'knots' adds up to 7, but entry 't' has 6"),
+        ({"knots": [-3, 9]}, "entry 'knots' must hold the number of knots of every curve"),
+        ({"knots": [2.0, 4.0]}, "entry 'knots' must hold the number of knots of every curve"),
+        ({"report": "[]"}, "entry 'report' must be a list with one value for each of 2 curves"),
+        ({"bc_type": '["natural", "foo"]'}, "curve 'b': entry 'bc_type': "),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_messages_about_collections(changes, message):
+    with pytest.raises(ss.ValidationError, match=f"the file: {message}"):
+        ss.load_many(many_with(**changes))

@@ -330,7 +330,7 @@ def test_other_spaces_are_refused():
         spline = ss.CubicSpline(KNOTS, points_on(ss.space(name)), name)
         with pytest.raises(ss.ValidationError, match="so:3"):
             rotations.angular_velocity(spline, 0.5)
-    with pytest.raises(TypeError, match="a curve through points is needed"):
+    with pytest.raises(TypeError, match="spline must be a curve"):
         rotations.angular_velocity(Rotation.identity(3), 0.5)
 
 

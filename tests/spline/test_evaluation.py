@@ -113,7 +113,7 @@ def test_velocity_and_speed(space):
         ([0.5, 1, INF], r"x\[2\] is inf; times must be finite"),
         (2.5, r"x = 2\.5 is outside the knots \[0, 2\].*extrapolate=True, 'geodesic' or 'periodic'"),
         ([0, 2, -0.25], r"x\[2\] = -0\.25 is outside the knots"),
-        (np.nextafter(2, 3), r"x = 2\.0000000000000004 is outside the knots"),
+        (2 + 2**-47, r"x = 2\.000000000000007 is outside the knots"),
         (1j, r"x must be numbers, not complex128"),
         ("a", r"x is 'a', no date such as 2021-08-29"),
         (None, r"x must be an array of numbers, not of object: it is a NoneType"),
@@ -183,7 +183,7 @@ def test_indices_are_those_of_the_array_that_was_given(argument):
 
 def test_messages_are_short():
     with pytest.raises(ss.ValidationError) as caught:
-        ss.CubicSpline(None, P, S2)(-1e-300)
+        ss.CubicSpline(None, P, S2)(-1e300)
     assert len(str(caught.value)) < 250
 
 

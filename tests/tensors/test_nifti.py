@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -17,7 +18,7 @@ AFFINE = np.diag([2.0, 2.0, 2.5, 1.0])
 def nibabel(request, monkeypatch):
     if request.param == "nibabel":
         return pytest.importorskip("nibabel")
-    images = {}
+    images = []
 
     class Image:
         def __init__(self, data, affine, header=None, dtype=None):
@@ -26,8 +27,13 @@ def nibabel(request, monkeypatch):
 
     module = ModuleType("nibabel")
     module.Nifti1Image = Image
-    module.save = lambda image, name: images.__setitem__(name, image)
-    module.load = lambda name: images[name]
+
+    def save(image, name):
+        Path(name).write_text(str(len(images)))
+        images.append(image)
+
+    module.save = save
+    module.load = lambda name: images[int(Path(name).read_text())]
     monkeypatch.setitem(sys.modules, "nibabel", module)
     return module
 

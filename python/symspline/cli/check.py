@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import brief
 from ..curves.ends import is_closed
 from ..manifolds import Manifold
 from ..pieces import spline_pieces
@@ -55,12 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Measure, print and judge."""
     curves = read_curves(options.curves)
-    width = max(len("curve"), *map(len, curves.splines)) if curves.named else 0
+    width = max(len("curve"), *(len(brief(name)) for name in curves.splines)) if curves.named else 0
     print(_line(width, "curve", "points", *MEASURES))
     failed = []
     for name, spline in curves.splines.items():
         found = measure(spline)
-        print(_line(width, name, len(spline.t), *(f"{value:.1e}" for value in found.values)))
+        print(_line(width, brief(name), len(spline.t), *(f"{value:.1e}" for value in found.values)))
         if not found.excess <= 1:
             failed.append(name)
     if failed:

@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ..archive import json_in, read
 from ..arrays import brief
 from ..files import load, load_many, save_many
 from ..spaces import Space
@@ -121,11 +122,13 @@ def _entries(path: Path, file: BinaryIO) -> list[str]:
 
 
 def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
-    with np.load(file, allow_pickle=False) as archive:
-        try:
-            columns = Columns(**json.loads(str(archive[_COLUMNS])))
-        except (ValueError, TypeError, RecursionError) as error:
-            raise Problem(f"{path} is damaged: {brief(error)}") from None
+    try:
+        columns = Columns(**json_in(read(file, lambda name: name == _COLUMNS), _COLUMNS))
+    except OSError:
+        raise
+    except Exception as error:
+        # Damage shows as errors of zipfile, of its decompressors and of NumPy.
+        raise Problem(f"{path} is damaged: {brief(error)}") from None
     names = columns.points
     if columns.quaternion is None:
         wanted: int | None = len(LONLAT if columns.lonlat else labels(space))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,11 +41,21 @@ class Data:
         joined, alone: how many rows had the time of another one, and how many points stood alone between gaps.
     """
 
-    def __init__(self, path: Path, rows: Rows, repair: Repair = _NOTHING, repeats: bool = False) -> None:
-        """With ``repeats`` several points of a curve may have one time."""
+    def __init__(
+        self,
+        path: Path,
+        rows: Rows,
+        repair: Repair = _NOTHING,
+        repeats: bool = False,
+        hint: Callable[[], str | None] = lambda: None,
+    ) -> None:
+        """With ``repeats`` several points of a curve may have one time; the hint is a column that may hold the names of
+        several curves."""
+        self._hint = hint
         self._path = path
         self._rows = rows
         self._repair = repair
+        self.dedup = repair.dedup
         repair.check(bool(rows.times.size))
         self._runs = {name: repair.ordered(own, rows.times) for name, own in group(rows).items()}
         firsts = {name: own[starts] for name, (own, starts) in self._runs.items()}
@@ -54,6 +64,7 @@ class Data:
             self._check_curve(name, own, repeats)
         self.groups, self.alone = repair.cut(firsts, rows.times, rows.labels is not None)
         self.named = rows.labels is not None or repair.max_gap is not None
+        self.repeated = sum(_repeats(rows.times[own]) for own in firsts.values()) if repeats else 0
         if not self.groups:
             raise Problem(
                 f"{path}: with --max-gap {repair.max_gap} every point stands alone; a curve needs two"
@@ -74,6 +85,9 @@ class Data:
         own = self.groups[name]
         text = re.sub(
             r"points\[(\d+)\]", lambda m: f"the point in {self._rows.place(own[int(m[1])])}", message
+        )
+        text = re.sub(
+            r"\bt\[(\d+)\] = (\S+)", lambda m: f"time {m[2]} in {self._rows.place(own[int(m[1])])}", text
         )
         called = f"curve {name!r}" if self.named else "the curve"
         text = text.replace(found[0], called) if found else text
@@ -151,11 +165,18 @@ class Data:
         if bad.size:
             before, here = (self._rows.place(own[i]) for i in (bad[0], bad[0] + 1))
             same = times[bad[0] + 1] == times[bad[0]]
-            advice = "--dedup first or mean makes one point of them" if same else "--sort puts rows in order"
+            column = self._hint()
+            curves = "" if column is None else f"--curve {column} makes a curve of each {column}, "
+            repair = "--dedup first or mean makes one point of them" if same else "--sort puts rows in order"
             raise Problem(
                 f"{self._path}, {here}: time {times[bad[0] + 1]}{of} does not come after {times[bad[0]]} in {before}; "
-                f"times must {'not fall' if repeats else 'increase'}; {advice}"
+                f"times must {'not fall' if repeats else 'increase'}; {curves}{repair}"
             )
+
+
+def _repeats(times: NDArray[Any]) -> int:
+    """How many times come again."""
+    return int((times[1:] == times[:-1]).sum())
 
 
 def group(rows: Rows) -> Groups:

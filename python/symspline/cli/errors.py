@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
-from ..archive import replacing
 from ..arrays import brief
+from ..disk import replacing
 from ..spaces.base import CLASSES
 
 _NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
@@ -82,10 +82,16 @@ def check_target(path: Path) -> None:
     """Raise `Problem` if a file cannot be written: better before the work than after it."""
     if path.is_dir():
         raise Problem(f"cannot write {path}: it is a folder")
-    if not path.parent.is_dir():
-        raise Problem(f"cannot write {path}: there is no folder {path.parent}")
-    if not os.access(path.parent, os.W_OK):
-        raise Problem(f"cannot write {path}: no permission to write into {path.parent}")
+    if path.exists() and not path.is_file():
+        raise Problem(
+            f"cannot write {path}: it is a device, a pipe or a socket; give the name of a regular file"
+        )
+    # Of a symbolic link the target is written.
+    folder = path.resolve().parent if path.is_symlink() else path.parent
+    if not folder.is_dir():
+        raise Problem(f"cannot write {path}: there is no folder {folder}")
+    if not os.access(folder, os.W_OK):
+        raise Problem(f"cannot write {path}: no permission to write into {folder}")
 
 
 @contextmanager

@@ -6,11 +6,15 @@ import argparse
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from ..functions import fit_many
+from ..report import long_gaps
 from ..signs import IN_PYTHON
 from ..smoothing import SmoothingSpline
 from ..smoothing.many import smooth_many
@@ -30,7 +34,7 @@ from .quaternions import ORDERS
 from .recording import Repair
 from .roles import named_columns, point_entries, split_names
 from .tables import ending
-from .time_columns import check_days, time_column
+from .time_columns import check_days, column_of_names, time_column
 
 SUMMARY = "fit C2 splines to the points in a table, through them or, with --smooth, near them"
 DESCRIPTION = """\
@@ -154,7 +158,10 @@ def run(options: argparse.Namespace) -> int:
     check_days(table, time, rows)
     if not options.lonlat and quaternion is None:
         rows = replace(rows, numbers=completed(rows.numbers, entries, space))
-    data = Data(table.path, rows, Repair(options.sort, options.dedup, options.max_gap), smooth is not None)
+    used = [time, curve, *(column for entry in entries for column in entry.columns)]
+    hint = partial(column_of_names, table, time, used) if curve is None else lambda: None
+    repair = Repair(options.sort, options.dedup, options.max_gap)
+    data = Data(table.path, rows, repair, smooth is not None, hint)
     columns = named_columns(entries, time, curve, options.lonlat)
     columns = replace(columns, utc=rows.utc, quaternion=quaternion)
     splines = _fit(data, space, columns, options, smooth)
@@ -165,7 +172,13 @@ def run(options: argparse.Namespace) -> int:
         if smooth is None
         else smoothing.summary(cast(list[SmoothingSpline], fitted), options.lonlat)
     )
-    print(f"{options.output}: {said}{_repaired(data)}")
+    print(f"{options.output}: {said}{_repaired(data)}{_gaps(fitted)}")
+    column = hint() if data.joined or data.repeated else None
+    if column is not None:
+        say(
+            f"{data.joined or data.repeated} rows have a time that another row has, and column {column!r} tells them "
+            f"apart: if the table holds several tracks, fit each of them with --curve {column}"
+        )
     return 0
 
 
@@ -228,12 +241,33 @@ def _repaired(data: Data) -> str:
     said = [
         f"{count} row{'s' if count > 1 else ''} {what}"
         for count, what in (
-            (data.joined, "with a time that another had"),
+            (
+                data.joined,
+                "merged with others of the same time (--dedup mean)"
+                if data.dedup == "mean"
+                else "left out, whose time an earlier row has (--dedup first)",
+            ),
             (data.alone, "alone between gaps left out"),
         )
         if count
     ]
     return "".join(f"; {part}" for part in said)
+
+
+def _gaps(splines: Sequence[CubicSpline]) -> str:
+    """How many steps are far longer than most, across which nothing was measured."""
+    found = []
+    for spline in splines:
+        times = spline._times
+        if isinstance(spline, SmoothingSpline):
+            times = np.unique(spline._noisy.times[spline._noisy.used])
+        long = long_gaps(times)
+        found += np.diff(times)[long].tolist()
+    if not found:
+        return ""
+    unit = " s" if splines[0]._clock.dates else ""
+    gaps = f"{len(found)} long gap{'s' if len(found) > 1 else ''}"
+    return f"; {gaps}, up to {max(found):.4g}{unit} (--max-gap cuts there)"
 
 
 def _summary(splines: Sequence[CubicSpline]) -> str:

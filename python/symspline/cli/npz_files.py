@@ -7,8 +7,8 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
+from .._core import ValidationError
+from ..archive import read
 from ..arrays import brief
 from .errors import Problem, did_you_mean, reading
 from .layout import IM, RE
@@ -53,10 +53,11 @@ def _arrays(path: Path) -> dict[str, Array]:
             raise Problem(f"{path} is not an NPZ file")
         file.seek(0)
         try:
-            with np.load(file, allow_pickle=False) as archive:
-                arrays = {key: archive[key] for key in archive.files}
+            arrays = read(file, lambda name: True)
         except (OSError, MemoryError):
             raise
+        except ValidationError as error:
+            raise Problem(f"{path}: {error}") from None
         except Exception as error:
             # Damage shows as errors of zipfile, of its decompressors and of NumPy.
             raise Problem(f"{path} is damaged, or holds other things than numbers: {brief(error)}") from None

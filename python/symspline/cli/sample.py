@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..curves.ends import is_closed
 from ..smoothing import SmoothingSpline
 from ..spline import CubicSpline
+from ..times import onto_ends
 from .curves import Columns, Curves, read_curves
 from .data import Groups, group
 from .errors import Problem, check_target, did_you_mean, first_twice
@@ -38,8 +39,9 @@ number x0_re and x0_im. With --nu 1 there is the velocity, x0_d1, ... or x0_d1_r
 covariant acceleration, x0_d2, ..., per unit of time, which is a second for dates. For longitude and latitude
 these are east_d1, north_d1, ..., in degrees of arc; for unit quaternions, whose sign
 does not jump along a curve, the derivatives on their sphere. Of curves fitted with --smooth there is the standard
-deviation of a coordinate of the point, std, in a product std1, std2, ... of its factors, and of the velocity, std_d1;
-for longitude and latitude in degrees. A line or a subspace has many arrays: which one stands for
+deviation of a coordinate of the point, std, and of the velocity, std_d1, in the units of the columns beside it: degrees
+for longitude and latitude, radians for rotation matrices, half of that for unit quaternions. A product has std1, std2,
+... of its factors, and a pose std_position and std_rotation. A line or a subspace has many arrays: which one stands for
 it may change from one segment of a curve to the next, and vectors go with the one in their row."""
 EPILOG = """\
 examples:
@@ -166,7 +168,10 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
         )
     if spline.extrapolate is not None or is_closed(spline.bc_type):
         return
-    outside = np.flatnonzero((times < knots[0]) | (times > knots[-1]))
+    inside = times
+    if times.dtype.kind == knots.dtype.kind == "f":
+        inside, _ = onto_ends(times, knots, (), False)
+    outside = np.flatnonzero((inside < knots[0]) | (inside > knots[-1]))
     if outside.size:
         raise Problem(
             f"{path}, {rows.place(own[outside[0]])}: time {times[outside[0]]} is outside {curves.called(name)}, "
@@ -223,7 +228,9 @@ def _values(
             for nu, sign in zip(orders, signs, strict=True):
                 parts.append(_quantity(spline, x, nu, curves.columns, sign))
                 if with_spreads and isinstance(spline, SmoothingSpline):
-                    parts.append(spreads(spline, x, nu, curves.columns.lonlat))
+                    parts.append(
+                        spreads(spline, x, nu, curves.columns.lonlat, curves.columns.quaternion is not None)
+                    )
             blocks.append(np.concatenate(parts, axis=1))
             done += len(x)
             progress(done, total)

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..smoothing import SmoothingSpline
-from ..spaces import Space, factors_of
+from ..spaces import Space, SpecialEuclidean, SpecialOrthogonal, factors_of
 from .errors import Problem
 from .layout import Doubles
 from .numbers import is_number
 
 _CRITERIA = ("gcv", "gcv1.4", "reml")
 _BEST = "best"
+_ROTATIONS = SpecialOrthogonal(3)
 
 
 @dataclass(frozen=True)
@@ -122,11 +123,12 @@ def summary(splines: Sequence[SmoothingSpline], lonlat: bool) -> str:
         own = [report[number] for report in reports]
         noise = [np.degrees(report.sigma) if lonlat else report.sigma for report in own]
         bound = sum(bool(report.at_bound) for report in own)
+        rough = sum(bool(report.at_bound) and report.df > 2.5 for report in own)
         of = f"{space}: " if len(spaces) > 1 else ""
         parts.append(
             f"{of}λ {_range([report.lam for report in own])}{_at_bound(bound, len(own))}, "
             f"{_range([report.df for report in own])} degrees of freedom, noise {_range(noise)}"
-            f"{'°' if lonlat else ''}"
+            f"{'°' if lonlat else ''}{_none_found(rough, len(own))}"
         )
     return f"{curves} near {data} points of {splines[0].space}, converged: {'; '.join(parts)}"
 
@@ -143,18 +145,42 @@ def _at_bound(count: int, of: int) -> str:
     return " (at its bound)" if of == 1 else f" ({count} at a bound)"
 
 
+def _none_found(count: int, of: int) -> str:
+    """Of a curve that goes through all of its data nothing was smoothed."""
+    if not count:
+        return ""
+    which = "the curve goes" if of == 1 else f"{count} curves go"
+    return f" (no noise was found: {which} through the points, as without --smooth; --sigma or a λ says how much)"
+
+
 def spread_names(space: Space, nu: int) -> list[str]:
-    """The columns of standard deviations: of points and velocities, one a factor."""
+    """The columns of standard deviations: of points and velocities, one per factor, of poses one for place and
+    rotation each."""
     if nu > 1:
         return []
-    count, end = len(factors_of(space)), f"_d{nu}" if nu else ""
-    return [f"std{number}{end}" for number in range(1, count + 1)] if count > 1 else [f"std{end}"]
+    factors, end = factors_of(space), f"_d{nu}" if nu else ""
+    return [
+        f"std{number if len(factors) > 1 else ''}{part}{end}"
+        for number, factor in enumerate(factors, 1)
+        for part in (("_position", "_rotation") if isinstance(factor, SpecialEuclidean) else ("",))
+    ]
 
 
-def spreads(spline: SmoothingSpline, x: Any, nu: int, lonlat: bool) -> Doubles:
-    """These columns at times x, shape (rows, columns)."""
+def spreads(spline: SmoothingSpline, x: Any, nu: int, lonlat: bool, quaternion: bool) -> Doubles:
+    """These columns at times x, shape (rows, columns), each in the unit of the columns that it stands beside.
+
+    Numbers of a unit quaternion change half as much as the angle of its rotation.
+    """
     if nu > 1:
         return np.empty((len(x), 0))
     found = spline.std(x, nu)
-    columns = np.stack(found if isinstance(found, tuple) else (found,), axis=-1)
-    return np.degrees(columns) if lonlat else columns
+    columns: list[Doubles] = []
+    for factor, own in zip(
+        factors_of(spline.space), found if isinstance(found, tuple) else (found,), strict=True
+    ):
+        turn = own / 2 if quaternion else own
+        if isinstance(factor, SpecialEuclidean):
+            columns += [own, turn]
+        else:
+            columns.append(turn if factor == _ROTATIONS else np.degrees(own) if lonlat else own)
+    return np.stack(columns, axis=-1)

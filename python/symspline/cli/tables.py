@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import date, time, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +117,7 @@ class ArrayTable(Table):
             progress(done, len(numbers))
             columns.append(self._numbers(name))
         times, utc = self._times(time) if time is not None else (np.empty(0), False)
-        labels = self._column(label).astype(np.str_).tolist() if label is not None else None
+        labels = self._texts(label) if label is not None else None
         given = [*columns, *([times] if time is not None else []), *([labels] if labels is not None else [])]
         lengths = sorted(set(map(len, given)))
         if len(lengths) > 1:
@@ -131,10 +132,21 @@ class ArrayTable(Table):
             raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
         return self._finite(array.astype(np.float64), name, _row)
 
+    def _texts(self, name: str) -> list[str]:
+        """A column as texts; bytes, lists and records are none."""
+        array = self._column(name)
+        for row, cell in enumerate(array.tolist() if array.dtype.kind in "OS" else ()):
+            if not isinstance(cell, (str, int, float, date, time, timedelta)):
+                raise self._fail(name, _row)(
+                    row, f"holds {type(cell).__name__}, not a text, a number or a time"
+                )
+        texts: list[str] = array.astype(np.str_).tolist()
+        return texts
+
     def _times(self, name: str) -> tuple[Array, bool | None]:
         array = self._column(name)
         if array.dtype.kind in "OUT":
-            return parse_times(array.astype(np.str_).tolist(), self._fail(name, _row))
+            return parse_times(self._texts(name), self._fail(name, _row))
         if array.dtype.kind in "iu":
             return array, False
         if array.dtype.kind != "M":

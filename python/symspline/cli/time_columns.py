@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .errors import Problem, listed
+from .progress import Progress
 from .tables import Rows, Table
 
 NUMBERED = "none"
@@ -72,6 +73,42 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
         f"{table.path}: {listed(found)} {may}; say --time {found[0]}, or --time {NUMBERED} to number the points "
         "0, 1, 2, ..."
     )
+
+
+def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) -> str | None:
+    """A column that is not used and tells rows of equal times apart: it may hold the names of several curves.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    time : str or None
+        Its column of times.
+    used : sequence of str or None
+        Columns that are used.
+
+    Returns
+    -------
+    str or None
+        The first column of which every value stands in two rows or more, none of them at the same time.
+    """
+    if time is None:
+        return None
+    for name in table.names:
+        if name in used or name in table.dates:
+            continue
+        try:
+            with Progress("reading") as progress:
+                rows = table.read([], time, name, progress)
+        except Problem:
+            # A cell is empty, or holds no text.
+            continue
+        labels = np.unique(np.array(rows.labels), return_inverse=True)[1]
+        order = np.lexsort((rows.times, labels))
+        same = (np.diff(labels[order]) == 0) & (rows.times[order][1:] == rows.times[order][:-1])
+        if 1 < labels.max() + 1 <= len(labels) / 2 and np.bincount(labels).min() > 1 and not same.any():
+            return name
+    return None
 
 
 def check_days(table: Table, name: str | None, rows: Rows) -> None:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._core import ValidationError
-from ..arrays import as_array, shown
+from ..arrays import as_array, cast, shown
 from ..spaces import Array
+from ..times import onto_ends
 from .curve import Curve, order_of
 from .ends import End, ends_of
 from .gradient import Gradient, Places
@@ -24,6 +25,8 @@ def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: 
         ValidationError: a time is outside the knots.
     """
     nu = order_of(nu)
+    dtype = x.dtype if x.dtype.kind == "f" else np.dtype(np.float64)
+    x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
     shape = x.shape if per_curve else batch + x.shape
     own = np.broadcast_to(x, shape).reshape(math.prod(batch), math.prod(shape[len(batch) :]))
     rows = _per_curve(knots, batch)

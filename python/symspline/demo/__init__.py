@@ -15,7 +15,7 @@ from textwrap import fill
 
 import numpy as np
 
-from ..archive import replacing
+from ..disk import replacing
 from ..hurdat import Storm, read_sample
 from ..spline import CubicSpline
 from ..tracks import GLOBE, Positions, Summary, comparison, fit_tracks, hourly, summary

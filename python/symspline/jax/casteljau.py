@@ -119,7 +119,9 @@ def _values(model: Model, space: Space, t: Any, points: Any, velocities: Any, x:
             found = _horizontal(space, point, first, second)
         else:
             found = second - bent(space, point, first, first)
-    inside = (x >= t[0]) & (x <= t[-1])
+    # As in `symspline.times.onto_ends`, a few units in the last place beyond the ends are rounding.
+    reach = 4 * jnp.finfo(x.dtype).eps * jnp.maximum(jnp.abs(t[0]), jnp.abs(t[-1]))
+    inside = (x >= t[0] - reach) & (x <= t[-1] + reach)
     return jnp.where(jnp.expand_dims(inside, tuple(range(x.ndim, found.ndim))), found, jnp.nan)
 
 

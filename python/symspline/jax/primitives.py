@@ -175,7 +175,7 @@ def _moved(fixed: Fixed, layout: Layout, nu: int, x: Any, data: Any) -> tuple[Cu
     points = space.project(np.ascontiguousarray(layout.data(points, core + 1)))
     found = np.array(layout.data(velocities, core + 1), points.dtype)
     knots = np.array(layout.data(t, 1), np.float64)
-    at, per_curve = layout.places(np.array(x, np.float64))
+    at, per_curve = layout.places(np.asarray(x))
     curve = curve_of(space, knots, [(points, found)])
     batch = points.shape[: points.ndim - core - 1]
     bc_type = joined(fixed.kinds, _ends(fixed.kinds, [layout.data(v, core) for v in vectors]))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from ..arrays import whole_number
+from ..arrays import shown, whole_number
 from ..spaces import Array
 from .geodesics import FINE, integrate, jacobian_by_differences
 from .manifold import Manifold
@@ -29,9 +29,9 @@ class Surface(Manifold):
         self, f: Function, grad: Function, n: int, hess: Function | None, radius: float | None
     ) -> None:
         self._f, self._grad, self._given_hess = f, grad, hess
-        for name, function in (("F", f), ("grad", grad), ("hess", hess or grad)):
+        for name, function in (("F", f), ("grad", grad), ("hess", grad if hess is None else hess)):
             if not callable(function):
-                raise ValidationError(f"{name} must be a function, not {function!r}")
+                raise ValidationError(f"{name} must be a function, not {shown(function)}")
         super().__init__(
             exp=self._exp,
             log=self._log,

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 from .._core import ValidationError
 from ..curves.curve import Curve as Data
 from ..curves.noise import Noise
+from ..report import long_gaps
 from ..spaces import Space
 from .style import DATA, DATES, INK, colors
 
 Doubles = NDArray[np.float64]
 
 _SECOND = np.timedelta64(1, "s")
-_LONG = 10
-"""So many times the median is a long gap between points."""
 MOST = 50
 """The largest number of curves of a batch that are drawn."""
 FEW = 5
@@ -160,8 +159,7 @@ class Curve:
     def gaps(self) -> Doubles:
         """Starts and ends on a time axis of the gaps between points that are far longer than most, shape (m, 2)."""
         times = self.marks
-        gaps = np.diff(times)
-        long = gaps > _LONG * np.median(gaps)
+        long = long_gaps(times)
         return np.stack([times[:-1][long], times[1:][long]], axis=1)
 
     @cached_property

@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
+from .._core import ValidationError
+from ..arrays import shown
+from ..disk import path_of, replacing
 from ..spaces import Product, SpecialEuclidean, factors_of
 from .bands import ALPHA
 from .curves import Curve, Spline, curves_of
@@ -50,8 +53,27 @@ def plot(spline: Spline, file: Any = None) -> Figure:
     picture.draw(figure.add_subfigure(grid[1, 0]), curves)
     _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
     if file is not None:
-        figure.savefig(file)
+        save(figure, file)
     return figure
+
+
+def save(figure: Figure, file: Any) -> None:
+    """Write a figure to an open file, or replace a file by its name, whose ending says the format."""
+    path = path_of(file, method="write")
+    if path is None:
+        figure.savefig(file)
+        return
+    known = figure.canvas.get_supported_filetypes()
+    ending = path.suffix[1:].lower()
+    if not ending:
+        ending = figure.canvas.get_default_filetype()
+        path = path.with_name(f"{path.name}.{ending}")
+    if ending not in known:
+        raise ValidationError(
+            f"file = {shown(str(path))}: the name of a picture must end in .{', .'.join(sorted(known))}"
+        )
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=ending)
 
 
 def _description(spline: Spline) -> str:

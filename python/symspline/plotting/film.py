@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .figure import CurveFigure
+from .figure import CurveFigure, save
 from .frames import VIEW
 from .style import DATES, DPI, EDGE, HALO, INK, heading, window
 
@@ -56,7 +56,7 @@ def plot_film(film: Film, file: Any = None) -> Figure:
         axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24))
         _draw_one(axes, x, drawing, seen[2], _color(i / (len(multiples) - 1)))
     if file is not None:
-        figure.savefig(file)
+        save(figure, file)
     return figure
 
 

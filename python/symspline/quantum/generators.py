@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from .._core import ValidationError
 from ..convert.reading import Array, adjoint
 from ..curves.curve import order_of
+from ..piecewise import check_curve
 from ..spaces import ComplexGrassmannian, ComplexProjective, Space, SpecialUnitary, Unitary
 from ..spline import CubicSpline
 
@@ -55,6 +56,7 @@ def hamiltonian(
 
 def quantum_space(spline: Any) -> Space:
     """The space of a curve that has a Hamiltonian."""
+    check_curve(spline)
     space: Space = spline.space
     if isinstance(space, (ComplexProjective, ComplexGrassmannian, Unitary, SpecialUnitary)):
         return space

@@ -14,6 +14,7 @@ from ..curves.plain import Plain
 from ..curves.span import span_of
 from ..spaces import ComplexGrassmannian, ComplexProjective
 from ..spline import CubicSpline
+from ..times import onto_ends
 from .generators import generator, quantum_space
 
 Doubles = NDArray[np.float64]
@@ -95,6 +96,7 @@ def _times(spline: CubicSpline, x: ArrayLike) -> Doubles:
             "propagator(spline[i], x)"
         )
     first, last = spline._times[..., 0].max(), spline._times[..., -1].min()
+    times, _ = onto_ends(times, np.array([first, last]), (), False)
     refuse(
         ~((times >= first) & (times <= last)),
         "x",
@@ -110,6 +112,8 @@ def _edges(curve: Curve) -> Doubles:
     knots = np.broadcast_to(curve.times, (*curve.batch, curve.times.shape[-1]))
     lengths = np.diff(knots)
     inner = knots[..., :-1, None] + lengths[..., None] * np.linspace(0, 1, 9)
+    # By rounding the last of them may lie behind the last knot.
+    inner = np.minimum(inner, knots[..., 1:, None])
     speed = curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
     legs = speed.reshape(inner.shape).max(axis=-1) * lengths
     # The same number in all curves, so that they are one array.

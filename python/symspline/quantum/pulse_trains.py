@@ -70,7 +70,7 @@ def _edges(spline: CubicSpline, edges: ArrayLike) -> tuple[Array, Array]:
         raise ValidationError(
             f"edges must be two or more times in a row, not an array of shape {times.shape}"
         )
-    spacing = np.diff(spline._clock.at(edges, spline._batch, False)[0])
+    spacing = np.diff(spline._clock.at(edges, spline._batch, False, spline._times)[0])
     refuse(
         ~(spacing > 0),
         "edges",

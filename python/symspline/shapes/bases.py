@@ -29,8 +29,10 @@ class Bases:
     def __call__(self, x: Array) -> Array:
         """X at times x, shape x.shape + (rows, n); at the end of a closed spline as it comes there."""
         first, last = self.shape.t[0], self.shape.t[-1]
+        shape = self.shape
+        own = shape._clock.at(x, (), False, shape._times)[0]
         refuse(
-            ~((x >= first) & (x <= last)),
+            ~((own >= shape._times[0]) & (own <= shape._times[-1])),
             "x",
             lambda i: f"is {x[i]}, outside the drawings, which go from {first} to {last}",
         )
@@ -44,5 +46,5 @@ class Bases:
 
     def share(self, x: Array) -> Array:
         """Times from 0 at the first knot to 1 at the last."""
-        times, knots = self.shape._clock.at(x, (), False)[0], self.shape._times
+        times, knots = self.shape._clock.at(x, (), False, self.shape._times)[0], self.shape._times
         return np.asarray((times - knots[0]) / (knots[-1] - knots[0]))

@@ -58,6 +58,10 @@ class Space:
     _doubles_shape: tuple[int, ...]
 
     def __init__(self, *parameters: int) -> None:
+        if not hasattr(type(self), "_name"):
+            raise TypeError(
+                f"{type(self).__name__} takes no parameters itself; make one of its kinds, as Sphere(2)"
+            )
         for value in parameters:
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
                 raise ValidationError(f"{type(self).__name__} takes whole numbers, not {shown(value)}")
@@ -409,6 +413,8 @@ class Space:
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
         """Random points, shape ``shape + point_shape``: uniform on a compact space."""
+        if not isinstance(shape, (int, np.integer, tuple, list)):
+            raise ValidationError(f"shape must be a whole number or a tuple of them, not {shown(shape)}")
         sizes = (shape,) if isinstance(shape, (int, np.integer)) else tuple(shape)
         noise = self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes))
         return self._apply("scatter", x=self._scatter_scale * noise)

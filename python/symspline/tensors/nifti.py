@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from os import PathLike, fspath
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
-from ..arrays import as_array
+from ..arrays import as_array, brief, shown
+from ..disk import path_of, replacing
 from .orders import Array, from_vectors, to_vectors
 
 File = str | PathLike[str]
@@ -57,26 +59,24 @@ def read_nifti(file: File, order: str | None = None, mask: ArrayLike | File | No
         ValidationError: the file or the mask is of another shape, the mask is not finite, negative, or a file with
             another affine map, or the order is not given or not what the file says.
     """
-    image = _nibabel().load(fspath(file))
-    numbers = np.asanyarray(image.dataobj)
+    path = _path(file)
+    image, numbers = _load(path)
     if int(image.header["intent_code"]) == _SYMMATRIX:
         if order not in (None, "dipy", "itk"):
             raise ValidationError(
-                f"{fspath(file)} says that it holds symmetric matrices in the order of NIfTI, not in that of "
+                f"{path} says that it holds symmetric matrices in the order of NIfTI, not in that of "
                 f"{order!r}; leave order out"
             )
         order = "dipy"
     elif order is None:
         raise ValidationError(
-            f"{fspath(file)} does not say in which order its six volumes are; say order='dipy', 'fsl' or 'mrtrix', "
+            f"{path} does not say in which order its six volumes are; say order='dipy', 'fsl' or 'mrtrix', "
             "after the program that wrote it"
         )
     if numbers.ndim == 5 and numbers.shape[3] == 1:
         numbers = numbers[:, :, :, 0]
     if numbers.ndim != 4 or numbers.shape[3] != 6:
-        raise ValidationError(
-            f"{fspath(file)} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)"
-        )
+        raise ValidationError(f"{path} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)")
     inside = _mask(mask, numbers, image.affine)
     return Volume(from_vectors(numbers[inside], order), inside, np.asarray(image.affine, float), image.header)
 
@@ -99,6 +99,13 @@ def write_nifti(file: File, volume: Volume, order: str) -> None:
         ValidationError: the tensors are not as many as the mask has voxels, or not symmetric.
     """
     nibabel = _nibabel()
+    path = _path(file)
+    if not path.name.endswith((".nii", ".nii.gz")):
+        raise ValidationError(
+            f"file = {shown(str(path))}: the name of a NIfTI file must end in .nii or .nii.gz"
+        )
+    if not isinstance(volume, Volume):
+        raise TypeError(f"volume must be a symspline.tensors.Volume, not {shown(volume)}")
     mask = np.asarray(volume.mask, bool)
     if np.shape(volume.tensors) != (np.count_nonzero(mask), 3, 3):
         raise ValidationError(
@@ -118,20 +125,40 @@ def write_nifti(file: File, volume: Volume, order: str) -> None:
     if order == "itk" or was:
         code, rows = (_SYMMATRIX, 3) if order == "itk" else (0, 0)
         image.header["intent_code"], image.header["intent_p1"] = code, rows
-    nibabel.save(image, fspath(file))
+    with replacing(path) as temporary:
+        nibabel.save(image, temporary)
+
+
+def _path(file: Any, name: str = "file") -> Path:
+    path = path_of(file, name, method="read")
+    if path is None:
+        raise TypeError(f"{name} must be the name of a file: nibabel takes no open ones")
+    return path
+
+
+def _load(path: Path) -> tuple[Any, Array]:
+    """The image in a file, and its numbers."""
+    try:
+        image = _nibabel().load(path)
+        return image, np.asanyarray(image.dataobj)
+    except (OSError, MemoryError, ImportError):
+        raise
+    except Exception as error:
+        # Damage shows as errors of nibabel, NumPy, zlib and of whatever else reads the formats that it knows.
+        raise ValidationError(f"{path} is damaged or not a NIfTI file: {brief(error)}") from None
 
 
 def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.bool_]:
     if mask is None:
         return np.asarray(np.isfinite(numbers).all(axis=-1) & numbers.any(axis=-1))
     if isinstance(mask, (str, PathLike)):
-        image = _nibabel().load(fspath(mask))
+        image, voxels = _load(_path(mask, "mask"))
         # Headers hold single precision.
         if not np.allclose(image.affine, affine, rtol=1e-4, atol=1e-4):
             raise ValidationError(
-                f"the mask {fspath(mask)} has another affine map than the tensors; bring it to their voxels first"
+                f"the mask {mask} has another affine map than the tensors; bring it to their voxels first"
             )
-        mask = np.asanyarray(image.dataobj)
+        mask = voxels
     values = as_array(mask, "mask")
     bad = np.argwhere(~(values >= 0))
     if len(bad):

@@ -82,7 +82,7 @@ def asked_of(
 def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[str]) -> None:
     if isinstance(space, Product):
         raise ValidationError(f"{space} is a product, whose factors are independent: fit each by itself")
-    if isinstance(point_dims, str) or len(point_dims) != len(space.point_shape):
+    if not isinstance(point_dims, (tuple, list)) or len(point_dims) != len(space.point_shape):
         raise ValidationError(
             f"a point of {space} has shape {space.point_shape}, so point_dims must be {len(space.point_shape)} names "
             f"in a tuple, not {shown(point_dims)}"

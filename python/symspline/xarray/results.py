@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from .._core import ValidationError
+from ..arrays import shown
 from ..options import checked_policy, outside
 from ..spaces import space as space_named
 from .asked import check_dims, rehearse, times_with_names
@@ -19,6 +20,8 @@ KNOTS = "symspline_knots"
 
 def along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool = False) -> xr.DataArray:
     """A quantity of curves at times x."""
+    if not isinstance(ds, xr.Dataset):
+        raise ValidationError(f"ds is not what symspline.xarray.fit returns: it is {shown(ds)}")
     try:
         space = space_named(ds.attrs["space"])
         dim, point_dims, policy = (ds.attrs[name] for name in ("curve_dim", "point_dims", "extrapolate"))

@@ -1,0 +1,147 @@
+"""Tables of which a command line without a word would make a wrong curve."""
+
+import csv
+
+import numpy as np
+import pytest
+from tabular import write
+
+import symspline as ss
+
+
+def ships(order="by ship", identity=("ann", "bob", "cat")):
+    """Three tracks at the same times, two degrees apart, and a column that says which row is whose."""
+    rows = [
+        f"{t}.0,{10 + 0.1 * t + 2 * k:.3f},{50 + 0.05 * t * t:.3f},{name}"
+        for k, name in enumerate(identity)
+        for t in range(6)
+    ]
+    if order == "by time":
+        rows.sort(key=lambda row: float(row.split(",")[0]))
+    write("ships.csv", "time,lon,lat,ship\n" + "\n".join(rows) + "\n")
+
+
+NUMBERS = (17, 4, 9)
+
+
+@pytest.mark.parametrize("identity", [("ann", "bob", "cat"), NUMBERS], ids=["texts", "numbers"])
+@pytest.mark.parametrize("order", ["by ship", "by time"])
+@pytest.mark.parametrize("options", ["", "--sort"])
+def test_equal_times_of_several_tracks_suggest_their_column_first(run, fails, order, identity, options):
+    ships(order, identity)
+    message = fails(f"fit ships.csv --lonlat {options} -o a.npz")
+    assert "; --curve ship makes a curve of each ship, " in message
+    assert message.index("--curve") < max(message.find("--dedup"), message.find("--sort"))
+    if order == "by time" and not options:
+        run("fit ships.csv --lonlat --curve ship -o a.npz")
+        assert len(ss.load_many("a.npz")) == 3
+
+
+def test_merged_tracks_are_told(run):
+    ships()
+    out = run("fit ships.csv --lonlat --sort --dedup mean -o a.npz", notes=True)
+    assert "12 rows merged with others of the same time (--dedup mean)" in out
+    assert "column 'ship' tells them apart" in out and "--curve ship" in out
+
+
+def test_tracks_that_are_smoothed_as_one_are_told(run):
+    ships("by time")
+    assert "fit each of them with --curve ship" in run("fit ships.csv --lonlat -o a.npz --smooth", notes=True)
+
+
+def test_columns_that_do_not_tell_rows_apart_are_not_suggested(fails):
+    write("a.csv", "t,x,note\n0,0,a\n1,1,b\n1,2,b\n2,3,a\n")
+    assert "--curve" not in fails("fit a.csv --space r:1 --columns x -o a.npz")
+
+
+def test_long_gaps_are_told(run):
+    write("a.csv", "t,x\n" + "".join(f"{t},{t}\n" for t in [*range(20), 80, 81, 82]))
+    assert "; 1 long gap, up to 61 (--max-gap cuts there)" in run("fit a.csv --space r:1 -o a.npz")
+    assert "long gap" not in run("fit a.csv --space r:1 --max-gap 10 -o a.npz")
+    assert "; 1 long gap, up to 61 " in run("fit a.csv --space r:1 -o a.npz --smooth 0.1")
+
+
+def test_smoothing_that_finds_no_noise_says_so(run):
+    t = np.arange(30)
+    write("a.csv", "t,x\n" + "".join(f"{i},{(-1) ** i * 1.0}\n" for i in t))
+    out = run("fit a.csv --space r:1 -o a.npz --smooth 1e-14")
+    assert "no noise" not in out
+    out = run("fit a.csv --space r:1 -o a.npz --smooth")
+    if ss.load("a.npz").df > 29:
+        assert "(no noise was found: the curve goes through the points, as without --smooth" in out
+
+
+# ---- units of standard deviations ----
+
+
+def noisy_turns():
+    rng = np.random.default_rng(0)
+    t = np.linspace(0, 4, 60)
+    turns = ss.rotations.from_rotation_vectors(np.outer(t, [0, 0, 0.5]) + 0.02 * rng.standard_normal((60, 3)))
+    return t, turns, ss.rotations.as_quaternions(turns, scalar_first=True), 3 * rng.standard_normal((60, 3))
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def column(path, name):
+    return np.array([float(row[name]) for row in rows(path)])
+
+
+def test_deviations_beside_quaternions_are_of_quaternions(run):
+    t, _, q, _ = noisy_turns()
+    lines = (",".join(map(repr, [a, *b])) + "\n" for a, b in zip(t.tolist(), q.tolist(), strict=True))
+    write("q.csv", "t,qw,qx,qy,qz\n" + "".join(lines))
+    run("fit q.csv --space so:3 -o q.npz --smooth")
+    run("sample q.npz -n 9 --nu 0,1 -o s.csv")
+    spline, x = ss.load("q.npz"), column("s.csv", "t")
+    np.testing.assert_allclose(column("s.csv", "std"), spline.std(x) / 2, rtol=1e-12)
+    np.testing.assert_allclose(column("s.csv", "std_d1"), spline.std(x, 1) / 2, rtol=1e-12)
+    # A turn by a small angle moves the quaternion half as far.
+    moved = spline.space.exp(spline(1.0), spline.std(1.0) * spline.space.frame(spline(1.0))[0])
+    here, there = ss.rotations.as_quaternions(np.stack([spline(1.0), moved]), scalar_first=True)
+    np.testing.assert_allclose(np.linalg.norm(there - here), spline.std(1.0) / 2, rtol=1e-3)
+
+
+def test_deviations_beside_matrices_are_radians(run):
+    t, turns, _, _ = noisy_turns()
+    np.savez("m.npz", t=t, points=turns)
+    run("fit m.npz --space so:3 -o c.npz --smooth")
+    run("sample c.npz -n 9 -o s.csv")
+    np.testing.assert_allclose(column("s.csv", "std"), ss.load("c.npz").std(column("s.csv", "t")), rtol=1e-12)
+
+
+def test_deviations_of_poses_are_of_place_and_rotation(run):
+    t, turns, _, places = noisy_turns()
+    np.savez("m.npz", t=t, points=ss.poses.join(turns, places))
+    run("fit m.npz --space se:3 -o c.npz --smooth 0.1")
+    run("sample c.npz -n 9 --nu 0,1 -o s.csv")
+    spline, x = ss.load("c.npz"), column("s.csv", "t")
+    for name, expected in (("std_position", spline.std(x)), ("std_rotation", spline.std(x))):
+        np.testing.assert_allclose(column("s.csv", name), expected, rtol=1e-12)
+    assert "std" not in rows("s.csv")[0] and "std_position_d1" in rows("s.csv")[0]
+    write("p.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + "".join(
+        ",".join(map(repr, [a, *p.tolist(), *q.tolist()])) + "\n"
+        for a, p, q in zip(t.tolist(), places, ss.rotations.as_quaternions(turns, scalar_first=False), strict=True)
+    ))  # fmt: skip
+    run("fit p.csv --space se:3 -o c.npz --smooth 0.1")
+    run("sample c.npz -n 9 -o s.csv")
+    np.testing.assert_allclose(
+        column("s.csv", "std_position"), 2 * column("s.csv", "std_rotation"), rtol=1e-12
+    )
+    run("fit p.csv --space 'so:3 x r:3' --columns qw,qx,qy,qz,tx,ty,tz -o c.npz --smooth")
+    run("sample c.npz -n 9 -o s.csv")
+    turn, place = ss.load("c.npz").std(column("s.csv", "t"))
+    np.testing.assert_allclose(column("s.csv", "std1"), turn / 2, rtol=1e-12)
+    np.testing.assert_allclose(column("s.csv", "std2"), place, rtol=1e-12)
+
+
+def test_escape_characters_do_not_reach_the_terminal(run, fails):
+    write("a.csv", "t,x,id\n0,0,\x1b[31mred\n1,1,\x1b[31mred\n")
+    run("fit a.csv --space r:1 --curve id --columns x -o a.npz")
+    assert "\x1b" not in run("check a.npz")
+    assert "\x1b" not in fails("plot a.npz --curve no -o a.png")
+    write("b.csv", "t,x\n0,\x1b[31m\n")
+    assert "\\x1b[31m" in fails("fit b.csv --space r:1 --columns x -o b.npz")

@@ -1,0 +1,211 @@
+"""Files are replaced as a whole: their permissions, links to them, and what is no regular file."""
+
+import os
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+from curves import S2
+from refused import P
+
+import symspline as ss
+from symspline import disk
+
+SPLINE = ss.CubicSpline(None, P, S2)
+POSES = np.broadcast_to(np.eye(4), (3, 4, 4))
+SQUARE = [[0.0, 0], [1, 0], [1, 1], [0, 1]]
+
+
+def write_nifti(file):
+    pytest.importorskip("nibabel")
+    volume = ss.tensors.Volume(np.eye(3)[None], np.ones((1, 1, 1), bool), np.eye(4))
+    ss.tensors.write_nifti(file, volume, "fsl")
+
+
+def plot(file):
+    pytest.importorskip("matplotlib")
+    SPLINE.plot(file)
+
+
+def plot_film(file):
+    pytest.importorskip("matplotlib")
+    ss.shapes.AffineMorph(None, [SQUARE, np.multiply(SQUARE, 2)]).plot(file)
+
+
+WRITERS = {
+    "curve.npz": SPLINE.save,
+    "hermite.npz": ss.HermiteSpline(None, P, np.zeros((3, 3)), S2).save,
+    "smooth.npz": ss.make_smoothing_spline(None, P, S2, 0.1).save,
+    "many.npz": lambda file: ss.save_many({"a": SPLINE}, file),
+    "poses.txt": lambda file: ss.poses.write_tum(file, [0, 1, 2], POSES),
+    "poses.kitti": lambda file: ss.poses.write_kitti(file, POSES),
+    "poses.csv": lambda file: ss.poses.write_euroc(file, [0, 1, 2], POSES),
+    "curve.png": plot,
+    "film.svg": plot_film,
+    "tensors.nii": write_nifti,
+    "tensors.nii.gz": write_nifti,
+}
+writers = pytest.mark.parametrize("name", WRITERS)
+posix = pytest.mark.skipif(os.name != "posix", reason="permissions, links and pipes as on POSIX systems")
+
+
+def mode(path):
+    return stat.S_IMODE(os.stat(path).st_mode)
+
+
+@posix
+@writers
+@pytest.mark.parametrize("own", [0o600, 0o640, 0o444])
+def test_an_existing_file_keeps_its_permissions(tmp_path, name, own):
+    path = tmp_path / name
+    path.write_bytes(b"as it was")
+    path.chmod(own)
+    WRITERS[name](path)
+    assert mode(path) == own and path.read_bytes() != b"as it was"
+    assert os.listdir(tmp_path) == [name]
+
+
+@posix
+def test_a_new_file_has_the_usual_permissions(tmp_path):
+    (tmp_path / "other").write_bytes(b"")
+    SPLINE.save(tmp_path / "curve.npz")
+    assert mode(tmp_path / "curve.npz") == mode(tmp_path / "other")
+
+
+@posix
+@writers
+def test_the_target_of_a_symbolic_link_is_replaced(tmp_path, name):
+    target, link = tmp_path / "kept" / name, tmp_path / name
+    target.parent.mkdir()
+    target.write_bytes(b"as it was")
+    link.symlink_to(Path("kept") / name)
+    WRITERS[name](link)
+    assert link.is_symlink() and target.read_bytes() != b"as it was"
+    target.unlink()
+    WRITERS[name](link)
+    assert link.is_symlink() and target.is_file()
+
+
+@posix
+def test_links_in_a_circle_raise(tmp_path):
+    (tmp_path / "a.npz").symlink_to("b.npz")
+    (tmp_path / "b.npz").symlink_to("a.npz")
+    with pytest.raises(OSError, match="symbolic link"):
+        SPLINE.save(tmp_path / "a.npz")
+    assert (tmp_path / "a.npz").is_symlink()
+
+
+@posix
+@writers
+def test_devices_pipes_and_folders_are_refused(tmp_path, name):
+    pipe, folder, device = tmp_path / f"pipe-{name}", tmp_path / f"folder-{name}", tmp_path / f"device-{name}"
+    os.mkfifo(pipe)
+    folder.mkdir()
+    device.symlink_to(os.devnull)
+    for path, what in ((pipe, "pipe"), (folder, "folder"), (device, "device")):
+        with pytest.raises(OSError, match=what):
+            WRITERS[name](path)
+    assert stat.S_ISFIFO(os.stat(pipe).st_mode) and stat.S_ISCHR(os.stat(os.devnull).st_mode)
+
+
+@writers
+def test_long_names(tmp_path, name):
+    path = tmp_path / ("é" * ((250 - len(name)) // 2) + name)
+    WRITERS[name](path)
+    assert path.is_file() and len(os.listdir(tmp_path)) == 1
+
+
+@writers
+def test_data_are_on_disk_before_the_file_is_replaced(tmp_path, name, monkeypatch):
+    path, calls = tmp_path / name, []
+    sync, replace = os.fsync, Path.replace
+    monkeypatch.setattr(
+        disk.os, "fsync", lambda number: (calls.append(os.fstat(number).st_size), sync(number))
+    )
+    monkeypatch.setattr(Path, "replace", lambda a, b: (calls.append("replace"), replace(a, b))[1])
+    WRITERS[name](path)
+    assert calls == [path.stat().st_size, "replace"]
+
+
+@writers
+def test_an_older_file_stays_if_writing_fails(tmp_path, name, monkeypatch):
+    path = tmp_path / name
+    path.write_bytes(b"as it was")
+
+    def full(number):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(disk.os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        WRITERS[name](path)
+    assert path.read_bytes() == b"as it was" and os.listdir(tmp_path) == [name]
+
+
+@writers
+@pytest.mark.parametrize("file", [0, 1, True, 2.0, None, b"name", ["name"]], ids=repr)
+def test_other_things_than_paths_are_refused(name, file):
+    if file is None and WRITERS[name] in (plot, plot_film):
+        pytest.skip("None is no file at all")
+    with pytest.raises(TypeError, match=r"^file must be "):
+        WRITERS[name](file)
+
+
+@writers
+@pytest.mark.parametrize("file", ["", "a\0b", "\ud800"], ids=ascii)
+def test_texts_that_are_no_names_are_refused(name, file):
+    with pytest.raises(ss.ValidationError, match=r"^file "):
+        WRITERS[name](file)
+
+
+def test_pictures_have_an_ending(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plot("curve")
+    assert os.listdir() == ["curve.png"]
+    with pytest.raises(ss.ValidationError, match=r"'a\.xyz': the name of a picture must end in \..*\.png, "):
+        SPLINE.plot("a.xyz")
+
+
+READERS = {
+    "load": ss.load,
+    "load_many": ss.load_many,
+    "read_tum": ss.poses.read_tum,
+    "read_kitti": ss.poses.read_kitti,
+    "read_euroc": ss.poses.read_euroc,
+    "read_nifti": lambda file: (pytest.importorskip("nibabel"), ss.tensors.read_nifti(file, "fsl")),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("file", [0, 1, True, 2.0, None, b"name", ["name"]], ids=repr)
+def test_readers_take_paths_and_open_files_only(name, file):
+    with pytest.raises(TypeError, match=r"^file must be "):
+        READERS[name](file)
+
+
+def test_times_and_masks_are_paths_or_open_files(tmp_path):
+    ss.poses.write_kitti(tmp_path / "poses", POSES)
+    with pytest.raises(TypeError, match=r"^times must be "):
+        ss.poses.read_kitti(tmp_path / "poses", 0)
+
+
+def test_text_files_that_are_open_as_bytes(tmp_path):
+    ss.poses.write_kitti(tmp_path / "poses", POSES)
+    with open(tmp_path / "poses", "rb") as file, pytest.raises(TypeError, match="file must be open as text"):
+        ss.poses.read_kitti(file)
+
+
+def test_damaged_text_and_nifti_files(tmp_path):
+    import gzip
+
+    data = gzip.compress(b"0 0 0 0 0 0 0 1\n" * 1000)
+    (tmp_path / "cut.txt.gz").write_bytes(data[:-9])
+    with pytest.raises(ss.ValidationError, match=r"cut\.txt\.gz is damaged"):
+        ss.poses.read_tum(tmp_path / "cut.txt.gz")
+    pytest.importorskip("nibabel")
+    write_nifti(tmp_path / "a.nii.gz")
+    good = (tmp_path / "a.nii.gz").read_bytes()
+    for n in (0, 5, len(good) // 2):
+        (tmp_path / "b.nii.gz").write_bytes(good[:n])
+        with pytest.raises((ss.ValidationError, OSError)):
+            ss.tensors.read_nifti(tmp_path / "b.nii.gz", "fsl")

@@ -1,0 +1,181 @@
+"""Data as people bring them: every entry gives what the same data cleaned by hand give, or a clear error."""
+
+import numpy as np
+import pytest
+
+import symspline as ss
+from symspline.cli import main
+
+EPOCH = 1.7e9
+
+
+def path(t):
+    """A smooth path on the sphere."""
+    t = np.asarray(t, float)
+    lon, lat = 0.3 * t, 0.4 * np.sin(0.5 * t)
+    return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
+
+
+def irregular(n=60):
+    return np.cumsum(np.random.default_rng(0).uniform(0.05, 0.4, n))
+
+
+T = irregular()
+P = path(T)
+
+
+def turns(t):
+    return ss.rotations.from_rotation_vectors(np.outer(t, [0.0, 0.1, 0.3]))
+
+
+def by_spline(t, points):
+    spline = ss.CubicSpline(t, points, "sphere:2")
+    return spline(spline.t)
+
+
+def by_fit(t, points):
+    velocities, _ = ss.fit(t, points, "sphere:2")
+    return ss.evaluate(t, t, points, velocities, "sphere:2")
+
+
+def by_fit_many(t, points):
+    (spline,) = ss.fit_many([(t, points)], "sphere:2")
+    return spline(spline.t)
+
+
+def by_segments(t, points):
+    (spline,) = ss.fit_segments(t, points, "sphere:2", max_gap=1e9)
+    return spline(spline.t)
+
+
+def by_hermite(t, points):
+    spline = ss.HermiteSpline(t, points, np.zeros(np.shape(points)), "sphere:2")
+    return spline(spline.t)
+
+
+def by_xarray(t, points):
+    xr = pytest.importorskip("xarray")
+    import symspline.xarray
+
+    da = xr.DataArray(points, dims=("time", "q"), coords={"time": t})
+    ds = symspline.xarray.fit(da, "sphere:2", on_failure="raise")
+    return symspline.xarray.evaluate(ds, np.asarray(t)).values
+
+
+def by_command_line(t, points):
+    np.savez("a.npz", t=t, points=points)
+    if main(["fit", "a.npz", "--space", "sphere:2", "-o", "b.npz"]):
+        raise ss.ValidationError("the command line failed")
+    spline = ss.load("b.npz")
+    return spline(spline.t)
+
+
+ENTRIES = [by_spline, by_fit, by_fit_many, by_segments, by_hermite, by_xarray, by_command_line]
+entries = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.__name__)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+CLEAN = {
+    "irregular": (T, P),
+    "long": (np.arange(20_000) * 0.01, path(np.arange(20_000) * 0.01)),
+    "with a gap": (np.delete(T, slice(20, 30)), np.delete(P, slice(20, 30), axis=0)),
+    "single precision": (T.astype(np.float32), P.astype(np.float32)),
+    "seconds since 1970": (T + EPOCH, P),
+    "nanoseconds since 1970": (np.rint((T + EPOCH) * 1e9).astype(np.int64).astype("M8[ns]"), P),
+    "whole nanoseconds": (np.int64(EPOCH) * 10**9 + np.rint(T * 1e9).astype(np.int64), P),
+    "sorted afterwards": (T[::-1][np.argsort(T[::-1])], P[::-1][np.argsort(T[::-1])]),
+}
+
+
+@entries
+@pytest.mark.parametrize("kind", CLEAN)
+def test_points_come_back(entry, kind):
+    t, points = CLEAN[kind]
+    tolerance = 1e-6 if kind == "single precision" else 1e-9
+    np.testing.assert_allclose(entry(t, points), points, atol=tolerance)
+
+
+@pytest.mark.parametrize("kind", ["seconds since 1970", "nanoseconds since 1970", "sorted afterwards"])
+def test_offsets_and_orders_do_not_change_the_curve(kind):
+    t, points = CLEAN[kind]
+    spline, plain = ss.CubicSpline(t, points, "sphere:2"), ss.CubicSpline(T, P, "sphere:2")
+    # Doubles near 1.7e9 are 2.4e-7 apart.
+    np.testing.assert_allclose(spline(spline.t, nu=1), plain(T, nu=1), atol=1e-5)
+
+
+def dirty(how):
+    """Data with a fault, and what cleans it; None if nobody but the user can."""
+    t, points = T.copy(), P.copy()
+    if how == "repeated":
+        t[7] = t[6]
+    elif how == "unsorted":
+        t[[7, 8]] = t[[8, 7]]
+    elif how == "missing points":
+        points[5] = np.nan
+    elif how == "missing times":
+        t[5] = np.nan
+    elif how == "not normalised":
+        points[5] *= 2
+    return t, points
+
+
+@entries
+@pytest.mark.parametrize("how", ["repeated", "unsorted", "missing points", "missing times", "not normalised"])
+def test_faults_raise_with_the_place(entry, how, capsys):
+    t, points = dirty(how)
+    with pytest.raises(ss.ValidationError) as caught:
+        entry(t, points)
+    message = str(caught.value) + capsys.readouterr().err
+    assert any(str(place) in message for place in (5, 6, 7, 8)), message
+    assert len(message) < 600
+
+
+def test_one_bad_curve_in_a_batch():
+    batch = np.stack([P, dirty("missing points")[1], P])
+    with pytest.raises(ss.ValidationError, match="curve 1"):
+        ss.CubicSpline(T, batch, "sphere:2")
+    curves = ss.CubicSpline(T, batch, "sphere:2", on_failure="ignore")
+    alone = ss.CubicSpline(T, P, "sphere:2")
+    assert curves.report.converged.tolist() == [True, False, True]
+    assert np.array_equal(curves[0](T), alone(T)) and np.isnan(curves[1](T)).all()
+    assert np.array_equal(curves[2].velocities, alone.velocities)
+
+
+def test_repeated_times_of_a_recording_are_merged_or_refused():
+    t, points = dirty("repeated")
+    with pytest.raises(ss.ValidationError, match="duplicates"):
+        ss.fit_segments(t, points, "sphere:2", max_gap=9)
+    (merged,) = ss.fit_segments(t, points, "sphere:2", max_gap=9, duplicates="mean")
+    mean = ss.Sphere(2).geodesic(points[6], points[7], 0.5)
+    by_hand = np.delete(points, 7, axis=0)
+    by_hand[6] = mean
+    np.testing.assert_allclose(merged.points, by_hand, atol=1e-12)
+
+
+def test_a_table_of_pandas_in_any_order():
+    pd = pytest.importorskip("pandas")
+    lon, lat = ss.geo.to_lonlat(P)
+    stamps = pd.to_datetime(np.rint((T + EPOCH) * 1e3).astype(np.int64), unit="ms")
+    frame = pd.DataFrame({"time": stamps, "lon": lon, "lat": lat})
+    expected = ss.geo.resample(frame, "1s", time="time", max_gap=9)
+    shuffled = frame.sample(frac=1, random_state=0)
+    pd.testing.assert_frame_equal(ss.geo.resample(shuffled, "1s", time="time", max_gap=9), expected)
+    frame.loc[5, "lat"] = np.nan
+    with pytest.raises(ss.ValidationError, match=r"row 5.*dropna"):
+        ss.geo.resample(frame, "1s", time="time", max_gap=9)
+
+
+def test_trajectories_with_gaps_and_huge_offsets():
+    t = T + EPOCH
+    ss.poses.write_tum("a.txt", t, (turns(T), P))
+    read, poses = ss.poses.read_tum("a.txt")
+    assert np.array_equal(read, t)
+    np.testing.assert_allclose(poses[:, :3, 3], P, atol=1e-15)
+    with open("a.txt", "a") as file:
+        file.write("1.8e9 0 0 nan 0 0 0 1\n")
+    with pytest.raises(ss.ValidationError, match=rf"line {len(T) + 1}.*'tz' holds nan"):
+        ss.poses.read_tum("a.txt")
