@@ -16,6 +16,7 @@ ROOT = DOCS.parent
 PAGE = DOCS / "paper.md"
 BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
 
+
 class Row(NamedTuple):
     """One item of the paper."""
 

@@ -1,11 +1,14 @@
 //! Long work that can be watched and stopped.
 
+use std::cell::RefCell;
+use std::panic::resume_unwind;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, ThreadId};
 
 /// Counts finished units of work, and asks its owner from time to time whether to go on.
 pub struct Monitor<'a> {
-    cancelled: AtomicBool,
+    cancelled: Arc<AtomicBool>,
     finished: AtomicUsize,
     owner: ThreadId,
     go_on: &'a (dyn Fn(usize) -> bool + Sync),
@@ -16,7 +19,7 @@ impl<'a> Monitor<'a> {
     /// and only on the thread that made the monitor.
     pub fn new(go_on: &'a (dyn Fn(usize) -> bool + Sync)) -> Self {
         Monitor {
-            cancelled: AtomicBool::new(false),
+            cancelled: Arc::default(),
             finished: AtomicUsize::new(0),
             owner: thread::current().id(),
             go_on,
@@ -39,5 +42,36 @@ impl<'a> Monitor<'a> {
     /// Counts finished units.
     pub fn advance(&self, units: usize) {
         self.finished.fetch_add(units, Ordering::Relaxed);
+    }
+
+    /// Lets [`checkpoint`] on this thread hear of this monitor for as long as the result lives. It is for threads whose
+    /// owner waits elsewhere: on the owner's own thread nobody would ask meanwhile.
+    pub fn listen(&self) -> Listening {
+        Listening(STOP.replace(Some(self.cancelled.clone())))
+    }
+}
+
+thread_local! {
+    static STOP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+}
+
+/// Ends what [`Monitor::listen`] began.
+pub struct Listening(Option<Arc<AtomicBool>>);
+
+impl Drop for Listening {
+    fn drop(&mut self) {
+        STOP.set(self.0.take());
+    }
+}
+
+/// What unwinds from a [`checkpoint`] of work that was stopped.
+pub struct Cancelled;
+
+/// To be called within long loops that have no way to return early: products and factorisations of large matrices.
+/// Where the work was stopped it unwinds with [`Cancelled`], without a message.
+pub fn checkpoint() {
+    let stop = STOP.with_borrow(|stop| stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed)));
+    if stop {
+        resume_unwind(Box::new(Cancelled));
     }
 }

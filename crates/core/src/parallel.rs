@@ -77,6 +77,7 @@ pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work:
         for _ in 0..threads {
             scope.spawn(|_| {
                 let _done = Done { queue: &queue, busy: &busy, wake: &wake };
+                let _listening = monitor.listen();
                 while !monitor.cancelled()
                     && let Some(item) = take(&queue)
                 {

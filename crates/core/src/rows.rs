@@ -137,6 +137,15 @@ pub fn apply(
     faults.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
+/// About how many numbers of eight bytes one group of rows takes in an operation on a space.
+pub fn memory(space: &Erased, operation: Option<Operation>) -> f64 {
+    // Functions of a matrix keep some dozens of its size, with one number for every lane.
+    let matrices = if space.point_shape().len() > 1 { 40.0 } else { 8.0 };
+    let frame = if operation == Some(Operation::RandomTangent) { space.frame_len() as f64 } else { 0.0 };
+    // Bases of algebras hold a place, a number and a list for each dimension.
+    LANES as f64 * (matrices * space.point_len() as f64 + frame) + 5.0 * space.dim() as f64
+}
+
 /// Projects points in place. The first that is farther off than `tol`, or not finite, is an error:
 /// its row, how far it is off, and why it is no point.
 pub fn project_points(space: &Erased, points: &mut [f64], tol: f64) -> Result<(), (usize, f64, String)> {

@@ -2,7 +2,7 @@
 
 use crate::members::Members;
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use symspline_core::matrix::Matrix;
 use symspline_core::scalar::{Lane, Scalar, lane};
 use symspline_core::space::stretch_series;
@@ -14,32 +14,46 @@ type Element = Vec<(usize, f64)>;
 #[derive(Clone, Copy)]
 pub struct Algebra<const D: usize> {
     n: usize,
-    basis: &'static [Element],
+    members: Members,
+    basis: &'static OnceLock<Vec<Element>>,
 }
 
 /// Bases by the numbers of an entry, the size and the group.
-type Bases = BTreeMap<(usize, usize, Members), &'static [Element]>;
+type Bases = BTreeMap<(usize, usize, Members), &'static OnceLock<Vec<Element>>>;
 
-/// Bases of all algebras that were asked for. They stay, so that a space can be copied.
+/// Places for the bases of all algebras that were asked for. They stay, so that a space can be copied; a basis is made
+/// when it is first needed, so that a name alone costs nothing.
 static BASES: Mutex<Bases> = Mutex::new(Bases::new());
 
 impl<const D: usize> Algebra<D> {
     /// That of a group of n × n matrices.
     pub fn new(n: usize, members: Members) -> Self {
         let mut bases = BASES.lock().unwrap_or_else(PoisonError::into_inner);
-        let basis = *bases.entry((D, n, members)).or_insert_with(|| Vec::leak(basis(D, n, members)));
-        Algebra { n, basis }
+        let basis = *bases.entry((D, n, members)).or_insert_with(|| Box::leak(Box::default()));
+        Algebra { n, members, basis }
+    }
+
+    fn basis(&self) -> &'static [Element] {
+        self.basis.get_or_init(|| basis(D, self.n, self.members))
     }
 
     /// Number of coordinates.
     pub fn dim(&self) -> usize {
-        self.basis.len()
+        let n = self.n;
+        match self.members {
+            Members::All => n * n * D,
+            Members::Affine => (n - 1) * n,
+            Members::Similarity => 1 + (n - 1) * (n - 2) / 2 + n - 1,
+            Members::Special => n * n - 1,
+            Members::Symplectic => n * (n + 1) / 2,
+            Members::Lorentz | Members::PseudoOrthogonal(_) => n * (n - 1) / 2,
+        }
     }
 
     /// Coordinates of a matrix.
     pub fn coordinates<S: Scalar>(&self, m: &Matrix<S, D>, x: &mut [S]) {
         let numbers = m.entries().as_flattened();
-        for (x, element) in x.iter_mut().zip(self.basis) {
+        for (x, element) in x.iter_mut().zip(self.basis()) {
             let zero = S::constant(Lane::ZERO);
             *x = element.iter().fold(zero, |sum, &(at, factor)| numbers[at].fma_lane(lane(factor), sum));
         }
@@ -48,7 +62,7 @@ impl<const D: usize> Algebra<D> {
     /// `scale` times the matrix with given coordinates.
     pub fn multiple<S: Scalar>(&self, scale: f64, x: &[S]) -> Matrix<S, D> {
         let mut numbers = vec![S::constant(Lane::ZERO); self.n * self.n * D];
-        for (&x, element) in x.iter().zip(self.basis) {
+        for (&x, element) in x.iter().zip(self.basis()) {
             for &(at, factor) in element {
                 numbers[at] = x.fma_lane(lane(factor * scale), numbers[at]);
             }
@@ -58,7 +72,7 @@ impl<const D: usize> Algebra<D> {
 
     /// The nearest matrix of the algebra.
     pub fn part(&self, m: Matrix<Lane, D>) -> Matrix<Lane, D> {
-        if self.basis.len() == m.entries().len() * D {
+        if self.dim() == m.entries().len() * D {
             return m;
         }
         let mut x = vec![Lane::ZERO; self.dim()];
@@ -130,5 +144,29 @@ fn basis(d: usize, n: usize, members: Members) -> Vec<Element> {
                 .map(|(i, j)| two((i, j), (j, i), if (i < p) == (j < p) { -1.0 } else { 1.0 }))
                 .collect()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_basis_has_as_many_matrices_as_the_algebra_has_dimensions() {
+        for members in [
+            Members::All,
+            Members::Affine,
+            Members::Similarity,
+            Members::Special,
+            Members::Symplectic,
+            Members::Lorentz,
+            Members::PseudoOrthogonal(2),
+        ] {
+            for n in [4, 6] {
+                let algebra = Algebra::<1>::new(n, members);
+                assert_eq!(algebra.basis().len(), algebra.dim(), "{members:?}, {n}");
+            }
+        }
+        assert_eq!(Algebra::<2>::new(3, Members::All).basis().len(), 18);
     }
 }

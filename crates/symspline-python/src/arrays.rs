@@ -29,6 +29,24 @@ pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArr
     Ok(make.bind(py).call1((shape.to_vec(),))?.cast_into()?)
 }
 
+/// MemoryError unless there is room for about so many numbers, with words for the work that needs them. Rust would stop
+/// the process where memory ends.
+pub fn require_room(numbers: f64, work: impl FnOnce() -> String) -> PyResult<()> {
+    if numbers <= SMALL as f64 {
+        return Ok(());
+    }
+    let bytes = numbers * size_of::<f64>() as f64;
+    let free = bytes < isize::MAX as f64 && Vec::<f64>::new().try_reserve_exact(numbers as usize).is_ok();
+    if free {
+        return Ok(());
+    }
+    let gigabytes = bytes / 1e9;
+    Err(PyMemoryError::new_err(format!(
+        "{} needs about {gigabytes:.3e} GB of memory, more than is free",
+        work()
+    )))
+}
+
 /// Room for so many numbers, or MemoryError where compiled code would stop the process.
 pub fn room<T>(count: usize) -> PyResult<Vec<T>> {
     let mut room = Vec::new();

@@ -4,7 +4,7 @@ use crate::arrays::{in_order, room, zeros};
 use crate::errors::invalid;
 use crate::fit::{EndOf, end};
 use crate::space::Handle;
-use crate::watch::watched;
+use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use symspline::derivative::{Data, Derivative, Of};
@@ -122,7 +122,7 @@ pub fn push<'py>(
     if !result.is_empty() {
         let size = result.len() / slices.curves;
         let items = result.chunks_mut(size).enumerate().collect();
-        watched(py, None, slices.curves, |monitor| {
+        watched(py, None, slices.curves, is_heavy(&handle.space.get()), |monitor| {
             each(items, monitor, |c, out| {
                 let own = |array| part(array, c, slices.curves).to_vec();
                 let change = Data { points: own(points), knots: own(knots), ends: ends.map(own) };
@@ -147,7 +147,7 @@ pub fn pull<'py>(
     slices.room(handle.space.get().dim())?;
     let mut gradients = vec![Data::default(); slices.curves];
     let items = gradients.iter_mut().enumerate().collect();
-    watched(py, None, slices.curves, |monitor| {
+    watched(py, None, slices.curves, is_heavy(&handle.space.get()), |monitor| {
         each(items, monitor, |c, out| {
             let own = part(cotangent, c, slices.curves);
             *out = slices.derivative(&handle.space.get(), c).pull(slices.times(c), slices.of, own);

@@ -4,7 +4,7 @@ use crate::arrays::{in_order, zeros};
 use crate::errors::{invalid, number, place};
 use crate::space::Handle;
 use crate::validate::of_curve;
-use crate::watch::watched;
+use crate::watch::{is_heavy, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline::curve::{
@@ -98,7 +98,9 @@ pub fn lift_knots<'py>(
     let out = zeros(py, &[count, nodes, k, k, 2])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
-    watched(py, None, count * nodes, |monitor| find_knots(&space, &curves, monitor, result))?;
+    watched(py, None, count * nodes, is_heavy(&space), |monitor| {
+        find_knots(&space, &curves, monitor, result)
+    })?;
     drop(write);
     Ok(out)
 }
@@ -122,7 +124,7 @@ pub fn transport<'py>(
     let result = write.as_slice_mut()?;
     result.copy_from_slice(in_order(&vectors)?);
     let count = result.len() / handle.space.get().point_len().max(1);
-    watched(py, None, count, |monitor| {
+    watched(py, None, count, is_heavy(&handle.space.get()), |monitor| {
         run_transport(&handle.space.get(), &curves, times, policy, monitor, result);
     })?;
     drop(write);
@@ -185,7 +187,7 @@ fn sampled<'py>(
     }
     let result = write.as_slice_mut()?;
     let asked = Asked { curves: &curves, times: &times, quantity, outside: policy };
-    watched(py, progress, samples, |monitor| compute(&space, &asked, monitor, result))?;
+    watched(py, progress, samples, is_heavy(&space), |monitor| compute(&space, &asked, monitor, result))?;
     drop(write);
     Ok(out)
 }
@@ -236,7 +238,7 @@ pub fn evaluate_bspline<'py>(
     let out = zeros(py, &shape)?;
     let mut write = out.readwrite();
     let (x, result) = (in_order(&x)?, write.as_slice_mut()?);
-    watched(py, None, result.len(), |monitor| {
+    watched(py, None, result.len(), is_heavy(&handle.space.get()), |monitor| {
         run_bspline(&handle.space.get(), &curve, x, quantity, monitor, result);
     })?;
     drop(write);

@@ -1,14 +1,14 @@
 //! Fitting, called from Python.
 
-use crate::arrays::{in_order, room, zeros};
+use crate::arrays::{in_order, require_room, room, zeros};
 use crate::errors::invalid;
 use crate::space::Handle;
 use crate::validate;
-use crate::watch::watched;
+use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use symspline::fit::{End, Ends, Method, Options, Problem, Report, Solver, Status, fit as solve};
+use symspline::fit::{End, Ends, Method, Options, Problem, Report, Solver, Status, fit as solve, memory};
 use symspline::space::Ambient;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -44,6 +44,7 @@ pub fn fit<'py>(
     progress: Option<Py<PyAny>>,
     dry: bool,
 ) -> PyResult<Fitted<'py>> {
+    let name = method;
     let method = match method {
         "auto" => Method::Auto,
         "fixed-point" => Method::FixedPoint,
@@ -80,6 +81,14 @@ pub fn fit<'py>(
 
     // What the work itself needs, with some to spare: copies of ends, and the pieces and reports of curves.
     drop(room::<f64>(nodes + curves * (64 + 4 * len))?);
+    let longest = offsets.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+    require_room(memory(&handle.space.get(), longest, method), || {
+        let least = match method {
+            Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
+            _ => "",
+        };
+        format!("fitting {longest} points on {} with method={name:?}{least},", handle.described())
+    })?;
     let out = zeros(py, points.shape())?;
     let velocities = zeros(py, points.shape())?;
     let (mut out_write, mut velocities_write) = (out.readwrite(), velocities.readwrite());
@@ -109,8 +118,9 @@ pub fn fit<'py>(
         drop((out_write, velocities_write));
         return Ok((out, velocities, columns(py, &[])?, Vec::new()));
     }
-    let reports =
-        watched(py, progress, nodes, |monitor| solve(&handle.space.get(), &problem, &options, monitor, u))?;
+    let reports = watched(py, progress, nodes, is_heavy(&handle.space.get()), |monitor| {
+        solve(&handle.space.get(), &problem, &options, monitor, u)
+    })?;
     let faults = faults(handle, &options, &reports, &batch);
     drop((out_write, velocities_write));
     Ok((out, velocities, columns(py, &reports)?, faults))

@@ -4,7 +4,7 @@ use crate::arrays::{in_order, room, zeros};
 use crate::errors::invalid;
 use crate::fit::EndOf;
 use crate::space::Handle;
-use crate::watch::watched;
+use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
@@ -134,7 +134,9 @@ pub fn smooth<'py>(
             ends: vectors.map(|v| if v.is_empty() { none } else { &v[c * len..][..len] }),
         })
         .collect();
-    let found = watched(py, progress, curves * count, |monitor| run(&space, &data, &options, monitor))?;
+    let found = watched(py, progress, curves * count, is_heavy(&space), |monitor| {
+        run(&space, &data, &options, monitor)
+    })?;
 
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
     Ok((

@@ -1,11 +1,11 @@
 //! The compiled side of a space.
 
-use crate::arrays::{in_order, room, zeros};
+use crate::arrays::{in_order, require_room, room, zeros};
 use crate::errors::{CutLocusError, invalid, place};
-use crate::watch::watched;
+use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::rows::{Operation, apply, project_points, tangent_defects};
+use symspline::rows::{Operation, apply, memory, project_points, tangent_defects};
 use symspline::space::{Ambient, Origin};
 use symspline::spaces::{self, AnySpace};
 
@@ -16,6 +16,12 @@ pub struct Handle {
 }
 
 impl Handle {
+    /// The space for a message, such as "gl:3".
+    pub fn described(&self) -> String {
+        let (name, parameters) = self.space.name();
+        format!("{name}:{}", parameters.iter().map(usize::to_string).collect::<Vec<_>>().join(","))
+    }
+
     /// Number of axes of a point's array of doubles.
     pub fn point_axes(&self) -> usize {
         self.space.get().point_shape().len()
@@ -89,10 +95,13 @@ impl Handle {
         let t = t.as_ref().map_or(Ok(&[][..]), in_order)?;
         let len = self.space.get().point_len();
         let rows = slices[0].len() / len;
+        require_room(memory(&self.space.get(), Some(operation)), || {
+            format!("this operation on {}", self.described())
+        })?;
         let out = zeros(py, &[rows * operation.row_len(len)])?;
         let mut write = out.readwrite();
         let result = write.as_slice_mut()?;
-        let done = watched(py, None, rows, |monitor| {
+        let done = watched(py, None, rows, is_heavy(&self.space.get()), |monitor| {
             apply(&self.space.get(), operation, &slices, t, monitor, result)
         })?;
         drop(write);
@@ -120,6 +129,7 @@ impl Handle {
         tol: f64,
     ) -> PyResult<()> {
         let points = in_order(&points)?;
+        require_room(memory(&self.space.get(), None), || format!("checking points of {}", self.described()))?;
         let mut copy = room(points.len())?;
         copy.extend_from_slice(points);
         let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
@@ -136,6 +146,9 @@ impl Handle {
         points: PyReadonlyArrayDyn<'py, f64>,
         vectors: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        require_room(memory(&self.space.get(), None), || {
+            format!("checking vectors on {}", self.described())
+        })?;
         drop(room::<f64>(2 * points.shape()[0])?);
         let defects = tangent_defects(&self.space.get(), in_order(&points)?, in_order(&vectors)?);
         let shape = [points.shape()[0]];

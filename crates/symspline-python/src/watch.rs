@@ -4,11 +4,23 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::{Duration, Instant};
 use symspline::monitor::Monitor;
+use symspline::space::{Ambient, Erased, Origin};
 
 /// How often Python gets a look.
 const INTERVAL: Duration = Duration::from_millis(50);
+
+/// Numbers of a point, and dimensions, from which one step of work may take long.
+const HEAVY_POINT: usize = 900;
+const HEAVY_DIM: usize = 48;
+
+/// Whether work on a space may need to be stopped within one step.
+pub fn is_heavy(space: &Erased) -> bool {
+    space.point_shape().len() > 1 && (space.point_len() >= HEAVY_POINT || space.dim() >= HEAVY_DIM)
+}
 
 /// Runs `work` without the GIL. From time to time signals are checked and `progress` is called with
 /// the finished and the total number of units; an exception in either stops the work. A panic is a RuntimeError.
@@ -16,6 +28,7 @@ pub fn watched<T: Send>(
     py: Python,
     progress: Option<Py<PyAny>>,
     total: usize,
+    heavy: bool,
     work: impl FnOnce(&Monitor) -> T + Send,
 ) -> PyResult<T> {
     let state = Mutex::new((Instant::now(), None::<PyErr>));
@@ -32,7 +45,28 @@ pub fn watched<T: Send>(
         state.1.is_none()
     };
     let monitor = Monitor::new(&go_on);
-    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&monitor))));
+    let result = py.detach(|| {
+        if !heavy {
+            return catch_unwind(AssertUnwindSafe(|| work(&monitor)));
+        }
+        // One step of such work may take minutes. Another thread does it, and this one asks for signals.
+        let owner = thread::current();
+        let finished = AtomicBool::new(false);
+        thread::scope(|scope| {
+            let worker = scope.spawn(|| {
+                let _listening = monitor.listen();
+                let result = catch_unwind(AssertUnwindSafe(|| work(&monitor)));
+                finished.store(true, Ordering::Release);
+                owner.unpark();
+                result
+            });
+            while !finished.load(Ordering::Acquire) {
+                thread::park_timeout(INTERVAL / 5);
+                monitor.poll();
+            }
+            worker.join().and_then(|result| result)
+        })
+    });
     if let Ok(Some(error)) = state.into_inner().map(|s| s.1) {
         return Err(error);
     }

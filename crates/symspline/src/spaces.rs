@@ -22,6 +22,9 @@ pub fn all() -> impl Iterator<Item = &'static Entry> {
     .flatten()
 }
 
+/// Numbers in the name of a space are at most this, so that sizes of arrays do not overflow.
+const LARGEST: usize = 1 << 24;
+
 /// Any of the spaces.
 #[derive(Clone)]
 pub struct AnySpace {
@@ -45,6 +48,9 @@ impl AnySpace {
                 names.join(", "),
                 parameters.len()
             ));
+        }
+        if let Some(large) = parameters.iter().find(|&&n| n > LARGEST) {
+            return Err(format!("{name}: {large} is too large; numbers up to {LARGEST} are allowed"));
         }
         let table = (entry.make)(parameters)?;
         Ok(AnySpace { name: entry.names[0], parameters: parameters.to_vec(), table })

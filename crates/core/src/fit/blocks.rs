@@ -1,5 +1,6 @@
 //! Block tridiagonal systems, cyclic ones too: the Jacobian of the C² condition.
 
+use crate::monitor::checkpoint;
 use crate::scalar::Lane;
 
 /// Blocks of m × m numbers, row by row: those left of, on and right of the diagonal. In a cyclic system
@@ -146,6 +147,7 @@ impl Blocks {
 /// `c −= a b` for an m × m matrix a and m × `columns` matrices b and c.
 fn subtract_product(a: &[Lane], b: &[Lane], c: &mut [Lane], m: usize, columns: usize) {
     for r in 0..m {
+        checkpoint();
         for k in 0..m {
             let factor = -a[r * m + k];
             for j in 0..columns {
@@ -158,6 +160,7 @@ fn subtract_product(a: &[Lane], b: &[Lane], c: &mut [Lane], m: usize, columns: u
 /// Gauss–Jordan elimination of the first m columns of m rows, with row exchanges lane by lane.
 fn eliminate(a: &mut [Lane], m: usize, width: usize) {
     for k in 0..m {
+        checkpoint();
         for i in k + 1..m {
             let larger = a[i * width + k].abs().simd_gt(a[k * width + k].abs());
             if larger.any() {

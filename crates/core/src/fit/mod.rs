@@ -30,8 +30,8 @@ pub use ends::{ChainEnds, EndKind, NotAKnot};
 pub use solve::SolverSet;
 
 use crate::monitor::Monitor;
-use crate::scalar::{Lane, lane};
-use crate::space::{Ambient, Erased};
+use crate::scalar::{LANES, Lane, lane};
+use crate::space::{Ambient, Erased, Frame, Origin};
 use pieces::{OVERLAP, Piece, fit_cut};
 
 /// Curves with more segments than this are cut into pieces.
@@ -214,6 +214,19 @@ impl Default for Report {
             condition: 1.0,
         }
     }
+}
+
+/// About how many numbers of eight bytes the fit of eight curves takes at a time.
+pub fn memory(space: &Erased, nodes: usize, method: Method) -> f64 {
+    let (nodes, m) = (nodes.min(LONG) as f64, space.dim() as f64);
+    // Chords, velocities, residuals and steps at every node, and the history of Anderson's mixing.
+    let chain = LANES as f64 * (nodes * (20.0 * m + space.chord_len() as f64) + space.frame_len() as f64);
+    let jacobian = match method {
+        // Auto leaves out what does not fit.
+        Method::Auto | Method::FixedPoint | Method::QuasiNewton => 0.0,
+        Method::Newton | Method::Homotopy => LANES as f64 * (3.0 * nodes + 4.0) * m * m,
+    };
+    chain + jacobian + crate::rows::memory(space, None)
 }
 
 /// Fits all curves of a problem; velocities get the layout of the points. Curves at fault are NaN.

@@ -8,6 +8,7 @@ use super::blocks::Blocks;
 use super::chain::Chain;
 use super::condition::{NodeVectors, sweep};
 use super::ends::ChainEnds;
+use crate::monitor::checkpoint;
 use crate::scalar::{Dual, Lane, Scalar};
 use crate::space::Erased;
 
@@ -66,6 +67,7 @@ impl Newton {
                     chain.across_seam(space, true, &mut seed);
                     last.iter_mut().zip(seed).for_each(|(u, d)| u.d = d);
                 }
+                checkpoint();
                 sweep(space, chain, ends, &self.u, &mut self.r, &mut self.vectors, Lane::ZERO);
                 for i in 0..nodes {
                     // A row sees the coloured one of its three nodes; of two equal ones (a closed curve of

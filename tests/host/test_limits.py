@@ -1,0 +1,152 @@
+"""No input aborts the process: sizes that no memory holds are errors, and long calls end soon after Ctrl-C."""
+
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory as Linux has them")
+
+LIMITED = """
+import resource
+import sys
+import time
+
+import numpy as np
+
+import symspline as ss
+
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+refused = (ss.ValidationError, ss.CutLocusError, ss.ConvergenceError, MemoryError)
+"""
+
+
+def run(script, timeout=100):
+    """What a script prints in a process with 4 GB of address space."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", LIMITED + textwrap.dedent(script)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+    )
+    assert done.returncode == 0, (done.returncode, done.stderr[-2000:])
+    return done.stdout
+
+
+def test_names_of_huge_spaces_do_not_abort():
+    script = """
+    families = ["r", "sphere", "h", "rp", "cp", "ch", "hp", "so", "o", "u", "su", "spd", "sspd", "hpd", "siegel",
+                "gl", "cgl", "sl", "sp", "aff", "sim", "lorentz"]
+    names = [f"{family}:{n}" for family in families for n in (300, 3000, 20_000, 100_000, 10**7, 2**24, 10**12)]
+    names += [f"{family}:{k},{n}" for family in ("gr", "cgr", "st") for k in (2, 400) for n in (10**5, 10**9)]
+    names += ["igr:0,1,1099511627776,1", "igr:0,1,3000,3000", "se:3 x gl:100000", "sphere:2 x so:100000"]
+    made = 0
+    for name in names:
+        try:
+            space = ss.space(name)
+            made += 1
+            space.dim, repr(space), space.point_shape
+            # Small ones are other tests' matter, and what takes long can be stopped.
+            if 3000 <= max(map(int, name.replace(":", ",").replace(" x ", ",").split(",")[-1:])):
+                p = space.random_point(np.random.default_rng(0), (1,))
+                space.check_point(p)
+        except refused:
+            pass
+    print(len(names), made)
+    """
+    count, made = map(int, run(script, 300).split())
+    assert count > 160 and made > 60
+
+
+@pytest.mark.parametrize(
+    ("name", "nodes", "options", "words"),
+    [
+        ("spd:100", 20, {"method": "newton"}, "method='quasi-newton' needs far less"),
+        ("so:60", 30, {"method": "homotopy"}, "so:60"),
+        ("so:60", 2, {}, None),
+        ("spd:40", 12, {}, None),
+    ],
+)
+def test_fits_in_many_dimensions_do_not_abort(name, nodes, options, words):
+    script = f"""
+    space = ss.space({name!r})
+    rng = np.random.default_rng(1)
+    first = space.random_point(rng)
+    v = space.random_tangent(rng, np.broadcast_to(first, ({nodes}, *first.shape)))
+    points = space.exp(first, 0.05 * v)
+    try:
+        print(ss.CubicSpline(None, points, space, **{options!r}).report.converged)
+    except MemoryError as error:
+        print(error)
+    """
+    said = run(script)
+    if words is None:
+        assert said.strip() == "True"
+    else:
+        assert words in said and "GB" in said
+
+
+LONG_CALLS = {
+    "newton": "ss.CubicSpline(None, far(ss.space('spd:14'), 40), 'spd:14', method='newton', max_iter=10**6, tol=0)",
+    "homotopy": "ss.CubicSpline(None, far(ss.space('so:12'), 60), 'so:12', method='homotopy')",
+    "fixed-point": "ss.CubicSpline(None, far(ss.space('so:9'), 300), 'so:9', method='fixed-point', tol=0, max_iter=10**7)",
+    "auto": "ss.CubicSpline(None, far(ss.space('so:20'), 60), 'so:20')",
+    "vjp": "spline('so:12', 60).vjp(30.0, np.ones((12, 12)))",
+    "jvp": "spline('so:12', 60).jvp(30.0, points=np.zeros((60, 12, 12)))",
+    "log": "many(ss.space('so:150'), 'log')",
+    "large log": "one(ss.space('u:280'))",
+    "geodesic": "many(ss.space('spd:120'), 'distance')",
+    "evaluate": "spline('spd:30', 4)(np.linspace(0, 3, 10**6))",
+    "smooth": "ss.make_smoothing_spline(None, far(ss.space('spd:9'), 400), 'spd:9', method='newton')",
+    "gl": "many(ss.space('gl:120'), 'log')",
+}
+
+
+@pytest.mark.parametrize("call", LONG_CALLS)
+def test_long_calls_end_soon_after_a_signal(call):
+    script = f"""
+    import signal
+    import threading
+
+    def far(space, nodes):
+        rng = np.random.default_rng(2)
+        p = space.random_point(rng)
+        return space.exp(p, 0.4 * space.random_tangent(rng, np.broadcast_to(p, (nodes, *p.shape))))
+
+    def spline(name, nodes):
+        space = ss.space(name)
+        return ss.CubicSpline(None, far(space, nodes), space, method="quasi-newton", on_failure="ignore")
+
+    def one(space):
+        p = far(space, 2)
+        begin_to_count()
+        return space.log(p[0], p[1])
+
+    def many(space, name):
+        p = far(space, 40)
+        begin_to_count()
+        while True:
+            getattr(space, name)(p, p[::-1])
+
+    sent = []
+
+    def begin_to_count():
+        sent.clear()
+
+    def interrupt():
+        sent.append(time.monotonic())
+        signal.raise_signal(signal.SIGINT) if False else signal.pthread_kill(main, signal.SIGINT)
+
+    main = threading.main_thread().ident
+    timer = threading.Timer(1.5, interrupt)
+    timer.start()
+    try:
+        {LONG_CALLS[call]}
+        print("done")
+    except KeyboardInterrupt:
+        print(time.monotonic() - sent[-1])
+    """
+    said = run(script, 60).strip()
+    # A machine that is fast enough may finish before the signal comes.
+    assert said == "done" or float(said) < 1.0, said
