@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ._core import ValidationError
 from .archive import FORMAT, HERMITE, LISTS, MANY, SMOOTHING, VERSION, rich, write
 from .arrays import brief, shown
+from .curves.ends import is_closed
 from .curves.fit import curve_of, read_ends
 from .handed import NO_ZONE, UTC_ZONE
 from .hermite import HermiteSpline
@@ -186,7 +187,8 @@ def _read(arrays: dict[str, NDArray[Any]]) -> CubicSpline | HermiteSpline:
 def _smoothing(arrays: dict[str, NDArray[Any]]) -> SmoothingSpline:
     clock, t = _times(arrays, "data_t")
     spline = _cubic(arrays, clock)
-    return SmoothingSpline._like(spline, *read_stored(arrays, clock, t, spline._curve))
+    closed = is_closed(spline.bc_type)
+    return SmoothingSpline._like(spline, *read_stored(arrays, clock, t, spline._curve, closed))
 
 
 def _cubic(arrays: dict[str, NDArray[Any]], counted: Clock | None = None) -> CubicSpline:

@@ -1,6 +1,5 @@
 //! Symmetric banded matrices, eight side by side.
 
-use std::ops::Range;
 use symspline_core::scalar::Lane;
 
 /// Entries on the diagonal and `width` places left of it, row by row; after [`factor`](Banded::factor) those of L and
@@ -28,6 +27,12 @@ impl Banded {
     fn place(&self, i: usize, j: usize) -> usize {
         let (row, column) = if i >= j { (i, j) } else { (j, i) };
         row * (self.width + 1) + row - column
+    }
+
+    /// A place inside the band.
+    pub fn entry(&mut self, i: usize, j: usize) -> &mut Lane {
+        let place = self.place(i, j);
+        &mut self.entries[place]
     }
 
     /// An entry inside the band.
@@ -69,9 +74,9 @@ impl Banded {
             .fold(Lane::splat(f64::INFINITY), |least, d| d.simd_lt(least).select(d, least))
     }
 
-    /// Of a factored matrix: ln det A, or what some rows have of it.
-    pub fn log_det(&self, rows: Range<usize>) -> Lane {
-        rows.fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
+    /// Of a factored matrix: ln det A.
+    pub fn log_det(&self) -> Lane {
+        (0..self.size).fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
     }
 
     /// Of a factored matrix: A⁻¹x in place, for rows of several numbers.

@@ -35,6 +35,7 @@ pub fn smooth<'py>(
     sigma: Array<'py>,
     ends: Option<[EndOf<'py>; 2]>,
     criterion: &str,
+    gamma: f64,
     loss: &str,
     method: &str,
     tol: f64,
@@ -42,7 +43,7 @@ pub fn smooth<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Smoothed<'py>> {
     let options = Options {
-        criterion: criterion_named(criterion)?,
+        criterion: criterion_named(criterion, gamma)?,
         loss: match loss {
             "linear" => Loss::Linear,
             "huber" => Loss::Huber,
@@ -136,10 +137,11 @@ pub fn smooth<'py>(
         .collect();
     let found = watched(py, progress, curves * count, |monitor| run(&space, &data, &options, monitor))?;
 
+    let coefficients = count + if ends.is_none() { 2 } else { 0 };
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
     Ok((
         gathered(py, &shape, &found, |smooth| &smooth.points)?,
-        gathered(py, &[batch, &[count, 4]].concat(), &found, |smooth| &smooth.inverse)?,
+        gathered(py, &[batch, &[coefficients, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
     ))
 }
@@ -178,14 +180,13 @@ fn gathered<'py>(
     Ok(out)
 }
 
-fn criterion_named(name: &str) -> PyResult<Criterion> {
+fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
     Ok(match name {
-        "gcv" => Criterion::Gcv { penalty: 1.0 },
-        "gcv1.4" => Criterion::Gcv { penalty: 1.4 },
+        "gcv" => Criterion::Gcv { gamma },
         "reml" => Criterion::Reml,
         "cp" => Criterion::Cp,
         _ => {
-            return Err(invalid(format!("criterion must be 'gcv', 'gcv1.4', 'reml' or 'cp', not {name:?}")));
+            return Err(invalid(format!("criterion must be 'gcv', 'reml' or 'cp', not {name:?}")));
         }
     })
 }
