@@ -224,8 +224,8 @@ def _count(spline: ss.SmoothingSpline) -> str:
 # ---- the choice of λ, and other ways ----
 
 CRITERIA: dict[str, dict[str, Any]] = {
-    "GCV": {},
-    "GCV 1.4": {"criterion": "gcv1.4"},
+    "GCV": {"gamma": 1.0},
+    "GCV 1.4": {"criterion": "gcv", "gamma": 1.4},
     "REML": {"criterion": "reml"},
     "C_p": {"criterion": "cp"},
 }

@@ -8,8 +8,7 @@ A camera goes round a table, and its tracking is off by 4 cm and 3 degrees.
 # %%
 # The naive way
 # -------------
-# One smoothing for the pose as a whole. In ``se:3`` metres and radians count alike, and one λ has to do for both: which
-# of them it suits depends on the unit of length.
+# A spline through the poses keeps all of their noise.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -28,13 +27,13 @@ space = ss.space("r:3 x so:3")
 noise = [0.04 * rng.standard_normal((len(t), 3)), np.radians(3) * rng.standard_normal((len(t), 3))]
 tracked = (truth[0] + noise[0], truth[1] @ Rotation.from_rotvec(noise[1]).as_matrix())
 
-pose = ss.make_smoothing_spline(t, ss.poses.join(tracked[1], tracked[0]), "se:3")
+pose = ss.CubicSpline(t, ss.poses.join(tracked[1], tracked[0]), "se:3")
 attitude, place = ss.poses.split(pose(t))
 
 # %%
 # A λ for each
 # ------------
-# In the product of R³ and SO(3) places and attitudes are each smoothed by as much as they need.
+# Places and attitudes are each smoothed by as much as they need: in the product of R³ and SO(3), and in ``se:3`` too.
 
 path = ss.make_smoothing_spline(t, tracked, space)
 print(
@@ -43,7 +42,7 @@ print(
     )
 )
 
-for name, places, attitudes in (("one λ", place, attitude), ("a λ for each", *path(t))):
+for name, places, attitudes in (("through the poses", place, attitude), ("smooth", *path(t))):
     off = ss.space("r:3").distance(places, truth[0]), ss.space("so:3").distance(attitudes, truth[1])
     print(f"{name}: off by {100 * off[0].mean():.1f} cm, {np.degrees(off[1].mean()):.2f} degrees")
 
@@ -59,7 +58,7 @@ for name, seen, whole, smooth, true, unit in zip(
     ["r:3", "so:3"], tracked, (place, attitude), path(t), truth, [100, 180 / np.pi], strict=True
 ):
     axes[name].plot(t, unit * ss.space(name).distance(seen, true), ".", color="0.75")
-    axes[name].plot(t, unit * ss.space(name).distance(whole, true), color="C1", linewidth=1, label="se:3")
+    axes[name].plot(t, unit * ss.space(name).distance(whole, true), color="C1", linewidth=1, label="through the poses")
     axes[name].plot(t, unit * ss.space(name).distance(smooth, true))
 axes["r:3"].set(title="Distance from the truth", ylabel="centimetres", xticklabels=[])
 axes["r:3"].legend(loc="upper left")

@@ -30,6 +30,7 @@ from .segments import fit_segments  # noqa: E402
 from .smoothing import (  # noqa: E402
     SmoothingReport,
     SmoothingSpline,
+    SmoothingWarning,
     make_lsq_spline,
     make_smoothing_spline,
 )
@@ -104,6 +105,7 @@ __all__ = [
     "Similarity",
     "SmoothingReport",
     "SmoothingSpline",
+    "SmoothingWarning",
     "Space",
     "SpecialEuclidean",
     "SpecialLinear",

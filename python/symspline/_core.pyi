@@ -107,6 +107,7 @@ def smooth(
     sigma: _Doubles,
     ends: Sequence[tuple[str, _Doubles | None]] | None,
     criterion: str,
+    gamma: float,
     loss: str,
     method: str,
     tol: float,

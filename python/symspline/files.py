@@ -28,6 +28,7 @@ from .archive import (
     write,
 )
 from .arrays import brief, shown
+from .curves.ends import is_closed
 from .curves.fit import curve_of, read_ends
 from .disk import path_of
 from .handed import NO_ZONE, UTC_ZONE
@@ -221,7 +222,8 @@ def _read(arrays: Entries) -> CubicSpline | HermiteSpline:
 def _smoothing(arrays: Entries) -> SmoothingSpline:
     clock, t = _times(arrays, "data_t")
     spline = _cubic(arrays, clock)
-    return SmoothingSpline._like(spline, *read_stored(arrays, clock, t, spline._curve))
+    closed = is_closed(spline.bc_type)
+    return SmoothingSpline._like(spline, *read_stored(arrays, clock, t, spline._curve, closed))
 
 
 def _cubic(arrays: Entries, counted: Clock | None = None) -> CubicSpline:

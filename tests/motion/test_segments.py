@@ -157,6 +157,7 @@ def noisy(space, seed=0):
     return t, tuple(both) if isinstance(smooth, tuple) else both[0]
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "spd:3", "so:3 x r:3"])
 def test_noisy_pieces_are_smoothed_alone(name):
     space = ss.space(name)
@@ -197,7 +198,7 @@ def test_noisy_points_of_one_time_all_count():
 
 def test_of_noisy_pieces_that_fail_all_are_kept():
     t, p = noisy(ss.space("sphere:2"))
-    with pytest.raises(ss.ConvergenceError, match=r"curve 0: .* raise max_iter.*and 1 more") as caught:
+    with pytest.raises(ss.ConvergenceError, match=r"curve 0: .* Raise max_iter.*and 1 more") as caught:
         ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1)
     assert [len(piece.t) for piece in caught.value.spline] == [30, 30]
     with pytest.warns(ss.ConvergenceWarning, match="curve 0: "):

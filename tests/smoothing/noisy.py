@@ -32,3 +32,8 @@ def example(name, sigma=0.1, n=60, seed=0, **options):
 def rms(space, p, q):
     """Root mean squared distance."""
     return np.sqrt(np.mean(space.distance(p, q) ** 2, axis=-1))
+
+
+def each(value):
+    """One value, or those of the parts of a product or of poses."""
+    return value if isinstance(value, tuple) else (value,)

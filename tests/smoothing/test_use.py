@@ -61,26 +61,32 @@ def test_curves_of_a_batch_may_have_times_of_their_own():
 
 
 def test_what_failed_is_told_and_kept():
-    with pytest.raises(ss.ConvergenceError, match="raise max_iter") as caught:
+    with pytest.raises(ss.ConvergenceError, match="Raise max_iter") as caught:
         ss.make_smoothing_spline(T, NOISY, S2, max_iter=1)
     assert not caught.value.spline.report.converged
     with pytest.warns(ss.ConvergenceWarning):
         spline = ss.make_smoothing_spline(T, NOISY, S2, max_iter=1, on_failure="warn")
     assert "NOT converged" in str(spline.report)
-    with pytest.raises(ss.ConvergenceError, match="each knot needs some beside it"):
+    with pytest.raises(ss.ConvergenceError, match="every knot needs data beside it"):
         ss.make_lsq_spline(T[:6], NOISY[:6], np.linspace(0, T[5], 30), S2)
 
 
-def test_a_bound_is_told():
-    line = S2.exp(np.broadcast_to([1.0, 0, 0], (40, 3)), T[:, None] * [0, 0.1, 0])
-    straight = ss.make_smoothing_spline(T, line, S2, on_failure="ignore")
-    assert straight.report.at_bound or straight.df > 30
-    rng = np.random.default_rng(0)
-    noisy = ss.make_smoothing_spline(
-        T, 0.3 * T[:, None] + rng.standard_normal((40, 1)), "r:1", criterion="reml"
-    )
-    if noisy.report.at_bound:
-        assert "at its bound: a geodesic" in str(noisy.report)
+def test_bounds_are_warned_of():
+    """White noise has no curve: the smoothest one is chosen. With much too small a noise level the data are met."""
+    noise = np.random.default_rng(1).standard_normal((40, 1))
+    with pytest.warns(ss.SmoothingWarning, match=r"The smoothing chose the largest lam.*\(2\.0\d degrees"):
+        stiff = ss.make_smoothing_spline(T, 0.3 * T[:, None] + noise, "r:1", criterion="reml")
+    assert "at its bound: a geodesic" in str(stiff.report)
+    with pytest.warns(ss.SmoothingWarning, match=r"goes through nearly all data .* criterion='reml'"):
+        rough = ss.make_smoothing_spline(T, noise, "r:1", criterion="cp", sigma=1e-6)
+    assert rough.df > 39
+    both = np.stack([noise, np.sin(T)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))])
+    with pytest.warns(ss.SmoothingWarning, match=r"of curve 0 chose the largest lam"):
+        ss.make_smoothing_spline(T, both, "r:1", criterion="reml")
+    with pytest.warns(ss.SmoothingWarning, match=r"in factor 1, Euclidean\(1\) chose"):
+        ss.make_smoothing_spline(T, (both[1], both[0]), "r:1 x r:1", criterion="reml")
+    # A λ that was given is nobody's choice.
+    ss.make_smoothing_spline(T, noise, "r:1", 1e12)
 
 
 def test_two_times_make_a_geodesic():
@@ -96,6 +102,7 @@ def test_two_times_make_a_geodesic():
         assert spline.sigma == pytest.approx(np.std(spline.residuals) * np.sqrt(100 / 98))
 
 
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_three_points_that_are_met_are_no_geodesic():
     spline = ss.make_smoothing_spline([0.0, 1.0, 2.0], NOISY[[0, 20, 30]], S2, criterion="reml")
     assert "a geodesic" not in str(spline.report) or spline.df < 2.5
@@ -120,8 +127,10 @@ def test_three_points_that_are_met_are_no_geodesic():
         ({"criterion": "aic"}, "criterion must be"),
         ({"criterion": 3}, "criterion must be a word, not 3"),
         ({"tol": True}, "tol must be"),
-        ({"bc_type": "periodic", "knots": 3}, "a closed curve needs at least 4 knots"),
-        ({"criterion": "cp"}, "needs sigma"),
+        ({"bc_type": "periodic", "knots": 3}, "A closed curve needs at least 4 knots"),
+        ({"criterion": "cp"}, "Pass sigma"),
+        ({"gamma": 0.9}, "gamma must be a number >= 1"),
+        ({"criterion": "gcv1.4"}, "criterion must be 'gcv'"),
         ({"loss": "l1"}, "loss must be"),
         ({"method": "fast"}, "method must be"),
         ({"tol": 0.0}, "tol must be"),

@@ -105,7 +105,7 @@ def test_errors_come_before_it():
 
 def test_noisy_quaternions_and_those_with_velocities():
     for make in (
-        lambda q: ss.make_smoothing_spline(None, q, "sphere:3"),
+        lambda q: ss.make_smoothing_spline(None, q, "sphere:3", 1.0),
         lambda q: ss.HermiteSpline(None, q, 0 * q, "sphere:3"),
     ):
         silent(lambda make=make: make(motion()))

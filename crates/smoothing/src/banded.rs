@@ -1,6 +1,6 @@
 //! Symmetric banded matrices, eight side by side.
 
-use std::ops::Range;
+use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::Lane;
 
 /// Entries on the diagonal and `width` places left of it, row by row; after [`factor`](Banded::factor) those of L and
@@ -30,6 +30,12 @@ impl Banded {
         row * (self.width + 1) + row - column
     }
 
+    /// A place inside the band.
+    pub fn entry(&mut self, i: usize, j: usize) -> &mut Lane {
+        let place = self.place(i, j);
+        &mut self.entries[place]
+    }
+
     /// An entry inside the band.
     pub fn at(&self, i: usize, j: usize) -> Lane {
         self.entries[self.place(i, j)]
@@ -40,6 +46,7 @@ impl Banded {
         let (w, stride) = (self.width, self.width + 1);
         let mut scaled = vec![Lane::ZERO; stride];
         for i in 0..self.size {
+            checkpoint();
             let most = w.min(i);
             // L_ij D_j = A_ij − Σ_k L_ik D_k L_jk, from the farthest column on.
             for d in (1..=most).rev() {
@@ -69,15 +76,16 @@ impl Banded {
             .fold(Lane::splat(f64::INFINITY), |least, d| d.simd_lt(least).select(d, least))
     }
 
-    /// Of a factored matrix: ln det A, or what some rows have of it.
-    pub fn log_det(&self, rows: Range<usize>) -> Lane {
-        rows.fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
+    /// Of a factored matrix: ln det A.
+    pub fn log_det(&self) -> Lane {
+        (0..self.size).fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
     }
 
     /// Of a factored matrix: A⁻¹x in place, for rows of several numbers.
     pub fn solve(&self, columns: usize, x: &mut [Lane]) {
         let (w, stride) = (self.width, self.width + 1);
         for i in 0..self.size {
+            checkpoint();
             let (before, here) = x.split_at_mut(i * columns);
             for d in 1..=w.min(i) {
                 let l = self.entries[i * stride + d];
@@ -86,6 +94,7 @@ impl Banded {
             }
         }
         for i in (0..self.size).rev() {
+            checkpoint();
             let (here, behind) = x[i * columns..].split_at_mut(columns);
             let inverse = Lane::ONE / self.entries[i * stride];
             here.iter_mut().for_each(|x| *x *= inverse);
@@ -103,6 +112,7 @@ impl Banded {
         let (n, w, stride) = (self.size, self.width, self.width + 1);
         let mut z = Banded::zeros(n, w);
         for i in (0..n).rev() {
+            checkpoint();
             let most = w.min(n - 1 - i);
             for d in (0..=most).rev() {
                 let j = i + d;

@@ -20,7 +20,7 @@ pub fn quantile(m: usize, probability: f64) -> f64 {
 }
 
 /// `P(m/2, x/2)`, by its series (DLMF 8.7.1) `e⁻ʸ yᵃ Σ yᵏ/Γ(a + k + 1)`.
-fn distribution(m: usize, x: f64) -> f64 {
+pub fn distribution(m: usize, x: f64) -> f64 {
     let (a, y) = (0.5 * m as f64, 0.5 * x);
     if y == 0.0 {
         return 0.0;

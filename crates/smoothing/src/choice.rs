@@ -5,6 +5,7 @@
 //! `(S + RP)ᵀMa`. Its residuals and degrees of freedom for eight λ at a time cost one banded solve.
 
 use crate::curved::Curved;
+use crate::cyclic::Seam;
 use crate::flat::{Flat, times_mass};
 use crate::misfit::{Factors, Misfit};
 use symspline_core::scalar::{LANES, Lane, few, lane};
@@ -12,10 +13,10 @@ use symspline_core::scalar::{LANES, Lane, few, lane};
 /// How λ is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Criterion {
-    /// Generalised cross-validation (Craven & Wahba 1979); degrees of freedom count `penalty` times.
+    /// Generalised cross-validation (Craven & Wahba 1979); degrees of freedom count `gamma` times.
     Gcv {
         /// 1, or 1.4 against too rough curves (Gu 2013, §3.2).
-        penalty: f64,
+        gamma: f64,
     },
     /// Restricted maximum likelihood (Wahba 1985).
     Reml,
@@ -33,6 +34,8 @@ pub struct Linear<'a> {
     pub misfit: &'a Misfit<'a>,
     /// Jacobi's operator, where it is not left out.
     pub curved: Option<&'a Curved>,
+    /// How a closed curve goes on.
+    pub seam: Option<&'a Seam>,
     /// Accelerations at the knots.
     pub bends: &'a [f64],
     /// The standard deviation of the noise, for [`Criterion::Cp`].
@@ -50,6 +53,7 @@ impl<'a> Linear<'a> {
         m: usize,
         misfit: &'a Misfit<'a>,
         curved: Option<&'a Curved>,
+        seam: Option<&'a Seam>,
         bends: &'a [f64],
         curvature: &[f64],
         sigma: f64,
@@ -66,27 +70,27 @@ impl<'a> Linear<'a> {
                 }
             }
         }
-        if flat.own.knots.len() < flat.basis.count() {
-            // Where the turns of a closed curve end, splines end that should go on.
-            let (rows, edge) = (flat.basis.count(), 4.min(flat.own.knots.start));
-            for at in [0..edge * m, (rows - edge) * m..rows * m] {
-                pull[at.clone()].fill(0.0);
-                stiffness[at].fill(0.0);
-            }
+        if let Some(seam) = seam {
+            seam.fold(&mut pull);
+            seam.fold(&mut stiffness);
         }
-        Linear { flat, m, misfit, curved, bends, sigma, pull, stiffness }
+        Linear { flat, m, misfit, curved, seam, bends, sigma, pull, stiffness }
     }
 
     /// The step of the coefficients for one λ, given the factors of A.
     pub fn step(&self, lam: f64, factors: &Factors) -> Vec<f64> {
         let right: Vec<f64> =
             self.pull.iter().zip(&self.stiffness).map(|(pull, stiffness)| pull - lam * stiffness).collect();
-        factors.solve_one(self.m, &right)
+        let mut step = factors.solve_one(self.m, &right);
+        if let Some(seam) = self.seam {
+            seam.extend(&mut step);
+        }
+        step
     }
 
     /// A for eight λ.
     pub fn factored(&self, lam: Lane) -> Factors {
-        self.misfit.factored(self.flat, self.m, self.curved, lam)
+        self.misfit.factored(self.flat, self.m, self.curved, self.seam, lam)
     }
 
     /// What eight λ come to.
@@ -100,6 +104,9 @@ impl<'a> Linear<'a> {
             .map(|(pull, stiffness)| (-lam).mul_add(lane(*stiffness), lane(*pull)))
             .collect();
         factors.solve(m, &mut x);
+        if let Some(seam) = self.seam {
+            seam.extend_lanes(&mut x);
+        }
         let freedom = self.misfit.freedom(flat, &factors.inverse_band());
         let rss = self.misfit.rss(flat, m, &x);
         // (a + Sδ)ᵀM(a + Sδ), with Jacobi's operator (a + (S + RP)δ)ᵀM(a + (S + RP)δ).
@@ -109,15 +116,17 @@ impl<'a> Linear<'a> {
             lane(self.bends[i * m + c]) + flat.bends[i].of_lanes(&x, m, c) + turned
         };
         for c in 0..m {
-            let mut left = bend(flat.own.segments.start, c);
-            for i in flat.own.segments.clone() {
+            let mut left = bend(0, c);
+            for i in 0..flat.basis.knots() - 1 {
                 let right = bend(i + 1, c);
                 energy += (left * left + left * right + right * right) * lane(flat.basis.h(i) / 3.0);
                 left = right;
             }
         }
-        let definite = factors.least_pivot().simd_gt(Lane::ZERO);
-        Look { freedom, rss, energy, definite, log_det: factors.log_det(flat.own.knots.clone()) }
+        // What rounding leaves of a matrix may have degrees of freedom that no curve has.
+        let least = lane(0.9 * flat.null().min(flat.free() as f64));
+        let sound = factors.least_pivot().simd_gt(Lane::ZERO) & freedom.simd_gt(least);
+        Look { freedom, rss, energy, sound, log_det: factors.log_det() }
     }
 
     /// The λ that a criterion likes best, from a guess or from everywhere, and whether it lies at a bound.
@@ -128,8 +137,9 @@ impl<'a> Linear<'a> {
         const NEAR: f64 = 0.6;
         /// Decades that eight looks are enough for at first.
         const DECADES: f64 = 7.5;
-        /// Fewer degrees of freedom than this are a geodesic, for which every larger λ is as good.
-        const STRAIGHT: f64 = 2.01;
+        /// With so few degrees of freedom more than curves without energy have, every larger λ is as good.
+        const STRAIGHT: f64 = 0.01;
+        let straight = self.flat.null() + STRAIGHT;
         let start = self.flat.balance().log10();
         let (mut from, mut to) = (start + RANGE.0 + 3.0 * self.flat.basis.short().log10(), start + RANGE.1);
         let bounds = (from, to);
@@ -143,13 +153,13 @@ impl<'a> Linear<'a> {
                 few(|l| from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64);
             let found = self.look(Lane::new(at.map(|x| 10f64.powf(x))));
             let scores = self.score(criterion, Lane::new(at.map(|x| 10f64.powf(x))), &found).to_array();
-            let freedom = found.freedom.to_array();
+            let freedom = found.sound.select(found.freedom, lane(f64::NAN)).to_array();
             (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
         };
         (0..passes).for_each(|part| look(&mut seen, from, to, part, passes));
         for _ in 0..4 {
             seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let Some(best) = least(&seen, STRAIGHT) else { return (10f64.powf(from), true) };
+            let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
             let (left, right) = (best.saturating_sub(1), (best + 1).min(seen.len() - 1));
             (from, to) = (seen[left].0, seen[right].0);
             // At the end of a guess's neighbourhood the search goes on outside it.
@@ -164,32 +174,30 @@ impl<'a> Linear<'a> {
         }
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
         seen.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
-        let Some(best) = least(&seen, STRAIGHT) else { return (10f64.powf(from), true) };
-        let straight = seen.get(best + 1).is_none_or(|next| next.2 <= STRAIGHT);
-        let rough = best == 0 || !seen[best - 1].1.is_finite();
-        if rough || straight {
+        let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
+        let stiff = seen.get(best + 1).is_none_or(|next| next.2 <= straight);
+        if stiff || rough(&seen, best) {
             return (10f64.powf(seen[best].0), true);
         }
         (10f64.powf(lowest([seen[best - 1], seen[best], seen[best + 1]].map(|(x, y, _)| (x, y)))), false)
     }
 
     fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
-        let own = &self.flat.own;
-        let (n, m) = (self.misfit.count(own.data.clone(), self.m), self.m as f64);
+        let (n, m) = (self.misfit.count(self.m), self.m as f64);
         // Where no degrees of freedom are left, or rounding leaves no matrix, there is nothing to compare.
-        let known = (lane(n * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.definite;
+        let known = (lane(n * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.sound;
         let per = look.rss / lane(m);
         let score = match criterion {
-            Criterion::Gcv { penalty } => {
-                let left = lane(n) - look.freedom * lane(penalty);
-                // With 1.4 the denominator passes through zero: rougher curves than that are out of the question.
+            Criterion::Gcv { gamma } => {
+                let left = lane(n) - look.freedom * lane(gamma);
+                // With γ > 1 the denominator passes through zero: rougher curves than that are out of the question.
                 left.simd_gt(Lane::ZERO).select((per / (left * left)).ln(), lane(f64::INFINITY))
             }
             Criterion::Cp => per + look.freedom * lane(2.0 * self.sigma * self.sigma),
             Criterion::Reml => {
-                let count = own.knots.len() as f64;
-                lane(n - 2.0) * (per + lam * look.energy / lane(m)).ln() + look.log_det
-                    - lane(count - 2.0) * lam.ln()
+                let (count, null) = (self.flat.free() as f64, self.flat.null());
+                lane(n - null) * (per + lam * look.energy / lane(m)).ln() + look.log_det
+                    - lane(count - null) * lam.ln()
             }
         };
         known.select(score, lane(f64::INFINITY))
@@ -207,13 +215,29 @@ pub struct Look {
     /// ln det A.
     pub log_det: Lane,
     /// Where A is positive definite, as far as rounding tells.
-    pub definite: Lane,
+    pub sound: Lane,
 }
 
-/// The place of the least score among curves that are no geodesics, or the first geodesic if that is better.
+/// The place of the least score among curves that are no geodesics, or the first geodesic if that is better. Where the
+/// score is least for the roughest curve, which goes through the data, a minimum between the bounds is taken instead:
+/// cross-validation has one where noise is to be seen, however low the score falls beyond it.
 fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
     let end = seen.iter().position(|look| look.2 <= straight).map_or(seen.len(), |first| first + 1);
-    (0..end).filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
+    let lowest = |places: &mut dyn Iterator<Item = usize>| {
+        places.filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
+    };
+    let best = lowest(&mut (0..end))?;
+    // Where the curve hardly changes any more, rounding makes minima.
+    let below = |i: usize, j: usize| seen[j].1 - seen[i].1 > 1e-8 * (1.0 + seen[i].1.abs());
+    let inside = |i: &usize| !rough(seen, *i) && below(*i, i - 1) && below(*i, i + 1);
+    let between =
+        if rough(seen, best) { lowest(&mut (0..end.saturating_sub(1)).filter(inside)) } else { None };
+    between.or(Some(best))
+}
+
+/// Whether nothing rougher than one of the curves is known.
+fn rough(seen: &[(f64, f64, f64)], place: usize) -> bool {
+    place == 0 || !seen[place - 1].1.is_finite()
 }
 
 /// Where the parabola through three points is lowest; the middle one is.

@@ -2,7 +2,7 @@
 //! u (Jacobi's operator). The flat problem leaves R out, which says too little of curves that are nearly geodesic over
 //! long distances: of a great circle it takes `ξ'' + ξ` for `ξ''`, and a wave around it, which costs nothing, for bent.
 
-use crate::flat::{Flat, FlatEnd, times_mass};
+use crate::flat::{Flat, times_mass};
 use crate::frames::curvature_terms;
 use crate::misfit::stride;
 use symspline_core::scalar::{Lane, lane};
@@ -21,7 +21,7 @@ impl Curved {
     /// For velocities at the knots, in units of the mean knot spacing.
     pub fn new(space: &Erased, flat: &Flat, speeds: &[f64]) -> Self {
         let m = space.dim();
-        let knots = flat.basis.count();
+        let knots = flat.basis.knots();
         let mut turns = vec![0.0; knots * m * m];
         for column in 0..m {
             let unit: Vec<f64> = (0..knots * m).map(|i| f64::from(i % m == column)).collect();
@@ -32,11 +32,11 @@ impl Curved {
         }
         // Natural ends have no acceleration, and so none to change.
         for (end, knot) in [(0, 0), (1, knots - 1)] {
-            if flat.basis.ends[end] == FlatEnd::Natural {
+            if flat.basis.is_natural(end) {
                 turns[knot * m * m..][..m * m].fill(0.0);
             }
         }
-        let mut curved = Curved { m, turns, penalty: vec![0.0; knots * m * stride(m)] };
+        let mut curved = Curved { m, turns, penalty: vec![0.0; flat.basis.count() * m * stride(m)] };
         for i in 0..knots - 1 {
             let sixth = flat.basis.h(i) / 6.0;
             for (left, right, factor) in [(i, i, 2.0), (i + 1, i + 1, 2.0), (i, i + 1, 1.0), (i + 1, i, 1.0)]
@@ -100,7 +100,7 @@ impl Curved {
     pub fn pull(&self, flat: &Flat, bends: &[f64]) -> Vec<f64> {
         let m = self.m;
         let mass = times_mass(&flat.basis, bends, m);
-        let mut out = vec![0.0; mass.len()];
+        let mut out = vec![0.0; flat.basis.count() * m];
         for (knot, x) in mass.chunks_exact(m).enumerate() {
             let turn = self.turn(knot);
             let turned: Vec<f64> =

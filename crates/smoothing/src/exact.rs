@@ -25,10 +25,10 @@ pub struct Pull<'a> {
     pub points: &'a [f64],
     /// `log_γ y`.
     pub vectors: &'a [f64],
-    /// By what a robust loss multiplies it.
-    pub factors: &'a [f64],
     /// Weights.
     pub weights: &'a [f64],
+    /// By what a robust loss multiplies them; None for one.
+    pub factors: Option<&'a [f64]>,
     /// Of weights that are matrices their roots, and the frames of the data carried to the curve.
     pub information: Option<(&'a [Root], &'a [f64])>,
 }
@@ -98,15 +98,16 @@ pub fn step(
         let here = pull.places[first..].iter().take_while(|place| place.0 == *segment).count();
         for k in first..first + here {
             let r = &pull.vectors[k * len..][..len];
+            let factor = pull.factors.map_or(1.0, |factors| factors[k]);
             if let Some((roots, frames)) = pull.information {
                 let frame = &frames[k * m * len..][..m * len];
                 let (matrix, all) = at(0, k, Of::Point, &[r, frame].concat());
                 let (r, frame) = (all.column(0).into_owned(), all.columns(1, m).into_owned());
                 let (rows, _, own) = information::at(space, &roots[k].matrix, &frame, &r);
-                add(matrix, Some(&rows), own * pull.factors[k], 1.0);
+                add(matrix, Some(&rows), own, factor);
             } else {
                 let (matrix, r) = at(0, k, Of::Point, r);
-                add(matrix, None, r.column(0) * pull.factors[k], pull.weights[k]);
+                add(matrix, None, r.column(0).into_owned(), pull.weights[k] * factor);
             }
         }
         let h = path.t[*segment + 1] - path.t[*segment];

@@ -4,13 +4,15 @@
 //! energy ∫ x''² is cᵀΩc with Ω = SᵀMS, M being the mass matrix of hat functions. Times are divided by the mean knot
 //! spacing.
 
+use crate::Ends;
 use crate::banded::Banded;
-use std::ops::Range;
 use symspline_core::scalar::{Lane, lane};
 
 /// Places beside the diagonal in BᵀWB and Ω.
 pub const WIDTH: usize = 3;
 const BAND: usize = WIDTH + 1;
+/// Coefficients of a closed curve that come again behind the last one.
+pub const OVERLAP: usize = 3;
 
 /// What happens at an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,20 +83,35 @@ pub struct Basis {
     /// The mean knot spacing.
     pub spacing: f64,
     /// What happens at the ends.
-    pub ends: [FlatEnd; 2],
+    pub ends: Ends,
 }
 
 impl Basis {
     /// On increasing knots, two or more.
-    pub fn new(knots: &[f64], ends: [FlatEnd; 2]) -> Self {
+    pub fn new(knots: &[f64], ends: Ends) -> Self {
         let last = knots.len() - 1;
         let spacing = (knots[last] - knots[0]) / last as f64;
         Basis { tau: knots.iter().map(|t| (t - knots[0]) / spacing).collect(), spacing, ends }
     }
 
-    /// Number of coefficients, which is that of knots.
-    pub fn count(&self) -> usize {
+    /// Number of knots.
+    pub fn knots(&self) -> usize {
         self.tau.len()
+    }
+
+    /// Number of coefficients, which is that of knots. Of a closed curve the first [`OVERLAP`] come again at the end.
+    pub fn count(&self) -> usize {
+        self.tau.len() + if self.is_closed() { OVERLAP - 1 } else { 0 }
+    }
+
+    /// Whether the last knot is the first again.
+    pub fn is_closed(&self) -> bool {
+        self.ends == Ends::Periodic
+    }
+
+    /// Whether the second derivative vanishes at an end.
+    pub fn is_natural(&self, end: usize) -> bool {
+        matches!(self.ends, Ends::Open(ends) if ends[end] == FlatEnd::Natural)
     }
 
     /// Length of a segment, divided by the mean.
@@ -110,8 +127,14 @@ impl Basis {
     }
 
     /// Knots with the first and the last one three times more: the support of the i-th B-spline begins at the i-th.
+    /// Those of a closed curve go on periodically.
     fn extended(&self, i: usize) -> f64 {
-        self.tau[i.saturating_sub(3).min(self.tau.len() - 1)]
+        let last = self.tau.len() - 1;
+        if self.is_closed() {
+            let (turn, at) = ((i + last * 3 - 3) / last, (i + last * 3 - 3) % last);
+            return self.tau[at] + (turn as f64 - 3.0) * self.tau[last];
+        }
+        self.tau[i.saturating_sub(3).min(last)]
     }
 
     /// Value (`nu` = 0) or derivative of a spline at a place between 0 and 1 of a segment.
@@ -146,6 +169,9 @@ impl Basis {
     /// Without the outermost coefficients, which the conditions at the ends give.
     fn folded(&self, segment: usize, factors: [f64; 4]) -> Row {
         let n = self.tau.len() - 1;
+        if self.is_closed() {
+            return Row { first: segment, factors };
+        }
         // Coefficients from 1 to n + 1 are kept, and counted from zero.
         let first = segment.saturating_sub(1).min((n + 1).saturating_sub(4));
         let mut row = Row { first, factors: [0.0; 4] };
@@ -167,15 +193,13 @@ impl Basis {
     /// constant, which is no part of changes.
     fn outermost(&self, end: usize) -> [f64; 2] {
         let n = self.tau.len() - 1;
-        match self.ends[end] {
-            FlatEnd::Velocity => [1.0, 0.0],
-            FlatEnd::Natural => {
-                let (h, next) = if end == 0 { (0, 1) } else { (n - 1, n.saturating_sub(2)) };
-                let both = self.h(h) + if n > 1 { self.h(next) } else { 0.0 };
-                let ratio = self.h(h) / both;
-                [1.0 + ratio, -ratio]
-            }
+        if !self.is_natural(end) {
+            return [1.0, 0.0];
         }
+        let (h, next) = if end == 0 { (0, 1) } else { (n - 1, n.saturating_sub(2)) };
+        let both = self.h(h) + if n > 1 { self.h(next) } else { 0.0 };
+        let ratio = self.h(h) / both;
+        [1.0 + ratio, -ratio]
     }
 
     /// A derivative at every knot.
@@ -188,7 +212,7 @@ impl Basis {
 /// M times vectors at the knots, M being the mass matrix of hats: `∫ a b` of functions that are linear between knots.
 pub fn times_mass(basis: &Basis, a: &[f64], m: usize) -> Vec<f64> {
     let mut out = vec![0.0; a.len()];
-    for i in 0..basis.count() - 1 {
+    for i in 0..basis.knots() - 1 {
         let sixth = basis.h(i) / 6.0;
         for c in 0..m {
             let (left, right) = (a[i * m + c], a[(i + 1) * m + c]);
@@ -230,48 +254,39 @@ pub struct Flat {
     pub gram: Vec<f64>,
     /// Ω, likewise.
     pub penalty: Vec<f64>,
-    /// What is counted.
-    pub own: Own,
-}
-
-/// The part of a problem that is counted: of a closed curve, which is unrolled three times, the turn in the middle.
-#[derive(Clone)]
-pub struct Own {
-    /// Data.
-    pub data: Range<usize>,
-    /// Coefficients, and the knots that they belong to.
-    pub knots: Range<usize>,
-    /// Segments.
-    pub segments: Range<usize>,
-}
-
-impl Own {
-    /// All.
-    pub fn all(data: usize, knots: usize) -> Self {
-        Own { data: 0..data, knots: 0..knots, segments: 0..knots - 1 }
-    }
-
-    /// The turn in the middle of three.
-    pub fn turn(data: usize, knots: usize) -> Self {
-        let (data, n) = (data / 3, (knots - 1) / 3);
-        Own { data: data..2 * data, knots: n..2 * n, segments: n..2 * n }
-    }
 }
 
 impl Flat {
     /// For data that lie at places of segments, with their weights.
-    pub fn new(basis: Basis, places: &[(usize, f64)], weights: &[f64], own: Own) -> Self {
+    pub fn new(basis: Basis, places: &[(usize, f64)], weights: &[f64]) -> Self {
         let count = basis.count();
         let data: Vec<Row> = places.iter().map(|&(segment, place)| basis.row(segment, place, 0)).collect();
         let (values, bends) = (basis.at_knots(0), basis.at_knots(2));
-        let hats = (0..count - 1).flat_map(|i| {
+        let hats = (0..basis.knots() - 1).flat_map(|i| {
             let (s, sixth) = (&bends, basis.h(i) / 6.0);
             let (l, r) = (s[i], s[i + 1]);
             [(l, l, 2.0 * sixth), (r, r, 2.0 * sixth), (l, r, sixth), (r, l, sixth)]
         });
         let penalty = gram(count, hats);
-        let gram = gram(count, data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)));
-        Flat { data, values, bends, gram, penalty, basis, own }
+        let mut flat = Flat { data, values, bends, gram: Vec::new(), penalty, basis };
+        flat.gram = flat.gram_of(weights);
+        flat
+    }
+
+    /// BᵀWB for other weights.
+    pub fn gram_of(&self, weights: &[f64]) -> Vec<f64> {
+        gram(self.basis.count(), self.data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)))
+    }
+
+    /// Degrees of freedom of the curves without energy: straight lines, of which given velocities and closed ends leave
+    /// constants.
+    pub fn null(&self) -> f64 {
+        if self.basis.is_natural(0) && self.basis.is_natural(1) { 2.0 } else { 1.0 }
+    }
+
+    /// Coefficients without those that come again.
+    pub fn free(&self) -> usize {
+        self.basis.count() - if self.basis.is_closed() { OVERLAP } else { 0 }
     }
 
     /// The λ at which data and energy weigh about the same for splines that turn at every knot: the mean weight of a
@@ -298,7 +313,7 @@ mod tests {
     #[test]
     fn is_a_natural_cubic_spline() {
         for count in 2..=6 {
-            let basis = Basis::new(&KNOTS[..count], [FlatEnd::Natural; 2]);
+            let basis = Basis::new(&KNOTS[..count], Ends::Open([FlatEnd::Natural; 2]));
             let c: Vec<f64> = (0..count).map(|i| (3.0 * i as f64).cos()).collect();
             let last = count - 2;
             for (segment, place) in [(0, 0.0), (last, 1.0)] {
@@ -325,7 +340,7 @@ mod tests {
     #[test]
     fn reproduces_straight_lines() {
         for ends in [FlatEnd::Natural, FlatEnd::Velocity] {
-            let basis = Basis::new(&KNOTS, [ends; 2]);
+            let basis = Basis::new(&KNOTS, Ends::Open([ends; 2]));
             for segment in 0..5 {
                 let ones = value(&basis, &[1.0; 6], segment, 0.3, 0);
                 assert!((ones - 1.0).abs() < 1e-15);
@@ -335,8 +350,8 @@ mod tests {
 
     #[test]
     fn energy_is_that_of_the_second_derivative() {
-        let basis = Basis::new(&KNOTS, [FlatEnd::Natural; 2]);
-        let flat = Flat::new(basis, &[(0, 0.0)], &[0.0], Own::all(1, 6));
+        let basis = Basis::new(&KNOTS, Ends::Open([FlatEnd::Natural; 2]));
+        let flat = Flat::new(basis, &[(0, 0.0)], &[0.0]);
         let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
         let mut bends = vec![0.0; 6];
         flat.bends.iter().zip(&mut bends).for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));

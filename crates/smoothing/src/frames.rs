@@ -92,6 +92,21 @@ impl<'a> Frames<'a> {
         }
     }
 
+    /// What coordinates at the first knot are at the last one, where the polygon has come back to its first point: the
+    /// holonomy, m × m numbers row by row.
+    pub fn round(&self) -> Vec<f64> {
+        let (m, len) = (self.space.dim(), self.len());
+        let last = self.points.len() / len - 1;
+        let mut out = vec![0.0; m * m];
+        for column in 0..m {
+            let mut x = vec![0.0; (last + 1) * m];
+            x[column] = 1.0;
+            let there = self.coordinates(&self.tangents(&x)[..len], |_| last);
+            there.iter().enumerate().for_each(|(row, y)| out[row * m + column] = *y);
+        }
+        out
+    }
+
     /// Numbers of a point.
     fn len(&self) -> usize {
         self.space.point_len()

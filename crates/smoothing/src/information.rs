@@ -73,6 +73,7 @@ pub fn members(frames: &[f64], j: usize, m: usize, len: usize) -> Vec<f64> {
 }
 
 /// What data with weights that are matrices say at a curve, one after another.
+#[derive(Clone)]
 pub struct Seen {
     /// N, m × m numbers row by row: s changes by about −Nξ if the curve moves by ξ.
     pub rows: Vec<f64>,

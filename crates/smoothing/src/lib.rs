@@ -15,6 +15,7 @@ mod banded;
 pub mod chi;
 mod choice;
 mod curved;
+mod cyclic;
 mod exact;
 mod flat;
 mod frames;
@@ -23,11 +24,11 @@ mod loss;
 mod misfit;
 mod path;
 mod progress;
+mod robust;
 mod sight;
 mod smooth;
 mod start;
 mod track;
-mod turns;
 mod variance;
 
 pub use choice::Criterion;
@@ -167,7 +168,8 @@ pub struct Smooth {
     pub points: Vec<f64>,
     /// Velocities at the knots.
     pub velocities: Vec<f64>,
-    /// The band of A⁻¹, see [`variance`]: four numbers a knot.
+    /// The band of A⁻¹, see [`variance`]: four numbers a coefficient. Open curves have as many as knots, closed ones two
+    /// more.
     pub inverse: Vec<f64>,
     /// How it went.
     pub report: Report,

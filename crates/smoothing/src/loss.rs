@@ -30,6 +30,11 @@ impl Loss {
         }
     }
 
+    /// ψ(r)/|r|, for q = |r|²/c²: the weight of a datum in reweighted least squares.
+    pub fn weight(self, q: f64) -> f64 {
+        self.slopes(q, 1).0
+    }
+
     /// ψ(r)/r and the mean of ψ' over all directions, for q = |r|²/c².
     fn slopes(self, q: f64, m: usize) -> (f64, f64) {
         let m = m as f64;
@@ -47,7 +52,6 @@ impl Loss {
     pub fn value(self, square: f64, corner: f64) -> f64 {
         let q = square / (corner * corner);
         match self {
-            _ if corner.is_infinite() => square,
             Loss::Huber if q > 1.0 => corner * corner * (2.0 * q.sqrt() - 1.0),
             Loss::Linear | Loss::Huber => square,
             Loss::Cauchy => corner * corner * q.ln_1p(),
@@ -57,9 +61,6 @@ impl Loss {
     /// By which factors ψ(r)/(|r| ψ̄') residuals in m dimensions become those of the pseudo-data, for their weighed
     /// squares; and ψ̄'.
     pub fn pseudo(self, corner: f64, squares: &[f64], m: usize) -> (Vec<f64>, f64) {
-        if self == Loss::Linear {
-            return (vec![1.0; squares.len()], 1.0);
-        }
         let slopes: Vec<(f64, f64)> =
             squares.iter().map(|square| self.slopes(square / (corner * corner), m)).collect();
         let mean = slopes.iter().map(|s| s.1).sum::<f64>() / slopes.len() as f64;

@@ -6,19 +6,23 @@
 
 use crate::banded::Banded;
 use crate::curved::Curved;
-use crate::flat::{Flat, Row, WIDTH};
+use crate::cyclic::{Factored, Seam};
+use crate::flat::{Flat, OVERLAP, Row, WIDTH};
 use crate::information::Seen;
-use std::ops::Range;
+use std::borrow::Cow;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 
 /// Residuals at a curve, in coordinates of frames along it, and their weights.
+#[derive(Clone)]
 pub enum Misfit<'a> {
     /// A number each: `w|r|²`.
     Numbers {
         /// Weights w.
-        weights: &'a [f64],
+        weights: Cow<'a, [f64]>,
         /// Residuals r, m numbers each.
         residuals: Vec<f64>,
+        /// BᵀWB, as the entries (i, i − d) at i · 4 + d.
+        gram: Cow<'a, [f64]>,
     },
     /// A matrix each.
     Matrices {
@@ -29,9 +33,12 @@ pub enum Misfit<'a> {
     },
 }
 
+/// Coefficients times the cube of the dimension up to which coordinates are coupled.
+pub const COUPLED: usize = 10_000_000;
+
 /// A, factored, for another λ on each lane.
 pub struct Factors {
-    banded: Banded,
+    matrix: Factored,
     /// Coordinates that it has in itself: one, which stands for all, or m.
     coupled: usize,
 }
@@ -39,46 +46,40 @@ pub struct Factors {
 impl<'a> Misfit<'a> {
     /// For weights that are matrices.
     pub fn matrices(flat: &Flat, m: usize, seen: Seen) -> Self {
-        let stride = stride(m);
-        let mut gram = vec![0.0; flat.basis.count() * m * stride];
-        let mut square = vec![0.0; m * m];
-        for (b, n) in flat.data.iter().zip(seen.rows.chunks_exact(m * m)) {
-            square.fill(0.0);
-            for row in n.chunks_exact(m) {
-                for (at, x) in square.iter_mut().enumerate() {
-                    *x = row[at / m].mul_add(row[at % m], *x);
-                }
-            }
-            for (p, f) in b.factors.iter().enumerate() {
-                for (q, g) in b.factors[..=p].iter().enumerate() {
-                    let factor = f * g;
-                    if factor == 0.0 {
-                        continue;
-                    }
-                    for (at, x) in square.iter().enumerate() {
-                        let (i, j) = ((b.first + p) * m + at / m, (b.first + q) * m + at % m);
-                        if i >= j {
-                            gram[i * stride + i - j] += factor * x;
-                        }
-                    }
-                }
-            }
-        }
+        let gram = coupled_gram(flat, m, &seen.rows);
         Misfit::Matrices { seen, gram }
     }
 
-    /// Multiplies what data pull by the factors of a robust loss.
+    /// Multiplies residuals by factors: the pseudo-data of a robust loss.
     pub fn soften(&mut self, factors: &[f64], m: usize) {
-        let soften = |x: &mut [f64]| {
-            for (x, factor) in x.chunks_exact_mut(m).zip(factors) {
-                x.iter_mut().for_each(|x| *x *= factor);
-            }
-        };
         match self {
-            Misfit::Numbers { residuals, .. } => soften(residuals),
+            Misfit::Numbers { residuals, .. } => scale(residuals, factors, m),
             Misfit::Matrices { seen, .. } => {
-                soften(&mut seen.residuals);
-                soften(&mut seen.pulls);
+                scale(&mut seen.residuals, factors, m);
+                scale(&mut seen.pulls, factors, m);
+            }
+        }
+    }
+
+    /// Multiplies weights by factors; data with a factor of zero are not counted.
+    pub fn reweigh(&mut self, flat: &Flat, factors: &[f64], m: usize) {
+        match self {
+            Misfit::Numbers { weights, gram, .. } => {
+                let own: Vec<f64> = weights.iter().zip(factors).map(|(w, factor)| w * factor).collect();
+                *gram = Cow::Owned(flat.gram_of(&own));
+                *weights = Cow::Owned(own);
+            }
+            Misfit::Matrices { seen, gram } => {
+                let roots: Vec<f64> = factors.iter().map(|factor| factor.sqrt()).collect();
+                scale(&mut seen.rows, &roots, m * m);
+                scale(&mut seen.residuals, &roots, m);
+                scale(&mut seen.pulls, factors, m);
+                seen.ranks
+                    .iter_mut()
+                    .zip(factors)
+                    .filter(|(_, factor)| **factor == 0.0)
+                    .for_each(|(r, _)| *r = 0);
+                *gram = coupled_gram(flat, m, &seen.rows);
             }
         }
     }
@@ -89,7 +90,7 @@ impl<'a> Misfit<'a> {
         let mut weighed = vec![0.0; m];
         for (k, row) in flat.data.iter().enumerate() {
             match self {
-                Misfit::Numbers { weights, residuals } => {
+                Misfit::Numbers { weights, residuals, .. } => {
                     let r = &residuals[k * m..][..m];
                     weighed.iter_mut().zip(r).for_each(|(x, r)| *x = weights[k] * r);
                 }
@@ -101,23 +102,36 @@ impl<'a> Misfit<'a> {
     }
 
     /// A for eight λ.
-    pub fn factored(&self, flat: &Flat, m: usize, curved: Option<&Curved>, lam: Lane) -> Factors {
+    /// A seam with holonomy couples the coordinates, too.
+    pub fn factored(
+        &self,
+        flat: &Flat,
+        m: usize,
+        curved: Option<&Curved>,
+        seam: Option<&Seam>,
+        lam: Lane,
+    ) -> Factors {
         let count = flat.basis.count();
-        let coupled = if curved.is_some() || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
+        // So many numbers are too many: then the matrix, not its right side, leaves the holonomy out.
+        let few = m.saturating_pow(3).saturating_mul(count) <= COUPLED;
+        let turns = few && seam.is_some_and(|seam| !seam.is_plain());
+        let coupled =
+            if curved.is_some() || turns || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
         let entry = |at: usize| {
             let stiff =
                 curved.map_or_else(|| of_each(&flat.penalty, coupled, at), |curved| curved.penalty[at]);
-            lam.mul_add(lane(stiff), lane(self.gram(flat, coupled, at)))
+            lam.mul_add(lane(stiff), lane(self.gram(coupled, at)))
         };
-        let mut banded = Banded::of(count * coupled, stride(coupled) - 1, entry);
-        banded.factor();
-        Factors { banded, coupled }
+        let banded = Banded::of(count * coupled, stride(coupled) - 1, entry);
+        let plain = Seam::plain(OVERLAP, coupled);
+        let seam = seam.map(|seam| if seam.m == coupled && few { seam } else { &plain });
+        Factors { matrix: Factored::new(banded, seam), coupled }
     }
 
     /// An entry of BᵀWB, which is that of every coordinate by itself or that of all.
-    fn gram(&self, flat: &Flat, coupled: usize, at: usize) -> f64 {
+    fn gram(&self, coupled: usize, at: usize) -> f64 {
         match self {
-            Misfit::Numbers { .. } => of_each(&flat.gram, coupled, at),
+            Misfit::Numbers { gram, .. } => of_each(gram, coupled, at),
             Misfit::Matrices { gram, .. } => gram[at],
         }
     }
@@ -126,7 +140,7 @@ impl<'a> Misfit<'a> {
     fn square(&self, row: &Row, k: usize, m: usize, x: &[Lane]) -> Lane {
         let mut sum = Lane::ZERO;
         match self {
-            Misfit::Numbers { weights, residuals } => {
+            Misfit::Numbers { weights, residuals, .. } => {
                 for c in 0..m {
                     let moved = lane(residuals[k * m + c]) - row.of_lanes(x, m, c);
                     sum = (moved * lane(weights[k])).mul_add(moved, sum);
@@ -145,41 +159,77 @@ impl<'a> Misfit<'a> {
     }
 
     /// The number of data for each coordinate.
-    pub fn count(&self, own: Range<usize>, m: usize) -> f64 {
+    pub fn count(&self, m: usize) -> f64 {
         match self {
-            Misfit::Numbers { .. } => own.len() as f64,
-            Misfit::Matrices { seen, .. } => seen.ranks[own].iter().sum::<usize>() as f64 / m as f64,
+            Misfit::Numbers { weights, .. } => weights.iter().filter(|w| **w > 0.0).count() as f64,
+            Misfit::Matrices { seen, .. } => seen.ranks.iter().sum::<usize>() as f64 / m as f64,
         }
     }
 
     /// The weighed sum of squares when the coefficients have moved by x.
     pub fn rss(&self, flat: &Flat, m: usize, x: &[Lane]) -> Lane {
-        flat.own.data.clone().fold(Lane::ZERO, |sum, k| sum + self.square(&flat.data[k], k, m, x))
+        (0..flat.data.len()).fold(Lane::ZERO, |sum, k| sum + self.square(&flat.data[k], k, m, x))
     }
 
     /// The weighed sum of squares as it is.
-    pub fn rss_now(&self, own: Range<usize>, m: usize) -> f64 {
+    pub fn rss_now(&self, m: usize) -> f64 {
         let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
         match self {
-            Misfit::Numbers { weights, residuals } => {
-                own.map(|k| weights[k] * square(&residuals[k * m..][..m])).sum()
+            Misfit::Numbers { weights, residuals, .. } => {
+                weights.iter().zip(residuals.chunks_exact(m)).map(|(w, r)| w * square(r)).sum()
             }
-            Misfit::Matrices { seen, .. } => square(&seen.residuals[own.start * m..own.end * m]),
+            Misfit::Matrices { seen, .. } => square(&seen.residuals),
         }
     }
 
     /// tr A⁻¹BᵀWB over the number of coordinates, given the band of A⁻¹: the degrees of freedom of one.
     pub fn freedom(&self, flat: &Flat, inverse: &Banded) -> Lane {
         let (stride, coupled) = (inverse.width + 1, inverse.size / flat.basis.count());
-        let own = &flat.own.knots;
         let mut sum = Lane::ZERO;
-        for i in own.start * coupled..own.end * coupled {
+        for i in 0..inverse.size {
             for j in i.saturating_sub(inverse.width)..(i + stride).min(inverse.size) {
-                sum += inverse.at(i, j) * lane(self.gram(flat, coupled, i.max(j) * stride + i.abs_diff(j)));
+                sum += inverse.at(i, j) * lane(self.gram(coupled, i.max(j) * stride + i.abs_diff(j)));
             }
         }
         sum * lane(1.0 / coupled as f64)
     }
+}
+
+/// Multiplies rows of `size` numbers by factors.
+fn scale(rows: &mut [f64], factors: &[f64], size: usize) {
+    for (row, factor) in rows.chunks_exact_mut(size).zip(factors) {
+        row.iter_mut().for_each(|x| *x *= factor);
+    }
+}
+
+/// BᵀNᵀNB for m × m matrices N.
+fn coupled_gram(flat: &Flat, m: usize, rows: &[f64]) -> Vec<f64> {
+    let stride = stride(m);
+    let mut gram = vec![0.0; flat.basis.count() * m * stride];
+    let mut square = vec![0.0; m * m];
+    for (b, n) in flat.data.iter().zip(rows.chunks_exact(m * m)) {
+        square.fill(0.0);
+        for row in n.chunks_exact(m) {
+            for (at, x) in square.iter_mut().enumerate() {
+                *x = row[at / m].mul_add(row[at % m], *x);
+            }
+        }
+        for (p, f) in b.factors.iter().enumerate() {
+            for (q, g) in b.factors[..=p].iter().enumerate() {
+                let factor = f * g;
+                if factor == 0.0 {
+                    continue;
+                }
+                for (at, x) in square.iter().enumerate() {
+                    let (i, j) = ((b.first + p) * m + at / m, (b.first + q) * m + at % m);
+                    if i >= j {
+                        gram[i * stride + i - j] += factor * x;
+                    }
+                }
+            }
+        }
+    }
+    gram
 }
 
 /// Places of a row of the band of coupled coordinates.
@@ -196,7 +246,7 @@ fn of_each(band: &[f64], coupled: usize, at: usize) -> f64 {
 impl Factors {
     /// A⁻¹x in place: coefficients of m numbers.
     pub fn solve(&self, m: usize, x: &mut [Lane]) {
-        self.banded.solve(m / self.coupled, x);
+        self.matrix.solve(m / self.coupled, x);
     }
 
     /// The same for one λ, which is on all lanes.
@@ -214,25 +264,24 @@ impl Factors {
                 *x = Lane::new(few(|l| right.get(k * LANES + l).copied().unwrap_or(0.0)));
             }
         }
-        self.banded.solve(columns, &mut x);
+        self.matrix.solve(columns, &mut x);
         let number = |i: usize, c: usize| x[i * columns + c / LANES].as_array()[c % LANES];
         (0..right.len()).map(|at| number(at / m, at % m)).collect()
     }
 
     /// The smallest pivot: not positive where A is not positive definite, as far as rounding tells.
     pub fn least_pivot(&self) -> Lane {
-        self.banded.least_pivot()
+        self.matrix.least_pivot()
     }
 
-    /// ln det A of one coordinate, or what the coefficients of some knots have of it.
-    pub fn log_det(&self, knots: Range<usize>) -> Lane {
-        let rows = knots.start * self.coupled..knots.end * self.coupled;
-        self.banded.log_det(rows) * lane(1.0 / self.coupled as f64)
+    /// ln det A of one coordinate.
+    pub fn log_det(&self) -> Lane {
+        self.matrix.log_det() * lane(1.0 / self.coupled as f64)
     }
 
     /// The band of A⁻¹.
     pub fn inverse_band(&self) -> Banded {
-        self.banded.inverse_band()
+        self.matrix.inverse_band()
     }
 
     /// The band of A⁻¹ of one coordinate: the mean of all.

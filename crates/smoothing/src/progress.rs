@@ -1,8 +1,10 @@
 //! How the search for a curve goes: its λ, its steps, and when it ends.
 
 use crate::banded::Banded;
-use crate::choice::Linear;
-use crate::{Ends, Options, Report, Tier};
+use crate::choice::{Criterion, Linear};
+use crate::misfit::COUPLED;
+use crate::robust::{Lam, ROUGH_ROUNDS, Robust, Stage};
+use crate::{Report, Tier};
 use symspline_core::space::{Erased, Origin};
 
 /// Contraction of the flat tier, known or expected, from which it takes curvature into its matrix, or the exact one
@@ -12,9 +14,6 @@ const SLOW: f64 = 0.5;
 const HOPELESS: f64 = 2.0;
 /// Dimension up to which the exact way is taken by itself.
 const LARGE: usize = 64;
-/// Knots times the cube of the dimension up to which the flat tier may take curvature into its matrix, where coordinates
-/// are coupled.
-const COUPLED: usize = 10_000_000;
 /// λ moves by less than this between rounds when it is settled, in natural logarithms.
 const SETTLED: f64 = 3e-3;
 /// λ that still moves by more after the last round was not found.
@@ -42,6 +41,8 @@ pub struct Progress {
     pub unsettled: bool,
     /// Whether the flat way was given up.
     pub forced: bool,
+    /// Iterations before this stage of the fit.
+    pub begun: usize,
     density: f64,
     /// What is known so far.
     pub report: Report,
@@ -62,16 +63,20 @@ impl Progress {
             curved: false,
             unsettled: false,
             forced: false,
+            begun: 0,
             density,
             report,
         }
     }
 
     /// How far to go along a step if steps shrink slowly in one direction: the limit of their geometric series (Aitken).
-    pub fn further(&mut self, step: &[f64]) -> f64 {
+    ///
+    /// Steps of reweighted least squares shrink steadily, if slowly; others that do not shrink are to be given up.
+    pub fn further(&mut self, step: &[f64], reweighs: bool) -> f64 {
+        let most = if reweighs { 0.99 } else { 0.9 };
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let ratio = product(step, &self.last) / product(&self.last, &self.last);
-        if self.last.len() == step.len() && ratio > 0.3 && ratio < 0.9 {
+        if self.last.len() == step.len() && ratio > 0.3 && ratio < most {
             self.last.clear();
             return 1.0 / (1.0 - ratio);
         }
@@ -79,53 +84,60 @@ impl Progress {
         1.0
     }
 
+    /// Begins with another problem, and perhaps another λ.
+    pub fn restart(&mut self, lam: Lam) {
+        (self.last_step, self.slow, self.begun) = (f64::INFINITY, 0, self.report.iterations);
+        self.last.clear();
+        match lam {
+            Lam::Same => {}
+            Lam::Anew => (self.settled, self.lam, self.report.rounds) = (false, None, 0),
+            Lam::Near => (self.settled, self.report.rounds) = (false, 0),
+            Lam::Times(factor) => self.lam = self.lam.map(|lam| lam * factor),
+        }
+    }
+
     /// Whether the exact way is to be taken.
-    pub fn takes_exact_way(&self, space: &Erased, tier: Tier, ends: Ends) -> bool {
+    pub fn takes_exact_way(&self, space: &Erased, tier: Tier) -> bool {
         let limit = if self.settled { SLOW } else { HOPELESS };
         let known = self.forced || (self.settled && self.report.exact);
-        // With curvature in its matrix the flat way contracts. But a stiff closed curve feels from one turn what happens
-        // at the ends of three.
-        let contracts = self.curved && ends != Ends::Periodic;
-        let hopeless = known || (!contracts && self.report.kappa > limit) || self.slow > 1;
-        tier == Tier::Newton || (hopeless && self.may_be_exact(space, tier, ends))
+        // With curvature in its matrix the flat way contracts.
+        let hopeless = known || (!self.curved && self.report.kappa > limit) || self.slow > 1;
+        tier == Tier::Newton || (hopeless && self.may_be_exact(space, tier))
     }
 
     /// Whether there is the exact way to be taken.
-    pub fn may_be_exact(&self, space: &Erased, tier: Tier, ends: Ends) -> bool {
-        // In flat space the flat way is the exact one, but for closed curves; and the blocks of the other have a limit.
-        let other = space.curvature() != 0.0 || ends == Ends::Periodic;
-        tier == Tier::Auto && other && space.dim() <= LARGE
+    pub fn may_be_exact(&self, space: &Erased, tier: Tier) -> bool {
+        // In flat space the flat way is the exact one; and the blocks of the other have a limit.
+        tier == Tier::Auto && space.curvature() != 0.0 && space.dim() <= LARGE
     }
 
-    /// λ of the pseudo-data at a curve: a better one, unless it is given or settled; and what is expected of the flat way
-    /// with it.
+    /// λ at a curve: a better one, unless it is given or settled; and what is expected of the flat way with it.
     pub fn weigh(
         &mut self,
         space: &Erased,
         linear: &Linear,
         speeds: &[f64],
-        options: &Options,
-        softness: f64,
+        robust: &Robust,
+        asked: Criterion,
     ) -> f64 {
         if !self.settled {
-            self.choose(linear, options, softness);
+            let rounds = if robust.stage == Stage::Rough { ROUGH_ROUNDS } else { ROUNDS };
+            self.choose(linear, robust.criterion(asked), rounds);
         }
-        // The pseudo-data have the original weights, and their λ is softer by their slope.
-        let lam = self.lam.unwrap_or(0.0) / softness;
+        let lam = self.lam.unwrap_or(0.0);
         self.expect(space, speeds, lam);
         lam
     }
 
-    fn choose(&mut self, linear: &Linear, options: &Options, softness: f64) {
-        let (lam, at_bound) = linear.choose(options.criterion, self.lam.map(|lam| lam / softness));
-        let mut lam = lam * softness;
+    fn choose(&mut self, linear: &Linear, criterion: Criterion, rounds: usize) {
+        let (mut lam, at_bound) = linear.choose(criterion, self.lam);
         self.report.rounds += 1;
         let moved = self.lam.map_or(f64::INFINITY, |before| (lam / before).ln().abs());
         // What goes to and fro meets half way.
         if let Some(before) = self.lam.filter(|_| self.report.rounds > ROUNDS / 2 && !at_bound) {
             lam = (lam * before).sqrt();
         }
-        self.settled = moved < SETTLED || self.report.rounds >= ROUNDS;
+        self.settled = moved < SETTLED || self.report.rounds >= rounds;
         self.unsettled = moved > UNSETTLED && self.settled;
         self.report.at_bound = at_bound;
         self.lam = Some(lam);
@@ -144,11 +156,11 @@ impl Progress {
     }
 
     /// λ, degrees of freedom and noise of the curve as it is.
+    ///
+    /// `softness` is the slope of a robust loss: λ of its pseudo-data is that of the curve over it.
     pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
         let Linear { flat, m, misfit, .. } = linear;
-        let own = flat.own.data.clone();
-        let count = misfit.count(own.clone(), *m);
-        let rss = misfit.rss_now(own, *m);
+        let (count, rss) = (misfit.count(*m), misfit.rss_now(*m));
         let unit = flat.basis.spacing.powi(3);
         let freedom = misfit.freedom(flat, inverse).as_array()[0];
         // Where λ hardly matters, as for a geodesic, its best value wanders.
@@ -163,7 +175,7 @@ impl Progress {
     }
 
     /// Whether a step is small beside the standard deviations of the points.
-    pub fn judge(&mut self, step: &[f64], deviations: &[f64], reach: f64, options: &Options) -> bool {
+    pub fn judge(&mut self, step: &[f64], deviations: &[f64], reach: f64, tol: f64, reweighs: bool) -> bool {
         /// Steps that are this part of the path, and no longer shrink, are rounding.
         const FLOOR: f64 = 1e-8;
         const STILL: f64 = 1e-13;
@@ -173,18 +185,15 @@ impl Progress {
         let rate = longest / self.last_step;
         if self.last_step.is_finite() {
             self.report.rate = rate;
-            // Steps of new λ are no contraction; but they do not grow.
-            let slow = rate > if self.settled { SLOW } else { 1.0 };
+            // Steps of new λ or new weights are no contraction; but they do not grow.
+            let slow = rate > if self.settled && !reweighs { SLOW } else { 1.0 };
             self.slow = if slow { self.slow + 1 } else { 0 };
         }
         self.last_step = longest;
         self.report.step = relative;
         // Squares that are too large or too small for doubles say nothing.
         let known = self.scale.is_finite() && (longest > 0.0 || step.iter().all(|x| *x == 0.0));
-        known
-            && (relative <= options.tol
-                || longest <= STILL * reach
-                || (longest <= FLOOR * reach && rate > SLOW))
+        known && (relative <= tol || longest <= STILL * reach || (longest <= FLOOR * reach && rate > SLOW))
     }
 }
 

@@ -6,6 +6,7 @@ use crate::frames::Frames;
 use crate::information::{self, Root};
 use crate::misfit::Misfit;
 use crate::path::{Path, Place, pulls};
+use std::borrow::Cow;
 use symspline_core::space::{Ambient, Erased, Origin};
 
 /// The data, seen from the curve.
@@ -22,8 +23,6 @@ pub struct Sight<'a> {
     pub squares: Vec<f64>,
     /// Residuals in the frames of the knots.
     pub misfit: Misfit<'a>,
-    /// By what a robust loss multiplies them.
-    pub factors: Vec<f64>,
 }
 
 impl<'a> Sight<'a> {
@@ -33,7 +32,7 @@ impl<'a> Sight<'a> {
         path: &Path,
         frames: &Frames,
         places: &[Place],
-        flat: &Flat,
+        flat: &'a Flat,
         data: &Data<'a>,
         roots: &[Root],
     ) -> Self {
@@ -44,8 +43,12 @@ impl<'a> Sight<'a> {
         let residuals = at_knots(&vectors);
         if roots.is_empty() {
             let squares = distances.iter().zip(data.weights).map(|(square, w)| square * w).collect();
-            let misfit = Misfit::Numbers { weights: data.weights, residuals };
-            return Sight { gammas, vectors, distances, carried: None, squares, misfit, factors: Vec::new() };
+            let misfit = Misfit::Numbers {
+                weights: Cow::Borrowed(data.weights),
+                residuals,
+                gram: Cow::Borrowed(&flat.gram),
+            };
+            return Sight { gammas, vectors, distances, carried: None, squares, misfit };
         }
         let carried = information::carried_frames(space, &gammas, data.points);
         let columns: Vec<Vec<f64>> =
@@ -54,12 +57,6 @@ impl<'a> Sight<'a> {
         let square = |s: &[f64]| s.iter().map(|x| x * x).sum();
         let squares = seen.residuals.chunks_exact(m).map(square).collect();
         let misfit = Misfit::matrices(flat, m, seen);
-        Sight { gammas, vectors, distances, carried: Some(carried), squares, misfit, factors: Vec::new() }
-    }
-
-    /// With the factors of a robust loss.
-    pub fn soften(&mut self, factors: Vec<f64>, m: usize) {
-        self.misfit.soften(&factors, m);
-        self.factors = factors;
+        Sight { gammas, vectors, distances, carried: Some(carried), squares, misfit }
     }
 }

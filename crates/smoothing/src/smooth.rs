@@ -3,56 +3,63 @@
 use crate::information;
 use crate::loss::{self, Loss};
 use crate::path::{Path, moved, places};
+use crate::robust::Robust;
 use crate::start::{Level, levels};
 use crate::track::Track;
-use crate::turns::{self, Turns};
-use crate::{Data, Ends, Options, Smooth};
-use std::ops::Range;
-use symspline_core::fit::{End, Ends as FitEnds, Method, Options as FitOptions, Problem, Status, fit};
+use crate::{Data, Ends, Options, Smooth, State};
+use symspline_core::fit::{
+    End, Ends as FitEnds, Method, Options as FitOptions, Problem, Report, Status, fit,
+};
 use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
 use symspline_core::space::{Ambient, Erased, Origin};
 
-/// Where that is not enough for a spline a shorter step is better than a longer search.
+/// Where that is not enough for a spline a shorter step is better than a longer search...
 const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: Some(200) };
+/// ... but where the step is already short.
+const LONG_FIT: FitOptions = FitOptions { max_iter: None, ..FIT };
+/// The C² residual of a spline that will do on the way.
+const ENOUGH: f64 = 1e-8;
 const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
 /// Knots times dimensions from which threads pay.
 const PARALLEL: usize = 4096;
 
 /// Smooths curves; they are independent of each other.
 pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
-    if options.ends == Ends::Periodic {
-        let turns: Vec<Turns> = data.iter().map(Turns::of).collect();
-        let unrolled: Vec<Data> = turns.iter().zip(data).map(|(turns, data)| turns.data(data)).collect();
-        return smooth_all(space, &unrolled, options, monitor);
-    }
-    smooth_all(space, data, options, monitor)
-}
-
-fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monitor) -> Vec<Smooth> {
     let len = space.point_len();
     let work: usize = data.iter().map(|d| d.times.len()).sum::<usize>() * space.dim();
     let threads = data.len() > 1 && work > PARALLEL;
-    let mut tracks = start(space, data, options, monitor, threads);
+    let mut beginnings = beginnings(space, data, options, monitor, threads);
+    let mut tracks: Vec<Option<Track>> = data.iter().map(|_| None).collect();
+    start(space, data, options, monitor, &mut beginnings, &mut tracks);
     while !monitor.cancelled() {
+        // Where no spline joins the points to begin with the next beginning is smoother.
+        for track in &mut tracks {
+            track.take_if(|track| track.report().state == State::NoCurve && track.report().iterations == 0);
+        }
+        start(space, data, options, monitor, &mut beginnings, &mut tracks);
         let mut running: Vec<&mut Track> =
             tracks.iter_mut().flatten().filter(|track| !track.done()).collect();
         if running.is_empty() {
             break;
         }
-        let ends: Vec<[Vec<f64>; 2]> = running.iter().map(|track| track.end_velocities(space)).collect();
-        let ends = [0, 1].map(|e| ends.iter().flat_map(|own| own[e].iter().copied()).collect::<Vec<f64>>());
-        let ends = options.ends.of_fit(&ends);
-        let curves = running.iter().map(|track| {
-            let Range { start, end } = track.curve();
-            (&track.knots[start..end], &track.points[start * len..end * len])
-        });
-        let fitted = fit_all(space, curves, ends, monitor);
+        let mut fitted =
+            fit_tracks(space, &running.iter().map(|t| &**t).collect::<Vec<_>>(), options, &FIT, monitor);
+        let again =
+            |(track, found): (&&mut Track, &Option<Vec<f64>>)| found.is_none() && track.steps_are_short();
+        let again: Vec<bool> = running.iter().zip(&fitted).map(again).collect();
+        if again.contains(&true) {
+            let chosen: Vec<&Track> =
+                running.iter().zip(&again).filter(|(_, again)| **again).map(|(t, _)| &**t).collect();
+            let found = fit_tracks(space, &chosen, options, &LONG_FIT, monitor);
+            let places = fitted.iter_mut().zip(&again).filter(|(_, again)| **again);
+            places.zip(found).for_each(|((place, _), found)| *place = found);
+        }
         let items: Vec<_> = running.iter_mut().zip(fitted).collect();
         parallel::for_each(items, threads, monitor, |(track, velocities)| match velocities {
             None => track.retreat(space),
             Some(velocities) => {
-                track.take(velocities, len);
+                track.velocities = velocities;
                 track.advance(space, options, monitor, !threads);
                 if track.done() {
                     monitor.advance(track.knots.len());
@@ -63,13 +70,27 @@ fn smooth_all(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     let ended = tracks.into_iter().zip(data).map(|(track, data)| {
         track.unwrap_or_else(|| {
             let points = vec![f64::NAN; data.knots.len() * len];
-            let mut none =
-                Track::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, f64::INFINITY);
+            let plain = Robust::new(Loss::Linear, space.dim(), 0.0, true, true);
+            let mut none = Track::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, plain);
             none.retreat(space);
             none
         })
     });
-    ended.map(|track| track.finish(len)).collect()
+    ended.map(Track::finish).collect()
+}
+
+/// The velocities of the splines through the points of curves.
+fn fit_tracks(
+    space: &Erased,
+    tracks: &[&Track],
+    options: &Options,
+    how: &FitOptions,
+    monitor: &Monitor,
+) -> Vec<Option<Vec<f64>>> {
+    let ends: Vec<[Vec<f64>; 2]> = tracks.iter().map(|track| track.end_velocities(space)).collect();
+    let ends = [0, 1].map(|e| ends.iter().flat_map(|own| own[e].iter().copied()).collect::<Vec<f64>>());
+    let curves = tracks.iter().map(|track| (&track.knots[..], &track.points[..]));
+    fit_all(space, curves, options.ends.of_fit(&ends), how, monitor)
 }
 
 /// The velocities of the splines through points, where there are such splines.
@@ -77,6 +98,7 @@ fn fit_all<'a>(
     space: &Erased,
     curves: impl Iterator<Item = (&'a [f64], &'a [f64])>,
     ends: FitEnds,
+    how: &FitOptions,
     monitor: &Monitor,
 ) -> Vec<Option<Vec<f64>>> {
     let len = space.point_len();
@@ -90,21 +112,33 @@ fn fit_all<'a>(
     let problem = Problem { t: &t, shared: false, points: &points, offsets: &offsets, ends };
     // Those who watch count curves, not the fits on the way to them.
     let silent = |_| !monitor.poll();
-    let reports = fit(space, &problem, &FIT, &Monitor::new(&silent), &mut velocities);
+    let reports = fit(space, &problem, how, &Monitor::new(&silent), &mut velocities);
     let own = |c: usize| velocities[offsets[c] * len..offsets[c + 1] * len].to_vec();
-    reports.iter().enumerate().map(|(c, r)| (r.status == Status::Converged).then(|| own(c))).collect()
+    // Knots that nearly coincide leave a residual of rounding that is more than the tolerance, and harmless beside noise.
+    let fitted = |r: &Report| {
+        r.status == Status::Converged || (r.status == Status::Unconverged && r.residual < ENOUGH)
+    };
+    reports.iter().enumerate().map(|(c, r)| fitted(r).then(|| own(c))).collect()
 }
 
-/// Curves to begin with; none where even the geodesic between the first and the last mean does not exist.
-fn start<'a>(
+/// What a curve may begin with.
+#[derive(Default)]
+struct Beginning {
+    /// Means of its data, the best last.
+    levels: Vec<Level>,
+    /// For a robust loss: about the standard deviation of the noise.
+    sigma: f64,
+}
+
+fn beginnings(
     space: &Erased,
-    data: &[Data<'a>],
+    data: &[Data],
     options: &Options,
     monitor: &Monitor,
     threads: bool,
-) -> Vec<Option<Track<'a>>> {
-    let mut pyramids: Vec<(Vec<Level>, f64)> = data.iter().map(|_| (Vec::new(), f64::INFINITY)).collect();
-    parallel::for_each(pyramids.iter_mut().zip(data).collect(), threads, monitor, |(found, data)| {
+) -> Vec<Beginning> {
+    let mut all: Vec<Beginning> = data.iter().map(|_| Beginning::default()).collect();
+    parallel::for_each(all.iter_mut().zip(data).collect(), threads, monitor, |(found, data)| {
         let weights = if data.information.is_empty() {
             data.weights.to_vec()
         } else {
@@ -115,34 +149,56 @@ fn start<'a>(
         let [times, points, weights] = if options.loss == Loss::Linear {
             [data.times.to_vec(), data.points.to_vec(), weights.clone()]
         } else {
-            let sigma = data.sigma.unwrap_or_else(|| loss::noise(space, &data));
-            // Where nothing deviates nothing is an outlier.
-            found.1 = if sigma > 0.0 { sigma * options.loss.corner(space.dim()) } else { f64::INFINITY };
+            found.sigma = data.sigma.unwrap_or_else(|| loss::noise(space, &data));
             loss::plausible(space, &data)
         };
-        found.0 = levels(space, &times, &points, &weights);
-        found.0.reverse();
+        found.levels = match options.ends {
+            Ends::Open(_) => levels(space, &times, &points, &weights),
+            // A turn before and one behind, so that the beginning closes.
+            Ends::Periodic => {
+                let period = data.knots[data.knots.len() - 1] - data.knots[0];
+                let turns = |x: f64| move |t: &f64| t + x * period;
+                let times =
+                    [-1.0, 0.0, 1.0].map(|x| times.iter().map(turns(x)).collect::<Vec<f64>>()).concat();
+                levels(space, &times, &points.repeat(3), &weights.repeat(3))
+            }
+        };
+        found.levels.reverse();
     });
-    let mut tracks: Vec<Option<Track>> = data.iter().map(|_| None).collect();
+    all
+}
+
+/// Curves to begin with for those that have none; none where even the geodesic between the first and the last mean does
+/// not exist.
+fn start<'a>(
+    space: &Erased,
+    data: &[Data<'a>],
+    options: &Options,
+    monitor: &Monitor,
+    beginnings: &mut [Beginning],
+    tracks: &mut [Option<Track<'a>>],
+) {
     loop {
         let missing: Vec<usize> = (0..data.len()).filter(|&c| tracks[c].is_none()).collect();
         let tried: Vec<(usize, Level)> =
-            missing.into_iter().filter_map(|c| Some((c, pyramids[c].0.pop()?))).collect();
+            missing.into_iter().filter_map(|c| Some((c, beginnings[c].levels.pop()?))).collect();
         if tried.is_empty() || monitor.cancelled() {
-            return tracks;
+            return;
         }
         let levels = tried.iter().map(|(_, level)| (&level.times[..], &level.points[..]));
-        let fitted = fit_all(space, levels, NATURAL, monitor);
+        let fitted = fit_all(space, levels, NATURAL, &FIT, monitor);
         for ((c, level), velocities) in tried.iter().zip(fitted) {
             let Some(velocities) = velocities else { continue };
             let path = Path { t: &level.times, points: &level.points, velocities: &velocities };
             let knots = data[*c].knots;
             let mut points = prolonged(space, &path, knots);
             if options.ends == Ends::Periodic {
-                turns::repeat(&mut points, space.point_len());
+                let (len, last) = (space.point_len(), points.len() - space.point_len());
+                points.copy_within(..len, last);
             }
-            tracks[*c] =
-                Some(Track::new(data[*c], space.dim(), knots.to_vec(), points, options.ends, pyramids[*c].1));
+            let (m, own, sigma) = (space.dim(), data[*c], beginnings[*c].sigma);
+            let robust = Robust::new(options.loss, m, sigma, own.sigma.is_some(), own.lam.is_none());
+            tracks[*c] = Some(Track::new(own, m, knots.to_vec(), points, options.ends, robust));
         }
     }
 }

@@ -26,6 +26,7 @@ pub fn levels(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) ->
     }
     let mut found = Vec::new();
     loop {
+        level = level.apart(space);
         let distance = level.mean_square(space);
         found.push((distance, level.clone()));
         if level.times.len() <= 3 {
@@ -39,6 +40,22 @@ pub fn levels(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) ->
 }
 
 impl Level {
+    /// Joins neighbours that are much nearer in time than others: a spline through noisy points at nearly one time has
+    /// velocities that lead far away.
+    fn apart(mut self, space: &Erased) -> Level {
+        /// The least distance, over the mean.
+        const NEAR: f64 = 0.1;
+        loop {
+            let last = self.times.len() - 1;
+            let least = NEAR * (self.times[last] - self.times[0]) / last as f64;
+            let near = |level: &Level, i: usize| level.times[i + 1] - level.times[i] < least;
+            if last < 3 || !(0..last).any(|i| near(&self, i)) {
+                return self;
+            }
+            self = self.paired(space, near);
+        }
+    }
+
     /// Takes the mean of pairs, from the first on, where `join` says so. Data without weight say nothing.
     fn paired(&self, space: &Erased, join: impl Fn(&Level, usize) -> bool) -> Level {
         let len = space.point_len();

@@ -3,19 +3,18 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::curved::Curved;
+use crate::cyclic::Seam;
 use crate::exact::{self, Pull};
-use crate::flat::{Basis, Flat, FlatEnd, Own};
+use crate::flat::{Basis, Flat, OVERLAP};
 use crate::frames::{Frames, curvature_terms};
 use crate::information::{self, Root};
-use crate::loss;
 use crate::path::{Path, Place, moved, places};
 use crate::progress::{Progress, larger, length};
+use crate::robust::Robust;
 use crate::sight::Sight;
-use crate::turns;
 use crate::variance::rows_of;
 use crate::{Data, Ends, Options, Report, Smooth, State};
 use std::f64::consts::PI;
-use std::ops::Range;
 use symspline_core::fit::Ends as FitEnds;
 use symspline_core::monitor::Monitor;
 use symspline_core::scalar::{Lane, lane};
@@ -41,10 +40,7 @@ pub struct Track<'a> {
     roots: Vec<Root>,
     flat: Flat,
     ends: Ends,
-    /// The residual from which a robust loss counts less.
-    corner: f64,
-    /// Whether that has its final size.
-    rescaled: bool,
+    robust: Robust,
     /// Points at the knots to begin with.
     first: Vec<f64>,
     /// Points at the knots.
@@ -65,17 +61,18 @@ pub struct Track<'a> {
 
 impl<'a> Track<'a> {
     /// A curve with given knots through first points.
-    ///
-    /// `corner` is the residual from which a robust loss counts less.
-    pub fn new(data: Data<'a>, m: usize, knots: Vec<f64>, points: Vec<f64>, ends: Ends, corner: f64) -> Self {
+    pub fn new(
+        data: Data<'a>,
+        m: usize,
+        knots: Vec<f64>,
+        points: Vec<f64>,
+        ends: Ends,
+        robust: Robust,
+    ) -> Self {
         let places = places(&knots, data.times);
-        let (kinds, own) = match ends {
-            Ends::Open(kinds) => (kinds, Own::all(data.times.len(), knots.len())),
-            Ends::Periodic => ([FlatEnd::Natural; 2], Own::turn(data.times.len(), knots.len())),
-        };
-        let basis = Basis::new(&knots, kinds);
+        let basis = Basis::new(&knots, ends);
         let unit = basis.spacing.powi(3);
-        let flat = Flat::new(basis, &places, data.weights, own);
+        let flat = Flat::new(basis, &places, data.weights);
         let lam = data.lam;
         let balance = flat.balance();
         // From here on curves are geodesics; with larger λ rounding would make A forget the data.
@@ -94,8 +91,7 @@ impl<'a> Track<'a> {
             places,
             flat,
             ends,
-            corner,
-            rescaled: corner.is_infinite() || data.sigma.is_some(),
+            robust,
             velocities: vec![0.0; points.len()],
             first: points.clone(),
             points,
@@ -110,32 +106,18 @@ impl<'a> Track<'a> {
     }
 
     /// The curve as it is.
-    pub fn finish(self, len: usize) -> Smooth {
+    pub fn finish(self) -> Smooth {
         let report = self.report();
-        let curve = self.curve();
         let inverse = match &self.inverse {
-            Some(inverse) => rows_of(inverse)[curve.start * 4..curve.end * 4].to_vec(),
-            None => vec![f64::NAN; curve.len() * 4],
+            Some(inverse) => rows_of(inverse),
+            None => vec![f64::NAN; self.flat.basis.count() * 4],
         };
-        let part = |x: &[f64], size: usize| x[curve.start * size..curve.end * size].to_vec();
-        Smooth {
-            knots: part(&self.knots, 1),
-            points: part(&self.points, len),
-            velocities: part(&self.velocities, len),
-            inverse,
-            report,
-        }
+        Smooth { knots: self.knots, points: self.points, velocities: self.velocities, inverse, report }
     }
 
     /// How it goes.
     pub fn report(&self) -> Report {
         self.progress.report
-    }
-
-    /// The part of the knots that is the curve.
-    pub fn curve(&self) -> Range<usize> {
-        let Own { segments, .. } = &self.flat.own;
-        segments.start..segments.end + 1
     }
 
     /// Velocities at the ends, carried from the first and the last of the data to the ends of the curve.
@@ -159,16 +141,9 @@ impl<'a> Track<'a> {
         })
     }
 
-    /// Takes the velocities of the fitted curve.
-    pub fn take(&mut self, velocities: Vec<f64>, len: usize) {
-        match self.ends {
-            Ends::Open(_) => self.velocities = velocities,
-            Ends::Periodic => {
-                let start = self.curve().start * len;
-                self.velocities[start..start + velocities.len()].copy_from_slice(&velocities);
-                turns::repeat(&mut self.velocities, len);
-            }
-        }
+    /// Whether the last step was within a few standard deviations of the points, and was not taken back.
+    pub fn steps_are_short(&self) -> bool {
+        self.before.is_some() && self.retreats == 0 && self.progress.report.step < 3.0
     }
 
     /// Whether nothing is left to do.
@@ -197,9 +172,9 @@ impl<'a> Track<'a> {
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
         let frames = Frames::new(space, &self.points);
         let mut sight = Sight::new(space, &path, &frames, &self.places, flat, data, &self.roots);
-        let (factors, softness) = options.loss.pseudo(self.corner, &sight.squares, m);
+        let factors = self.robust.factors(&sight.squares);
         if self.progress.settled && self.progress.report.exact {
-            let objective = self.value(space, options, &sight);
+            let objective = self.value(space, &sight);
             let before = std::mem::replace(&mut self.objective, objective);
             if self.objective > before * (1.0 + ROUNDING) && self.retreats < RETREATS {
                 self.objective = before;
@@ -207,7 +182,11 @@ impl<'a> Track<'a> {
             }
         }
         self.retreats = 0;
-        sight.soften(factors, m);
+        let whole = factors.as_ref().map(|factors| {
+            let whole = sight.misfit.clone();
+            sight.misfit.reweigh(flat, factors, m);
+            whole
+        });
         let misfit = &sight.misfit;
         let mut bends = frames.coordinates(&path.bends(space, &path.knots()), |i| i);
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
@@ -215,15 +194,18 @@ impl<'a> Track<'a> {
         speeds.iter_mut().for_each(|x| *x *= spacing);
         let curvature = curvature_terms(space, &speeds, &bends);
         let sigma = data.sigma.unwrap_or(f64::NAN);
-        let seen_with = |curved| Linear::new(flat, m, misfit, curved, &bends, &curvature, sigma);
+        let closed = self.ends == Ends::Periodic;
+        let seam = closed.then(|| Seam { overlap: OVERLAP, m, turn: frames.round() });
+        let seen_with =
+            |misfit, curved| Linear::new(flat, m, misfit, curved, seam.as_ref(), &bends, &curvature, sigma);
         let (curved, later);
         curved = self.progress.curved.then(|| Curved::new(space, flat, &speeds));
-        let mut linear = seen_with(curved.as_ref());
-        let mut lam = self.progress.weigh(space, &linear, &speeds, options, softness);
+        let mut linear = seen_with(misfit, curved.as_ref());
+        let mut lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         if self.progress.curved && linear.curved.is_none() {
             later = Curved::new(space, flat, &speeds);
-            linear = seen_with(Some(&later));
-            lam = self.progress.weigh(space, &linear, &speeds, options, softness);
+            linear = seen_with(misfit, Some(&later));
+            lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         }
         let system = linear.factored(lane(lam));
         if !(system.least_pivot().as_array()[0] > 0.0) {
@@ -232,9 +214,9 @@ impl<'a> Track<'a> {
         }
         let band = system.inverse_band();
         let inverse = system.mean(&band);
-        self.progress.note(&linear, &band, lam, softness);
+        self.progress.note(&linear, &band, lam, 1.0);
 
-        let exact = self.progress.takes_exact_way(space, options.tier, options.ends);
+        let exact = self.progress.takes_exact_way(space, options.tier);
         if exact && self.strays > 0 {
             return self.begin_again();
         }
@@ -246,24 +228,35 @@ impl<'a> Track<'a> {
         let (step, ambient) = if exact {
             let lam = lam * spacing.powi(3);
             let ends = self.ends.of_fit(&velocities);
-            let ambient = self.exact_step(space, ends, &sight, lam, monitor, alone);
+            let ambient = self.exact_step(space, ends, &sight, factors.as_deref(), lam, monitor, alone);
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {
             let change = linear.step(lam, &system);
-            let mut step = vec![0.0; change.len()];
+            let mut step = vec![0.0; flat.values.len() * m];
             flat.values.iter().zip(step.chunks_exact_mut(m)).for_each(|(row, x)| row.apply(&change, x));
             (step, None)
         };
         let deviations: Vec<f64> =
             flat.values.iter().map(|row| (row.square(&inverse).as_array()[0] * m as f64).sqrt()).collect();
         let reach = speeds.chunks_exact(m).map(length).sum::<f64>();
-        let own = flat.own.knots.clone();
-        let own_step = &step[own.start * m..own.end * m];
-        let small = self.progress.judge(own_step, &deviations[own], reach, options);
+        let tol = self.robust.tol(options.tol);
+        let small = self.progress.judge(&step, &deviations, reach, tol, self.robust.reweighs());
         self.inverse = Some(inverse);
+        let taken = self.progress.report.iterations - self.progress.begun;
+        let over = taken >= self.robust.most(options.max_iter);
+        if !self.robust.last() && self.progress.settled && (small || over) {
+            return self.go_on(&sight.squares);
+        }
         if self.progress.settled && small {
-            if !self.rescaled {
-                return self.rescale(options, &sight.squares, m);
+            if let Some(mut whole) = whole {
+                // Degrees of freedom and deviations of the M-estimator are those of its pseudo-data (Cox 1983).
+                let (factors, softness) = self.robust.pseudo(&sight.squares);
+                whole.soften(&factors, m);
+                let linear = seen_with(&whole, linear.curved);
+                let system = linear.factored(lane(lam / softness));
+                let band = system.inverse_band();
+                self.inverse = Some(system.mean(&band));
+                self.progress.note(&linear, &band, lam / softness, softness);
             }
             self.progress.report.state =
                 if self.progress.unsettled { State::Unsettled } else { State::Converged };
@@ -272,13 +265,14 @@ impl<'a> Track<'a> {
         // Farther than the data are nothing is known.
         let farthest = sight.distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
         let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
-        let further = if self.progress.settled { self.progress.further(&step) } else { 1.0 };
+        let further =
+            if self.progress.settled { self.progress.further(&step, self.robust.reweighs()) } else { 1.0 };
         let limited = longest * further > farthest;
         self.strays += usize::from(limited && self.progress.settled && !exact);
-        if self.strays > ASTRAY && self.progress.may_be_exact(space, options.tier, options.ends) {
+        if self.strays > ASTRAY && self.progress.may_be_exact(space, options.tier) {
             return self.begin_again();
         }
-        if self.progress.report.iterations >= options.max_iter || self.strays > ASTRAY {
+        if over || self.strays > ASTRAY {
             self.progress.report.state = State::Unconverged;
             return;
         }
@@ -302,21 +296,14 @@ impl<'a> Track<'a> {
     }
 
     /// J of the curve as it is.
-    fn value(&self, space: &Erased, options: &Options, sight: &Sight) -> f64 {
+    fn value(&self, space: &Erased, sight: &Sight) -> f64 {
         let lam = self.progress.lam.unwrap_or(0.0) * self.flat.basis.spacing.powi(3);
-        let own = &sight.squares[self.flat.own.data.clone()];
-        let terms = own.iter().map(|square| options.loss.value(*square, self.corner));
-        terms.sum::<f64>() + lam * exact::energy(space, &self.whole(space.point_len()))
+        let terms = sight.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
+        terms.sum::<f64>() + lam * exact::energy(space, &self.path())
     }
 
-    /// The curve without the turns before and after it that a closed one has.
-    fn whole(&self, len: usize) -> Path<'_> {
-        let Range { start, end } = self.curve();
-        Path {
-            t: &self.knots[start..end],
-            points: &self.points[start * len..end * len],
-            velocities: &self.velocities[start * len..end * len],
-        }
+    fn path(&self) -> Path<'_> {
+        Path { t: &self.knots, points: &self.points, velocities: &self.velocities }
     }
 
     /// The step of the exact way, as tangent vectors.
@@ -325,54 +312,35 @@ impl<'a> Track<'a> {
         space: &Erased,
         ends: FitEnds,
         sight: &Sight,
+        factors: Option<&[f64]>,
         lam: f64,
         monitor: &Monitor,
         alone: bool,
     ) -> Vec<f64> {
-        let (m, len) = (space.dim(), space.point_len());
-        let (curve, seen) = (self.curve(), self.flat.own.data.clone());
-        // What lies where one turn ends lies at the end of its last segment.
-        let last = curve.end - 2;
-        let of_place = |&(segment, tau): &Place| {
-            if segment > last { (last - curve.start, 1.0) } else { (segment - curve.start, tau) }
-        };
-        let places: Vec<Place> = self.places[seen.clone()].iter().map(of_place).collect();
-        let information = sight
-            .carried
-            .as_ref()
-            .map(|carried| (&self.roots[seen.clone()], &carried[seen.start * m * len..seen.end * m * len]));
         let pull = Pull {
-            places: &places,
-            points: &sight.gammas[seen.start * len..seen.end * len],
-            vectors: &sight.vectors[seen.start * len..seen.end * len],
-            factors: &sight.factors[seen.clone()],
-            weights: &self.data.weights[seen],
-            information,
+            places: &self.places,
+            points: &sight.gammas,
+            vectors: &sight.vectors,
+            factors,
+            weights: self.data.weights,
+            information: sight.carried.as_ref().map(|carried| (&self.roots[..], &carried[..])),
         };
-        let own = exact::step(space, &self.whole(len), ends, &pull, lam, monitor, alone);
-        let mut step = vec![0.0; self.points.len()];
-        step[curve.start * len..curve.end * len].copy_from_slice(&own);
-        if self.ends == Ends::Periodic {
-            turns::repeat(&mut step, len);
-        }
-        step
+        exact::step(space, &self.path(), ends, &pull, lam, monitor, alone)
     }
 
     /// Moves the points.
     fn go(&mut self, space: &Erased, from: &[f64], step: &[f64]) {
         self.points = moved(space, from, step);
         if self.ends == Ends::Periodic {
-            turns::repeat(&mut self.points, space.point_len());
+            let (len, last) = (space.point_len(), self.points.len() - space.point_len());
+            self.points.copy_within(..len, last);
         }
     }
 
-    /// Once more with the noise beside the curve, which is never taken to be larger, nor much smaller.
-    fn rescale(&mut self, options: &Options, squares: &[f64], m: usize) {
-        let own = self.flat.own.data.clone();
-        let freedom = self.progress.report.freedom;
-        let noise = loss::noise_beside(&squares[own], freedom, m);
-        self.corner = (noise * options.loss.corner(m)).clamp(0.5 * self.corner, self.corner);
-        (self.rescaled, self.objective) = (true, f64::INFINITY);
-        (self.progress.settled, self.progress.report.rounds) = (self.data.lam.is_some(), 0);
+    /// To the next stage of a robust fit.
+    fn go_on(&mut self, squares: &[f64]) {
+        let lam = self.robust.next(squares, self.progress.report.freedom);
+        self.progress.restart(lam);
+        (self.objective, self.before, self.strays) = (f64::INFINITY, None, 0);
     }
 }

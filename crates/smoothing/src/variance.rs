@@ -1,14 +1,15 @@
 //! How uncertain a smoothed curve is: the posterior of an integrated Wiener process (Wahba 1983), in frames along it.
 
+use crate::Ends;
 use crate::banded::Banded;
+use crate::cyclic::{Factored, Seam};
 use crate::flat::{Basis, FlatEnd, WIDTH};
 use crate::path::places;
-use crate::{Ends, turns};
 use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
 
-/// The rows of the band of A⁻¹ as plain numbers, four a knot.
+/// The rows of the band of A⁻¹ as plain numbers, four a coefficient.
 pub fn rows_of(inverse: &Banded) -> Vec<f64> {
     let entry = |at: usize| {
         let (i, d) = (at / BAND, at % BAND);
@@ -24,27 +25,15 @@ pub fn rows_of(inverse: &Banded) -> Vec<f64> {
 /// there with the inverse covariance λT, `vᵀTv` being the part of ∫ x''² in them; and between two knots whose points and
 /// velocities are given it has the variance `h³s³(1 − s)³/(3λ)`, and its velocity `h s(1 − s)(1 − 3s(1 − s))/λ`.
 pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64], nu: usize) -> Vec<f64> {
-    match ends {
-        Ends::Open(ends) => on_line(knots, rows, lam, ends, times, nu),
-        Ends::Periodic => {
-            let last = knots.len() - 1;
-            let (first, period) = (knots[0], knots[last] - knots[0]);
-            let inside: Vec<f64> = times.iter().map(|t| first + (t - first).rem_euclid(period)).collect();
-            let mut turn = rows.to_vec();
-            turn.truncate(last * BAND);
-            let mut three = turn.repeat(3);
-            three.extend_from_slice(&turn[..BAND]);
-            on_line(&turns::knots(knots), &three, lam, [FlatEnd::Natural; 2], &inside, nu)
-        }
-    }
-}
-
-fn on_line(knots: &[f64], rows: &[f64], lam: f64, ends: [FlatEnd; 2], times: &[f64], nu: usize) -> Vec<f64> {
-    let inverse = Banded::of(knots.len(), WIDTH, |at| lane(rows[at]));
-    let velocities = velocities_given_points(knots, ends);
     let basis = Basis::new(knots, ends);
+    let inverse = Banded::of(basis.count(), WIDTH, |at| lane(rows[at]));
+    let velocities = velocities_given_points(knots, ends);
     let last = knots.len() - 1;
     let one = |t: &f64| {
+        let t = match ends {
+            Ends::Open(_) => *t,
+            Ends::Periodic => knots[0] + (t - knots[0]).rem_euclid(knots[last] - knots[0]),
+        };
         let near = t.clamp(knots[0], knots[last]);
         let (segment, s) = places(knots, &[near])[0];
         let (h, beyond) = (knots[segment + 1] - knots[segment], t - near);
@@ -78,20 +67,21 @@ fn on_line(knots: &[f64], rows: &[f64], lam: f64, ends: [FlatEnd; 2], times: &[f
 
 /// The band of T⁻¹, where vᵀTv is the part of ∫ x''² in the velocities at knots: `4(v₀² + v₀v₁ + v₁²)/h` a segment. Given
 /// velocities vary as little as makes no difference.
-fn velocities_given_points(knots: &[f64], ends: [FlatEnd; 2]) -> Banded {
+fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
     const FIXED: f64 = 1e12;
     let last = knots.len() - 1;
     let stiffness = |i: usize| 1.0 / (knots[i + 1] - knots[i]);
-    let mut t = Banded::of(last + 1, 1, |at| {
+    let given = |end: usize| matches!(ends, Ends::Open(ends) if ends[end] == FlatEnd::Velocity);
+    let t = Banded::of(last + 1, 1, |at| {
         let (i, beside) = (at / 2, at % 2 == 1);
         let [left, right] = [(i > 0).then(|| stiffness(i - 1)), (i < last).then(|| stiffness(i))];
         if beside {
             return lane(2.0 * left.unwrap_or(0.0));
         }
-        let end = if i == 0 { Some(ends[0]) } else { (i == last).then_some(ends[1]) };
-        let fixed = if end == Some(FlatEnd::Velocity) { FIXED } else { 1.0 };
+        let fixed = if (i == 0 && given(0)) || (i == last && given(1)) { FIXED } else { 1.0 };
         lane(4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0)))
     });
-    t.factor();
-    t.inverse_band()
+    // The last velocity of a closed curve is the first.
+    let seam = (ends == Ends::Periodic).then(|| Seam::plain(1, 1));
+    Factored::new(t, seam.as_ref()).inverse_band()
 }

@@ -14,6 +14,9 @@ use symspline::smoothing::{
 };
 use symspline::space::{Ambient, Origin};
 
+/// Points times the cube of the dimension from which one iteration may take tenths of a second.
+const HEAVY_FACTORS: usize = 1_000_000;
+
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// Points at the knots, the band of A⁻¹, and the columns of the report.
@@ -35,6 +38,7 @@ pub fn smooth<'py>(
     sigma: Array<'py>,
     ends: Option<[EndOf<'py>; 2]>,
     criterion: &str,
+    gamma: f64,
     loss: &str,
     method: &str,
     tol: f64,
@@ -42,7 +46,7 @@ pub fn smooth<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Smoothed<'py>> {
     let options = Options {
-        criterion: criterion_named(criterion)?,
+        criterion: criterion_named(criterion, gamma)?,
         loss: match loss {
             "linear" => Loss::Linear,
             "huber" => Loss::Huber,
@@ -134,14 +138,16 @@ pub fn smooth<'py>(
             ends: vectors.map(|v| if v.is_empty() { none } else { &v[c * len..][..len] }),
         })
         .collect();
-    let found = watched(py, progress, curves * count, is_heavy(&space), |monitor| {
-        run(&space, &data, &options, monitor)
-    })?;
+    // One iteration factors banded matrices of three blocks for every knot.
+    let heavy = is_heavy(&space) || count * space.dim().pow(3) > HEAVY_FACTORS;
+    let found =
+        watched(py, progress, curves * count, heavy, |monitor| run(&space, &data, &options, monitor))?;
 
+    let coefficients = count + if ends.is_none() { 2 } else { 0 };
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();
     Ok((
         gathered(py, &shape, &found, |smooth| &smooth.points)?,
-        gathered(py, &[batch, &[count, 4]].concat(), &found, |smooth| &smooth.inverse)?,
+        gathered(py, &[batch, &[coefficients, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
     ))
 }
@@ -180,14 +186,13 @@ fn gathered<'py>(
     Ok(out)
 }
 
-fn criterion_named(name: &str) -> PyResult<Criterion> {
+fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
     Ok(match name {
-        "gcv" => Criterion::Gcv { penalty: 1.0 },
-        "gcv1.4" => Criterion::Gcv { penalty: 1.4 },
+        "gcv" => Criterion::Gcv { gamma },
         "reml" => Criterion::Reml,
         "cp" => Criterion::Cp,
         _ => {
-            return Err(invalid(format!("criterion must be 'gcv', 'gcv1.4', 'reml' or 'cp', not {name:?}")));
+            return Err(invalid(format!("criterion must be 'gcv', 'reml' or 'cp', not {name:?}")));
         }
     })
 }

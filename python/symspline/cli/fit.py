@@ -16,7 +16,7 @@ from .._core import ConvergenceError, CutLocusError, ValidationError
 from ..functions import fit_many
 from ..report import long_gaps
 from ..signs import IN_PYTHON
-from ..smoothing import SmoothingSpline
+from ..smoothing import SmoothingSpline, SmoothingWarning
 from ..smoothing.many import smooth_many
 from ..spaces import Space
 from ..spaces import space as space_named
@@ -200,6 +200,8 @@ def _fit(
     fitted: Sequence[CubicSpline]
     try:
         with warnings.catch_warnings(record=True) as noted, Progress("fitting") as progress:
+            # The summary says of how many curves λ is at a bound.
+            warnings.simplefilter("ignore", SmoothingWarning)
             if smooth is None:
                 fitted = fit_many(
                     data.curves(space, columns),

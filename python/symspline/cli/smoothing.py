@@ -16,7 +16,7 @@ from .errors import Problem
 from .layout import Doubles
 from .numbers import is_number
 
-_CRITERIA = ("gcv", "gcv1.4", "reml")
+_CRITERIA = ("gcv", "reml")
 _BEST = "best"
 _ROTATIONS = SpecialOrthogonal(3)
 
@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=_BEST,
         metavar="HOW",
         help="a smooth curve near the points, not through them; times may repeat. Write it behind IN. HOW smooth is "
-        "chosen from the data by gcv (default; with --sigma it is Mallows' C_p), gcv1.4, which is safer where motion "
-        "is nearly straight, or reml; or it is a number λ >= 0, in a product perhaps one of every factor with commas",
+        "chosen from the data by gcv (default; with --sigma it is Mallows' C_p) or reml; or it is a number λ >= 0, in "
+        "a product perhaps one of every factor with commas",
     )
     add(
         "--sigma",

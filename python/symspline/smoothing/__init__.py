@@ -3,5 +3,12 @@
 from .make import make_lsq_spline, make_smoothing_spline
 from .report import SmoothingReport
 from .spline import SmoothingSpline
+from .warned import SmoothingWarning
 
-__all__ = ["SmoothingReport", "SmoothingSpline", "make_lsq_spline", "make_smoothing_spline"]
+__all__ = [
+    "SmoothingReport",
+    "SmoothingSpline",
+    "SmoothingWarning",
+    "make_lsq_spline",
+    "make_smoothing_spline",
+]

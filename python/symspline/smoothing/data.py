@@ -10,15 +10,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
 from ..arrays import as_array, shown
+from ..curves.chosen import _invalid as invalid_curves
 from ..curves.ends import End
 from ..curves.fit import Points, read, read_ends, validated
+from ..curves.solve import Fault
 from ..handed import times_of
 from ..options import within
 from ..spaces import Array, Space, factors_of
 from ..times import Clock, knots_of
+from .factors import grouped, smoothed_spaces, split
 from .weighing import Weighing, read_weighing
 
 Doubles = NDArray[np.float64]
+
+
+# Segments that are longer than the whole over this get further knots where a curve was not found without them.
+_GAPS = 12
 
 
 class Noisy(NamedTuple):
@@ -28,8 +35,8 @@ class Noisy(NamedTuple):
         clock: how times are counted.
         t: times, shape (N,) or (..., N), as they are shown.
         times: the same in the core.
-        points: in every factor, on the space; data of weight zero stand for others.
-        weighing: in every factor.
+        points: in every factor, on the space; data of weight zero stand for others. NaN for curves that are left out.
+        weighing: in every space in which data are smoothed.
     """
 
     clock: Clock
@@ -51,6 +58,13 @@ class Knots(NamedTuple):
     t: Array
     times: Doubles
 
+    def of_curves(self, chosen: NDArray[np.intp] | None) -> Knots:
+        """The knots of these curves of a batch, None for all."""
+        if chosen is None or self.times.ndim == 1:
+            return self
+        t, times = (x.reshape(-1, x.shape[-1])[chosen] for x in (self.t, self.times))
+        return Knots(t, np.ascontiguousarray(times))
+
 
 def read_noisy(
     t: ArrayLike | None,
@@ -60,8 +74,8 @@ def read_noisy(
     frames: Any,
     bc_type: Any,
     atol: float | None,
-) -> tuple[Noisy, list[list[End] | None]]:
-    """The data, and the conditions at the ends in every factor, after all checks.
+) -> Given:
+    """The data as a user gives them, after all checks but those of points.
 
     Raises:
         ValidationError: something is wrong with them; it says where.
@@ -71,21 +85,91 @@ def read_noisy(
     clock, shown_times, times = _times_of(t, batch, count)
     weighing = read_weighing(weights, frames, space, data)
     if weights is not None:
-        data = [_without_missing(part, own.weights) for part, own in zip(data, weighing, strict=True)]
-    # Points only: times may repeat, and knots need not be where data are.
-    plain = np.arange(count, dtype=np.float64)
+        each = zip(data, grouped(space, weighing), strict=True)
+        data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
     ends = read_ends(bc_type, space, batch)
     for kind, _ in (end for own in ends for end in own or []):
         if kind not in ("natural", "velocity"):
             raise ValidationError(
-                f"bc_type {kind!r} is no end of a smooth curve: 'natural', 'clamped', 'periodic', or (1, velocity)"
+                f"bc_type {kind!r} is not an end condition of a smooth curve. Use 'natural', 'clamped', 'periodic' or "
+                "(1, velocity)."
             )
-    # The ends of a closed curve are noisy, too, and differ.
-    natural = read_ends("natural", space, batch)
-    on_space = validated(space, plain, data, [own or other for own, other in zip(ends, natural, strict=True)])
-    for own in weighing:
-        _check_enough(times, own.weights, batch, count)
-    return Noisy(clock, shown_times, times, on_space, weighing, batch), ends
+    return Given(clock, shown_times, times, data, weighing, ends, batch, None)
+
+
+class Given(NamedTuple):
+    """Noisy data before their points are checked, as `Noisy`.
+
+    Attributes:
+        data: points in every factor.
+        ends: conditions at the ends, in every factor.
+        chosen: the numbers of these curves in the batch of a user; None for all of them.
+    """
+
+    clock: Clock
+    t: Array
+    times: Doubles
+    data: list[Points]
+    weighing: list[Weighing]
+    ends: list[list[End] | None]
+    batch: tuple[int, ...]
+    chosen: NDArray[np.intp] | None
+
+    def sound(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
+        """The curves that are to be made, and what is wrong with others: unless ``strict`` those with points that are
+        none or too few are left out."""
+        chosen = np.ones(self.batch, bool) if mask is None else mask.copy()
+        faults: list[Fault] = []
+        if self.batch and not strict:
+            faults = invalid_curves(space, self.data, np.flatnonzero(chosen))
+            chosen.flat[[number for number, *_ in faults]] = False
+            for weighing in self.weighing:
+                for number in np.flatnonzero(chosen & ~_enough(self.times, weighing.weights, self.batch)):
+                    faults.append(
+                        (int(number), "invalid", _too_few(weighing.weights, self.batch, int(number)))
+                    )
+                    chosen.flat[number] = False
+        if chosen.all():
+            return self, sorted(faults)
+        return self._some(space, np.flatnonzero(chosen)), sorted(faults)
+
+    def _some(self, space: Space, chosen: NDArray[np.intp]) -> Given:
+        """These curves alone, along one axis."""
+        lead = len(self.batch)
+
+        def rows(array: Any) -> Any:
+            return np.ascontiguousarray(array.reshape(-1, *array.shape[lead:])[chosen])
+
+        shared = self.times.ndim == 1
+        return Given(
+            self.clock,
+            self.t if self.t.ndim == 1 else rows(self.t),
+            self.times if shared else rows(self.times),
+            [part._replace(doubles=rows(part.doubles), batch=(len(chosen),)) for part in self.data],
+            [own.map(rows) for own in self.weighing],
+            [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
+            (len(chosen),),
+            chosen,
+        )
+
+    def checked(self, space: Space) -> Noisy:
+        """With points that are moved onto the space.
+
+        Raises:
+            ValidationError: some are none; it says where.
+        """
+        # Points only: times may repeat, and knots need not be where data are. The ends of a closed curve are noisy,
+        # too, and differ.
+        plain = np.arange(self.data[0].nodes, dtype=np.float64)
+        natural = read_ends("natural", space, self.batch)
+        ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
+        on_space = validated(space, plain, self.data, ends)
+        for own in self.weighing:
+            enough = _enough(self.times, own.weights, self.batch)
+            if not np.all(enough):
+                number = int(np.flatnonzero(~enough)[0])
+                raise ValidationError(_too_few(own.weights, self.batch, number))
+        return Noisy(self.clock, self.t, self.times, on_space, self.weighing, self.batch)
 
 
 def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[Clock, Array, Doubles]:
@@ -103,9 +187,11 @@ def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[
     return clock, shown_times, times
 
 
-def _without_missing(part: Points, weights: Doubles) -> Points:
+def _without_missing(part: Points, weights: list[Doubles]) -> Points:
     """Points of weight zero, which may be NaN, stand for the nearest others before or after them."""
-    missing = np.broadcast_to(weights == 0, (*part.batch, part.nodes))
+    missing = reduce(
+        np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights]
+    )
     if not missing.any():
         return part
     order = np.arange(part.nodes)
@@ -117,23 +203,24 @@ def _without_missing(part: Points, weights: Doubles) -> Points:
     return part._replace(doubles=np.ascontiguousarray(doubles))
 
 
-def _check_enough(times: Doubles, weights: Doubles, batch: tuple[int, ...], count: int) -> None:
-    """Two different times at least."""
-    shape = (*batch, count)
-    used = np.broadcast_to(weights > 0, shape)
-    own = np.broadcast_to(times, shape)
+def _enough(times: Doubles, weights: Doubles, batch: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Which curves have data at two different times at least."""
+    shape = (*batch, times.shape[-1])
+    used, own = np.broadcast_to(weights > 0, shape), np.broadcast_to(times, shape)
     first, last = np.where(used, own, np.inf).min(-1), np.where(used, own, -np.inf).max(-1)
-    if not np.all(last > first):
-        index = np.argwhere(~(last > first))[0].tolist()
-        of = f" of curve {','.join(map(str, index))}" if batch else ""
-        if not used[tuple(index)].any():
-            raise ValidationError(
-                f"all weights of the data{of} are 0; a curve needs points at two times at least"
-            )
-        raise ValidationError(f"the data{of} lie at one time; a curve needs points at two times at least")
+    return np.asarray(last > first)
 
 
-def knots_for(noisy: Noisy, knots: Any) -> Knots:
+def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
+    index = np.unravel_index(number, batch)
+    of = f" of curve {','.join(map(str, index))}" if batch else ""
+    own = weights[index] if weights.ndim > 1 else weights
+    if not np.any(own > 0):
+        return f"All weights of the data{of} are 0. A curve needs points at two times at least."
+    return f"The data{of} lie at one time. A curve needs points at two times at least."
+
+
+def knots_for(noisy: Given, knots: Any) -> Knots:
     """Knots: None for all different times, a number of them, or the knots themselves."""
     t, times = noisy.t, noisy.times
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
@@ -161,6 +248,18 @@ def knots_for(noisy: Noisy, knots: Any) -> Knots:
         given = found
     # Curves that count from a time of their own each have them.
     return Knots(np.broadcast_to(given, found.shape).copy(), found)
+
+
+def has_all_times(knots: Knots, noisy: Noisy) -> bool:
+    """Whether there is a knot at every time of data that count."""
+    used = np.broadcast_to(noisy.used, (*noisy.batch, noisy.times.shape[-1]))
+    if noisy.times.ndim == 1:
+        used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
+    if knots.times.ndim == 1 and noisy.times.ndim == 1:
+        return bool(np.isin(noisy.times[used], knots.times).all())
+    return bool(
+        np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)])
+    )
 
 
 def _different(t: Array, times: Doubles) -> Knots:
@@ -214,10 +313,30 @@ def sparse(knots: Knots, noisy: Noisy, lam: float | None) -> Knots:
     return _picked(knots, np.array([*kept, len(times) - 1]))
 
 
+def in_gaps(knots: Knots, given: Given) -> Knots:
+    """The knots with further ones in long gaps. There the curve of the space through two points that are far apart may
+    turn faster than one segment can."""
+    if knots.times.ndim > 1 or len(knots.times) < 3:
+        return knots
+    h = np.diff(knots.times)
+    parts = np.ceil(h * _GAPS / h.sum()).astype(int)
+    i = np.repeat(np.arange(len(h)), parts)
+    j = np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
+    # Dates are divided in their own unit.
+    first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
+    whole = step.dtype.kind in "ium"
+    shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
+    times, _ = given.clock.at(shown_times, (), False)
+    inner = np.flatnonzero(j == 0)
+    times[inner], times[-1] = knots.times[:-1], knots.times[-1]
+    return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots
+
+
 def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
     return Knots(knots.t[..., index], np.ascontiguousarray(knots.times[..., index]))
 
 
 def points_of(noisy: Noisy, space: Space) -> list[tuple[Space, Array]]:
-    """Every factor with its points."""
-    return list(zip(factors_of(space), noisy.points, strict=True))
+    """Every space in which data are smoothed, with its points."""
+    points = [own for pair in zip(factors_of(space), noisy.points, strict=True) for own in split(*pair)]
+    return list(zip(smoothed_spaces(space), points, strict=True))

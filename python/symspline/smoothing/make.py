@@ -10,20 +10,23 @@ from numpy.typing import ArrayLike
 
 from .._core import ValidationError
 from ..arrays import shown, whole_number
+from ..curves.chosen import fit_wanted, mask_of
 from ..curves.ends import End, is_closed, kept
 from ..curves.fit import Asked as Fitted
-from ..curves.fit import Points, fit
-from ..curves.solve import Fault, Options, Progress
+from ..curves.fit import Points
+from ..curves.solve import Options, Progress
 from ..failures import fail
 from ..manifolds.manifold import refuse_functions
 from ..options import check_on_failure, check_progress, checked_policy
 from ..signs import warn_of_signs
 from ..spaces import Product, Space, factors_of
 from ..spaces import space as space_named
-from .data import Knots, Noisy, knots_for, points_of, read_noisy, some, sparse
-from .solve import Asked, enough, one_a_curve, smoothed
+from .data import Given, Knots, Noisy, has_all_times, in_gaps, knots_for, points_of, read_noisy, some, sparse
+from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
+from .solve import NO_CURVE, Asked, enough, one_a_curve, smoothed
 from .spline import SmoothingSpline
 from .spread import warn_of_spread
+from .warned import warn_of_bounds
 
 _FIT = Options("auto", 1e-12, None)
 # Knots from which fewer are tried first, and how many.
@@ -42,6 +45,7 @@ def make_smoothing_spline(
     frames: Any = None,
     knots: Any = None,
     criterion: str = "gcv",
+    gamma: float = 1.4,
     sigma: Any = None,
     bc_type: Any = "natural",
     loss: str = "linear",
@@ -51,59 +55,96 @@ def make_smoothing_spline(
     extrapolate: bool | str | None = None,
     on_failure: str = "raise",
     atol: float | None = None,
+    where: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> SmoothingSpline:
-    """The C² curve γ that makes ``Σ w d(y, γ(t))² + λ ∫ |∇γ'|² dt`` least.
+    """Fit a C² curve close to noisy points.
 
-    In flat space it is SciPy's ``make_smoothing_spline``. λ is chosen from the data unless it is given.
+    The curve minimises a weighted sum of squared distances to the data and the integrated squared acceleration. The
+    data determine the weight λ between the two, unless `lam` is given. In flat space the result is SciPy's
+    ``make_smoothing_spline``.
 
-    Args:
-        t: times of the data, not decreasing; several data may have one time, and copies of a datum in a row are one
-            of their weight. None for 0, 1, …, shape (N,) or (..., N).
-        points: noisy points y, shape (..., N, *space.point_shape); leading axes are independent curves, each with a
-            λ of its own. For a `Product` a tuple of arrays.
-        space: a space or its name. In `SpecialEuclidean`, which has no invariant metric, the curve solves the same
-            equations in the frames of the space, in which lengths and angles count alike; a product of R³ and SO(3)
-            has a λ for each.
-        lam: λ >= 0; 0 comes nearest to the data, and large ones give a geodesic. None to choose it; for a batch also
-            one a curve, for a product also a tuple with one of every factor. Its unit is weight · time³.
-        weights: of the data, >= 0, shape (N,) or (..., N): one over the variance of their noise, up to a factor. Points
-            of weight zero are left out, and may be NaN. Or information matrices W, shape (N, m, m) or (..., N, m, m)
-            with m = ``space.dim``, inverse covariances of the noise, for points of which some directions are known
-            better than others: eᵀWe takes the place of w d², e being the coordinates of ``space.log(y, γ(t))``.
-            Directions without any information are allowed. For a product a tuple with one of these for
-            every factor.
-        frames: the tangent vectors that the matrices refer to, m at every point and not necessarily orthonormal,
-            shape (..., N, m, *space.point_shape); None for those of ``space.frame(points)``. Of rotations
-            ``symspline.rotations.velocities(points[:, None], np.eye(3))`` are the axes of the body, in radians.
-        knots: of the curve: None for all times of data, a number of them, or an array that reaches from the first
-            to the last time. About four times the degrees of freedom are enough. Of more than 4000
-            times None takes so many that further ones would not change the curve.
-        criterion: how λ is chosen: ``"gcv"`` (generalised cross-validation), ``"gcv1.4"`` (the same with every
-            degree of freedom counted 1.4 times, safer where motion is nearly geodesic or noise is correlated),
-            ``"reml"``, or ``"cp"`` (Mallows' C_p, which needs ``sigma``).
-        sigma: standard deviation of the noise in a coordinate for weight one, if it is known, as a length in the space:
-            radians on the unit sphere. Also one a curve, or a tuple for a product.
-        bc_type: conditions at the ends: ``"natural"``, ``"clamped"``, ``(1, velocity)`` at either end, as for
-            `CubicSpline`, or ``"periodic"``. Velocities are tangent at the first and the last of the points, and are
-            carried from there to the curve in parallel. A closed curve has the period of its knots.
-        loss: ``"linear"`` for least squares; ``"huber"`` or ``"cauchy"`` if there are outliers.
-        method: ``"flat"`` solves the problem of numbers in frames along the curve, again and again, with the curvature
-            of the space in its matrix where curves are nearly geodesic over long distances; its result is within
-            about 1e-4 of the error of the minimum, more where segments are long. ``"newton"`` is the Gauss-Newton
-            method for the minimum itself, and much slower. ``"auto"`` takes the first, and the second where it
-            converges slowly.
-        tol: the search ends when no point moves by more than this part of its standard deviation.
-        max_iter: most splines that are fitted.
-        extrapolate, on_failure, atol, progress: as for `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (N,) or (..., N), or None
+        Times of the data, not decreasing. Several data may have one time; consecutive copies of a datum count as one
+        datum with the sum of their weights. None means 0, 1, ..., N - 1.
+    points : array_like, shape (..., N, *space.point_shape)
+        Noisy points. Leading axes are batch axes; each curve has its own λ. For a `Product` a tuple of arrays.
+    space : Space or str
+        A space or its name. Points of `SpecialEuclidean` are smoothed as rotations and positions, which have a λ and a
+        noise level each: a rigid motion has no invariant metric. The curve is a curve of the space through the poses
+        that result.
+    lam : float, array_like or tuple, optional
+        λ ≥ 0 in units of weight · time³. With 0 the curve comes as near to the data as its knots allow; large values
+        give a geodesic. For a batch also one for each curve; for products and poses also a tuple with one for each
+        part. Chosen by `criterion` if omitted.
+    weights : array_like or tuple, optional
+        Weights ≥ 0 of the data, shape (N,) or (..., N): the inverse variances of their noise up to a common factor.
+        Points of weight 0 are left out, and may be NaN. Or information matrices W, shape (N, m, m) or (..., N, m, m)
+        with m = ``space.dim``: inverse covariances of the noise, possibly rank-deficient. Then eᵀWe takes the place of
+        w d², where e are the coordinates of ``space.log(y, γ(t))``. For a product a tuple with one of these for each
+        factor. For poses also a pair, for rotations and positions; of matrices for whole poses the correlation of the
+        two is not used.
+    frames : array_like or tuple, optional
+        Tangent vectors that the information matrices refer to, m at every point and not necessarily orthonormal, shape
+        (..., N, m, *space.point_shape). Default ``space.frame(points)``. For rotations,
+        ``symspline.rotations.velocities(points[:, None], np.eye(3))`` are the axes of the body, in radians.
+    knots : int or array_like, optional
+        Knots of the curve: how many, or an increasing array that reaches from the first to the last time. About four
+        times the degrees of freedom are enough. By default all times of the data are knots; of more than 4000 times,
+        as many as the degrees of freedom need.
+    criterion : {"gcv", "reml", "cp"}, default "gcv"
+        How λ is chosen: by generalised cross-validation, by restricted maximum likelihood, or by Mallows' C_p, which
+        needs `sigma`.
+    gamma : float, default 1.4
+        How much a degree of freedom counts in ``"gcv"``. With 1, cross-validation as Craven and Wahba define it, a
+        curve through all data is chosen now and then.
+    sigma : float, array_like or tuple, optional
+        Standard deviation of the noise in a coordinate for weight one, as a length in the space: radians on the unit
+        sphere. Also one for each curve, or a tuple for products and poses.
+    bc_type : {"natural", "clamped", "periodic"} or pair, default "natural"
+        Conditions at the ends, or ``(1, velocity)`` at either end, as for `CubicSpline`. Velocities are tangent at the
+        first and the last point, from where they are transported to the curve. A closed curve has the period of its
+        knots.
+    loss : {"linear", "huber", "cauchy"}, default "linear"
+        Least squares, or a loss that limits the influence of outliers. Cauchy's is the better one for many or distant
+        outliers.
+    method : {"auto", "flat", "newton"}, default "auto"
+        ``"flat"`` solves the linearised problem in frames along the curve repeatedly. Its result is within about 1e-4
+        of the error of the minimum, and further off where segments are long. ``"newton"`` is the full Gauss-Newton
+        method, and much slower. ``"auto"`` uses the first, and the second where the first converges slowly.
+    tol : float, default 1e-3
+        The search ends when no point moves by more than this fraction of its standard deviation.
+    max_iter : int, default 50
+        The largest number of iterations, each of which fits a spline. For robust losses that of each of their stages.
+    extrapolate, on_failure, atol, progress
+        As for `CubicSpline`.
+    where : array_like of bool, optional
+        Mask over the batch. Curves where it is False are not fitted and evaluate to NaN. With ``on_failure="warn"`` or
+        ``"ignore"`` the same holds for curves with invalid points or with data at fewer than two times.
 
-    Raises:
-        ValidationError: the input is not what is described above.
-        ConvergenceError: the search did not end, or no spline goes through the points that it led to.
+    Returns
+    -------
+    SmoothingSpline
+        A `CubicSpline` that knows λ, the degrees of freedom, the noise level and standard deviations.
 
-    Warns:
-        UserWarning: data are about as far from their curve as random points of a compact space would be.
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    ConvergenceError
+        If the search did not end, or no spline joins the points that it led to.
 
+    Warns
+    -----
+    SmoothingWarning
+        If the criterion is least at a bound: for a curve through all data, or for one without any bending.
+    UserWarning
+        If the data are about as far from their curve as random points of a compact space would be.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> import symspline as ss
     >>> sphere, rng = ss.Sphere(2), np.random.default_rng(0)
@@ -120,66 +161,117 @@ def make_smoothing_spline(
     check_on_failure(on_failure)
     check_progress(progress)
     if criterion == "cp" and sigma is None:
-        raise ValidationError("criterion 'cp' needs sigma, the standard deviation of the noise")
+        raise ValidationError("criterion='cp' needs the standard deviation of the noise. Pass sigma.")
     for name, word in (("criterion", criterion), ("loss", loss), ("method", method)):
         if not isinstance(word, str):
             raise ValidationError(f"{name} must be a word, not {shown(word)}")
+    if isinstance(gamma, bool) or not (isinstance(gamma, (int, float, np.number)) and 1 <= gamma < np.inf):
+        raise ValidationError(f"gamma must be a number >= 1, not {shown(gamma)}")
     if isinstance(tol, bool) or not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
         raise ValidationError(f"tol must be a number > 0, not {shown(tol)}")
-    asked = Asked(criterion, loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
-    noisy, ends = read_noisy(t, points, space, weights, frames, bc_type, atol)
-    if loss != "linear" and sigma is None and any(own.is_singular for own in noisy.weighing):
+    asked = Asked(criterion, float(gamma), loss, method, float(tol), whole_number(max_iter, "max_iter", 1))
+    given = read_noisy(t, points, space, weights, frames, bc_type, atol)
+    lams = _in_parts(space, lam, "lam", given.batch)
+    sigmas = _in_parts(space, sigma, "sigma", given.batch)
+    if loss != "linear" and sigma is None and any(own.is_singular for own in given.weighing):
         raise ValidationError(
-            f"loss {loss!r} with weights that know nothing of some directions needs sigma, the size of the noise: "
-            "1 where they are inverse covariances"
+            f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
+            "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
-    if noisy.times.shape[-1] == 2:
+    if given.times.shape[-1] == 2:
         # Of two points none is an outlier, and nothing says how large the noise is.
         asked = asked._replace(loss="linear")
-    lams = _in_factors(space, lam, "lam", noisy.batch)
-    sigmas = _in_factors(space, sigma, "sigma", noisy.batch)
+    mask = None if where is None else mask_of(where, given.batch)
+    some_given, faults = given.sound(space, mask, on_failure == "raise")
+    noisy, chosen = some_given.checked(space), some_given.chosen
+    if chosen is not None:
+        lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
+    ends = [
+        own
+        for factor, of_factor in zip(factors_of(space), some_given.ends, strict=True)
+        for own in split_ends(factor, of_factor)
+    ]
+    named = _names(given.batch, chosen)
+    every = knots_for(given, knots)
+    free = knots is None or has_all_times(every, noisy)
 
     def run(at: Knots) -> list[Any]:
-        each = zip(points_of(noisy, space), noisy.weighing, _chosen(lams, at), sigmas, ends, strict=True)
+        own = at.of_curves(chosen)
+        each = zip(points_of(noisy, space), noisy.weighing, _chosen(lams, own), sigmas, ends, strict=True)
         return [
-            smoothed(factor, noisy, own, weighing, at, one_lam, one_sigma, end, asked, progress)
-            for (factor, own), weighing, one_lam, one_sigma, end in each
+            smoothed(
+                part,
+                noisy,
+                points_of_part,
+                weighing,
+                own,
+                one_lam,
+                one_sigma,
+                end,
+                asked,
+                named,
+                free,
+                progress,
+            )
+            for (part, points_of_part), weighing, one_lam, one_sigma, end in each
         ]
 
-    whole = knots_for(noisy, knots)
-    if is_closed(bc_type) and whole.times.shape[-1] < 4:
-        raise ValidationError(f"a closed curve needs at least 4 knots, not {whole.times.shape[-1]}")
+    if is_closed(bc_type) and every.times.shape[-1] < 4:
+        raise ValidationError(
+            f"A closed curve needs at least 4 knots, and there are {every.times.shape[-1]}. Give more data, or knots."
+        )
     if knots is None:
-        found, at = _with_enough(whole, noisy, lams, run)
+        found, at = _with_enough(every, noisy, lams, run)
+        finer = in_gaps(at, given)
+        if (
+            any(NO_CURVE in fault[2] for _, _, own in found for fault in own)
+            and finer.times.shape != at.times.shape
+        ):
+            found, at = run(finer), finer
     else:
-        found, at = run(whole), whole
-    parts = [
-        Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, noisy.batch, at.times.shape[-1])
-        for factor, (own, _, _) in zip(factors_of(space), found, strict=True)
-    ]
+        found, at = run(every), every
     carried = [
-        _carried(end, factor, own, curve_points, noisy)
-        for end, (factor, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
+        _carried(end, part, own, curve_points, noisy)
+        for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
-    curve, reports, _ = fit(Fitted(space, at.times, parts, carried, _FIT, False), None)
+    whole = _whole(given, noisy, chosen)
+    at_knots = [
+        join(factor, [_at_places(own, given.batch, chosen) for own, _, _ in parts])
+        for factor, parts in zip(factors_of(space), grouped(space, found), strict=True)
+    ]
+    conditions = [
+        _joined(factor, [_ends_at_places(one, given.batch, chosen) for one in own])
+        for factor, own in zip(factors_of(space), grouped(space, carried), strict=True)
+    ]
+    parts = [
+        Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, given.batch, at.times.shape[-1])
+        for factor, own in zip(factors_of(space), at_knots, strict=True)
+    ]
+    good = None if chosen is None else _flags(given.batch, chosen)
+    curve, reports, _ = fit_wanted(Fitted(space, at.times, parts, conditions, _FIT, False), None, good)
+    noise = [part.map(lambda column: _at_places(column, given.batch, chosen)) for _, part, _ in found]
     spline = SmoothingSpline._of(
-        noisy.clock,
-        at.t,
-        curve,
-        _conditions(bc_type, carried, space),
-        policy,
-        reports,
-        noisy,
-        [part for _, part, _ in found],
+        given.clock, at.t, curve, _conditions(bc_type, conditions, space), policy, reports, whole, noise
     )
-    faults: list[Fault] = next((faults for _, _, faults in found if faults), [])
+    faults += next((own for _, _, own in found if own), [])
     if faults:
-        fail(faults, on_failure, spline)
-    warn_of_spread(space, curve, noisy, [part.report.df for _, part, _ in found])
-    nodes = noisy.times.shape[-1]
+        fail(sorted(faults), on_failure, spline)
+    warn_of_bounds(
+        space,
+        [part.report for part in noise],
+        [_at_places(np.isnan(own), given.batch, chosen) for own in lams],
+        [np.sum(own.weights > 0, axis=-1) for own in given.weighing],
+    )
+    warn_of_spread(space, curve, whole, [part.report.df for part in noise])
+    nodes = given.times.shape[-1]
     warn_of_signs(
         space,
-        [[Points(one._as_doubles(own), 0.0, noisy.batch, nodes) for one, own in points_of(noisy, space)]],
+        [
+            [
+                Points(one._as_doubles(own), 0.0, given.batch, nodes)
+                for one, own in zip(factors_of(space), whole.points, strict=True)
+            ]
+        ],
     )
     return spline
 
@@ -220,14 +312,56 @@ def _chosen(lams: list[Any], at: Knots) -> list[Any]:
     return [np.where(np.isnan(lam), cube, lam) for lam in lams]
 
 
-def _in_factors(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> list[Any]:
-    """A number a curve in every factor."""
-    factors = factors_of(space)
-    if isinstance(space, Product) and isinstance(value, tuple):
-        if len(value) != len(factors):
-            raise ValidationError(f"{name} has {len(value)} entries, but the product {len(factors)} factors")
+def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> list[Any]:
+    """A number a curve in every space in which data are smoothed."""
+    spaces = smoothed_spaces(space)
+    if is_several(space) and isinstance(value, tuple):
+        if len(value) != len(spaces):
+            raise ValidationError(
+                f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
+                f"{', '.join(map(repr, spaces))}. Give one for each."
+            )
         return [one_a_curve(one, name, batch) for one in value]
-    return [one_a_curve(value, name, batch)] * len(factors)
+    return [one_a_curve(value, name, batch)] * len(spaces)
+
+
+def _names(batch: tuple[int, ...], chosen: Any) -> Callable[[int], tuple[int, str]]:
+    """The number of a curve among those that are made to its number in the batch, and what messages call it."""
+
+    def name(number: int) -> tuple[int, str]:
+        there = number if chosen is None else int(chosen[number])
+        return there, f" of curve {','.join(map(str, np.unravel_index(there, batch)))}" if batch else ""
+
+    return name
+
+
+def _flags(batch: tuple[int, ...], chosen: Any) -> Any:
+    flags = np.zeros(batch, bool)
+    flags.flat[chosen] = True
+    return flags
+
+
+def _at_places(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
+    """What belongs to the curves that are made, at their places in the batch: NaN, False or zero for the others."""
+    if chosen is None:
+        return column
+    rows = np.asarray(column)
+    nothing = np.nan if rows.dtype.kind in "fc" else 0
+    out = np.full((int(np.prod(batch)), *rows.shape[1:]), nothing, rows.dtype)
+    out[chosen] = rows
+    return out.reshape(*batch, *rows.shape[1:])
+
+
+def _ends_at_places(ends: list[End] | None, batch: tuple[int, ...], chosen: Any) -> list[End] | None:
+    return ends and [(kind, None if v is None else _at_places(v, batch, chosen)) for kind, v in ends]
+
+
+def _whole(given: Given, noisy: Noisy, chosen: Any) -> Noisy:
+    """The data of all curves; NaN for points of those that are left out."""
+    if chosen is None:
+        return noisy
+    points = [_at_places(own, given.batch, chosen) for own in noisy.points]
+    return Noisy(given.clock, given.t, given.times, points, given.weighing, given.batch)
 
 
 def _with_enough(
@@ -275,6 +409,22 @@ def _carried(ends: list[End] | None, space: Space, data: Any, points: Any, noisy
             vector = np.ascontiguousarray(space._as_doubles(moved))
         result.append((kind, vector))
     return None if ends is None else result
+
+
+def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
+    """The conditions at the ends of a factor from those of its parts."""
+    if ends[0] is None or len(ends) == 1:
+        return ends[0]
+    parts: tuple[Space, ...] = parts_of_factor(space)
+    joined: list[End] = []
+    for each in zip(*[own or [] for own in ends], strict=True):
+        vectors = [vector for _, vector in each]
+        if any(vector is None for vector in vectors):
+            joined.append((each[0][0], None))
+            continue
+        rows = [part._numbers(vector) for part, vector in zip(parts, vectors, strict=True)]
+        joined.append((each[0][0], np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0)))))
+    return joined
 
 
 def _conditions(bc_type: Any, carried: list[list[End] | None], space: Space) -> Any:

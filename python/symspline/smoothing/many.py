@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
 from .._core import ConvergenceError, ValidationError
 from ..curves.solve import Fault, Progress
-from ..failures import fail
+from ..failures import callers_level, fail
 from ..options import check_on_failure, check_progress
 from ..spaces import Space
 from .make import make_smoothing_spline
@@ -36,16 +37,25 @@ def smooth_many(
     given = list(curves)
     found: list[SmoothingSpline] = []
     faults: list[Fault] = []
+    noted: list[tuple[int, Any]] = []
     for number, (t, points, own) in enumerate(given):
-        try:
-            found.append(make_smoothing_spline(t, points, space, **own, **options))
-        except ConvergenceError as error:
-            found.append(error.spline)
-            faults.append((number, "unconverged", f"curve {number}: {error}"))
-        except ValidationError as error:
-            raise ValidationError(f"curve {number}: {error}") from None
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            try:
+                found.append(make_smoothing_spline(t, points, space, **own, **options))
+            except ConvergenceError as error:
+                found.append(error.spline)
+                faults.append((number, "unconverged", f"curve {number}: {error}"))
+            except ValidationError as error:
+                raise ValidationError(f"curve {number}: {error}") from None
+        noted += [(number, note) for note in seen]
         if progress is not None:
             progress(number + 1, len(given))
+    # One warning of a kind for all curves.
+    for kind in dict.fromkeys(note.category for _, note in noted):
+        first, *more = [(number, note) for number, note in noted if note.category is kind]
+        others = f" (and {len(more)} more curves)" if more else ""
+        warnings.warn(f"curve {first[0]}: {first[1].message}{others}", kind, stacklevel=callers_level())
     if faults:
         fail(faults, on_failure, found)
     return found

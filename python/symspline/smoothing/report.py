@@ -41,12 +41,18 @@ class SmoothingReport:
         good = np.asarray(self.converged)
         if good.ndim == 0:
             state = "converged" if good else "NOT converged"
-            bound = f" (at its bound: {'a geodesic' if self.df < 2.5 else 'rough'})" if self.at_bound else ""
+            bound = (
+                f" (at its bound: {'a geodesic' if self.is_stiff() else 'rough'})" if self.at_bound else ""
+            )
             return (
                 f"{state}: {self.method}, {self.iterations} iterations, λ = {self.lam:.3g}{bound}, "
                 f"{self.df:.1f} degrees of freedom, noise {self.sigma:.2g}"
             )
         return f"{np.count_nonzero(good)} of {good.size} curves converged: {self.method}"
+
+    def is_stiff(self, index: tuple[int, ...] = ()) -> bool:
+        """Whether a curve has hardly more degrees of freedom than one without any bending."""
+        return bool(np.asarray(self.df)[index] < 2.5)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SmoothingReport):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,22 +21,28 @@ from .weighing import Weighing
 
 Doubles = NDArray[np.float64]
 
+# Part of the message where a smoothing ended without a curve.
+NO_CURVE = "no spline joins"
 _STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
 class Smoothed(NamedTuple):
-    """What is kept of the smoothing in one factor.
+    """What is kept of the smoothing in one space.
 
     Attributes:
-        band: the band of A⁻¹, shape (..., K, 4): variances of the curve, at noise of variance one.
+        band: the band of A⁻¹, shape (..., K, 4), (..., K + 2, 4) for closed curves: variances of the curve, at noise of
+            variance one.
         band_lam: the λ that goes with it, that of the pseudo-data of a robust loss.
         sigma: the standard deviation of a coordinate by which bands are scaled, estimated or known.
+        between: whether the curve is the mean of a process that is free between its knots, as it is with a knot at
+            every time of the data; with knots of a user it is a spline, which is not.
     """
 
     report: SmoothingReport
     band: Doubles
     band_lam: Any
     sigma: Any
+    between: bool
 
     def map(self, function: Any) -> Smoothed:
         """The same for a part of a batch."""
@@ -44,6 +51,7 @@ class Smoothed(NamedTuple):
             function(self.band),
             function(self.band_lam),
             function(self.sigma),
+            self.between,
         )
 
 
@@ -51,6 +59,7 @@ class Asked(NamedTuple):
     """How to smooth; the core checks the words."""
 
     criterion: str
+    gamma: float
     loss: str
     method: str
     tol: float
@@ -67,6 +76,8 @@ def smoothed(
     sigma: Doubles,
     ends: list[End] | None,
     asked: Asked,
+    name: Callable[[int], tuple[int, str]],
+    between: bool,
     progress: Progress | None,
 ) -> tuple[Array, Smoothed, list[Fault]]:
     """The points of smooth curves at the knots, in a space that is no product."""
@@ -107,36 +118,41 @@ def smoothed(
     known = sigma.reshape(batch) if batch else sigma[0].item()
     scale = np.where(np.isnan(known), noise, known) if batch else noise if np.isnan(known) else known
     numbers = small._numbers(found)
-    faults = [
-        (number, "unconverged", _reason(_STATES[kind], batch, number, report, asked))
-        for number, kind in enumerate(np.ravel(state).tolist())
-        if kind
-    ]
-    return numbers if span is None else span.up(numbers), Smoothed(report, band, band_lam, scale), faults
+    faults: list[Fault] = []
+    for number, kind in enumerate(np.ravel(state).tolist()):
+        if kind:
+            there, of = name(number)
+            faults.append((there, "unconverged", _reason(_STATES[kind], of, number, report, asked)))
+    return (
+        numbers if span is None else span.up(numbers),
+        Smoothed(report, band, band_lam, scale, between),
+        faults,
+    )
 
 
-def _reason(state: str, batch: tuple[int, ...], number: int, report: SmoothingReport, asked: Asked) -> str:
-    of = f" of curve {','.join(map(str, np.unravel_index(number, batch)))}" if batch else ""
+def _reason(state: str, of: str, number: int, report: SmoothingReport, asked: Asked) -> str:
     if state == "no curve":
         return (
-            f"smoothing{of} led to points that no spline joins: neighbouring data are too far apart for their noise; "
-            "give a larger lam, fewer knots, or check units and signs of the data"
+            f"The smoothing{of} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
+            "knots in the gaps of the data, a larger lam, or cut the recording at its gaps (symspline.fit_segments). "
+            "Check units and signs of the data."
         )
     if state == "undetermined":
         return (
-            f"the data{of} do not determine the curve: with lam = 0 each knot needs some beside it, give fewer knots; "
-            "else weights differ by more than doubles can add"
+            f"The data{of} do not determine the curve. With lam=0 every knot needs data beside it: give fewer knots. "
+            "Otherwise the weights differ by more than the precision of floating-point numbers: leave out data of tiny "
+            "weight."
         )
     if state == "unsettled":
         return (
-            f"the smoothing{of} found no lam: it still moved after many rounds, last to "
-            f"{np.ravel(report.lam)[number]:.3g}; give lam, or another criterion"
+            f"The smoothing{of} found no lam: it still moved after many rounds, last to "
+            f"{np.ravel(report.lam)[number]:.3g}. Pass this lam, or another criterion."
         )
     step = np.ravel(report.step)[number]
+    other = "" if asked.method == "newton" else " or pass method='newton'"
     return (
-        f"no convergence of the smoothing{of}: a last step of {step:.1e} standard deviations after "
-        f"{np.ravel(report.iterations)[number]} iterations (tol {asked.tol:.1e}); raise max_iter, give a smaller lam "
-        "or method='newton'"
+        f"No convergence of the smoothing{of}: a last step of {step:.1e} standard deviations after "
+        f"{np.ravel(report.iterations)[number]} iterations (tol {asked.tol:.1e}). Raise max_iter{other}."
     )
 
 

@@ -17,6 +17,7 @@ from ..spaces import Array, Product, Space, factors_of
 from ..spline import CubicSpline
 from ..times import Clock
 from .data import Doubles, Noisy
+from .factors import grouped, is_several, smoothed_spaces
 from .solve import Smoothed
 from .stored import noisy_arrays
 
@@ -50,7 +51,11 @@ class SmoothingSpline(CubicSpline):
         self._noisy, self._smoothed = noisy, smoothed
 
     def _each(self, values: list[Any]) -> Any:
-        """One value, or one of every factor."""
+        """One value, or one for every space in which data were smoothed."""
+        return tuple(values) if is_several(self.space) else values[0]
+
+    def _in_factors(self, values: list[Any]) -> Any:
+        """One value, or one for every factor."""
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
@@ -77,7 +82,7 @@ class SmoothingSpline(CubicSpline):
     @property
     def data(self) -> tuple[Array, Any]:
         """The times and the points that were smoothed."""
-        return self._noisy.t, self._each(self._noisy.points)
+        return self._noisy.t, self._in_factors(self._noisy.points)
 
     @property
     def residuals(self) -> Any:
@@ -88,20 +93,22 @@ class SmoothingSpline(CubicSpline):
         found = []
         gammas = at if isinstance(self.space, Product) else (at,)
         for space, gamma, points, weighing in zip(
-            factors_of(self.space), gammas, noisy.points, noisy.weighing, strict=True
+            factors_of(self.space), gammas, noisy.points, grouped(self.space, noisy.weighing), strict=True
         ):
-            used = np.broadcast_to(weighing.weights > 0, (*noisy.batch, points.shape[len(noisy.batch)]))
+            counts = np.any([own.weights > 0 for own in weighing], axis=0)
+            used = np.broadcast_to(counts, (*noisy.batch, points.shape[len(noisy.batch)]))
             used = used & np.isfinite(gamma).all(axis=tuple(range(len(noisy.batch) + 1, gamma.ndim)))
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
             found.append(vectors)
-        return self._each(found)
+        return self._in_factors(found)
 
     def std(self, x: ArrayLike, nu: int = 0) -> Any:
         """Standard deviation of the curve at times x, for one coordinate of an orthonormal frame.
 
-        It is the root of σ² b(t)ᵀA⁻¹b(t), and of what a curve of this roughness does between two knots: the posterior
-        of a spline (Wahba 1983) in frames along the curve.
+        It is the root of σ² b(t)ᵀA⁻¹b(t), in frames along the curve: the posterior of a spline (Wahba 1983). If the
+        knots are the times of the data, as by default, what a curve of this roughness may do between them is added; a
+        spline on knots of your own has no such freedom.
 
         Args:
             x: times, any shape; beyond the knots the curve goes on straight, or round again if it is closed.
@@ -137,6 +144,9 @@ class SmoothingSpline(CubicSpline):
         """The standard deviation of one curve in a factor at times x of the core."""
         knots = self._times[index] if self._times.ndim > 1 else self._times
         lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
+        if not part.between:
+            # As with λ = 0: nothing happens between the knots but what the spline does.
+            lam = 0.0
         variance = _core.smoothing_variance(
             np.ascontiguousarray(knots),
             np.ascontiguousarray(part.band[index]),
@@ -165,11 +175,11 @@ class SmoothingSpline(CubicSpline):
         if not 0 < level < 1:
             raise ValidationError(f"level must lie between 0 and 1, not {level!r}")
         spreads = self.std(x)
-        each = spreads if isinstance(self.space, Product) else (spreads,)
+        each = spreads if is_several(self.space) else (spreads,)
         return self._each(
             [
-                _radius(factor, level) * spread
-                for factor, spread in zip(factors_of(self.space), each, strict=True)
+                _radius(part, level) * spread
+                for part, spread in zip(smoothed_spaces(self.space), each, strict=True)
             ]
         )
 
@@ -187,12 +197,13 @@ class SmoothingSpline(CubicSpline):
         noisy = self._noisy
         times = noisy.times[index] if noisy.times.ndim > 1 else noisy.times
         used = noisy.used[index] if noisy.used.ndim > 1 else noisy.used
+        # Of poses, whose parts have a unit each, pictures show the position.
         radii = [
-            _radius(factor, 0.95) * self._spread(part, index, x, 0)
-            for factor, part in zip(factors_of(self.space), self._smoothed, strict=True)
+            _radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
+            for own in grouped(self.space, zip(smoothed_spaces(self.space), self._smoothed, strict=True))
         ]
-        product = isinstance(self.space, Product)
-        speed = None if product else self._spread(self._smoothed[0], index, x, 1)
+        several = is_several(self.space)
+        speed = None if several else self._spread(self._smoothed[0], index, x, 1)
         return Noise(times[used], [points[index][used] for points in noisy.points], radii, speed)
 
     @property
@@ -217,10 +228,11 @@ class SmoothingSpline(CubicSpline):
     def _parts(self) -> tuple[SmoothingSpline, ...]:
         """The splines in the factors of a product."""
         noisy = self._noisy
-        each = zip(super()._parts, noisy.points, noisy.weighing, self._smoothed, strict=True)
+        weighing = grouped(self.space, noisy.weighing)
+        found = grouped(self.space, self._smoothed)
         return tuple(
-            self._like(part, noisy._replace(points=[points], weighing=[weighing]), [found])
-            for part, points, weighing, found in each
+            self._like(part, noisy._replace(points=[points], weighing=own), noise)
+            for part, points, own, noise in zip(super()._parts, noisy.points, weighing, found, strict=True)
         )
 
     @classmethod

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..curves.curve import Curve
 from ..failures import callers_level
-from ..spaces import Array, Space
+from ..spaces import Array, Space, factors_of
 from .data import Noisy, points_of
+from .factors import split
 
 # Of squared distances. Where smoothing still finds the curve, as with noise of half a radian on S², SO(3) or RP², the
 # quotient is below; of random points it is above, but where the curve follows them.
@@ -25,13 +26,16 @@ def warn_of_spread(space: Space, curve: Curve, noisy: Noisy, dfs: list[Any]) -> 
     every = -(-noisy.times.shape[-1] // _ENOUGH)
     at = np.ascontiguousarray(noisy.times[..., ::every])
     chosen = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
-    for part, (factor, own), weighing, df in zip(
-        curve.parts, points_of(noisy, space), noisy.weighing, dfs, strict=True
+    parts = zip(factors_of(space), curve.parts, strict=True)
+    at_curve = [
+        x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))
+    ]
+    for x, (factor, own), weighing, df in zip(
+        at_curve, points_of(noisy, space), noisy.weighing, dfs, strict=True
     ):
         # Elsewhere no points are random ones, or none are far.
         if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
             continue
-        x = part.evaluate(at, "point", "raise", at.ndim > 1)
         found = _median_distance(factor, x, own[chosen], _counts(weighing.weights)[..., ::every])
         random = factor.random_point(np.random.default_rng(0), (2, _ENOUGH))
         expected = float(np.median(factor._apply("distance", p=random[0], q=random[1])))

@@ -16,6 +16,7 @@ from ..curves.curve import Curve
 from ..spaces import Product, Space, factors_of
 from ..times import Clock
 from .data import Noisy
+from .factors import is_several, smoothed_spaces
 from .report import SmoothingReport
 from .solve import Smoothed
 from .weighing import Weighing
@@ -35,10 +36,11 @@ def noisy_arrays(space: Space, noisy: Noisy, smoothed: list[Smoothed]) -> dict[s
     alike = all(np.array_equal(first.weights, own.weights) for own in others)
     if alike:
         arrays["data_weights"] = first.weights
-    each = zip(noisy.points, noisy.weighing, smoothed, strict=True)
-    for i, (points, weighing, found) in enumerate(each):
+    for i, points in enumerate(noisy.points):
+        arrays["data" + (f"_{i}" if isinstance(space, Product) else "")] = points
+    for i, (weighing, found) in enumerate(zip(noisy.weighing, smoothed, strict=True)):
         suffix = _suffix(space, i)
-        arrays["data" + suffix], arrays["band" + suffix] = points, found.band
+        arrays["band" + suffix] = found.band
         if not alike:
             arrays["data_weights" + suffix] = weighing.weights
         if weighing.information is not None:
@@ -47,21 +49,23 @@ def noisy_arrays(space: Space, noisy: Noisy, smoothed: list[Smoothed]) -> dict[s
 
 
 def _suffix(space: Space, i: int) -> str:
-    return f"_{i}" if isinstance(space, Product) else ""
+    """Of what belongs to the i-th space in which data were smoothed."""
+    return f"_{i}" if is_several(space) else ""
 
 
 def _plain(found: Smoothed) -> dict[str, Any]:
     numbers = vars(found.report) | {"band_lam": found.band_lam, "scale": found.sigma}
-    return {key: plain(value) for key, value in numbers.items()}
+    return {key: plain(value) for key, value in numbers.items()} | {"between": found.between}
 
 
 def read_stored(
-    arrays: Mapping[str, NDArray[Any]], clock: Clock, t: NDArray[Any], curve: Curve
+    arrays: Mapping[str, NDArray[Any]], clock: Clock, t: NDArray[Any], curve: Curve, closed: bool
 ) -> tuple[Noisy, list[Smoothed]]:
     """The data of a curve, and what is known of their noise.
 
     Args:
         clock, t: of the data.
+        closed: whether the curve is.
 
     Raises:
         ValidationError: something does not fit.
@@ -75,18 +79,23 @@ def read_stored(
     if np.any(times[..., 0] < curve.times[..., 0]) or np.any(times[..., -1] > curve.times[..., -1]):
         raise ValidationError("there are data before the first or behind the last knot")
     points, weighing, smoothed = [], [], []
-    for i, (factor, numbers) in enumerate(
-        zip(factors_of(space), json.loads(str(arrays["noise"])), strict=True)
-    ):
+    for i, factor in enumerate(factors_of(space)):
+        name = f"data_{i}" if isinstance(space, Product) else "data"
+        rows = factor._numbers(factor._doubles(arrays[name], name))
+        if rows.shape != (*batch, count, *factor.point_shape):
+            raise ValidationError(f"the data have shape {rows.shape}")
+        # Curves that were left out are NaN, and so are their data.
+        own = curve.parts[i].points
+        there = np.isfinite(own).all(axis=tuple(range(len(batch), own.ndim)))
+        factor.check_point(rows[there])
+        points.append(rows)
+    parts = zip(smoothed_spaces(space), json.loads(str(arrays["noise"])), strict=True)
+    for i, (part, numbers) in enumerate(parts):
         suffix = _suffix(space, i)
-        own = factor._numbers(factor._doubles(arrays["data" + suffix], "data" + suffix))
-        if own.shape != (*batch, count, *factor.point_shape):
-            raise ValidationError(f"the data have shape {own.shape}")
-        factor.check_point(own)
-        points.append(own)
-        weighing.append(_weighing(arrays, suffix, factor.dim, batch, count))
+        weighing.append(_weighing(arrays, suffix, part.dim, batch, count))
         band = arrays["band" + suffix]
-        _check_shape("the band", band, (*batch, knots, 4))
+        # The coefficients of a closed curve: the first ones come again at the end.
+        _check_shape("the band", band, (*batch, knots + (2 if closed else 0), 4))
         found = _smoothed(numbers, band, batch)
         if not np.isfinite(band[np.asarray(found.report.converged)]).all():
             raise ValidationError("the band is not finite")
@@ -120,6 +129,9 @@ def _smoothed(numbers: dict[str, Any], band: NDArray[np.float64], batch: tuple[i
     method = numbers.pop("method")
     if method not in ("flat", "newton"):
         raise ValidationError(f"the method of the smoothing is {shown(method)}")
+    between = numbers.pop("between")
+    if not isinstance(between, bool):
+        raise ValidationError(f"between of the smoothing is {shown(between)}")
     columns = {}
     for key, kind in (_KINDS | dict.fromkeys(_NUMBERS, "f")).items():
         value = numbers.pop(key)
@@ -130,4 +142,4 @@ def _smoothed(numbers: dict[str, Any], band: NDArray[np.float64], batch: tuple[i
     if numbers:
         raise ValidationError(f"the smoothing has unknown entries: {shown(list(numbers))}")
     band_lam, scale = columns.pop("band_lam"), columns.pop("scale")
-    return Smoothed(SmoothingReport(method, **columns), band, band_lam, scale)
+    return Smoothed(SmoothingReport(method, **columns), band, band_lam, scale, between)

@@ -12,6 +12,7 @@ from ..arrays import as_array, cast
 from ..curves.fit import Points
 from ..spaces import Array, Product, Space, factors_of
 from ..spaces.base import LARGE
+from .factors import coordinates_in_parts, parts_of_factor, split
 
 Doubles = NDArray[np.float64]
 # Parts of a matrix or of a vector that are rounding errors.
@@ -48,31 +49,75 @@ class Weighing(NamedTuple):
 
 
 def read_weighing(weights: Any, frames: Any, space: Space, data: list[Points]) -> list[Weighing]:
-    """Weights or matrices in every factor, after all checks.
+    """Weights or matrices in every space in which data are smoothed, after all checks.
 
     Args:
         weights: None, numbers (N,) or (..., N), or matrices (N, m, m) or (..., N, m, m); of a product a tuple with
-            one of these for every factor, or numbers for all of them.
+            one of these for every factor, or numbers for all of them; of poses perhaps a pair, for rotations and
+            positions.
         frames: m tangent vectors at every point which matrices refer to, shape (..., N, m, *point_shape); None for
             those of ``space.frame``. In a product a tuple.
     """
-    factors, batch, count = factors_of(space), data[0].batch, data[0].nodes
+    factors = factors_of(space)
     own = [weights] * len(factors)
     if isinstance(space, Product) and isinstance(weights, tuple):
         own = _one_a_factor(weights, "weights", len(factors))
     own_frames = [frames] * len(factors)
     if isinstance(space, Product) and frames is not None:
         own_frames = _one_a_factor(frames, "frames", len(factors))
-    found = []
+    found: list[Weighing] = []
     for factor, given, frame, part in zip(factors, own, own_frames, data, strict=True):
-        array = None if given is None else as_array(given, "weights")
-        shape = (factor.dim, factor.dim)
-        if array is None or array.shape in ((count,), (*batch, count)) or array.shape[-2:] != shape:
-            if frame is not None:
-                raise ValidationError("frames are for weights that are matrices")
-            found.append(Weighing(checked_weights(given, batch, count, shape), None))
-        else:
-            found.append(_with_matrices(array, frame, factor, part))
+        spaces = parts_of_factor(factor)
+        if len(spaces) > 1 and isinstance(given, tuple):
+            each = _one_a_factor(given, "weights", len(spaces))
+            frames_of = (
+                [frame] * len(spaces) if frame is None else _one_a_factor(frame, "frames", len(spaces))
+            )
+            points = split(factor, factor._numbers(part.doubles))
+            for space_of, one, at, rows in zip(spaces, each, frames_of, points, strict=True):
+                doubles = np.ascontiguousarray(space_of._as_doubles(rows))
+                found.append(_in_factor(space_of, one, at, part._replace(doubles=doubles)))
+            continue
+        weighing = _in_factor(factor, given, frame, part)
+        found += [weighing] if len(spaces) == 1 else _in_parts(weighing, factor, part)
+    return found
+
+
+def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Weighing:
+    array = None if given is None else as_array(given, "weights")
+    shape, lead = (space.dim, space.dim), (*data.batch, data.nodes)
+    if array is None or array.shape in ((data.nodes,), lead) or array.shape[-2:] != shape:
+        if frames is not None:
+            raise ValidationError(
+                "`frames` says what information matrices refer to, and `weights` are numbers. Leave `frames` out, or "
+                "pass matrices."
+            )
+        return Weighing(checked_weights(given, data.batch, data.nodes, shape), None)
+    return _with_matrices(array, frames, space, data)
+
+
+def _in_parts(weighing: Weighing, space: Space, data: Points) -> list[Weighing]:
+    """The weighing of each part of poses: the inverse of its marginal covariance, a Schur complement."""
+    parts = parts_of_factor(space)
+    if weighing.information is None:
+        return [weighing] * len(parts)
+    lead = (*data.batch, data.nodes)
+    points = space._numbers(data.doubles).reshape(lead + space.point_shape)
+    good = np.isfinite(points).all(axis=(-2, -1))
+    into = np.zeros((*lead, space.dim, space.dim))
+    into[good] = np.linalg.inv(coordinates_in_parts(space, space.project(points[good])))
+    whole = np.swapaxes(into, -1, -2) @ weighing.information @ into
+    found, first = [], 0
+    for part in parts:
+        own = np.arange(space.dim)[first : first + part.dim]
+        rest = np.setdiff1d(np.arange(space.dim), own)
+        block = whole[..., own[:, None], own]
+        cross = whole[..., own[:, None], rest]
+        others = np.linalg.pinv(whole[..., rest[:, None], rest], rcond=_SINGULAR, hermitian=True)
+        matrix = block - cross @ others @ np.swapaxes(cross, -1, -2)
+        matrix = np.ascontiguousarray(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
+        found.append(Weighing(np.trace(matrix, axis1=-2, axis2=-1) / part.dim, matrix))
+        first += part.dim
     return found
 
 
@@ -160,8 +205,9 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
             f"frames has shape {given.shape}, but {m} tangent vectors at every point of {space!r} have the shape "
             f"{(*lead, m, *space.point_shape)}"
         )
-    used = np.broadcast_to(used, lead)
     points = space._numbers(data.doubles).reshape(lead + space.point_shape)
+    # What is no point is found out later.
+    used = np.broadcast_to(used, lead) & np.isfinite(points).all(axis=tuple(range(len(lead), points.ndim)))
     vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]
     finite = np.isfinite(vectors).all(axis=tuple(range(1, vectors.ndim)))
     _check(finite, "are not finite", "frames", np.argwhere(used))

@@ -1,0 +1,293 @@
+"""Smoothing data as people bring them: irregular, long, with gaps and copies, rounded, with a bad curve in a batch."""
+
+import warnings
+
+import numpy as np
+import pytest
+from noisy import each, rms
+
+import symspline as ss
+
+
+def stamps(kind, n, rng):
+    """Times from 0 to 1, of which some lie very near to each other."""
+    if kind == "uniform":
+        t = np.sort(rng.random(n))
+    elif kind == "exponential":
+        t = np.cumsum(rng.exponential(size=n))
+    elif kind == "bursts":
+        centres = np.sort(rng.random(max(3, n // 10)))
+        t = np.sort(rng.choice(centres, n) + 0.03 / len(centres) * rng.standard_normal(n))
+    else:
+        step = np.linspace(0, 1, n - n // 4)
+        again = rng.choice(step[:-1], n // 4, replace=False) + 0.01 * step[1] * rng.random(n // 4)
+        t = np.sort(np.r_[step, again])
+    return (t - t[0]) / (t[-1] - t[0])
+
+
+def wave(name, t, rng):
+    space = ss.space(name)
+    rates, phases = rng.uniform(0.5, 2, 3), rng.uniform(0, 2 * np.pi, 3)
+    u = np.sin(2 * np.pi * rates * t[:, None] + phases)
+    if name == "r:2":
+        return space, u[:, :2]
+    if name == "sphere:2":
+        return space, space.project(0.6 * u + [0, 0, 1])
+    still = np.broadcast_to(np.eye(3), (len(t), 3, 3))
+    return space, space.exp(still, ss.rotations.velocities(still, 0.8 * u))
+
+
+def recorded(name, kind, n, seed, outliers, sigma=0.05):
+    rng = np.random.default_rng([seed, n, len(kind)])
+    t = stamps(kind, n, rng)
+    space, truth = wave(name, t, rng)
+    noisy = space.exp(truth, sigma * space.random_tangent(rng, truth))
+    bad = rng.random(n) < (0.15 if outliers else 0)
+    noisy[bad] = space.exp(truth[bad], space.random_tangent(rng, truth[bad]))
+    return space, t, truth, noisy, bad
+
+
+@pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3"])
+@pytest.mark.parametrize("outliers", [False, True])
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_robust_losses_at_irregular_times(name, outliers, loss):
+    ratios = []
+    for kind in ("uniform", "exponential", "bursts", "near copies"):
+        for n in (20, 50, 150):
+            for seed in range(2):
+                space, t, truth, noisy, bad = recorded(name, kind, n, seed, outliers)
+                good = ~bad
+                clean = ss.make_smoothing_spline(t[good], noisy[good], space)
+                robust = ss.make_smoothing_spline(t, noisy, space, loss=loss)
+                assert robust.report.converged
+                x = (t >= clean.t[0]) & (t <= clean.t[-1])
+                ratios.append(rms(space, robust(t[x]), truth[x]) / rms(space, clean(t[x]), truth[x]))
+    # Distant outliers cost Huber's loss 18 % in theory: (.85 · .71 + .15 · 1.81)/(.85 · .82)² times the variance.
+    assert np.median(ratios) < (1.25 if loss == "huber" and outliers else 1.12)
+
+
+def test_the_size_of_the_noise_survives_outliers():
+    found = []
+    for seed in range(20):
+        _, t, _, noisy, _ = recorded("r:2", "uniform", 150, seed, True)
+        found.append(ss.make_smoothing_spline(t, noisy, "r:2", loss="cauchy").sigma)
+    assert 0.045 < np.median(found) < 0.065 and max(found) < 0.1
+
+
+@pytest.mark.parametrize("name", ["r:2", "sphere:2"])
+def test_no_curve_goes_through_noisy_data_in_silence(name):
+    """30 even times and one more, 1 % of a step away from another: with gamma=1 one curve in seven did."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        t = np.sort(np.r_[np.linspace(0, 1, 30), 10.01 / 29])
+        space, truth = wave(name, t, rng)
+        noisy = space.exp(truth, 0.1 * space.random_tangent(rng, truth))
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            spline = ss.make_smoothing_spline(t, noisy, space)
+        assert spline.df < 24 or seen
+
+
+def drive(length, rng, n=600):
+    """Poses of a car that winds along a road: times, attitudes, positions."""
+    t = np.linspace(0, 60, n)
+    path = length * np.stack([t / 60, 0.03 * np.sin(0.6 * t + rng.random()), 0 * t], axis=-1)
+    forward = np.gradient(path, t, axis=0)
+    forward /= np.linalg.norm(forward, axis=-1, keepdims=True)
+    left = np.cross([0.0, 0, 1], forward)
+    left /= np.linalg.norm(left, axis=-1, keepdims=True)
+    return t, np.stack([forward, left, np.cross(forward, left)], axis=-1), path
+
+
+@pytest.mark.parametrize("length", [1.0, 30.0, 1000.0])
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+@pytest.mark.parametrize("knots", [None, 240])
+def test_poses_are_as_good_as_their_parts(length, unit, knots):
+    so3, rng = ss.space("so:3"), np.random.default_rng(1)
+    t, attitudes, path = drive(length, rng)
+    turned = so3.exp(attitudes, ss.rotations.velocities(attitudes, 0.005 * rng.standard_normal((600, 3))))
+    moved = unit * (path + 0.005 * rng.standard_normal((600, 3)))
+    poses = ss.poses.join(turned, moved)
+    smooth = ss.make_smoothing_spline(t, poses, "se:3", knots=knots)
+    parts = ss.make_smoothing_spline(t, (turned, moved), "so:3 x r:3", knots=knots)
+    assert smooth.sigma == pytest.approx((0.005, 0.005 * unit), rel=0.1)
+    # Between the knots, too.
+    x = 0.5 * (t[1:] + t[:-1])
+    dense = ss.CubicSpline(t, path, "r:3", bc_type="not-a-knot")(x)
+    errors = [np.sqrt(np.mean((p / unit - dense) ** 2)) for p in (smooth(x)[:, :3, 3], parts(x)[1])]
+    assert errors[0] < 1.25 * errors[1] < 0.005
+    turns = [so3.distance(r, parts(x)[0]).max() for r in (smooth(x)[:, :3, :3],)]
+    assert turns[0] < 1e-4
+    # Each part has its own numbers.
+    assert smooth.lam == parts.lam and smooth.df == parts.df
+    assert smooth.std(x) == pytest.approx(np.array(parts.std(x))) and len(smooth.band(x)) == 2
+    assert smooth.residuals.shape == poses.shape
+
+
+def test_poses_take_matrices_velocities_and_files(tmp_path):
+    se3, rng = ss.space("se:3"), np.random.default_rng(2)
+    t, attitudes, path = drive(20.0, rng, 200)
+    truth = ss.poses.join(attitudes, path)
+    frames = se3.frame(truth)
+    deviations = np.r_[0.02, 0.02, 0.02, 0.01, 0.1, 0.1]
+    noisy = se3.exp(truth, np.einsum("ni,nijk->njk", rng.standard_normal((200, 6)) * deviations, frames))
+    weights = np.tile(np.diag(1 / deviations**2), (200, 1, 1))
+    start = ss.CubicSpline(t, truth, se3, bc_type="not-a-knot")(0.0, nu=1)
+    start = se3.project_tangent(noisy[0], noisy[0] @ np.linalg.inv(truth[0]) @ start)
+    informed = ss.make_smoothing_spline(t, noisy, se3, weights=weights, bc_type=((1, start), "natural"))
+    assert informed.sigma == pytest.approx((1, 1), rel=0.15)
+    # Transported with the attitude and the position, each by itself.
+    assert np.abs(informed(0.0, nu=1)[:3, 3] - start[:3, 3]).max() < 1e-9
+    pair = (np.ones(200), np.where(np.arange(200) == 3, 0.0, 1.0))
+    apart = ss.make_smoothing_spline(t, noisy, se3, (1.0, 2.0), weights=pair)
+    assert apart.lam == pytest.approx((1.0, 2.0))
+    for spline in (informed, apart):
+        spline.save(tmp_path / "poses.npz")
+        back = ss.load(tmp_path / "poses.npz")
+        assert back == spline and back.report == spline.report
+        assert np.array_equal(back.std(t), spline.std(t))
+    both = ss.make_smoothing_spline(t, (noisy, path), "se:3 x r:3", loss="huber")
+    assert len(both.lam) == 3 and len(both._parts[0].lam) == 2
+    with pytest.raises(ss.ValidationError, match="`lam` has 2 entries, but there are 3 parts"):
+        ss.make_smoothing_spline(t, (noisy, path), "se:3 x r:3", (1.0, 2.0))
+
+
+def test_a_bad_curve_does_not_stop_a_batch():
+    space, t, _, noisy, _ = recorded("sphere:2", "uniform", 40, 0, False)
+    batch = np.stack([noisy, np.full_like(noisy, np.nan), noisy[::-1], 2 * noisy])
+    with pytest.raises(ss.ValidationError, match=r"of curve 1"):
+        ss.make_smoothing_spline(t, batch, space)
+    found = ss.make_smoothing_spline(t, batch, space, on_failure="ignore")
+    with pytest.warns(ss.ConvergenceWarning, match=r"curve 1.*1 more"):
+        ss.make_smoothing_spline(t, batch, space, on_failure="warn")
+    chosen = ss.make_smoothing_spline(t, batch, space, where=[True, False, True, False])
+    for spline in (found, chosen):
+        assert spline.report.converged.tolist() == [True, False, True, False]
+        assert np.isnan(spline(0.5)[[1, 3]]).all() and np.isnan(spline.lam[[1, 3]]).all()
+        assert np.isnan(spline.std(0.5)[[1, 3]]).all() and np.isnan(spline.residuals[[1, 3]]).all()
+        for i, data in ((0, noisy), (2, noisy[::-1])):
+            alone = ss.make_smoothing_spline(t, data, space)
+            assert alone == spline[i] and alone.report == spline[i].report
+            assert np.array_equal(alone.std(0.3), spline[i].std(0.3))
+    with pytest.raises(ss.ValidationError, match="where must be"):
+        ss.make_smoothing_spline(t, batch, space, where=[True])
+    nothing = ss.make_smoothing_spline(t, batch, space, where=np.zeros(4, bool))
+    assert np.isnan(nothing(0.5)).all()
+
+
+@pytest.mark.parametrize("name", ["sphere:2", "se:3", "sphere:2 x r:3"])
+def test_files_keep_curves_that_were_left_out(name, tmp_path):
+    space, rng = ss.space(name), np.random.default_rng(0)
+    points = space.exp(space.random_point(rng), 0.1 * rng.random()) if name == "r:3" else None
+    t = np.linspace(0, 1, 12)
+    ends = [space.random_point(rng, 3), space.random_point(rng, 3)]
+    points = space.geodesic(*[
+        tuple(x[:, None] for x in end) if isinstance(end, tuple) else end[:, None] for end in ends
+    ], 0.3 * t)  # fmt: skip
+    arrays = each(points)
+    for array in arrays:
+        array[1] = np.nan
+    batch = arrays if isinstance(points, tuple) else arrays[0]
+    spline = ss.make_smoothing_spline(t, batch, space, 1e-3, on_failure="ignore")
+    spline.save(tmp_path / "curves.npz")
+    back = ss.load(tmp_path / "curves.npz")
+    assert np.array_equal(
+        back.report.converged if name == "sphere:2" else back.report[0].converged, [1, 0, 1]
+    )
+    assert all(
+        np.array_equal(a, b, equal_nan=True) for a, b in zip(each(back(0.2)), each(spline(0.2)), strict=True)
+    )
+
+
+def test_missing_samples_are_the_same_alone_and_in_a_batch():
+    space, t, _, noisy, _ = recorded("so:3", "uniform", 50, 1, False)
+    weights = np.ones((3, 50))
+    weights[0, :4], weights[1, 20:30], weights[2, 44:] = 0, 0, 0
+    batch = np.where(weights[:, :, None, None] > 0, noisy, np.nan)
+    together = ss.make_smoothing_spline(t, batch, space, weights=weights)
+    for k in range(3):
+        alone = ss.make_smoothing_spline(t, batch[k], space, weights=weights[k])
+        assert alone == together[k] and alone.lam == together.lam[k]
+    shared = ss.make_smoothing_spline(t, np.stack([batch[1], batch[1]]), space, weights=weights[1])
+    assert shared[0] == together[1]
+    # A curve without any data is a bad one.
+    weights[2] = 0
+    rest = ss.make_smoothing_spline(t, batch, space, weights=weights, on_failure="ignore")
+    assert rest[0] == together[0] and not rest.report.converged[2]
+    with pytest.raises(ss.ValidationError, match="curve 2"):
+        ss.make_smoothing_spline(t, batch, space, weights=weights)
+
+
+@pytest.mark.parametrize("offset", [1.7e9, 1e12, -4e7])
+def test_times_may_count_from_long_ago(offset):
+    space, t, _, noisy, _ = recorded("sphere:2", "uniform", 60, 2, False)
+    # What is left of the times after rounding.
+    seconds = np.round(1000 * t) / 8
+    near, far = (ss.make_smoothing_spline(base + seconds, noisy, space) for base in (0, offset))
+    assert far.lam == pytest.approx(near.lam, rel=1e-6)
+    assert space.distance(far.points, near.points).max() < 1e-9
+
+
+def test_single_precision_and_repeated_times():
+    space, t, truth, noisy, _ = recorded("sphere:2", "exponential", 200, 3, False)
+    twice, rows = np.repeat(t, 2), np.repeat(noisy, 2, axis=0)
+    rows[1::2] = space.exp(truth, 0.05 * space.random_tangent(np.random.default_rng(0), truth))
+    double = ss.make_smoothing_spline(twice, rows, space)
+    single = ss.make_smoothing_spline(twice, rows.astype(np.float32), space)
+    assert single.lam == pytest.approx(double.lam, rel=1e-3)
+    assert space.distance(single(t), double(t)).max() < 1e-5
+    assert rms(space, double(t), truth) < 0.02 and double.sigma == pytest.approx(0.05, rel=0.1)
+
+
+def test_long_recordings_with_gaps():
+    rng = np.random.default_rng(4)
+    t = np.sort(rng.uniform(0, 1000, 20_000))
+    t = t[(t < 300) | (t > 340)]
+    space, truth = wave("sphere:2", t / 100, rng)
+    noisy = space.exp(truth, 0.1 * space.random_tangent(rng, truth))
+    for options in ({}, {"loss": "cauchy"}):
+        spline = ss.make_smoothing_spline(t, noisy, space, **options)
+        assert rms(space, spline(t), truth) < 0.02 and spline.sigma == pytest.approx(0.1, rel=0.1)
+
+
+def far_apart():
+    """Three bursts of a turning body: between two of them it turns by more than a segment between two knots can."""
+    rng = np.random.default_rng([21, 20, 0, 4, 6])
+    centres = np.sort(rng.random(3))
+    t = np.sort(centres[rng.integers(0, 3, 20)] + 0.01 * rng.standard_normal(20))
+    t = (t - t[0]) / (t[-1] - t[0])
+    rates, phases = rng.uniform(0.5, 2, 3), rng.uniform(0, 6.28, 3)
+    turns = 0.8 * np.stack([np.sin(2 * np.pi * rates[i] * t + phases[i]) for i in range(3)], -1)
+    space, still = ss.space("so:3"), np.broadcast_to(np.eye(3), (20, 3, 3))
+    truth = space.exp(still, ss.rotations.velocities(still, turns))
+    return space, t, truth, space.exp(truth, 0.05 * space.random_tangent(rng, truth))
+
+
+def test_a_gap_that_one_segment_cannot_cross():
+    space, t, truth, noisy = far_apart()
+    for loss in ("linear", "huber", "cauchy"):
+        spline = ss.make_smoothing_spline(t, noisy, space, loss=loss)
+        assert rms(space, spline(t), truth) < 0.06
+
+
+def test_the_advice_of_messages_helps():
+    space, t, truth, noisy = far_apart()
+    times = np.unique(t)
+    with pytest.raises(ss.ConvergenceError, match="Pass more knots in the gaps"):
+        ss.make_smoothing_spline(t, noisy, space, knots=times)
+    more = ss.make_smoothing_spline(t, noisy, space, knots=np.union1d(times, np.linspace(0, 1, 13)))
+    assert more.report.converged and rms(space, more(t), truth) < 0.06
+    assert ss.make_smoothing_spline(t, noisy, space, 1e-3, knots=times).report.converged
+
+    space, t, _, noisy, _ = recorded("sphere:2", "uniform", 40, 0, False)
+    with pytest.raises(ss.ConvergenceError, match="every knot needs data beside it: give fewer knots"):
+        ss.make_lsq_spline(t, noisy, np.linspace(0, 1, 60), space)
+    assert ss.make_lsq_spline(t, noisy, 8, space).report.converged
+    with pytest.raises(ss.ConvergenceError, match="Raise max_iter or pass method='newton'"):
+        ss.make_smoothing_spline(t, noisy, space, max_iter=2)
+    for advice in ({"max_iter": 50}, {"method": "newton"}):
+        assert ss.make_smoothing_spline(t, noisy, space, **advice).report.converged
+    with pytest.raises(ss.ConvergenceError) as caught:
+        ss.make_smoothing_spline(t, noisy, space, max_iter=2, method="newton")
+    # What was tried already is not proposed again.
+    assert "method='newton'" not in str(caught.value)
