@@ -58,7 +58,9 @@ for name, seen, whole, smooth, true, unit in zip(
     ["r:3", "so:3"], tracked, (place, attitude), path(t), truth, [100, 180 / np.pi], strict=True
 ):
     axes[name].plot(t, unit * ss.space(name).distance(seen, true), ".", color="0.75")
-    axes[name].plot(t, unit * ss.space(name).distance(whole, true), color="C1", linewidth=1, label="through the poses")
+    axes[name].plot(
+        t, unit * ss.space(name).distance(whole, true), color="C1", linewidth=1, label="through the poses"
+    )
     axes[name].plot(t, unit * ss.space(name).distance(smooth, true))
 axes["r:3"].set(title="Distance from the truth", ylabel="centimetres", xticklabels=[])
 axes["r:3"].legend(loc="upper left")
