@@ -15,6 +15,7 @@ from ..curves.fit import Asked as Fitted
 from ..curves.fit import Points, fit
 from ..curves.solve import Fault, Options, Progress
 from ..failures import fail
+from ..far import warn_of_far_points
 from ..manifolds.manifold import refuse_functions
 from ..options import check_on_failure, check_progress, checked_policy
 from ..signs import warn_of_signs
@@ -181,6 +182,7 @@ def make_smoothing_spline(
         space,
         [[Points(one._as_doubles(own), 0.0, noisy.batch, nodes) for one, own in points_of(noisy, space)]],
     )
+    warn_of_far_points([curve], [reports])
     return spline
 
 
