@@ -14,7 +14,7 @@ LAYERS = [
     ["spaces"],
     ["manifolds"],
     ["curves"],
-    ["failures", "options", "plotting", "signs"],
+    ["failures", "far", "options", "plotting", "signs"],
     ["piecewise", "free"],
     ["archive"],
     ["spline"],

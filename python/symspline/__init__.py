@@ -25,7 +25,7 @@ from .free import BezierCurve, BSpline  # noqa: E402
 from .functions import evaluate, fit, fit_many  # noqa: E402
 from .hermite import HermiteSpline  # noqa: E402
 from .manifolds import Manifold, Stiefel  # noqa: E402
-from .report import ConvergenceWarning, Report  # noqa: E402
+from .report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
 from .segments import fit_segments  # noqa: E402
 from .smoothing import (  # noqa: E402
     SmoothingReport,
@@ -87,6 +87,7 @@ __all__ = [
     "CutLocusError",
     "DeSitter",
     "Euclidean",
+    "FarPointsWarning",
     "GeneralLinear",
     "Gradient",
     "Grassmannian",

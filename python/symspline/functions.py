@@ -16,6 +16,7 @@ from .curves.curve import Curve, quantity_of
 from .curves.ends import kept, picked
 from .curves.solve import Progress
 from .failures import fail
+from .far import warn_of_far_points
 from .handed import in_library, library_of
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .piecewise import evaluated
@@ -187,4 +188,5 @@ def fit_many(
     if faults:
         fail(faults, on_failure, fitted)
     warn_of_signs(space, [own if mask is None or mask[i] else None for i, own in enumerate(points)])
+    warn_of_far_points([found.curve for found in fits], [found.reports for found in fits])
     return fitted

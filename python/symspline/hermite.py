@@ -11,6 +11,7 @@ from . import archive
 from ._core import CutLocusError, ValidationError
 from .curves.curve import Curve
 from .curves.fit import curve_of, read, read_ends, validated
+from .far import warn_of_far_points
 from .functions import velocities_of
 from .options import checked_policy, outside, within
 from .piecewise import Piecewise
@@ -83,6 +84,7 @@ class HermiteSpline(Piecewise):
         _check_legs(curve)
         self._fill(clock, shown_times, curve, policy)
         warn_of_signs(space, [data])
+        warn_of_far_points([curve], [None])
 
     def _fill(self, clock: Clock, t: Array, curve: Curve, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate

@@ -19,6 +19,11 @@ class ConvergenceWarning(UserWarning):
     """A curve did not converge, or passes a cut locus, and ``on_failure="warn"``."""
 
 
+class FarPointsWarning(UserWarning):
+    """Most neighbours are so far apart that several C² curves may exist: the points may be in representations that do
+    not fit each other."""
+
+
 @dataclass(frozen=True)
 class Report:
     """How a fit went. For a batch of curves every field but ``method`` and ``curvature`` is an array

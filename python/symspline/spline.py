@@ -20,6 +20,7 @@ from .curves.gradient import Gradient, Places
 from .curves.solve import Progress
 from .curves.together import longest_step
 from .failures import fail
+from .far import warn_of_far_points
 from .options import check_on_failure, check_progress, checked_policy, options_of, outside, within
 from .piecewise import Piecewise
 from .report import Report, combined
@@ -80,6 +81,8 @@ class CubicSpline(Piecewise):
     Warns:
         UserWarning: neighbours are within 1e-5 of each other's cut locus: a little more, and the curve would go the
             other way round. Or points of ``sphere:3`` look like quaternions of which some have the wrong sign.
+        FarPointsWarning: more than half of the steps of a curve with four or more are beyond 0.6 of the way to the cut
+            locus.
 
     >>> import symspline as ss
     >>> spline = ss.CubicSpline([0, 1, 3], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
@@ -126,6 +129,7 @@ class CubicSpline(Piecewise):
         if faults:
             fail(faults, on_failure, self)
         warn_of_signs(space, [data], [report.max_step for report in reports])
+        warn_of_far_points([curve], [reports])
 
     def _fill(
         self,

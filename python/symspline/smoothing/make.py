@@ -16,6 +16,7 @@ from ..curves.fit import Asked as Fitted
 from ..curves.fit import Points
 from ..curves.solve import Options, Progress
 from ..failures import fail
+from ..far import warn_of_far_points
 from ..manifolds.manifold import refuse_functions
 from ..options import check_on_failure, check_progress, checked_policy
 from ..signs import warn_of_signs
@@ -273,6 +274,7 @@ def make_smoothing_spline(
             ]
         ],
     )
+    warn_of_far_points([curve], [reports])
     return spline
 
 
