@@ -36,10 +36,11 @@ acceleration = np.diff(velocity, axis=0) / np.diff(middle)[:, None]
 # %%
 # The spline
 # ----------
-# `fit_segments` cuts the recording where it pauses. `ss.poses.imu` gives what a gyroscope and an accelerometer in the
+# `fit_segments` cuts the recording where it pauses. Attitude and position are two factors of a product, so that neither
+# disturbs the other. `ss.poses.imu` gives what a gyroscope and an accelerometer in the
 # frame of the camera would have said at any rate, gravity included.
 
-pieces = ss.fit_segments(t, poses, "se:3", max_gap=0.5, duplicates="mean")
+pieces = ss.fit_segments(t, ss.poses.split(poses), "so:3 x r:3", max_gap=0.5, duplicates="mean")
 
 figure, axes = plt.subplots(3, figsize=(9, 8), sharex=True, layout="constrained")
 axes[0].plot(t[1:-1], acceleration, drawstyle="steps-mid", linewidth=1)

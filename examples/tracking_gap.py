@@ -23,9 +23,9 @@ fine = np.linspace(0, 20, 2001)
 drift = 0.7 * np.sin(0.9 * fine) + 0.1 * fine
 driven = np.cumsum(8 * np.column_stack([np.cos(drift), np.sin(drift), 0 * drift]), axis=0) * 0.01
 places = np.column_stack([np.interp(stamps, fine, axis) for axis in driven.T])
-poses = ss.poses.join(Rotation.from_rotvec(np.outer(angle, [0, 0, 1])), places)
+poses = (Rotation.from_rotvec(np.outer(angle, [0, 0, 1])), places)
 
-one = ss.CubicSpline(stamps, poses, "se:3")
+one = ss.CubicSpline(stamps, poses, "so:3 x r:3")
 print(f"longest time between points: {one.report.max_gap:.1f} s")
 
 # %%
@@ -34,12 +34,12 @@ print(f"longest time between points: {one.report.max_gap:.1f} s")
 # `fit_segments` makes a curve of every stretch without a gap. What happens in between is an answer of your own:
 # nothing, or a bridge that begins and ends with the velocities found on either side, and is known to be one.
 
-before, after = ss.fit_segments(stamps, poses, "se:3", max_gap=0.5)
+before, after = ss.fit_segments(stamps, poses, "so:3 x r:3", max_gap=0.5)
 t0, t1 = before.t[-1], after.t[0]
 bridge = ss.CubicSpline(
     [t0, t1],
-    np.stack([before(t0), after(t1)]),
-    "se:3",
+    tuple(np.stack(ends) for ends in zip(before(t0), after(t1), strict=True)),
+    "so:3 x r:3",
     bc_type=((1, before(t0, nu=1)), (1, after(t1, nu=1))),
 )
 
@@ -50,11 +50,11 @@ def speed(spline, x):
 
 figure, (above, below) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
 x = np.linspace(0, stamps[-1], 1000)
-above.plot(*one(x)[:, :2, 3].T, color="0.7", linewidth=3, label="one curve")
+above.plot(*one(x)[1][:, :2].T, color="0.7", linewidth=3, label="one curve")
 below.plot(x, speed(one, x), color="0.7", linewidth=3)
 for piece, style, label in ((before, "C0", "pieces"), (after, "C0", None), (bridge, "C1--", "bridge")):
     x = np.linspace(piece.t[0], piece.t[-1], 300)
-    above.plot(*piece(x)[:, :2, 3].T, style, label=label)
+    above.plot(*piece(x)[1][:, :2].T, style, label=label)
     below.plot(x, speed(piece, x), style)
 above.plot(*places[::5, :2].T, "k.", markersize=4, label="seen")
 above.set(aspect="equal", xlabel="metres", title="From above")

@@ -1,13 +1,14 @@
 """Recordings of poses: files in and out, velocities, accelerations, and what an inertial sensor on the body measures.
 
-Poses take the body to the world, [[R, x], [0, 1]] with R the attitude and x the position. Curves of them are on
-``se:3``, where geodesics are screw motions, or on ``so:3 x r:3``, where positions go their own way; lists of 4 × 4
-matrices, such as ``poses_se3`` of evo, are points of ``se:3`` as they are.
+Poses take the body to the world, [[R, x], [0, 1]] with R the attitude and x the position. Fit curves of them on
+``so:3 x r:3``: the product has an invariant metric, and noise and smoothing of attitude and position stay separate.
+`split` makes its points of 4 × 4 matrices, such as ``poses_se3`` of evo. On ``se:3``, of which such matrices are points as
+they are, geodesics are screw motions, as joints and tools make them.
 
 >>> import io, symspline as ss
 >>> from symspline import poses
 >>> t, given = poses.read_tum(io.StringIO("0 0 0 0 0 0 0 1\\n1 2 0 0 0 0 0.6 0.8\\n"))
->>> spline = ss.CubicSpline(t, given, "se:3")
+>>> spline = ss.CubicSpline(t, poses.split(given), "so:3 x r:3")
 >>> gyro, specific_force = poses.imu(spline, 0.5)
 >>> gyro.round(8) + 0.0
 array([0.        , 0.        , 1.28700222])

@@ -145,7 +145,7 @@ def _worst(values: Any) -> Any:
 
 
 def _same(a: Any, b: Any) -> bool:
-    if a is None or b is None or isinstance(a, str):
+    if a is None or b is None or isinstance(a, (str, tuple)):
         return bool(a == b)
     return np.array_equal(a, b, equal_nan=True)
 

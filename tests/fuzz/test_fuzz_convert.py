@@ -21,8 +21,8 @@ TAKEN = {
 
 
 def test_all_are_here():
-    # Totally geodesic parts have tests of their own.
-    parts = {name for name in ss.convert.__all__ if "siegel" in name or "subspace" in name}
+    # Totally geodesic parts and indefinite spaces have tests of their own.
+    parts = {name for name in ss.convert.__all__ if any(word in name for word in ("siegel", "subspace", "reflection"))}
     assert set(TAKEN) | parts == set(ss.convert.__all__)
 
 

@@ -9,7 +9,7 @@ use crate::information::{self, Root};
 use crate::path::{Path, Place};
 use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
-use symspline_core::monitor::Monitor;
+use symspline_core::monitor::{Monitor, checkpoint};
 use symspline_core::parallel;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
@@ -80,6 +80,7 @@ pub fn step(
     let mut parts: Vec<(usize, Matrix, Vector)> =
         (0..n).map(|i| (i, Matrix::zeros(4 * m, 4 * m), Vector::zeros(4 * m))).collect();
     parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
+        checkpoint();
         let motion = derivative.motion(*segment);
         let at = |kind: usize, k: usize, of: Of, vectors: &[f64]| {
             let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);

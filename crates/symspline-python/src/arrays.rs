@@ -29,9 +29,9 @@ pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArr
     Ok(make.bind(py).call1((shape.to_vec(),))?.cast_into()?)
 }
 
-/// MemoryError unless there is room for about so many numbers, with words for the work that needs them. Rust would stop
+/// MemoryError unless there is room for about so many numbers, with words for the work that needs them and a remedy. Rust would stop
 /// the process where memory ends.
-pub fn require_room(numbers: f64, work: impl FnOnce() -> String) -> PyResult<()> {
+pub fn require_room(numbers: f64, work: impl FnOnce() -> (String, &'static str)) -> PyResult<()> {
     if numbers <= SMALL as f64 {
         return Ok(());
     }
@@ -41,9 +41,9 @@ pub fn require_room(numbers: f64, work: impl FnOnce() -> String) -> PyResult<()>
         return Ok(());
     }
     let gigabytes = bytes / 1e9;
+    let (work, remedy) = work();
     Err(PyMemoryError::new_err(format!(
-        "{} needs about {gigabytes:.3e} GB of memory, more than is free",
-        work()
+        "{work} needs about {gigabytes:.3} GB of memory, more than is free{remedy}"
     )))
 }
 

@@ -82,13 +82,15 @@ pub fn fit<'py>(
     // What the work itself needs, with some to spare: copies of ends, and the pieces and reports of curves.
     drop(room::<f64>(nodes + curves * (64 + 4 * len))?);
     let longest = offsets.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
-    require_room(memory(&handle.space.get(), longest, method), || {
-        let least = match method {
-            Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
-            _ => "",
-        };
-        format!("fitting {longest} points on {} with method={name:?}{least},", handle.described())
-    })?;
+    if !dry {
+        require_room(memory(&handle.space.get(), longest, method), || {
+            let least = match method {
+                Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
+                _ => "",
+            };
+            (format!("fitting {longest} points on {} with method='{name}'", handle.described()), least)
+        })?;
+    }
     let out = zeros(py, points.shape())?;
     let velocities = zeros(py, points.shape())?;
     let (mut out_write, mut velocities_write) = (out.readwrite(), velocities.readwrite());

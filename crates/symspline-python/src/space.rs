@@ -96,7 +96,7 @@ impl Handle {
         let len = self.space.get().point_len();
         let rows = slices[0].len() / len;
         require_room(memory(&self.space.get(), Some(operation)), || {
-            format!("this operation on {}", self.described())
+            (format!("this operation on {}", self.described()), "")
         })?;
         let out = zeros(py, &[rows * operation.row_len(len)])?;
         let mut write = out.readwrite();
@@ -129,7 +129,9 @@ impl Handle {
         tol: f64,
     ) -> PyResult<()> {
         let points = in_order(&points)?;
-        require_room(memory(&self.space.get(), None), || format!("checking points of {}", self.described()))?;
+        require_room(memory(&self.space.get(), None), || {
+            (format!("checking points of {}", self.described()), "")
+        })?;
         let mut copy = room(points.len())?;
         copy.extend_from_slice(points);
         let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
@@ -147,7 +149,7 @@ impl Handle {
         vectors: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         require_room(memory(&self.space.get(), None), || {
-            format!("checking vectors on {}", self.described())
+            (format!("checking vectors on {}", self.described()), "")
         })?;
         drop(room::<f64>(2 * points.shape()[0])?);
         let defects = tangent_defects(&self.space.get(), in_order(&points)?, in_order(&vectors)?);

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..smoothing import SmoothingSpline
-from ..spaces import Space, SpecialEuclidean, SpecialOrthogonal, factors_of
+from ..spaces import Product, Space, SpecialEuclidean, SpecialOrthogonal, factors_of
 from .errors import Problem
 from .layout import Doubles
 from .numbers import is_number
@@ -175,12 +175,12 @@ def spreads(spline: SmoothingSpline, x: Any, nu: int, lonlat: bool, quaternion: 
         return np.empty((len(x), 0))
     found = spline.std(x, nu)
     columns: list[Doubles] = []
-    for factor, own in zip(
-        factors_of(spline.space), found if isinstance(found, tuple) else (found,), strict=True
-    ):
-        turn = own / 2 if quaternion else own
+    each = found if isinstance(spline.space, Product) else (found,)
+    half = 2 if quaternion else 1
+    for factor, own in zip(factors_of(spline.space), each, strict=True):
         if isinstance(factor, SpecialEuclidean):
-            columns += [own, turn]
+            rotation, position = own
+            columns += [position, rotation / half]
         else:
-            columns.append(turn if factor == _ROTATIONS else np.degrees(own) if lonlat else own)
+            columns.append(own / half if factor == _ROTATIONS else np.degrees(own) if lonlat else own)
     return np.stack(columns, axis=-1)

@@ -174,7 +174,11 @@ pub fn settle(
         let calmer = other & bends.simd_lt(known);
         second = calmer.select(known, other.select(second.min(bends), second));
         least = Some(calmer.select(bends, known));
-        let nearer = on & !settled & found.residual.simd_lt(outcome.residual);
+        // A solution with a control point beyond the cut locus is spurious.
+        let nearer = on
+            & !settled
+            & found.residual.simd_lt(outcome.residual)
+            & mask_from(|l| found.fault[l].is_none());
         outcome.adopt(space, chain, &before, &found, calmer | nearer, on);
         // What led to the first curve is what the search for others is measured by.
         let now = outcome.settled(idle) & !settled;
