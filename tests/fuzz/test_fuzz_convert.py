@@ -22,7 +22,11 @@ TAKEN = {
 
 def test_all_are_here():
     # Totally geodesic parts and indefinite spaces have tests of their own.
-    parts = {name for name in ss.convert.__all__ if any(word in name for word in ("siegel", "subspace", "reflection"))}
+    parts = {
+        name
+        for name in ss.convert.__all__
+        if any(word in name for word in ("siegel", "subspace", "reflection"))
+    }
     assert set(TAKEN) | parts == set(ss.convert.__all__)
 
 

@@ -97,7 +97,7 @@ LONG_CALLS = {
     "log": "many(ss.space('so:150'), 'log')",
     "large log": "one(ss.space('u:280'))",
     "geodesic": "many(ss.space('spd:120'), 'distance')",
-    "evaluate": "spline('spd:30', 4)(np.linspace(0, 3, 10**6))",
+    "evaluate": "spline('spd:30', 4)(np.linspace(0, 3, 200_000))",
     "smooth": "ss.make_smoothing_spline(None, far(ss.space('spd:9'), 400), 'spd:9', method='newton')",
     "gl": "many(ss.space('gl:120'), 'log')",
 }
