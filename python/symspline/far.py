@@ -109,7 +109,7 @@ def _parts_of_the_way(space: Space, points: Array) -> NDArray[np.float64]:
         if not isinstance(space, Sphere):
             cosines = np.abs(cosines)
         return np.asarray(np.arccos(np.clip(cosines, -1, 1)) / space.injectivity_radius)
-    finite = np.isfinite(points).all(axis=tuple(range(-axes, 0)))
+    finite = np.asarray(np.isfinite(points).all(axis=tuple(range(-axes, 0))))
     good = finite[..., :-1] & finite[..., 1:]
     result = np.full(good.shape, np.nan)
     a, b = p[good], q[good]
