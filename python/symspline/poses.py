@@ -2,8 +2,8 @@
 
 Poses take the body to the world, [[R, x], [0, 1]] with R the attitude and x the position. Fit curves of them on
 ``so:3 x r:3``: the product has an invariant metric, and noise and smoothing of attitude and position stay separate.
-`split` makes its points of 4 × 4 matrices, such as ``poses_se3`` of evo. Such matrices are points of ``se:3`` as they are;
-geodesics there are screw motions, as joints and tools make them.
+`split` makes its points of 4 × 4 matrices, such as ``poses_se3`` of evo. Such matrices are points of ``se:3`` as they
+are; geodesics there are screw motions, as joints and tools make them.
 
 >>> import io, symspline as ss
 >>> from symspline import poses
