@@ -51,15 +51,15 @@ def region(found: Mapping[str, Points]) -> Figure:
     for ax in (near, everywhere):
         ax.fill_between(kd, low, high, color=SEA, linewidth=0, zorder=0)
         ax.plot(kd, low, color="#31688e", linewidth=1, zorder=1)
-        grid = np.meshgrid(np.linspace(1e-4, 0.75, 300), np.linspace(1e-4, 0.6, 300))
+        grid = np.meshgrid(np.linspace(1e-4, 1.6, 600), np.linspace(1e-4, 0.6, 300))
         ax.contourf(*grid, contraction(*grid), levels=[0, 1], colors=[SAND], alpha=0.6, zorder=0)
         for points, marker in zip(found.values(), MARKERS, strict=False):
             dots = _draw(ax, points, marker)
         ax.set(xlabel="K D", ylabel="K V")
         ax.spines[["top", "right"]].set_visible(False)
-    near.set(xlim=(0, 0.36), ylim=(0, 1), title="Where Theorem 3.1 speaks")
+    near.set(xlim=(0, 0.36), ylim=(0, 1), title="Range of Theorem 3.1")
     near.text(0.04, 0.6, "(38) holds: legs stay below V", fontsize=10, color="#31688e")
-    near.text(0.2, 0.12, "α < 1: sweeps contract", fontsize=10, color="#9a5b00")
+    near.text(0.275, 0.29, "α < 1:\nsweeps contract", fontsize=10, color="#9a5b00")
     near.text(0.12, 0.01, "longest legs of the solutions", fontsize=9, color="#333333")
     everywhere.set(xlim=(0, 3.1), ylim=(0, 2.1), title="Everywhere")
     for name, marker in zip(found, MARKERS, strict=False):

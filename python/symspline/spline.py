@@ -53,7 +53,7 @@ class CubicSpline(Piecewise):
             Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
         method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1, literally), ``"homotopy"``
             (the curve that is continued from near points), or ``"auto"``: quasi-Newton, then Newton's method and the
-            homotopy for curves that did not converge. Points far apart (steps beyond 0.6 of the way to the cut locus,
+            homotopy for curves that did not converge. Points far apart (steps beyond 0.55 of the way to the cut locus,
             or beyond 0.4 where quasi-Newton is slow) may have several C² curves. Then ``"auto"`` also runs Algorithm 1,
             all other solvers and a trust region within a budget, and keeps the solution with the lowest bending energy.
             `Report.method` names the solver that found it.
