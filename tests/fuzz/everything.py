@@ -29,8 +29,6 @@ NEEDS = {"symspline.xarray": "xarray"}
 LEFT_OUT = {"set_num_threads", "show_config", "from_geomstats", "from_pymanopt", "map"}
 # Made by `make_smoothing_spline` only.
 LEFT_OUT |= {"SmoothingSpline"}
-# What smoothing splines alone have.
-LEFT_OUT |= {"std", "band"}
 
 P = np.eye(3)
 T = np.array([0.0, 1.0, 3.0])

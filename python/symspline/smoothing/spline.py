@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from .._core import ValidationError
+from ..arrays import shown
 from ..curves.curve import Curve, order_of
 from ..curves.ends import fixed_velocities
 from ..curves.noise import Noise
@@ -172,8 +173,9 @@ class SmoothingSpline(CubicSpline):
         Returns:
             Shape batch axes + x.shape: a distance in the space.
         """
-        if not 0 < level < 1:
-            raise ValidationError(f"level must lie between 0 and 1, not {level!r}")
+        number = isinstance(level, (int, float, np.integer, np.floating)) and not isinstance(level, bool)
+        if not number or not 0 < level < 1:
+            raise ValidationError(f"level must lie between 0 and 1, not {shown(level)}")
         spreads = self.std(x)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
