@@ -46,7 +46,7 @@ def fit(
     offsets: Sequence[int] | None = None,
     progress: _Progress | None = None,
     dry: bool = False,
-) -> tuple[_Doubles, _Doubles, dict[str, NDArray[Any]], list[tuple[int, str, str]]]: ...
+) -> tuple[_Doubles, _Doubles, tuple[NDArray[np.int64], _Doubles], list[tuple[int, str, str]]]: ...
 def evaluate(
     handle: Handle,
     t: _Doubles,

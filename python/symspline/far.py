@@ -72,6 +72,9 @@ def warn_of_far_points(curves: Sequence[Curve], reports: Sequence[Sequence[Repor
             if not limit < np.inf or (own is not None and _all_near(own[k].max_step, limit)):
                 continue
             far = np.count_nonzero(_parts_of_the_way(part.space, part.points) > FAR, axis=-1)
+            if own is not None:
+                # Failures of curves that did not converge are reported elsewhere, as `on_failure` demands.
+                far = np.where(own[k].converged, far, 0)
             for index in np.argwhere(far > steps / 2).tolist():
                 place = tuple([number] * (len(curves) > 1) + index)
                 found.append((place, int(far[tuple(index)]), steps, part.space))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,11 +152,7 @@ def _same(a: Any, b: Any) -> bool:
 # As the compiled core numbers them, in the order in which they are tried.
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
 
-Columns = dict[str, NDArray[Any]]
-"""The fields of a report as arrays over the curves, ``"solver"`` as a number in `SOLVERS`, ``"skipped"`` as a set of
-bits."""
-_INTEGERS = ("iterations", "solver", "skipped")
-_NUMBERS = ("residual", "max_step", "rate")
+INTEGERS = ("converged", "iterations", "solver", "skipped")
 # NaN where they are not known.
 OPTIONAL = (
     "invariant_radius",
@@ -166,15 +161,46 @@ OPTIONAL = (
     "alternative_energy",
     "velocity_error",
 )
+NUMBERS = ("residual", "max_step", "rate", *OPTIONAL)
 
 
-def empty_columns(count: int) -> Columns:
-    """The columns of so many curves that were not fitted."""
-    return {
-        "converged": np.zeros(count, bool),
-        **{name: np.zeros(count, np.int64) for name in _INTEGERS},
-        **{name: np.full(count, np.nan) for name in (*_NUMBERS, *OPTIONAL)},
-    }
+class Columns(NamedTuple):
+    """The fields of reports as two tables with a row for each field and a column for each curve: ``"solver"`` is a
+    number in `SOLVERS`, ``"skipped"`` a set of bits.
+
+    Attributes:
+        integers: rows in the order of `INTEGERS`.
+        numbers: rows in the order of `NUMBERS`.
+    """
+
+    integers: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+
+    def row(self, name: str) -> NDArray[Any]:
+        """The values of a field, one for each curve; a view that can be written to."""
+        integer = name in INTEGERS
+        values: NDArray[Any] = (
+            self.integers[INTEGERS.index(name)] if integer else self.numbers[NUMBERS.index(name)]
+        )
+        return values
+
+    def part(self, curves: Any) -> Columns:
+        """Those of some curves."""
+        return Columns(self.integers[:, curves], self.numbers[:, curves])
+
+    def put(self, curves: Any, other: Columns) -> None:
+        """Replace those of some curves."""
+        self.integers[:, curves], self.numbers[:, curves] = other
+
+    @staticmethod
+    def empty(count: int) -> Columns:
+        """Those of so many curves that were not fitted."""
+        return Columns(np.zeros((len(INTEGERS), count), np.int64), np.full((len(NUMBERS), count), np.nan))
+
+    @staticmethod
+    def joined(each: Sequence[Columns]) -> Columns:
+        """Those of the curves of all."""
+        return Columns(*(np.concatenate(tables, axis=1) for tables in zip(*each, strict=True)))
 
 
 def combined(
@@ -233,21 +259,41 @@ def shaped(
     """A report from the columns of curves with these knots; ``method`` is what was asked for."""
     gap = longest_gap(times, batch)
     if batch == ():
-        one = {name: column.item() for name, column in columns.items()}
-        solver, bits = one.pop("solver"), one.pop("skipped")
-        for name in OPTIONAL:
-            if math.isnan(one.get(name, math.nan)):
-                one[name] = None
-        one["guaranteed_sweeps"] = _count(one["guaranteed_sweeps"])
-        return Report(method=SOLVERS[solver], max_gap=gap, curvature=curvature, skipped=_skipped(bits), **one)
-    many: dict[str, Any] = {name: column.reshape(batch) for name, column in columns.items()}
-    solvers, sets = many.pop("solver"), many.pop("skipped")
-    used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
+        converged, iterations, solver, bits = columns.integers[:, 0].tolist()
+        residual, step, rate, *rest = columns.numbers[:, 0].tolist()
+        radius, bound, sweeps, other, error = [None if x != x else x for x in rest]
+        return Report(
+            SOLVERS[solver],
+            bool(converged),
+            iterations,
+            residual,
+            step,
+            gap,
+            curvature,
+            radius,
+            rate,
+            other,
+            bound,
+            _count(sweeps),
+            _skipped(bits),
+            error,
+        )
+    # Each row by itself: a batch may have no curves.
+    integers = {name: columns.row(name).reshape(batch) for name in INTEGERS}
+    numbers: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in NUMBERS}
+    solvers = integers["solver"]
     for name in OPTIONAL:
-        if name not in many or np.isnan(many[name]).all():
-            many[name] = None
-    bits = int(np.bitwise_or.reduce(sets, axis=None))
-    return Report(method=used, max_gap=gap, curvature=curvature, skipped=_skipped(bits), **many)
+        if np.isnan(numbers[name]).all():
+            numbers[name] = None
+    return Report(
+        method=SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method,
+        converged=integers["converged"].astype(bool),
+        iterations=integers["iterations"],
+        max_gap=gap,
+        curvature=curvature,
+        skipped=_skipped(int(np.bitwise_or.reduce(integers["skipped"], axis=None))),
+        **numbers,
+    )
 
 
 def _count(value: Any) -> Any:

@@ -149,5 +149,6 @@ def test_long_calls_end_soon_after_a_signal(call):
         print(time.monotonic() - sent[-1])
     """
     said = run(script, 60).strip()
-    # A machine that is fast enough may finish before the signal comes.
-    assert said == "done" or float(said) < 1.0, said
+    # A machine that is fast enough may finish before the signal comes. Alone on the machine all end within a second;
+    # other tests run beside this one.
+    assert said == "done" or float(said) < 2.5, said

@@ -80,7 +80,7 @@ def test_motions_of_one_sign_do_not_warn(q):
 
 def test_other_spaces_do_not_warn():
     silent(lambda: ss.CubicSpline(None, flipped(4), "rp:3"))
-    silent(lambda: ss.CubicSpline(None, points_on(ss.Sphere(2), step=2.0), "sphere:2", on_failure="ignore"))
+    silent(lambda: ss.CubicSpline(None, points_on(ss.Sphere(2), step=1.8), "sphere:2", on_failure="ignore"))
     turns = ss.rotations.from_quaternions(flipped(4), scalar_first=True)
     silent(lambda: ss.CubicSpline(None, turns, "so:3"))
 

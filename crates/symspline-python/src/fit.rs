@@ -7,7 +7,6 @@ use crate::validate;
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use symspline::fit::{End, Ends, Method, Options, Problem, Report, Solver, Status, fit as solve, memory};
 use symspline::space::Ambient;
 
@@ -20,7 +19,7 @@ pub type EndOf<'py> = (String, Option<Array<'py>>);
 type Fitted<'py> = (
     Bound<'py, PyArrayDyn<f64>>,
     Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyDict>,
+    Columns<'py>,
     Vec<(usize, &'static str, String)>,
 );
 
@@ -143,33 +142,34 @@ fn length(x: f64) -> String {
     if x < 1e6 { format!("{x:.3}") } else { format!("{x:.3e}") }
 }
 
-/// The columns of the report by name, one number for each curve.
-fn columns<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Bound<'py, PyDict>> {
-    let columns = PyDict::new(py);
-    let converged = reports.iter().map(|r| r.status == Status::Converged);
-    columns.set_item("converged", PyArray1::from_iter(py, converged))?;
-    type Column<T> = (&'static str, fn(&Report) -> T);
-    let integers: [Column<i64>; 3] = [
-        ("iterations", |r| r.iterations as i64),
-        ("solver", |r| r.solver as i64),
-        ("skipped", |r| i64::from(r.skipped.0)),
+/// The report as two tables with a row for each field, in the order of `INTEGERS` and `NUMBERS` in report.py, and a column
+/// for each curve.
+type Columns<'py> = (Bound<'py, PyArrayDyn<i64>>, Bound<'py, PyArrayDyn<f64>>);
+
+fn columns<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Columns<'py>> {
+    const INTEGERS: [fn(&Report) -> i64; 4] = [
+        |r| i64::from(r.status == Status::Converged),
+        |r| r.iterations as i64,
+        |r| r.solver as i64,
+        |r| i64::from(r.skipped.0),
     ];
-    for (name, column) in integers {
-        columns.set_item(name, PyArray1::from_iter(py, reports.iter().map(column)))?;
-    }
-    let numbers: [Column<f64>; 7] = [
-        ("residual", |r| r.residual),
-        ("max_step", |r| r.max_step),
-        ("rate", |r| r.rate),
-        ("invariant_radius", |r| r.invariant_radius),
-        ("contraction_bound", |r| r.contraction_bound),
-        ("guaranteed_sweeps", |r| r.guaranteed_sweeps),
-        ("alternative_energy", |r| r.alternative),
+    // The error of velocities is known on manifolds made of functions only.
+    const NUMBERS: [fn(&Report) -> f64; 8] = [
+        |r| r.residual,
+        |r| r.max_step,
+        |r| r.rate,
+        |r| r.invariant_radius,
+        |r| r.contraction_bound,
+        |r| r.guaranteed_sweeps,
+        |r| r.alternative,
+        |_| f64::NAN,
     ];
-    for (name, column) in numbers {
-        columns.set_item(name, PyArray1::from_iter(py, reports.iter().map(column)))?;
-    }
-    Ok(columns)
+    let integers = PyArray1::from_iter(py, INTEGERS.iter().flat_map(|f| reports.iter().map(f)));
+    let numbers = PyArray1::from_iter(py, NUMBERS.iter().flat_map(|f| reports.iter().map(f)));
+    Ok((
+        integers.reshape([INTEGERS.len(), reports.len()])?.to_dyn().clone(),
+        numbers.reshape([NUMBERS.len(), reports.len()])?.to_dyn().clone(),
+    ))
 }
 
 fn faults(

@@ -19,7 +19,7 @@ const HEAVY_DIM: usize = 48;
 
 /// Whether work on a space may need to be stopped within one step.
 pub fn is_heavy(space: &Erased) -> bool {
-    space.point_shape().len() > 1 && (space.point_len() >= HEAVY_POINT || space.dim() >= HEAVY_DIM)
+    (space.point_len() >= HEAVY_POINT || space.dim() >= HEAVY_DIM) && space.point_shape().len() > 1
 }
 
 /// Runs `work` without the GIL. From time to time signals are checked and `progress` is called with

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from ..arrays import as_array
-from ..report import empty_columns
+from ..report import Columns
 from ..spaces import Array, Space, factors_of
 from .ends import End
 from .fit import Asked, Fit, Points, finished, first_faults, fit, fit_many, solve_factors
@@ -205,15 +205,14 @@ def _left_out(space: Space, points: Points) -> Solved:
     count = math.prod(points.batch)
     shape = (*points.batch, points.nodes, *space.point_shape)
     places, velocities = (np.full(shape, np.nan, space.dtype) for _ in range(2))
-    return Solved(places, velocities, empty_columns(count), [])
+    return Solved(places, velocities, Columns.empty(count), [])
 
 
 def _place_some(whole: Solved, found: Solved, chosen: Numbers) -> None:
     """Curves at their places in the whole batch."""
     for all_rows, rows in ((whole.points, found.points), (whole.velocities, found.velocities)):
         all_rows.reshape(-1, *rows.shape[1:])[chosen] = rows
-    for name, column in found.columns.items():
-        whole.columns[name][chosen] = column
+    whole.columns.put(chosen, found.columns)
 
 
 def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:

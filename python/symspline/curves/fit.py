@@ -180,7 +180,7 @@ def fit_many(
         own = slice(start, stop)
         reports = [
             shaped(
-                {name: column[i : i + 1] for name, column in found.columns.items()},
+                found.columns.part(slice(i, i + 1)),
                 times[i],
                 (),
                 task.space.curvature,

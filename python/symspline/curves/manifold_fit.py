@@ -13,7 +13,7 @@ from ..manifolds.certificate import velocity_errors
 from ..manifolds.condition import End, Legs, Problem, legs_of, not_a_knot
 from ..manifolds.frames import frames_along
 from ..manifolds.iteration import FLOOR, iterate
-from ..report import SOLVERS, Columns, empty_columns
+from ..report import SOLVERS, Columns
 from ..spaces import Array
 from .curve import Doubles
 from .solve import Options, Progress, Solved, Task
@@ -37,9 +37,9 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
     faults = _far(space, lengths, "points[{0}] and points[{1}]", batch)
     good = np.array([i for i in range(count) if i not in faults], np.int64)
     velocities = np.full(p.shape, np.nan, space.dtype)
-    columns = empty_columns(count)
-    columns["residual"][:], columns["solver"][:] = np.inf, SOLVERS.index("quasi-newton")
-    columns["max_step"][good] = lengths[good].max(axis=1)
+    columns = Columns.empty(count)
+    columns.row("residual")[:], columns.row("solver")[:] = np.inf, SOLVERS.index("quasi-newton")
+    columns.row("max_step")[good] = lengths[good].max(axis=1)
     if good.size:
         ends = _ends(task, h, p)
         problem = Problem(operations, h, p, frames_along(operations, p), ends).some(good)
@@ -49,24 +49,24 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
                 node = 0 if which == 0 else nodes - 1
                 start[:, node] = problem.coordinates(end.vector[:, None], slice(node, node + 1))[:, 0]
         scale = np.abs(p[good]).reshape(good.size, -1).max(axis=1)
-        longest = columns["max_step"][good]
+        longest = columns.row("max_step")[good]
         floor = np.maximum(FLOOR, _ROUNDING * scale / np.where(longest > 0, longest, 1.0))
         pace = (lengths[good] / h[good]).max(axis=1)
         advance = None if progress is None else partial(_report, progress, nodes, count)
         found = iterate(problem, start, pace, floor, options.tol, options.max_iter, advance)
         velocities[good] = found.velocities
         for name in ("converged", "iterations", "residual", "rate"):
-            columns[name][good] = getattr(found, name)
+            columns.row(name)[good] = getattr(found, name)
         unknowns = slice(0, start.shape[1])
         coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
-        columns["velocity_error"][good] = velocity_errors(problem, coordinates, pace)
+        columns.row("velocity_error")[good] = velocity_errors(problem, coordinates, pace)
         legs = legs_of(operations, problem.h, problem.p, found.velocities)
         faults |= _unfit(space, problem, legs, good, found.converged, columns, options, batch)
         for i in faults:
             if faults[i][0] == "cut-locus":
                 velocities[i] = np.nan
-                columns["converged"][i], columns["residual"][i] = False, np.inf
-                columns["velocity_error"][i] = np.nan
+                columns.row("converged")[i], columns.row("residual")[i] = False, np.inf
+                columns.row("velocity_error")[i] = np.nan
     return Solved(
         points,
         velocities.reshape(points.shape),
@@ -142,9 +142,9 @@ def _unfit(
         elif not converged[number]:
             faults[i] = (
                 "unconverged",
-                f"no convergence{_of(i, batch)}: residual {columns['residual'][i]:.3e} after "
-                f"{columns['iterations'][i]} iterations (tol {options.tol:.1e}, longest step "
-                f"{columns['max_step'][i]:.3f}); put more points where steps are long, choose "
+                f"no convergence{_of(i, batch)}: residual {columns.row('residual')[i]:.3e} after "
+                f"{columns.row('iterations')[i]} iterations (tol {options.tol:.1e}, longest step "
+                f"{columns.row('max_step')[i]:.3f}); put more points where steps are long, choose "
                 "times that suit the distances, or raise max_iter; exp, log and dlog must fit each other",
             )
     return faults

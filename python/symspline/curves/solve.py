@@ -70,7 +70,7 @@ def solve(task: Task, options: Options, progress: Progress | None = None, dry: b
     found, velocities, columns, faults = _core.fit(
         space._handle, times, points, ends, *options, tol is not None, tol or 0.0, offsets, progress, dry
     )
-    return Solved(space._numbers(found), space._numbers(velocities), columns, faults)
+    return Solved(space._numbers(found), space._numbers(velocities), Columns(*columns), faults)
 
 
 def checked(task: Task, options: Options) -> Task:
@@ -106,7 +106,7 @@ def one_by_one(
     return Solved(
         task.space._numbers(task.points),
         np.concatenate([found.velocities[0] for found in each]),
-        {name: np.concatenate([found.columns[name] for found in each]) for name in each[0].columns},
+        Columns.joined([found.columns for found in each]),
         faults,
     )
 
