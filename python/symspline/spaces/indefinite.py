@@ -15,9 +15,9 @@ from .base import Array, Space
 class Indefinite(Space):
     """A space with an invariant metric that is indefinite.
 
-    Such a metric gives no lengths, so `inner`, `norm` and `distance` do not use it. They are the Euclidean ones of
-    arrays (see each class), depend on the coordinate system, and serve for reporting only; `curvature` is NaN. Splines
-    do not depend on them: they commute with every isometry of the indefinite metric.
+    Such a metric gives no lengths, so ``inner``, ``norm`` and ``distance`` do not use it. They are the Euclidean ones
+    of arrays (see each class), depend on the coordinate system, and serve for reporting only; `curvature` is NaN.
+    Splines do not depend on them: they commute with every isometry of the indefinite metric.
     """
 
     def invariant_form(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
@@ -51,7 +51,7 @@ class Indefinite(Space):
         return np.broadcast_to(result, lead)[()].copy()
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
-        """Return the size of ``log(p, q)``, by `norm`; shape of the leading axes.
+        """Return the size of ``log(p, q)``, by ``norm``; shape of the leading axes.
 
         Raises
         ------
@@ -72,8 +72,9 @@ class DeSitter(Indefinite, Preserving):
     time-like. Points with ⟨p, q⟩ > −1 are joined by one geodesic of less than half a turn; no geodesic joins points
     with ⟨p, q⟩ < −1. Space-like geodesics are closed.
 
-    `invariant_form` is the metric. It gives no lengths, so that `inner`, `norm` and `distance` are those of the arrays
-    of numbers: `distance(p, q)` is the size of `log(p, q)`, and not symmetric. Rounding errors of a point are ε|p|².
+    ``invariant_form`` is the metric. It gives no lengths, so that ``inner``, ``norm`` and ``distance`` are those of
+    the arrays of numbers: `distance(p, q)` is the size of `log(p, q)`, and not symmetric. Rounding errors of a point
+    are ε|p|².
 
     >>> import numpy as np, symspline as ss
     >>> ss.DeSitter(2).log([0, 1, 0], [np.sinh(2), np.cosh(2), 0]).round(8)
@@ -101,8 +102,9 @@ class AntiDeSitter(Indefinite, Preserving):
     as their velocity is time-like, null or space-like. Points with ⟨p, q⟩ < 1 are joined by one geodesic of less than
     half a turn; no geodesic joins points with ⟨p, q⟩ > 1. Time-like geodesics are closed.
 
-    `invariant_form` is the metric. It gives no lengths, so that `inner`, `norm` and `distance` are those of the arrays
-    of numbers: `distance(p, q)` is the size of `log(p, q)`, and not symmetric. Rounding errors of a point are ε|p|².
+    ``invariant_form`` is the metric. It gives no lengths, so that ``inner``, ``norm`` and ``distance`` are those of
+    the arrays of numbers: `distance(p, q)` is the size of `log(p, q)`, and not symmetric. Rounding errors of a point
+    are ε|p|².
 
     >>> import numpy as np, symspline as ss
     >>> ss.AntiDeSitter(2).log([1, 0, 0], [np.cos(2), np.sin(2), 0]).round(8)
@@ -128,9 +130,10 @@ class IndefiniteGrassmannian(Indefinite):
     `symspline.convert.basis_to_reflection` makes reflections of bases.
 
     Geodesics are P exp(tΩ), as in `GeneralLinear`, and ``log(P, Q) = P log(PQ)`` exists while no eigenvalue of PQ is a
-    negative number. `invariant_form` is the metric, ⟨u, v⟩ = tr(uv)/8: on a line spanned by x, with the velocity v
-    orthogonal to x, it is ⟨v, v⟩/⟨x, x⟩. It gives no lengths; `inner`, `norm` and `distance` are those of Ω = P⁻¹v as
-    an array of numbers. ``igr:0,1,1,n`` is `DeSitter` with x and −x as one point, ``igr:1,0,2,n-1`` is `AntiDeSitter`.
+    negative number. ``invariant_form`` is the metric, ⟨u, v⟩ = tr(uv)/8: on a line spanned by x, with the velocity v
+    orthogonal to x, it is ⟨v, v⟩/⟨x, x⟩. It gives no lengths; ``inner``, ``norm`` and ``distance`` are those of Ω =
+    P⁻¹v as an array of numbers. ``igr:0,1,1,n`` is `DeSitter` with x and −x as one point, ``igr:1,0,2,n-1`` is
+    `AntiDeSitter`.
 
     >>> import symspline as ss
     >>> space = ss.IndefiniteGrassmannian(0, 1, 1, 2)
