@@ -70,7 +70,10 @@ class Fit(NamedTuple):
 
 def kind_of(space: Space) -> type[Plain]:
     """How curves are made in a space that is no product."""
-    return next(kind for kind in (OnManifold, InSpan, Plain) if kind.suits(space))
+    for kind in (OnManifold, InSpan):
+        if kind.suits(space):
+            return kind
+    return Plain
 
 
 def read(points: Any, space: Space) -> list[Points]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import cached_property, wraps
 from inspect import signature
 from typing import Any, ClassVar
 
@@ -106,8 +106,13 @@ class Space:
         """Type of the numbers of a point: float64, or complex128."""
         return self._dtype
 
-    def __str__(self) -> str:
+    @cached_property
+    def _text(self) -> str:
+        # Spaces are compared by it, several times in a fit.
         return f"{self._name}:{','.join(map(str, self._parameters))}"
+
+    def __str__(self) -> str:
+        return self._text
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(map(str, self._parameters))})"
