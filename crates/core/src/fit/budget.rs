@@ -22,7 +22,7 @@ pub const PATIENT: f64 = 300.0;
 pub const FEWEST_STEPS: f64 = 20.0;
 pub const FEWEST_SWEEPS: f64 = 40.0;
 /// The search for other curves may cost so many times what the first one cost ...
-const TIMES_FIRST: f64 = 3.0;
+const TIMES_FIRST: f64 = 2.0;
 /// ... or, if that is more, so many evaluations up to [`DIMENSION`], beyond it as many fewer as its square.
 const SEARCH: f64 = 25_600.0;
 /// Where no curve was found yet, so many floating-point operations may be spent on each solver.
