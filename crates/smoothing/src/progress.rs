@@ -100,18 +100,18 @@ impl Progress {
     pub fn takes_exact_way(&self, space: &Erased, tier: Tier) -> bool {
         let limit = if self.settled { SLOW } else { HOPELESS };
         let known = self.forced || (self.settled && self.report.exact);
-        // With curvature in its matrix the flat way contracts.
+        // With curvature in its matrix the linearised solver contracts.
         let hopeless = known || (!self.curved && self.report.kappa > limit) || self.slow > 1;
         tier == Tier::Newton || (hopeless && self.may_be_exact(space, tier))
     }
 
     /// Whether there is the exact way to be taken.
     pub fn may_be_exact(&self, space: &Erased, tier: Tier) -> bool {
-        // In flat space the flat way is the exact one; and the blocks of the other have a limit.
+        // In flat space the linearised solver is full Gauss–Newton, whose blocks have a limit elsewhere.
         tier == Tier::Auto && space.curvature() != 0.0 && space.dim() <= LARGE
     }
 
-    /// λ at a curve: a better one, unless it is given or settled; and what is expected of the flat way with it.
+    /// λ at a curve: a better one, unless it is given or settled, and the expected step of the linearised solver.
     pub fn weigh(
         &mut self,
         space: &Erased,

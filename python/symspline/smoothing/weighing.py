@@ -206,7 +206,7 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
             f"{(*lead, m, *space.point_shape)}"
         )
     points = space._numbers(data.doubles).reshape(lead + space.point_shape)
-    # What is no point is found out later.
+    # Invalid points are reported later.
     used = np.broadcast_to(used, lead) & np.isfinite(points).all(axis=tuple(range(len(lead), points.ndim)))
     vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]
     finite = np.isfinite(vectors).all(axis=tuple(range(1, vectors.ndim)))
