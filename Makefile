@@ -9,7 +9,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 .PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate check-tools clean
 
 demo: .venv/built
-	$(BIN)/symspline demo --out demo-output
+	$(BIN)/python examples/storms/demo.py --out demo-output
 
 # Format, lints, types, and the laws of every space in Rust: what to run before a commit.
 check: .venv/tools

@@ -14,7 +14,7 @@ def description(threads: int, packages: Iterable[str]) -> dict[str, str]:
     """Processor, system, versions, date."""
     return {
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "processor": f"{_processor()}, {os.cpu_count()} cores, {threads} used by symspline unless it says one",
+        "processor": f"{_processor()}, {os.cpu_count()} cores, {threads} used by symspline except where one is stated",
         "system": f"{platform.system()} {platform.machine()}",
         "load before": _load(),
         "Python": platform.python_version(),

@@ -51,6 +51,8 @@ nitpicky = True
 nitpick_ignore = [("py:obj", "spline")]
 # Other projects' names cannot be looked up without a network, and types of arrays stand for what they take.
 nitpick_ignore_regex = [
+    ("py:class", r"ndarray|array_like|optional|value|str to float|bool|\d+|[A-Z]"),
+    ("py:obj", "transvection"),
     (
         "py:.*",
         r"(numpy|np|scipy|jax|torch|pandas|pd|matplotlib|qutip|qt|nibabel|collections|pathlib|typing)\..*",
@@ -75,8 +77,10 @@ autodoc_typehints = "none"
 # It is described without being installed: it is large, and nothing on these pages runs it.
 autodoc_mock_imports = ["torch"]
 napoleon_google_docstring = True
-napoleon_numpy_docstring = False
+napoleon_numpy_docstring = True
 napoleon_use_rtype = False
+# Types are words such as array_like, not classes to link to.
+napoleon_use_param = False
 napoleon_use_ivar = True
 napoleon_attr_annotations = False
 maximum_signature_line_length = 90
@@ -89,6 +93,8 @@ sphinx_gallery_conf = {
     "gallery_dirs": ["gallery"],
     "copyfile_regex": r"index\.rst",
     "filename_pattern": r"\.py$",
+    # The demonstration is a program of several files.
+    "ignore_pattern": r"(demo|maps|tracks|hurdat)\.py$",
     "image_scrapers": ("gallery_pictures",),
     "backreferences_dir": "api/backreferences",
     "doc_module": ("symspline",),

@@ -51,7 +51,7 @@ def times_table(curves: int = 1000, runs: int = 3) -> str:
         return curve(x, t, points, space)
 
     def in_jax(points: Any) -> Any:
-        return evaluate(t, points, fit(t, points, space)[0], x, space)
+        return evaluate(t, points, fit(t, points, space)[0], space, x)
 
     def loss(function: Any) -> Any:
         return lambda points: jnp.sum(function(points) ** 3)

@@ -234,7 +234,7 @@ def store_table(count: int = 1_000_000, chunk: int = 2 * CHUNK) -> str:
             f"{most:.0f} MiB, of which {before:.0f} MiB before the first block; limit {LIMIT}",
         ],
         ["converged", spaced(converged)],
-        ["same bits as without dask", "yes" if same else "no"],
+        ["bit-identical to the run without dask", "yes" if same else "no"],
     ]
     return table(["two workers", ""], rows)
 

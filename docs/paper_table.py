@@ -40,7 +40,7 @@ SPACES = f"{ISOMETRY} {LAWS}test_exp_and_log_are_inverse {C2}"
 REGION = "solvers.md#theorem-31-and-measurements"
 
 ROWS = [
-    Row("Problem 1.1", "C² curve through points", "CubicSpline", C2, "start.md#ten-lines"),
+    Row("Problem 1.1", "C² curve through points", "CubicSpline", C2, "start.md#a-first-curve"),
     Row(
         "(1)",
         "energy that Riemannian cubics minimise",
@@ -53,7 +53,7 @@ ROWS = [
         "Introduction, parallelism",
         "each iteration is parallel",
         "set_num_threads",
-        "tests/host/test_threads.py::test_one_thread_and_two_give_the_same_bits",
+        "tests/host/test_threads.py::test_fits_do_not_depend_on_the_number_of_threads",
         "guide/batches.md#threads",
     ),
     Row("Table 1, row 1", "Euclidean space ℝⁿ = SE(n)/SO(n)", "Euclidean", SPACES, "notation.md"),
@@ -153,14 +153,14 @@ ROWS = [
         "(16)–(18)",
         'iteration map: `method="fixed-point"`',
         "CubicSpline",
-        "tests/fit/test_algorithm_1.py",
+        "tests/fit/test_solvers.py::test_every_iterate_is_that_of_the_paper",
         "solvers.md",
     ),
     Row(
         "(19)",
         "clamped spline: `bc_type=((1, v), (1, w))`",
         "CubicSpline",
-        "tests/spline/test_ends.py::test_a_given_velocity_is_kept_to_the_last_bits",
+        "tests/spline/test_ends.py::test_end_vectors_are_kept",
         "guide/ends.md",
     ),
     Row(
@@ -183,7 +183,7 @@ ROWS = [
         "Algorithm 1",
         'control points: `method="fixed-point"`',
         "CubicSpline",
-        "tests/fit/test_algorithm_1.py "
+        "tests/fit/test_solvers.py::test_every_iterate_is_that_of_the_paper "
         "tests/fit/test_solvers.py::test_fixed_point_is_linear_with_a_rate_of_one_half",
         "solvers.md",
     ),
@@ -258,7 +258,7 @@ ROWS = [
         "Riemannian manifolds by the condition of Popiel and Noakes",
         "Manifold",
         "tests/manifolds/test_manifold_curves.py::test_acceleration_is_continuous "
-        "tests/manifolds/test_manifold_curves.py::test_on_a_symmetric_space_it_is_the_same_curve",
+        "tests/manifolds/test_manifold_curves.py::test_symmetric_spaces_give_the_same_curve",
         "manifolds.md",
     ),
     Row(
@@ -341,7 +341,7 @@ ROWS = [
     ),
     Row(
         "(38)",
-        "V; U − V stands for D + V",
+        "V; U − V denotes D + V",
         "Report.invariant_radius",
         f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
         REGION,

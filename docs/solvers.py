@@ -17,7 +17,7 @@ import numpy as np
 import solvers_figures as figures
 from comparisons.page import insert, parser, table, versions
 from numpy.typing import NDArray
-from solvers_calm import calm_table, spaces_table
+from solvers_energy import energy_table, spaces_table
 from solvers_uneven import uneven_table
 
 import symspline as ss
@@ -173,7 +173,7 @@ def main() -> None:
     parts = {
         "zigzags": zigzag_table(),
         "walks": f"**S²**\n\n{walk_table(S2)}\n\n**S³**\n\n{walk_table(S3)}",
-        "calm": calm_table(),
+        "energy": energy_table(),
         "spaces": spaces_table(),
         "uneven": uneven_table(),
         "knots": f"**S²**\n\n{walk_table(S2, t=t)}\n\n**S³**\n\n{walk_table(S3, t=t)}",

@@ -49,7 +49,7 @@ class Search:
         points = np.stack([self.p[:-1], self.p[1:]], axis=1)
         points = np.broadcast_to(points, (*lead, segments, 2, 3)).reshape(-1, 2, 3)
         velocities = np.stack([u[..., :-1, :], u[..., 1:, :]], axis=-2) * self.h[:, None, None]
-        a = ss.evaluate(ENDS, ENDS, points, velocities.reshape(-1, 2, 3), S2, nu=2)
+        a = ss.evaluate(ENDS, points, velocities.reshape(-1, 2, 3), S2, ENDS, nu=2)
         a = a.reshape(*lead, segments, 2, 3) / np.square(self.h)[:, None, None]
         jumps = np.zeros((*lead, segments + 1, 3))
         jumps[..., 1:, :] += a[..., 1, :]
@@ -98,9 +98,9 @@ def uneven_table(steps: tuple[float, ...] = STEPS) -> str:
         rows.append(row)
     head = [
         "step",
-        "h up to 3 : 1, `auto` finds",
-        "of others, the search",
-        "10 : 1, `auto` finds",
-        "the search",
+        "h up to 3 : 1, `auto` converges",
+        "of the rest, the search succeeds",
+        "10 : 1, `auto` converges",
+        "of the rest, the search succeeds",
     ]
     return table(head, rows)

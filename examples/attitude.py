@@ -2,7 +2,7 @@
 Attitude of a spacecraft
 ========================
 
-Four pointings are given as SciPy rotations, and the attitude, its rate and the torque between them are wanted.
+Four pointings are given as SciPy rotations. The attitude, its rate and the torque between them are to be computed.
 """
 
 # %%

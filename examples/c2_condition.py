@@ -29,7 +29,7 @@ spline = ss.CubicSpline(t, points, sphere)
 # Movement and logarithm (Fig. 2)
 # -------------------------------
 # The movement E_p(v) is the motion of the whole space that takes p along its geodesic: `transvection`. It moves every
-# other point x, too. The logarithm says which v takes p to q.
+# other point x, too. The logarithm is the v that takes p to q.
 
 p, q, x = points[1], points[2], points[3]
 v = sphere.log(p, q)

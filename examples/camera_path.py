@@ -27,8 +27,8 @@ naive = ss.CubicSpline(None, (places, looks), space, bc_type="not-a-knot")
 # %%
 # Even speed
 # ----------
-# First the times: as far apart as the places. Then the clock: the length of the path up to a time is the integral of
-# its speed, and the time at which a length is reached is that function read backwards.
+# First choose times in proportion to the distances. Then reparametrise: the length of the path up to a time is the
+# integral of its speed, and the time at which a length is reached is that function read backwards.
 
 t = np.r_[0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))]
 path = ss.CubicSpline(t, (places, looks), space, bc_type="not-a-knot")

@@ -42,7 +42,7 @@ in_grams = np.linalg.inv(grams) @ log_euclidean(grams @ given @ grams) @ np.lina
 # %%
 # The spline
 # ----------
-# The affine-invariant metric of ``spd:2`` knows no units: change them before or after, the curve is the same.
+# The affine-invariant metric of ``spd:2`` does not depend on units: you can change them before or after the fit.
 
 spline = ss.CubicSpline(t, given, "spd:2")
 rescaled = ss.CubicSpline(t, grams @ given @ grams, "spd:2")

@@ -27,7 +27,7 @@ naive = CubicSpline(hours, np.column_stack([lon, lat]))(x)
 # %%
 # The spline
 # ----------
-# Places are unit vectors. Longitude and latitude are only a way to write them down, before and after.
+# Positions are unit vectors. Longitude and latitude are only a way to write them down, before and after.
 
 track = ss.CubicSpline(3600 * hours, ss.geo.from_lonlat(lon, lat), "sphere:2", bc_type="not-a-knot")
 smooth_lon, smooth_lat = ss.geo.to_lonlat(track(3600 * x))

@@ -2,7 +2,7 @@
 Diffusion tensors that do not swell
 ===================================
 
-Two bundles of fibres cross the picture at right angles to each other, and a tensor between them is wanted.
+Two bundles of fibres cross the picture at right angles to each other, and a tensor between them is to be computed.
 """
 
 # %%

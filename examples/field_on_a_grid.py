@@ -2,9 +2,9 @@
 A field on a grid, in blocks
 ============================
 
-The direction of a magnetic field at 2592 places, known every ten years. A loop over the places would do, and hold all
-of them in memory; here the years between are made block by block in dask, from one zarr store to another, and a map
-shows how fast the field turns.
+The direction of a magnetic field is known at 2592 positions every ten years. A loop over the positions would need all
+of them in memory. Here the years between are computed block by block in dask, from one zarr store to another, and a map
+shows how fast the field rotates.
 """
 
 import tempfile

@@ -2,15 +2,15 @@
 Fitting by gradient in JAX
 ==========================
 
-Four hundred noisy directions were seen, at any times. Eight points of a curve are wanted so that the curve goes as near
-to all as it can: a function of points that is made small by following its gradient.
+Four hundred noisy directions were measured at arbitrary times. Eight points of a curve are to be chosen so that the
+curve is as close to all of them as possible. The sum of squares is minimised by gradient descent over the points.
 """
 
 # %%
 # The naive way
 # -------------
-# Means of the directions near each of the eight times, as points of the curve. A mean over a stretch of a bent curve
-# lies inside the bend: such a curve cuts the corners.
+# Means of the directions near each of the eight times, as points of the curve. A mean over an interval of a bent
+# curve lies inside the bend, so such a curve cuts the corners.
 
 import jax
 import jax.numpy as jnp

@@ -31,7 +31,7 @@ naive = Rotation.from_quat(components)
 # %%
 # The spline
 # ----------
-# ``so:3`` is the space of rotations: signs play no part in it. (On ``sphere:3`` they do, and a warning says so.)
+# ``so:3`` is the space of rotations: signs play no part in it. (On ``sphere:3`` they do, and a warning is issued.)
 
 spline = ss.CubicSpline(t, ss.rotations.from_quaternions(quaternions, scalar_first=False), "so:3")
 

@@ -2,16 +2,16 @@
 Poses and an IMU
 ================
 
-What would an inertial sensor on a handheld camera have measured? The camera's poses were recorded, every tenth of
-them is used. The recording is of TUM's RGB-D benchmark (CC BY 4.0); eight seconds are left out as if the tracking had
-been lost.
+What would an inertial sensor on a handheld camera have measured? The camera's poses were recorded; every tenth pose
+is used. The recording is from TUM's RGB-D benchmark (CC BY 4.0). Eight seconds are removed, as if the tracking had been
+lost.
 """
 
 # %%
 # The naive way
 # -------------
 # Divide differences of positions by differences of times, twice. The acceleration is a staircase in the wrong
-# frame, and in the pause it says that the camera was still: a line that looks like data.
+# frame. In the gap it is zero, as if the camera had been at rest, and looks like data.
 
 from pathlib import Path
 
@@ -36,18 +36,17 @@ acceleration = np.diff(velocity, axis=0) / np.diff(middle)[:, None]
 # %%
 # The spline
 # ----------
-# `fit_segments` cuts the recording where it pauses. Attitude and position are two factors of a product, so that neither
-# disturbs the other. `ss.poses.imu` gives what a gyroscope and an accelerometer in the
-# frame of the camera would have said at any rate, gravity included.
+# `fit_segments` splits the recording at its gaps. Attitude and position are two independent factors of a product.
+# `ss.poses.imu` computes the signals of a gyroscope and an accelerometer in the frame of the camera, gravity included.
 
-pieces = ss.fit_segments(t, ss.poses.split(poses), "so:3 x r:3", max_gap=0.5, duplicates="mean")
+segments = ss.fit_segments(t, ss.poses.split(poses), "so:3 x r:3", max_gap=0.5, duplicates="mean")
 
 figure, axes = plt.subplots(3, figsize=(9, 8), sharex=True, layout="constrained")
 axes[0].plot(t[1:-1], acceleration, drawstyle="steps-mid", linewidth=1)
 axes[0].set(ylabel="m/s²", ylim=(-3, 3), title="Differences of differences of positions, in the world")
-for piece in pieces:
-    x = np.arange(piece.t[0], piece.t[-1], 0.01)
-    for ax, values in zip(axes[1:], ss.poses.imu(piece, x), strict=True):
+for segment in segments:
+    x = np.arange(segment.t[0], segment.t[-1], 0.01)
+    for ax, values in zip(axes[1:], ss.poses.imu(segment, x), strict=True):
         ax.set_prop_cycle(None)
         ax.plot(x, values, linewidth=1)
 axes[1].set(ylabel="angular velocity, rad/s", title="From the spline, in the frame of the camera")

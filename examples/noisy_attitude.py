@@ -2,7 +2,8 @@
 Angular velocity of a noisy attitude
 ====================================
 
-A sensor says the attitude ten times a second, off by one degree about each axis. The angular velocity is wanted.
+A sensor measures the attitude ten times a second, with errors of one degree about each axis. The angular velocity is to
+be estimated.
 """
 
 # %%

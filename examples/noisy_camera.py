@@ -33,7 +33,8 @@ attitude, place = ss.poses.split(pose(t))
 # %%
 # A λ for each
 # ------------
-# Places and attitudes are each smoothed by as much as they need: in the product of R³ and SO(3), and in ``se:3`` too.
+# Positions and attitudes are smoothed separately, each with its own λ: in the product of R³ and SO(3), and in ``se:3``
+# too.
 
 path = ss.make_smoothing_spline(t, tracked, space)
 print(
@@ -52,7 +53,7 @@ axes["above"].plot(*tracked[0][:, :2].T, ".", color="0.75", label="tracked")
 axes["above"].plot(*path.points[0][:, :2].T, label="smooth")
 for colour, (places, attitudes) in (("0.75", tracked), ("C0", path(t))):
     axes["above"].quiver(*places[::4, :2].T, *attitudes[::4, :2, 0].T, color=colour, scale=15, width=0.004)
-axes["above"].set(aspect="equal", title="From above: places, and where the camera looks", xlabel="metres")
+axes["above"].set(aspect="equal", title="From above: positions, and where the camera looks", xlabel="metres")
 axes["above"].legend(loc="center")
 for name, seen, whole, smooth, true, unit in zip(
     ["r:3", "so:3"], tracked, (place, attitude), path(t), truth, [100, 180 / np.pi], strict=True

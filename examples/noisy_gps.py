@@ -2,7 +2,8 @@
 Noisy GPS
 =========
 
-A bicycle ride with a GPS error of 5 to 10 m in every fix, as receivers tell it themselves. Speed and course are wanted.
+A bicycle ride with a GPS error of 5 to 10 m in every fix, as reported by the receiver. Speed and course are to be
+estimated.
 """
 
 # %%
@@ -19,7 +20,7 @@ rng = np.random.default_rng(3)
 t = np.arange(300.0)  # seconds
 speed, course = 5 + 3 * np.cos(t / 25), 150 + 70 * np.sin(t / 45)  # m/s, degrees clockwise from north
 metres = np.cumsum(speed * [np.sin(np.radians(course)), np.cos(np.radians(course))], axis=1)
-accuracy = rng.uniform(5, 10, len(t))  # metres, as receivers tell it
+accuracy = rng.uniform(5, 10, len(t))  # metres, as reported by the receiver
 metres += accuracy * rng.standard_normal((2, len(t)))
 degree, narrow = np.radians(1) * ss.geo.EARTH_RADIUS, np.cos(np.radians(57.7))
 lon, lat = 11.97 + metres[0] / degree / narrow, 57.7 + metres[1] / degree

@@ -3,7 +3,7 @@ Reduced bases over a parameter
 ==============================
 
 Heat conduction is simulated for five diffusivities, and a basis of four vectors (proper orthogonal decomposition, POD)
-is made for each. A basis for another diffusivity is wanted, without another simulation.
+is computed for each. A basis for another diffusivity is to be found without another simulation.
 """
 
 # %%
@@ -40,7 +40,7 @@ bases = bases * np.where(np.arange(5) % 2, -1, 1)[:, None, None]  # signs as oth
 # %%
 # The spline
 # ----------
-# Subspaces are points of the Grassmannian; no matter which basis stands for one.
+# Subspaces are points of the Grassmannian, and any of their bases represents them.
 
 spline = ss.CubicSpline(diffusivities, bases, ss.Grassmannian(4, n), bc_type="not-a-knot")
 

@@ -12,7 +12,7 @@ made up: they are off a given path by as much as their circles of 95 % confidenc
 # A running mean over five poles, as the literature has it: it treats good and bad poles alike, and has nothing to say
 # at the ends. And near the pole of the globe, where the path begins, means of longitudes mean nothing.
 
-from importlib.resources import files
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -54,7 +54,9 @@ figure = plt.figure(figsize=(8, 6.5), layout="constrained")
 axes = figure.subplots()
 for lat in (30, 45, 60, 75):
     axes.plot(*seen(ss.geo.from_lonlat(np.arange(361), lat)), color="0.85", linewidth=0.7)
-coast = np.genfromtxt(files("symspline") / "data" / "coastline.csv", delimiter=",", skip_header=1)
+coast = np.genfromtxt(
+    Path(ss.__file__).parents[2] / "examples" / "storms" / "coastline.csv", delimiter=",", skip_header=1
+)
 for piece in np.split(coast, np.flatnonzero(np.isnan(coast[:, 0]))):
     axes.plot(*seen(ss.geo.from_lonlat(*piece[1:].T)), color="0.75", linewidth=0.8)
 for pole, radius in zip(smooth(x), smooth.band(x), strict=True):

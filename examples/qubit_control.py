@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 
 import symspline as ss
 
-# The paper does not give its states; these are six places on the Bloch sphere.
+# The paper does not give its states; these are six points on the Bloch sphere.
 places = ss.geo.from_lonlat([0, 60, 100, 170, 220, 300], [60, 20, -30, -10, 40, 10])
 times = np.array([0.0, 1.0, 2.0, 3.5, 4.5, 6.0])
 kets = ss.quantum.from_bloch_vector(places)

@@ -2,8 +2,8 @@
 Storms from a table
 ===================
 
-Where was each of 37 storms at every hour, and how fast? The table has a fix every six hours, rows without a place,
-and a pause. The storms are NOAA's best tracks of 2021 and 2022, which come with the package.
+Where was each of 37 storms at every hour, and how fast? The table has a fix every six hours, rows without a
+position, and a gap. The storms are NOAA's best tracks of 2021 and 2022, in the folder of the demonstration.
 """
 
 # %%
@@ -12,14 +12,18 @@ and a pause. The storms are NOAA's best tracks of 2021 and 2022, which come with
 # Interpolate latitude and longitude in pandas. Tracks get corners at the fixes, and the speed jumps from one fix to the
 # next.
 
-from importlib.resources import files
+import sys
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
 import symspline as ss
-from symspline.hurdat import read_sample
+
+STORMS = Path(ss.__file__).parents[2] / "examples" / "storms"
+sys.path.append(str(STORMS))
+from hurdat import read_sample  # noqa: E402
 
 table = pd.concat(
     pd.DataFrame({"storm": s.label, "time": s.times, "lat": s.lat, "lon": s.lon}) for s in read_sample()
@@ -52,14 +56,14 @@ print(
 of_larry = hourly[hourly["storm"] == "Larry 2021"].set_index("time")["sog"].resample("1h").mean()
 figure, axes = plt.subplots(figsize=(9, 3), layout="constrained")
 axes.plot(naive.index[1:], naive_speed, color="0.6", label="latitude and longitude, linear")
-axes.plot(of_larry.index, 3.6 * of_larry, label="spline on the sphere, in two pieces")
+axes.plot(of_larry.index, 3.6 * of_larry, label="spline on the sphere, in two segments")
 axes.set(ylabel="km/h", title="Speed of Larry, 2021")
 axes.legend()
 
 # %%
 # All storms, coloured by speed:
 
-coast = pd.read_csv(files("symspline") / "data" / "coastline.csv")
+coast = pd.read_csv(STORMS / "coastline.csv")
 figure, axes = plt.subplots(figsize=(9, 5.2), layout="constrained")
 axes.plot(*coast.to_numpy().T, color="0.75", linewidth=0.7)
 dots = axes.scatter(hourly["lon"], hourly["lat"], c=3.6 * hourly["sog"], s=2, vmax=80, cmap="plasma")

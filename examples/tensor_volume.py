@@ -2,14 +2,14 @@
 A volume of diffusion tensors
 =============================
 
-Tensors of all voxels were measured on four days, and are wanted on a day between, in the order that MRtrix reads.
+Tensors of all voxels were measured on four days. They are to be interpolated for a day between, in the order of MRtrix.
 """
 
 # %%
 # The naive way
 # -------------
-# A loop over the voxels, each with a curve of its own: Python is called for each. Instead, all voxels are one batch:
-# one call, on all cores, with the same bits.
+# Loop over the voxels and fit one curve each, with one call from Python per voxel. Instead, all voxels can be one
+# batch: one call on all cores, with bit-identical results.
 
 import tempfile
 import time
@@ -34,7 +34,7 @@ names = [folder / f"day{day:02.0f}.nii.gz" for day in days]
 for i, name in enumerate(names):  # as FSL would have written them
     nibabel.save(nibabel.Nifti1Image(recorded[..., i, :], np.eye(4)), name)
 
-volumes = [ss.tensors.read_nifti(name, "fsl", mask) for name in names]
+volumes = [ss.tensors.read_nifti(name, order="fsl", mask=mask) for name in names]
 matrices = np.stack([volume.tensors for volume in volumes], axis=1)
 
 start = time.perf_counter()
@@ -55,10 +55,10 @@ print(
     f"{len(curves)} voxels, mean diffusivity {values.mean():.2e} mm²/s, all positive: {bool((values > 0).all())}"
 )
 print(
-    f"the same bits: {np.array_equal(tensors, one_by_one)}; loop {1e3 * loop:.1f} ms, batch {1e3 * together:.1f} ms"
+    f"bit-identical: {np.array_equal(tensors, one_by_one)}; loop {1e3 * loop:.1f} ms, batch {1e3 * together:.1f} ms"
 )
 
-ss.tensors.write_nifti(folder / "day30.nii.gz", replace(volumes[0], tensors=tensors), "mrtrix")
+ss.tensors.write_nifti(folder / "day30.nii.gz", replace(volumes[0], tensors=tensors), order="mrtrix")
 
 figure, axes = plt.subplots(figsize=(5, 4), layout="constrained")
 diffusivity = np.full(mask.shape, np.nan)

@@ -29,10 +29,10 @@ one = ss.CubicSpline(stamps, poses, "so:3 x r:3")
 print(f"longest time between points: {one.report.max_gap:.1f} s")
 
 # %%
-# The pieces
-# ----------
-# `fit_segments` makes a curve of every stretch without a gap. What happens in between is an answer of your own:
-# nothing, or a bridge that begins and ends with the velocities found on either side, and is known to be one.
+# The segments
+# ------------
+# `fit_segments` fits one curve per segment without a gap. You decide how to fill the gap: not at all, or with a bridge
+# that begins and ends with the velocities on either side and is marked as such.
 
 before, after = ss.fit_segments(stamps, poses, "so:3 x r:3", max_gap=0.5)
 t0, t1 = before.t[-1], after.t[0]
@@ -52,10 +52,10 @@ figure, (above, below) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained
 x = np.linspace(0, stamps[-1], 1000)
 above.plot(*one(x)[1][:, :2].T, color="0.7", linewidth=3, label="one curve")
 below.plot(x, speed(one, x), color="0.7", linewidth=3)
-for piece, style, label in ((before, "C0", "pieces"), (after, "C0", None), (bridge, "C1--", "bridge")):
-    x = np.linspace(piece.t[0], piece.t[-1], 300)
-    above.plot(*piece(x)[1][:, :2].T, style, label=label)
-    below.plot(x, speed(piece, x), style)
+for segment, style, label in ((before, "C0", "segments"), (after, "C0", None), (bridge, "C1--", "bridge")):
+    x = np.linspace(segment.t[0], segment.t[-1], 300)
+    above.plot(*segment(x)[1][:, :2].T, style, label=label)
+    below.plot(x, speed(segment, x), style)
 above.plot(*places[::5, :2].T, "k.", markersize=4, label="seen")
 above.set(aspect="equal", xlabel="metres", title="From above")
 above.plot(*driven[::10, :2].T, "k:", linewidth=1, label="driven")

@@ -33,11 +33,11 @@ for method in ("quasi-newton", "fixed-point", "auto"):
 #
 #     ½ u/sin(u) (u − KV) ≤ KV,   u = KD + 2KV < π,
 #
-# so that control legs that begin below V stay below it. It is the blue region of the paper's Fig. 10; the smallest V is
-# ``report.invariant_radius``. The paper draws a lower rectangle, "sufficiently small", without numbers. In its place is
-# the region where :doc:`a bound α of the contraction </convergence>` is below 1; at the smallest V it is
-# ``report.contraction_bound``. The dots are random walks, each at the longest leg of its curve and coloured by how fast
-# the iteration contracts.
+# so that control handles that begin below V stay below it. It is the blue region of the paper's Fig. 10; the smallest V
+# is ``report.invariant_radius``. The paper draws a lower rectangle, "sufficiently small", without numbers. In its place
+# is the region where :doc:`a bound α of the contraction </convergence>` is below 1; at the smallest V it is
+# ``report.contraction_bound``. The dots are random walks, each at the longest handle of its curve and coloured by how
+# fast the iteration contracts.
 
 kd, kv = np.meshgrid(np.linspace(0, 0.36, 400), np.linspace(0, 1, 400))
 u = kd + 2 * kv

@@ -53,6 +53,6 @@ right.plot(angle, 1 + months / 12, "k.")
 right.set(rmin=0, yticks=[], xticks=np.radians([0, 90, 180, 270]), xticklabels=list("NESW"))
 right.set_title("outwards: January to January")
 print(
-    f"on 1 December (x = 10.5) from {smooth[525]:.0f} degrees, and the spline of the degrees says {naive[525]:.0f}"
+    f"on 1 December (x = 10.5) from {smooth[525]:.0f} degrees, and the spline of the degrees gives {naive[525]:.0f}"
 )
 plt.show()

@@ -1,11 +1,15 @@
-"""The spaces that the law suite runs over, and data on them. A new space joins with one line."""
+"""The spaces and the end conditions that tests run over, and data on them. A new space joins with one line."""
 
+import copy
+import functools
+import inspect
+import re
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 
 import symspline as ss
-from symspline._core import Handle
 
 EPS = np.finfo(float).eps
 
@@ -19,14 +23,14 @@ class Case:
         far: the longest step between neighbours that the solver laws use.
         smooth: whether to run the laws on smooth curves (needs dimension 2 or more).
         few: whether to run the long laws on few of their cases: for further sizes of a family.
-        face: whether to test on it what is no matter of formulas.
+        interface: whether it stands for its family where formulas do not matter.
     """
 
     name: str
     far: float = 2.5
     smooth: bool = True
     few: bool = False
-    face: bool = False
+    interface: bool = False
 
     @property
     def space(self):
@@ -35,67 +39,67 @@ class Case:
 
 CASES = [
     Case("euclidean:1", smooth=False),
-    Case("euclidean:3", face=True),
+    Case("euclidean:3", interface=True),
     Case("sphere:1", smooth=False),
-    Case("sphere:2", face=True),
+    Case("sphere:2", interface=True),
     Case("sphere:3"),
     Case("sphere:7"),
     Case("hyperbolic:1", far=1.5, smooth=False),
-    Case("hyperbolic:2", far=1.5, face=True),
+    Case("hyperbolic:2", far=1.5, interface=True),
     Case("hyperbolic:5", far=1.5),
     Case("ds:2", far=1.2),
-    Case("ds:3", far=1.5, few=True, face=True),
+    Case("ds:3", far=1.5, few=True, interface=True),
     Case("ads:2", far=1.5, few=True),
-    Case("ads:4", far=1.5, face=True),
+    Case("ads:4", far=1.5, interface=True),
     Case("rp:1", far=1.2, smooth=False, few=True),
-    Case("rp:2", far=1.2, face=True),
-    Case("rp:7", far=1.2, few=True, face=True),
-    Case("cp:1", far=1.0, few=True, face=True),
+    Case("rp:2", far=1.2, interface=True),
+    Case("rp:7", far=1.2, few=True, interface=True),
+    Case("cp:1", far=1.0, few=True, interface=True),
     Case("cp:2", far=1.0),
-    Case("cp:7", far=1.0, few=True, face=True),
+    Case("cp:7", far=1.0, few=True, interface=True),
     Case("ch:1", far=0.75, few=True),
-    Case("ch:2", far=0.75, face=True),
+    Case("ch:2", far=0.75, interface=True),
     Case("hp:1", far=1.4, few=True),
-    Case("hp:2", far=1.4, few=True, face=True),
-    Case("gr:1,3", far=1.2, few=True, face=True),
+    Case("hp:2", far=1.4, few=True, interface=True),
+    Case("gr:1,3", far=1.2, few=True, interface=True),
     Case("gr:2,3", far=1.2, few=True),
-    Case("gr:2,5", far=1.2, face=True),
+    Case("gr:2,5", far=1.2, interface=True),
     Case("gr:3,8", far=1.2, few=True),
     Case("gr:7,8", far=1.2, few=True),
-    Case("cgr:1,2", far=1.0, few=True, face=True),
-    Case("cgr:2,4", far=1.0, face=True),
+    Case("cgr:1,2", far=1.0, few=True, interface=True),
+    Case("cgr:2,4", far=1.0, interface=True),
     Case("cgr:3,8", far=1.0, few=True),
-    Case("so:2", smooth=False, few=True, face=True),
-    Case("so:3", face=True),
-    Case("so:5", few=True, face=True),
-    Case("o:2", smooth=False, few=True, face=True),
-    Case("o:3", few=True, face=True),
-    Case("u:1", smooth=False, few=True, face=True),
-    Case("u:2", face=True),
+    Case("so:2", smooth=False, few=True, interface=True),
+    Case("so:3", interface=True),
+    Case("so:5", few=True, interface=True),
+    Case("o:2", smooth=False, few=True, interface=True),
+    Case("o:3", few=True, interface=True),
+    Case("u:1", smooth=False, few=True, interface=True),
+    Case("u:2", interface=True),
     Case("u:5", few=True),
-    Case("su:2", face=True),
-    Case("su:3", few=True, face=True),
+    Case("su:2", interface=True),
+    Case("su:3", few=True, interface=True),
     Case("spd:1", far=1.5, smooth=False, few=True),
-    Case("spd:2", far=1.5, face=True),
+    Case("spd:2", far=1.5, interface=True),
     Case("spd:3", far=1.5),
-    Case("sspd:3", far=1.5, few=True, face=True),
+    Case("sspd:3", far=1.5, few=True, interface=True),
     Case("siegel:1", far=1.5, few=True),
-    Case("siegel:2", far=1.5, few=True, face=True),
-    Case("hpd:1", far=1.5, smooth=False, few=True, face=True),
-    Case("hpd:2", far=1.5, face=True),
+    Case("siegel:2", far=1.5, few=True, interface=True),
+    Case("hpd:1", far=1.5, smooth=False, few=True, interface=True),
+    Case("hpd:2", far=1.5, interface=True),
     Case("hpd:5", far=1.5, few=True),
-    Case("se:2", far=1.5, face=True),
-    Case("se:3", far=1.5, face=True),
-    Case("gl:2", far=1.5, face=True),
+    Case("se:2", far=1.5, interface=True),
+    Case("se:3", far=1.5, interface=True),
+    Case("gl:2", far=1.5, interface=True),
     Case("gl:3", far=1.5, few=True),
-    Case("cgl:2", far=1.5, few=True, face=True),
-    Case("aff:2", far=1.5, few=True, face=True),
-    Case("sim:3", far=1.5, few=True, face=True),
-    Case("sl:3", far=1.5, few=True, face=True),
-    Case("sp:4", far=1.5, few=True, face=True),
-    Case("lorentz:3", far=1.5, few=True, face=True),
+    Case("cgl:2", far=1.5, few=True, interface=True),
+    Case("aff:2", far=1.5, few=True, interface=True),
+    Case("sim:3", far=1.5, few=True, interface=True),
+    Case("sl:3", far=1.5, few=True, interface=True),
+    Case("sp:4", far=1.5, few=True, interface=True),
+    Case("lorentz:3", far=1.5, few=True, interface=True),
     Case("igr:0,1,1,2", far=1.5, few=True),
-    Case("igr:1,1,2,2", far=1.5, few=True, face=True),
+    Case("igr:1,1,2,2", far=1.5, few=True, interface=True),
 ]
 
 # Matrices so long that a law takes seconds: they obey three, of the space, of the curve and of its derivatives.
@@ -106,21 +110,123 @@ LARGE = [
     Case("spd:8", far=1.5, few=True),
 ]
 
-# What is no matter of formulas is tested on these: every family, points that are real and complex, vectors
-# and matrices, of one array and of many; and products.
-SINGLE = [case.space for case in CASES if case.face]
+# Every family, for operations and names; and products.
+SINGLE = [case.space for case in CASES if case.interface]
 SPACES = SINGLE + [
     ss.space(name) for name in ("sphere:3 x r:2", "u:2 x r:3", "cp:1 x so:3", "gr:2,5 x hpd:2 x se:3")
 ]
-# And on these where one of a kind is enough.
+# One of each kind, for what does not depend on the formulas of a space: flat, of positive, negative and indefinite
+# curvature, real and complex, vectors and matrices, points of one array and of many, groups, products.
+REPRESENTATIVE = [
+    ss.space(name)
+    for name in (
+        *(
+            "euclidean:3",
+            "sphere:2",
+            "hyperbolic:2",
+            "ads:4",
+            "cp:2",
+            "gr:2,5",
+            "so:3",
+            "u:2",
+            "hpd:2",
+            "se:3",
+        ),
+        *("sphere:3 x r:2", "gr:2,5 x hpd:2 x se:3"),
+    )
+]
+# Where a vector space, a positively and a negatively curved space and a product are enough.
 COMMON = [ss.space(name) for name in ("euclidean:3", "sphere:2", "hyperbolic:2", "sphere:3 x r:2")]
+
+# End conditions by name; `end_conditions` makes the arguments.
+ENDS = ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"]
+WORDS = ENDS[:4]
+
+
+def end_conditions(kind, first, last):
+    """The argument `bc_type` for such ends, with a vector for either end."""
+    return {
+        "velocity": ((1, first), (1, last)),
+        "acceleration": ((2, first), (2, last)),
+        "mixed": ("not-a-knot", (1, last)),
+        "turned": ((2, first), "not-a-knot"),
+    }.get(kind, kind)
+
 
 # Small ones of which K of (22) is not 0. Loops on these, and on that of poses, turn frames.
 CURVED = ["sphere:2", "hyperbolic:2", "rp:2", "cp:2", "gr:2,5", "so:3", "su:2", "u:2", "spd:2", "hpd:2"]
 LOOPS = [*CURVED, "se:3"]
 
-# The names of every space in the library, one row a family.
-FAMILIES = Handle.names()
+
+def _repeat(test, names, values, arguments):
+    """Run a test for each of these values, every time with the same random numbers. A failure names its values."""
+    for value in values:
+        generators = {k: copy.deepcopy(v) for k, v in arguments.items() if isinstance(v, np.random.Generator)}
+        chosen = dict(zip(names, value if len(names) > 1 else [value], strict=True))
+        try:
+            test(**arguments | generators | chosen)
+        except BaseException as error:
+            error.add_note("with " + ", ".join(f"{name} = {value}" for name, value in chosen.items()))
+            raise
+
+
+def _with_parameters(run, test, added, removed):
+    """`run` as pytest sees it: with the parameters of the test, but for those that it chooses itself."""
+    run = functools.wraps(test)(run)
+    kept = [p for name, p in inspect.signature(test).parameters.items() if name not in removed]
+    first = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in added]
+    run.__signature__ = inspect.Signature([*first, *kept])
+    return run
+
+
+def _listed(names):
+    return [name.strip() for name in names.split(",")] if isinstance(names, str) else names
+
+
+def loop_over(names, values):
+    """As `pytest.mark.parametrize`, but within one case: for values that hardly matter to which code runs."""
+    names = _listed(names)
+
+    def decorate(test):
+        return _with_parameters(lambda **given: _repeat(test, names, values, given), test, (), names)
+
+    return decorate
+
+
+def grouped(names, groups):
+    """As `pytest.mark.parametrize`, with one case for each of these named groups of values."""
+    names = _listed(names)
+
+    def decorate(test):
+        def run(group, **given):
+            _repeat(test, names, groups[group], given)
+
+        return pytest.mark.parametrize("group", groups)(_with_parameters(run, test, ("group",), names))
+
+    return decorate
+
+
+def by_family(cases):
+    """A law of spaces: one case per family, which loops over its sizes."""
+    families = {}
+    for case in cases:
+        families.setdefault(case.name.partition(":")[0], []).append(case)
+    return grouped("case", families)
+
+
+every_family = by_family(CASES)
+
+
+def _families():
+    """The names of every symmetric space in the library, one row per family, from the message that lists them."""
+    try:
+        ss.space("unknown:1")
+    except ss.ValidationError as error:
+        listed = re.search(r"known are (.*), e\.g\.", str(error))[1]
+    return [row.split(" or ") for row in listed.split(", ") if not row.startswith("stiefel")]
+
+
+FAMILIES = _families()
 
 POSITIVE = (
     ss.SymmetricPositiveDefinite,
@@ -306,7 +412,7 @@ def one_sided(spline, nu):
     h = np.diff(t)
     pairs = np.stack([p[:-1], p[1:]], axis=1), np.stack([u[:-1], u[1:]], axis=1)
     knots = np.stack([0 * h, h], axis=1)
-    values = ss.evaluate(knots, knots, *pairs, spline.space, nu, per_curve=True)
+    values = ss.evaluate(knots, *pairs, spline.space, knots, nu, per_curve=True)
     return values[:, 0], values[:, 1]
 
 

@@ -2,31 +2,36 @@
 
     spaces       operations, laws of geometry, names; points that are off a space
     fit          the spline is C² and obeys its laws; solvers
-    spline       the interface of `CubicSpline`, promise by promise, with what it refuses
-    motion       what curves of rotations and poses are asked: rates, quaternions, recordings
+    spline       the interface of `CubicSpline`, promise by promise, and its errors
+    motion       curves of rotations and poses: rates, quaternions, recordings
     derivatives  with respect to the data
-    in_jax       the compiled spline as a function in JAX, and those that are all JAX
+    in_jax       the compiled spline as a function in JAX, and splines written in JAX
     free         `BSpline` and `BezierCurve`
     files, convert, cli, plotting, demo
-    manifolds    curves on manifolds that are made of functions, Stiefel manifolds, surfaces; the public suite of laws
-    geo          places, speed and course on a globe
+    manifolds    curves on manifolds made of functions, Stiefel manifolds, surfaces; the public suite of laws
+    geo          positions, speed and course on a globe
     quantum      Hamiltonians, propagators, pulses, the Bloch sphere
     subspaces    reduced bases over a parameter
     tensors      diffusion tensors in the order of each program, NIfTI files
     shapes       affine shapes of landmarks, morphs and their pictures
     xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
-    host         the program around: threads, memory, interruptions, arrays of other libraries
-    docs, bench  what they show runs
+    host         threads, memory, interruptions, arrays of other libraries
+    docs, bench  the code of the documentation and of the benchmarks runs
     examples     the recipes run
     fuzz         random input; `make fuzz` runs it at length
-    raw_data     data as people bring them: gaps, repeats, missing samples, huge offsets, over every entry
+    raw_data     recordings with gaps, duplicates, missing samples and huge offsets, through every entry point
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
-Beside this file lies what they share: `cases` is the list of spaces and data on them, `curves` has arrays and
-comparisons, `refused` what must be an error, `lifting` the horizontal lift by a general solver.
+Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
+run several values within one case of pytest; `curves` has arrays and comparisons, `refused` invalid input, `lifting`
+the horizontal lift by a general solver.
+
+A law of spaces runs as one case per family (`cases.every_family`), whatever does not depend on the formulas of a
+space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
 """
 
 import signal
+import sys
 
 import pytest
 
@@ -42,3 +47,18 @@ def threads():
     """Puts the number of threads back."""
     yield
     ss.set_num_threads(0)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def memory():
+    """No test takes 2 GB. A process of JAX keeps up to two more: what it compiled for all of its tests."""
+    yield
+    if sys.platform == "linux":
+        import resource
+
+        # Children that are forked begin with all that this process has.
+        most = dict.fromkeys(
+            (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN), 4 if "jax" in sys.modules else 2
+        )
+        for who, gigabytes in most.items():
+            assert resource.getrusage(who).ru_maxrss < gigabytes * 2**20, "the largest resident size in kB"

@@ -7,14 +7,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import COMMON, QUOTIENTS, SINGLE, SPACES, apart, walk
+from cases import COMMON, QUOTIENTS, REPRESENTATIVE, SPACES, apart, loop_over, walk
 
 import symspline as ss
 
 every_space = pytest.mark.parametrize("space", SPACES, ids=str)
-every_single = pytest.mark.parametrize("space", SINGLE, ids=str)
+every_kind = pytest.mark.parametrize("space", REPRESENTATIVE, ids=str)
+every_single = pytest.mark.parametrize(
+    "space", [s for s in REPRESENTATIVE if not isinstance(s, ss.Product)], ids=str
+)
 every_common = pytest.mark.parametrize("space", COMMON, ids=str)
-every_batch = pytest.mark.parametrize("batch", [(), (2, 3)], ids=str)
+every_batch = loop_over("batch", [(), (2, 3)])
 
 S2, S3 = ss.Sphere(2), ss.Sphere(3)
 # Its axes, as points of S².
@@ -72,6 +75,17 @@ def run_python(code, *arguments, timeout=20, **environment):
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
+
+
+def core_calls(name, function):
+    """How often a call of a function of Python calls one of compiled code of that name."""
+    calls = []
+    sys.setprofile(lambda frame, event, arg: event == "c_call" and arg.__name__ == name and calls.append(arg))
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return len(calls)
 
 
 def at_node(space, value, i):

@@ -31,7 +31,7 @@ def fails(match, points, space, kind=ss.ValidationError):
     calls = [lambda: ss.CubicSpline(None, points, space), lambda: ss.fit_many([(None, points)], space)]
     if kind is ss.ValidationError:
         zero = np.zeros_like(points, dtype=ss.space(space).dtype)
-        calls.append(lambda: ss.evaluate(0.5, None, points, zero, space))
+        calls.append(lambda: ss.evaluate(None, points, zero, space, 0.5))
     for call in calls:
         with warnings.catch_warnings(), pytest.raises(kind) as caught:
             warnings.simplefilter("error")

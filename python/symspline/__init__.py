@@ -16,25 +16,27 @@ from . import _cpu
 
 _cpu.load(_Path(__file__).parent)
 
-from . import convert, geo, hurdat, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
+from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
+from ._base_curve import Curve  # noqa: E402
+from ._bspline import BezierCurve, BSpline  # noqa: E402
+from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
-from .config import show_config  # noqa: E402
-from .curves.gradient import Gradient  # noqa: E402
-from .files import load, load_many, save_many  # noqa: E402
-from .free import BezierCurve, BSpline  # noqa: E402
-from .functions import evaluate, fit, fit_many  # noqa: E402
-from .hermite import HermiteSpline  # noqa: E402
-from .manifolds import Manifold, Stiefel  # noqa: E402
-from .report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
-from .segments import fit_segments  # noqa: E402
-from .smoothing import (  # noqa: E402
+from ._cubic import CubicSpline  # noqa: E402
+from ._curves.gradient import Gradient  # noqa: E402
+from ._exceptions import SymsplineError  # noqa: E402
+from ._files import load, load_many, save_many  # noqa: E402
+from ._functional import evaluate, fit, fit_many  # noqa: E402
+from ._hermite import HermiteSpline  # noqa: E402
+from ._report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
+from ._segments import fit_segments  # noqa: E402
+from ._smoothing import (  # noqa: E402
     SmoothingReport,
     SmoothingSpline,
     SmoothingWarning,
     make_lsq_spline,
     make_smoothing_spline,
 )
-from .spaces import (  # noqa: E402
+from ._spaces import (  # noqa: E402
     Affine,
     AntiDeSitter,
     ComplexGeneralLinear,
@@ -67,9 +69,9 @@ from .spaces import (  # noqa: E402
     Unitary,
     space,
 )
-from .spline import CubicSpline  # noqa: E402
-from .threads import set_num_threads  # noqa: E402
-from .version import VERSION  # noqa: E402
+from ._threads import set_num_threads  # noqa: E402
+from ._version import VERSION  # noqa: E402
+from .manifolds import Manifold, Stiefel  # noqa: E402
 
 __version__ = VERSION
 __all__ = [
@@ -84,6 +86,7 @@ __all__ = [
     "ConvergenceError",
     "ConvergenceWarning",
     "CubicSpline",
+    "Curve",
     "CutLocusError",
     "DeSitter",
     "Euclidean",
@@ -117,6 +120,7 @@ __all__ = [
     "Stiefel",
     "SymmetricPositiveDefinite",
     "Symplectic",
+    "SymsplineError",
     "Unitary",
     "ValidationError",
     "convert",
@@ -125,7 +129,6 @@ __all__ = [
     "fit_many",
     "fit_segments",
     "geo",
-    "hurdat",
     "load",
     "load_many",
     "make_lsq_spline",
@@ -152,3 +155,8 @@ if _threads := _os.environ.get("SYMSPLINE_NUM_THREADS"):
         set_num_threads(int(_threads))
     except ValidationError as _error:
         raise ImportError(f"SYMSPLINE_NUM_THREADS: {_error}") from None
+
+
+def __dir__() -> list[str]:
+    """The public names; everything else starts with an underscore."""
+    return sorted([*__all__, *(name for name in globals() if name.startswith("__"))])

@@ -6,16 +6,12 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ._exceptions import ConvergenceError as ConvergenceError
+from ._exceptions import CutLocusError as CutLocusError
+from ._exceptions import ValidationError as ValidationError
+
 _Doubles = NDArray[np.float64]
 _Progress = Callable[[int, int], object]
-
-class ValidationError(ValueError): ...
-
-class CutLocusError(ValueError):
-    spline: Any
-
-class ConvergenceError(RuntimeError):
-    spline: Any
 
 @final
 class Handle:
@@ -33,20 +29,43 @@ class Handle:
     def check_points(self, points: _Doubles, shape: Sequence[int], tol: float) -> None: ...
     def tangent_defects(self, points: _Doubles, vectors: _Doubles) -> _Doubles: ...
 
+_Ends = Sequence[tuple[str, _Doubles | None]] | None
+# Curve, kind, node, value, limit, and what is wrong with a point.
+_Fault = tuple[int, str, int | None, float, float, str | None]
+
 def fit(
     handle: Handle,
     t: _Doubles,
     points: _Doubles,
-    ends: Sequence[tuple[str, _Doubles | None]] | None,
+    ends: _Ends,
     method: str,
     tol: float,
     max_iter: int | None,
     check: bool,
     point_tol: float,
     offsets: Sequence[int] | None = None,
+    mask: Sequence[bool] | None = None,
+    skip_invalid: bool = False,
     progress: _Progress | None = None,
-    dry: bool = False,
-) -> tuple[_Doubles, _Doubles, tuple[NDArray[np.int64], _Doubles], list[tuple[int, str, str]]]: ...
+) -> tuple[_Doubles, _Doubles, tuple[NDArray[np.int64], _Doubles], list[_Fault]]: ...
+def validate(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    ends: _Ends,
+    point_tol: float,
+    offsets: Sequence[int] | None = None,
+    mask: Sequence[bool] | None = None,
+    skip_invalid: bool = False,
+) -> tuple[_Doubles, list[_Fault]]: ...
+def hermite(
+    handle: Handle,
+    t: _Doubles,
+    points: _Doubles,
+    velocities: _Doubles,
+    point_tol: float,
+    tangent_tol: float,
+) -> list[_Doubles]: ...
 def evaluate(
     handle: Handle,
     t: _Doubles,
@@ -112,6 +131,7 @@ def smooth(
     method: str,
     tol: float,
     max_iter: int,
+    raise_lam: bool,
     progress: _Progress | None,
 ) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...]]: ...
 def smoothing_variance(

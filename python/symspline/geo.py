@@ -1,5 +1,9 @@
-"""Places and directions on a globe: longitude and latitude in degrees, unit vectors of S², speed and course.
+"""Positions and directions on a globe: longitude, latitude, speed and course.
 
+Longitudes and latitudes are in degrees; points are unit vectors of ``Sphere(2)``.
+
+Examples
+--------
 >>> import symspline as ss
 >>> track = ss.CubicSpline([0, 3600], ss.geo.from_lonlat([0, 1], [0, 0]), "sphere:2")
 >>> ss.geo.sog(track, 60).round(3), ss.geo.cog(track, 60).round(3)
@@ -16,16 +20,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ._arrays import short_repr
+from ._base_curve import check_curve
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from .arrays import shown
-from .failures import callers_level
-from .functions import fit_many
-from .piecewise import check_curve
-from .places import compass, from_lonlat, to_lonlat
-from .segments import check_smooth, cut
-from .smoothing.many import smooth_many
-from .spaces import Sphere
-from .spline import CubicSpline
+from ._cubic import CubicSpline
+from ._errors import callers_level
+from ._functional import fit_many
+from ._lonlat import compass, from_lonlat, to_lonlat
+from ._segments import check_smooth, cut
+from ._smoothing.many import smooth_many
+from ._spaces import Sphere
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,24 +37,34 @@ if TYPE_CHECKING:
 __all__ = ["EARTH_RADIUS", "cog", "compass", "from_lonlat", "resample", "sog", "to_lonlat"]
 
 EARTH_RADIUS = 6_371_008.8
-"""Metres: the mean radius R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
+"""Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
 
 def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> Any:
-    """Speed over ground, in m/s.
+    """Compute the speed over ground.
 
-    Args:
-        spline: a curve on ``Sphere(2)``. Its times are dates, or seconds; of other numbers the speed is in metres per
-            unit of time.
-        x: times, as for calling it.
-        radius: of the globe, in metres.
+    Parameters
+    ----------
+    spline : CubicSpline
+        Curve on ``Sphere(2)``. If its times are dates or seconds, the speed is in metres per second; for other times it
+        is in metres per unit of time.
+    x : array_like
+        Times, as for ``spline(x)``.
+    radius : float, default EARTH_RADIUS
+        Radius of the globe in metres.
 
-    Returns:
-        Shape batch axes + x.shape.
+    Returns
+    -------
+    float or ndarray, shape ``(*batch axes, *x.shape)``
+        Speed.
 
-    Raises:
-        ValidationError: the curve is in another space, or a time is outside the knots.
+    Raises
+    ------
+    ValidationError
+        If the curve is on another space, or a time is outside the knots.
 
+    Examples
+    --------
     >>> import symspline as ss
     >>> north = ss.CubicSpline([0, 60], from_lonlat([5, 5], [50, 50.01]), "sphere:2")
     >>> sog(north, 30, radius=6371e3).round(6)
@@ -58,25 +72,35 @@ def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> A
     """
     _check_globe(spline)
     if isinstance(radius, bool) or not isinstance(radius, (int, float, np.number)) or not 0 < radius < np.inf:
-        raise ValidationError(f"radius must be a number above 0, not {shown(radius)}")
+        raise ValidationError(f"radius must be a number above 0, not {short_repr(radius)}")
     return radius * spline.speed(x)
 
 
 def cog(spline: CubicSpline, x: ArrayLike) -> Any:
-    """Course over ground: degrees clockwise from north, in [0, 360); NaN where the place is at rest.
+    """Compute the course over ground.
 
-    At a pole, where every way is south or north, north is as on the meridian of 0° E.
+    The course is in degrees clockwise from north, in [0, 360). It is NaN where the velocity is zero. At a pole, north
+    is the direction of north on the meridian of 0° E.
 
-    Args:
-        spline: a curve on ``Sphere(2)``.
-        x: times, as for calling it.
+    Parameters
+    ----------
+    spline : CubicSpline
+        Curve on ``Sphere(2)``.
+    x : array_like
+        Times, as for ``spline(x)``.
 
-    Returns:
-        Shape batch axes + x.shape.
+    Returns
+    -------
+    float or ndarray, shape ``(*batch axes, *x.shape)``
+        Course in degrees.
 
-    Raises:
-        ValidationError: the curve is in another space, or a time is outside the knots.
+    Raises
+    ------
+    ValidationError
+        If the curve is on another space, or a time is outside the knots.
 
+    Examples
+    --------
     >>> import symspline as ss
     >>> west = ss.CubicSpline([0, 60], from_lonlat([5, 4], [0, 0]), "sphere:2")
     >>> cog(west, 30).round(6)
@@ -105,59 +129,80 @@ def resample(
     radius: float = EARTH_RADIUS,
     **options: Any,
 ) -> pd.DataFrame:
-    """Places of a pandas table at regular times, with speed and course over ground: one C² curve a vessel, animal or
-    storm, and a new one behind every pause.
+    """Resample the positions of a pandas table to regular times.
 
-    Args:
-        frame: a table with times and places; its rows may be in any order.
-        every: the step, as pandas writes it: ``"1min"``, a ``Timedelta``. Times are whole multiples of it, in UTC.
-        by: the column that tells tracks apart, such as ``"mmsi"``, or several; None for one track.
-        time: the column of times; None for the index.
-        columns: those of longitude and latitude, in degrees.
-        max_gap, min_points, duplicates, smooth: as for `symspline.fit_segments`, a pause in seconds or as a
-            ``timedelta64``; ``smooth=True`` for places with noise. Between pieces there are no rows; a track without a
-            piece of ``min_points`` has none.
-        radius: of the globe, in metres.
-        options: those of `CubicSpline`, or those of `make_smoothing_spline` but weights and frames.
+    One C² curve is fitted per track (a vessel, an animal, a storm), and a new one after every gap. The result includes
+    speed and course over ground.
 
-    Returns:
-        A table with the columns ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and
-        ``cog`` in degrees clockwise from north; times keep their time zone. With ``on_failure="warn"`` or ``"ignore"``
-        the numbers of a piece whose curve did not converge are NaN.
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Table of times and positions. The rows may be in any order.
+    every : str or pandas.Timedelta, default "1min"
+        Step between the new times, which are whole multiples of it in UTC.
+    by : str or sequence of str, optional
+        Column, or columns, whose values identify the tracks, such as ``"mmsi"``. None means one track.
+    time : str, optional
+        Column of the times. None means the index.
+    columns : tuple of str, default ("lon", "lat")
+        Columns of longitude and latitude, in degrees.
+    max_gap : float or timedelta64
+        Longest gap within a curve, in seconds or as a duration; see `symspline.fit_segments`. The result has no rows
+        within gaps.
+    min_points : int, default 2
+        Segments with fewer points are dropped.
+    duplicates : str, default "raise"
+        Treatment of duplicate times; see `symspline.fit_segments`.
+    smooth : bool, default False
+        True to fit smoothing splines to noisy positions.
+    radius : float, default EARTH_RADIUS
+        Radius of the globe in metres.
+    **options
+        Options of `CubicSpline`, or with ``smooth=True`` those of `make_smoothing_spline` except weights and frames.
 
-    Raises:
-        ValidationError: a column is not there, a row has no place or no name, no track has a piece of ``min_points``,
-            or the places or times are not what `symspline.fit_segments` takes.
-        ConvergenceError, CutLocusError: as for `CubicSpline` or `make_smoothing_spline`; the message names the track.
+    Returns
+    -------
+    pandas.DataFrame
+        The columns ``by``, the times, longitude and latitude under their names, ``sog`` in m/s, and ``cog`` in degrees
+        clockwise from north. Times keep their time zone. With ``on_failure="warn"`` or ``"ignore"``, the numbers of
+        segments whose curve did not converge are NaN.
+
+    Raises
+    ------
+    ValidationError
+        If a column does not exist, a position or a name is missing, every segment has fewer than ``min_points`` points,
+        or `symspline.fit_segments` does not accept the positions or times.
+    ConvergenceError, CutLocusError
+        As for `CubicSpline` and `make_smoothing_spline`. The message names the track.
     """
     import pandas as pd
 
     keys: list[Any] = [] if by is None else list(by) if isinstance(by, (list, tuple)) else [by]
 
     if not isinstance(frame, pd.DataFrame):
-        raise ValidationError(f"frame must be a table of pandas, not {shown(frame)}")
+        raise ValidationError(f"frame must be a pandas DataFrame, not {short_repr(frame)}")
     for name in (*keys, time, *columns):
         if name is not None and name not in frame.columns:
             raise ValidationError(
-                f"there is no column {name!r}; the columns are {', '.join(map(str, frame.columns))}"
+                f"column {name!r} does not exist; the columns are {', '.join(map(str, frame.columns))}"
             )
     name = time or frame.index.name or "time"
     stamps = (
         frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
     )
     if stamps.dtype.kind != "M":
-        raise ValidationError(f"the times {name!r} are no dates; make them of texts by pandas.to_datetime")
+        raise ValidationError(f"column {name!r} must hold dates; convert strings by pandas.to_datetime")
     check_smooth(smooth, duplicates, options)
     for option in ("weights", "frames"):
         if smooth and option in options:
             raise ValidationError(
-                f"{option} go with rows, and resample takes none; use symspline.fit_segments"
+                f"resample does not support {option}, because they belong to rows; use symspline.fit_segments"
             )
     for column in [*keys, *columns]:
         missing = np.flatnonzero(frame[column].isna())
         if missing.size:
             raise ValidationError(
-                f"{len(missing)} rows have no {column!r}, the first of them row {missing[0]}; leave them out: "
+                f"{len(missing)} rows have no {column!r}, the first of them row {missing[0]}; drop them by "
                 f"frame.dropna(subset=[{column!r}])"
             )
     step = pd.Timedelta(every)
@@ -172,7 +217,7 @@ def resample(
     vectors = from_lonlat(*(frame[column].to_numpy() for column in columns))
     curves, owners = [], []
     for label, rows in tracks.items():
-        # One place is no track.
+        # A curve needs two positions.
         if len(rows) < 2:
             continue
         own = rows[np.argsort(utc[rows], kind="stable")]
@@ -186,10 +231,11 @@ def resample(
         owners += [label] * len(pieces)
     if not curves and len(frame):
         raise ValidationError(
-            f"no track has {min_points} places without a pause longer than max_gap={shown(max_gap)}, in seconds"
+            f"every track has fewer than {min_points} positions between gaps longer than max_gap={short_repr(max_gap)} "
+            "seconds; increase max_gap or decrease min_points"
         )
     names = [
-        f"{_named(keys, label)}{', ' if keys else ''}the piece from {np.datetime_as_string(t[0][0], 's')} on"
+        f"{_named(keys, label)}{', ' if keys else ''}the segment from {np.datetime_as_string(t[0][0], 's')} on"
         for (t, _), label in zip(curves, owners, strict=True)
     ]
     tables = []
@@ -211,12 +257,12 @@ def resample(
 
 
 def _named(keys: list[Any], label: tuple[Any, ...]) -> str:
-    """A track in messages."""
+    """Return the description of a track for messages."""
     return ", ".join(f"{key} {value}" for key, value in zip(keys, label, strict=True))
 
 
 def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: dict[str, Any]) -> Any:
-    """The curves; messages about them have their names."""
+    """Fit the curves, and replace their numbers in messages by their names."""
     if not curves:
         return []
 
@@ -243,4 +289,4 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
 def _check_globe(spline: CubicSpline) -> None:
     check_curve(spline)
     if str(spline.space) != "sphere:2":
-        raise ValidationError(f"places on a globe are points of Sphere(2), not of {spline.space!r}")
+        raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")

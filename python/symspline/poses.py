@@ -1,10 +1,12 @@
-"""Recordings of poses: files in and out, velocities, accelerations, and what an inertial sensor on the body measures.
+"""Recordings of poses: files, velocities, accelerations, and the signals of an inertial sensor.
 
-Poses take the body to the world, [[R, x], [0, 1]] with R the attitude and x the position. Fit curves of them on
-``so:3 x r:3``: the product has an invariant metric, and noise and smoothing of attitude and position stay separate.
-`split` makes its points of 4 × 4 matrices, such as ``poses_se3`` of evo. Such matrices are points of ``se:3`` as they
-are; geodesics there are screw motions, as joints and tools make them.
+A pose maps the body frame to the world frame: [[R, x], [0, 1]] with attitude R and position x. Fit curves of poses on
+``so:3 x r:3``. This product has an invariant metric, and the noise and smoothing of attitude and position stay
+separate. `split` converts 4 × 4 matrices, such as ``poses_se3`` of evo, to its points. The matrices themselves are
+points of ``se:3``, whose geodesics are the screw motions of joints and tools.
 
+Examples
+--------
 >>> import io, symspline as ss
 >>> from symspline import poses
 >>> t, given = poses.read_tum(io.StringIO("0 0 0 0 0 0 0 1\\n1 2 0 0 0 0 0.6 0.8\\n"))
@@ -22,11 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ._arrays import as_array, short_repr
+from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
-from .arrays import as_array, shown
-from .curves.curve import Curve
-from .piecewise import check_curve, evaluated
-from .pose_files import (
+from ._curves.curve import CurveArrays
+from ._pose_files import (
     check_seconds,
     join,
     read_euroc,
@@ -37,8 +39,8 @@ from .pose_files import (
     write_kitti,
     write_tum,
 )
+from ._spaces import Array, Euclidean, SpecialEuclidean
 from .rotations import Spline, attitude, check_frame, turned
-from .spaces import Array, Euclidean, SpecialEuclidean
 
 __all__ = [
     "Imu",
@@ -60,11 +62,14 @@ _SE3, _R3 = SpecialEuclidean(3), Euclidean(3)
 
 
 class Imu(NamedTuple):
-    """What an inertial sensor at the origin of the body measures, in the frame of the body.
+    """Measurements of an inertial sensor at the origin of the body, in the body frame.
 
-    Attributes:
-        gyro: angular velocity, radians per unit of time, shape (..., 3).
-        specific_force: Rᵀ(ẍ − g), units of length per unit of time squared, shape (..., 3).
+    Attributes
+    ----------
+    gyro : ndarray, shape (..., 3)
+        Angular velocity, radians per unit of time.
+    specific_force : ndarray, shape (..., 3)
+        :math:`R^T(\\ddot x - g)`, units of length per unit of time squared.
     """
 
     gyro: Array
@@ -79,24 +84,41 @@ def imu(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Imu:
-    """What a gyroscope and an accelerometer at the origin of the body measure at times x.
+    """Compute the signals of a gyroscope and an accelerometer at the origin of the body.
 
-    At natural ends a curve has no acceleration: there, and so on both sides of a gap, the accelerometer shows nothing
-    but gravity. Of poses without noise take ``bc_type="not-a-knot"`` for a recording that begins or ends in motion.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
+    x : array_like
+        Times.
+    gravity : array_like, shape (3,), default (0.0, 0.0, -9.81)
+        Gravity g in the world frame, in the units of positions and times; by default metres and seconds, with z
+        upwards. A body at rest measures −g.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Args:
-        spline: a curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
-        x, extrapolate, per_curve: as for calling the spline.
-        gravity: g in the world, shape (3,), in the units of positions and times: metres and seconds here, z upwards.
-            A body at rest measures −g.
+    Returns
+    -------
+    Imu
+        Named tuple of two arrays of shape ``(*batch axes, *x.shape, 3)``.
 
-    Returns:
-        A pair `Imu` of arrays of shape batch axes + x.shape + (3,).
+    Raises
+    ------
+    ValidationError
+        If the curve does not contain exactly one pose, gravity is not three numbers, or the times are nanoseconds since
+        1970 instead of seconds.
 
-    Raises:
-        ValidationError: the spline has no poses, gravity is not three numbers, or times are no seconds but nanoseconds
-            since 1970.
+    Notes
+    -----
+    At natural ends the acceleration of a curve is zero. The accelerometer then measures gravity alone there, also on
+    both sides of a gap. For poses without noise, pass ``bc_type="not-a-knot"`` if the recording begins or ends in
+    motion.
 
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> still = ss.CubicSpline(None, [np.eye(4), np.eye(4)], "se:3")
     >>> imu(still, 0.5).specific_force
@@ -105,7 +127,9 @@ def imu(
     check_curve(spline)
     g = as_array(gravity, "gravity")
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
-        raise ValidationError(f"gravity must be three numbers, a vector in the world, not {shown(gravity)}")
+        raise ValidationError(
+            f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}"
+        )
     check_seconds(spline.t, "t")
     motion = _Motion(spline, x, extrapolate, per_curve)
     return Imu(motion.turning, motion.in_body(motion.acceleration - g))
@@ -119,18 +143,30 @@ def twist(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Array:
-    """The twist (ω, v) at times x, the angular part first.
+    """Compute the twist (ω, v), angular part first.
 
-    Source: Lynch & Park, Modern Robotics (2017), 3.3.2.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
+    x : array_like
+        Times.
+    frame : {"body", "world"}, default "body"
+        ``"body"`` for g⁻¹g': ω and the velocity of the body's origin in the body frame. ``"world"`` for g'g⁻¹: Rω, and
+        the velocity ẋ − Rω × x of the point of the body that passes the origin of the world.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Args:
-        spline: a curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
-        x, extrapolate, per_curve: as for calling the spline.
-        frame: ``"body"`` for g⁻¹g': ω and the velocity of the body's origin in the frame of the body; ``"world"`` for
-            g'g⁻¹: Rω, and the velocity ẋ − Rω × x of that point of the body that passes the world's origin.
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, 6)``
+        Twists.
 
-    Returns:
-        Shape batch axes + x.shape + (6,).
+    References
+    ----------
+    Lynch & Park, "Modern Robotics", 2017, section 3.3.2.
     """
     check_frame(frame)
     motion = _Motion(spline, x, extrapolate, per_curve)
@@ -148,15 +184,25 @@ def linear_velocity(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Array:
-    """The velocity ẋ of the position at times x.
+    """Compute the velocity ẋ of the position.
 
-    Args:
-        spline: a curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
-        x, extrapolate, per_curve: as for calling the spline.
-        frame: ``"world"`` for ẋ, or ``"body"`` for Rᵀẋ.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
+    x : array_like
+        Times.
+    frame : {"world", "body"}, default "world"
+        ``"world"`` for ẋ, ``"body"`` for Rᵀẋ.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Returns:
-        Shape batch axes + x.shape + (3,).
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, 3)``
+        Velocities.
     """
     check_frame(frame)
     motion = _Motion(spline, x, extrapolate, per_curve)
@@ -171,17 +217,28 @@ def linear_acceleration(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Array:
-    """The acceleration ẍ of the position at times x, without gravity; see `imu` for what is measured.
+    """Compute the acceleration ẍ of the position, without gravity.
 
-    On ``se:3`` it is not the last column of ``spline(x, nu=2)``, which is ẍ − ω × ẋ with ω in the world.
+    See `imu` for measured accelerations. On ``se:3`` the result differs from the last column of ``spline(x, nu=2)``,
+    which is ẍ − ω × ẋ with ω in the world frame.
 
-    Args:
-        spline: a curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
-        x, extrapolate, per_curve: as for calling the spline.
-        frame: ``"world"`` for ẍ, or ``"body"`` for Rᵀẍ.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``se:3``, or on a product with one ``so:3`` and one ``r:3``.
+    x : array_like
+        Times.
+    frame : {"world", "body"}, default "world"
+        ``"world"`` for ẍ, ``"body"`` for Rᵀẍ.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Returns:
-        Shape batch axes + x.shape + (3,).
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, 3)``
+        Accelerations.
     """
     check_frame(frame)
     motion = _Motion(spline, x, extrapolate, per_curve)
@@ -189,7 +246,7 @@ def linear_acceleration(
 
 
 class _Motion:
-    """A moving body at times x. Each quantity is evaluated when it is first asked for, and then kept."""
+    """Motion of a body at times x; each quantity is evaluated on first access and cached."""
 
     def __init__(self, spline: Spline, x: ArrayLike, extrapolate: Any, per_curve: bool) -> None:
         self._attitude, self._position = attitude(spline), _position(spline)
@@ -231,21 +288,23 @@ class _Motion:
         values = self._at(self._position, quantity)
         return values[..., :3, 3] if self._position.space == _SE3 else values
 
-    def _at(self, curve: Curve, quantity: str) -> Array:
+    def _at(self, curve: CurveArrays, quantity: str) -> Array:
         values: Array = evaluated(curve, self._clock, self._x, quantity, self._where, self._per_curve, None)
         return values
 
 
-def _position(spline: Spline) -> Curve:
-    """The curve that has the positions: of poses, or the one on R³.
+def _position(spline: Spline) -> CurveArrays:
+    """Return the curve that contains the positions: the one of poses, or the one on R³.
 
-    Raises:
-        ValidationError: there is none, or several.
+    Raises
+    ------
+    ValidationError
+        If the curve does not contain exactly one position.
     """
     attitude(spline)
     found = [part for part in spline._curve.parts if part.space in (_SE3, _R3)]
     if len(found) != 1:
         raise ValidationError(
-            f"a curve of poses is on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
+            f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
         )
     return found[0]

@@ -1,10 +1,11 @@
-"""Curves of rotations in the words of those who turn things: angular velocity, quaternions without jumps of
-sign, rotation vectors, six numbers.
+"""Rotations: angular velocity, quaternions without jumps of sign, rotation vectors, six-number representations.
 
-Rotations take vectors of the body to the world, as the matrices of SciPy's ``Rotation`` do. Points may be given as
-such a ``Rotation`` or as matrices of shape (..., 3, 3); curves are on ``so:3``, on ``se:3``, or on a product with one
-of them, such as ``so:3 x r:3``.
+Rotations map vectors from the body frame to the world frame, as the matrices of SciPy's ``Rotation`` do. You can pass
+points as a ``Rotation`` or as matrices of shape (..., 3, 3). Curves are on ``so:3``, on ``se:3``, or on a product with
+one of them, such as ``so:3 x r:3``.
 
+Examples
+--------
 >>> import numpy as np, symspline as ss
 >>> from symspline import rotations
 >>> turning = rotations.from_rotation_vectors([[0, 0, 0], [0, 0, 1], [0, 0, 2.0]])
@@ -21,17 +22,17 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ._arrays import short_repr
+from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
-from .arrays import shown
+from ._cubic import CubicSpline
+from ._curves.curve import CurveArrays, Doubles
+from ._curves.fit import curve_of
+from ._hermite import HermiteSpline
+from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
 from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert.quaternions import checked_order
-from .convert.reading import length, real_numbers, refuse
-from .curves.curve import Curve, Doubles
-from .curves.fit import curve_of
-from .hermite import HermiteSpline
-from .piecewise import check_curve, evaluated
-from .spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
-from .spline import CubicSpline
+from .convert._quaternions import checked_order
+from .convert._reading import length, real_numbers, refuse
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -55,12 +56,12 @@ Spline = CubicSpline | HermiteSpline
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _FRAMES = ("body", "world")
 _SIX = ("columns", "rows", "interleaved")
-# Two of the six numbers' vectors that are closer to parallel than this have no third in single precision.
+# If the two vectors are closer to parallel than this, the third is not determined in single precision.
 _PARALLEL = 1e-6
-# Curves made of others, whose making goes over all knots: the rotations of poses, and the curves on S³ above curves
-# on SO(3).
-_ATTITUDES: WeakKeyDictionary[Curve, Curve] = WeakKeyDictionary()
-_LIFTS: WeakKeyDictionary[Curve, Curve] = WeakKeyDictionary()
+# Caches of derived curves, whose computation processes all knots: the rotations of poses, and the curves on S³ above
+# curves on SO(3).
+_ATTITUDES: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
+_LIFTS: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
 
 
 # ---- along a curve ----
@@ -69,23 +70,34 @@ _LIFTS: WeakKeyDictionary[Curve, Curve] = WeakKeyDictionary()
 def rotation(
     spline: Spline, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
 ) -> Rotation:
-    """The rotations at times x as SciPy's ``Rotation``.
+    """Evaluate a curve as a SciPy ``Rotation``.
 
-    Args:
-        spline: a curve on ``so:3``, ``se:3``, or a product with one of them.
-        x, extrapolate, per_curve: as for calling the spline.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``so:3``, ``se:3``, or a product with one of them.
+    x : array_like
+        Times.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Returns:
-        A ``Rotation`` of shape batch axes + x.shape; SciPy before 1.17 has only those of one axis or none.
+    Returns
+    -------
+    scipy.spatial.transform.Rotation, shape ``(*batch axes, *x.shape)``
+        Rotations. SciPy before 1.17 supports at most one axis.
 
-    Raises:
-        ImportError: SciPy is not installed.
+    Raises
+    ------
+    ImportError
+        If SciPy is not installed.
     """
     try:
         from scipy.spatial.transform import Rotation
     except ImportError:
         raise ImportError(
-            "rotation gives back a Rotation of SciPy; install it with: pip install scipy"
+            "rotation returns a SciPy Rotation; install SciPy with: pip install scipy"
         ) from None
     found: Rotation = Rotation.from_matrix(_at(spline, x, "point", extrapolate, per_curve))
     return found
@@ -99,18 +111,35 @@ def angular_velocity(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Array:
-    """The angular velocity ω at times x: R' = R ω̂ in the frame of the body, what a gyroscope there measures.
+    """Compute the angular velocity of a curve.
 
-    Args:
-        spline: a curve on ``so:3``, ``se:3``, or a product with one of them.
-        x, extrapolate, per_curve: as for calling the spline.
-        frame: ``"body"`` for ω, as SciPy's ``RotationSpline(t, R)(x, 1)``, or ``"world"`` for Rω.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``so:3``, ``se:3``, or a product with one of them.
+    x : array_like
+        Times.
+    frame : {"body", "world"}, default "body"
+        ``"body"`` for ω, as measured by a gyroscope and as returned by SciPy's ``RotationSpline(t, R)(x, 1)``;
+        ``"world"`` for Rω.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Returns:
-        Radians per unit of time (per second for dates), shape batch axes + x.shape + (3,).
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, 3)``
+        Radians per unit of time (per second for dates).
 
-    Raises:
-        ValidationError: the spline has no rotation, or ``frame`` is another word.
+    Raises
+    ------
+    ValidationError
+        If the curve does not contain exactly one rotation, or `frame` is invalid.
+
+    Notes
+    -----
+    The angular velocity ω in the body frame satisfies :math:`R' = R \\hat\\omega`.
     """
     return _rate(spline, x, "velocity", frame, extrapolate, per_curve)
 
@@ -123,12 +152,30 @@ def angular_acceleration(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Array:
-    """The angular acceleration at times x: ω' in the frame of the body, (Rω)' = Rω' in the world; continuous.
+    """Compute the angular acceleration of a curve, which is continuous.
 
-    Args and errors are those of `angular_velocity`; ``RotationSpline(t, R)(x, 2)`` is that of the body.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``so:3``, ``se:3``, or a product with one of them.
+    x : array_like
+        Times.
+    frame : {"body", "world"}, default "body"
+        ``"body"`` for ω', as returned by SciPy's ``RotationSpline(t, R)(x, 2)``; ``"world"`` for (Rω)' = Rω'.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Returns:
-        Radians per unit of time squared, shape batch axes + x.shape + (3,).
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, 3)``
+        Radians per unit of time squared.
+
+    Raises
+    ------
+    ValidationError
+        If the curve does not contain exactly one rotation, or `frame` is invalid.
     """
     return _rate(spline, x, "acceleration", frame, extrapolate, per_curve)
 
@@ -141,19 +188,32 @@ def quaternion(
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
 ) -> Array:
-    """Unit quaternions at times x that never jump from q to −q: one continuous curve on S³.
+    """Evaluate a curve as unit quaternions without jumps of sign.
 
-    It begins at the quaternion of the first point whose scalar part is not negative. After a closed curve it may
-    be at −q where it was at q, and a time then has the quaternion of its own turn.
+    The quaternions form one continuous curve on S³. It begins at the quaternion of the first point whose scalar part is
+    not negative. After one period of a closed curve, the quaternion may be −q instead of q; the sign then depends on
+    the number of periods.
 
-    Args:
-        spline: a curve on ``so:3``, ``se:3``, or a product with one of them.
-        x, extrapolate, per_curve: as for calling the spline.
-        scalar_first: True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS. It must be given.
+    Parameters
+    ----------
+    spline : CubicSpline or HermiteSpline
+        Curve on ``so:3``, ``se:3``, or a product with one of them.
+    x : array_like
+        Times. The first call for a curve also processes all knots.
+    scalar_first : bool
+        Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for ``spline(x)``.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times.
 
-    Returns:
-        Shape batch axes + x.shape + (4,). The first call also goes over all knots.
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, 4)``
+        Unit quaternions.
 
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> turns = ss.CubicSpline(None, from_rotation_vectors([[0, 0, i] for i in range(8)]), "so:3")
     >>> quaternion(turns, [0, 2 * np.pi], scalar_first=True).round(8) + 0.0
@@ -176,17 +236,27 @@ def quaternion(
 
 
 def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: str = "body") -> Array:
-    """The velocities R ω̂ of rotations that turn with angular velocities, as a `symspline.HermiteSpline` or an end takes
-    them; what `angular_velocity` makes of a curve, backwards.
+    """Convert angular velocities to tangent vectors at rotations.
 
-    Args:
-        rotations: points of ``so:3``, shape (..., 3, 3), or a SciPy ``Rotation``.
-        rates: angular velocities, radians per unit of time, shape (..., 3).
-        frame: ``"body"`` for rates as a gyroscope measures them, or ``"world"``.
+    This is the inverse of `angular_velocity`. Use the result as velocities of a `symspline.HermiteSpline` or as end
+    vectors.
 
-    Returns:
-        Tangent vectors at the rotations, shape (..., 3, 3).
+    Parameters
+    ----------
+    rotations : array_like, shape (..., 3, 3), or scipy.spatial.transform.Rotation
+        Points of ``so:3``.
+    rates : array_like, shape (..., 3)
+        Angular velocities ω in radians per unit of time.
+    frame : {"body", "world"}, default "body"
+        Frame of `rates`; ``"body"`` for rates as a gyroscope measures them.
 
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Tangent vectors :math:`R \\hat\\omega` (body) or :math:`\\hat\\omega R` (world).
+
+    Examples
+    --------
     >>> velocities(np.eye(3), [0, 0, 2])
     array([[ 0., -2.,  0.],
            [ 2.,  0.,  0.],
@@ -198,18 +268,20 @@ def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: str = "
     return (r @ hat if frame == "body" else hat @ r) + 0.0
 
 
-def attitude(spline: Spline) -> Curve:
-    """The curve of the rotations alone, on SO(3).
+def attitude(spline: Spline) -> CurveArrays:
+    """Return the curve of the rotations alone, on SO(3).
 
-    Raises:
-        ValidationError: the spline has none, or several.
+    Raises
+    ------
+    ValidationError
+        If the curve does not contain exactly one rotation.
     """
     check_curve(spline)
     found = [part for part in spline._curve.parts if part.space in (_SO3, _SE3)]
     if len(found) != 1:
         raise ValidationError(
-            f"a curve of rotations is on so:3, se:3, or a product with one of them, not on {spline.space}; quaternions "
-            "become points of so:3 by symspline.rotations.from_quaternions"
+            f"the curve must be on so:3, se:3, or a product with one of them, not on {spline.space}; to convert "
+            "quaternions to points of so:3, use symspline.rotations.from_quaternions"
         )
     curve = found[0]
     if curve.space == _SO3:
@@ -222,9 +294,9 @@ def attitude(spline: Spline) -> Curve:
 
 
 def check_frame(frame: Any) -> None:
-    """Raise ValidationError unless it is one of the two words."""
+    """Raise ValidationError unless frame is "body" or "world"."""
     if not isinstance(frame, str) or frame not in _FRAMES:
-        raise ValidationError(f"frame must be 'body' or 'world', not {shown(frame)}")
+        raise ValidationError(f"frame must be 'body' or 'world', not {short_repr(frame)}")
 
 
 def _at(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
@@ -236,21 +308,21 @@ def _at(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve
 def _rate(
     spline: Spline, x: ArrayLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
 ) -> Array:
-    """The body's angular velocity or acceleration, turned into the frame."""
+    """Return the angular velocity or acceleration in the given frame."""
     check_frame(frame)
     body = _at(spline, x, f"body {quantity}", extrapolate, per_curve)
     return body if frame == "body" else turned(_at(spline, x, "point", extrapolate, per_curve), body)
 
 
 def _vee(r: Array, d: Array) -> Array:
-    """The vector of RᵀD, the half difference of its entries across the diagonal."""
+    """Return the vector of RᵀD, half the difference of its entries across the diagonal."""
     after, before = [1, 2, 0], [2, 0, 1]
     result: Array = (r[..., before] * d[..., after] - r[..., after] * d[..., before]).sum(axis=-2) / 2
     return result
 
 
 def turned(r: Array, v: Array) -> Array:
-    """Rv for matrices and vectors."""
+    """Return Rv for matrices R and vectors v."""
     result: Array = np.einsum("...ij,...j->...i", r, v)
     return result
 
@@ -260,18 +332,18 @@ def _dot(p: Array, q: Array) -> Array:
     return result
 
 
-def _lift(curve: Curve) -> Curve:
-    """The curve on S³ above a curve on SO(3).
+def _lift(curve: CurveArrays) -> CurveArrays:
+    """Return the curve on S³ above a curve on SO(3).
 
-    The Bézier segments of the one are above those of the other, where neighbouring control points are less than
-    half a turn apart: from those quaternions follow the signs at the knots.
+    The Bézier segments of one are above those of the other if neighbouring control points differ by less than half a
+    turn. The signs at the knots follow from the quaternions of the control points.
     """
     if curve not in _LIFTS:
         _LIFTS[curve] = _lifted(curve)
     return _LIFTS[curve]
 
 
-def _lifted(curve: Curve) -> Curve:
+def _lifted(curve: CurveArrays) -> CurveArrays:
     q = matrix_to_quaternion(curve.points, scalar_first=True)
     # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
     rate = _velocity_above(q, curve)
@@ -282,22 +354,26 @@ def _lifted(curve: Curve) -> Curve:
     return _above(curve, signs * q, signs * rate)
 
 
-def _above(curve: Curve, q: Array, velocities: Array) -> Curve:
-    """A curve on S³ with the times of another."""
+def _above(curve: CurveArrays, q: Array, velocities: Array) -> CurveArrays:
+    """Return a curve on S³ with the times of another curve."""
     # The core reads memory in order.
     pair = np.ascontiguousarray(q), np.ascontiguousarray(velocities)
     return curve_of(_S3, curve.times, [pair], fitted=False)
 
 
-def _velocity_above(q: Array, curve: Curve) -> Array:
-    """½ q (0, ω), scalar first, for the velocities R ω̂ of a curve at the quaternions q of its points R."""
-    omega = _vee(curve.points, curve.velocities)
+def _velocity_above(q: Array, curve: CurveArrays) -> Array:
+    """Return ½ q (0, ω), scalar first, for the velocities R ω̂ of a curve at the quaternions q of its points R."""
+    return quaternion_velocity(q, _vee(curve.points, curve.velocities))
+
+
+def quaternion_velocity(q: Array, omega: Array) -> Array:
+    """Return ½ q (0, ω), scalar first, for angular velocities ω in the frame of the body."""
     w, v = q[..., :1], q[..., 1:]
     return np.concatenate([-_dot(v, omega)[..., None], w * omega + np.cross(v, omega)], axis=-1) / 2
 
 
-def _wrapped(curve: Curve, times: Doubles, per_curve: bool) -> tuple[Doubles, Doubles]:
-    """Times moved into the knots by whole periods, with the batch axes, and by how many."""
+def _wrapped(curve: CurveArrays, times: Doubles, per_curve: bool) -> tuple[Doubles, Doubles]:
+    """Move times into the knots by whole periods, and return them with the number of periods."""
     batch = curve.batch
     own = times.shape[len(batch) :] if per_curve else times.shape
     times = np.broadcast_to(times, batch + own)
@@ -311,17 +387,24 @@ def _wrapped(curve: Curve, times: Doubles, per_curve: bool) -> tuple[Doubles, Do
 
 
 def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None = None) -> Array:
-    """The unit quaternions of rotations, each with a scalar part that is not negative.
+    """Convert rotations to unit quaternions with non-negative scalar part.
 
-    For those along a curve, without jumps of sign, see `quaternion`.
+    For quaternions along a curve without jumps of sign, use `quaternion`.
 
-    Args:
-        rotations: points of ``so:3``, shape (..., 3, 3), or a SciPy ``Rotation``.
-        scalar_first: True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS. It must be given.
+    Parameters
+    ----------
+    rotations : array_like, shape (..., 3, 3), or scipy.spatial.transform.Rotation
+        Points of ``so:3``.
+    scalar_first : bool
+        Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
 
-    Returns:
-        Shape (..., 4).
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        Unit quaternions.
 
+    Examples
+    --------
     >>> as_quaternions([[0, -1, 0], [1, 0, 0], [0, 0, 1]], scalar_first=False).round(8)
     array([0.        , 0.        , 0.70710678, 0.70710678])
     """
@@ -331,22 +414,41 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
 def from_quaternions(
     quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
 ) -> Array:
-    """The rotations of unit quaternions: q and −q are the same one.
+    """Convert unit quaternions to rotations; q and −q give the same rotation.
 
-    Args:
-        quaternions: unit vectors, shape (..., 4).
-        scalar_first: True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS. It must be given.
-        atol: how far from 1 lengths may be, such as 1e-5 for numbers of six decimals; None for 1e-8 of doubles.
+    Parameters
+    ----------
+    quaternions : array_like, shape (..., 4)
+        Unit quaternions.
+    scalar_first : bool
+        Required. True for (w, x, y, z), False for (x, y, z, w) as in SciPy and ROS.
+    atol : float, optional
+        Largest deviation of the norms from 1, such as 1e-5 for numbers of six decimal places. None means 1e-8 in double
+        precision.
 
-    Returns:
-        Points of ``so:3``, shape (..., 3, 3).
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Points of ``so:3``.
     """
     return quaternion_to_matrix(quaternions, scalar_first=scalar_first, atol=atol)
 
 
 def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
-    """Axis times angle in radians, the angle from 0 to π, shape (..., 3).
+    """Convert rotations to rotation vectors.
 
+    Parameters
+    ----------
+    rotations : array_like, shape (..., 3, 3), or scipy.spatial.transform.Rotation
+        Points of ``so:3``.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Axis times angle in radians, with the angle from 0 to π.
+
+    Examples
+    --------
     >>> as_rotation_vectors([[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(8)
     array([0.        , 0.        , 1.57079633])
     """
@@ -360,8 +462,20 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
 
 
 def from_rotation_vectors(vectors: ArrayLike) -> Array:
-    """Rotations from axis times angle in radians, shape (..., 3), as points of ``so:3``, shape (..., 3, 3).
+    """Convert rotation vectors to rotations.
 
+    Parameters
+    ----------
+    vectors : array_like, shape (..., 3)
+        Axis times angle in radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Points of ``so:3``.
+
+    Examples
+    --------
     >>> from_rotation_vectors([0, 0, np.pi / 2]).round(8) + 0.0
     array([[ 0., -1.,  0.],
            [ 1.,  0.,  0.],
@@ -371,20 +485,29 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
 
 
 def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None) -> Array:
-    """The six numbers of machine learning, continuous over all rotations: two columns, or rows, of the matrix.
+    """Convert rotations to the six-number representation of machine learning.
 
-    Source: Zhou, Barnes, Lu, Yang & Li, On the Continuity of Rotation Representations in Neural Networks (CVPR
-    2019).
+    The representation consists of two columns, or rows, of the matrix. It is continuous over all rotations [1]_.
 
-    Args:
-        rotations: points of ``so:3``, shape (..., 3, 3), or a SciPy ``Rotation``.
-        order: ``"columns"`` for the first column and then the second, as in the paper; ``"rows"`` for the first two
-            rows, as in PyTorch3D; ``"interleaved"`` for the 3 × 2 matrix of the two columns row by row, as in SPIN.
-            It must be given.
+    Parameters
+    ----------
+    rotations : array_like, shape (..., 3, 3), or scipy.spatial.transform.Rotation
+        Points of ``so:3``.
+    order : {"columns", "rows", "interleaved"}
+        Required. ``"columns"`` for the first column and then the second, as in [1]_; ``"rows"`` for the first two rows,
+        as in PyTorch3D; ``"interleaved"`` for the 3 × 2 matrix of the two columns row by row, as in SPIN.
 
-    Returns:
-        Shape (..., 6).
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        Six numbers per rotation.
 
+    References
+    ----------
+    .. [1] Zhou, Barnes, Lu, Yang & Li, "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019.
+
+    Examples
+    --------
     >>> as_six_numbers([[0, -1, 0], [1, 0, 0], [0, 0, 1]], order="columns")
     array([ 0.,  1.,  0., -1.,  0.,  0.])
     """
@@ -397,18 +520,33 @@ def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None)
 
 
 def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
-    """The rotations that six numbers of any network stand for, by Gram and Schmidt (Zhou et al. 2019, (15)).
+    """Convert the six-number output of a neural network to rotations.
 
-    Args:
-        numbers: two vectors of any length that are not parallel, shape (..., 6).
-        order: as for `as_six_numbers`. It must be given.
+    The two vectors are orthonormalised by the Gram–Schmidt process ([1]_, equation 15).
 
-    Returns:
-        Points of ``so:3``, shape (..., 3, 3).
+    Parameters
+    ----------
+    numbers : array_like, shape (..., 6)
+        Two vectors of any length that are not parallel.
+    order : {"columns", "rows", "interleaved"}
+        Required. See `as_six_numbers`.
 
-    Raises:
-        ValidationError: a vector is zero, or the two are parallel.
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Points of ``so:3``.
 
+    Raises
+    ------
+    ValidationError
+        If a vector is zero, or the two vectors are parallel.
+
+    References
+    ----------
+    .. [1] Zhou, Barnes, Lu, Yang & Li, "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019.
+
+    Examples
+    --------
     >>> from_six_numbers([2, 0, 0, 1, 1, 0], order="columns")
     array([[1., 0., 0.],
            [0., 1., 0.],
@@ -426,7 +564,7 @@ def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
         refuse(
             ~(sine > _PARALLEL),
             "numbers",
-            lambda i: f"are {a[i]} and {b[i]}: two vectors that are not zero and not parallel are needed",
+            lambda i: f"are {a[i]} and {b[i]}, but the two vectors must be nonzero and not parallel",
         )
         second = second / sine[..., None]
     rows = np.stack([first, second, np.cross(first, second)], axis=-2)
@@ -434,7 +572,7 @@ def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
 
 
 def _hat(v: Array) -> Array:
-    """The matrix of the cross product with a vector."""
+    """Return the matrix of the cross product with a vector."""
     hat = np.zeros((*v.shape[:-1], 3, 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         hat[..., k, j], hat[..., j, k] = v[..., i], -v[..., i]
@@ -452,6 +590,6 @@ def _swapped(x: Array) -> Array:
 def _check_six(order: Any) -> None:
     if not isinstance(order, str) or order not in _SIX:
         raise ValidationError(
-            "the order of the six numbers is in doubt, and they do not show it: say order='columns' (Zhou et al.), "
-            f"'rows' (PyTorch3D) or 'interleaved' (SPIN); got {shown(order)}"
+            "order is required, because the six numbers do not show it: pass order='columns' (Zhou et al.), "
+            f"'rows' (PyTorch3D) or 'interleaved' (SPIN); got {short_repr(order)}"
         )

@@ -1,5 +1,7 @@
-"""Reduced bases over a parameter: proper orthogonal decomposition, and operators in bases that vary smoothly.
+"""Reduced bases over a parameter: proper orthogonal decomposition, and reduced operators that vary smoothly.
 
+Examples
+--------
 >>> import numpy as np, symspline as ss
 >>> grid, time = np.linspace(0, 1, 50), np.linspace(0, 1, 20)
 >>> decay = lambda mu: np.exp(-mu * time * np.arange(1, 4)[:, None] ** 2)
@@ -18,39 +20,53 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ._arrays import as_array, short_repr, whole_number
+from ._base_curve import check_curve
 from ._core import ValidationError
-from .arrays import as_array, shown, whole_number
-from .convert.reading import Array, adjoint, numbers, refuse
-from .handed import times_of
-from .piecewise import check_curve
-from .spaces import ComplexGrassmannian, Grassmannian
-from .spline import CubicSpline
+from ._cubic import CubicSpline
+from ._input import times_of
+from ._spaces import ComplexGrassmannian, Grassmannian
+from .convert._reading import Array, adjoint, numbers, refuse
 
 # Singular values closer than this, in units of the largest, are equal but for rounding.
 _EQUAL = 1e-12
 
+__all__ = ["from_snapshots", "reduced_operator"]
+
 
 def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | None = None) -> Array:
-    """The subspaces that hold most of some snapshots: bases of the proper orthogonal decomposition.
+    """Compute bases of the proper orthogonal decomposition of snapshots.
 
-    Of all subspaces of dimension k it is the one from which the snapshots are least away, in the sum of squares.
-    Source: Sirovich, Turbulence and the dynamics of coherent structures (1987); Eckart & Young (1936).
+    Among all subspaces of dimension k, the result has the smallest sum of squared distances to the snapshots [1]_ [2]_.
 
-    Args:
-        x: snapshots in columns, shape (..., n, m), real or complex; leading axes are values of the parameter. The mean
-            is not taken away.
-        rank: the dimension k of the subspaces.
-        energy: instead of ``rank``, the share of the sum of squares that every subspace holds at least, above 0 and at
-            most 1: k is the smallest that does for all.
+    Parameters
+    ----------
+    x : array_like, shape (..., n, m)
+        Snapshots in columns, real or complex. Leading axes are values of the parameter. The mean is not subtracted.
+    rank : int, optional
+        Dimension k of the subspaces. Pass either `rank` or `energy`.
+    energy : float, optional
+        Fraction of the sum of squares that every subspace must contain, above 0 and at most 1. The smallest k that
+        suffices for all subspaces is used.
 
-    Returns:
-        The first k left singular vectors, shape (..., n, k): points of ``Grassmannian(k, n)``, or of
-        ``ComplexGrassmannian(k, n)``.
+    Returns
+    -------
+    ndarray, shape (..., n, k)
+        First k left singular vectors: points of ``Grassmannian(k, n)``, or of ``ComplexGrassmannian(k, n)``.
 
-    Raises:
-        ValidationError: not one of ``rank`` and ``energy`` is given; k is not below n; or the snapshots do not
-            determine the subspace: they have a lower rank, or singular values k and k + 1 are equal.
+    Raises
+    ------
+    ValidationError
+        If not exactly one of `rank` and `energy` is given, k is not below n, or the snapshots do not determine the
+        subspace: their rank is below k, or singular values k and k + 1 are equal.
 
+    References
+    ----------
+    .. [1] Sirovich, "Turbulence and the dynamics of coherent structures", 1987.
+    .. [2] Eckart & Young, "The approximation of one matrix by another of lower rank", 1936.
+
+    Examples
+    --------
     >>> abs(from_snapshots([[3, 3], [0, 0], [0, 1]], rank=1)).round(3).ravel().tolist()
     [0.986, 0.0, 0.169]
     """
@@ -58,16 +74,16 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
     n, m = snapshots.shape[-2:]
     if (rank is None) == (energy is None):
         raise ValidationError(
-            "say either rank, the dimension of the subspaces, or energy, the share they hold"
+            "pass either rank, the dimension of the subspaces, or energy, the fraction they contain"
         )
     if not snapshots.size:
-        raise ValidationError(f"x has shape {snapshots.shape}: there are no snapshots")
+        raise ValidationError(f"x has shape {snapshots.shape}, but must contain at least one snapshot")
     left, sizes, _ = np.linalg.svd(snapshots, full_matrices=False)
     k = whole_number(rank, "rank", 1) if rank is not None else _rank(sizes, energy)
     if k >= n or k > m:
         raise ValidationError(
-            f"{k} dimensions need more than {k} numbers a snapshot, and {k} snapshots or more; x has shape "
-            f"{snapshots.shape}"
+            f"a basis of {k} dimensions needs more than {k} numbers per snapshot and at least {k} snapshots; "
+            f"x has shape {snapshots.shape}"
         )
     beyond = np.concatenate([sizes, np.zeros((*sizes.shape[:-1], 1))], axis=-1)
     refuse(
@@ -84,29 +100,41 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
 def reduced_operator(
     spline: CubicSpline, operator: Any | Callable[[float], Any], x: ArrayLike, start: ArrayLike | None = None
 ) -> Array:
-    """An operator in the reduced bases at parameters x: X*AX, with bases X that do not turn within the subspaces.
+    """Compute the reduced operator X*AX in bases X that vary smoothly along a curve.
 
-    The bases are those of `CubicSpline.lift`, so that the matrices are as smooth as the curve and A; those of a call
-    of the spline jump at the knots. Source: Amsallem & Farhat, Interpolation method for adapting reduced-order models
-    (2008), for the interpolation of subspaces.
+    The bases are those of `CubicSpline.lift`, so the matrices are as smooth as the curve and A. The representatives
+    that ``spline(x)`` returns may jump at the knots.
 
-    Args:
-        spline: one curve on a `Grassmannian` or a `ComplexGrassmannian`.
-        operator: A, of shape (n, n): an array, a sparse matrix, or what else multiplies arrays by ``@``; or a function
-            of the parameter that returns such.
-        x: parameters, any shape.
-        start: the basis at the first knot, shape (n, k); None for the first point of the curve.
+    Parameters
+    ----------
+    spline : CubicSpline
+        One curve on a `Grassmannian` or a `ComplexGrassmannian`.
+    operator : array_like, sparse matrix or callable, shape (n, n)
+        A: an array, a sparse matrix, any object that supports ``@`` with arrays, or a function of the parameter that
+        returns one of these.
+    x : array_like
+        Parameters, any shape.
+    start : array_like, shape (n, k), optional
+        Basis at the first knot. None means the first point of the curve.
 
-    Returns:
-        Shape x.shape + (k, k).
+    Returns
+    -------
+    ndarray, shape ``(*x.shape, k, k)``
+        Reduced operators.
 
-    Raises:
-        ValidationError: the curve is in another space or a batch, or the operator is of another shape.
+    Raises
+    ------
+    ValidationError
+        If the curve is on another space or a batch, or the operator has another shape.
+
+    References
+    ----------
+    Amsallem & Farhat, "Interpolation method for adapting reduced-order models", 2008.
     """
     check_curve(spline)
     space = spline.space
     if not isinstance(space, (Grassmannian, ComplexGrassmannian)) or spline._batch:
-        raise ValidationError(f"reduced bases are one curve on a Grassmannian, not {spline!r}")
+        raise ValidationError(f"spline must be one curve on a Grassmannian, not {spline!r}")
     n, k = space.point_shape
     if not callable(operator) or hasattr(operator, "shape"):
         _check_operator(operator, n)
@@ -127,9 +155,9 @@ def reduced_operator(
 
 
 def _rank(sizes: Array, energy: Any) -> int:
-    """The smallest rank with which every subspace holds a share of the sum of squares."""
+    """Return the smallest rank with which every subspace contains the given fraction of the sum of squares."""
     if isinstance(energy, bool) or not isinstance(energy, (int, float, np.floating)) or not 0 < energy <= 1:
-        raise ValidationError(f"energy must be a share above 0 and at most 1, not {shown(energy)}")
+        raise ValidationError(f"energy must be a fraction above 0 and at most 1, not {short_repr(energy)}")
     squares = (sizes / np.maximum(sizes[..., :1], np.finfo(float).tiny)) ** 2
     # What is left beyond rank 1, 2, …, without cancellation.
     left = np.cumsum(squares[..., ::-1], axis=-1)[..., ::-1]

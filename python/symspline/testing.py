@@ -1,5 +1,7 @@
-"""Whether a space is one: laws that anyone can run on a space of their own.
+"""Tests of the laws of a space, which you can run on your own space.
 
+Examples
+--------
 >>> import symspline as ss
 >>> print(ss.testing.check(ss.Sphere(2)))  # doctest: +ELLIPSIS
 Sphere(2) obeys
@@ -15,13 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._arrays import short_repr, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
-from .arrays import shown, whole_number
-from .functions import evaluate
+from ._cubic import CubicSpline
+from ._functional import evaluate
+from ._spaces import Array, Product, Space
+from ._spaces import space as space_named
 from .manifolds import Manifold
-from .spaces import Array, Product, Space
-from .spaces import space as space_named
-from .spline import CubicSpline
+
+__all__ = ["Conformance", "check"]
 
 Doubles = NDArray[np.float64]
 
@@ -39,12 +43,16 @@ _COUNT = 6
 
 @dataclass(frozen=True)
 class Conformance:
-    """How far a space is from the laws that it obeys.
+    """Deviations of a space from the laws of symmetric spaces.
 
-    Attributes:
-        space: the space.
-        deviations: the largest relative deviation from each law; for the law of the order how far it is from four.
-        allowed: what is allowed of each.
+    Attributes
+    ----------
+    space : Space
+        Space that was checked.
+    deviations : dict of str to float
+        Largest relative deviation from each law; for the order of convergence, the distance from four.
+    allowed : dict of str to float
+        Largest allowed deviation from each law.
     """
 
     space: Space
@@ -70,7 +78,7 @@ class Conformance:
 def _check_number(name: str, value: Any) -> None:
     number = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
     if not number or not 0 < value < np.inf:
-        raise ValidationError(f"{name} must be a number above 0, not {shown(value)}")
+        raise ValidationError(f"{name} must be a number above 0, not {short_repr(value)}")
 
 
 def check(
@@ -81,32 +89,48 @@ def check(
     tol: float = 1e-10,
     seed: int = 0,
 ) -> Conformance:
-    """Check a space, such as a `symspline.Manifold`, and the curves on it.
+    """Check the laws of a space, such as a `symspline.Manifold`, and of the curves on it.
 
-    The laws: log inverts exp and exp log; what they give is tangent, and on the space; the inner product is one;
-    distance is symmetric, and its derivative is that of the first variation, which ties geodesics to the inner
-    product; the derivative of log is that of differences; splines interpolate, velocity and covariant acceleration are
-    the same from both sides of every knot, on equal and unequal knots; and with not-a-knot ends a smooth curve is
-    found with an error that falls with the fourth power of the spacing.
+    The laws are:
 
-    Args:
-        space: a space, no product, or its name.
-        point: a point to start from; None for a random one, which a `Manifold` has if it has ``project``.
-        length: of the longest steps that are tried; None for half the injectivity radius, and no more than 0.5.
-        tol: how exact exp, log and distances are meant to be, relative to numbers of size 1; what is allowed of the
-            other laws follows from it. Distances that are arc cosines need 1e-7.
-        seed: of the random numbers.
+    - exp and log are inverse, log is tangent, and exp stays on the space;
+    - the inner product is symmetric, bilinear and positive;
+    - distance is symmetric, and its derivative agrees with the first variation, which relates geodesics to the inner
+      product;
+    - the derivative of log agrees with differences;
+    - splines interpolate, and value, velocity and covariant acceleration are continuous at every knot, on equal and
+      unequal knots;
+    - with not-a-knot ends, the error for a smooth curve falls with the fourth power of the spacing.
 
-    Returns:
-        The largest deviation from each law.
+    Parameters
+    ----------
+    space : Space or str
+        Space, except products, or its name.
+    point : array_like, optional
+        Point from which the tests start. None means a random one, which requires ``project`` of a `Manifold`.
+    length : float, optional
+        Longest step of the tests. None means half the injectivity radius, and at most 0.5.
+    tol : float, default 1e-10
+        Expected accuracy of exp, log and distances, relative to numbers of size 1. The limits of the other laws are
+        derived from it. Distances that are arc cosines need 1e-7.
+    seed : int, default 0
+        Seed of the random numbers.
 
-    Raises:
-        AssertionError: a law is broken; the message says which and by how much.
-        ValidationError: the space cannot be checked.
+    Returns
+    -------
+    Conformance
+        Largest deviation from each law.
+
+    Raises
+    ------
+    AssertionError
+        If a law is violated. The message states the law and the deviation.
+    ValidationError
+        If the space cannot be checked.
     """
     space = space_named(space)
     if isinstance(space, Product):
-        raise ValidationError("a product is checked factor by factor")
+        raise ValidationError("a product cannot be checked; check each factor")
     _check_number("tol", tol)
     if length is not None:
         _check_number("length", length)
@@ -135,7 +159,7 @@ def check(
 
 
 class _Sample:
-    """Points and steps of many lengths from them."""
+    """Random points, and steps of many lengths from them."""
 
     def __init__(
         self, space: Space, base: Array, longest: float, tol: float, rng: np.random.Generator
@@ -149,17 +173,17 @@ class _Sample:
         self.q = space.exp(self.p, self.v)
 
     def tangents(self, p: Array) -> Array:
-        """Random unit tangent vectors."""
+        """Return random unit tangent vectors."""
         v = self.space.random_tangent(self.rng, p)
         return np.asarray(v / self.wide(self.space.norm(p, v)))
 
     def wide(self, x: Any) -> Array:
-        """Numbers, to multiply points with."""
+        """Reshape numbers so that they can be multiplied by points."""
         shape = *np.shape(x), *[1] * len(self.space.point_shape)
         return np.asarray(x).reshape(shape)
 
     def size(self, x: Array) -> Array:
-        """The largest entry of every point or vector."""
+        """Return the largest entry of every point or vector."""
         axes = tuple(range(-len(self.space.point_shape), 0))
         return np.asarray(np.abs(x).max(axis=axes))
 
@@ -211,7 +235,7 @@ def _metric(found: Conformance, s: _Sample) -> None:
 
 
 def _allowed(s: _Sample) -> float:
-    """Of differences: their own error, and that of what they are made of."""
+    """Return the limit for differences: their own error, and that of their terms."""
     return max(_DIFFERENCES / min(1.0, s.longest) ** 2, 10 * s.tol / _STEP)
 
 
@@ -226,7 +250,7 @@ def _derivative(found: Conformance, s: _Sample) -> None:
 
 
 def _walk(s: _Sample) -> Array:
-    """Points whose steps are as long as the longest, and turn by half a radian."""
+    """Return points whose steps have the longest length and turn by half a radian."""
     space, p = s.space, [s.base]
     direction = s.tangents(s.base)
     for _ in range(5):
@@ -254,15 +278,17 @@ def _smoothness(found: Conformance, s: _Sample) -> None:
 
 
 def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
-    """The largest jumps at a knot of value, velocity and acceleration, each segment evaluated by itself; the last two
-    relative to what jumps."""
+    """Return the largest jumps at a knot of value, velocity and acceleration.
+
+    Each segment is evaluated by itself. The last two jumps are relative to the quantity.
+    """
     space, p, u = s.space, spline.points, spline.velocities
     h = np.diff(spline.t)
     knots = np.stack([0 * h, h], axis=1)
     points, velocities = (np.stack([x[:-1], x[1:]], axis=1) for x in (p, u))
 
     def sides(nu: int) -> tuple[Array, Array]:
-        values = evaluate(knots, knots, points, velocities, space, nu, per_curve=True)
+        values = evaluate(knots, points, velocities, space, knots, nu, per_curve=True)
         return values[:-1, 1], values[1:, 0]
 
     def jump(nu: int) -> float:
@@ -278,7 +304,7 @@ def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
 
 
 def _order(found: Conformance, s: _Sample) -> None:
-    """Of curves with not-a-knot ends through points of a smooth curve."""
+    """Check the order of convergence of curves with not-a-knot ends through points of a smooth curve."""
     space = s.space
     axes = [s.tangents(s.base) for _ in range(3)]
 

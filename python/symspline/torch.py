@@ -7,42 +7,53 @@ from typing import Any
 import numpy as np
 import torch
 
-from .adapters import fitted, movable, split
-from .curves.ends import ends_in_factors
-from .manifolds.manifold import refuse_functions
-from .spaces import Product, Space, parts_of
-from .spaces import space as space_named
+from ._adapters import fitted, movable, split
+from ._curves.ends import ends_in_factors
+from ._spaces import Product, Space, parts_of
+from ._spaces import space as space_named
+from .manifolds._manifold import refuse_functions
 
 
 def curve(
     x: Any, t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", **options: Any
 ) -> Any:
-    """The spline through points at times x: ``CubicSpline(t, points, space, ...)(x)``.
+    """Evaluate a spline through points, with derivatives in PyTorch.
 
-    It has derivatives of first order, backward and forward, with respect to x, t, points and the vectors in
-    ``bc_type``. Numbers are computed in double precision, and come back in that of the points.
+    The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the
+    vectors in `bc_type` are available in reverse and forward mode. Computations use double precision; the result has
+    the precision of the points.
 
-    Points and vectors are first moved to the nearest of the space, so that points which an optimiser moved are
-    welcome. Where many arrays are one point (projective spaces, Grassmannians), differentiate what does not
-    depend on the choice.
+    Parameters
+    ----------
+    x : tensor
+        Times, any shape.
+    t : tensor, shape (n,) or (..., n)
+        Knots.
+    points : tensor, shape (..., n, *space.point_shape)
+        Points; for a `Product` a tuple. Points and end vectors are projected onto the manifold first, so an optimiser
+        may move them off it.
+    space : Space or str
+        Space or its name.
+    bc_type : str, tuple or pair, default "natural"
+        End conditions, as for `CubicSpline`. Vectors may be tensors.
+    **options
+        Other options of `CubicSpline`.
 
-    With ``on_failure="ignore"`` or ``"warn"`` a curve that did not converge has values, of the best iterate, but its
-    derivatives are NaN: they follow from the C² condition, which it does not fulfil.
+    Returns
+    -------
+    tensor, shape ``(*batch axes, *x.shape, *space.point_shape)``
+        Points of the curve; for a `Product` a tuple.
 
-    Args:
-        x: times, any shape.
-        t: knots, shape (N+1,), or (..., N+1).
-        points: shape (..., N+1, *point_shape); for a `Product` a tuple.
-        space: the space or its name.
-        bc_type: as for `CubicSpline`; vectors may be tensors.
-        options: further options of `CubicSpline`. With ``on_failure="ignore"`` derivatives of curves that have not
-            converged are NaN.
+    Notes
+    -----
+    Where many arrays represent the same point (projective spaces, Grassmannians), differentiate only functions that do
+    not depend on the representative.
 
-    Returns:
-        Shape batch axes + x.shape + point_shape; for a `Product` a tuple.
+    With ``on_failure="ignore"`` or ``"warn"``, a curve that did not converge has the values of the best iterate. Its
+    derivatives are NaN, because they are derived from the C² condition, which the iterate does not satisfy.
     """
     space = space_named(space)
-    refuse_functions(space, "derivatives with respect to the data are not made")
+    refuse_functions(space, "derivatives with respect to the data are not available")
     if isinstance(space, Product):
         pieces = zip(
             parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
@@ -84,7 +95,7 @@ class _Curve(torch.autograd.Function):
 
 
 def _tensor(array: Any, like: Any) -> Any:
-    """A gradient in the type of its input."""
+    """Return a gradient in the type of its input."""
     if array is None or like is None:
         return None
     dtype, shape = like

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from benchmarks import cost, data, every_space, geodesics, geometries, libraries, tables, timing
 from benchmarks.walks import LONGEST, walks
+from cases import loop_over
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -83,7 +84,7 @@ SPACES = [
 
 
 @pytest.mark.parametrize("name", SPACES)
-@pytest.mark.parametrize("knots", [2, 3, 12])
+@loop_over("knots", [2, 3, 12])
 def test_fit_in_numpy_is_the_same(name, knots):
     space = ss.space(name)
     points = walks(space, 4, knots)

@@ -105,7 +105,7 @@ def test_parquet_without_pyarrow(run, fails, monkeypatch):
     assert "pip install 'symspline[parquet]'" in fails("fit out.parquet --space s:2 -o a.npz")
 
 
-def test_what_programs_write_as_csv(run):
+def test_csv_dialects_of_other_programs(run):
     """A byte order mark, Windows line ends, blanks behind commas, quotes, blank lines, no last line end."""
     text = '\ufeff"t", "x"\r\n0,1.5\r\n\r\n 1 , "2.5"\r\n\r\n3,1e-3'
     write("a.csv", text)
@@ -117,7 +117,7 @@ def test_what_programs_write_as_csv(run):
     assert ss.load("b.npz") == ss.load("a.npz")
 
 
-def test_long_files_are_read_in_pieces(run, fails):
+def test_long_files_are_read_in_chunks(run, fails):
     n = 4500
     angle = np.arange(n) / 10
     rows = [f"{i},{np.cos(a):.17g},{np.sin(a):.17g},note\n" for i, a in enumerate(angle)]

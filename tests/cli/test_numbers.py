@@ -1,4 +1,4 @@
-"""Numbers in tables are written as usual, or refused with their place."""
+"""Numbers in unusual notation are refused with their place in the table."""
 
 import pytest
 
@@ -26,14 +26,14 @@ def test_numbers_are_written_as_usual(said, cell):
     code, err = said("t,x", ["0,1", "1,2", f"{cell},3"], ["--space", "r:1"])
     assert code == 2 and f"line 4: column 't' holds {cell!r}" in err
     code, err = said("t,x", ["0,1", "1,2"], ["--space", "r:1", "--tol", "1_0"])
-    assert code == 2 and "--tol: invalid float value: '1_0'" in err
+    assert code == 2 and "--tol: invalid number value: '1_0'" in err
     code, err = said("t,x", ["0,1", "1, 2.5 "], ["--space", "r:1"])
     assert (code, err) == (0, "")
     assert main(["sample", "a.npz", "-n", "1_0", "-o", "b.csv"]) == 2
 
 
 @pytest.mark.parametrize("lon", ["1e15", "9999", "-9999"])
-def test_longitudes_that_are_none(said, lon):
+def test_invalid_longitudes(said, lon):
     code, err = said("t,lon,lat", ["0,10,20", f"1,{lon},21"], ["--lonlat"])
     assert code == 2 and "line 3: longitude" in err and "not between -360 and 360 degrees" in err
     # From zero, and from -180 counted on.

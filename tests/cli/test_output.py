@@ -30,7 +30,6 @@ def test_output_that_cannot_be_written(run, fails, monkeypatch):
     assert fails("fit a.csv --space s:2 -o b.npz") == "cannot write b.npz: it is a folder"
     assert fails("plot a.npz -o no/b.png").startswith("cannot write no/b.png")
     assert fails("sample a.npz -n 3 -o no/b.csv").startswith("cannot write no/b.csv")
-    assert fails("demo --out a.csv") == "cannot make the folder a.csv: File exists"
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert fails("fit a.csv --space s:2 -o c.npz") == "cannot write c.npz: no permission to write into ."
 
@@ -96,7 +95,7 @@ def test_interrupted(fails, monkeypatch, where):
 
     write("a.csv", AXES)
     write("a.npz", "as it was")
-    target = {"fitting": "symspline.cli.fit.fit_many", "saving": "numpy.savez"}[where]
+    target = {"fitting": "symspline.cli._fit.fit_many", "saving": "numpy.savez"}[where]
     monkeypatch.setattr(target, interrupt)
     assert fails("fit a.csv --space s:2 -o a.npz", code=130) == "interrupted"
     assert Path("a.npz").read_text() == "as it was"
@@ -116,7 +115,7 @@ def test_interrupted_by_a_signal(curves, folder):
     assert not os.listdir("out")
 
 
-def test_nobody_reads_on(curves):
+def test_closed_pipe(curves):
     line = [sys.executable, "-m", "symspline", "check", "a.npz"]
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()
@@ -137,12 +136,12 @@ def test_not_enough_memory(curves, fails, monkeypatch):
     def too_much(*_):
         raise MemoryError
 
-    monkeypatch.setattr("symspline.cli.sample.spread", too_much)
+    monkeypatch.setattr("symspline.cli._sample.spread", too_much)
     assert fails("sample a.npz -n 3 -o b.csv") == "there is not enough memory for this"
 
 
 def test_progress_on_a_terminal(curves, capsys, monkeypatch):
-    monkeypatch.setattr("symspline.cli.progress._WAIT", 0)
+    monkeypatch.setattr("symspline.cli._terminal._WAIT", 0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
     shown = capsys.readouterr().err

@@ -30,27 +30,32 @@ def columns(**more):
     return {"t": TIMES, **dict(zip(WXYZ, Q.T, strict=True)), **more}
 
 
-@pytest.mark.parametrize(
-    "names", [WXYZ, ["rot_W", "rot_X", "rot_Y", "rot_Z"], [*"wxyz"], ["q.w []", "q.x []", "q.y []", "q.z []"]]
-)
-@pytest.mark.parametrize("order", [[0, 1, 2, 3], [1, 2, 3, 0], [2, 0, 3, 1]])
-def test_quaternions_by_their_names_in_any_order(run, names, order):
-    write_table("a.csv", {"t": TIMES, **{names[i]: Q[:, i] for i in order}})
-    run("fit a.csv --space so:3 -o a.npz")
-    spline = ss.load("a.npz")
-    np.testing.assert_allclose(spline.points, TURNS.as_matrix(), atol=1e-15)
-    run("check a.npz")
-    run("sample a.npz -n 200 -o b.csv")
-    assert list(table("b.csv")) == ["t", *(names[i] for i in order)]
-    q = numbers(table("b.csv"), *names)
-    x = np.linspace(0, 5, 200)
-    np.testing.assert_allclose(Rotation.from_quat(q, scalar_first=True).as_matrix(), spline(x), atol=1e-14)
-    assert ((q[1:] * q[:-1]).sum(1) > 0.99).all() and q[0, 0] >= 0 > q[:, 0].min()
+def test_quaternions_by_their_names_in_any_order(run):
+    for names in [
+        WXYZ,
+        ["rot_W", "rot_X", "rot_Y", "rot_Z"],
+        [*"wxyz"],
+        ["q.w []", "q.x []", "q.y []", "q.z []"],
+    ]:
+        for order in [[0, 1, 2, 3], [1, 2, 3, 0], [2, 0, 3, 1]]:
+            write_table("a.csv", {"t": TIMES, **{names[i]: Q[:, i] for i in order}})
+            run("fit a.csv --space so:3 -o a.npz")
+            spline = ss.load("a.npz")
+            np.testing.assert_allclose(spline.points, TURNS.as_matrix(), atol=1e-15)
+            run("check a.npz")
+            run("sample a.npz -n 200 -o b.csv")
+            assert list(table("b.csv")) == ["t", *(names[i] for i in order)]
+            q = numbers(table("b.csv"), *names)
+            x = np.linspace(0, 5, 200)
+            np.testing.assert_allclose(
+                Rotation.from_quat(q, scalar_first=True).as_matrix(), spline(x), atol=1e-14
+            )
+            assert ((q[1:] * q[:-1]).sum(1) > 0.99).all() and q[0, 0] >= 0 > q[:, 0].min()
 
 
 def test_derivatives_of_quaternions_are_those_on_their_sphere(run, monkeypatch):
     """The sphere covers the rotations: the same curve there, with derivatives of its own."""
-    monkeypatch.setattr("symspline.cli.sample._CHUNK", 7)
+
     signs = np.where(np.cumsum(np.append(False, (Q[1:] * Q[:-1]).sum(1) < 0)) % 2, -1, 1)
     start = np.sign(Q[0, 0])
     on_sphere = ss.CubicSpline(TIMES, start * signs[:, None] * Q, "sphere:3")
@@ -85,7 +90,7 @@ def test_poses(run, space):
     np.testing.assert_allclose(turn, own, atol=1e-14)
 
 
-def test_orders_that_names_do_not_tell(run, fails):
+def test_order_of_quaternions_from_the_option(run, fails):
     write_table("a.csv", {"t": TIMES, **{f"q{i}": Q[:, i] for i in range(4)}})
     problem = fails("fit a.csv --space so:3 -o a.npz")
     assert problem.startswith(
@@ -97,7 +102,7 @@ def test_orders_that_names_do_not_tell(run, fails):
     assert ss.load("b.npz") == ss.load("a.npz")
     write_table("a.csv", columns())
     problem = fails("fit a.csv --space so:3 --quaternion xyzw -o c.npz")
-    assert problem.startswith("--quaternion xyzw makes other numbers of qw, qx, qy, qz than their names")
+    assert problem.startswith("--quaternion xyzw contradicts the names qw, qx, qy, qz")
     run("fit a.csv --space so:3 --quaternion wxyz -o a.npz")
     assert "--quaternion is for so:3, se:3" in fails("fit a.csv --space s:3 --quaternion wxyz -o c.npz")
     assert "are not the 4 numbers of a quaternion" in fails(
@@ -107,7 +112,7 @@ def test_orders_that_names_do_not_tell(run, fails):
     run("fit a.csv --space sphere:3 -o a.npz")
 
 
-def test_quaternions_that_are_rounded_or_none(run, fails):
+def test_rounded_and_invalid_quaternions(run, fails):
     write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, Q.round(6).T, strict=True))})
     run("fit a.csv --space so:3 -o a.npz")
     np.testing.assert_allclose(ss.load("a.npz").points, TURNS.as_matrix(), atol=5e-6)
@@ -115,7 +120,7 @@ def test_quaternions_that_are_rounded_or_none(run, fails):
     off[3] *= 1.001
     write_table("a.csv", {"t": TIMES, **dict(zip(WXYZ, off.T, strict=True))})
     problem = fails("fit a.csv --space so:3 -o b.npz")
-    assert problem.startswith("a.csv, line 5: the quaternion has length 1.001, not 1 (allowed: 1 ± 1e-04)")
+    assert problem.startswith("a.csv, line 5: the quaternion has length 1.001, not 1")
 
 
 # ---- TUM ----
@@ -154,9 +159,8 @@ def test_tum_of_curves_from_matrices_and_dates(run):
     assert lines[1].split()[0] == "1630195200.000000000" and lines[2].split()[0] == "1630195201.000000007"
 
 
-@pytest.mark.parametrize(
-    "text, problem",
-    [
+def test_bad_tum_trajectories(fails):
+    for text, problem in [
         ("", "a.tum is empty"),
         ("# x\n", "a.tum is empty"),
         (
@@ -167,14 +171,12 @@ def test_tum_of_curves_from_matrices_and_dates(run):
         ("0 0 0 0 0 0 0 1\n1 0 nan 0 0 0 0 1\n", "a.tum, line 2: column 'ty' holds nan"),
         ("0 0 0 0 0 0 0 1\n1 0 0 0 1 0 0 1\n", "a.tum, line 2: the quaternion has length 1.41421"),
         ("0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "a.tum, line 2: time 0.0 does not come after 0.0 in line 1"),
-    ],
-)
-def test_bad_tum_trajectories(fails, text, problem):
-    write("a.tum", text)
-    assert fails("fit a.tum --space se:3 -o a.npz").startswith(problem)
+    ]:
+        write("a.tum", text)
+        assert fails("fit a.tum --space se:3 -o a.npz").startswith(problem)
 
 
-def test_what_a_tum_trajectory_cannot_hold(run, fails):
+def test_curves_that_do_not_fit_a_tum_trajectory(run, fails):
     ss.CubicSpline(None, np.eye(3), "s:2").save("a.npz")
     assert "has poses, points of se:3" in fails("sample a.npz -n 3 -o b.tum")
     p = points_on(ss.space("se:3"), 6, step=0.4)
@@ -187,12 +189,12 @@ def test_what_a_tum_trajectory_cannot_hold(run, fails):
     assert "counted from 1970 on" in fails("sample a.npz -n 3 -o b.tum")
 
 
-@pytest.mark.parametrize("places", ["[0, 1, 2]", "[0, 1, 2, 2]", '"wxyz"', "[0, 1, 2, true]", "{}"])
-def test_places_of_quaternions_that_are_damaged(fails, places):
-    ss.CubicSpline(None, TURNS.as_matrix(), "so:3").save("a.npz")
-    np.savez(
-        "b.npz",
-        **dict(np.load("a.npz")),
-        columns=f'{{"points": ["a", "b", "c", "d"], "quaternion": {places}}}',
-    )
-    assert fails("sample b.npz -n 3 -o c.csv").startswith("b.npz is damaged: ")
+def test_damaged_quaternion_columns(fails):
+    for places in ["[0, 1, 2]", "[0, 1, 2, 2]", '"wxyz"', "[0, 1, 2, true]", "{}"]:
+        ss.CubicSpline(None, TURNS.as_matrix(), "so:3").save("a.npz")
+        np.savez(
+            "b.npz",
+            **dict(np.load("a.npz")),
+            columns=f'{{"points": ["a", "b", "c", "d"], "quaternion": {places}}}',
+        )
+        assert fails("sample b.npz -n 3 -o c.csv").startswith("b.npz is damaged: ")

@@ -1,4 +1,4 @@
-"""Recordings put right: rows out of order, times that come twice, pauses."""
+"""Recordings with unsorted rows, duplicates and gaps."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,6 @@ from curves import each, parts, points_on, same
 from tabular import numbered, table, write, write_table
 
 import symspline as ss
-from symspline.cli.recording import means
 
 
 def line(t, x=None, name="a.csv", **more):
@@ -40,7 +39,7 @@ def test_sort_within_every_curve(run):
 def test_dedup(run, fails):
     line([0, 0, 1, 2, 2, 2], [1, 3, 5, 1, 2, 6])
     out = run("fit a.csv --space r:1 --dedup first -o a.npz")
-    assert out.endswith("; 3 rows left out, whose time an earlier row has (--dedup first)\n")
+    assert out.endswith("; 3 rows omitted after another of their time (--dedup first)\n")
     assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[1], [5], [1]], "r:1")
     run("fit a.csv --space r:1 --dedup mean -o a.npz")
     assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[2], [5], [3]], "r:1")
@@ -67,17 +66,19 @@ def test_means_of_two_points_lie_halfway(run, name):
 
 
 @pytest.mark.parametrize("name", ["s:2", "so:3", "spd:3", "h:2", "gr:2,4"])
-def test_a_mean_is_where_all_ways_to_it_add_up_to_nothing(name):
+def test_logarithms_at_a_mean_add_up_to_zero(run, name):
     space = ss.space(name)
     p = points_on(space, n=9, step=0.4)
-    found = means(space, p, np.array([0, 1, 5]))
-    np.testing.assert_array_equal(found[0], p[0])
+    write_table("a.npz", {"t": np.array([0.0, *[1.0] * 4, *[2.0] * 4]), **numbered(p)})
+    run(f"fit a.npz --space '{name}' --dedup mean -o b.npz")
+    found = ss.load("b.npz").points
+    assert same(found[0], p[0])
     for centre, own in ((found[1], p[1:5]), (found[2], p[5:])):
         sums = space.log(centre, own).sum(axis=0)
         assert space.norm(centre, sums) < 1e-13 * space.rounding(centre)
 
 
-def test_points_that_have_no_mean(fails):
+def test_points_without_a_mean(fails):
     write("a.csv", "t,x,y,z\n0,1,0,0\n1,0,1,0\n1,0,-1,0\n")
     problem = fails("fit a.csv --space s:2 --dedup mean -o a.npz")
     assert problem.startswith("a.csv: points with one time are too far apart to have a mean; --dedup first")
@@ -87,7 +88,7 @@ def test_max_gap(run, fails):
     line([0, 1, 2, 12, 13, 40, 60, 61])
     out = run("fit a.csv --space r:1 --max-gap 5 -o a.npz")
     assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith(
-        "; 1 row alone between gaps left out\n"
+        "; 1 row alone between gaps omitted\n"
     )
     found = ss.load_many("a.npz")
     assert {name: spline.t.tolist() for name, spline in found.items()} == {
@@ -101,7 +102,7 @@ def test_max_gap(run, fails):
     # As long as the limit is no gap.
     run("fit a.csv --space r:1 --max-gap 27 -o a.npz")
     assert list(ss.load_many("a.npz")) == ["1"]
-    assert "every point stands alone" in fails("fit a.csv --space r:1 --max-gap 0.5 -o c.npz")
+    assert "every point is alone" in fails("fit a.csv --space r:1 --max-gap 0.5 -o c.npz")
     assert "give a gap without a unit" in fails("fit a.csv --space r:1 --max-gap 5s -o c.npz")
     assert "--max-gap soon: a duration is a number" in fails("fit a.csv --space r:1 --max-gap soon -o c.npz")
 
@@ -119,14 +120,14 @@ def test_max_gap_of_dates_and_of_named_curves(run, fails):
     )
 
 
-@pytest.mark.parametrize("option", ["--sort", "--dedup first", "--max-gap 3"])
-def test_without_times_there_is_nothing_to_go_by(fails, option):
-    write("a.csv", "x\n1\n2\n")
-    problem = fails(f"fit a.csv --space r:1 {option} -o a.npz")
-    assert problem.startswith(f"{option.split()[0]} goes by times, and there is no column of times")
+def test_options_that_need_times(fails):
+    for option in ["--sort", "--dedup first", "--max-gap 3"]:
+        write("a.csv", "x\n1\n2\n")
+        problem = fails(f"fit a.csv --space r:1 {option} -o a.npz")
+        assert problem.startswith(f"{option.split()[0]} needs times, and there is no column of times")
 
 
-def test_problems_after_repairs_name_the_row(fails):
+def test_errors_after_sorting_name_the_row(fails):
     write("a.csv", "t,x,y,z\n5,0,-1,0\n0,1,0,0\n0,1,0,0\n1,0,1,0\n")
     problem = fails("fit a.csv --space s:2 --sort --dedup first -o a.npz")
     assert "the point in line 5 and the point in line 2 of the curve" in problem

@@ -8,7 +8,6 @@ from curves import each, parts
 from tabular import numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss
-from symspline.cli import curves as files
 
 RNG = np.random.default_rng(0)
 T = np.arange(60.0)
@@ -67,17 +66,19 @@ def test_times_may_repeat(run, fails):
     run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
     near(ss.load("a.npz"), ss.make_smoothing_spline(T[:30], PLACES[::2], "sphere:2"))
     write_table("a.csv", {"t": -(T // 2), "lon": LON, "lat": LAT})
-    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith("must not fall; --sort puts rows in order")
+    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith(
+        "must not decrease; --sort puts rows in order"
+    )
     write_table("a.csv", {"t": T - T, "lon": LON, "lat": LAT})
     assert "The data lie at one time" in fails("fit a.csv --lonlat --smooth -o b.npz")
 
 
-def test_pieces_and_several_curves(run):
+def test_segments_and_several_curves(run):
     t = np.r_[T[:20], T[20:40] + 50, 200, 200, T[42:] + 300]
     write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
     out = run("fit a.csv --lonlat --smooth --max-gap 5 -o a.npz")
     assert out.startswith("a.npz: 3 curves near 58 points") and " to " in out
-    assert out.endswith("; 2 rows alone between gaps left out\n")
+    assert out.endswith("; 2 rows alone between gaps omitted\n")
     pieces = ss.fit_segments(t, PLACES, "sphere:2", max_gap=5, smooth=True)
     for found, expected in zip(ss.load_many("a.npz").values(), pieces, strict=True):
         near(found, expected)
@@ -97,7 +98,7 @@ def poses():
     ("line", "options"),
     [("", {}), ("2,3", {"lam": (2.0, 3.0)}), ("--sigma 0.02,0.1", {"criterion": "cp", "sigma": (0.02, 0.1)})],
 )
-def test_every_factor_has_its_own(run, line, options):
+def test_smoothing_parameters_per_factor(run, line, options):
     space, p = ss.space("so:3 x r:3"), poses()
     write_table("a.npz", {"t": T, **numbered(p)})
     out = run(f"fit a.npz --space '{space}' -o b.npz --smooth {line}")
@@ -107,7 +108,7 @@ def test_every_factor_has_its_own(run, line, options):
     assert f"so:3: λ {turning.lam:.3g}" in out and f"; euclidean:3: λ {place.lam:.3g}" in out
 
 
-def test_pieces_of_two_points(run):
+def test_segments_of_two_points(run):
     t = np.r_[T[:30], T[30:32] + 50, T[32:] + 200]
     write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
     for more in ("", "--robust", "--sigma 0.01"):
@@ -116,12 +117,12 @@ def test_pieces_of_two_points(run):
         assert np.abs(piece.points - PLACES[30:32]).max() < 1e-10
 
 
-def test_a_bound_is_told(run):
+def test_a_bound_is_reported(run):
     write_table("b.csv", {"t": T, "x": T**2})
     assert "(at its bound), 60 degrees" in run("fit b.csv --space r:1 --smooth reml -o b.npz")
 
 
-def test_rows_written_twice_are_one(run):
+def test_repeated_rows_are_merged(run):
     i = np.sort(np.r_[np.arange(60), 30])
     write_table("a.csv", {"t": T[i], "lon": LON[i], "lat": LAT[i]})
     # Else cross-validation would take two points that agree exactly for data without noise.
@@ -130,32 +131,29 @@ def test_rows_written_twice_are_one(run):
     near(ss.load("a.npz"), ss.make_smoothing_spline(T, PLACES, "sphere:2"))
 
 
-@pytest.mark.parametrize(
-    ("line", "says"),
-    [
+def test_contradicting_options(fails):
+    for line, says in [
         (
             "--smooth --bc-type not-a-knot",
-            "--smooth makes curves with natural ends; leave --bc-type not-a-knot out",
+            "--bc-type not-a-knot is for curves through the points; omit it with --smooth",
         ),
-        ("--smooth --method newton", "--method is for curves through the points; leave it out with --smooth"),
-        ("--smooth --tol 1e-9", "--tol is for curves through the points; leave it out with --smooth"),
-        ("--smooth --dedup mean", "with --smooth all points of one time count; leave --dedup mean out"),
+        ("--smooth --method newton", "--method is for curves through the points; omit it with --smooth"),
+        ("--smooth --tol 1e-9", "--tol is for curves through the points; omit it with --smooth"),
+        ("--smooth --dedup mean", "with --smooth all points of one time count; omit --dedup mean"),
         ("--sigma 0.1", "--sigma is for noisy data; give --smooth, too"),
         ("--robust", "--robust is for noisy data; give --smooth, too"),
         (
             "--smooth b.csv",
-            "--smooth b.csv: give gcv, reml or a number; where the table is meant, write it",
+            "--smooth b.csv: give gcv, reml or a number; write the name of the table before",
         ),
         ("--smooth 1_0", "--smooth 1_0: give gcv"),
-        ("--smooth=-1", "--smooth -1: -1 is not a number >= 0"),
-        ("--smooth nan", "--smooth nan: nan is not a number >= 0"),
+        ("--smooth=-1", "--smooth -1: -1 is not a finite number >= 0"),
+        ("--smooth nan", "--smooth nan: nan is not a finite number >= 0"),
         ("--smooth 1,2", "lam must be a number, not (1.0, 2.0)"),
         ("--smooth --sigma small", "--sigma small: give a number such as 0.1"),
-        ("--smooth --sigma 0", "--sigma 0: noise is more than 0"),
-    ],
-)
-def test_what_does_not_go_together(fails, line, says):
-    assert says in fails(f"fit a.csv --lonlat -o a.npz {line}")
+        ("--smooth --sigma 0", "--sigma 0: the standard deviation must be greater than 0"),
+    ]:
+        assert says in fails(f"fit a.csv --lonlat -o a.npz {line}")
 
 
 def test_a_bad_point_is_named_by_its_line(fails):
@@ -166,10 +164,9 @@ def test_a_bad_point_is_named_by_its_line(fails):
     assert "line 6" in fails("fit b.csv --space sphere:2 --curve id --smooth -o b.npz")
 
 
-def test_samples_have_standard_deviations(run, monkeypatch):
-    spline = ss.make_smoothing_spline(T, PLACES, "sphere:2")
+def test_samples_have_standard_deviations(run):
     run("fit a.csv --lonlat --smooth -o a.npz")
-    monkeypatch.setattr(files, "load", lambda file: spline)
+    spline = ss.load("a.npz")
     run("sample a.npz -n 7 --nu 0,1,2 -o b.npz")
     found, x = read_table("b.npz"), np.linspace(0, 59, 7)
     assert [name for name in found if name.startswith("std")] == ["std", "std_d1"]
@@ -177,12 +174,11 @@ def test_samples_have_standard_deviations(run, monkeypatch):
     assert np.array_equal(found["std_d1"], np.degrees(spline.std(x, 1)))
 
 
-def test_deviations_of_every_factor(run, monkeypatch):
+def test_deviations_of_every_factor(run):
     p = poses()
-    spline = ss.make_smoothing_spline(T, p, "so:3 x r:3")
     write_table("a.npz", {"t": T, **numbered(p)})
     run("fit a.npz --space 'so:3 x r:3' --smooth -o b.npz")
-    monkeypatch.setattr(files, "load", lambda file: spline)
+    spline = ss.load("b.npz")
     run("sample b.npz -n 7 -o c.npz")
     found = read_table("c.npz")
     for i, expected in enumerate(spline.std(np.linspace(0, 59, 7)), 1):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -35,7 +36,7 @@ def random_states(n, rng, field):
 
 
 @pytest.mark.parametrize("n", [1, 2, 5])
-@pytest.mark.parametrize("distance", DISTANCES)
+@loop_over("distance", DISTANCES)
 def test_models_there_and_back(n, distance, rng):
     x = far_points(n, distance, rng)
     size = np.sinh(distance)
@@ -166,7 +167,7 @@ def axes(rng):
     return some / np.linalg.norm(some, axis=-1, keepdims=True)
 
 
-@pytest.mark.parametrize("angle", ANGLES)
+@loop_over("angle", ANGLES)
 @pytest.mark.parametrize("scalar_first", [True, False])
 def test_quaternions_there_and_back(angle, scalar_first, rng):
     q = np.concatenate([np.full((52, 1), np.cos(angle / 2)), np.sin(angle / 2) * axes(rng)], axis=-1)
@@ -214,12 +215,12 @@ def test_quaternions_multiply_as_rotations(rng):
     assert np.abs(r @ s - t).max() <= 10 * EPS
 
 
-@pytest.mark.parametrize("order", [None, 1, 0, "wxyz", "xyzw", np.True_])
+@loop_over("order", [None, 1, 0, "wxyz", "xyzw", np.True_])
 @pytest.mark.parametrize(
     "call, value", [(convert.matrix_to_quaternion, np.eye(3)), (convert.quaternion_to_matrix, [1.0, 0, 0, 0])]
 )
-def test_the_order_must_be_said(call, value, order):
-    match = r"in doubt.* scalar_first=True for \(w, x, y, z\) or scalar_first=False for \(x, y, z, w\) as in SciPy"
+def test_quaternion_order_is_required(call, value, order):
+    match = r"required.* scalar_first=True for \(w, x, y, z\) or scalar_first=False for \(x, y, z, w\) as in SciPy"
     with pytest.raises(ss.ValidationError, match=match):
         call(value, scalar_first=order)
     with pytest.raises(ss.ValidationError, match=match):
@@ -283,7 +284,7 @@ def test_single_precision_is_enough(call, value, order):
 
 
 @each
-def test_the_first_bad_entry_is_named(call, value, order):
+def test_error_names_the_first_invalid_entry(call, value, order):
     many = np.tile(value, (2, 3, *(1,) * np.ndim(value)))
     many[1, 2] = many[0, 1] = -3.0
     with pytest.raises(
@@ -297,8 +298,8 @@ def test_the_first_bad_entry_is_named(call, value, order):
 
 
 @each
-@pytest.mark.parametrize("bad", ["text", [[1, 2], [3]], 3.0, [], [None]])
-def test_what_is_no_array_of_points(call, value, order, bad):
+@loop_over("bad", ["text", [[1, 2], [3]], 3.0, [], [None]])
+def test_invalid_point_arrays_raise(call, value, order, bad):
     with pytest.raises(ss.ValidationError):
         call(bad, **order)
 
@@ -310,15 +311,15 @@ BAD = [
         r"not on the hyperboloid.* is 2\.0, but .* is 1\.0; .*project",
     ),
     (convert.hyperboloid_to_ball, [-1.25, 0.75, 0.0], r"not on the hyperboloid.* -1\.25"),
-    (convert.hyperboloid_to_ball, [1e17, 1e17, 0.0], "too far out for the ball.*half-space"),
+    (convert.hyperboloid_to_ball, [1e17, 1e17, 0.0], "too distant for the ball.*half-space"),
     (convert.hyperboloid_to_half_space, [1.0, 0.1], "not on the hyperboloid"),
     (convert.ball_to_hyperboloid, [0.6, 0.8], r"not inside the unit ball: its length is 1\.0"),
     (convert.ball_to_half_space, [1e200, 0.8], r"not inside the unit ball: its length is 1e\+200"),
     (convert.ball_to_half_space, [1.7e308, 1.7e308], "not inside the unit ball: its length is inf"),
     (convert.half_space_to_ball, [1.0, 0.0], r"height, is 0\.0; it must be positive"),
-    (convert.half_space_to_ball, [1e30, 1.0], "too far out for the ball"),
+    (convert.half_space_to_ball, [1e30, 1.0], "too distant for the ball"),
     (convert.half_space_to_hyperboloid, [1.0, -2.0], r"height, is -2\.0; it must be positive"),
-    (convert.half_space_to_hyperboloid, [1.0, 1e-320], "too far out for the hyperboloid"),
+    (convert.half_space_to_hyperboloid, [1.0, 1e-320], "too distant for the hyperboloid"),
     (convert.half_space_to_hyperboloid, [1.0, 1j], "must be real, of shape .*, not complex"),
     (convert.basis_to_projector, [[1.0], [1.0]], r"orthonormal columns: .* 1\.000e\+00; .*qr"),
     (convert.basis_to_projector, [[1e300], [1.0]], "orthonormal columns"),
@@ -329,7 +330,7 @@ BAD = [
     (
         convert.projector_to_basis,
         [np.eye(2), np.diag([1.0, 0.0])],
-        r"projector\[1\] has rank 1, others .* 2;",
+        r"projector\[1\] has rank 1, but others .* 2;",
     ),
     (convert.projector_to_basis, np.zeros((2, 2)), "zero or empty"),
     (convert.projector_to_basis, np.zeros((0, 2, 2)), "zero or empty"),
@@ -345,7 +346,7 @@ BAD = [
 @pytest.mark.parametrize(
     ("call", "value", "message"), BAD, ids=[f"{c.__name__}-{i}" for i, (c, *_) in enumerate(BAD)]
 )
-def test_bad_points_are_refused_in_words(call, value, message):
+def test_invalid_points_raise(call, value, message):
     with pytest.raises(ss.ValidationError, match=message):
         call(value)
 

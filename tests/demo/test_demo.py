@@ -3,14 +3,15 @@
 import csv
 import sys
 
+import demo
+import hurdat
 import numpy as np
 import pytest
+import tracks
 
 import symspline as ss
-from symspline import demo, hurdat, tracks
-from symspline.cli import main
+from symspline._pairs import Segments, pairs
 from symspline.geo import from_lonlat, to_lonlat
-from symspline.pieces import Pieces, pairs
 
 HOUR = np.timedelta64(1, "h")
 
@@ -75,7 +76,7 @@ def test_jumps_are_found_where_there_are_some(splines):
     spline = splines[0]
     bent = spline.velocities.copy()
     bent[3] *= 1.01
-    pieces = Pieces(spline.space, *map(pairs, (spline.t, spline.points, bent)))
+    pieces = Segments(spline.space, *map(pairs, (spline.t, spline.points, bent)))
     _, velocity, acceleration = tracks.relative_jumps(pieces)
     assert velocity < 1e-12 and acceleration > 1e-3
     position, velocity, _ = tracks.relative_jumps(tracks.slerp_pieces(spline))
@@ -123,7 +124,7 @@ def test_great_circles_and_linear_lonlat_jump(storms, splines):
 
 
 def test_demo_writes_its_files(tmp_path, capsys):
-    assert main(["demo", "--out", str(tmp_path / "new" / "folder")]) == 0
+    assert demo.main(["--out", str(tmp_path / "new" / "folder")]) == 0
     folder = tmp_path / "new" / "folder"
     text = capsys.readouterr().out
     assert text.isascii()

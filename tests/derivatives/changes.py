@@ -1,7 +1,7 @@
 """Data that move a little, and what the curve does then by finite differences."""
 
 import numpy as np
-from cases import closed_walk, unit_tangent, walk
+from cases import closed_walk, end_conditions, unit_tangent, walk
 
 import symspline as ss
 
@@ -17,12 +17,7 @@ def data(case, end, seed=0, n=6, step=None):
     n = len(points)
     t = np.cumsum(rng.uniform(0.7, 1.3, n))
     vectors = [0.4 * unit_tangent(space, points[i], rng) for i in (0, -1)]
-    bc = {
-        "velocities": ((1, vectors[0]), (1, vectors[1])),
-        "accelerations": ((2, vectors[0]), (2, vectors[1])),
-        "mixed": ("not-a-knot", (1, vectors[1])),
-        "turned": ((2, vectors[0]), "not-a-knot"),
-    }.get(end, end)
+    bc = end_conditions(end, *vectors)
     return space, t, points, bc
 
 
@@ -74,6 +69,3 @@ def by_differences(space, t, points, bc, change, x, orders=(0, 1, 2)):
 def inside(t, rng, n=7):
     """Times between the knots that stay there when the knots move a little."""
     return np.sort(rng.uniform(t[0] + 0.05, t[-1] - 0.05, n))
-
-
-ENDS = ("natural", "clamped", "not-a-knot", "periodic", "velocities", "accelerations", "mixed", "turned")

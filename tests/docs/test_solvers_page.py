@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import solvers
-import solvers_calm
+import solvers_energy
 import solvers_figures as figures
 import solvers_uneven
 
@@ -32,17 +32,17 @@ def test_walk_table_counts_walks(monkeypatch):
     solvers.walks.cache_clear()
 
 
-def test_calm_table(monkeypatch):
-    monkeypatch.setattr(solvers_calm, "KINDS", {"walks of 0.5": solvers_calm.KINDS["walks of 0.5"]})
-    (row,) = cells(solvers_calm.calm_table(3))
-    # Of no set of points another method finds a calmer curve.
+def test_energy_table(monkeypatch):
+    monkeypatch.setattr(solvers_energy, "KINDS", {"walks of 0.5": solvers_energy.KINDS["walks of 0.5"]})
+    (row,) = cells(solvers_energy.energy_table(3))
+    # Of no set of points does another method give a lower bending energy.
     assert row[0] == "walks of 0.5" and row[2] == "0" and row[3].startswith("0 of ") and float(row[4]) <= 1.05
 
 
 def test_spaces_table(monkeypatch):
-    monkeypatch.setattr(solvers_calm, "SPACES", ("gr:2,4", "spd:3"))
-    for row in cells(solvers_calm.spaces_table(4)):
-        # Where Algorithm 1 converges, so does auto, and to no curve that bends more.
+    monkeypatch.setattr(solvers_energy, "SPACES", ("gr:2,4", "spd:3"))
+    for row in cells(solvers_energy.spaces_table(4)):
+        # Where Algorithm 1 converges, so does auto, and never to a curve of higher bending energy.
         assert int(row[1]) <= int(row[5]) and row[6] == "0" and float(row[7]) <= 1.001
 
 
@@ -91,7 +91,7 @@ def test_figures_are_drawn(tmp_path):
 
 def test_the_page_has_a_place_for_every_table():
     text = solvers.PAGE.read_text(encoding="utf-8")
-    for part in ("zigzags", "walks", "calm", "spaces", "uneven", "knots", "time"):
+    for part in ("zigzags", "walks", "energy", "spaces", "uneven", "knots", "time"):
         assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1
     for name in ("solvers_region.png", "solvers_residuals.png"):
         assert name in text and (solvers.HERE / name).stat().st_size < 200_000

@@ -43,7 +43,7 @@ def test_rates_table(monkeypatch):
 def test_from_store_to_store_in_little_memory():
     """23 MB of points become 46 MB of curves, in blocks of 1 MB of points."""
     rows = dict(cells(many_curves.store_table(40_000, 2_000)))
-    assert rows["converged"] == "40 000" and rows["same bits as without dask"] == "yes"
+    assert rows["converged"] == "40 000" and rows["bit-identical to the run without dask"] == "yes"
     most, before = map(int, re.findall(r"(\d+) MiB", rows["peak memory of a worker"]))
     assert most - before < 40
 

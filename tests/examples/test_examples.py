@@ -30,7 +30,7 @@ SAYS = {
     "tracking_gap": r"longest time between points: 12\.1 s",
     "camera_path": r"from frame to frame 57\.\d to 57\.\d mm",
     "date_line": r"speed 17\.2 m/s, course 123 degrees",
-    "wind_over_a_year": r"on 1 December \(x = 10\.5\) from 35\d degrees, and the spline of the degrees says 188",
+    "wind_over_a_year": r"on 1 December \(x = 10\.5\) from 35\d degrees, and the spline of the degrees gives 188",
     "covariances": r"grams or kilograms: \de-1[2-6] apart",
     "diffusion_tensors": r"log det off a cubic spline by \de-1[4-6]",
     "affine_shapes": r"the curve crosses the rim 1 time; largest speed 1\.16, also near \(C\)",

@@ -245,7 +245,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 @pytest.mark.parametrize("what", [None, 5, [1, 2]], ids=str)
-def test_things_that_are_no_files(what):
+def test_non_files_raise(what):
     with pytest.raises((ss.ValidationError, TypeError, OSError)):
         ss.load(what)
 

@@ -11,7 +11,7 @@ from curves import (
     S2,
     THREE,
     at_node,
-    every_space,
+    every_kind,
     failing,
     parts,
     points_on,
@@ -194,7 +194,7 @@ def test_files_of_given_velocities_that_are_damaged():
 # ---- many curves in one file ----
 
 
-@every_space
+@every_kind
 def test_many_curves_in_one_file(space):
     curves = {str(n): ss.CubicSpline(None, points_on(space, n, step=0.5), space) for n in (2, 5, 3)}
     file = io.BytesIO()

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import loop_over
 from curves import S2
 from refused import P
 
 import symspline as ss
-from symspline import disk
 
 SPLINE = ss.CubicSpline(None, P, S2)
 POSES = np.broadcast_to(np.eye(4), (3, 4, 4))
@@ -20,7 +20,7 @@ SQUARE = [[0.0, 0], [1, 0], [1, 1], [0, 1]]
 def write_nifti(file):
     pytest.importorskip("nibabel")
     volume = ss.tensors.Volume(np.eye(3)[None], np.ones((1, 1, 1), bool), np.eye(4))
-    ss.tensors.write_nifti(file, volume, "fsl")
+    ss.tensors.write_nifti(file, volume, order="fsl")
 
 
 def plot(file):
@@ -120,9 +120,7 @@ def test_long_names(tmp_path, name):
 def test_data_are_on_disk_before_the_file_is_replaced(tmp_path, name, monkeypatch):
     path, calls = tmp_path / name, []
     sync, replace = os.fsync, Path.replace
-    monkeypatch.setattr(
-        disk.os, "fsync", lambda number: (calls.append(os.fstat(number).st_size), sync(number))
-    )
+    monkeypatch.setattr(os, "fsync", lambda number: (calls.append(os.fstat(number).st_size), sync(number)))
     monkeypatch.setattr(Path, "replace", lambda a, b: (calls.append("replace"), replace(a, b))[1])
     WRITERS[name](path)
     assert calls == [path.stat().st_size, "replace"]
@@ -136,15 +134,15 @@ def test_an_older_file_stays_if_writing_fails(tmp_path, name, monkeypatch):
     def full(number):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(disk.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
         WRITERS[name](path)
     assert path.read_bytes() == b"as it was" and os.listdir(tmp_path) == [name]
 
 
 @writers
-@pytest.mark.parametrize("file", [0, 1, True, 2.0, None, b"name", ["name"]], ids=repr)
-def test_other_things_than_paths_are_refused(name, file):
+@loop_over("file", [0, 1, True, 2.0, None, b"name", ["name"]])
+def test_non_paths_raise(name, file):
     if file is None and WRITERS[name] in (plot, plot_film):
         pytest.skip("None is no file at all")
     with pytest.raises(TypeError, match=r"^file must be "):
@@ -152,8 +150,8 @@ def test_other_things_than_paths_are_refused(name, file):
 
 
 @writers
-@pytest.mark.parametrize("file", ["", "a\0b", "\ud800"], ids=ascii)
-def test_texts_that_are_no_names_are_refused(name, file):
+@loop_over("file", ["", "a\0b", "\ud800"])
+def test_invalid_file_names_raise(name, file):
     with pytest.raises(ss.ValidationError, match=r"^file "):
         WRITERS[name](file)
 
@@ -172,13 +170,13 @@ READERS = {
     "read_tum": ss.poses.read_tum,
     "read_kitti": ss.poses.read_kitti,
     "read_euroc": ss.poses.read_euroc,
-    "read_nifti": lambda file: (pytest.importorskip("nibabel"), ss.tensors.read_nifti(file, "fsl")),
+    "read_nifti": lambda file: (pytest.importorskip("nibabel"), ss.tensors.read_nifti(file, order="fsl")),
 }
 
 
 @pytest.mark.parametrize("name", READERS)
-@pytest.mark.parametrize("file", [0, 1, True, 2.0, None, b"name", ["name"]], ids=repr)
-def test_readers_take_paths_and_open_files_only(name, file):
+@loop_over("file", [0, 1, True, 2.0, None, b"name", ["name"]])
+def test_readers_reject_non_files(name, file):
     with pytest.raises(TypeError, match=r"^file must be "):
         READERS[name](file)
 
@@ -208,4 +206,4 @@ def test_damaged_text_and_nifti_files(tmp_path):
     for n in (0, 5, len(good) // 2):
         (tmp_path / "b.nii.gz").write_bytes(good[:n])
         with pytest.raises((ss.ValidationError, OSError)):
-            ss.tensors.read_nifti(tmp_path / "b.nii.gz", "fsl")
+            ss.tensors.read_nifti(tmp_path / "b.nii.gz", order="fsl")

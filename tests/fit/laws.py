@@ -1,8 +1,7 @@
 """Data for the laws of curves."""
 
 import numpy as np
-
-ENDS = ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"]
+from cases import end_conditions
 
 
 def sharpness(space):
@@ -10,13 +9,9 @@ def sharpness(space):
     return max(1.0, np.nan_to_num(space.curvature))
 
 
-def end_conditions(kind, space, p):
-    velocity = 0.8 * space.log(p[0], p[1]), 0.3 * space.log(p[-1], p[-2])
-    return {
-        "velocity": ((1, velocity[0]), (1, velocity[1])),
-        "acceleration": ((2, velocity[0]), (2, velocity[1])),
-        "mixed": ("not-a-knot", (1, velocity[1])),
-    }.get(kind, kind)
+def ends_along(kind, space, p):
+    """End conditions with vectors along the chords at the ends."""
+    return end_conditions(kind, 0.8 * space.log(p[0], p[1]), 0.3 * space.log(p[-1], p[-2]))
 
 
 def knots(kind, n, rng):

@@ -2,8 +2,21 @@
 
 import numpy as np
 import pytest
-from cases import CASES, EPS, QUOTIENTS, apart, base_point, closed_walk, condition, unit_tangent, walk
-from laws import ENDS, end_conditions, knots, sharpness
+from cases import (
+    CASES,
+    ENDS,
+    EPS,
+    QUOTIENTS,
+    apart,
+    base_point,
+    closed_walk,
+    condition,
+    every_family,
+    loop_over,
+    unit_tangent,
+    walk,
+)
+from laws import ends_along, knots, sharpness
 from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
@@ -21,8 +34,8 @@ def rng():
     return np.random.default_rng(20180308)
 
 
-@every
-@pytest.mark.parametrize("ends", ["natural", "not-a-knot", "periodic", "velocity"])
+@every_family
+@loop_over("ends", ["natural", "not-a-knot", "periodic", "velocity"])
 def test_solvers_agree(case, ends, rng):
     space = case.space
     if case.few and ends != "periodic":
@@ -32,7 +45,7 @@ def test_solvers_agree(case, ends, rng):
     for step in (0.3,) if case.few else (1e-3, 0.3, 1.0 / sharpness(space)):
         p = (closed_walk if ends == "periodic" else walk)(space, step, 14, rng)
         t = knots("random", len(p), rng)
-        bc = end_conditions(ends, space, p)
+        bc = ends_along(ends, space, p)
         one, *others = (
             ss.CubicSpline(t, p, space, bc_type=bc, method=m, tol=1e-13).velocities
             for m in ("fixed-point", "quasi-newton", "newton")
@@ -42,7 +55,7 @@ def test_solvers_agree(case, ends, rng):
             assert np.abs(one - other).max() <= 2e-12 * np.abs(one).max() * condition(space, p)
 
 
-@every
+@every_family
 def test_the_spline_commutes_with_isometries(case, rng):
     space = case.space
     p = walk(space, 0.6, 9, rng)
@@ -61,7 +74,7 @@ def test_the_spline_commutes_with_isometries(case, rng):
         assert apart(space, there(x), move(here(x))) <= allowed
 
 
-@every
+@every_family
 def test_reversing_time_reverses_the_curve(case, rng):
     space = case.space
     p = walk(space, 0.7, 9, rng)
@@ -79,7 +92,7 @@ def test_reversing_time_reverses_the_curve(case, rng):
             assert np.abs(forth(x, nu) - sign * there).max() <= factor * allowed
 
 
-@every
+@every_family
 def test_derivatives_agree_with_differences(case, rng):
     space = case.space
     p = walk(space, 0.8, 7, rng)
@@ -116,9 +129,7 @@ def smooth_curve(space, t, closed):
 
 
 @every_smooth
-@pytest.mark.parametrize(
-    ("ends", "order"), [("velocity", 4), ("not-a-knot", 4), ("periodic", 4), ("natural", 2)]
-)
+@loop_over(("ends", "order"), [("velocity", 4), ("not-a-knot", 4), ("periodic", 4), ("natural", 2)])
 def test_a_smooth_curve_is_recovered(case, ends, order):
     space = case.space
     x = np.linspace(0, 1, 2001)
@@ -143,8 +154,8 @@ def test_a_smooth_curve_is_recovered(case, ends, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
-@every
-def test_a_batch_is_its_curves_bit_for_bit(case, rng):
+@every_family
+def test_batches_are_bit_identical_to_single_curves(case, rng):
     space = case.space
     # Of long steps every way to a curve is tried, which takes its time where there are many dimensions.
     longest = 1.5 if space.dim <= 4 else 0.8
@@ -152,7 +163,7 @@ def test_a_batch_is_its_curves_bit_for_bit(case, rng):
     t = knots("random", 11, rng)
     # In any order, in one segment (from curve to curve too), and dense over all.
     times = rng.uniform(t[0], t[-1], 37), np.linspace(t[2], t[3], 40)[1:-1], np.linspace(t[0], t[-1], 331)
-    for ends in ("natural", "not-a-knot") if case.face and not case.few else ("not-a-knot",):
+    for ends in ("natural", "not-a-knot") if case.interface and not case.few else ("not-a-knot",):
         batch = ss.CubicSpline(t, p, space, bc_type=ends)
         values = [(x, nu, batch(x, nu)) for x in times for nu in range(3)]
         for i, points in enumerate(p):
@@ -163,14 +174,14 @@ def test_a_batch_is_its_curves_bit_for_bit(case, rng):
 
 
 @pytest.mark.parametrize("ends", ENDS)
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 17])
+@loop_over("n", [2, 3, 4, 5, 17])
 def test_flat_space_is_scipy(ends, n, rng):
     space = ss.Euclidean(3)
     t = np.cumsum(rng.uniform(0.2, 2, n))
     p = rng.standard_normal((n, 3))
     if ends == "periodic":
         p[-1] = p[0]
-    bc = end_conditions(ends, space, p)
+    bc = ends_along(ends, space, p)
     ours, flat = ss.CubicSpline(t, p, space, bc_type=bc), FlatSpline(t, p, bc_type=bc)
     x = np.linspace(t[0], t[-1], 101)
     h = np.diff(t).min()

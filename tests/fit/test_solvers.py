@@ -1,8 +1,12 @@
 """The solvers: one step in flat space, quadratic convergence, points far apart, and never silent failure."""
 
+import warnings
+from itertools import islice
+
 import numpy as np
 import pytest
-from cases import EPS, closed_walk, condition, jumps, walk, zigzag, zigzag_on
+from algorithm_1 import sweeps
+from cases import EPS, closed_walk, condition, jumps, loop_over, walk, zigzag, zigzag_on
 from curves import S2, same
 from scipy.interpolate import CubicSpline as FlatSpline
 
@@ -62,7 +66,7 @@ def test_newton_takes_one_step_in_flat_space(dim, n, rng):
         ("cp:2", 0.6),
     ],
 )
-@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic"])
+@loop_over("ends", ["natural", "clamped", "not-a-knot", "periodic"])
 def test_newton_converges_quadratically(name, step, ends, rng):
     space = ss.space(name)
     p = (closed_walk if ends == "periodic" else walk)(space, step, 12, rng)
@@ -96,7 +100,7 @@ def test_fixed_point_is_linear_with_a_rate_of_one_half(rng):
 
 
 @pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "mixed"])
-@pytest.mark.parametrize("n", [4, 5, 12])
+@loop_over("n", [4, 5, 12])
 def test_quasi_newton_takes_one_step_in_flat_space(n, ends, rng):
     t, p = np.cumsum(rng.uniform(0.2, 2, n)), rng.standard_normal((n, 2))
     if ends == "periodic":
@@ -170,7 +174,7 @@ def test_auto_is_quasi_newton_where_that_is_quick(rng):
     ("points", "method"),
     [(zigzag(1.0), "quasi-newton"), (zigzag(2.0), "fixed-point"), (zigzag(2.8), "trust-region")],
 )
-def test_auto_says_which_solver_got_there(points, method):
+def test_auto_reports_the_successful_solver(points, method):
     spline = ss.CubicSpline(None, points, S2)
     assert spline.report.method == method
     assert max(jumps(spline)) < 1
@@ -197,6 +201,18 @@ def test_in_many_dimensions_the_search_costs_a_few_times_the_first_solution(name
     # Nothing but the C² condition was evaluated: steps of Newton's method would have cost thousands of evaluations.
     assert auto.iterations <= 5 * max(first, 60)
     assert {"newton", "homotopy", "trust-region"} <= set(auto.skipped)
+
+
+def test_algorithm_1_gets_more_sweeps_if_no_other_solver_can_be_afforded():
+    """Six subspaces far apart, for which quasi-Newton stagnates and Algorithm 1 converges slowly."""
+    space = ss.space("gr:6,80")
+    rng = np.random.default_rng(3)
+    points = np.stack([space.random_point(rng) for _ in range(6)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ss.FarPointsWarning)
+        report = ss.CubicSpline(None, points, space).report
+    assert report.converged and report.method == "fixed-point"
+    assert report.iterations > 2000 and "newton" in report.skipped
 
 
 def test_nothing_is_left_out_in_few_dimensions():
@@ -237,7 +253,7 @@ def test_auto_converges_wherever_fixed_point_does(name, part):
     assert (auto | ~fixed).all()
 
 
-@pytest.mark.parametrize("step", np.arange(0.2, 3.11, 0.1))
+@loop_over("step", np.arange(0.2, 3.11, 0.1))
 def test_auto_converges_on_zigzags_wherever_fixed_point_does(step):
     for n in (5, 10, 20):
         auto, fixed = (fit(zigzag(step, n), S2, method=m).report for m in ("auto", "fixed-point"))
@@ -358,9 +374,122 @@ def test_auto_never_bends_more_than_a_patient_quasi_newton():
     assert auto.bending_energy() <= patient.bending_energy() * (1 + 1e-9)
 
 
-def test_a_homotopy_that_does_not_arrive_says_so():
+def test_unfinished_homotopy_is_reported():
     i = np.arange(8)
     p = ss.geo.from_lonlat(np.degrees(i % 2), np.degrees(0.1 * (i - 3.5)))
     t = np.cumsum([0, 20, 1, 20, 1, 20, 1, 20])
     with pytest.raises(ss.ConvergenceError, match=r"the homotopy had not come to these points .*method"):
         ss.CubicSpline(t, p, S2, method="homotopy")
+
+
+# ---- Algorithm 1 of the paper ----
+
+
+# Table 1 of the paper, and parts of it.
+TABLE_1 = [
+    *("r:3", "sphere:2", "sphere:3", "h:2", "gr:2,5", "o:3", "so:3", "so:4"),
+    *("cp:2", "rp:2", "cgr:2,4", "u:2", "su:3", "spd:3", "hpd:2"),
+]
+
+
+def iterate(space, p, count, ends="natural", t=None):
+    """The velocities that `method="fixed-point"` has after `count` sweeps, in the units of the paper."""
+    bc_type = ends if isinstance(ends, str) else ((1, 3 * ends[0]), (1, 3 * ends[1]))
+    options = {"bc_type": bc_type, "method": "fixed-point", "tol": 0.0, "on_failure": "ignore"}
+    return ss.CubicSpline(t, p, space, max_iter=count + 1, **options).velocities / 3
+
+
+def given_ends(space, p):
+    return 0.3 * space.log(p[0], p[1]), -0.4 * space.log(p[-1], p[-2])
+
+
+@pytest.mark.parametrize("name", TABLE_1)
+@pytest.mark.parametrize("ends", ["natural", "clamped"])
+def test_every_iterate_is_that_of_the_paper(name, ends):
+    space, rng = ss.space(name), np.random.default_rng(3)
+    for nodes, step in ((3, 0.9), (7, 0.5), (6, 1.2)):
+        p = walk(space, step, nodes, rng, turn=3.0)
+        pair = "natural" if ends == "natural" else given_ends(space, p)
+        tol = 1e-14 + 4 * EPS * condition(space, p)
+        for count, (v, _) in enumerate(islice(sweeps(space, p, pair), 30)):
+            off = space.norm(p, iterate(space, p, count, pair) - v).max()
+            assert off <= tol, (nodes, step, count)
+
+
+def test_number_of_sweeps_on_the_example_of_the_paper():
+    # Appendix D: (1, 0, 0), (0, 1, 0), (0, 0, 1).
+    def needed(tol):
+        return next(k for k, (_, delta) in enumerate(sweeps(S2, np.eye(3))) if delta <= tol)
+
+    report = ss.CubicSpline(None, np.eye(3), S2, method="fixed-point").report
+    # The residual of the report is ‖δ‖ in other units; both fall by the same factor in a sweep.
+    assert abs(report.iterations - needed(1e-13)) <= 8
+    assert report.converged and report.rate < 0.6
+
+
+@pytest.mark.parametrize("step", [1.5, 2.0, 2.5])
+def test_zigzags_converge_to_the_curve_of_the_transcription(step):
+    # An exact zigzag is symmetric, and its symmetric curve repels the iteration: rounding would decide where it goes.
+    rng = np.random.default_rng(1)
+    p = S2.project(zigzag(step) + 0.03 * rng.standard_normal((20, 3)))
+    spline = ss.CubicSpline(None, p, S2, method="fixed-point")
+    found = next(islice(sweeps(S2, p), spline.report.iterations - 1, None))[0]
+    assert np.abs(found - spline.velocities / 3).max() <= 1e-9
+    auto = ss.CubicSpline(None, p, S2)
+    assert auto.bending_energy() <= spline.bending_energy() * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("step", [1.5, 2.0, 2.5])
+def test_auto_finds_a_curve_that_bends_less_than_that_of_quasi_newton(step):
+    p = zigzag(step)
+    symmetric = ss.CubicSpline(None, p, S2, method="newton").bending_energy()  # by quadrature, to 1e-4
+    auto = ss.CubicSpline(None, p, S2)
+    assert auto.bending_energy() < 0.98 * symmetric
+    assert auto.bending_energy() < auto.report.alternative_energy <= symmetric * (1 + 1e-4)
+
+
+@pytest.mark.parametrize("kind", ["not-a-knot", "acceleration", "periodic"])
+def test_other_ends_and_unequal_knots_converge_to_the_same_curve(kind):
+    rng = np.random.default_rng(5)
+    space = ss.space("so:3")
+    p = walk(space, 0.5, 9, rng)
+    t = np.cumsum(rng.uniform(0.5, 1.5, 9))
+    bc_type = kind
+    if kind == "periodic":
+        p[-1] = p[0]
+    if kind == "acceleration":
+        bc_type = ((2, 0.4 * space.log(p[0], p[1])), (2, 0.3 * space.random_tangent(rng, p[-1])))
+    one, other = (
+        ss.CubicSpline(t, p, space, bc_type=bc_type, method=m) for m in ("fixed-point", "quasi-newton")
+    )
+    assert np.abs(one.velocities - other.velocities).max() <= 1e-11
+
+
+def test_far_sets_converge_where_the_transcription_does():
+    rng = np.random.default_rng(8)
+    found = 0
+    for name in ("sphere:2", "so:3", "cp:1", "gr:2,4"):
+        space = ss.space(name)
+        for _ in range(3):
+            p = walk(space, 0.75 * min(space.injectivity_radius, np.pi), 6, rng, turn=100.0)
+            try:
+                literal = any(delta <= 1e-12 for _, delta in islice(sweeps(space, p), 400))
+            except ss.ValidationError:
+                continue
+            if literal:
+                found += 1
+                spline = ss.CubicSpline(None, p, space, method="fixed-point", on_failure="ignore")
+                # The limit may have a control point past the cut locus, which is another error.
+                passes = np.isnan(spline.velocities).any()
+                assert spline.report.converged or passes
+    assert found >= 6
+
+
+def test_an_undefined_logarithm_names_its_segment():
+    # With v₀ = 0 and v₂ = 1 towards −p₁, the control point of the last segment is opposite to p₁ in the first sweep.
+    p = np.array([[0.0, 0, 1], [1, 0, 0], [np.cos(3.0), np.sin(3.0), 0]])
+    towards = np.array([-np.sin(3.0), np.cos(3.0), 0.0])
+    ends = ("clamped", (1, -3 * (np.pi - 3.0) * towards))
+    options = {"bc_type": ends, "method": "fixed-point", "max_iter": 1}
+    with pytest.raises(ss.CutLocusError, match=r"control points between points\[1\] and points\[2\]"):
+        ss.CubicSpline(None, p, S2, **options)

@@ -5,14 +5,15 @@ import math
 import numpy as np
 import pytest
 from cases import (
-    CASES,
     EPS,
     QUADRICS,
     QUOTIENTS,
     apart,
     base_point,
     condition,
+    every_family,
     has_metric,
+    loop_over,
     steep_tangent,
     unit_tangent,
     walk,
@@ -21,13 +22,7 @@ from scipy.interpolate import BSpline as FlatBSpline
 
 import symspline as ss
 
-every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-
-
-DEGREES = range(1, 6)
-
-
-every_degree = pytest.mark.parametrize("degree", DEGREES)
+every_degree = loop_over("degree", range(1, 6))
 
 
 @pytest.fixture
@@ -75,7 +70,7 @@ def some_knots(kind, degree):
     return clamped(interior, degree)
 
 
-@pytest.mark.parametrize("kind", [*INTERIOR, "not clamped", "one end"])
+@loop_over("kind", [*INTERIOR, "not clamped", "one end"])
 @every_degree
 def test_flat_space_is_scipy(kind, degree, rng):
     if kind == "double" and degree == 1:
@@ -114,7 +109,7 @@ def test_flat_bezier_curves_are_bernstein_polynomials(degree, rng):
 # ---- every space ----
 
 
-@every
+@every_family
 def test_a_cubic_is_a_segment_of_the_spline(case, rng):
     space = case.space
     p = walk(space, 0.6, 6, rng)
@@ -136,7 +131,7 @@ def test_a_cubic_is_a_segment_of_the_spline(case, rng):
         assert np.abs(ours - theirs).max() <= 100 * allowed / h.min() ** nu + 1e-11 * np.abs(theirs).max()
 
 
-@every
+@every_family
 @every_degree
 def test_clamped_ends(case, degree, rng):
     space = case.space
@@ -152,7 +147,7 @@ def test_clamped_ends(case, degree, rng):
         assert np.abs(velocity - degree / h * leg).max() <= 10 * degree * allowed
 
 
-@every
+@every_family
 @every_degree
 def test_control_points_on_a_geodesic(case, degree, rng):
     space = case.space
@@ -169,7 +164,7 @@ def test_control_points_on_a_geodesic(case, degree, rng):
     assert np.abs(curve(x, nu=2)).max() <= 300 * allowed
 
 
-@every
+@every_family
 def test_points_stay_on_the_space(case, rng):
     space = case.space
     curve = ss.BSpline(clamped([1.0, 1.0, 2.0], 3), control_points(space, 7, rng), 3, space)
@@ -180,8 +175,8 @@ def test_points_stay_on_the_space(case, rng):
     assert np.allclose(curve.speed(x), space.norm(curve(x), curve(x, nu=1)), rtol=1e-12)
 
 
-@every
-@pytest.mark.parametrize("degree", [2, 3, 5])
+@every_family
+@loop_over("degree", [2, 3, 5])
 def test_derivatives_agree_with_differences(case, degree, rng):
     space = case.space
     knots = clamped([0.7, 1.9], degree)
@@ -249,7 +244,7 @@ def test_derivatives_far_apart(name, step, rng):
         assert np.abs((4 * half2 - d2) / 3 - acceleration).max() <= 1e-4 * scale
 
 
-@every
+@every_family
 def test_curves_commute_with_isometries(case, rng):
     space = case.space
     points = control_points(space, 6, rng)
@@ -290,8 +285,8 @@ def test_the_array_of_a_point_does_not_matter(name, rng):
 # ---- at knots ----
 
 
-@every
-@pytest.mark.parametrize(("degree", "times"), [(2, 1), (3, 1), (3, 2), (5, 1), (5, 4)])
+@every_family
+@loop_over(("degree", "times"), [(2, 1), (3, 1), (3, 2), (5, 1), (5, 4)])
 def test_curves_are_c1(case, degree, times, rng):
     """At knots that are repeated less often than the degree."""
     space = case.space
@@ -306,7 +301,7 @@ def test_curves_are_c1(case, degree, times, rng):
     assert np.abs(jump).max() <= 30 * degree * allowed
 
 
-@every
+@every_family
 def test_corners(case, rng):
     """At a knot repeated as often as the degree the curve goes through a control point, and has a velocity
     from either side."""
@@ -332,7 +327,7 @@ def test_corners(case, rng):
             assert np.abs(curve(1.0, nu=2) - bend).max() <= 300 * allowed
 
 
-@every
+@every_family
 def test_curves_that_jump(case, rng):
     """At a knot repeated once more often than the degree."""
     space = case.space

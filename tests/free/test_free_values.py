@@ -217,6 +217,6 @@ def test_times_outside(x, match):
 
 
 @pytest.mark.parametrize("nu", [3, -1, 1.5, "1", None, [1]])
-def test_derivatives_that_there_are_not(nu):
+def test_missing_derivatives_raise(nu):
     with pytest.raises(ss.ValidationError, match=r"nu must be 0, 1 or 2, not "):
         ss.BezierCurve(P, "sphere:2")(0.5, nu=nu)

@@ -13,7 +13,6 @@ MODULES = [
     "symspline",
     "symspline.convert",
     "symspline.geo",
-    "symspline.hurdat",
     "symspline.manifolds",
     "symspline.poses",
     "symspline.quantum",
@@ -29,6 +28,8 @@ NEEDS = {"symspline.xarray": "xarray"}
 LEFT_OUT = {"set_num_threads", "show_config", "from_geomstats", "from_pymanopt", "map"}
 # Made by `make_smoothing_spline` only.
 LEFT_OUT |= {"SmoothingSpline"}
+# An abstract class.
+LEFT_OUT |= {"Curve"}
 
 P = np.eye(3)
 T = np.array([0.0, 1.0, 3.0])
@@ -61,7 +62,6 @@ def objects():
         "BezierCurve": ss.BezierCurve(P, "sphere:2"),
         "AffineMorph": ss.shapes.AffineMorph(T, [SQUARE, 2 * SQUARE, SQUARE + 1]),
         "Report": sphere.report,
-        "Storm": ss.hurdat.read_sample()[0],
         "Stiefel": ss.Stiefel(2, 3),
     }
     return found | {f"space {space}": space for space in SPACES}
@@ -177,7 +177,6 @@ def pools(things):
         "landmarks": [[SQUARE, 2 * SQUARE]],
         "tensors": [SPD],
         "order": ["dipy", "fsl"],
-        "text": [ss.hurdat.__doc__, "AL012021, ANA, 1,\n20210522, 0600,  , SS, 33.9N, 59.0W,  40, 1005"],
         "edges": [T],
         "operators": [np.eye(2)[None]],
         "lam": [0.1, None],

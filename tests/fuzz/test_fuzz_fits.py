@@ -156,7 +156,7 @@ def test_fit_many(data):
     )
     if isinstance(fitted, Refusal):
         note(repr(fitted.error))
-        fitted = getattr(fitted.error, "spline", [])
+        fitted = getattr(fitted.error, "spline", None) or []
     for spline, (t, p) in zip(fitted, curves if fitted else [], strict=True):
         use(draw, spline, mood, more.get("check", True) is True)
         own = {key: more[key] for key in more if key in ("method", "tol", "max_iter", "check")}
@@ -184,7 +184,7 @@ def test_evaluate(data):
     if mood == ODD:
         p, u, nu = (draw(nonsense) if rarely(draw) else value for value in (p, u, nu))
     values = attempt(
-        lambda: ss.evaluate(x, t, p, u, space, nu, extrapolate=policy), x, t, p, u, wrong_types=mood == ODD
+        lambda: ss.evaluate(t, p, u, space, x, nu, extrapolate=policy), x, t, p, u, wrong_types=mood == ODD
     )
     if not isinstance(values, Refusal):
         for factor, value in zip(parts(space), parts(values), strict=True):

@@ -12,8 +12,8 @@ from fuzz.fits import knots
 from fuzz.outcomes import Refusal, attempt
 from fuzz.tables import STEPS
 from fuzz.values import BAD
-from symspline.cli import times
-from symspline.cli.errors import Problem
+from symspline.cli import _times as times
+from symspline.cli._errors import Problem
 
 steps = st.one_of(
     st.sampled_from(STEPS),

@@ -77,9 +77,9 @@ def test_noisy_tracks_are_smoothed():
 @pytest.mark.parametrize(
     "change, what",
     [
-        (lambda t: {"by": "ship"}, "there is no column 'ship'; the columns are mmsi, when, lon, lat"),
-        (lambda t: {"columns": ("x", "lat")}, "there is no column 'x'"),
-        (lambda t: {"time": "lon"}, "the times 'lon' are no dates"),
+        (lambda t: {"by": "ship"}, "column 'ship' does not exist; the columns are mmsi, when, lon, lat"),
+        (lambda t: {"columns": ("x", "lat")}, "column 'x' does not exist"),
+        (lambda t: {"time": "lon"}, "column 'lon' must hold dates"),
         (
             lambda t: {"duplicates": "raise"},
             r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both",
@@ -87,21 +87,21 @@ def test_noisy_tracks_are_smoothed():
         (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
         (lambda t: {"smooth": 0.5}, "smooth must be True or False, not 0.5"),
         (lambda t: {"smooth": True, "duplicates": "mean"}, "leave duplicates='mean' out"),
-        (lambda t: {"smooth": True, "weights": [1]}, "weights go with rows, and resample takes none"),
+        (lambda t: {"smooth": True, "weights": [1]}, "resample does not support weights"),
         (
             lambda t: {"max_gap": 6},
-            r"no track has 2 places without a pause longer than max_gap=6, in seconds",
+            r"every track has fewer than 2 positions between gaps longer than max_gap=6 seconds",
         ),
         (
             lambda t: {"frame": t.assign(mmsi=t["mmsi"].where(t.index != 3))},
-            r"1 rows have no 'mmsi', the first of them row 8; leave them out: frame.dropna\(subset=\['mmsi'\]\)",
+            r"1 rows have no 'mmsi', the first of them row 8; drop them by frame.dropna\(subset=\['mmsi'\]\)",
         ),
         (lambda t: {"frame": t.assign(lat=np.nan)}, "rows have no 'lat', the first of them row 0"),
         (lambda t: {"frame": t.assign(lat=100.0)}, r"lat\[0\] is 100.0: lat must be from -90 to 90 degrees"),
-        (lambda t: {"frame": t.to_numpy()}, "frame must be a table of pandas"),
+        (lambda t: {"frame": t.to_numpy()}, "frame must be a pandas DataFrame"),
     ],
 )
-def test_what_cannot_be_resampled_is_refused(change, what):
+def test_invalid_resampling_raises(change, what):
     table = ais()
     arguments = {
         "frame": table,
@@ -129,7 +129,7 @@ def test_rows_of_curves_that_did_not_converge_are_nan(smooth):
     found = geo.resample(table, "1h", on_failure="ignore", **options)
     wild = found["mmsi"] == 244
     assert found.loc[wild, ["lon", "lat", "sog", "cog"]].isna().all(axis=None)
-    whose = "mmsi 244, the piece from 2026-01-01T00:00:00 on"
+    whose = "mmsi 244, the segment from 2026-01-01T00:00:00 on"
     with pytest.raises(ss.ConvergenceError, match=whose) as error:
         geo.resample(table[12:], "1h", **options)
     assert len(error.value.spline) == 1

@@ -21,15 +21,15 @@ def test_array_api_strict(space):
     plain, expected = ss.fit(None, p, space)
     assert type(u) is type(strict.asarray(p)) and u.dtype == strict.asarray(plain).dtype
     assert same(np.asarray(u), plain) and report == expected
-    values = ss.evaluate(strict.asarray(X), strict.asarray(np.arange(6.0)), strict.asarray(p), u, space, nu=1)
-    assert type(values) is type(u) and same(np.asarray(values), ss.evaluate(X, None, p, plain, space, nu=1))
-    for mixed in (ss.evaluate(strict.asarray(X), None, p, plain, space), ss.evaluate(X, None, p, u, space)):
-        assert type(mixed) is type(u) and same(np.asarray(mixed), ss.evaluate(X, None, p, plain, space))
+    values = ss.evaluate(strict.asarray(np.arange(6.0)), strict.asarray(p), u, space, strict.asarray(X), nu=1)
+    assert type(values) is type(u) and same(np.asarray(values), ss.evaluate(None, p, plain, space, X, nu=1))
+    for mixed in (ss.evaluate(None, p, plain, space, strict.asarray(X)), ss.evaluate(None, p, u, space, X)):
+        assert type(mixed) is type(u) and same(np.asarray(mixed), ss.evaluate(None, p, plain, space, X))
 
 
 def test_jax():
     u, _ = ss.fit(None, jnp.asarray(POINTS), S2)
-    values = ss.evaluate(jnp.asarray(X), None, jnp.asarray(POINTS), u, S2)
+    values = ss.evaluate(None, jnp.asarray(POINTS), u, S2, jnp.asarray(X))
     assert isinstance(u, jnp.ndarray) and isinstance(values, jnp.ndarray) and values.shape == (2, 3, 3)
     # JAX has single precision unless it is told otherwise.
     expected = ss.CubicSpline(None, POINTS, S2)
@@ -41,14 +41,14 @@ def test_parts_of_a_product():
     p = POINTS, np.arange(12.0).reshape(2, 6, 1)
     u, _ = ss.fit(None, tuple(map(strict.asarray, p)), "sphere:2 x r:1")
     assert [type(part) for part in u] == [type(strict.asarray(X))] * 2
-    values = ss.evaluate(X, None, p, u, "sphere:2 x r:1")
+    values = ss.evaluate(None, p, u, "sphere:2 x r:1", X)
     assert [part.shape for part in values] == [(2, 3, 3), (2, 3, 1)]
     np.testing.assert_allclose(np.asarray(values[1])[0, :, 0], X, atol=1e-14)
 
 
 def test_numpy_stays():
     u, _ = ss.fit(None, POINTS.tolist(), S2)
-    assert type(u) is np.ndarray and type(ss.evaluate(0.5, None, POINTS, u, S2)) is np.ndarray
+    assert type(u) is np.ndarray and type(ss.evaluate(None, POINTS, u, S2, 0.5)) is np.ndarray
     u, _ = ss.fit(None, xr.DataArray(POINTS), S2)
     assert type(u) is np.ndarray
 
@@ -65,8 +65,8 @@ def test_blocks_of_dask_are_refused(wrap):
         (lambda: ss.CubicSpline(None, wrap(POINTS), S2), "points"),
         (lambda: ss.fit(wrap(np.arange(6.0)), POINTS, S2), "t"),
         (lambda: ss.fit(wrap(dates), POINTS, S2), "t"),
-        (lambda: ss.evaluate(wrap(X), None, POINTS, u, S2), "x"),
-        (lambda: ss.evaluate(X, None, POINTS, wrap(u), S2), "u"),
+        (lambda: ss.evaluate(None, POINTS, u, S2, wrap(X)), "x"),
+        (lambda: ss.evaluate(None, POINTS, wrap(u), S2, X), "velocities"),
         (lambda: spline(wrap(X)), "x"),
         (lambda: S2.distance(POINTS, wrap(POINTS)), "q"),
     ):

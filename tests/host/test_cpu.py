@@ -44,7 +44,7 @@ def test_a_module_built_for_any_processor_is_let_in(folder):
 
 
 @pytest.mark.parametrize("content, other", [(FOR_ANY, "v3"), (FOR_V3, "plain")])
-def test_what_is_not_there_cannot_be_forced(folder, monkeypatch, content, other):
+def test_missing_modules_cannot_be_forced(folder, monkeypatch, content, other):
     monkeypatch.setattr(_cpu, "_has_v3", lambda: True)
     (folder / NAMED["_core"]).write_bytes(content)
     monkeypatch.setenv("SYMSPLINE_CPU", other)
@@ -72,7 +72,7 @@ def test_of_two_the_one_that_suits(folder, monkeypatch, has_v3, asked, name):
     assert _cpu._choose(folder)[0] == (name and folder / NAMED[name])
 
 
-def test_what_the_processor_lacks_cannot_be_forced(folder, monkeypatch):
+def test_unsupported_modules_cannot_be_forced(folder, monkeypatch):
     monkeypatch.setattr(_cpu, "_says_v3", lambda plain: False)
     for name in NAMED.values():
         (folder / name).touch()

@@ -17,13 +17,13 @@ import numpy as np
 
 import symspline as ss
 
-resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
 refused = (ss.ValidationError, ss.CutLocusError, ss.ConvergenceError, MemoryError)
 """
 
 
 def run(script, timeout=100):
-    """What a script prints in a process with 4 GB of address space."""
+    """What a script prints in a process with 2 GB of address space."""
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", LIMITED + textwrap.dedent(script)],
         capture_output=True,
@@ -57,6 +57,52 @@ def test_names_of_huge_spaces_do_not_abort():
     """
     count, made = map(int, run(script, 300).split())
     assert count > 160 and made > 60
+
+
+def test_hostile_files_do_not_abort():
+    """Arrays, names and sizes in NPZ files that would take more memory than there is, or are nonsense."""
+    script = """
+    import io, struct, zipfile
+
+    good = io.BytesIO()
+    ss.CubicSpline(None, np.eye(3), "sphere:2").save(good)
+    arrays = dict(np.load(io.BytesIO(good.getvalue())))
+
+    def npy(array):
+        file = io.BytesIO()
+        np.save(file, array)
+        return file.getvalue()
+
+    def header(shape, descr="<f8"):
+        text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + chr(10)
+        return b"\\x93NUMPY\\x01\\x00" + struct.pack("<H", len(text)) + text.encode()
+
+    families = ("sphere", "r", "so", "spd", "gl", "gr:1,", "x")
+    contents = [npy(np.array(f"{f}:{n}")) for f in families for n in (10**4, 10**7, 10**15, -1)]
+    contents += [npy(np.zeros(shape, kind)) for shape in [(), (0,), (2**20,), (3, 3), (1,) * 20]
+                 for kind in ("f8", "c16", "U4", "M8[s]", "i1", "?")]
+    contents += [header(shape) for shape in [(2**40,), (3, 2**33), (-5,), (2**31, 2**31, 2**31), ("a",), ()]]
+    contents += [header((4,), descr) for descr in ("|O", "<U99999999", "V1000000000", "<f2", "M8[s]", "nonsense")]
+    contents += [npy(np.full((3, 3), value)) for value in (np.nan, np.inf, 1e308, 0.0, 2**63)]
+    contents += [b"", b"no array", npy(np.zeros(0))[:30]]
+    tried = refusals = 0
+    for name in arrays:
+        for content in contents:
+            for packed in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)[: 1 + (name == "points")]:
+                file = io.BytesIO()
+                with zipfile.ZipFile(file, "w", packed) as target:
+                    for other, array in arrays.items():
+                        target.writestr(other + ".npy", content if other == name else npy(array))
+                file.seek(0)
+                tried += 1
+                try:
+                    ss.load(file)
+                except refused:
+                    refusals += 1
+    print(tried, refusals)
+    """
+    tried, refusals = map(int, run(script, 300).split())
+    assert tried > 400 and refusals > 0.9 * tried
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def test_other_threads_run_during_a_fit(threads, n):
     assert sum(start < t < end for t in ticks) > 4
 
 
-# ---- the same bits ----
+# ---- bit-identical results ----
 
 
 def work(seed):
@@ -150,7 +150,7 @@ def test_parallel_calls_from_many_threads_give_the_same_bits(threads):
 
 @every_common
 @pytest.mark.parametrize("kind", ["long", "closed", "batch", "many"])
-def test_one_thread_and_two_give_the_same_bits(threads, space, kind):
+def test_fits_do_not_depend_on_the_number_of_threads(threads, space, kind):
     if kind == "many":
         curves = [(None, points_on(space, n, step=0.4, seed=n)) for n in range(2, 60)] * 20
         fits = [(lambda c=curves: ss.fit_many(c, space))]
@@ -175,7 +175,7 @@ def test_one_thread_and_two_give_the_same_bits(threads, space, kind):
 
 @every_common
 @pytest.mark.parametrize("quantity", [0, 1, 2, "speed", "per curve"])
-def test_one_thread_and_two_evaluate_the_same_bits(threads, space, quantity):
+def test_evaluation_does_not_depend_on_the_number_of_threads(threads, space, quantity):
     spline = ss.CubicSpline(None, points_on(space, 50, (2,), step=0.4), space)
     x = np.random.default_rng(0).uniform(0, 49, (2, 20_000))
 

@@ -9,7 +9,8 @@ import pytest
 from cases import unit_tangent, walk
 
 import symspline as ss
-from symspline.jax import curve, primitives
+from symspline.jax import _primitives as primitives
+from symspline.jax import curve
 
 CURVES = 4
 X = np.array([0.3, 1.7, 3.1]) + 0.1 * np.arange(CURVES)[:, None]

@@ -62,7 +62,7 @@ def test_values_are_those_of_the_spline(name, nu):
     # What times do to points, and data alone to velocities, is asked of one space each.
     + [("so:3", 0, 1.0), ("gr:2,5", 0, 1.0), ("spd:2", 1, 0.0)],
 )
-def test_they_follow_their_data_as_arrays(name, nu, dx):
+def test_rates_differentiate_with_respect_to_data(name, nu, dx):
     """The derivative of the arrays, with their normal parts; and its transpose."""
     space, points, steps = data(name)
     value = function(name, nu)
@@ -97,7 +97,7 @@ def test_the_second_derivative_as_an_array_is_that_of_the_velocity():
     np.testing.assert_allclose(twice, acceleration - speed2 * position, atol=1e-14)
 
 
-def test_what_is_not_known_is_an_error():
+def test_unknown_names_raise():
     _, points, _ = data("sphere:2")
     with pytest.raises(NotImplementedError, match="third derivative"):
         jax.jacfwd(lambda x: curve(x, T, points, "sphere:2", nu=2))(X)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from double import double_and_quickly_compiled
 
-from symspline.jax import series, spectral
+from symspline.jax import _series as series
+from symspline.jax import _spectral as spectral
 
 
 @pytest.fixture(autouse=True)

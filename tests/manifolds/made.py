@@ -42,7 +42,7 @@ def flat(n):
     )
 
 
-def _ellipsoid(x):
+def ellipsoid_equation(x):
     return np.sum((x / AXES) ** 2, axis=-1) - 1
 
 
@@ -77,7 +77,7 @@ def _torus_hess(x):
 
 
 # The shortest conjugate distances are π times the smallest radius of curvature.
-ellipsoid = partial(ss.manifolds.from_surface, _ellipsoid, _ellipsoid_grad, 3)
+ellipsoid = partial(ss.manifolds.from_surface, ellipsoid_equation, _ellipsoid_grad, 3)
 torus = partial(ss.manifolds.from_surface, _torus, _torus_grad, 3)
 ELLIPSOID = ellipsoid(hess=_ellipsoid_hess)
 TORUS = torus(hess=_torus_hess)

@@ -34,7 +34,7 @@ def test_a_manifold_without_random_points_needs_one():
     with pytest.raises(ss.ValidationError, match="made without project="):
         check(flat(3))
     check(flat(3), point=[1.0, 2.0, 3.0])
-    with pytest.raises(ss.ValidationError, match="factor by factor"):
+    with pytest.raises(ss.ValidationError, match="check each factor"):
         check("sphere:2 x r:2")
 
 
@@ -97,7 +97,7 @@ def shortened(p, v):
         ({"project_tangent": shortened}, "project_tangent is a projection"),
     ],
 )
-def test_what_is_broken_is_named(changes, law):
+def test_broken_laws_are_reported(changes, law):
     with pytest.raises(AssertionError, match=rf"breaks the law that {law}.*: off by .*, allowed"):
         check(twin(S2, **changes))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 from cases import walk as space_walk
 from made import ELLIPSOID, TORUS, flat, jump, knots, twin, walk
 from pymanopt import manifolds
@@ -50,8 +51,8 @@ def test_acceleration_is_continuous(name, spacing):
 
 
 @pytest.mark.parametrize("ends", ["not-a-knot", "clamped", "periodic", "velocity", "acceleration", "mixed"])
-@pytest.mark.parametrize("n", [3, 4, 8])
-@pytest.mark.parametrize("step", [0.3, 1.2])
+@loop_over("n", [3, 4, 8])
+@loop_over("step", [0.3, 1.2])
 def test_all_ends_on_a_stiefel_manifold(ends, n, step):
     p = walk(ST52, step, n, 3)
     if ends == "periodic":
@@ -115,7 +116,7 @@ def test_derivatives_where_a_segment_ends_almost_at_the_cut_locus(name):
 
 @pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "mixed"])
 @pytest.mark.parametrize("name", ["sphere:2", "cp:2", "so:3"])
-def test_on_a_symmetric_space_it_is_the_same_curve(name, ends):
+def test_symmetric_spaces_give_the_same_curve(name, ends):
     """The compiled core solves the S-form of the paper."""
     space = ss.space(name)
     rng = np.random.default_rng(6)
@@ -140,7 +141,7 @@ def test_on_a_symmetric_space_it_is_the_same_curve(name, ends):
 @pytest.mark.parametrize(
     "ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"]
 )
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 9])
+@loop_over("n", [2, 3, 4, 5, 9])
 def test_flat_space_is_scipy(ends, n):
     space, rng = flat(3), np.random.default_rng(8)
     t, p = knots("unequal", n, 9), rng.standard_normal((n, 3))
@@ -156,7 +157,7 @@ def test_flat_space_is_scipy(ends, n):
 
 
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
-def test_transport_is_no_part_of_the_solution(ends):
+def test_solution_does_not_need_transport(ends):
     space = ss.Sphere(2)
     p = space_walk(space, 1.2, 10, np.random.default_rng(10))
     if ends == "periodic":

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
+from cases import WORDS, loop_over
 from made import ELLIPSOID, flat, knots, torus, twin, walk
 
 import symspline as ss
-from symspline.manifolds.condition import Problem
-from symspline.manifolds.frames import frames_along
-from symspline.manifolds.tridiagonal import Tridiagonal
 
 SPHERE, SPD, ST52 = ss.Sphere(2), ss.SymmetricPositiveDefinite(3), ss.Stiefel(2, 5)
-ENDS = ["natural", "not-a-knot", "clamped", "periodic"]
 # Requested residuals: loose, and down to near rounding.
 TOLS = 10.0 ** -np.arange(2, 12, 2)
 
@@ -52,15 +49,15 @@ def check(space, p, ends, exact_space):
     assert known >= len(TOLS) - 1
 
 
-@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("ends", WORDS)
 @pytest.mark.parametrize("step", [0.2, 0.8, 1.2])
-def test_on_symmetric_spaces_it_bounds_the_distance_from_the_compiled_solution(step, ends):
+def test_velocity_error_bounds_the_distance_from_the_compiled_solution(step, ends):
     check(twin(SPHERE), walk(SPHERE, step, 10, 1), ends, SPHERE)
     check(twin(SPD), tensors(10, step, 3), ends, SPD)
 
 
-@pytest.mark.parametrize("ends", ENDS)
-def test_on_other_manifolds_it_bounds_the_distance_from_a_tight_solution(ends):
+@pytest.mark.parametrize("ends", WORDS)
+def test_velocity_error_bounds_the_distance_from_a_tight_solution(ends):
     for space, step in ((ST52, 0.3), (ST52, 1.2), (ELLIPSOID, 0.6)):
         check(space, walk(space, step, 10, 1), ends, space)
 
@@ -94,10 +91,10 @@ def moved(space, size, kind):
     return twin(space, log=log)
 
 
-@pytest.mark.parametrize("ends", ENDS)
-@pytest.mark.parametrize("size", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("ends", WORDS)
+@loop_over("size", [1e-4, 1e-6, 1e-8, 1e-10])
 @pytest.mark.parametrize("kind", ["longer", "aside", "noise"])
-def test_a_wrong_logarithm_is_noticed(kind, size, ends):
+def test_wrong_logarithms_increase_the_velocity_error(kind, size, ends):
     t, p = data(walk(SPHERE, 0.8, 10, 1), ends)
     exact = ss.CubicSpline(t, p, SPHERE, bc_type=ends)
     spline = ss.CubicSpline(t, p, moved(SPHERE, size, kind), bc_type=ends, on_failure="ignore")
@@ -130,7 +127,7 @@ def test_derivatives_by_differences_count():
     assert error(space, spline, exact) <= spline.report.velocity_error <= 1e-9
 
 
-def test_it_has_the_unit_of_velocities():
+def test_velocity_error_has_the_unit_of_velocities():
     p = walk(ST52, 0.8, 8, 5)
     one, other = (ss.CubicSpline(scale * np.arange(8.0), p, ST52, tol=1e-6) for scale in (1.0, 1e3))
     assert one.report.velocity_error == pytest.approx(1e3 * other.report.velocity_error, rel=1e-3)
@@ -172,26 +169,3 @@ def test_curves_that_do_not_move():
     assert ss.CubicSpline(None, np.ones((4, 3)), flat(3)).report.velocity_error <= 1e-12
     given = ss.CubicSpline(None, [np.zeros(3), np.ones(3)], flat(3), bc_type="clamped")
     assert given.report.velocity_error == 0.0
-
-
-@pytest.mark.parametrize("n", [2, 3, 4, 9])
-@pytest.mark.parametrize(
-    "ends", [("natural", "not-a-knot"), ("not-a-knot", "clamped"), ("clamped", "natural")]
-)
-def test_the_longest_step_is_that_of_the_worst_signs(ends, n):
-    space = flat(2)
-    p = np.random.default_rng(6).standard_normal((1, n, 2))
-    spline = ss.CubicSpline(knots("unequal", n, 7), p[0], space, bc_type=ends)
-    from symspline.curves.ends import ends_of
-    from symspline.curves.manifold_fit import _ends
-    from symspline.curves.solve import Task
-
-    h = np.diff(spline.t)[None]
-    task = Task(space, spline.t, p, ends_of(ends, space, (1,)), None)
-    matrix = Tridiagonal(
-        Problem(space.operations, h, p, frames_along(space.operations, p), _ends(task, h, p))
-    )
-    columns = [matrix.step(unit[None, :, None] * np.ones((1, 1, 1)))[0, :, 0] for unit in np.eye(n)]
-    sizes = np.random.default_rng(8).uniform(0.1, 1.0, n)
-    worst = (np.abs(np.array(columns)).T @ sizes).max()
-    assert matrix.largest_step(sizes[None])[0] == pytest.approx(worst, rel=1e-12)

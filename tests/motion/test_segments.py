@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from curves import each, every_space, factors, largest_difference, parts, points_on
+from curves import each, every_kind, factors, largest_difference, parts, points_on
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -11,8 +11,8 @@ from symspline import poses
 T = np.array([0.0, 1, 2, 3, 15, 16, 17, 40, 60, 61])
 
 
-@every_space
-def test_pieces_are_fitted_alone(space):
+@every_kind
+def test_segments_are_fitted_independently(space):
     p = points_on(space, len(T), step=0.3)
     first, second, third = ss.fit_segments(T, p, space, max_gap=2, bc_type="not-a-knot")
     for piece, own in ((first, slice(0, 4)), (second, slice(4, 7)), (third, slice(8, 10))):
@@ -26,8 +26,8 @@ def test_pieces_are_fitted_alone(space):
     assert whole == ss.CubicSpline(T, p, space, **options)
 
 
-@every_space
-def test_of_points_at_one_time_the_first_is_kept(space):
+@every_kind
+def test_first_of_duplicate_times_is_kept(space):
     p = points_on(space, 8, step=0.3)
     t = [0, 1, 1, 1, 2, 3, 3, 4]
     (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="first")
@@ -35,8 +35,8 @@ def test_of_points_at_one_time_the_first_is_kept(space):
     assert found == ss.CubicSpline(np.arange(5.0), each(lambda a: a[kept], p), space)
 
 
-@every_space
-def test_the_mean_is_where_directions_add_up_to_zero(space):
+@every_kind
+def test_merged_point_is_the_mean(space):
     p = points_on(space, 8, step=0.3)
     t = [0, 1, 1, 1, 2, 3, 3, 4]
     (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="mean")
@@ -111,7 +111,7 @@ def test_what_scipy_and_lists_hold():
         ("bc_type", {"bc_type": "loose"}),
     ],
 )
-def test_refused(match, changes):
+def test_invalid_arguments_raise(match, changes):
     arguments = {"t": np.arange(5.0), "points": np.ones((5, 1)), "space": "r:1", "max_gap": 1.0} | changes
     with pytest.raises(ss.ValidationError, match=match):
         ss.fit_segments(**arguments)
@@ -159,7 +159,7 @@ def noisy(space, seed=0):
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "spd:3", "so:3 x r:3"])
-def test_noisy_pieces_are_smoothed_alone(name):
+def test_noisy_segments_are_smoothed_independently(name):
     space = ss.space(name)
     t, p = noisy(space)
     pieces = ss.fit_segments(t, p, space, max_gap=2, smooth=True, criterion="reml")
@@ -196,7 +196,7 @@ def test_noisy_points_of_one_time_all_count():
     assert first == ss.make_smoothing_spline(t[kept], y[kept], "r:1", 1.0, weights=[1, 2, 4, 5])
 
 
-def test_of_noisy_pieces_that_fail_all_are_kept():
+def test_failed_noisy_segments_are_all_kept():
     t, p = noisy(ss.space("sphere:2"))
     with pytest.raises(ss.ConvergenceError, match=r"curve 0: .* Raise max_iter.*and 1 more") as caught:
         ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1)
@@ -220,7 +220,7 @@ def test_of_noisy_pieces_that_fail_all_are_kept():
         ({"bc_type": "not-a-knot"}, "bc_type"),
     ],
 )
-def test_what_noisy_pieces_do_not_take(options, says):
+def test_invalid_smoothing_options_raise(options, says):
     t, p = noisy(ss.space("sphere:2"))
     with pytest.raises((ss.ValidationError, TypeError), match=says):
         ss.fit_segments(t, p, "sphere:2", **{"max_gap": 2, "smooth": True, **options})

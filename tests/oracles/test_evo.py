@@ -31,7 +31,7 @@ def absolute_error(first, second, relation):
 
 
 @pytest.mark.parametrize("space", ["se:3", "so:3 x r:3"])
-def test_what_goes_in_comes_out(space, recording, tmp_path):
+def test_points_round_trip(space, recording, tmp_path):
     t, given = poses.read_tum(recording)
     curve = ss.CubicSpline(t, given if space == "se:3" else poses.split(given), space)
     out = tmp_path / "curve.tum"

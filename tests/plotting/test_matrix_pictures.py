@@ -6,7 +6,7 @@ from drawn import axes_named, lines_of, rendered, spline_on
 from matplotlib.collections import PolyCollection
 
 import symspline as ss
-from symspline.plotting import components, ellipses, frames, subspaces
+from symspline._plotting import ellipses, frames, graphs
 
 
 def test_quaternions_as_rotations():
@@ -66,7 +66,9 @@ def test_principal_angles(name):
     p = space.random_point(rng, 5)
     turn = ss.Orthogonal(k) if k > 1 and not np.iscomplexobj(p) else ss.Unitary(k)
     turned = p.reshape(5, n, k) @ turn.random_point(rng, 5)
-    np.testing.assert_allclose(subspaces.principal_angles(turned), subspaces.principal_angles(p), atol=1e-12)
+    np.testing.assert_allclose(
+        graphs.principal_angles(turned, turned[0]), graphs.principal_angles(p, p[0]), atol=1e-12
+    )
 
 
 def test_outlines_of_positive_definite_matrices():
@@ -104,7 +106,7 @@ def test_ellipses_are_drawn_to_scale(name):
     assert bold.get_facecolor()[0, 3] > 0 == faint.get_facecolor()[0, 3]
     view = np.eye(2) if name == "spd:2" else frames.VIEW[:2]
     roots = np.sqrt(np.linalg.eigvalsh(view @ spline.points @ view.T))
-    # The bar says how long a number is.
+    # The bar shows the length of a number.
     (bar,) = [line for line in axes.lines if line.get_marker() == "|"]
     (number,) = [float(text.get_text()) for text in axes.texts if text.get_text().replace(".", "").isdigit()]
     unit = np.ptp(axes.transAxes.transform(bar.get_xydata())[:, 0]) / number
@@ -145,16 +147,16 @@ def test_lengths_of_rigid_motions_are_those_in_the_body():
 
 
 def test_names_of_components():
-    assert components.component_names((3,), False) == ["x₁", "x₂", "x₃"]
-    assert components.component_names((2, 2), False) == ["x₁₁", "x₁₂", "x₂₁", "x₂₂"]
-    assert components.component_names((2,), True) == ["Re x₁", "Im x₁", "Re x₂", "Im x₂"]
-    assert components.component_names((10, 1), False)[-1] == "x₁₀,₁"
-    numbers = components.components(np.array([[1 + 2j, 3 + 4j], [5, 6j]]))
+    assert graphs.component_names((3,), False) == ["x₁", "x₂", "x₃"]
+    assert graphs.component_names((2, 2), False) == ["x₁₁", "x₁₂", "x₂₁", "x₂₂"]
+    assert graphs.component_names((2,), True) == ["Re x₁", "Im x₁", "Re x₂", "Im x₂"]
+    assert graphs.component_names((10, 1), False)[-1] == "x₁₀,₁"
+    numbers = graphs.components(np.array([[1 + 2j, 3 + 4j], [5, 6j]]))
     np.testing.assert_array_equal(numbers, [[1, 2, 3, 4], [5, 0, 0, 6]])
     figure = spline_on("sphere:15").plot()
     (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
     assert sorted(text.get_text() for text in legend.texts) == sorted(
-        [*components.component_names((12,), False), "4 others"]
+        [*graphs.component_names((12,), False), "4 others"]
     )
 
 

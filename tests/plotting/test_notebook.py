@@ -22,7 +22,7 @@ def test_a_small_picture_and_the_text(spline):
 
 
 def test_the_text_alone_without_matplotlib(spline, monkeypatch):
-    monkeypatch.setattr("symspline.piecewise.find_spec", lambda _: None)
+    monkeypatch.setattr("symspline._base_curve.find_spec", lambda _: None)
     assert spline._repr_html_() == "<pre>&lt;CubicSpline on Sphere(2): 3 points, natural&gt;</pre>"
 
 

@@ -5,8 +5,8 @@ import pytest
 from drawn import axes_named, dots_of, lines_of, rendered, texts_of
 
 import symspline as ss
+from symspline._plotting import disk, globe, sphere
 from symspline.geo import from_lonlat
-from symspline.plotting import bloch, disk, dome, globe, sphere
 
 # ---- maps and globes ----
 
@@ -144,11 +144,11 @@ BLOCH = {
 
 def test_bloch_vectors():
     states = np.array(list(BLOCH))
-    vectors = bloch.bloch_vectors(states)
+    vectors = sphere.bloch_vectors(states)
     np.testing.assert_allclose(vectors, list(BLOCH.values()), atol=1e-15)
-    np.testing.assert_allclose(bloch.bloch_vectors(states[:, :, None] * np.exp(2j)), vectors, atol=1e-15)
+    np.testing.assert_allclose(sphere.bloch_vectors(states[:, :, None] * np.exp(2j)), vectors, atol=1e-15)
     p, q = ss.ComplexProjective(1).random_point(np.random.default_rng(11), (2, 20))
-    angle = np.arccos(np.sum(bloch.bloch_vectors(p) * bloch.bloch_vectors(q), axis=1))
+    angle = np.arccos(np.sum(sphere.bloch_vectors(p) * sphere.bloch_vectors(q), axis=1))
     np.testing.assert_allclose(angle, 2 * ss.ComplexProjective(1).distance(p, q))
 
 
@@ -159,7 +159,7 @@ def test_states_are_drawn_on_the_bloch_sphere(size, zoomed):
     middle = space.random_point(rng)
     points = space.exp(middle, size * space.random_tangent(rng, np.stack([middle] * 8)))
     figure = rendered(ss.CubicSpline(None, points, "cp:1").plot())
-    axes, vectors = figure.axes[0], bloch.bloch_vectors(points)
+    axes, vectors = figure.axes[0], sphere.bloch_vectors(points)
     places, first = dots_of(axes)
     view = np.linalg.lstsq(vectors, places)[0]
     np.testing.assert_allclose(vectors @ view, places, atol=1e-9)
@@ -212,7 +212,9 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
 
 
 def test_half_sphere_is_the_upper_one():
-    line = dome.broken(dome.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001))))
+    line = sphere.broken_at_rim(
+        sphere.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001)))
+    )
     np.testing.assert_allclose(np.linalg.norm(line[~np.isnan(line[:, 0])], axis=1), 1)
     assert np.nanmin(line) >= -1 and np.nanmin(line[:, 2]) >= 0
 

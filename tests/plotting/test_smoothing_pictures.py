@@ -7,9 +7,9 @@ from matplotlib.dates import date2num
 from matplotlib.path import Path
 
 import symspline as ss
-from symspline.plotting import disk, sphere
-from symspline.plotting.curves import curves_of
-from symspline.plotting.pictures import _PICTURES
+from symspline._plotting import disk, sphere
+from symspline._plotting.curves import curves_of
+from symspline._plotting.figure import _PICTURES
 
 T = np.linspace(0, 10, 40)
 
@@ -94,7 +94,7 @@ def test_few_of_many_curves_have_data():
     assert len(data_of(figure.axes[0])) == 5 * 40
 
 
-def test_products_have_no_band_of_the_speed():
+def test_products_lack_a_speed_band():
     both = ss.make_smoothing_spline(T, (noisy("r:1"), noisy("s:2")), "r:1 x s:2")
     figure = rendered(both.plot())
     assert not bands_of(axes_named(figure, "speed"))
@@ -154,7 +154,7 @@ def test_caps_have_their_radius(radius):
 def test_discs_of_the_hyperbolic_plane_have_their_radius(radius):
     plane, rng = ss.Hyperbolic(2), np.random.default_rng(0)
     points = plane.random_point(rng, 20)
-    rims = disk._rims(disk.flat(points, np.array([1.0, 0, 0])), np.full(20, radius))
+    rims = disk.rims(disk.flat(points, np.array([1.0, 0, 0])), np.full(20, radius))
     square = np.sum(rims**2, axis=-1, keepdims=True)
     lifted = np.concatenate([1 + square, 2 * rims], axis=-1) / (1 - square)
     distance = plane.distance(points[:, None], plane.project(lifted))

@@ -103,7 +103,7 @@ def test_phases_and_bases_do_not_matter(name):
     other = ss.CubicSpline(KNOTS, turned, name)
     for nu in (0, 1):
         # The solver's tolerance is 1e-12 of the legs.
-        assert np.abs(hamiltonian(other, X, nu) - hamiltonian(spline, X, nu)).max() < 1e-11
+        assert np.abs(hamiltonian(other, X, nu=nu) - hamiltonian(spline, X, nu=nu)).max() < 1e-11
 
 
 @pytest.mark.parametrize("name", [*STATES, *GATES])
@@ -150,7 +150,7 @@ def test_batches_and_shapes(name):
     assert np.array_equal(h[1, 2, 0], hamiltonian(spline[1][2], X))
 
 
-def test_beyond_the_end_it_goes_on_as_it_was():
+def test_extrapolation_continues_the_motion():
     spline = curve("cp:2")
     end = hamiltonian(spline, 5.0)
     assert np.abs(hamiltonian(spline, [5.5, 7.0], extrapolate="geodesic") - end).max() < 1e-13
@@ -158,11 +158,9 @@ def test_beyond_the_end_it_goes_on_as_it_was():
         hamiltonian(spline, 5.5)
 
 
-def test_what_has_no_hamiltonian():
+def test_spaces_without_hamiltonian_raise():
     sphere = ss.CubicSpline(None, np.eye(3), "sphere:2")
-    with pytest.raises(
-        ss.ValidationError, match=r"Sphere\(2\) has no Hamiltonian; states are points of Compl"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"Sphere\(2\) does not define a Hamiltonian; use Compl"):
         hamiltonian(sphere, 0.5)
     for nu in (2, True, -1, "1", None):
         with pytest.raises(ss.ValidationError, match="nu must be 0 or 1, not"):

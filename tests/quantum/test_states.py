@@ -112,7 +112,7 @@ def test_kets_are_columns():
         (r"kets\[1\] is not a state", lambda: from_kets([Ket([1, 0]), Ket([1, 1])])),
     ],
 )
-def test_what_is_no_state(match, call):
+def test_invalid_states_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
 
@@ -143,8 +143,8 @@ def test_solvers_may_step_over_the_end(stand_in):
     assert np.abs(qobjevo(closed)(3.5) - hamiltonian(closed, 0.5)).max() < 1e-13
 
 
-def test_curves_that_are_no_qobjevo(stand_in):
-    with pytest.raises(ss.ValidationError, match=r"is a batch; .* qobjevo\(spline\[0\]\)"):
+def test_invalid_qobjevo_curves_raise(stand_in):
+    with pytest.raises(ss.ValidationError, match=r"is a batch, .* qobjevo\(spline\[0\]\)"):
         qobjevo(curve("cp:2", batch=(2,)))
     dates = ss.CubicSpline(np.arange("2024-01-01", "2024-01-07", dtype="M8[D]"), curve("cp:2").points, "cp:2")
     with pytest.raises(ss.ValidationError, match="are dates"):
@@ -154,16 +154,16 @@ def test_curves_that_are_no_qobjevo(stand_in):
 def test_there_is_no_hamiltonian_before_the_first_knot(stand_in):
     later = ss.CubicSpline([100, 101, 102], curve("cp:2").points[:3], "cp:2")
     h = qobjevo(later)
-    with pytest.raises(ss.ValidationError, match=r"the curve begins at 100\.0, and the solver asks for 0\.5"):
+    with pytest.raises(ss.ValidationError, match=r"the time 0\.5 is before the first knot, 100\.0"):
         h(0.5)
     # What QuTiP asks for at first.
     assert h(0.0).shape == (3, 3)
-    with pytest.raises(ss.ValidationError, match=r"dims \[2, 2\] are 4 levels, but the curve has 3"):
-        qobjevo(later, [2, 2])
+    with pytest.raises(ss.ValidationError, match=r"dims \[2, 2\] have 4 levels, but the curve has 3"):
+        qobjevo(later, dims=[2, 2])
     with pytest.raises(
         ss.ValidationError, match=r"dims must be a list of whole numbers, such as \[2, 2\], not 3"
     ):
-        qobjevo(later, 3)
+        qobjevo(later, dims=3)
 
 
 def test_composite_systems_in_qutip():
@@ -176,14 +176,14 @@ def test_composite_systems_in_qutip():
     ]
     spline = ss.CubicSpline([3, 4, 6], from_kets([kets[0], kets[1], (kets[1] + kets[2]).unit()]), "cp:3")
     options = {"atol": 1e-12, "rtol": 1e-12, "nsteps": 100_000}
-    h = qobjevo(spline, [2, 2])
+    h = qobjevo(spline, dims=[2, 2])
     assert h.dims == [[2, 2], [2, 2]]
     found = qutip.sesolve(h, kets[0], [3, 4, 6], options=options).states
     assert abs(abs(found[1].overlap(kets[1])) - 1) < 1e-10
     # The error of the solver around it is not ours.
     with pytest.raises(Exception) as caught:
         qutip.sesolve(h, kets[0], [0, 4], options=options)
-    assert "the curve begins at 3.0" in str(caught.getrepr(style="native"))
+    assert "is before the first knot, 3.0" in str(caught.getrepr(style="native"))
 
 
 def test_without_qutip(monkeypatch):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 
 import symspline as ss
 from symspline.cli import main
@@ -35,7 +36,7 @@ def by_spline(t, points):
 
 def by_fit(t, points):
     velocities, _ = ss.fit(t, points, "sphere:2")
-    return ss.evaluate(t, t, points, velocities, "sphere:2")
+    return ss.evaluate(t, points, velocities, "sphere:2", t)
 
 
 def by_fit_many(t, points):
@@ -92,7 +93,7 @@ CLEAN = {
 
 
 @entries
-@pytest.mark.parametrize("kind", CLEAN)
+@loop_over("kind", CLEAN)
 def test_points_come_back(entry, kind):
     t, points = CLEAN[kind]
     tolerance = 1e-6 if kind == "single precision" else 1e-9
@@ -124,7 +125,7 @@ def dirty(how):
 
 
 @entries
-@pytest.mark.parametrize("how", ["repeated", "unsorted", "missing points", "missing times", "not normalised"])
+@loop_over("how", ["repeated", "unsorted", "missing points", "missing times", "not normalised"])
 def test_faults_raise_with_the_place(entry, how, capsys):
     t, points = dirty(how)
     with pytest.raises(ss.ValidationError) as caught:

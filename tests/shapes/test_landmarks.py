@@ -30,7 +30,7 @@ def grassmannian(points):
 @pytest.mark.parametrize("base", [None, 0, 4])
 def test_affine_images_have_one_shape(n, base):
     x = drawings(7, n=n)
-    shapes, images = from_landmarks(x, base), from_landmarks(affine_images(x), base)
+    shapes, images = from_landmarks(x, base=base), from_landmarks(affine_images(x), base=base)
     space = grassmannian(shapes)
     assert shapes.shape == (7, 6 if base is None else 5, n)
     space.check_point(shapes)
@@ -55,12 +55,12 @@ def test_kernels_are_the_other_way_to_say_it():
 @pytest.mark.parametrize("base", [None, 0, 5])
 def test_there_and_back(base):
     x = drawings(4, n=3)
-    shapes = from_landmarks(x, base)
-    assert np.abs(to_landmarks(shapes, x, base) - x).max() < 1e-14
+    shapes = from_landmarks(x, base=base)
+    assert np.abs(to_landmarks(shapes, x, base=base) - x).max() < 1e-14
     # Of all affine images the closest, whatever the basis.
     like = drawings(4, n=3, seed=5)
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
-    found = to_landmarks(shapes @ turn, like, base)
+    found = to_landmarks(shapes @ turn, like, base=base)
     for image, drawing, wanted in zip(found, x, like, strict=True):
         if base is None:
             columns = np.c_[drawing, np.ones(6)]
@@ -80,21 +80,24 @@ FLAT = np.array([[0.0, 0], [1, 1], [2, 2], [3, 3]])
         (r"x\[1\] lies in a hyperplane: its extents are 3.16, \d", lambda: from_landmarks([SQUARE, FLAT])),
         (r"x lies in a hyperplane", lambda: from_landmarks(FLAT, base=2)),
         (
-            r"x has shape \(3, 2\): 3 landmarks in 2 dimensions; .* from 4 landmarks on",
+            r"x has shape \(3, 2\): 3 landmarks in 2 dimensions; .* need at least 4 landmarks",
             lambda: from_landmarks(FLAT[1:]),
         ),
-        ("base must be None or the number of a landmark, 0 to 3, not 4", lambda: from_landmarks(SQUARE, 4)),
-        ("base must be .* not True", lambda: from_landmarks(SQUARE, True)),
+        (
+            "base must be None or the number of a landmark, 0 to 3, not 4",
+            lambda: from_landmarks(SQUARE, base=4),
+        ),
+        ("base must be .* not True", lambda: from_landmarks(SQUARE, base=True)),
         ("x must be real landmarks, not complex", lambda: from_landmarks(SQUARE * 1j)),
         (r"x\[2, 0\] is nan", lambda: from_landmarks([[0, 0], [1, 0], [np.nan, 1], [0, 1]])),
         (
             r"shape must be real, of shape \(..., 3, 2\)",
-            lambda: to_landmarks(from_landmarks(SQUARE), SQUARE, 0),
+            lambda: to_landmarks(from_landmarks(SQUARE), SQUARE, base=0),
         ),
         ("shape does not have orthonormal columns", lambda: to_landmarks(SQUARE, SQUARE)),
     ],
 )
-def test_what_is_no_shape(match, call):
+def test_invalid_shapes_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 from scipy.interpolate import CubicSpline
 from test_landmarks import affine_images, drawings
 
@@ -24,20 +25,20 @@ def turned(n, count, closed=False):
     return np.concatenate([x[:-1], x[:1]]) if closed else x
 
 
-def off_shape(morph, x):
+def off_shape(morph, x, base=None):
     """How far the drawings of a film are from the spline of the shapes."""
-    shapes = from_landmarks(morph(x), morph._base)
+    shapes = from_landmarks(morph(x), base=base)
     return morph.shape.space.distance(shapes, morph.shape(x)).max()
 
 
 @pytest.mark.parametrize("base", [None, 2])
-@pytest.mark.parametrize("n", [2, 3])
+@loop_over("n", [2, 3])
 @pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", ("clamped", "natural")])
 def test_the_film_goes_through_every_drawing(n, base, bc_type):
     x = turned(n, 5)
-    morph = AffineMorph(KNOTS, x, base, bc_type=bc_type)
+    morph = AffineMorph(KNOTS, x, base=base, bc_type=bc_type)
     assert np.abs(morph(KNOTS) - x).max() < NEAR
-    assert off_shape(morph, X) < NEAR
+    assert off_shape(morph, X, base) < NEAR
     assert morph(X.reshape(1, 41)).shape == (1, 41, 6, n) and morph(0.3).shape == (6, n)
     assert np.array_equal(morph.landmarks, x) and np.array_equal(morph.t, KNOTS)
 
@@ -45,18 +46,20 @@ def test_the_film_goes_through_every_drawing(n, base, bc_type):
 @pytest.mark.parametrize("base", [None, 2])
 def test_in_the_coordinates_of_the_first_drawing_only_the_shape_changes(base):
     x = turned(2, 5)
-    morph = AffineMorph(KNOTS, x, base, frame="first")
+    morph = AffineMorph(KNOTS, x, base=base, frame="first")
     assert np.abs(morph(0.0) - x[0]).max() < 1e-14
-    assert off_shape(morph, X) < NEAR
+    assert off_shape(morph, X, base) < NEAR
     film = morph(X)
     # Whatever affine maps have done to the others, also mirror them.
     images = affine_images(x)
     images[0] = x[0]
-    assert np.abs(AffineMorph(KNOTS, images, base, frame="first")(X) - film).max() < NEAR
+    assert np.abs(AffineMorph(KNOTS, images, base=base, frame="first")(X) - film).max() < NEAR
     # And what is done to all of them is done to the film.
     linear, shift = np.array([[1.0, 2.0], [0.5, -1.0]]), [3.0, 4.0]
     assert (
-        np.abs(AffineMorph(KNOTS, x @ linear + shift, base, frame="first")(X) - film @ linear - shift).max()
+        np.abs(
+            AffineMorph(KNOTS, x @ linear + shift, base=base, frame="first")(X) - film @ linear - shift
+        ).max()
         < 10 * NEAR
     )
 
@@ -107,14 +110,14 @@ def test_films_are_c2(frame):
 @pytest.mark.parametrize("base", [None, 0])
 def test_closed_films_are_c2_at_the_seam(base):
     x = turned(2, 5, closed=True)
-    morph = AffineMorph(KNOTS, x, base, bc_type="periodic")
+    morph = AffineMorph(KNOTS, x, base=base, bc_type="periodic")
     assert np.abs(morph(KNOTS) - x).max() < NEAR
     # The basis itself comes back turned.
     assert np.abs(morph.holonomy - np.eye(2)).max() > 1e-3
     end, start = one_sided(morph, 4.0, -1), one_sided(morph, 0.0, 1)
     for order, tol in enumerate((1e-11, 1e-8, 2e-5)):
         assert np.abs(end[order] - start[order]).max() < tol * max(1, np.abs(end[order]).max())
-    first = AffineMorph(KNOTS, x, base, frame="first", bc_type="periodic")
+    first = AffineMorph(KNOTS, x, base=base, frame="first", bc_type="periodic")
     middle = x[0].mean(axis=0) if base is None else x[0, base]
     assert np.abs(first(4.0) - middle - (x[0] - middle) @ first.holonomy).max() < NEAR
     assert np.abs(first.holonomy - morph.holonomy).max() < NEAR
@@ -134,7 +137,7 @@ def test_the_holonomy_of_four_landmarks_is_an_area():
     planes = np.linalg.svd(normals[:, None])[2][:, 1:].swapaxes(1, 2)
     x = np.concatenate([np.zeros((9, 1, 2)), planes], axis=1)
     x[-1] = x[0]
-    morph = AffineMorph(None, x, 0, frame="first", bc_type="periodic")
+    morph = AffineMorph(None, x, base=0, frame="first", bc_type="periodic")
     h = morph.holonomy
     bases = morph(np.linspace(0, 8, 4001))[:, 1:]
     n = np.cross(bases[..., 0], bases[..., 1])
@@ -161,10 +164,10 @@ def half_turn():
 
 
 def test_a_film_may_end_mirrored():
-    morph = AffineMorph(None, half_turn(), 0, frame="first", bc_type="periodic")
+    morph = AffineMorph(None, half_turn(), base=0, frame="first", bc_type="periodic")
     assert np.abs(np.sort(np.linalg.eigvalsh(morph.holonomy)) - [-1, 1]).max() < 1e-10
     with pytest.raises(ss.ValidationError, match=r"landmarks\[6\] is mirrored"):
-        AffineMorph(None, half_turn(), 0, bc_type="periodic")
+        AffineMorph(None, half_turn(), base=0, bc_type="periodic")
 
 
 def test_dates():
@@ -200,7 +203,7 @@ def flat():
             lambda: AffineMorph(KNOTS, turned(2, 5), frame="last"),
         ),
         (
-            "bc_type must be a word or a pair of words",
+            "bc_type must be a string or a pair of strings",
             lambda: AffineMorph(KNOTS, turned(2, 5), bc_type=((1, 0), "natural")),
         ),
         (
@@ -209,24 +212,24 @@ def flat():
         ),
         (r"with n >= 2, not \(5, 6, 1\)", lambda: AffineMorph(KNOTS, turned(2, 5)[..., :1])),
         (
-            r"x\[1\] is 4.5, outside the drawings, which go from 0.0 to 4.0",
+            r"x\[1\] is 4.5, but must be between the times of the first and last drawings, 0.0 and 4.0",
             lambda: AffineMorph(KNOTS, turned(2, 5))([1, 4.5]),
         ),
         ("only a closed film has a holonomy", lambda: AffineMorph(KNOTS, turned(2, 5)).holonomy),
         (
-            "the last drawing of a closed film must be the first, and is .*e-07 away from it",
+            "the last drawing of a closed film must equal the first, but differs by .*e-07",
             lambda: AffineMorph(
                 KNOTS, turned(2, 5, True) + np.array([0, 0, 0, 0, 4e-7])[:, None, None], bc_type="periodic"
             ),
         ),
         (
-            "the last drawing of a closed film must be the first, and is .* frame='first'",
+            "the last drawing of a closed film must equal the first, but differs by .* frame='first'",
             lambda: AffineMorph(
                 KNOTS, 2 * turned(2, 5, True) * np.array([1, 1, 1, 1, 2])[:, None, None], bc_type="periodic"
             ),
         ),
     ],
 )
-def test_what_is_no_film(match, call):
+def test_invalid_films_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()

@@ -28,11 +28,12 @@ def scattered(space, points, information, sigma, rng):
     return space.exp(points, sigma * v)
 
 
-def coordinates(space, frames, v):
+def coordinates(frames, v):
     """Of vectors, one in every frame."""
-    flat = [space._as_doubles(np.ascontiguousarray(x)) for x in (frames, v)]
-    columns = np.swapaxes(flat[0].reshape(*frames.shape[:2], -1), -1, -2)
-    return np.linalg.pinv(columns) @ flat[1].reshape(len(v), -1, 1)
+    columns, numbers = (
+        np.ascontiguousarray(x).reshape(*x.shape[:axes], -1).view(float) for x, axes in ((frames, 2), (v, 1))
+    )
+    return np.linalg.pinv(np.swapaxes(columns, -1, -2)) @ numbers[..., None]
 
 
 @pytest.mark.parametrize("lam", [0.01, 1.0, 100.0])
@@ -83,7 +84,7 @@ def test_multiples_of_one_are_numbers(name):
 
 
 @every
-def test_frames_say_what_matrices_mean(name):
+def test_information_matrices_refer_to_frames(name):
     """Any basis does; and a curve does not know which."""
     rng = np.random.default_rng(0)
     space, t, noisy, _ = example(name, 0.1, n=20)
@@ -104,13 +105,13 @@ def objective(space, t, noisy, points, lam, w):
     h = np.diff(t)
     x = t[:-1, None] + h[:, None] * (0.5 + np.array([-0.5, 0.5]) / np.sqrt(3))
     at, bends = spline(x), spline(x, nu=2)
-    e = coordinates(space, space.frame(noisy), space.log(noisy, points))
+    e = coordinates(space.frame(noisy), space.log(noisy, points))
     misfit = np.sum(np.swapaxes(e, -1, -2) @ w @ e)
     return misfit + lam * np.sum(0.5 * h[:, None] * space.inner(at, bends, bends))
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "sphere:1" and not n.startswith("se")])
-def test_the_exact_way_leads_to_the_minimum(name):
+def test_gauss_newton_reaches_the_minimum(name):
     rng = np.random.default_rng(2)
     space = ss.space(name)
     t = np.linspace(0, 10, 12)
@@ -126,7 +127,7 @@ def test_the_exact_way_leads_to_the_minimum(name):
         )
         bend = (up + down - 2 * here) / 1e-8
         assert bend > 0 and abs(up - down) / 2e-4 / bend < 1e-7
-    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=w, method="flat", **TIGHT)
+    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=w, method="linearized", **TIGHT)
     assert flat.report.converged
     # What the estimating equation is off by, more than usual over steps that are so long.
     assert rms(space, flat.points, exact.points) < 1.1e-2 * np.sqrt(space.dim) * exact.std(t).max()
@@ -259,17 +260,14 @@ def test_a_product_takes_one_of_every_factor(tmp_path):
     for weights in ((None, w), (w, None), (w, rng.uniform(1, 2, 30)), (w, w[::-1])):
         both = ss.make_smoothing_spline(t, (places, turns), "r:3 x so:3", weights=weights)
         for factor, points, own, part in zip(
-            (first, second), (places, turns), weights, both._parts, strict=True
+            (first, second), (places, turns), weights, both.points, strict=True
         ):
             alone = ss.make_smoothing_spline(t, points, factor, weights=own)
-            assert np.array_equal(part.points, alone.points)
+            assert np.array_equal(part, alone.points)
         file = tmp_path / "both.npz"
         both.save(file)
         again = ss.load(file)
-        assert all(np.array_equal(a, b) for a, b in zip(again.points, both.points, strict=True))
-        for a, b in zip(again._noisy.weighing, both._noisy.weighing, strict=True):
-            assert np.array_equal(a.weights, b.weights)
-            assert (a.information is None) == (b.information is None)
+        assert again == both and np.array_equal(again.std(t), both.std(t))
         assert all(np.array_equal(a, b) for a, b in zip(again.residuals, both.residuals, strict=True))
 
 
@@ -286,7 +284,7 @@ def test_pieces_have_matrices_of_their_own():
         assert np.array_equal(piece.points, alone.points)
 
 
-def test_what_is_wrong_with_them():
+def test_invalid_information_raises():
     space = ss.Sphere(2)
     _, t, noisy, _ = example("sphere:2", n=10)
     good = np.broadcast_to(np.eye(2), (10, 2, 2)).copy()

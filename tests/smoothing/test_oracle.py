@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from cases import loop_over
 from noisy import beside, truth
 from oracle import Dense, process_variance
 from scipy.stats import chi2
@@ -37,7 +38,7 @@ def knots_of(kind, t, closed):
 
 @pytest.mark.parametrize("ends", ENDS, ids=str)
 @pytest.mark.parametrize("kind", ["few", "all"])
-@pytest.mark.parametrize("lam", [1e-9, 1e-5, 1e-2, 10.0])
+@loop_over("lam", [1e-9, 1e-5, 1e-2, 10.0])
 def test_fits_of_numbers(ends, kind, lam):
     closed = ends == "periodic"
     t, w, y = data(closed)
@@ -64,7 +65,7 @@ def test_fits_of_numbers(ends, kind, lam):
 
 @pytest.mark.parametrize("ends", ENDS, ids=str)
 @pytest.mark.parametrize("kind", ["few", "all"])
-@pytest.mark.parametrize("criterion", ["gcv", "reml", "cp"])
+@loop_over("criterion", ["gcv", "reml", "cp"])
 def test_the_choice_of_lambda(ends, kind, criterion):
     """The criterion at the chosen λ is its minimum."""
     closed = ends == "periodic"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 from noisy import beside, example, rms
 
 import symspline as ss
@@ -48,7 +49,7 @@ def test_given_velocities(name, far):
 
     for e, (_, v) in zip((0, -1), conditions(spline.points), strict=True):
         assert np.abs(spline.velocities[e] - v).max() < 1e-12
-    # The flat way solves an estimating equation beside the minimum, whose velocities stay while ends move.
+    # The linearised solver solves an estimating equation beside the minimum, whose velocities stay while ends move.
     assert flatness(space, t, noisy, spline, 0.3, conditions, False) < far
     still = ss.make_smoothing_spline(t, noisy, space, bc_type="clamped")
     assert np.abs(still.velocities[[0, -1]]).max() == 0
@@ -58,14 +59,14 @@ def test_given_velocities(name, far):
     assert still.std(5.0) == pytest.approx(free.std(5.0), rel=0.1)
 
 
-def test_the_exact_way_has_given_velocities_too():
+def test_gauss_newton_keeps_given_velocities():
     space, t, noisy, _ = example("sphere:2", 0.05, n=20, segments=3)
     start = 0.2 * space.random_tangent(np.random.default_rng(1), noisy[0])
     ways = [
         ss.make_smoothing_spline(
             t, noisy, space, 0.3, bc_type=((1, start), "natural"), method=method, tol=1e-5
         )
-        for method in ("flat", "newton")
+        for method in ("linearized", "newton")
     ]
     assert space.distance(ways[0].points, ways[1].points).max() < 1e-4
 
@@ -111,7 +112,7 @@ def test_closed_curves(name, far):
 
 
 @pytest.mark.parametrize("name", ["r:2", "sphere:1", "sphere:2", "so:3", "spd:2", "gr:2,5", "cp:2"])
-def test_the_exact_way_closes_curves(name):
+def test_gauss_newton_fits_closed_curves(name):
     space, t, noisy, _ = ring(name, 20)
     # A datum where the curve ends, too, which is not the first one again.
     t, noisy = np.append(t, 10.0), np.append(noisy, beside(space, noisy[:1], 0.05), axis=0)
@@ -120,7 +121,7 @@ def test_the_exact_way_closes_curves(name):
         ss.make_smoothing_spline(
             t, noisy, space, 0.3, knots=knots, bc_type="periodic", method=method, **TIGHT
         )
-        for method in ("flat", "newton")
+        for method in ("linearized", "newton")
     )
     assert exact.report.converged and exact.report.method == "newton" and exact.report.iterations <= 15
     # Few knots far apart: the estimating equation is off by more than usual.
@@ -139,7 +140,7 @@ def test_orbits_are_closed_curves_too():
     for lam in (100.0, 1000.0):
         flat, exact = (
             ss.make_smoothing_spline(t, noisy, space, lam, method=method, **options, **TIGHT)
-            for method in ("flat", "newton")
+            for method in ("linearized", "newton")
         )
         assert flat.report.converged and exact.report.converged
         assert exact.report.iterations <= 12
@@ -211,8 +212,8 @@ def test_the_first_point_repeated_at_the_end_counts_once():
 
 
 @pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3"])
-@pytest.mark.parametrize("n", [3, 4, 6, 20])
-@pytest.mark.parametrize("repeated", [True, False])
+@loop_over("n", [3, 4, 6, 20])
+@loop_over("repeated", [True, False])
 def test_closed_curves_through_all_data(name, n, repeated):
     space, t, noisy, _ = ring(name, n)
     knots = np.append(t, 10.0)

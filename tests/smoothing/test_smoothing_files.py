@@ -195,7 +195,7 @@ def test_collections_that_are_damaged():
 
 
 @pytest.mark.parametrize("name", ["one", "batch", "dates", "product"])
-def test_the_command_line_reads_them(name, tmp_path, capsys):
+def test_command_line_reads_information(name, tmp_path, capsys):
     SAVED[name].save(tmp_path / "smooth.npz")
     assert main(["check", str(tmp_path / "smooth.npz")]) == 0
     assert main(["sample", str(tmp_path / "smooth.npz"), "-n", "5", "-o", str(tmp_path / "out.csv")]) == 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 from noisy import beside, each, example, rms, truth
 
 import symspline as ss
@@ -11,7 +12,7 @@ NAMES = [
     "spd:3", "hpd:2", "gr:2,5", "cgr:1,3", "rp:2", "cp:2", "ch:2", "hp:2", "siegel:2", "se:2", "se:3",
 ]  # fmt: skip
 every = pytest.mark.parametrize("name", NAMES)
-# Steps of the search that end it, in standard deviations; the flat way stagnates at rounding.
+# Steps of the search that end it, in standard deviations; the linearised solver stagnates at rounding.
 TIGHT = {"tol": 1e-8, "max_iter": 200}
 
 
@@ -52,7 +53,7 @@ def test_moves_with_its_data(name):
 
 
 @every
-def test_goes_back_as_it_came(name):
+def test_reversed_data_give_the_reversed_curve(name):
     space, t, noisy, _ = example(name, 0.05)
     spline = ss.make_smoothing_spline(t, noisy, space, 0.1, **TIGHT)
     back = ss.make_smoothing_spline(10 - t[::-1], noisy[::-1], space, 0.1, **TIGHT)
@@ -60,8 +61,8 @@ def test_goes_back_as_it_came(name):
 
 
 @every
-@pytest.mark.parametrize("unit", [1e-9, 86400.0])
-def test_knows_no_unit_of_time(name, unit):
+@loop_over("unit", [1e-9, 86400.0])
+def test_time_unit_does_not_matter(name, unit):
     space, t, noisy, _ = example(name, 0.05, n=30)
     spline = ss.make_smoothing_spline(t, noisy, space, **TIGHT)
     other = ss.make_smoothing_spline(unit * t, noisy, space, **TIGHT)
@@ -108,7 +109,7 @@ def objective(space, t, noisy, points, lam, weights):
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("se")])
-def test_the_exact_way_leads_to_the_minimum(name):
+def test_gauss_newton_reaches_the_minimum(name):
     space, t, noisy, points = example(name, 0.1, n=12, segments=3)
     rng = np.random.default_rng(2)
     weights, lam = rng.uniform(0.5, 2, 12), 0.3
@@ -124,8 +125,8 @@ def test_the_exact_way_leads_to_the_minimum(name):
         # The slope of a quadratic with the curvature that the two show: the distance to its minimum.
         slope, bend = (up - down) / (2 * step), (up + down - 2 * here) / step**2
         assert bend > 0 and abs(slope / bend) < 1e-6
-    # The flat way solves an estimating equation beside it.
-    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=weights, method="flat", **TIGHT)
+    # The linearised solver solves an estimating equation beside it.
+    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=weights, method="linearized", **TIGHT)
     error = rms(space, exact.points, points)
     assert rms(space, flat.points, exact.points) < 5e-3 * error
 
@@ -259,9 +260,9 @@ def test_few_knots_take_the_same_curve_either_way():
     space, t, noisy, points = example("sphere:2", 0.1, n=40, step=1.2)
     ways = [
         ss.make_smoothing_spline(t, noisy, space, 0.05, knots=9, method=method, **TIGHT)
-        for method in ("flat", "newton")
+        for method in ("linearized", "newton")
     ]
-    # On long segments the linear acceleration of the flat way is further from that of the curve.
+    # On long segments the linear acceleration of the linearised solver is further from that of the curve.
     assert rms(space, ways[0](t), ways[1](t)) < 0.06 * rms(space, ways[1](t), points)
 
 
@@ -271,6 +272,6 @@ def test_data_between_few_knots_pull_at_the_nearest(name):
     space, t, noisy, _ = example(name, 0.1, n=60)
     flat, exact = (
         ss.make_smoothing_spline(t, noisy, space, 0.1, knots=10, method=method, tol=1e-7, max_iter=200)
-        for method in ("flat", "newton")
+        for method in ("linearized", "newton")
     )
     assert rms(space, flat.points, exact.points) < 3e-3 * exact.std(t).max()

@@ -60,7 +60,7 @@ def test_curves_of_a_batch_may_have_times_of_their_own():
     assert batch.std(own, 0).shape == (2, 2, 40)
 
 
-def test_what_failed_is_told_and_kept():
+def test_failed_curves_are_reported_and_kept():
     with pytest.raises(ss.ConvergenceError, match="Raise max_iter") as caught:
         ss.make_smoothing_spline(T, NOISY, S2, max_iter=1)
     assert not caught.value.spline.report.converged
@@ -139,7 +139,7 @@ def test_three_points_that_are_met_are_no_geodesic():
         ({"points": 2 * NOISY}, r"points\[0\]"),
     ],
 )
-def test_bad_input_is_named(change, message):
+def test_invalid_input_raises(change, message):
     arguments = {"t": T, "points": NOISY, "space": S2, **change}
     with pytest.raises(ss.ValidationError, match=message):
         ss.make_smoothing_spline(**arguments)

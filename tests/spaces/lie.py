@@ -5,10 +5,22 @@ exponentials are the same for all spaces.
 """
 
 import numpy as np
+from cases import HYPERBOLIC
 from scipy.linalg import expm
 
 import symspline as ss
-from symspline.spaces.actions import Congruent, Group
+
+CONGRUENT = (
+    ss.SymmetricPositiveDefinite,
+    ss.HermitianPositiveDefinite,
+    ss.SpecialPositiveDefinite,
+    ss.Siegel,
+)
+GROUPS = (
+    *(ss.SpecialOrthogonal, ss.Orthogonal, ss.SpecialUnitary, ss.Unitary, ss.SpecialEuclidean),
+    *(ss.GeneralLinear, ss.ComplexGeneralLinear, ss.Affine, ss.Similarity),
+    *(ss.SpecialLinear, ss.Symplectic, ss.Lorentz),
+)
 
 
 def adjoint(x):
@@ -24,15 +36,20 @@ def columns(x):
     return x[..., None] if x.ndim == 1 else x
 
 
+def negative_axes(space):
+    """How many of the first axes have a negative sign in the form that the group preserves."""
+    if isinstance(space, ss.IndefiniteGrassmannian):
+        return int(str(space).split(",")[2])
+    return 2 if isinstance(space, ss.AntiDeSitter) else isinstance(space, (*HYPERBOLIC, ss.DeSitter))
+
+
 class Lie:
     """The group of a space, by formulas that are linear in matrices."""
 
     def __init__(self, space):
         self.space = space
         form = np.ones(space.point_shape[0])
-        if isinstance(space, ss.IndefiniteGrassmannian):
-            form[: space._parameters[2]] = -1.0
-        form[list(getattr(space, "_negative", ()))] = -1.0
+        form[: negative_axes(space)] = -1.0
         self.form = np.diag(form)
 
     def noise(self, rng, *shape):
@@ -53,9 +70,9 @@ class Lie:
         if isinstance(space, ss.SpecialPositiveDefinite):
             x = rng.standard_normal((n, n))
             return x - np.eye(n) * np.trace(x) / n
-        if isinstance(space, Congruent):
+        if isinstance(space, CONGRUENT):
             return self.noise(rng, n, n)
-        if isinstance(space, Group):
+        if isinstance(space, GROUPS):
             one = space.project(np.eye(n))
             pair = space.random_tangent(rng, np.array([one, one]))
             return np.asarray(pair)
@@ -77,13 +94,13 @@ class Lie:
         flip[last, last] = -1.0
         if isinstance(self.space, ss.Orthogonal):
             return np.array([g[0] @ flip, g[1]])
-        if isinstance(self.space, (Group, ss.QuaternionicProjective, ss.Siegel)):
+        if isinstance(self.space, (*GROUPS, ss.QuaternionicProjective, ss.Siegel)):
             return g
         return g @ flip
 
     def given(self, g):
         """As `Space.act` takes it."""
-        return tuple(g) if isinstance(self.space, Group) else g
+        return tuple(g) if isinstance(self.space, GROUPS) else g
 
     def act(self, g, x):
         return self.space.act(self.given(g), x)
@@ -95,9 +112,9 @@ class Lie:
             return g[:-1, :-1] @ v
         if isinstance(space, ss.IndefiniteGrassmannian):
             return g @ v @ np.linalg.inv(g)
-        if isinstance(space, Group):
+        if isinstance(space, GROUPS):
             return g[0] @ v @ np.linalg.inv(g[1])
-        if isinstance(space, Congruent):
+        if isinstance(space, CONGRUENT):
             return g @ v @ adjoint(g)
         return g @ v
 
@@ -106,9 +123,9 @@ class Lie:
         space = self.space
         if isinstance(space, ss.Euclidean):
             return x[:-1, :-1] @ p + x[:-1, -1]
-        if isinstance(space, Group):
+        if isinstance(space, GROUPS):
             return x[0] @ p - p @ x[1]
-        if isinstance(space, Congruent):
+        if isinstance(space, CONGRUENT):
             return x @ p + p @ adjoint(x)
         # What turns a basis within its subspace, or a phase, is no movement.
         return space.project_tangent(p, x @ p)
@@ -120,9 +137,9 @@ class Lie:
             x = np.zeros((len(p) + 1, len(p) + 1))
             x[:-1, -1] = v
             return x
-        if isinstance(space, Group):
+        if isinstance(space, GROUPS):
             return np.array([v @ np.linalg.inv(p), -np.linalg.solve(p, v)]) / 2
-        if isinstance(space, Congruent):
+        if isinstance(space, CONGRUENT):
             return v @ np.linalg.inv(p) / 2
         p, v = columns(p), columns(v)
         square = np.sign((adjoint(p) @ self.form @ p)[0, 0].real)
@@ -135,9 +152,9 @@ class Lie:
             s = -np.eye(len(p) + 1)
             s[:-1, -1], s[-1, -1] = 2 * p, 1.0
             return s @ x @ s
-        if isinstance(space, Group):
+        if isinstance(space, GROUPS):
             return np.array([p @ x[1] @ np.linalg.inv(p), np.linalg.solve(p, x[0] @ p)])
-        if isinstance(space, Congruent):
+        if isinstance(space, CONGRUENT):
             return -p @ adjoint(x) @ np.linalg.inv(p)
         p = columns(p)
         square = np.sign((adjoint(p) @ self.form @ p)[0, 0].real)

@@ -2,13 +2,26 @@
 
 import numpy as np
 import pytest
-from cases import CASES, EPS, apart, base_point, condition, has_metric, unit_tangent, walk
+from cases import (
+    CASES,
+    EPS,
+    apart,
+    base_point,
+    condition,
+    every_family,
+    has_metric,
+    loop_over,
+    unit_tangent,
+    walk,
+)
 from lie import Lie
 
 import symspline as ss
 
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-face = pytest.mark.parametrize("case", [c for c in CASES if c.face], ids=lambda case: case.name)
+one_per_family = pytest.mark.parametrize(
+    "case", [c for c in CASES if c.interface], ids=lambda case: case.name
+)
 
 
 @pytest.fixture
@@ -19,8 +32,8 @@ def rng():
 # ---- symmetries ----
 
 
-@every
-@pytest.mark.parametrize("length", [1e-9, 1e-3, 0.4, 0.9])
+@every_family
+@loop_over("length", [1e-9, 1e-3, 0.4, 0.9])
 def test_symmetry_reverses_geodesics(case, length, rng):
     space = case.space
     p = base_point(space, rng)
@@ -53,7 +66,7 @@ def test_symmetry_at_the_cut_locus(name, p, x, image):
     assert apart(space, space.symmetry(p, x), image) <= 4 * EPS
 
 
-@every
+@every_family
 def test_symmetries_are_conjugate_by_the_group(case, rng):
     """σ_{g·p}(g·x) = g·σ_p(x)."""
     space, lie = case.space, Lie(case.space)
@@ -68,7 +81,7 @@ def test_symmetries_are_conjugate_by_the_group(case, rng):
 # ---- the action ----
 
 
-@every
+@every_family
 def test_elements_act_as_a_group(case, rng):
     space, lie = case.space, Lie(case.space)
     x = base_point(space, rng)
@@ -82,7 +95,7 @@ def test_elements_act_as_a_group(case, rng):
     space.check_point(both)
 
 
-@every
+@every_family
 def test_elements_are_isometries(case, rng):
     """g·exp_p(v) = exp_{g·p}(g·v); distances and inner products stay, where there is an invariant metric."""
     space, lie = case.space, Lie(case.space)
@@ -99,8 +112,8 @@ def test_elements_are_isometries(case, rng):
     assert np.abs(space.log(there, lie.act(g, q)) - lie.push(g, v)).max() <= allowed
 
 
-@every
-@pytest.mark.parametrize("ends", ["natural", "not-a-knot"])
+@every_family
+@loop_over("ends", ["natural", "not-a-knot"])
 def test_the_spline_commutes_with_the_group(case, ends, rng):
     space, lie = case.space, Lie(case.space)
     p = walk(space, 0.4, 7, rng)
@@ -113,7 +126,7 @@ def test_the_spline_commutes_with_the_group(case, ends, rng):
     assert apart(space, there(x), lie.act(g, here(x))) <= allowed
 
 
-@face
+@one_per_family
 def test_act_and_symmetry_broadcast(case, rng):
     space, lie = case.space, Lie(case.space)
     p = walk(space, 0.3, 3, rng)

@@ -210,7 +210,7 @@ def test_injectivity_radius(case, rng):
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if not compact(c.space)], ids=lambda case: case.name)
-def test_no_injectivity_radius(case, rng):
+def test_injectivity_radius_is_infinite(case, rng):
     space = case.space
     if not has_metric(space):
         # Half a turn, of real matrices in a plane at least; translations and stretches have no cut locus.

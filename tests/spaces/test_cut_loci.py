@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import EPS, closed_walk, steep_tangent, unit_tangent, walk
+from cases import EPS, closed_walk, loop_over, steep_tangent, unit_tangent, walk
 from curves import S2
 from refused import CLAMPED, NAN, P, fails, fit_error
 
@@ -42,8 +42,8 @@ def test_special_unitary_phases_that_are_all_small(n, gap, rng):
     assert abs(space.distance(p, q) - np.linalg.norm(phases)) <= 50 * EPS * n
 
 
-@pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize("gap", [1e-2, 1e-6, 1e-10, 1e-14])
+@loop_over("axis", range(3))
+@loop_over("gap", [1e-2, 1e-6, 1e-10, 1e-14])
 @pytest.mark.parametrize("name", ["so:3", "se:3"])
 def test_half_turns_about_each_axis(name, axis, gap, rng):
     """Of the four formulas for the quaternion of a matrix only one keeps its digits there."""
@@ -61,7 +61,7 @@ def test_half_turns_about_each_axis(name, axis, gap, rng):
 
 @pytest.mark.filterwarnings("ignore:neighbours almost at the cut locus")
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
-@pytest.mark.parametrize("gap", [0.1, 1e-3, 1e-8, 1e-12, 1e-13, 1e-14])
+@loop_over("gap", [0.1, 1e-3, 1e-8, 1e-12, 1e-13, 1e-14])
 def test_the_last_digits_before_the_antipode(n, gap):
     """A logarithm there is tangent, of the right length, and leads to the point; so do curves."""
     space, rng = ss.Sphere(n), np.random.default_rng(n)
@@ -81,7 +81,7 @@ def test_the_last_digits_before_the_antipode(n, gap):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-@pytest.mark.parametrize("gap", [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 1e-2])
+@loop_over("gap", [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 1e-2])
 def test_a_curve_that_starts_at_the_far_pole(n, gap, rng):
     """Frames start at either pole: what is there is a reflection of what is elsewhere."""
     space = ss.Sphere(n)
@@ -232,7 +232,7 @@ def test_special_unitary_matrices_at_the_cut_locus(n):
     ss.CubicSpline(None, np.array([p[0], np.diag(np.exp(0.9j * phase))]), f"su:{n}")
 
 
-def test_the_bad_pair_of_a_batch_is_named():
+def test_error_names_the_pair_of_a_batch():
     at, limit = REACH["gr:2,5"]
     good, bad = np.array([at(0), at(0.5), at(1.0)]), np.array([at(0), at(0.2), at(0.2 + limit)])
     batch = np.array([[good, good, good], [good, bad, good]])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import EPS, condition, unit_tangent, walk
+from cases import EPS, condition, loop_over, unit_tangent, walk
 
 import symspline as ss
 
@@ -45,7 +45,7 @@ def test_random_points_are_on_the_space_to_rounding(name, rng):
     assert np.abs(x.conj().swapaxes(-1, -2) @ x - np.eye(x.shape[-1])).max() <= 20 * EPS
 
 
-@pytest.mark.parametrize("length", [1e-6, 0.3, 1.4])
+@loop_over("length", [1e-6, 0.3, 1.4])
 @pytest.mark.parametrize(
     "name", ["so:11", "u:11", "su:13", "spd:11", "hpd:11", "gr:11,23", "cgr:11,22", "gr:5,31"]
 )

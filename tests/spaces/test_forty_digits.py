@@ -3,7 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from cases import EPS, QUOTIENTS, unit_tangent
+from cases import EPS, QUOTIENTS, loop_over, unit_tangent
 from exact import DIGITS, Poses, PositiveDefinite, Sphere, Subspaces, Unitary, doubles, exact, transvection
 
 import symspline as ss
@@ -55,7 +55,7 @@ LENGTHS = [1e-12, 1e-8, 1e-4, 0.1, 0.6, 1.5]
 GAPS = [0.5, 1e-2, 1e-4, 1e-8, 1e-12, 1e-14]
 
 
-@pytest.mark.parametrize("length", [*LENGTHS, 3.0, *(np.pi - np.array(GAPS))])
+@loop_over("length", [*LENGTHS, 3.0, *(np.pi - np.array(GAPS))])
 @pytest.mark.parametrize("n", [1, 2, 5])
 def test_sphere(n, length, rng):
     space = ss.Sphere(n)
@@ -64,7 +64,7 @@ def test_sphere(n, length, rng):
     compare(space, Sphere(), p, length * unit_tangent(space, p, rng), x)
 
 
-@pytest.mark.parametrize("length", [*LENGTHS, 2.5])
+@loop_over("length", [*LENGTHS, 2.5])
 @pytest.mark.parametrize("name", ["u:2", "u:3", "su:3", "so:3", "so:4", "so:5", "o:4"])
 def test_groups(name, length, rng):
     space = ss.space(name)
@@ -88,7 +88,7 @@ def rotation_velocity(p, turn, angles):
     return p @ turn @ omega @ turn.T
 
 
-@pytest.mark.parametrize("gap", GAPS)
+@loop_over("gap", GAPS)
 @pytest.mark.parametrize("rest", [[0.7, -1.9], [0.7, 0.7, 0.7], [1e-9, 3.0, -3.0]])
 def test_unitary_near_pi(gap, rest, rng):
     space = ss.Unitary(1 + len(rest))
@@ -127,7 +127,7 @@ def test_special_unitary_past_pi(gap, rng):
     assert abs(space.distance(p, q) - third * np.sqrt(6)) <= 50 * EPS
 
 
-@pytest.mark.parametrize("length", LENGTHS)
+@loop_over("length", LENGTHS)
 @pytest.mark.parametrize("name", ["gr:2,4", "gr:3,4", "gr:2,6", "cgr:2,4", "cgr:1,3"])
 def test_subspaces(name, length, rng):
     space = ss.space(name)
@@ -135,7 +135,7 @@ def test_subspaces(name, length, rng):
     compare(space, Subspaces(), p, length * unit_tangent(space, p, rng), x, log_size=1 / (np.pi / 2 - length))
 
 
-@pytest.mark.parametrize("gap", GAPS)
+@loop_over("gap", GAPS)
 @pytest.mark.parametrize("name", ["gr:2,4", "cgr:2,4"])
 def test_subspaces_near_a_right_angle(name, gap, rng):
     space = ss.space(name)
@@ -146,8 +146,8 @@ def test_subspaces_near_a_right_angle(name, gap, rng):
     compare(space, Subspaces(), p, v, x, log_size=1 / gap if name[0] == "c" else 1.0)
 
 
-@pytest.mark.parametrize("condition", [1.0, 1e4, 1e8, 1e12])
-@pytest.mark.parametrize("length", [1e-8, 1e-4, 0.1, 1.0, 4.0])
+@loop_over("condition", [1.0, 1e4, 1e8, 1e12])
+@loop_over("length", [1e-8, 1e-4, 0.1, 1.0, 4.0])
 @pytest.mark.parametrize("name", ["spd:3", "hpd:3"])
 def test_positive_definite(name, length, condition, rng):
     space = ss.space(name)
@@ -158,7 +158,7 @@ def test_positive_definite(name, length, condition, rng):
     compare(space, PositiveDefinite(), p, v, x, size=size)
 
 
-@pytest.mark.parametrize("length", [*LENGTHS, 3.0])
+@loop_over("length", [*LENGTHS, 3.0])
 @pytest.mark.parametrize("name", ["se:2", "se:3"])
 def test_poses(name, length, rng):
     space = ss.space(name)

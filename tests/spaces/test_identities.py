@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import EPS, QUOTIENTS, base_point, closed_walk, condition, unit_tangent, walk
+from cases import EPS, QUOTIENTS, base_point, closed_walk, condition, loop_over, unit_tangent, walk
 
 import symspline as ss
 
@@ -201,7 +201,7 @@ every = pytest.mark.parametrize("case", IDENTITIES, ids=lambda case: f"{case.sou
 
 
 @every
-@pytest.mark.parametrize("length", [1e-12, 1e-8, 1e-4, 1e-2, 0.3, 1.2])
+@loop_over("length", [1e-12, 1e-8, 1e-4, 1e-2, 0.3, 1.2])
 def test_geometry_agrees(case, length, rng):
     here, there = ss.space(case.source), ss.space(case.target)
     for _ in range(10):
@@ -226,12 +226,11 @@ def test_geometry_agrees(case, length, rng):
         assert np.abs(a - b).max() <= 4 * allowed
 
 
-ENDS = ["natural", "not-a-knot", "periodic", "velocity", "acceleration"]
-
-
 @every
-@pytest.mark.parametrize("ends", ENDS)
-@pytest.mark.parametrize("step", [1e-6, 0.1, 0.7])
+@loop_over(
+    "step, ends",
+    [(1e-6, "natural"), (0.1, "not-a-knot"), (0.1, "velocity"), (0.7, "periodic"), (0.7, "acceleration")],
+)
 def test_splines_agree(case, ends, step, rng):
     here, there = ss.space(case.source), ss.space(case.target)
     p = (closed_walk if ends == "periodic" else walk)(here, step, 12, rng)
@@ -389,8 +388,8 @@ def gauges(space, n, rng):
 
 
 @pytest.mark.parametrize("name", ["rp:3", "cp:3", "gr:2,5", "cgr:2,4", "gr:4,5", "cgr:1,2"])
-@pytest.mark.parametrize("ends", ENDS)
-@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton"])
+@loop_over("ends", ["natural", "not-a-knot", "periodic", "velocity", "acceleration"])
+@loop_over("method", ["fixed-point", "quasi-newton"])
 def test_representatives_do_not_matter(name, ends, method, rng):
     space = ss.space(name)
 

@@ -12,6 +12,7 @@ from cases import (
     apart,
     base_point,
     condition,
+    every_family,
     has_metric,
     steep_tangent,
     unit_tangent,
@@ -39,7 +40,7 @@ def rng():
 def test_every_family_is_in_the_suite():
     families = {row[0] for row in FAMILIES}
     assert families == {case.name.partition(":")[0] for case in CASES}
-    assert families == {case.name.partition(":")[0] for case in CASES if case.face}
+    assert families == {case.name.partition(":")[0] for case in CASES if case.interface}
 
 
 def lengths(space):
@@ -67,7 +68,7 @@ def test_exp_and_log_are_inverse(case, rng):
         assert abs(space.distance(p, q) - length) <= allowed * max(1.0, length), length
 
 
-@every
+@every_family
 def test_geodesic_divides_the_distance(case, rng):
     space = case.space
     for length in (1e-8, 1e-3, 0.5, 0.9 * min(3.2, space.injectivity_radius)):
@@ -86,7 +87,7 @@ def symmetry(space, p, x):
     return space.exp(p, -space.log(p, x))
 
 
-@every
+@every_family
 def test_transvection_is_the_product_of_two_symmetries(case, rng):
     space = case.space
     for length in [x for x in lengths(space) if x < min(2.5, 0.9 * space.injectivity_radius)]:
@@ -101,7 +102,7 @@ def test_transvection_is_the_product_of_two_symmetries(case, rng):
         assert apart(space, space.transvection(p, v, p), space.exp(p, v)) <= allowed, length
 
 
-@every
+@every_family
 def test_transvection_carries_exp_and_keeps_length(case, rng):
     space = case.space
     for length in [x for x in lengths(space) if x < 3.0]:
@@ -120,7 +121,7 @@ def test_transvection_carries_exp_and_keeps_length(case, rng):
         assert np.abs(space.transport(p, q, v) + space.log(q, p)).max() <= allowed, length
 
 
-@every
+@every_family
 def test_inner_product_is_that_of_distance(case, rng):
     space = case.space
     p = base_point(space, rng)

@@ -8,7 +8,7 @@ attained only for short steps, so that their factors are tested there, but hardl
 
 import numpy as np
 import pytest
-from cases import base_point, unit_tangent
+from cases import base_point, loop_over, unit_tangent
 from lie import Lie, bracket
 
 import symspline as ss
@@ -200,7 +200,7 @@ def test_equation_26_connection_is_consistent_and_equivariant(name, rng):
 
 
 @every
-@pytest.mark.parametrize("size", [1e-3, 0.1, 0.5, 1.0])
+@loop_over("size", [1e-3, 0.1, 0.5, 1.0])
 def test_lemma_a1_derivative_of_the_orbit_map(name, size, rng):
     """T_ξq(δξ) = exp(ξ)·(π_p dexp_{−ξ}(δξ)·p) for q(ξ) = exp(ξ)·p and any ξ, δξ of the algebra."""
     s = Setting(name, rng)
@@ -214,7 +214,7 @@ def test_lemma_a1_derivative_of_the_orbit_map(name, size, rng):
 
 
 @every
-@pytest.mark.parametrize("size", SIZES)
+@loop_over("size", SIZES)
 def test_lemma_a2_dexp_is_sinh_ad_over_ad(name, size, rng):
     """π_p dexp_{−ξ} = sinh(ad_ξ)/ad_ξ = π_p dexp_ξ on m_p, and this is E_p(−v) D exp_p(v)."""
     s = Setting(name, rng)
@@ -233,7 +233,7 @@ def test_lemma_a2_dexp_is_sinh_ad_over_ad(name, size, rng):
 
 
 @every
-@pytest.mark.parametrize("size", [1e-4, 0.1, 0.5, 0.9])
+@loop_over("size", [1e-4, 0.1, 0.5, 0.9])
 def test_lemma_a3_derivative_of_the_symmetry(name, size, rng):
     """T I_p(exp(ξ)·δp) = −exp(−ξ)·δp at exp(ξ)·p."""
     s = Setting(name, rng)
@@ -254,7 +254,7 @@ def test_lemma_a3_derivative_of_the_symmetry(name, size, rng):
 
 
 @every
-@pytest.mark.parametrize("size", [1e-8, 1e-3, 0.3, 0.9])
+@loop_over("size", [1e-8, 1e-3, 0.3, 0.9])
 def test_lemma_a4_logarithm_is_equivariant(name, size, rng):
     """log_{g·p}(q) = g·log_p(g⁻¹·q) for any element g, also of other components of the group."""
     s = Setting(name, rng)
@@ -267,7 +267,7 @@ def test_lemma_a4_logarithm_is_equivariant(name, size, rng):
 
 
 @every
-@pytest.mark.parametrize("size", SIZES)
+@loop_over("size", SIZES)
 def test_lemma_a5_bounds_of_dexp(name, size, rng):
     """‖π_p dexp_ξ‖ ≤ sinh(K‖ξ‖)/(K‖ξ‖), and its inverse ≤ K‖ξ‖/sin(K‖ξ‖)."""
     s = Setting(name, rng)
@@ -286,7 +286,7 @@ def test_lemma_a5_bounds_of_dexp(name, size, rng):
 
 
 @every
-@pytest.mark.parametrize("size", SIZES)
+@loop_over("size", SIZES)
 def test_lemma_a6_distance_of_logarithms(name, size, rng):
     """‖ξ₀ − ξ₁‖ ≤ KU/sin(KU) d(q₀, q₁) with 2U = ‖ξ₀‖ + ‖ξ₁‖ + d(q₀, q₁)."""
     s = Setting(name, rng)
@@ -378,7 +378,7 @@ LENGTHS = [
     (0.8, 0.7, 0.6),
     (1.4, 0.05, 0.02),
 ]
-lengths = pytest.mark.parametrize(("omega", "xi", "following"), LENGTHS)
+lengths = loop_over(("omega", "xi", "following"), LENGTHS)
 
 
 def in_reach(segment):
@@ -416,7 +416,7 @@ def test_equation_37_is_attained_on_a_geodesic_there_and_back():
 
 
 @every
-@pytest.mark.parametrize("kd", [1e-6, 1e-3, 0.1, 0.26])
+@loop_over("kd", [1e-6, 1e-3, 0.1, 0.26])
 def test_proposition_c1_invariant_region(name, kd, rng):
     """‖ξ‖ ≤ V gives ‖φ(ξ)‖ ≤ V for natural and clamped ends, where V solves (38) with U − V = D + V."""
     s = Setting(name, rng)
@@ -557,7 +557,7 @@ def test_proposition_c4_derivative_by_itself(name, rng):
 
 
 @every
-@pytest.mark.parametrize(("end", "following"), [(0.01, 0.01), (0.3, 0.3), (0.7, 0.05), (0.02, 1.2)])
+@loop_over(("end", "following"), [(0.01, 0.01), (0.3, 0.3), (0.7, 0.05), (0.02, 1.2)])
 def test_proposition_c6_derivative_of_a_natural_end(name, end, following, rng):
     """‖∂φ₀/∂ξ₁‖ ≤ ½ 2Kφ₀/sin(2Kφ₀) sinh(Kξ₁)/(Kξ₁) ≤ ½ + ⅓K²φ₀² + K²ξ₁²/12 + O(K⁴)."""
     # 2φ₀ = ω⁺ with ξ₀ = 0, of (20) and (33).

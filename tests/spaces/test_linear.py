@@ -164,7 +164,7 @@ def test_positive_numbers_are_a_line():
         ("so:1,1", [[-1, 0], [0, -1]], "turns time round"),
     ],
 )
-def test_what_is_no_member_is_told(name, point, why):
+def test_non_members_raise(name, point, why):
     space = ss.space(name)
     good = np.eye(len(point))
     with pytest.raises(ss.ValidationError, match=rf"points\[1\].*{why}"):

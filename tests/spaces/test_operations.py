@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from cases import COMMON, EPS, INDEFINITE
+from cases import COMMON, EPS, INDEFINITE, loop_over
 from curves import (
     S2,
     at_node,
     each,
+    every_kind,
     every_space,
     factors,
     found,
@@ -44,8 +45,8 @@ OPERATIONS = {
 LEADING = {"project": (3, 1)}
 
 
-@every_space
-@pytest.mark.parametrize("name", OPERATIONS)
+@every_kind
+@loop_over("name", OPERATIONS)
 def test_operations_broadcast(space, name):
     near = points_on(space, 7, step=0.1)
     p, q = each(lambda a: a[:3, None], near), pick(near, slice(3, None))
@@ -64,7 +65,7 @@ def test_operations_broadcast(space, name):
     assert found(none) == ([((0,), np.float64)] if number else shaped(space, (0,)))
 
 
-@every_space
+@every_kind
 def test_geodesics_broadcast_their_times(space):
     near = points_on(space, 5, step=0.5)
     p, q = (at_node(space, near, i) for i in (0, 1))
@@ -98,7 +99,7 @@ def test_random_point_is_one_point_by_default():
 
 
 @every_space
-@pytest.mark.parametrize("shape", [(), 3, (3,), np.int64(3), (2, 3), 0], ids=str)
+@loop_over("shape", [(), 3, (3,), np.int64(3), (2, 3), 0])
 def test_random_points_and_tangents(space, shape):
     rng = np.random.default_rng(0)
     lead = tuple(shape) if isinstance(shape, tuple) else (int(shape),)
@@ -157,7 +158,7 @@ def test_project_and_check(space):
 
 
 @every_space
-def test_checks_name_the_place(space):
+def test_checks_name_the_index(space):
     p = points_on(space, 5, (2,), 0.5)
     bad = each(np.copy, p)
     parts(bad)[0][1, 3] = np.nan
@@ -197,7 +198,7 @@ def test_checks_name_the_place(space):
         (lambda: S2.check_tangent(2 * P, P), r"point 0 is off the space"),
     ],
 )
-def test_bad_operands(call, match):
+def test_invalid_operands_raise(call, match):
     with pytest.raises(ss.ValidationError, match=match):
         call()
 
@@ -236,7 +237,7 @@ def test_no_geodesic_joins_a_rotation_and_a_reflection(operation):
 
 
 @pytest.mark.parametrize("space", COMMON[:3], ids=str)
-def test_one_thread_and_two_operate_the_same(threads, space):
+def test_operations_do_not_depend_on_the_number_of_threads(threads, space):
     p = np.tile(points_on(space, 100, step=0.3), (300, 1))
     q = np.roll(p, 1, axis=0)
     results = []

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import CASES, EPS
+from cases import CASES, EPS, loop_over
 from curves import KNOTS, S2, points_on, same
 from refused import INF, NAN, TWO, P, changed, fails, fit_error, points, spoiled
 
@@ -206,7 +206,7 @@ def test_points_off_the_space(space, points, match):
     fit_error(match + r".*Points within 1e-8 are projected; use space\.project\(x\)", None, points, space)
 
 
-def test_the_bad_point_of_a_batch_is_named():
+def test_error_names_the_point_of_a_batch():
     fit_error(
         r"points\[2\] of curve 1 is off the space by 5\.000e-1", points=changed((1, 2), [0, 0, 1.5], TWO)
     )
@@ -233,9 +233,9 @@ def test_a_bad_point_is_found_before_a_long_fit():
 EVERY = [case.name for case in CASES]
 
 
-@pytest.mark.parametrize("value", [NAN, INF, -INF])
+@loop_over("value", [NAN, INF, -INF])
 @pytest.mark.parametrize("name", EVERY)
-def test_numbers_that_are_not_finite(name, value):
+def test_points_that_are_not_finite_raise(name, value):
     space = ss.space(name)
     p = points(name)
     for place in {0, p[0].size - 1}:

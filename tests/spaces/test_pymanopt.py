@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import EPS, QUOTIENTS, base_point, unit_tangent
+from cases import EPS, QUOTIENTS, base_point, loop_over, unit_tangent
 from pymanopt import manifolds
 
 import symspline as ss
@@ -39,7 +39,7 @@ PYMANOPT = [
 
 
 @pytest.mark.parametrize(("name", "theirs", "scale"), PYMANOPT, ids=[row[0] for row in PYMANOPT])
-@pytest.mark.parametrize("length", [1e-3, 0.1, 0.7, 1.4])
+@loop_over("length", [1e-3, 0.1, 0.7, 1.4])
 def test_geometry_is_that_of_pymanopt(name, theirs, scale, length, rng):
     space = ss.space(name)
     group = isinstance(space, ss.SpecialOrthogonal | ss.Unitary)

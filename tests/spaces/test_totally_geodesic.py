@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import EPS
+from cases import EPS, loop_over
 from curves import points_on
 
 import symspline as ss
@@ -99,7 +99,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", "clamped", "periodic", "given"])
+@loop_over("bc_type", ["natural", "not-a-knot", "clamped", "periodic", "given"])
 def test_curves_stay(name, bc_type):
     space, step, start, defect = CASES[name]
     p = walk_in(step, start)
@@ -287,7 +287,7 @@ def test_special_tensors_have_determinant_one():
         ("hp:1", np.eye(4)[:2] * np.ones((3, 1, 1)), "looks like vectors of quaternions"),
     ],
 )
-def test_points_that_are_none_are_told(space, points, why):
+def test_invalid_quadric_points_raise(space, points, why):
     with pytest.raises(ss.ValidationError, match=why):
         ss.CubicSpline(None, points, space)
 
@@ -306,10 +306,10 @@ def test_points_that_are_none_are_told(space, points, why):
         (convert.positive_definite_to_siegel, np.eye(3), "2n, 2n"),
         (convert.quaternions_to_subspace, [[1.0, 0, 0, 1]], "has length 1.41421356, not 1"),
         (convert.quaternions_to_subspace, [[1.0, 0, 0]], "must be real, of shape"),
-        (convert.subspace_to_quaternions, np.eye(4)[:, ::2], "spans no quaternionic line"),
+        (convert.subspace_to_quaternions, np.eye(4)[:, ::2], "does not span a quaternionic line"),
         (convert.subspace_to_quaternions, np.eye(3), "2n . 2, 2"),
     ],
 )
-def test_what_is_none_is_told(call, value, why):
+def test_invalid_subspaces_raise(call, value, why):
     with pytest.raises(ss.ValidationError, match=why):
         call(value)

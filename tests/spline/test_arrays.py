@@ -25,7 +25,7 @@ def test_misaligned_arrays_are_taken():
     spline = ss.CubicSpline(misaligned(t), misaligned(AXES), S2, bc_type=((1, misaligned(v)), "natural"))
     assert spline == expected
     assert np.array_equal(spline(misaligned(x)), expected(x))
-    assert np.array_equal(ss.evaluate(x, t, AXES, misaligned(spline.velocities), S2), expected(x))
+    assert np.array_equal(ss.evaluate(t, AXES, misaligned(spline.velocities), S2, x), expected(x))
     assert np.array_equal(S2.log(misaligned(AXES[0]), AXES[1]), S2.log(AXES[0], AXES[1]))
     moved = spline.jvp(misaligned(x), points=misaligned(AXES), t=misaligned(t))
     assert np.array_equal(moved, expected.jvp(x, points=AXES, t=t))

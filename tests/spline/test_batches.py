@@ -7,7 +7,7 @@ from curves import (
     S2,
     THREE,
     every_common,
-    every_space,
+    every_kind,
     found,
     pick,
     points_on,
@@ -20,7 +20,7 @@ from curves import (
 import symspline as ss
 
 
-@every_space
+@every_kind
 def test_a_batch_is_a_sequence(space):
     p = points_on(space, batch=(3, 2), step=0.5)
     bc_type = with_ends(space, p)
@@ -52,7 +52,7 @@ def test_own_times_are_picked_with_the_curve():
     assert same(dates[1](np.datetime64(7, "s")), dates[1].points[1])
 
 
-def test_one_curve_is_no_sequence():
+def test_single_curve_is_not_a_sequence():
     spline = ss.CubicSpline(None, THREE, S2)
     for use in (len, iter, lambda s: s[0]):
         with pytest.raises(TypeError, match="batch"):

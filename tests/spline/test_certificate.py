@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from cases import CURVED, base_point, closed_walk, unit_tangent, walk
+from cases import CURVED, base_point, closed_walk, loop_over, unit_tangent, walk
 
 import symspline as ss
 
@@ -37,7 +37,7 @@ def longest_leg(space, points, velocities):
 
 
 @pytest.mark.parametrize("name", CURVED)
-@pytest.mark.parametrize("kd", [1e-6, 0.01, 0.1, 0.2, 0.25, 0.26, 0.26108])
+@loop_over("kd", [1e-6, 0.01, 0.1, 0.2, 0.25, 0.26, 0.26108])
 def test_radius_is_the_smallest_of_38(name, kd, rng):
     space = ss.space(name)
     report = ss.CubicSpline(None, steps(space, kd, rng), space).report
@@ -48,21 +48,21 @@ def test_radius_is_the_smallest_of_38(name, kd, rng):
 
 
 @pytest.mark.parametrize("name", CURVED)
-@pytest.mark.parametrize("kd", [0.26110, 0.3, 1.0])
-def test_there_is_none_for_far_steps(name, kd, rng):
+@loop_over("kd", [0.26110, 0.3, 1.0])
+def test_radius_is_none_for_far_steps(name, kd, rng):
     space = ss.space(name)
     assert ss.CubicSpline(None, steps(space, kd, rng, turn=0.5), space).report.invariant_radius is None
 
 
 @pytest.mark.parametrize("name", ["euclidean:3", "so:2", "spd:1", "rp:1"])
-def test_in_flat_space_it_is_the_longest_step(name, rng):
+def test_radius_is_the_longest_step_in_flat_space(name, rng):
     space = ss.space(name)
     report = ss.CubicSpline(None, walk(space, 0.7, 6, rng), space).report
     assert report.curvature == 0.0
     assert report.invariant_radius == pytest.approx(report.max_step, rel=1e-15)
 
 
-def test_one_far_step_is_enough_to_have_none(rng):
+def test_one_far_step_removes_the_radius(rng):
     p = steps(S2, 0.1, rng)
     p = np.concatenate([p, S2.exp(p[-1], 0.27 * unit_tangent(S2, p[-1], rng))[None]])
     assert ss.CubicSpline(None, p, S2).report.invariant_radius is None
@@ -72,8 +72,8 @@ def test_one_far_step_is_enough_to_have_none(rng):
 
 
 @pytest.mark.parametrize("name", CURVED)
-@pytest.mark.parametrize("kd", [0.01, 0.2, 0.26])
-@pytest.mark.parametrize("ends", ["natural", "clamped", "velocity"])
+@loop_over("kd", [0.01, 0.2, 0.26])
+@loop_over("ends", ["natural", "clamped", "velocity"])
 def test_algorithm_1_stays_within(name, kd, ends, rng):
     space = ss.space(name)
     for turn in (0.5, 3.0, 100.0):
@@ -151,7 +151,7 @@ def row_of_jacobian(space, p, v, step=1e-5):
 
 
 @pytest.mark.parametrize("name", ["sphere:3", "su:3", "cgr:2,4", "spd:3", "gr:2,4", "cp:1", *CURVED])
-@pytest.mark.parametrize("kd", [0.02, 0.2, 0.26])
+@loop_over("kd", [0.02, 0.2, 0.26])
 def test_jacobian_is_within_the_bound(name, kd, rng):
     space = ss.space(name)
     d = kd / space.curvature
@@ -191,7 +191,7 @@ def test_bound_is_nearly_attained_on_the_sphere(rng):
 
 
 @pytest.mark.parametrize("name", CURVED)
-@pytest.mark.parametrize("kd", [0.01, 0.2, 0.255])
+@loop_over("kd", [0.01, 0.2, 0.255])
 def test_guaranteed_sweeps_are_enough(name, kd, rng):
     space = ss.space(name)
     p = steps(space, kd, rng)
@@ -228,7 +228,7 @@ def test_curves_of_any_length(nodes, rng):
     assert report.invariant_radius == pytest.approx(0.23405665250997934, rel=1e-9)
 
 
-def test_there_is_none_for_unequal_knots(rng):
+def test_radius_is_none_for_unequal_knots(rng):
     p = steps(S2, 0.1, rng)
     t = np.arange(10.0)
     t[4] += 1e-6
@@ -236,7 +236,7 @@ def test_there_is_none_for_unequal_knots(rng):
     assert ss.CubicSpline(np.cumsum(rng.uniform(0.5, 2, 10)), p, S2).report.invariant_radius is None
 
 
-def test_there_is_none_for_other_ends(rng):
+def test_radius_is_none_for_other_ends(rng):
     p = steps(S2, 0.1, rng)
     v = 0.1 * unit_tangent(S2, p[0], rng)
     for ends in ("not-a-knot", ("natural", "not-a-knot"), ((2, v), "natural")):
@@ -245,7 +245,7 @@ def test_there_is_none_for_other_ends(rng):
     assert ss.CubicSpline(None, loop, S2, bc_type="periodic").report.invariant_radius is None
 
 
-def test_there_is_none_without_an_invariant_metric(rng):
+def test_radius_is_none_without_an_invariant_metric(rng):
     space = ss.SpecialEuclidean(3)
     assert ss.CubicSpline(None, walk(space, 0.01, 6, rng), space).report.invariant_radius is None
 
@@ -308,7 +308,7 @@ def test_own_knots_have_own_radii(batch):
     assert [one.report.invariant_radius for one in many] == [radius[0], None, None]
 
 
-def test_it_survives_pickles_and_files(batch, tmp_path):
+def test_radius_survives_pickles_and_files(batch, tmp_path):
     for spline in (batch, batch[:2], *batch):
         spline.save(tmp_path / "curve.npz")
         for other in (ss.load(tmp_path / "curve.npz"), pickle.loads(pickle.dumps(spline))):
@@ -321,13 +321,13 @@ def test_a_loaded_batch_has_an_array(batch, tmp_path):
     assert isinstance(ss.load(tmp_path / "batch.npz").report.invariant_radius, np.ndarray)
 
 
-def test_it_reads_well(batch):
+def test_report_states_the_radius(batch):
     assert str(batch[1].report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
     assert "Theorem" not in str(batch[2].report)
     assert str(batch[:2].report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
 
 
-def test_it_does_not_speak_for_curves_that_have_none(batch):
+def test_report_omits_missing_radii(batch):
     assert ", control legs stay below" not in str(batch.report)
 
 
@@ -349,7 +349,7 @@ def test_the_order_of_factors_does_not_matter(rng):
     assert one.invariant_radius == other.invariant_radius
 
 
-def test_it_is_the_same_anywhere_on_the_space(rng):
+def test_radius_is_invariant_under_isometries(rng):
     p = steps(S2, 0.2, rng)
     o = base_point(S2, rng)
     moved = S2.transvection(o, unit_tangent(S2, o, rng), p)
@@ -360,7 +360,7 @@ def test_it_is_the_same_anywhere_on_the_space(rng):
 # ---- products ----
 
 
-def test_legs_of_a_product_stay_in_the_radii_of_its_factors(rng):
+def test_control_polygons_of_a_product_stay_within_the_radii(rng):
     parts = [steps(S2, 0.2, rng), steps(S2, 0.1, rng), rng.normal(size=(10, 3))]
     spaces = S2, S2, ss.Euclidean(3)
     radii = [ss.CubicSpline(None, p, s).report.invariant_radius for p, s in zip(parts, spaces, strict=True)]

@@ -5,13 +5,14 @@ import re
 
 import numpy as np
 import pytest
+from cases import loop_over
 from curves import (
     KNOTS,
     S2,
     each,
     every_batch,
     every_common,
-    every_space,
+    every_kind,
     found,
     pick,
     points_on,
@@ -23,9 +24,9 @@ from refused import INF, NAN, TWO, P
 import symspline as ss
 
 
-@every_space
+@every_kind
 @every_batch
-def test_what_evaluation_returns(space, batch):
+def test_evaluation_shapes_and_types(space, batch):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)
     for x in (
         0.7,
@@ -91,7 +92,7 @@ def test_per_curve_of_one_curve_changes_nothing():
     assert same(spline([0.5, 2], per_curve=True), spline([0.5, 2]))
 
 
-@every_space
+@every_kind
 def test_velocity_and_speed(space):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=(2,), step=0.5), space)
     x = np.linspace(0, 4, 9)
@@ -124,20 +125,20 @@ def test_velocity_and_speed(space):
 )
 def test_bad_times_of_evaluation(x, match):
     spline = ss.CubicSpline(None, P, S2)
-    for call in (spline, spline.speed, lambda x: ss.evaluate(x, None, P, spline.velocities, S2)):
+    for call in (spline, spline.speed, lambda x: ss.evaluate(None, P, spline.velocities, S2, x)):
         with pytest.raises(ss.ValidationError, match=match):
             call(x)
 
 
 @pytest.mark.parametrize("policy", [None, True, "geodesic", "periodic"])
-@pytest.mark.parametrize("x", [NAN, INF, -INF])
-def test_no_policy_makes_sense_of_nan(policy, x):
+@loop_over("x", [NAN, INF, -INF])
+def test_nan_times_raise_under_every_policy(policy, x):
     spline = ss.CubicSpline(None, P, S2, extrapolate=policy)
     with pytest.raises(ss.ValidationError, match=r"x\[1\] is (NaN|-?inf); times must be finite"):
         spline([1.0, x])
 
 
-def test_the_curve_of_a_bad_time_is_named():
+def test_error_names_the_curve_of_a_bad_time():
     spline = ss.CubicSpline([[0, 1, 2], [0, 1, 3]], TWO, S2)
     with pytest.raises(ss.ValidationError, match=r"x = 2\.5 is outside the knots \[0, 2\] of curve 0"):
         spline(2.5)

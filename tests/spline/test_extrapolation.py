@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import EPS, QUADRICS
+from cases import EPS, QUADRICS, loop_over
 from curves import (
     KNOTS,
     S2,
@@ -10,7 +10,7 @@ from curves import (
     bezier,
     each,
     every_common,
-    every_space,
+    every_kind,
     largest_difference,
     off,
     pick,
@@ -25,7 +25,7 @@ import symspline as ss
 OUTSIDE = [-0.5, 4.75]
 
 
-@every_space
+@every_kind
 def test_none_raises_outside(space):
     spline = ss.CubicSpline(KNOTS, points_on(space, step=0.5), space)
     for x in OUTSIDE:
@@ -35,7 +35,7 @@ def test_none_raises_outside(space):
             spline.speed(x)
 
 
-@every_space
+@every_kind
 def test_true_continues_the_last_segment(space):
     spline = ss.CubicSpline(KNOTS, points_on(space, step=0.5), space, extrapolate=True)
     for segment, x, tau in ((0, OUTSIDE[0], -0.5), (-1, OUTSIDE[1], 1.5)):
@@ -50,8 +50,8 @@ def test_true_is_scipys_in_flat_space():
         assert np.abs(spline(OUTSIDE, nu=nu) - flat(OUTSIDE, nu)).max() < 1e-12
 
 
-@every_space
-@pytest.mark.parametrize("ends", ["natural", "periodic"])
+@every_kind
+@loop_over("ends", ["natural", "periodic"])
 def test_periodic_wraps(space, ends):
     p = points_on(space, 3, step=0.5)
     p = each(lambda q: q[[0, 1, 2, 1, 0]], p)
@@ -77,7 +77,7 @@ def test_the_policy_of_a_call_wins(space):
 
 
 @every_common
-@pytest.mark.parametrize("policy", [None, True, "geodesic", "periodic"])
+@loop_over("policy", [None, True, "geodesic", "periodic"])
 def test_policies_differ_only_outside(space, policy):
     spline, x = ss.CubicSpline(KNOTS, points_on(space, 6), space), np.linspace(0, 4.5, 31)
     for nu in range(3):
@@ -90,7 +90,7 @@ def test_dates_extrapolate_too():
     assert largest_difference(spline(t[1] + 3), spline(t[1])) < 4 * EPS
 
 
-@every_space
+@every_kind
 def test_geodesic_keeps_the_velocity(space):
     p = points_on(space, step=0.5)
     spline = ss.CubicSpline(KNOTS, p, space, bc_type="not-a-knot", extrapolate="geodesic")

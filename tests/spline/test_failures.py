@@ -1,6 +1,7 @@
 """Curves that fail: errors, warnings, and what becomes of the others."""
 
 import pickle
+import re
 import warnings
 
 import numpy as np
@@ -148,7 +149,7 @@ def test_failures_in_fit_and_fit_many(kind):
     assert same_curve(splines[2], ss.CubicSpline(None, p[2][:7], S2, **options))
 
 
-def test_a_leg_past_the_cut_locus_is_a_cut_locus_error():
+def test_control_polygon_past_the_cut_locus_raises():
     # No point is far from its neighbour, but times that change too fast make a leg too long.
     q = points_on(S2, 2, step=1.0)
     e = S2.log(*q)
@@ -186,9 +187,9 @@ def test_nan_curves_warn_of_nothing():
         assert "1 of 2" in str(spline.report)
 
 
-def test_legs_that_doubles_cannot_hold():
+def test_overflowing_control_polygons():
     p = [np.eye(2), np.diag([2.0, 0.5])]
-    with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[0\] has length 21\.2"):
+    with pytest.raises(ss.ConvergenceError, match=r"control handle at points\[0\] has length 21\.2"):
         ss.CubicSpline(None, p, "spd:2", bc_type=((1, np.diag([45.0, -45.0])), "natural"))
     assert ss.CubicSpline(None, p, "spd:2", bc_type=((1, np.diag([30.0, -30.0])), "natural")).report.converged
 
@@ -197,22 +198,22 @@ def test_a_leg_is_measured_by_the_longer_of_its_segments():
     """On the hyperbolic line the spline is that of flat space: a short segment makes the next one overshoot."""
     space, x = ss.Hyperbolic(1), 0.8 * np.arange(5)
     p = np.stack([np.cosh(x), np.sinh(x)], axis=-1)
-    with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[[12]\] has length"):
+    with pytest.raises(ss.ConvergenceError, match=r"control handle at points\[[12]\] has length"):
         ss.CubicSpline([0, 1, 1.05, 5.05, 6.05], p, space)
 
 
-def test_legs_that_doubles_cannot_hold_are_an_error():
+def test_overflowing_control_polygons_raise():
     # Given velocities are a solution at once, but ε cosh²(30) is far above 1.
     p, v = [[1.0, 0, 0], [np.cosh(1), np.sinh(1), 0]], np.array([0, 0, 90.0])
-    with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[0\] has length 30\.0, .*times"):
+    with pytest.raises(ss.ConvergenceError, match=r"control handle at points\[0\] has length 30\.0, .*times"):
         ss.CubicSpline(None, p, "h:2", bc_type=((1, v), (1, v)))
     assert np.isfinite(ss.CubicSpline(None, p, "h:2", bc_type=((1, v / 10), (1, v / 10)))(0.5)).all()
 
 
-def test_legs_that_doubles_cannot_hold_in_complex_hyperbolic_space():
+def test_overflowing_control_polygons_of_complex_hyperbolic_space_raise():
     p = np.array([[1, 0], [np.cosh(1), np.sinh(1)]], dtype=complex)
     v = 57 * np.array([[0, 1j], [np.sinh(1), np.cosh(1)]])
-    with pytest.raises(ss.ConvergenceError, match=r"control leg at points\[0\] has length 19\.0"):
+    with pytest.raises(ss.ConvergenceError, match=r"control handle at points\[0\] has length 19\.0"):
         ss.CubicSpline(None, p, "ch:1", bc_type=((1, v[0]), (1, v[1])))
     assert np.isfinite(ss.CubicSpline(None, p, "ch:1", bc_type=((1, v[0] / 10), (1, v[1] / 10)))(0.5)).all()
 
@@ -223,8 +224,147 @@ def test_bad_points_of_one_of_many_curves(where):
     curves = [(None, good), (None, good[:4] * 1.5), (None, good[:3]), (None, good)]
     with pytest.raises(ss.ValidationError, match=r"points\[0\] of curve 1"):
         ss.fit_many(curves, S2, where=where)
-    with pytest.warns(ss.ConvergenceWarning, match=r"curve 1: points\[0\] is off"):
+    with pytest.warns(ss.ConvergenceWarning, match=r"points\[0\] of curve 1 is off"):
         found = ss.fit_many(curves, S2, where=where, on_failure="warn")
     assert [s.report.converged for s in found] == [True, False, True, where is None]
     assert np.isnan(found[1].velocities).all()
     assert same_curve(found[2], ss.CubicSpline(None, good[:3], S2))
+
+
+# ---- neighbours almost at the cut locus ----
+
+
+BEGIN = "neighbours almost at the cut locus"
+MARK = pytest.mark.parametrize(
+    "name",
+    ["sphere:2", "sphere:4", "rp:2", "cp:2", "gr:2,5", "cgr:2,4", "so:3", "so:5", "u:2", "su:3", "se:3"],
+)
+
+
+def cut_in(space, p, v):
+    """How many times as long as v a geodesic is where others get shorter, by bisection."""
+    low, high = 0.0, 20.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        shortest = space.distance(p, space.exp(p, middle * v)) > middle * space.norm(p, v) * (1 - 1e-9)
+        low, high = (middle, high) if shortest else (low, middle)
+    return low
+
+
+def rotations(*angles):
+    """Turned by these angles in degrees, one after the other, about one axis."""
+    return ss.rotations.from_rotation_vectors(np.radians(np.cumsum([0, *angles]))[:, None] * [0, 0, 1])
+
+
+def silent(call):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return call()
+
+
+def warned(call):
+    with pytest.warns(UserWarning) as caught:
+        result = call()
+    (warning,) = caught
+    # It points to the line that called, not into the package.
+    assert warning.filename == __file__
+    return result, str(warning.message)
+
+
+@MARK
+def test_within_a_hundred_thousandth(name):
+    space = ss.space(name)
+    rng = np.random.default_rng(3)
+    p = space.random_point(rng)
+    v = space.random_tangent(rng, p)
+    cut = cut_in(space, p, v)
+
+    def points(part):
+        return np.stack([space.exp(p, x * v) for x in (0, 0.3 * cut, (0.3 + part) * cut)])
+
+    silent(lambda: ss.CubicSpline(None, points(1 - 1.2e-5), space))
+    with pytest.warns(UserWarning, match=rf"{BEGIN}: between points\[1\] and points\[2\] the angle is"):
+        ss.CubicSpline(None, points(1 - 8e-6), space)
+
+
+def test_the_warning_says_where_and_why():
+    _, said = warned(lambda: ss.CubicSpline(None, rotations(20, 179.9999, 30), "so:3"))
+    head, angle, tail = re.split(r"([\d.]+)(?=, limit)", said)
+    assert head == f"{BEGIN}: between points[1] and points[2] the angle is "
+    assert float(angle) == pytest.approx(np.radians(179.9999), rel=1e-14)
+    assert tail == (
+        f", limit {np.pi}; had it been a little more, the curve would go the other way round: put a point between them"
+    )
+
+
+def test_curves_of_a_batch():
+    good, almost, bad = rotations(20, 30), rotations(20, 179.9999), rotations(180, 30)
+    batch = np.stack([[good, almost], [almost, good]])
+    _, said = warned(lambda: ss.CubicSpline(None, batch, "so:3"))
+    assert "between points[1] and points[2] of curve 0,1 the" in said and said.endswith("(and 1 more curves)")
+    _, said = warned(lambda: ss.fit_many([(None, good), (None, almost)], "so:3"))
+    assert "between points[1] and points[2] of curve 1 the" in said
+    silent(lambda: ss.CubicSpline(None, batch, "so:3", where=[[True, False], [False, True]]))
+    _, said = warned(lambda: ss.CubicSpline(None, batch, "so:3", where=[[False, False], [True, True]]))
+    assert "of curve 1,0 the" in said
+    # What failed comes first.
+    with pytest.raises(ss.CutLocusError, match="of curve 0 lie at or past"):
+        silent(lambda: ss.CubicSpline(None, np.stack([bad, almost]), "so:3"))
+    curves, said = warned(lambda: ss.CubicSpline(None, np.stack([bad, almost]), "so:3", on_failure="ignore"))
+    assert "of curve 1 the" in said
+    assert curves.report.converged.tolist() == [False, True]
+
+
+def test_any_factor_of_a_product():
+    almost, flat = rotations(20, 179.9999), np.zeros((3, 2))
+    opposite = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]])
+    warned(lambda: ss.CubicSpline(None, (flat, almost), "r:2 x so:3"))
+    with pytest.raises(ss.CutLocusError, match="lie at or past"):
+        silent(lambda: ss.CubicSpline(None, (almost, opposite), "so:3 x sphere:2"))
+
+
+@pytest.mark.parametrize("bc_type", ["natural", "periodic"])
+def test_long_curves_that_are_solved_in_pieces(bc_type):
+    angles = np.full(4000, 360 / 4000)
+    angles[3210] = 179.9999
+    points = rotations(*angles[:-1], 360 - angles[:-1].sum() % 360)
+    points[-1] = points[0]
+    _, said = warned(lambda: ss.CubicSpline(None, points, "so:3", bc_type=bc_type, method="newton"))
+    assert "between points[3210] and points[3211] the" in said
+
+
+def test_in_the_span_of_the_points():
+    e = np.eye(3, 50_000)
+    turn = np.pi - 1e-6
+    points = [e[2], e[0], np.cos(turn) * e[0] + np.sin(turn) * e[1]]
+    warned(lambda: ss.CubicSpline(None, points, "sphere:49999"))
+
+
+def test_errors_carry_the_curve_the_node_and_the_numbers():
+    points = np.stack([[points_on(S2), points_on(S2)], [points_on(S2), points_on(S2)]])
+    bad = points.copy()
+    bad[1, 0, 2] *= 2
+    with pytest.raises(ss.SymsplineError) as caught:
+        ss.CubicSpline(None, bad, S2)
+    assert type(caught.value) is ss.ValidationError
+    assert (caught.value.curve, caught.value.node, caught.value.spline) == ((1, 0), 2, None)
+    bad[1, 0, 2] = -points[1, 0, 1]
+    with pytest.raises(ss.CutLocusError) as caught:
+        ss.CubicSpline(None, bad, S2)
+    assert (caught.value.curve, caught.value.node) == ((1, 0), 1)
+    assert caught.value.value == pytest.approx(np.pi) and caught.value.limit == pytest.approx(np.pi)
+    with pytest.raises(ss.ConvergenceError) as caught:
+        ss.CubicSpline(None, points[0, 0], S2, method="fixed-point", max_iter=2)
+    assert caught.value.curve == () and caught.value.value > caught.value.limit == 1e-12
+    # Words that are added on the way to the user leave the fields as they are.
+    bad[1, 0, 2] = 2 * points[1, 0, 2]
+    dates = np.datetime64("2026-01-01") + np.arange(bad.shape[2])
+    with pytest.raises(ss.ValidationError, match=r"factor 1, Sphere\(2\): .*") as caught:
+        ss.CubicSpline(dates, (np.zeros((*bad.shape[:3], 1)), bad), "r:1 x sphere:2")
+    assert (caught.value.curve, caught.value.node) == ((1, 0), 2)
+    frames = ss.Stiefel(2, 4)
+    off = np.stack([np.eye(4, 2)] * 3)
+    off[1] *= 2
+    with pytest.raises(ss.ValidationError) as caught:
+        ss.CubicSpline(None, np.stack([np.stack([np.eye(4, 2)] * 3), off]), frames)
+    assert (caught.value.curve, caught.value.node) == ((1,), 1)

@@ -10,7 +10,7 @@ from curves import (
     each,
     every_batch,
     every_common,
-    every_space,
+    every_kind,
     pick,
     points_on,
     same,
@@ -27,14 +27,14 @@ import symspline as ss
 def test_evaluate_per_curve(space):
     spline = ss.CubicSpline(None, points_on(space, 5, (2,)), space)
     x = np.array([[0.5, 1], [2, 3.5]])
-    found = ss.evaluate(x, None, spline.points, spline.velocities, space, per_curve=True)
+    found = ss.evaluate(None, spline.points, spline.velocities, space, x, per_curve=True)
     assert same(found, spline(x, per_curve=True))
 
 
 def test_evaluate_over_dates():
     spline = ss.CubicSpline(np.datetime64("2024-01-01T00", "h") + np.array([0, 1, 3]), THREE, S2)
     x = spline.t[0] + np.timedelta64(90, "m")
-    assert same(ss.evaluate(x, spline.t, spline.points, spline.velocities, S2, 1), spline(x, nu=1))
+    assert same(ss.evaluate(spline.t, spline.points, spline.velocities, S2, x, 1), spline(x, nu=1))
 
 
 @every_common
@@ -67,7 +67,7 @@ def test_fit_many_of_closed_curves_and_of_dates():
         assert same_curve(spline, ss.CubicSpline(t, p, S2, bc_type="periodic"))
 
 
-def test_fit_many_of_nothing():
+def test_fit_many_of_an_empty_list():
     assert ss.fit_many([], S2) == []
 
 
@@ -77,7 +77,7 @@ def test_everything_is_exported():
     assert {"CubicSpline", "fit", "evaluate", "fit_many", "load", "space", "Product"} <= set(ss.__all__)
 
 
-@every_space
+@every_kind
 @every_batch
 def test_fit_and_evaluate_are_the_class(space, batch):
     p = points_on(space, batch=batch, step=0.5)
@@ -87,13 +87,13 @@ def test_fit_and_evaluate_are_the_class(space, batch):
     assert same(u, spline.velocities) and report == spline.report
     x = np.linspace(-0.5, 4.75, 8)
     for nu in range(3):
-        values = ss.evaluate(x, KNOTS, spline.points, u, str(space), nu, extrapolate="geodesic")
+        values = ss.evaluate(KNOTS, spline.points, u, str(space), x, nu, extrapolate="geodesic")
         assert same(values, spline(x, nu, extrapolate="geodesic"))
     with pytest.raises(ss.ValidationError, match="outside the knots"):
-        ss.evaluate(x, KNOTS, spline.points, u, space)
+        ss.evaluate(KNOTS, spline.points, u, space, x)
 
 
-@every_space
+@every_kind
 def test_fit_many_is_one_at_a_time(space):
     curves = []
     for i, n in enumerate([5, 2, 9, 3]):
@@ -112,12 +112,12 @@ def test_fit_many_is_one_at_a_time(space):
 
 
 def test_evaluate_compares_shapes():
-    with pytest.raises(ss.ValidationError, match=r"u has shape \(2, 3\), but points \(3, 3\)"):
-        ss.evaluate(0.5, None, P, P[:2], S2)
+    with pytest.raises(ss.ValidationError, match=r"velocities has shape \(2, 3\), but points \(3, 3\)"):
+        ss.evaluate(None, P, P[:2], S2, 0.5)
     with pytest.raises(ss.ValidationError, match=r"t has shape \(2,\), but 3 points"):
-        ss.evaluate(0.5, [0, 1], P, P, S2)
+        ss.evaluate([0, 1], P, P, S2, 0.5)
     with pytest.raises(ss.ValidationError, match=r"at least two points"):
-        ss.evaluate(0.5, None, P[:1], P[:1], S2)
+        ss.evaluate(None, P[:1], P[:1], S2, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -132,4 +132,4 @@ def test_evaluate_compares_shapes():
 )
 def test_evaluate_checks_its_input(t, p, u):
     with pytest.raises(ss.ValidationError):
-        ss.evaluate(0.5, t, p, u, S2)
+        ss.evaluate(t, p, u, S2, 0.5)

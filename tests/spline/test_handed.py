@@ -132,7 +132,7 @@ KINDS = {
 
 @pytest.mark.parametrize("zone", [BERLIN, KOLKATA, None])
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_curve_knows_whether_its_times_have_a_zone(zone, kind):
+def test_time_zones_are_kept(zone, kind):
     spline = KINDS[kind]([datetime(2026, 1, 1, hour, tzinfo=zone) for hour in (0, 6, 12)])
     file = io.BytesIO()
     spline.save(file)
@@ -166,7 +166,7 @@ def test_many_curves_in_a_file_are_of_one_kind_of_time(tmp_path):
         ss.load_many(tmp_path / "c.npz")["one"](NAIVE[1])
 
 
-def test_pieces_of_a_recording_take_durations():
+def test_max_gap_accepts_durations():
     t = [timedelta(0), timedelta(seconds=1), timedelta(seconds=3)]
     (piece,) = ss.fit_segments(t, P, S2, max_gap=5)
     assert np.array_equal(piece(t[1]), P[1]) and piece == ss.CubicSpline(t, P, S2)

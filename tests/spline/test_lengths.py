@@ -13,7 +13,7 @@ from curves import (
     each,
     every_batch,
     every_common,
-    every_space,
+    every_kind,
     found,
     off,
     pick,
@@ -29,7 +29,7 @@ from scipy.integrate import quad
 import symspline as ss
 
 
-@every_space
+@every_kind
 @every_batch
 def test_control_points(space, batch):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)
@@ -133,7 +133,7 @@ def test_integrals_come_to_rest_at_the_rounding_floor(code):
     run_python(f"{RESTS}\nassert {code}", timeout=3)
 
 
-@every_space
+@every_kind
 def test_length_and_energy_of_a_geodesic(space):
     p = points_on(space, 2, step=0.5)
     ends = at_node(space, p, 0), at_node(space, p, 1)
@@ -147,7 +147,7 @@ def test_length_and_energy_of_a_geodesic(space):
     assert spline.bending_energy() < 1e-20
 
 
-@every_space
+@every_kind
 @every_batch
 def test_length_and_energy_by_quadrature(space, batch):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import EPS, walk
+from cases import EPS, loop_over, walk
 from curves import same
 from scipy.integrate import solve_ivp
 
@@ -53,7 +53,7 @@ def rng():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_horizontal_and_represents_the_curve(name, rng):
+def test_lift_is_horizontal_and_projects_to_the_curve(name, rng):
     space, points = points_of(name, rng)
     spline = ss.CubicSpline(KNOTS, points, space)
     x = np.sort(np.append(rng.uniform(0, KNOTS[-1], 200), KNOTS))
@@ -72,7 +72,7 @@ def test_it_is_horizontal_and_represents_the_curve(name, rng):
 
 
 @pytest.mark.parametrize("name", ORTHONORMAL)
-def test_it_solves_its_equation(name, rng):
+def test_solution_satisfies_the_equation(name, rng):
     """X' = P'X for the projector P = YY*, in which representatives cancel; P' = DY* + YD* for a velocity D at Y."""
     space, points = points_of(name, rng)
     spline = ss.CubicSpline(KNOTS, points, space)
@@ -90,8 +90,8 @@ def test_it_solves_its_equation(name, rng):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("nu", [0, 1, 2])
-def test_it_is_continuous_at_knots(name, nu, rng):
+@loop_over("nu", [0, 1, 2])
+def test_lift_is_continuous_at_knots(name, nu, rng):
     space, points = points_of(name, rng)
     spline = ss.CubicSpline(KNOTS, points, space, bc_type="not-a-knot")
     inner_knots = KNOTS[1:-1]
@@ -105,7 +105,7 @@ def test_it_is_continuous_at_knots(name, nu, rng):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_does_not_depend_on_representatives(name, rng):
+def test_lift_does_not_depend_on_representatives(name, rng):
     space, points = points_of(name, rng)
     other = turned(space, points, rng)
     x = rng.uniform(-0.5, KNOTS[-1] + 0.5, 50)
@@ -230,7 +230,7 @@ def test_batches_products_and_large_spaces(rng):
         ([1j, 0.0, 0.0], r"start must be .*complex128"),
     ],
 )
-def test_what_is_no_representative_is_refused(start, what):
+def test_invalid_representatives_raise(start, what):
     spline = ss.CubicSpline(None, [[1, 0, 0], [0.6, 0.8, 0]], "rp:2")
     with pytest.raises(ss.ValidationError, match=what):
         spline.lift(0.5, start)

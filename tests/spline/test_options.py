@@ -4,6 +4,7 @@ import inspect
 
 import numpy as np
 import pytest
+from cases import loop_over
 from curves import KNOTS, S2, every_common, largest_difference, points_on
 from refused import INF, NAN, P, fit_error
 
@@ -58,8 +59,8 @@ def test_tol_and_max_iter_bound_the_work():
     ],
     ids=str,
 )
-@pytest.mark.parametrize("how", ["class", "product", "fit", "fit_many"])
-def test_bad_options(options, match, how):
+@loop_over("how", ["class", "product", "fit", "fit_many"])
+def test_invalid_options_raise(options, match, how):
     if how == "class":
         fit_error(match, **options)
     with pytest.raises(ss.ValidationError, match=match):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import loop_over
 from curves import same
 
 import symspline as ss
@@ -41,8 +42,8 @@ def like(values, dtype=None):
     return np.full(values.shape, np.nan, dtype or values.dtype)
 
 
-@pytest.mark.parametrize("nu", [0, 1, 2])
-@pytest.mark.parametrize("batch", [(), (2, 3)])
+@loop_over("nu", [0, 1, 2])
+@loop_over("batch", [(), (2, 3)])
 @pytest.mark.parametrize("name", SPACES)
 def test_out_takes_the_result(name, batch, nu):
     if nu and name.startswith("stiefel"):
@@ -95,7 +96,7 @@ def test_times_may_lie_where_results_go():
 def test_of_evaluate():
     spline, x = spline_of("cp:2", (2,)), np.linspace(0, 4, 6)
     out = np.empty((2, 6, 3), complex)
-    assert ss.evaluate(x, spline.t, spline.points, spline.velocities, "cp:2", 1, out=out) is out
+    assert ss.evaluate(spline.t, spline.points, spline.velocities, "cp:2", x, 1, out=out) is out
     assert same(out, spline(x, 1))
 
 
@@ -108,7 +109,7 @@ def test_of_evaluate():
         (np.broadcast_to(0.0, (5, 3)), "out is read-only"),
     ],
 )
-def test_what_cannot_take_a_result(out, message):
+def test_invalid_out_arrays_raise(out, message):
     with pytest.raises(ss.ValidationError, match=message):
         spline_of("sphere:2")(np.linspace(0, 4, 5), out=out)
 

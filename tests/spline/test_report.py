@@ -11,8 +11,8 @@ from curves import (
     at_node,
     every_batch,
     every_common,
+    every_kind,
     every_single,
-    every_space,
     failing,
     points_on,
 )
@@ -37,7 +37,7 @@ FIELDS = [
 ]
 
 
-@every_space
+@every_kind
 def test_report_of_one_curve(space):
     p = points_on(space, step=0.5)
     report = ss.CubicSpline(KNOTS, p, space).report
@@ -88,7 +88,7 @@ def test_max_gap_is_the_longest_time_between_points(space, batch):
         assert [s.report.max_gap for s in ss.fit_many([(KNOTS, p), (None, p)], space)] == [1.5, 1.0]
 
 
-@every_space
+@every_kind
 @every_batch
 def test_report_reads_as_one_line(space, batch):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)
@@ -97,7 +97,7 @@ def test_report_reads_as_one_line(space, batch):
     assert "converged" in line and spline.report.method in line
 
 
-def test_report_says_what_failed():
+def test_report_describes_the_failure():
     p, options = failing("cut locus")
     spline = ss.CubicSpline(None, p, S2, on_failure="ignore", **options)
     assert "2 of 3 curves converged" in str(spline.report)

@@ -85,7 +85,7 @@ def test_other_spaces_do_not_warn():
     silent(lambda: ss.CubicSpline(None, turns, "so:3"))
 
 
-def test_what_it_warns_of():
+def test_warning_conditions():
     # One sample with the other sign makes two and a half turns of half a one.
     def turned(space, points):
         return ss.CubicSpline(None, points, space).length()

@@ -54,7 +54,7 @@ def by_polygons(spline, a, b, v):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_the_limit_of_transports_along_short_geodesics(name, rng):
+def test_transport_is_the_limit_of_short_geodesics(name, rng):
     space = ss.space(name)
     spline = ss.CubicSpline(KNOTS, walk(space, 0.6, len(KNOTS), rng), space)
     a, b = 0.3, 3.7
@@ -131,7 +131,7 @@ def test_batches_products_and_large_spaces(rng):
     )
 
 
-def test_what_cannot_be_carried_is_refused():
+def test_invalid_vectors_to_transport_raise():
     spline = ss.CubicSpline(None, np.eye(3), "sphere:2", extrapolate="geodesic")
     with pytest.raises(ss.ValidationError, match=r"x\[1\] = 2.5 is outside the knots"):
         spline.transport(0, 2.5, [0, 1.0, 0])

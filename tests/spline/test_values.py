@@ -6,12 +6,13 @@ import pickle
 
 import numpy as np
 import pytest
+from cases import loop_over
 from curves import (
     KNOTS,
     S2,
     THREE,
     every_batch,
-    every_space,
+    every_kind,
     found,
     pair_of_curves,
     pick,
@@ -39,10 +40,10 @@ COPIES = {
 }
 
 
-@every_space
+@every_kind
 @every_batch
-@pytest.mark.parametrize("how", COPIES)
-def test_copies_are_the_same_to_the_last_bit(space, batch, how):
+@loop_over("how", COPIES)
+def test_copies_are_bit_identical(space, batch, how):
     p = points_on(space, batch=batch, step=0.5)
     spline = ss.CubicSpline(KNOTS, p, space, bc_type=with_ends(space, p), extrapolate="geodesic")
     made = COPIES[how](spline)
@@ -87,7 +88,7 @@ def test_splines_compare():
         hash(spline)
 
 
-@every_space
+@every_kind
 def test_curves_compare(space):
     p = points_on(space, step=0.5)
     spline = ss.CubicSpline(KNOTS, p, space)
@@ -98,7 +99,7 @@ def test_curves_compare(space):
     assert spline != ss.CubicSpline(KNOTS, points_on(ss.Sphere(5), step=0.5), "sphere:5")
 
 
-@every_space
+@every_kind
 @every_batch
 def test_curves_print(space, batch):
     line = repr(ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space))

@@ -114,7 +114,7 @@ def test_errors_name_the_curve_in_the_whole_list():
         ss.fit_many(bad, "s:2", where=mask)
     bad[1] = (None, np.eye(3, dtype=np.float32))
     bad[2] = (None, (1 + 1e-6) * np.eye(3))
-    with pytest.raises(ss.ValidationError, match=r"^curve 2: point 0 is off"):
+    with pytest.raises(ss.ValidationError, match=r"^curve 2: points\[0\] is off"):
         ss.fit_many(bad, "s:2", where=mask)
     with pytest.raises(
         ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"

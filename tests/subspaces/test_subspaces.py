@@ -147,15 +147,15 @@ def test_a_reduced_model_between_the_parameters():
 @pytest.mark.parametrize(
     ("match", "call"),
     [
-        ("say either rank, .* or energy", lambda: from_snapshots(ALL)),
-        ("say either rank, .* or energy", lambda: from_snapshots(ALL, 3, energy=0.9)),
-        ("energy must be a share above 0 and at most 1, not 99", lambda: from_snapshots(ALL, energy=99)),
+        ("pass either rank, .* or energy", lambda: from_snapshots(ALL)),
+        ("pass either rank, .* or energy", lambda: from_snapshots(ALL, 3, energy=0.9)),
+        ("energy must be a fraction above 0 and at most 1, not 99", lambda: from_snapshots(ALL, energy=99)),
         ("rank must be at least 1", lambda: from_snapshots(ALL, 0)),
         (
-            r"31 dimensions need .* 31 snapshots or more; x has shape \(5, 60, 30\)",
+            r"31 dimensions needs .* 31 snapshots; x has shape \(5, 60, 30\)",
             lambda: from_snapshots(ALL, 31),
         ),
-        ("3 dimensions need more than 3 numbers", lambda: from_snapshots(np.eye(3), 3)),
+        ("3 dimensions needs more than 3 numbers", lambda: from_snapshots(np.eye(3), 3)),
         (
             r"x\[1\] does not determine .* singular values 2 and 3 are 1 and 1",
             lambda: from_snapshots(equal(), 2),
@@ -164,7 +164,7 @@ def test_a_reduced_model_between_the_parameters():
             "values 2 and 3 are 0 and 0",
             lambda: from_snapshots(np.outer([1, 2, 3.0], [1, 1, 1]) * [1, 0, 0], 2),
         ),
-        ("there are no snapshots", lambda: from_snapshots(np.zeros((5, 0)), 1)),
+        ("must contain at least one snapshot", lambda: from_snapshots(np.zeros((5, 0)), 1)),
         (
             "one curve on a Grassmannian, not <CubicSpline on Sphere",
             lambda: reduced_operator(sphere(), np.eye(3), 0.5),
@@ -176,7 +176,7 @@ def test_a_reduced_model_between_the_parameters():
         (r"the operator has shape \(2, 2\)", lambda: reduced_operator(curve(), lambda mu: np.eye(2), 0.5)),
     ],
 )
-def test_what_is_no_reduced_basis(match, call):
+def test_invalid_bases_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
 

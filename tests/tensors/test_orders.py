@@ -32,14 +32,14 @@ def documented(order):
 
 @pytest.mark.parametrize("order", DOCUMENTED)
 def test_the_documented_order(order):
-    assert to_vectors(NAMED, order).tolist() == documented(order)
-    assert np.array_equal(from_vectors(documented(order), order), NAMED)
+    assert to_vectors(NAMED, order=order).tolist() == documented(order)
+    assert np.array_equal(from_vectors(documented(order), order=order), NAMED)
 
 
 def test_dipy_indexes_in_the_same_way():
     """The table in dipy.reconst.dti."""
     d = np.arange(6.0)
-    assert np.array_equal(from_vectors(d, "dipy"), d[np.array([[0, 1, 3], [1, 2, 4], [3, 4, 5]])])
+    assert np.array_equal(from_vectors(d, order="dipy"), d[np.array([[0, 1, 3], [1, 2, 4], [3, 4, 5]])])
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -47,19 +47,21 @@ def test_dipy_indexes_in_the_same_way():
 def test_there_and_back(order, dtype):
     x = np.random.default_rng(0).standard_normal((4, 5, 6)).astype(dtype)
     x[0, 0], x[1, 1, 2] = 0, np.nan
-    matrices = from_vectors(x, order)
+    matrices = from_vectors(x, order=order)
     assert matrices.dtype == dtype and matrices.shape == (4, 5, 3, 3)
     assert np.array_equal(matrices, matrices.swapaxes(-1, -2), equal_nan=True)
-    back = to_vectors(matrices, order)
+    back = to_vectors(matrices, order=order)
     assert back.dtype == dtype and np.array_equal(back, x, equal_nan=True)
 
 
 def test_curves_through_many_voxels():
     rng = np.random.default_rng(0)
     voxels = ss.SymmetricPositiveDefinite(3).random_point(rng, (30, 4)).astype(np.float32)
-    vectors = to_vectors(voxels, "mrtrix")
-    spline = ss.CubicSpline(None, from_vectors(vectors, "mrtrix"), "spd:3")
-    assert np.abs(to_vectors(spline(2.0), "mrtrix") - vectors[:, 2]).max() < 1e-6 * np.abs(vectors).max()
+    vectors = to_vectors(voxels, order="mrtrix")
+    spline = ss.CubicSpline(None, from_vectors(vectors, order="mrtrix"), "spd:3")
+    assert (
+        np.abs(to_vectors(spline(2.0), order="mrtrix") - vectors[:, 2]).max() < 1e-6 * np.abs(vectors).max()
+    )
 
 
 @pytest.mark.parametrize(
@@ -67,19 +69,25 @@ def test_curves_through_many_voxels():
     [
         (
             "order must be 'dipy', 'fsl', 'mrtrix', 'itk', .* not 'ants'",
-            lambda: from_vectors(np.ones(6), "ants"),
+            lambda: from_vectors(np.ones(6), order="ants"),
         ),
-        ("order must be .* not None: the numbers do not show it", lambda: to_vectors(np.eye(3), None)),
-        (r"x has shape \(2, 5\), but needs shape \(..., 6\)", lambda: from_vectors(np.ones((2, 5)), "fsl")),
-        ("x must be an array of real numbers, not of complex", lambda: from_vectors(np.ones(6) * 1j, "fsl")),
-        (r"matrices has shape \(3,\)", lambda: to_vectors(np.ones(3), "fsl")),
+        ("order must be .* not None: the numbers do not show it", lambda: to_vectors(np.eye(3), order=None)),
+        (
+            r"x has shape \(2, 5\), but needs shape \(..., 6\)",
+            lambda: from_vectors(np.ones((2, 5)), order="fsl"),
+        ),
+        (
+            "x must be an array of real numbers, not of complex",
+            lambda: from_vectors(np.ones(6) * 1j, order="fsl"),
+        ),
+        (r"matrices has shape \(3,\)", lambda: to_vectors(np.ones(3), order="fsl")),
         (
             r"matrices\[1\] is not symmetric: .* is 1.000e-03",
-            lambda: to_vectors([np.eye(3), skewed()], "fsl"),
+            lambda: to_vectors([np.eye(3), skewed()], order="fsl"),
         ),
     ],
 )
-def test_what_is_no_tensor(match, call):
+def test_invalid_tensors_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
 
@@ -92,10 +100,10 @@ def skewed():
 
 def test_precision():
     for given, kept in (("f2", "f4"), ("f4", "f4"), ("f8", "f8"), ("i4", "f8"), ("?", "f8")):
-        matrices = from_vectors(np.ones(6, given), "fsl")
-        assert matrices.dtype == kept and to_vectors(matrices, "fsl").dtype == kept
+        matrices = from_vectors(np.ones(6, given), order="fsl")
+        assert matrices.dtype == kept and to_vectors(matrices, order="fsl").dtype == kept
 
 
 def test_what_rounding_does_to_symmetry_is_allowed():
     matrix = np.array([[2, 0.3, 0], [0.3 * (1 + 1e-14), 1, 0], [0, 0, 1]])
-    assert to_vectors(matrix, "mrtrix")[3] == pytest.approx(0.3, rel=1e-13)
+    assert to_vectors(matrix, order="mrtrix")[3] == pytest.approx(0.3, rel=1e-13)

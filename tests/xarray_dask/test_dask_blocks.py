@@ -1,10 +1,7 @@
 """Blocks of dask: nothing is computed before it is asked for, by any scheduler, and one thread a worker is enough."""
 
-import os
 import pickle
 import sys
-import threading
-import warnings
 
 import dask
 import numpy as np
@@ -15,15 +12,12 @@ from fields import field, numbers, point_dims
 
 import symspline as ss
 import symspline.xarray as sx
-from symspline import _core
-from symspline.threads import one_thread
-from symspline.xarray import blocks
 
 X = np.array([0.0, 0.3, 2.5, 7.7, 13.0])
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads", "processes"])
-def test_blocks_give_the_bits_of_the_whole(scheduler):
+def test_blocks_are_bit_identical_to_the_whole(scheduler):
     da = field("so:3")
     where = xr.DataArray(np.arange(12).reshape(2, 6) != 5, dims=("lat", "lon"))
     dims = point_dims("so:3")
@@ -103,31 +97,35 @@ def test_a_failure_says_that_it_counts_in_its_block():
     with pytest.raises(ss.CutLocusError, match=r"of curve 1,1") as caught:
         ds.compute(scheduler="synchronous")
     sent = pickle.loads(pickle.dumps(caught.value))
-    assert type(sent) is ss.CutLocusError and not hasattr(sent, "spline") and sent.__notes__
+    assert type(sent) is ss.CutLocusError and sent.spline is None and sent.__notes__
 
 
 # ---- threads ----
 
 
-def test_one_thread_in_blocks_and_all_without(threads, monkeypatch):
+def test_blocks_use_one_thread_each(threads):
     seen = []
-    for name in ("CubicSpline", "given"):
-        function = getattr(blocks, name)
 
-        def spy(*arguments, function=function, **options):
-            seen.append(_core.num_threads())
-            return function(*arguments, **options)
+    def exp(p, v):
+        seen.append(ss.num_threads())
+        return S2.exp(p, v)
 
-        monkeypatch.setattr(blocks, name, spy)
+    space = ss.Manifold(
+        exp=exp,
+        log=S2.log,
+        project_tangent=S2.project_tangent,
+        inner=S2.inner,
+        project=S2.project,
+        point_shape=(3,),
+    )
+    x = S2.geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 5))
     ss.set_num_threads(3)
-    da = field()
-    sx.evaluate(sx.fit(da, S2, point_dims=("r",)), X)
-    assert set(seen) == {3}
+    ds = sx.fit(
+        xr.DataArray(x, dims=("time", "r")).expand_dims(curve=6).chunk(curve=2), space, point_dims=("r",)
+    )
     seen.clear()
-    sx.evaluate(sx.fit(da.chunk(lon=2), S2, point_dims=("r",)), X).compute(scheduler="threads", num_workers=2)
-    # Before that, a rehearsal on one curve.
-    assert seen == [3] + [1] * 6
-    assert ss.num_threads() == 3
+    ds.compute(scheduler="threads", num_workers=2)
+    assert set(seen) == {1} and ss.num_threads() == 3
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
@@ -147,55 +145,6 @@ sx.fit(da, "sphere:2")
 print(extra() - before)
 """
     assert run_python(code, timeout=60).split() == ["0", "3"]
-
-
-def test_one_thread_is_counted():
-    ss.set_num_threads(3)
-    try:
-        with one_thread():
-            with one_thread():
-                assert ss.num_threads() == 1
-            assert ss.num_threads() == 1
-            # It holds when this is over.
-            ss.set_num_threads(5)
-            assert ss.num_threads() == 1
-        assert ss.num_threads() == 5
-        with pytest.raises(KeyError), one_thread():
-            raise KeyError
-        assert ss.num_threads() == 5
-    finally:
-        ss.set_num_threads(0)
-
-
-def test_one_thread_in_many(threads):
-    ss.set_num_threads(2)
-    barrier = threading.Barrier(8)
-
-    def work():
-        barrier.wait(10)
-        for _ in range(500):
-            with one_thread():
-                assert ss.num_threads() == 1
-
-    workers = [threading.Thread(target=work) for _ in range(8)]
-    for worker in workers:
-        worker.start()
-    for worker in workers:
-        worker.join(20)
-    assert ss.num_threads() == 2
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_child_that_was_forked_meanwhile_has_all_threads(threads):
-    ss.set_num_threads(3)
-    with warnings.catch_warnings():
-        # Of the threads of other tests.
-        warnings.simplefilter("ignore")
-        with one_thread():
-            child = os.fork()
-            if child == 0:
-                os._exit(ss.num_threads())
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 3
 
 
 # ---- files ----

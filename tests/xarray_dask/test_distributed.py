@@ -52,7 +52,7 @@ def curves():
     return xr.DataArray(p, dims=("curve", "time", "q"))
 
 
-def test_workers_give_the_bits_of_this_process(client):
+def test_workers_are_bit_identical_to_this_process(client):
     da = curves()
     expected = ss.CubicSpline(None, da.values, S2, on_failure="ignore")
     ds = sx.fit(da.chunk(curve=EACH), S2)

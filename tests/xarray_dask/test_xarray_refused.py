@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
+from cases import loop_over
 from curves import S2, run_python
 from fields import field
 
@@ -24,8 +25,8 @@ def refused(match, call, kind=ss.ValidationError):
     [
         ("da must be an xarray.DataArray, not ndarray", lambda da: da.values, {}),
         ("da must be an xarray.DataArray, not Dataset", lambda da: da.to_dataset(), {}),
-        ("da has the dimensions ('lat', 'lon', 'when', 'r'), and no 'time'", lambda da: da.rename(time="when"), {}),
-        ("and no 'q'", None, {"point_dims": ("q",)}),
+        ("da has the dimensions ('lat', 'lon', 'when', 'r'), but not 'time'", lambda da: da.rename(time="when"), {}),
+        ("but not 'q'", None, {"point_dims": ("q",)}),
         ("point_dims must be 1 names in a tuple, not ('r', 's')", None, {"point_dims": ("r", "s")}),
         ("point_dims must be 1 names in a tuple, not 'r'", None, {"point_dims": "r"}),
         ("name a dimension twice", None, {"point_dims": ("time",)}),
@@ -49,14 +50,14 @@ def refused(match, call, kind=ss.ValidationError):
         ("the start vector has shape (2,), a point of sphere:2 (3,)", None, {"bc_type": ((1, [0, 0]), "natural")}),
         ("the end vector has the dimensions ('lat',)", None,
          {"bc_type": ("natural", (1, xr.DataArray([0, 0], dims="lat")))}),
-        ("where must be a DataArray of True and False whose dimensions are of ('lat', 'lon')", None,
+        ("where must be a DataArray of bool whose dimensions are among ('lat', 'lon')", None,
          {"where": np.ones((2, 6), bool)}),
         ("where must be a DataArray", None, {"where": xr.DataArray(np.ones(10, bool), dims="time")}),
         ("where must be a DataArray", None, {"where": xr.DataArray(np.ones(6), dims="lon")}),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("chunks", [None, {"lat": 1}], ids=["numpy", "dask"])
-def test_what_a_fit_refuses(match, change, options, chunks):
+@loop_over("chunks", [None, {"lat": 1}])
+def test_invalid_fits_raise(match, change, options, chunks):
     da = field(chunks=chunks)
     if change is not None:
         da = change(da)
@@ -77,8 +78,8 @@ def test_what_a_fit_refuses(match, change, options, chunks):
         ("extrapolate must be", [0.5], {"extrapolate": "up"}),
     ],
 )
-@pytest.mark.parametrize("chunks", [None, {"lat": 1}], ids=["numpy", "dask"])
-def test_times_that_are_refused(match, x, options, chunks):
+@loop_over("chunks", [None, {"lat": 1}])
+def test_invalid_times_raise(match, x, options, chunks):
     da = field(chunks=chunks)
     ds = sx.fit(da, S2, point_dims=("r",))
     for call in (sx.evaluate, sx.speed, sx.lift):
@@ -98,7 +99,7 @@ def test_derivatives_of_higher_order():
     )
 
 
-def test_what_no_fit_returned():
+def test_invalid_datasets_raise():
     ds = sx.fit(field(), S2, point_dims=("r",))
     refused(
         "ds is not what symspline.xarray.fit returns", lambda: sx.evaluate(ds.drop_vars("velocities"), 0.5)
@@ -147,6 +148,6 @@ def test_times_under_another_name_are_not_left_out(coords, names):
     assert (sx.fit(da.drop_vars(list(coords)), "sphere:2", dim="obs").max_gap == 1).all()
 
 
-def test_coordinates_that_are_no_times_do_not_matter():
+def test_unrelated_coordinates_are_ignored():
     da = xr.DataArray(np.eye(3), dims=("obs", "q"), coords={"depth": ("obs", [3.0, 1.0, 2.0])})
     assert sx.fit(da, "sphere:2", dim="obs").max_gap == 1

@@ -1,11 +1,13 @@
 //! What the spaces of symspline share: numbers, small matrices, the traits of a symmetric space, and the
 //! fit, evaluation and differentiation of splines on any of them.
 //!
-//! Solvers know a space by its table of operations only ([`space::Erased`]), so that they are compiled once.
+//! Solvers call a space through its table of operations ([`space::Erased`]), so that they are compiled once. The loops
+//! over knots and samples in that table are implemented in `kernels`, above `fit` and `curve`.
 
 pub mod curve;
 pub mod derivative;
 pub mod fit;
+mod kernels;
 #[cfg(feature = "laws")]
 pub mod laws;
 pub mod matrix;

@@ -34,7 +34,7 @@ pub enum Operation {
     /// the tangential part of v at p: p, v
     ProjectTangent,
     /// a random point from standard normal numbers: x
-    Scatter,
+    RandomPoint,
     /// a random tangent vector at p from standard normal numbers: p, x
     RandomTangent,
 }
@@ -101,15 +101,15 @@ pub fn apply(
                 }
                 Operation::Distance => result[0] = space.distance(a, b, &log, angle),
                 Operation::Transvection => space.transvect(a, b, c, &mut result),
-                Operation::Transport => space.carry(a, b, &log, c, &mut result),
+                Operation::Transport => space.parallel_transport(a, b, &log, c, &mut result),
                 Operation::Inner => result[0] = space.inner(a, b, c),
                 Operation::Rounding => result[0] = space.rounding(a),
                 Operation::Project => {
                     space.project(a);
                     result.copy_from_slice(a);
                 }
-                Operation::Scatter => {
-                    space.scatter(a);
+                Operation::RandomPoint => {
+                    space.random_point(a);
                     result.copy_from_slice(a);
                 }
                 Operation::RandomTangent => {
@@ -213,7 +213,7 @@ pub fn tangent_defects(space: &Erased, points: &[f64], vectors: &[f64]) -> Vec<f
 }
 
 /// The deciding angle of a tangent vector at a point.
-pub fn leg_angle(space: &Erased, point: &[f64], vector: &[f64]) -> f64 {
+pub fn handle_angle(space: &Erased, point: &[f64], vector: &[f64]) -> f64 {
     let p: Vec<Lane> = point.iter().map(|&x| lane(x)).collect();
     let v: Vec<Lane> = vector.iter().map(|&x| lane(x)).collect();
     space.angle_at(&p, &v).to_array()[0]

@@ -6,8 +6,8 @@
 
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Moved, Storage, by_size, cholesky, diagonalise, exp_minus_one, log_one_plus,
-    log_one_plus_alike, orthogonalise, solve_lower,
+    Dynamic, Matrix, Moved, Storage, by_size, cholesky, diagonalize, exp_minus_one, log_one_plus,
+    log_one_plus_alike, orthogonalize, solve_lower,
 };
 use symspline_core::scalar::{Each, Lane, Scalar, dot, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
@@ -107,7 +107,7 @@ fn positive_definite<const D: usize, A: Storage>(p: &Matrix<Lane, D, A>) -> Lane
     let mut scaled: [Matrix<Lane, D, A>; 1] = [Matrix::from_fn(n, n, |i, j| {
         p[(i, j)].each(|x| doubtful.select(x * units[i] * units[j], Lane::ZERO))
     })];
-    diagonalise(&mut scaled);
+    diagonalize(&mut scaled);
     let least = (0..n).map(|i| scaled[0][(i, i)][0]).fold(lane(f64::INFINITY), |m, x| m.min(x));
     sure | (doubtful & least.simd_gt(lane(n as f64 * SINGULAR)))
 }
@@ -138,7 +138,7 @@ fn log_of_factors<const D: usize, A: Storage>(
 ) -> Matrix<Lane, D, A> {
     let n = q.rows();
     let mut u = solve_lower(l, &cholesky(q));
-    orthogonalise(&mut u, None);
+    orthogonalize(&mut u, None);
     let square: Vec<Lane> =
         (0..n).map(|j| (0..n).flat_map(|i| u[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum))).collect();
     // u has columns of length σ.
@@ -159,7 +159,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
     fn cut_angle(&self) -> f64 {
         f64::INFINITY
     }
-    fn longest_leg(&self) -> f64 {
+    fn longest_handle(&self) -> f64 {
         // ε e^{2·17} is 1: what comes back from there is noise.
         17.0
     }
@@ -243,7 +243,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         p.map(|x| good.select(x, lane(f64::NAN))).write(x);
         good.select(off, lane(f64::INFINITY))
     }
-    fn scatter(&self, noise: &mut [Lane]) {
+    fn random_point(&self, noise: &mut [Lane]) {
         let mut h = self.read(noise).hermitian_part();
         if self.special {
             let mean = h.trace() * lane(1.0 / self.n as f64);
@@ -265,7 +265,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
             return format!("it is not {what}: the skew part is {off:.3e} of it");
         }
         let mut values = [p.clone()];
-        diagonalise(&mut values);
+        diagonalize(&mut values);
         let least = (0..self.n).map(|i| values[0][(i, i)][0].to_array()[0]).fold(f64::INFINITY, f64::min);
         let rounding = if least > 0.0 { ", which is rounding beside the others" } else { "" };
         if self.special && positive_definite(&p).all() && off < 1e-8 {
@@ -348,7 +348,7 @@ impl<const D: usize, A: Storage> Origin for PositiveDefinite<D, A> {
         exp_minus_one(&self.algebra().multiple(0.5, chord)).write(prepared);
     }
     /// With m = e^{−a/2}e^{d/2}e^{−b/2}: w⁺ = log(m m*) and w⁻ = −log(m* m).
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         _d: &[Lane],
         prepared: &[Lane],

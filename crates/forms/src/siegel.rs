@@ -2,7 +2,7 @@
 //! pJp = J with J = (0, 1; −1, 0), which is what the isometry p ↦ J p⁻¹ Jᵀ leaves where it is (Siegel, Symplectic
 //! geometry, 1943). The complex symmetric X + iY with positive definite Y is (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹).
 
-use crate::PositiveDefinite;
+use crate::positive_definite::PositiveDefinite;
 use std::f64::consts::FRAC_1_SQRT_2;
 use symspline_core::matrix::{Matrix, cholesky, solve_lower};
 use symspline_core::scalar::{Each, Lane, Scalar, lane};

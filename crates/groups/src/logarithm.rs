@@ -1,7 +1,7 @@
 //! The logarithm of unitary matrices by eigenvectors, accurate up to the cut locus.
 
 use std::f64::consts::PI;
-use symspline_core::matrix::{Matrix, Unary, diagonalise, multiply_add, sort_columns};
+use symspline_core::matrix::{Matrix, Unary, diagonalize, multiply_add, sort_columns};
 use symspline_core::scalar::{Each, Lane, lane, max_or_nan};
 
 /// 1 − cos θ up to which the logarithm is a power series; θ is 1.37 there.
@@ -29,7 +29,7 @@ pub fn numbers<const D: usize>(m: &Matrix<Lane, 2>) -> Vec<Lane> {
 fn eigen(e: &Matrix<Lane, 2>) -> (Vec<Lane>, Matrix<Lane, 2>) {
     let q = e.clone().plus_identity(Lane::ONE);
     let mut both = [q.hermitian_part(), times_minus_i(q.skew_part())];
-    let v = diagonalise(&mut both);
+    let v = diagonalize(&mut both);
     let [cosine, sine] = &both;
     ((0..q.rows()).map(|i| sine[(i, i)][0].atan2(cosine[(i, i)][0])).collect(), v)
 }
@@ -114,20 +114,20 @@ fn divide([a, b]: [Lane; 2], [c, d]: [Lane; 2]) -> [Lane; 2] {
 
 /// Divided difference of e^{iθ} over two or three angles.
 fn turning(angles: &[Lane]) -> [Lane; 2] {
-    let room = |_: Lane| lane(3.0);
+    let pole_distance = |_: Lane| lane(3.0);
     let cos = Unary {
         f: |x: Lane| {
             let (sin, cos) = x.sin_cos();
             [cos, -sin, -cos]
         },
-        room,
+        pole_distance,
     };
     let sin = Unary {
         f: |x: Lane| {
             let (sin, cos) = x.sin_cos();
             [sin, cos, -sin]
         },
-        room,
+        pole_distance,
     };
     match *angles {
         [a, b] => [cos.first(a, b), sin.first(a, b)],

@@ -5,13 +5,12 @@
 use crate::rigid::{Quaternion, Vector, conjugate, cross, multiply, of_matrix, rotate, to_matrix};
 use crate::unitary::{UnitaryGroup, special_orthogonal};
 use std::f64::consts::PI;
-use symspline_core::curve::Job;
 use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
-use symspline_core::space::{Ambient, Covered, Frame, Origin, Space};
+use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use symspline_core::special::{Trig, theta_over_sin};
 use symspline_vectors::{Sphere, constant_curvature as cc};
 
-/// SO(3). A page of its own for speed; it agrees with that of SO(n).
+/// SO(3), with its own implementation for speed; it agrees with that of SO(n).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rotations {
     general: UnitaryGroup<1>,
@@ -114,7 +113,7 @@ fn defect(p: &[Lane; 9]) -> [Lane; 9] {
 }
 
 /// Replaces a matrix by the nearest rotation; returns how far it was. What is near takes the steps of Newton's method
-/// that [`polar`](symspline_core::matrix::polar) takes, and anything else the general page.
+/// that [`polar`](symspline_core::matrix::polar) takes, and anything else the general implementation.
 pub fn nearest(general: &UnitaryGroup<1>, x: &mut [Lane]) -> Lane {
     /// Up to here three steps are enough.
     const NEAR: Lane = lane(1e-3);
@@ -194,8 +193,8 @@ impl Ambient for Rotations {
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         self.general.project_tangent(p, v)
     }
-    fn scatter(&self, noise: &mut [Lane]) {
-        self.general.scatter(noise);
+    fn random_point(&self, noise: &mut [Lane]) {
+        self.general.random_point(noise);
     }
     fn complaint(&self, x: &[f64]) -> String {
         self.general.complaint(x)
@@ -248,7 +247,7 @@ impl Origin for Rotations {
         cc::prepare::<1, false>(&[chord[0], chord[1], chord[2]].each(|x| x * HALF), prepared);
     }
     #[inline(always)]
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         d: &[Lane],
         prepared: &[Lane],
@@ -259,7 +258,7 @@ impl Origin for Rotations {
     ) {
         let half = |x: &[S]| [x[0], x[1], x[2]].each(|x| x * HALF);
         let d = [d[0], d[1], d[2]].each(|x| x * HALF);
-        cc::legs::<1, false, true, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
+        cc::inner_handles::<1, false, true, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
         w_plus.iter_mut().chain(w_minus).for_each(|w| *w = *w * TWO);
     }
     #[inline(always)]
@@ -276,8 +275,8 @@ impl Origin for Rotations {
 impl Space for Rotations {
     const HOT: bool = true;
 
-    fn samples(&self, job: &Job, out: &mut [f64]) {
-        job.run_covered(self, out);
+    fn evaluate_with<E: Evaluation>(&self, evaluation: E) {
+        evaluation.covered(self);
     }
 }
 

@@ -171,7 +171,7 @@ impl Ambient for SpecialEuclidean {
         let way = self.between(p, x);
         self.moved(p, &half.times(&way).times(&half), out);
     }
-    fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         // p e^{ξ/2} ζ e^{ξ/2} = q e^{−ξ/2} ζ e^{ξ/2}
         let half = Motion::exp(times(self.twist(p, v), lane(-0.5)));
         self.vector(q, half.adjoint(self.twist(p, x)), out);
@@ -211,11 +211,11 @@ impl Ambient for SpecialEuclidean {
         self.last_row(Lane::ONE, x);
         off
     }
-    fn scatter(&self, noise: &mut [Lane]) {
+    fn random_point(&self, noise: &mut [Lane]) {
         let n = self.n;
         let mut r: Vec<Lane> = (0..n * n).map(|c| noise[c / n * (n + 1) + c % n]).collect();
         if let Ok(group) = special_orthogonal(n) {
-            group.scatter(&mut r);
+            group.random_point(&mut r);
         }
         for (c, r) in r.iter().enumerate() {
             noise[c / n * (n + 1) + c % n] = *r;
@@ -285,7 +285,7 @@ impl Origin for SpecialEuclidean {
         prepared[4..].copy_from_slice(&t);
     }
     /// With m = e^{−a/2}e^{d/2}e^{−b/2} and m' the same in reverse order: w⁺ = log(m m'), w⁻ = −Ad(m⁻¹)w⁺.
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         _d: &[Lane],
         prepared: &[Lane],

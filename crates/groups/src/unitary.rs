@@ -8,8 +8,8 @@ use crate::logarithm::{SERIES, angles, complex, numbers, principal, su_limit, ti
 use std::f64::consts::{PI, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Moved, Storage, arc, by_size, determinant, diagonalise, exp_skew_minus_one, from_parts,
-    orthonormalise, parts_of, polar, reorthonormalise,
+    Dynamic, Matrix, Moved, Storage, arc, by_size, determinant, diagonalize, exp_skew_minus_one, from_parts,
+    orthonormalize, parts_of, polar, reorthonormalize,
 };
 use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space, below};
@@ -216,10 +216,10 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         p.write(x);
         off
     }
-    fn scatter(&self, noise: &mut [Lane]) {
+    fn random_point(&self, noise: &mut [Lane]) {
         let mut p = self.read(noise);
         // The factor Q of a Gaussian matrix, with R positive on its diagonal, is uniform.
-        orthonormalise(&mut p);
+        orthonormalize(&mut p);
         if self.special {
             let det = determinant(&p);
             for i in 0..self.n {
@@ -278,7 +278,7 @@ impl<const D: usize, A: Storage> Frame for UnitaryGroup<D, A> {
         let delta = r.adjoint_times(&omega).times(&r).skew_part();
         self.algebra().coordinates(&delta, chord);
         r = &r.times(&exp_skew_minus_one(&delta.scaled(lane(-0.5)))) + &r;
-        reorthonormalise(&mut r);
+        reorthonormalize(&mut r);
         r.write(frame);
         angle
     }
@@ -314,7 +314,7 @@ impl<const D: usize, A: Storage> Origin for UnitaryGroup<D, A> {
     }
     /// M = (m, m'⁻¹) with m = e^{−a/2}e^{d/2}e^{−b/2} and m' the same in reverse order: w⁺ = log(m m'), and
     /// w⁻ = log(m⁻¹m'⁻¹) is its image under conjugation by m.
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         _d: &[Lane],
         prepared: &[Lane],
@@ -345,7 +345,7 @@ impl<const D: usize, A: Storage> Origin for UnitaryGroup<D, A> {
     fn angle(&self, v: &[Lane]) -> Lane {
         let omega = self.algebra().matrix(v);
         let mut angles = [times_minus_i(complex::<D>(self.n, omega.entries().as_flattened()))];
-        diagonalise(&mut angles);
+        diagonalize(&mut angles);
         let theta = (0..self.n).map(|i| angles[0][(i, i)][0]);
         if self.is_su() {
             let (most, least) =

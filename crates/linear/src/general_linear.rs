@@ -4,7 +4,7 @@
 //! A tangent vector at p is v = pΩ; its transvection is `E_p(v)x = p e^{Ω/2} p⁻¹ x e^{Ω/2}`. The logarithm
 //! `log_p(q) = p log(p⁻¹q)` is the principal one: it exists while no eigenvalue of p⁻¹q is a negative number, and the
 //! deciding angle is the largest |arg| of one. No metric belongs to the group: lengths are those of Ω and serve for
-//! reporting only. Curves through points of a closed subgroup stay in it, so that its page is this one, with
+//! reporting only. Curves through points of a closed subgroup stay in it, so that this implementation serves it, too, with
 //! [`Members`] that know what belongs to it.
 
 use crate::algebra::Algebra;
@@ -135,7 +135,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
         p.write(x);
         off
     }
-    fn scatter(&self, noise: &mut [Lane]) {
+    fn random_point(&self, noise: &mut [Lane]) {
         let omega = self.algebra.part(self.read(noise)).scaled(lane(0.4 / (self.n as f64).sqrt()));
         exp_any_minus_one(&omega).plus_identity(Lane::ONE).write(noise);
         self.project(noise);
@@ -172,7 +172,7 @@ impl<const D: usize> Frame for GeneralLinear<D> {
         inverse(&r).write(second);
         angle
     }
-    fn tidy(&self, frame: &mut [Lane], _p: &[Lane]) {
+    fn reorthonormalize(&self, frame: &mut [Lane], _p: &[Lane]) {
         let (r, back) = frame.split_at_mut(self.point_len());
         self.project(r);
         inverse(&self.read(r)).write(back);
@@ -203,7 +203,7 @@ impl<const D: usize> Origin for GeneralLinear<D> {
         exp_any_minus_one(&self.algebra.multiple(0.5, chord)).write(prepared);
     }
     /// With m = e^{−a/2}e^{d/2}e^{−b/2} and m' the same in reverse order: w⁺ = log(m m'), w⁻ = −m⁻¹ w⁺ m.
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         _d: &[Lane],
         prepared: &[Lane],

@@ -3,9 +3,10 @@
 //! are what inversion leaves where it is in O(p,q), whose geodesics through two of them stay among them
 //! (Loos, Symmetric Spaces I, 1969, chapter II.1).
 
-use crate::{GeneralLinear, Members};
+use crate::general_linear::GeneralLinear;
+use crate::members::Members;
 use std::f64::consts::{PI, SQRT_2};
-use symspline_core::matrix::{Matrix, diagonalise, sort_columns};
+use symspline_core::matrix::{Matrix, diagonalize, sort_columns};
 use symspline_core::scalar::{Lane, Scalar, lane};
 use symspline_core::space::{Ambient, Part};
 
@@ -71,7 +72,7 @@ impl IndefiniteGrassmannian {
         let n = self.rows();
         let sign = |i: usize| lane(if i < self.form[0] { -1.0 } else { 1.0 });
         let mut m = [Square::from_fn(n, n, |i, j| [p[(i, j)][0] * sign(i)]).hermitian_part()];
-        let v = diagonalise(&mut m);
+        let v = diagonalize(&mut m);
         let roots: Vec<Lane> = (0..n).map(|i| m[0][(i, i)][0].abs().sqrt()).collect();
         let back = v.times(&Matrix::diagonal(&roots)).times_adjoint(&v);
         let r = self.turned(&back);
@@ -125,7 +126,7 @@ impl Part for IndefiniteGrassmannian {
             [lane(apart) - k[(i, j)][0]]
         });
         let mut split = [split];
-        let mut v = diagonalise(&mut split);
+        let mut v = diagonalize(&mut split);
         let mut keys: Vec<Lane> = (0..n).map(|i| split[0][(i, i)][0]).collect();
         sort_columns(&mut keys, &mut [&mut v]);
         let g = r.times(&v);
@@ -143,8 +144,8 @@ impl Part for IndefiniteGrassmannian {
         };
         same(trace(0, p), a, p) & same(trace(p, p + q), b, q)
     }
-    fn scatter(&self, noise: &mut [Lane]) {
-        self.whole.scatter(noise);
+    fn random_point(&self, noise: &mut [Lane]) {
+        self.whole.random_point(noise);
         let g = self.read(noise);
         let o: Vec<Lane> = (0..self.rows()).map(|i| lane(if self.inside(i) { 1.0 } else { -1.0 })).collect();
         g.times(&Matrix::diagonal(&o)).times(&self.inverse(&g)).write(noise);

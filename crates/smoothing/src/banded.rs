@@ -3,6 +3,14 @@
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::Lane;
 
+/// Bandwidth of BᵀWB and Ω: entries beside the diagonal.
+pub const WIDTH: usize = 3;
+
+/// Entries of a row of the band, for coupled coordinates.
+pub fn stride(coupled: usize) -> usize {
+    (WIDTH + 1) * coupled
+}
+
 /// Entries on the diagonal and `width` places left of it, row by row; after [`factor`](Banded::factor) those of L and
 /// D with A = L D Lᵀ.
 #[derive(Clone, Default)]

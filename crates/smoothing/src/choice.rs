@@ -5,24 +5,11 @@
 //! `(S + RP)ᵀMa`. Its residuals and degrees of freedom for eight λ at a time cost one banded solve.
 
 use crate::curved::Curved;
-use crate::cyclic::Seam;
+use crate::cyclic::PeriodicCorrection;
 use crate::flat::{Flat, times_mass};
 use crate::misfit::{Factors, Misfit};
+use crate::problem::Criterion;
 use symspline_core::scalar::{LANES, Lane, few, lane};
-
-/// How λ is chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Criterion {
-    /// Generalised cross-validation (Craven & Wahba 1979); degrees of freedom count `gamma` times.
-    Gcv {
-        /// 1, or 1.4 against too rough curves (Gu 2013, §3.2).
-        gamma: f64,
-    },
-    /// Restricted maximum likelihood (Wahba 1985).
-    Reml,
-    /// Mallows' C_p (1973), for noise of known size.
-    Cp,
-}
 
 /// A curve as the flat problem sees it: coordinates of m numbers, in units of the mean knot spacing.
 pub struct Linear<'a> {
@@ -35,7 +22,7 @@ pub struct Linear<'a> {
     /// Jacobi's operator, where it is not left out.
     pub curved: Option<&'a Curved>,
     /// How a closed curve goes on.
-    pub seam: Option<&'a Seam>,
+    pub periodic: Option<&'a PeriodicCorrection>,
     /// Accelerations at the knots.
     pub bends: &'a [f64],
     /// The standard deviation of the noise, for [`Criterion::Cp`].
@@ -53,7 +40,7 @@ impl<'a> Linear<'a> {
         m: usize,
         misfit: &'a Misfit<'a>,
         curved: Option<&'a Curved>,
-        seam: Option<&'a Seam>,
+        periodic: Option<&'a PeriodicCorrection>,
         bends: &'a [f64],
         curvature: &[f64],
         sigma: f64,
@@ -70,11 +57,11 @@ impl<'a> Linear<'a> {
                 }
             }
         }
-        if let Some(seam) = seam {
-            seam.fold(&mut pull);
-            seam.fold(&mut stiffness);
+        if let Some(periodic) = periodic {
+            periodic.fold(&mut pull);
+            periodic.fold(&mut stiffness);
         }
-        Linear { flat, m, misfit, curved, seam, bends, sigma, pull, stiffness }
+        Linear { flat, m, misfit, curved, periodic, bends, sigma, pull, stiffness }
     }
 
     /// The step of the coefficients for one λ, given the factors of A.
@@ -82,15 +69,15 @@ impl<'a> Linear<'a> {
         let right: Vec<f64> =
             self.pull.iter().zip(&self.stiffness).map(|(pull, stiffness)| pull - lam * stiffness).collect();
         let mut step = factors.solve_one(self.m, &right);
-        if let Some(seam) = self.seam {
-            seam.extend(&mut step);
+        if let Some(periodic) = self.periodic {
+            periodic.extend(&mut step);
         }
         step
     }
 
     /// A for eight λ.
     pub fn factored(&self, lam: Lane) -> Factors {
-        self.misfit.factored(self.flat, self.m, self.curved, self.seam, lam)
+        self.misfit.factored(self.flat, self.m, self.curved, self.periodic, lam)
     }
 
     /// What eight λ come to.
@@ -104,8 +91,8 @@ impl<'a> Linear<'a> {
             .map(|(pull, stiffness)| (-lam).mul_add(lane(*stiffness), lane(*pull)))
             .collect();
         factors.solve(m, &mut x);
-        if let Some(seam) = self.seam {
-            seam.extend_lanes(&mut x);
+        if let Some(periodic) = self.periodic {
+            periodic.extend_lanes(&mut x);
         }
         let freedom = self.misfit.freedom(flat, &factors.inverse_band());
         let rss = self.misfit.rss(flat, m, &x);

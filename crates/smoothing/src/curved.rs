@@ -2,9 +2,9 @@
 //! u (Jacobi's operator). The flat problem leaves R out, which says too little of curves that are nearly geodesic over
 //! long distances: of a great circle it takes `ξ'' + ξ` for `ξ''`, and a wave around it, which costs nothing, for bent.
 
+use crate::banded::stride;
 use crate::flat::{Flat, times_mass};
 use crate::frames::curvature_terms;
-use crate::misfit::stride;
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Erased, Origin};
 

@@ -11,9 +11,9 @@
 use crate::banded::Banded;
 use symspline_core::scalar::{Lane, lane};
 
-/// How a closed curve goes on at its start.
+/// The correction for a closed curve: how its coefficients go on at its start.
 #[derive(Clone)]
-pub struct Seam {
+pub struct PeriodicCorrection {
     /// Coefficients that come again behind the last one.
     pub overlap: usize,
     /// Coordinates of a coefficient.
@@ -22,11 +22,11 @@ pub struct Seam {
     pub turn: Vec<f64>,
 }
 
-impl Seam {
+impl PeriodicCorrection {
     /// Without holonomy.
     pub fn plain(overlap: usize, m: usize) -> Self {
         let turn = (0..m * m).map(|at| f64::from(at / m == at % m)).collect();
-        Seam { overlap, m, turn }
+        PeriodicCorrection { overlap, m, turn }
     }
 
     /// Whether there is none.
@@ -84,14 +84,14 @@ struct Border {
 }
 
 impl Factored {
-    /// Of a matrix in coefficients of `coupled` numbers; closed with a seam of as many.
-    pub fn new(mut whole: Banded, seam: Option<&Seam>) -> Self {
-        let Some(seam) = seam else {
+    /// Of a matrix in coefficients of `coupled` numbers; a closed curve has a correction of as many.
+    pub fn new(mut whole: Banded, periodic: Option<&PeriodicCorrection>) -> Self {
+        let Some(periodic) = periodic else {
             whole.factor();
             return Factored { band: whole, border: None };
         };
-        let (m, width) = (seam.m, whole.width);
-        let size = seam.overlap * m;
+        let (m, width) = (periodic.m, whole.width);
+        let size = periodic.overlap * m;
         // Coefficients without those that come again; and the bordered ones among them.
         let count = whole.size - size;
         let inner = count - size;
@@ -100,7 +100,7 @@ impl Factored {
         let again = |i: usize, b: usize| {
             let (block, c) = (b / m, b % m);
             (0..m).fold(Lane::ZERO, |sum, row| {
-                sum + near(i, count + block * m + row) * lane(seam.turn[row * m + c])
+                sum + near(i, count + block * m + row) * lane(periodic.turn[row * m + c])
             })
         };
         let mut band = Banded::of(inner, width, |at| {
@@ -124,7 +124,7 @@ impl Factored {
                 let (block, c) = (a / m, a % m);
                 // HᵀA[behind, behind]H.
                 let twice = (0..m).fold(Lane::ZERO, |sum, row| {
-                    sum + again(count + block * m + row, b) * lane(seam.turn[row * m + c])
+                    sum + again(count + block * m + row, b) * lane(periodic.turn[row * m + c])
                 });
                 let mut sum = near(a, b) + again(a, b) + again(b, a) + twice;
                 for i in 0..inner {
@@ -134,7 +134,7 @@ impl Factored {
             }
         }
         corner.factor();
-        let border = Border { size, turn: seam.turn.clone(), sides: [w, v], corner };
+        let border = Border { size, turn: periodic.turn.clone(), sides: [w, v], corner };
         Factored { band, border: Some(border) }
     }
 
@@ -238,7 +238,7 @@ mod tests {
         for (count, m, width) in [(3, 1, 3), (4, 1, 3), (9, 1, 3), (3, 2, 7), (5, 2, 7), (8, 2, 7)] {
             let (sine, cosine) = 0.7_f64.sin_cos();
             let turn = if m == 1 { vec![1.0] } else { vec![cosine, -sine, sine, cosine] };
-            let seam = Seam { overlap: 3, m, turn };
+            let periodic = PeriodicCorrection { overlap: 3, m, turn };
             let long = (count + 3) * m;
             let whole = Banded::of(long, width, |at| {
                 let (i, d) = (at / (width + 1), at % (width + 1));
@@ -251,20 +251,20 @@ mod tests {
                 })
             });
             let dense = |i: usize, j: usize| if i.abs_diff(j) <= width { whole.at(i, j) } else { Lane::ZERO };
-            let factored = Factored::new(whole.clone(), Some(&seam));
+            let factored = Factored::new(whole.clone(), Some(&periodic));
             let band = factored.inverse_band();
             assert!(factored.least_pivot().simd_gt(Lane::ZERO).all());
             for column in 0..count * m {
                 let mut x = vec![Lane::ZERO; count * m];
                 x[column] = Lane::ONE;
                 factored.solve(1, &mut x);
-                seam.extend_lanes(&mut x);
+                periodic.extend_lanes(&mut x);
                 // EᵀAE times it is the unit vector again.
                 let product: Vec<f64> = (0..long)
                     .map(|i| (0..long).fold(Lane::ZERO, |sum, j| sum + dense(i, j) * x[j]).as_array()[0])
                     .collect();
                 let mut product = product;
-                seam.fold(&mut product);
+                periodic.fold(&mut product);
                 for (i, y) in product.iter().enumerate() {
                     assert!((y - f64::from(i == column)).abs() < 1e-13, "{count} {m}: {i} {column} {y}");
                 }

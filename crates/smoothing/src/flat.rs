@@ -4,24 +4,13 @@
 //! energy ∫ x''² is cᵀΩc with Ω = SᵀMS, M being the mass matrix of hat functions. Times are divided by the mean knot
 //! spacing.
 
-use crate::Ends;
-use crate::banded::Banded;
+use crate::banded::{Banded, WIDTH};
+use crate::problem::{Ends, FlatEnd};
 use symspline_core::scalar::{Lane, lane};
 
-/// Places beside the diagonal in BᵀWB and Ω.
-pub const WIDTH: usize = 3;
 const BAND: usize = WIDTH + 1;
 /// Coefficients of a closed curve that come again behind the last one.
 pub const OVERLAP: usize = 3;
-
-/// What happens at an end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FlatEnd {
-    /// The second derivative vanishes.
-    Natural,
-    /// The first derivative is given.
-    Velocity,
-}
 
 /// A row of B, P or S: four neighbouring entries.
 #[derive(Clone, Copy, Default)]

@@ -1,7 +1,7 @@
-//! One frame at every knot of a curve, carried along the polygon of its points.
+//! One frame at every knot of a curve, transported along the polygon of its points.
 //!
 //! The polygon is cut into eight runs that go side by side in the lanes; what turns the frame with which a run begins
-//! into the one that comes out of the run before is kept, so that coordinates are those in one frame carried along the
+//! into the one that comes out of the run before is kept, so that coordinates are those in one frame transported along the
 //! whole polygon.
 
 use symspline_core::scalar::{LANES, Lane, few, gather, scatter};
@@ -17,7 +17,7 @@ pub struct Frames<'a> {
     frames: Vec<f64>,
     /// Knots of a run.
     run: usize,
-    /// Matrices that bring coordinates in the frames of a run to those in the frame carried from the first knot, and
+    /// Matrices that bring coordinates in the frames of a run to those in the frame transported from the first knot, and
     /// back; row by row. The first run has none.
     turns: Vec<[Vec<f64>; 2]>,
 }
@@ -46,7 +46,7 @@ impl<'a> Frames<'a> {
                 space.step(&mut frame, &p, &q, &mut chord);
                 std::mem::swap(&mut p, &mut q);
                 if i % TIDY == 0 {
-                    space.tidy(&mut frame, &p);
+                    space.reorthonormalize(&mut frame, &p);
                 }
             }
             if i < run {

@@ -39,8 +39,8 @@ pub fn roots(information: &[f64], m: usize) -> Vec<Root> {
     information.chunks_exact(m * m).map(root).collect()
 }
 
-/// The frames at data, carried along the geodesics to points of a curve: m vectors each.
-pub fn carried_frames(space: &Erased, gammas: &[f64], data: &[f64]) -> Vec<f64> {
+/// The frames at data, transported along the geodesics to points of a curve: m vectors each.
+pub fn transported_frames(space: &Erased, gammas: &[f64], data: &[f64]) -> Vec<f64> {
     let (len, m) = (space.point_len(), space.dim());
     let count = gammas.len() / len;
     let mut out = vec![0.0; count * m * len];
@@ -57,7 +57,7 @@ pub fn carried_frames(space: &Erased, gammas: &[f64], data: &[f64]) -> Vec<f64> 
             x.fill(Lane::ZERO);
             x[j] = Lane::ONE;
             space.tangent(&frame, &y, &x, &mut v);
-            space.carry(&y, &p, &way, &v, &mut there);
+            space.parallel_transport(&y, &p, &way, &v, &mut there);
             scatter(&there, &mut rows);
             for (i, row) in at.iter().zip(rows.chunks_exact(len)) {
                 out[(i * m + j) * len..][..len].copy_from_slice(row);

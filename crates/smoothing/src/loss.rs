@@ -3,22 +3,11 @@
 //! A robust fit is one of least squares to pseudo-data (Cox 1983): residuals r become `ψ(r)/ψ̄'`, ψ̄' being the mean
 //! slope of ψ. Cross-validation of pseudo-data keeps its sense; that of data that are weighted anew does not.
 
-use crate::Data;
 use crate::chi;
 use crate::frames::lanes_of;
+use crate::problem::{Data, Loss};
 use symspline_core::scalar::{LANES, Lane, gather};
 use symspline_core::space::{Ambient, Erased, Origin};
-
-/// A loss ρ with ρ(r) ≈ |r|² for small residuals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Loss {
-    /// |r|².
-    Linear,
-    /// |r|² up to c, and linear beyond.
-    Huber,
-    /// c² ln(1 + |r|²/c²).
-    Cauchy,
-}
 
 impl Loss {
     /// The residual at which the loss begins to count less, over the standard deviation of a coordinate.
@@ -229,9 +218,9 @@ mod tests {
 
     #[test]
     fn noise_is_that_of_the_data() {
-        use symspline_core::space::Table;
+        use symspline_core::space::Kernels;
         let plane = symspline_vectors::Euclidean::new(1).unwrap();
-        let space = Erased(&plane as &dyn Table);
+        let space = Erased(&plane as &dyn Kernels);
         // Normal noise from a hash of its number, about a straight line.
         let n = 4001;
         let times: Vec<f64> = (0..n).map(|i| i as f64 + 0.3 * (i as f64).sin()).collect();

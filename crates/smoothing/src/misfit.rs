@@ -4,10 +4,10 @@
 //! couple the coordinates: A is one matrix of all, with the width of a band of blocks. So does the curvature of the
 //! space, where it is not left out: see [`Curved`].
 
-use crate::banded::Banded;
+use crate::banded::{Banded, WIDTH, stride};
 use crate::curved::Curved;
-use crate::cyclic::{Factored, Seam};
-use crate::flat::{Flat, OVERLAP, Row, WIDTH};
+use crate::cyclic::{Factored, PeriodicCorrection};
+use crate::flat::{Flat, OVERLAP, Row};
 use crate::information::Seen;
 use std::borrow::Cow;
 use symspline_core::scalar::{LANES, Lane, few, lane};
@@ -102,19 +102,19 @@ impl<'a> Misfit<'a> {
     }
 
     /// A for eight λ.
-    /// A seam with holonomy couples the coordinates, too.
+    /// The holonomy of a closed curve couples the coordinates, too.
     pub fn factored(
         &self,
         flat: &Flat,
         m: usize,
         curved: Option<&Curved>,
-        seam: Option<&Seam>,
+        periodic: Option<&PeriodicCorrection>,
         lam: Lane,
     ) -> Factors {
         let count = flat.basis.count();
         // So many numbers are too many: then the matrix, not its right side, leaves the holonomy out.
         let few = m.saturating_pow(3).saturating_mul(count) <= COUPLED;
-        let turns = few && seam.is_some_and(|seam| !seam.is_plain());
+        let turns = few && periodic.is_some_and(|correction| !correction.is_plain());
         let coupled =
             if curved.is_some() || turns || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
         let entry = |at: usize| {
@@ -123,9 +123,9 @@ impl<'a> Misfit<'a> {
             lam.mul_add(lane(stiff), lane(self.gram(coupled, at)))
         };
         let banded = Banded::of(count * coupled, stride(coupled) - 1, entry);
-        let plain = Seam::plain(OVERLAP, coupled);
-        let seam = seam.map(|seam| if seam.m == coupled && few { seam } else { &plain });
-        Factors { matrix: Factored::new(banded, seam), coupled }
+        let plain = PeriodicCorrection::plain(OVERLAP, coupled);
+        let periodic = periodic.map(|given| if given.m == coupled && few { given } else { &plain });
+        Factors { matrix: Factored::new(banded, periodic), coupled }
     }
 
     /// An entry of BᵀWB, which is that of every coordinate by itself or that of all.
@@ -230,11 +230,6 @@ fn coupled_gram(flat: &Flat, m: usize, rows: &[f64]) -> Vec<f64> {
         }
     }
     gram
-}
-
-/// Places of a row of the band of coupled coordinates.
-pub fn stride(coupled: usize) -> usize {
-    (WIDTH + 1) * coupled
 }
 
 /// The entry `at` of a matrix that is the same for every coordinate, and couples none.

@@ -51,8 +51,8 @@ impl Path<'_> {
             let h = Lane::new(at.map(|(s, _)| self.t[s + 1] - self.t[s]));
             for e in 0..2 {
                 gather(at.map(|(s, _)| &self.points[(s + e) * len..][..len]), &mut segment.ends[e]);
-                gather(at.map(|(s, _)| &self.velocities[(s + e) * len..][..len]), &mut segment.legs[e]);
-                segment.legs[e].iter_mut().for_each(|x| *x *= h * lane(1.0 / 3.0));
+                gather(at.map(|(s, _)| &self.velocities[(s + e) * len..][..len]), &mut segment.handles[e]);
+                segment.handles[e].iter_mut().for_each(|x| *x *= h * lane(1.0 / 3.0));
             }
             segment.prepare(space, len);
             let tau = Lane::new(at.map(|(_, place)| place));
@@ -100,7 +100,7 @@ impl Path<'_> {
         (0..=n).map(|i| if i < n { (i, 0.0) } else { (n - 1, 1.0) }).collect()
     }
 
-    /// Vectors at places, where the points are `gammas`, carried to the nearest knots: coordinates in the frames there.
+    /// Vectors at places, where the points are `gammas`, transported to the nearest knots: coordinates in the frames there.
     pub fn at_knots(
         &self,
         space: &Erased,
@@ -114,18 +114,18 @@ impl Path<'_> {
         if places.iter().all(|&place| at_knot(place).is_some()) {
             return frames.coordinates(vectors, nearest);
         }
-        let mut carried = vec![0.0; vectors.len()];
+        let mut transported = vec![0.0; vectors.len()];
         let [mut p, mut q, mut v, mut way, mut out] = [(); 5].map(|_| vec![Lane::ZERO; len]);
-        for (group, carried) in carried.chunks_mut(LANES * len).enumerate() {
+        for (group, transported) in transported.chunks_mut(LANES * len).enumerate() {
             let at = lanes_of(group, places.len());
             gather(at.map(|i| &gammas[i * len..][..len]), &mut p);
             gather(at.map(|i| &self.points[nearest(i) * len..][..len]), &mut q);
             gather(at.map(|i| &vectors[i * len..][..len]), &mut v);
             space.log(&p, &q, &mut way);
-            space.carry(&p, &q, &way, &v, &mut out);
-            scatter(&out, carried);
+            space.parallel_transport(&p, &q, &way, &v, &mut out);
+            scatter(&out, transported);
         }
-        frames.coordinates(&carried, nearest)
+        frames.coordinates(&transported, nearest)
     }
 }
 

@@ -1,18 +1,18 @@
 //! How the search for a curve goes: its λ, its steps, and when it ends.
 
 use crate::banded::Banded;
-use crate::choice::{Criterion, Linear};
+use crate::choice::Linear;
 use crate::misfit::COUPLED;
+use crate::problem::{Criterion, Report, Tier};
 use crate::robust::{Lam, ROUGH_ROUNDS, Robust, Stage};
-use crate::{Report, Tier};
 use symspline_core::space::{Erased, Origin};
 
-/// Contraction of the flat tier, known or expected, from which it takes curvature into its matrix, or the exact one
-/// takes over.
+/// Contraction of the linearised solver, known or expected, from which it takes curvature into its matrix, or full
+/// Gauss–Newton takes over.
 const SLOW: f64 = 0.5;
 /// The same while λ and the curve are still rough guesses.
 const HOPELESS: f64 = 2.0;
-/// Dimension up to which the exact way is taken by itself.
+/// Dimension up to which full Gauss–Newton is chosen automatically.
 const LARGE: usize = 64;
 /// λ moves by less than this between rounds when it is settled, in natural logarithms.
 const SETTLED: f64 = 3e-3;
@@ -35,12 +35,14 @@ pub struct Progress {
     scale: f64,
     /// Iterations in a row in which the step hardly shrank.
     pub slow: usize,
-    /// Whether curvature is in the matrix of the flat way.
+    /// Whether curvature is in the matrix of the linearised solver.
     pub curved: bool,
     /// Whether the search for λ came to no end.
     pub unsettled: bool,
-    /// Whether the flat way was given up.
+    /// Whether the linearised solver was given up.
     pub forced: bool,
+    /// The smallest λ that may be chosen: with smaller ones no spline joined the points.
+    pub least: f64,
     /// Iterations before this stage of the fit.
     pub begun: usize,
     density: f64,
@@ -63,6 +65,7 @@ impl Progress {
             curved: false,
             unsettled: false,
             forced: false,
+            least: 0.0,
             begun: 0,
             density,
             report,
@@ -96,17 +99,17 @@ impl Progress {
         }
     }
 
-    /// Whether the exact way is to be taken.
-    pub fn takes_exact_way(&self, space: &Erased, tier: Tier) -> bool {
+    /// Whether to use full Gauss–Newton.
+    pub fn takes_gauss_newton(&self, space: &Erased, tier: Tier) -> bool {
         let limit = if self.settled { SLOW } else { HOPELESS };
         let known = self.forced || (self.settled && self.report.exact);
         // With curvature in its matrix the linearised solver contracts.
         let hopeless = known || (!self.curved && self.report.kappa > limit) || self.slow > 1;
-        tier == Tier::Newton || (hopeless && self.may_be_exact(space, tier))
+        tier == Tier::Newton || (hopeless && self.may_take_gauss_newton(space, tier))
     }
 
-    /// Whether there is the exact way to be taken.
-    pub fn may_be_exact(&self, space: &Erased, tier: Tier) -> bool {
+    /// Whether full Gauss–Newton is allowed.
+    pub fn may_take_gauss_newton(&self, space: &Erased, tier: Tier) -> bool {
         // In flat space the linearised solver is full Gauss–Newton, whose blocks have a limit elsewhere.
         tier == Tier::Auto && space.curvature() != 0.0 && space.dim() <= LARGE
     }
@@ -130,7 +133,10 @@ impl Progress {
     }
 
     fn choose(&mut self, linear: &Linear, criterion: Criterion, rounds: usize) {
-        let (mut lam, at_bound) = linear.choose(criterion, self.lam);
+        let (mut lam, mut at_bound) = linear.choose(criterion, self.lam);
+        if lam < self.least {
+            (lam, at_bound) = (self.least, true);
+        }
         self.report.rounds += 1;
         let moved = self.lam.map_or(f64::INFINITY, |before| (lam / before).ln().abs());
         // What goes to and fro meets half way.
@@ -143,7 +149,7 @@ impl Progress {
         self.lam = Some(lam);
     }
 
-    /// The contraction that the flat way is expected to have if it leaves curvature out: `K²|γ'|²√(λ/w)`, with the mean
+    /// The expected contraction of the linearised solver without curvature in its matrix: `K²|γ'|²√(λ/w)`, with the mean
     /// squared speed and w the weight per time, where there is little.
     fn expect(&mut self, space: &Erased, speeds: &[f64], lam: f64) {
         let m = space.dim();

@@ -12,13 +12,16 @@
 //! With a given λ the second stage is only the noise beside the rough curve.
 
 use crate::chi;
-use crate::choice::Criterion;
-use crate::loss::{self, Loss};
+use crate::loss;
+use crate::problem::{Criterion, Loss};
 
 /// Rounds in which λ is chosen in the first stage.
 pub const ROUGH_ROUNDS: usize = 6;
 /// Iterations of the first stage, at most: it need not converge.
 const ROUGH_STEPS: usize = 20;
+/// Iterations of the last stage, in multiples of those that were asked for: reweighted least squares converge linearly,
+/// and slowly where a datum is near the corner of Huber's loss.
+const FINAL_STEPS: usize = 20;
 /// Steps, in standard deviations, that end the stages before the last.
 const ROUGH_TOL: f64 = 0.03;
 /// Times that data are left out anew, at most.
@@ -128,7 +131,11 @@ impl Robust {
 
     /// Iterations of the stage, at most.
     pub fn most(&self, asked: usize) -> usize {
-        if self.stage == Stage::Rough { asked.min(ROUGH_STEPS) } else { asked }
+        match self.stage {
+            Stage::Rough => asked.min(ROUGH_STEPS),
+            Stage::Final => asked.saturating_mul(FINAL_STEPS),
+            Stage::Plain | Stage::Trimmed(_) => asked,
+        }
     }
 
     /// Whether steps shrink at a rate that says nothing of the solver, but of the weights.

@@ -1,12 +1,12 @@
 //! Many curves at a time: those that are not done go one step on together.
 
 use crate::information;
-use crate::loss::{self, Loss};
+use crate::loss;
 use crate::path::{Path, moved, places};
+use crate::problem::{Data, Ends, Loss, Options, Smooth, State};
 use crate::robust::Robust;
 use crate::start::{Level, levels};
 use crate::track::Track;
-use crate::{Data, Ends, Options, Smooth, State};
 use symspline_core::fit::{
     End, Ends as FitEnds, Method, Options as FitOptions, Problem, Report, Status, fit,
 };
@@ -57,7 +57,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         }
         let items: Vec<_> = running.iter_mut().zip(fitted).collect();
         parallel::for_each(items, threads, monitor, |(track, velocities)| match velocities {
-            None => track.retreat(space),
+            None => track.retreat(space, options),
             Some(velocities) => {
                 track.velocities = velocities;
                 track.advance(space, options, monitor, !threads);
@@ -72,7 +72,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
             let points = vec![f64::NAN; data.knots.len() * len];
             let plain = Robust::new(Loss::Linear, space.dim(), 0.0, true, true);
             let mut none = Track::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, plain);
-            none.retreat(space);
+            none.retreat(space, options);
             none
         })
     });

@@ -3,17 +3,17 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::curved::Curved;
-use crate::cyclic::Seam;
-use crate::exact::{self, Pull};
+use crate::cyclic::PeriodicCorrection;
 use crate::flat::{Basis, Flat, OVERLAP};
 use crate::frames::{Frames, curvature_terms};
+use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::path::{Path, Place, moved, places};
+use crate::problem::{Data, Ends, Options, Report, Smooth, State};
 use crate::progress::{Progress, larger, length};
-use crate::robust::Robust;
-use crate::sight::Sight;
+use crate::residuals::Residuals;
+use crate::robust::{Lam, Robust};
 use crate::variance::rows_of;
-use crate::{Data, Ends, Options, Report, Smooth, State};
 use std::f64::consts::PI;
 use symspline_core::fit::Ends as FitEnds;
 use symspline_core::monitor::Monitor;
@@ -22,10 +22,13 @@ use symspline_core::space::{Ambient, Erased, Origin};
 
 /// Steps are taken back and halved at most so often where no spline goes through the points they lead to.
 const RETREATS: usize = 6;
-/// Steps of the flat way that are longer than they may be, with a final λ, before it is given up: it does not contract,
+/// Steps of the linearised solver that exceed their limit, with a final λ, before it is given up: it does not contract,
 /// and what it comes to in the end, if it does, is a minimum near other curves.
 const ASTRAY: usize = 8;
-/// Of data with unequal weights the weight that one in so many does not reach says how stiff a curve is.
+/// If no spline joins the points that a chosen λ leads to, λ is multiplied by at least this factor, at most so often.
+const STIFFER: f64 = 10.0;
+const STIFFENINGS: usize = 4;
+/// The weight that one in so many data does not reach determines the stiffness of a curve with unequal weights.
 const LIGHT: usize = 10;
 /// J is known to this part of it.
 const ROUNDING: f64 = 1e-12;
@@ -50,9 +53,10 @@ pub struct Track<'a> {
     /// Where the last step began, and the step.
     before: Option<(Vec<f64>, Vec<f64>)>,
     retreats: usize,
-    /// Steps of the flat way that were too long.
+    stiffenings: usize,
+    /// Steps of the linearised solver that were too long.
     strays: usize,
-    /// J on the exact way, at the last λ.
+    /// J in full Gauss–Newton, at the last λ.
     objective: f64,
     /// The band of A⁻¹ at the end.
     inverse: Option<Banded>,
@@ -98,6 +102,7 @@ impl<'a> Track<'a> {
             knots,
             before: None,
             retreats: 0,
+            stiffenings: 0,
             strays: 0,
             objective: f64::INFINITY,
             inverse: None,
@@ -120,7 +125,7 @@ impl<'a> Track<'a> {
         self.progress.report
     }
 
-    /// Velocities at the ends, carried from the first and the last of the data to the ends of the curve.
+    /// Velocities at the ends, transported from the first and the last of the data to the ends of the curve.
     pub fn end_velocities(&self, space: &Erased) -> [Vec<f64>; 2] {
         let len = space.point_len();
         std::array::from_fn(|e| {
@@ -136,7 +141,7 @@ impl<'a> Track<'a> {
             let (mut way, mut out) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
             let v: Vec<Lane> = velocity.iter().map(|&v| lane(v)).collect();
             space.log(&y, &x, &mut way);
-            space.carry(&y, &x, &way, &v, &mut out);
+            space.parallel_transport(&y, &x, &way, &v, &mut out);
             out.iter().map(|x| x.as_array()[0]).collect()
         })
     }
@@ -152,15 +157,33 @@ impl<'a> Track<'a> {
     }
 
     /// No spline goes through the points: back by half of the step.
-    pub fn retreat(&mut self, space: &Erased) {
+    pub fn retreat(&mut self, space: &Erased, options: &Options) {
         self.retreats += 1;
         let Some((points, step)) = self.before.as_mut().filter(|_| self.retreats <= RETREATS) else {
-            self.progress.report.state = State::NoCurve;
+            self.stiffen(options);
             return;
         };
         step.iter_mut().for_each(|x| *x *= 0.5);
         let (points, step) = (points.clone(), step.clone());
         self.go(space, &points, &step);
+    }
+
+    /// Begins again with a lower bound for λ, if λ is chosen at all.
+    fn stiffen(&mut self, options: &Options) {
+        let allowed = options.raise_lam && self.data.lam.is_none() && self.stiffenings < STIFFENINGS;
+        let lam = self.progress.lam.filter(|_| allowed);
+        let (Some(lam), Some(_)) = (lam, &self.before) else {
+            self.progress.report.state = State::NoCurve;
+            return;
+        };
+        self.stiffenings += 1;
+        self.progress.least = STIFFER * lam;
+        // The last stage of a robust fit has its λ from the one before.
+        let settled = self.progress.settled && self.robust.reweighs();
+        self.progress.restart(if settled { Lam::Times(STIFFER) } else { Lam::Anew });
+        self.progress.forced = false;
+        (self.strays, self.before, self.retreats, self.objective) = (0, None, 0, f64::INFINITY);
+        self.points = self.first.clone();
     }
 
     /// One step from the spline through the points, or the end; on all cores if no other curve is worked on.
@@ -171,23 +194,23 @@ impl<'a> Track<'a> {
         self.progress.report.iterations += 1;
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
         let frames = Frames::new(space, &self.points);
-        let mut sight = Sight::new(space, &path, &frames, &self.places, flat, data, &self.roots);
-        let factors = self.robust.factors(&sight.squares);
+        let mut residuals = Residuals::new(space, &path, &frames, &self.places, flat, data, &self.roots);
+        let factors = self.robust.factors(&residuals.squares);
         if self.progress.settled && self.progress.report.exact {
-            let objective = self.value(space, &sight);
+            let objective = self.value(space, &residuals);
             let before = std::mem::replace(&mut self.objective, objective);
             if self.objective > before * (1.0 + ROUNDING) && self.retreats < RETREATS {
                 self.objective = before;
-                return self.retreat(space);
+                return self.retreat(space, options);
             }
         }
         self.retreats = 0;
         let whole = factors.as_ref().map(|factors| {
-            let whole = sight.misfit.clone();
-            sight.misfit.reweigh(flat, factors, m);
+            let whole = residuals.misfit.clone();
+            residuals.misfit.reweigh(flat, factors, m);
             whole
         });
-        let misfit = &sight.misfit;
+        let misfit = &residuals.misfit;
         let mut bends = frames.coordinates(&path.bends(space, &path.knots()), |i| i);
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
         bends.iter_mut().for_each(|x| *x *= spacing * spacing);
@@ -195,9 +218,10 @@ impl<'a> Track<'a> {
         let curvature = curvature_terms(space, &speeds, &bends);
         let sigma = data.sigma.unwrap_or(f64::NAN);
         let closed = self.ends == Ends::Periodic;
-        let seam = closed.then(|| Seam { overlap: OVERLAP, m, turn: frames.round() });
-        let seen_with =
-            |misfit, curved| Linear::new(flat, m, misfit, curved, seam.as_ref(), &bends, &curvature, sigma);
+        let periodic = closed.then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: frames.round() });
+        let seen_with = |misfit, curved| {
+            Linear::new(flat, m, misfit, curved, periodic.as_ref(), &bends, &curvature, sigma)
+        };
         let (curved, later);
         curved = self.progress.curved.then(|| Curved::new(space, flat, &speeds));
         let mut linear = seen_with(misfit, curved.as_ref());
@@ -216,19 +240,20 @@ impl<'a> Track<'a> {
         let inverse = system.mean(&band);
         self.progress.note(&linear, &band, lam, 1.0);
 
-        let exact = self.progress.takes_exact_way(space, options.tier);
+        let exact = self.progress.takes_gauss_newton(space, options.tier);
         if exact && self.strays > 0 {
             return self.begin_again();
         }
         if exact && !self.progress.report.exact {
-            // What is known of steps is of the other way.
+            // The known steps belong to the other solver.
             (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
         }
         self.progress.report.exact = exact;
         let (step, ambient) = if exact {
             let lam = lam * spacing.powi(3);
             let ends = self.ends.of_fit(&velocities);
-            let ambient = self.exact_step(space, ends, &sight, factors.as_deref(), lam, monitor, alone);
+            let ambient =
+                self.gauss_newton_step(space, ends, &residuals, factors.as_deref(), lam, monitor, alone);
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {
             let change = linear.step(lam, &system);
@@ -245,12 +270,12 @@ impl<'a> Track<'a> {
         let taken = self.progress.report.iterations - self.progress.begun;
         let over = taken >= self.robust.most(options.max_iter);
         if !self.robust.last() && self.progress.settled && (small || over) {
-            return self.go_on(&sight.squares);
+            return self.go_on(&residuals.squares);
         }
         if self.progress.settled && small {
             if let Some(mut whole) = whole {
                 // Degrees of freedom and deviations of the M-estimator are those of its pseudo-data (Cox 1983).
-                let (factors, softness) = self.robust.pseudo(&sight.squares);
+                let (factors, softness) = self.robust.pseudo(&residuals.squares);
                 whole.soften(&factors, m);
                 let linear = seen_with(&whole, linear.curved);
                 let system = linear.factored(lane(lam / softness));
@@ -263,13 +288,13 @@ impl<'a> Track<'a> {
             return;
         }
         // Farther than the data are nothing is known.
-        let farthest = sight.distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
+        let farthest = residuals.distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
         let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
         let further =
             if self.progress.settled { self.progress.further(&step, self.robust.reweighs()) } else { 1.0 };
         let limited = longest * further > farthest;
         self.strays += usize::from(limited && self.progress.settled && !exact);
-        if self.strays > ASTRAY && self.progress.may_be_exact(space, options.tier) {
+        if self.strays > ASTRAY && self.progress.may_take_gauss_newton(space, options.tier) {
             return self.begin_again();
         }
         if over || self.strays > ASTRAY {
@@ -284,7 +309,7 @@ impl<'a> Track<'a> {
         self.before = Some((before, ambient));
     }
 
-    /// From the beginning by the exact way: to where the flat way went astray the exact one may go astray, too.
+    /// Restarts with full Gauss–Newton: it could fail, too, from where the linearised solver went astray.
     fn begin_again(&mut self) {
         (self.strays, self.before, self.retreats) = (0, None, 0);
         (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
@@ -296,22 +321,22 @@ impl<'a> Track<'a> {
     }
 
     /// J of the curve as it is.
-    fn value(&self, space: &Erased, sight: &Sight) -> f64 {
+    fn value(&self, space: &Erased, residuals: &Residuals) -> f64 {
         let lam = self.progress.lam.unwrap_or(0.0) * self.flat.basis.spacing.powi(3);
-        let terms = sight.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
-        terms.sum::<f64>() + lam * exact::energy(space, &self.path())
+        let terms = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
+        terms.sum::<f64>() + lam * gauss_newton::energy(space, &self.path())
     }
 
     fn path(&self) -> Path<'_> {
         Path { t: &self.knots, points: &self.points, velocities: &self.velocities }
     }
 
-    /// The step of the exact way, as tangent vectors.
-    fn exact_step(
+    /// The step of full Gauss–Newton, as tangent vectors.
+    fn gauss_newton_step(
         &self,
         space: &Erased,
         ends: FitEnds,
-        sight: &Sight,
+        residuals: &Residuals,
         factors: Option<&[f64]>,
         lam: f64,
         monitor: &Monitor,
@@ -319,13 +344,16 @@ impl<'a> Track<'a> {
     ) -> Vec<f64> {
         let pull = Pull {
             places: &self.places,
-            points: &sight.gammas,
-            vectors: &sight.vectors,
+            points: &residuals.gammas,
+            vectors: &residuals.vectors,
             factors,
             weights: self.data.weights,
-            information: sight.carried.as_ref().map(|carried| (&self.roots[..], &carried[..])),
+            information: residuals
+                .transported
+                .as_ref()
+                .map(|transported| (&self.roots[..], &transported[..])),
         };
-        exact::step(space, &self.path(), ends, &pull, lam, monitor, alone)
+        gauss_newton::step(space, &self.path(), ends, &pull, lam, monitor, alone)
     }
 
     /// Moves the points.

@@ -1,10 +1,10 @@
 //! How uncertain a smoothed curve is: the posterior of an integrated Wiener process (Wahba 1983), in frames along it.
 
-use crate::Ends;
-use crate::banded::Banded;
-use crate::cyclic::{Factored, Seam};
-use crate::flat::{Basis, FlatEnd, WIDTH};
+use crate::banded::{Banded, WIDTH};
+use crate::cyclic::{Factored, PeriodicCorrection};
+use crate::flat::Basis;
 use crate::path::places;
+use crate::problem::{Ends, FlatEnd};
 use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
@@ -82,6 +82,6 @@ fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
         lane(4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0)))
     });
     // The last velocity of a closed curve is the first.
-    let seam = (ends == Ends::Periodic).then(|| Seam::plain(1, 1));
-    Factored::new(t, seam.as_ref()).inverse_band()
+    let periodic = (ends == Ends::Periodic).then(|| PeriodicCorrection::plain(1, 1));
+    Factored::new(t, periodic.as_ref()).inverse_band()
 }

@@ -50,13 +50,13 @@ impl Model for ComplexHyperbolic {
     fn is_complex(&self) -> bool {
         true
     }
-    fn fibre(&self) -> usize {
+    fn fiber_rank(&self) -> usize {
         1
     }
     fn cut_angle(&self) -> f64 {
         f64::INFINITY
     }
-    fn longest_leg(&self) -> f64 {
+    fn longest_handle(&self) -> f64 {
         18.0 // ε cosh²(18) ≈ 1: of points this far apart rounding leaves nothing.
     }
     fn dim(&self) -> usize {

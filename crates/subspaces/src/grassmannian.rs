@@ -9,7 +9,7 @@ use crate::logarithm::log_from;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 use std::marker::PhantomData;
 use symspline_core::matrix::{
-    Dynamic, Matrix, Moved, Storage, diagonalise, orthogonalise, orthonormalise, polar, reorthonormalise,
+    Dynamic, Matrix, Moved, Storage, diagonalize, orthogonalize, orthonormalize, polar, reorthonormalize,
     trig,
 };
 use symspline_core::scalar::{Each, Lane, Scalar, lane, max_or_nan};
@@ -153,7 +153,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
     fn is_complex(&self) -> bool {
         D == 2
     }
-    fn fibre(&self) -> usize {
+    fn fiber_rank(&self) -> usize {
         self.k
     }
     fn cut_angle(&self) -> f64 {
@@ -175,7 +175,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         // At the cut locus itself the logarithm has no direction, but there are angles. Beside a right one the others
         // need no digits where they are small.
         let mut cosines = self.read::<Lane>(q).adjoint_times(&self.read(p));
-        orthogonalise(&mut cosines, None);
+        orthogonalize(&mut cosines, None);
         let squares = (0..self.k).fold(Lane::ZERO, |sum, j| {
             let square =
                 (0..self.k).flat_map(|i| cosines[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum));
@@ -197,7 +197,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         let [to_p, to_delta] = turn.act(&p.adjoint_times(&z), &delta.adjoint_times(&z));
         (&(&z + &p.times(&to_p)) + &delta.times(&to_delta)).write(out);
     }
-    fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         self.transvect(p, v, x, out);
         // E_p(v) lives at the representative E p; at q it is E(v)x (E p)*q.
         let (p, delta) = (self.read(p), self.read(v));
@@ -229,9 +229,9 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         symspline_core::matrix::Select::select(rounding, y, nearest).write(x);
         off
     }
-    fn scatter(&self, noise: &mut [Lane]) {
+    fn random_point(&self, noise: &mut [Lane]) {
         let mut y = self.read(noise);
-        orthonormalise(&mut y);
+        orthonormalize(&mut y);
         y.write(noise);
     }
     fn complaint(&self, x: &[f64]) -> String {
@@ -276,19 +276,19 @@ impl<const D: usize, A: Storage> Frame for Subspaces<D, A> {
         let mut rest = &rest + &turn.times_adjoint(&b.stored());
         // The first columns span q, and the others are orthogonal to it.
         let mut x = q.times(&q.adjoint_times(&x_next));
-        reorthonormalise(&mut x);
+        reorthonormalize(&mut x);
         let along: Matrix<Lane, D> = x.stored();
         rest = &rest - &along.times(&along.adjoint_times(&rest));
         if self.n <= SMALL {
-            reorthonormalise(&mut rest);
+            reorthonormalize(&mut rest);
         }
         self.write_frame(&x, &rest, frame);
         angle
     }
-    fn tidy(&self, frame: &mut [Lane], _p: &[Lane]) {
+    fn reorthonormalize(&self, frame: &mut [Lane], _p: &[Lane]) {
         if self.n > SMALL {
             let mut q = Matrix::<Lane, D>::read(self.n, self.n, frame);
-            reorthonormalise(&mut q);
+            reorthonormalize(&mut q);
             q.write(frame);
         }
     }
@@ -328,7 +328,7 @@ impl<const D: usize, A: Storage> Origin for Subspaces<D, A> {
         }
     }
     /// The points E(−a) E(d) E(−b)·o and E(b) E(−d) E(a)·o as (k × k, (n−k) × k) blocks.
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         d: &[Lane],
         prepared: &[Lane],
@@ -396,7 +396,7 @@ impl<const D: usize, A: Storage> Space for Subspaces<D, A> {
 
 fn largest_singular_value<const D: usize, A: Storage>(b: &Matrix<Lane, D, A>) -> Lane {
     let mut g = [b.adjoint_times(b)];
-    diagonalise(&mut g);
+    diagonalize(&mut g);
     (0..b.cols()).fold(Lane::ZERO, |m, i| max_or_nan(m, g[0][(i, i)][0])).sqrt()
 }
 

@@ -1,6 +1,6 @@
 //! The logarithm of subspaces, accurate up to the cut locus.
 
-use symspline_core::matrix::{Matrix, Storage, arc, by_size, orthogonalise, orthonormalise, sort_columns};
+use symspline_core::matrix::{Matrix, Storage, arc, by_size, orthogonalize, orthonormalize, sort_columns};
 use symspline_core::scalar::{Each, Lane, Scalar, few, lane, max_or_nan};
 use symspline_core::special::theta_over_sin;
 
@@ -69,14 +69,14 @@ fn principal<const D: usize, A: Storage>(
     let k = top.rows();
     let mut v = top.adjoint();
     let mut u = Matrix::identity(k);
-    orthogonalise(&mut v, Some(&mut u));
+    orthogonalize(&mut v, Some(&mut u));
     let length = |m: &Matrix<Lane, D, A>, j: usize| {
         (0..m.rows()).flat_map(|i| m[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum)).sqrt()
     };
     let mut cosines: Vec<Lane> = (0..k).map(|j| length(&v, j)).collect();
     sort_columns(&mut cosines, &mut [&mut v, &mut u]);
     // The smallest cosines have the least accurate directions; they come last.
-    orthonormalise(&mut v);
+    orthonormalize(&mut v);
     let mut z = rest.times(&v);
     let mut angle = Lane::ZERO;
     for j in 0..k {

@@ -2,7 +2,7 @@
 //! (a + bi, c + di; −c + di, a − bi) for a quaternion, those planes that j takes to themselves, which is what the
 //! isometry Y ↦ jY leaves where it is (Besse, Manifolds all of whose geodesics are closed, 1978, §3).
 
-use crate::Subspaces;
+use crate::grassmannian::Subspaces;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 use symspline_core::matrix::Matrix;
 use symspline_core::scalar::{Each, Lane, Scalar, lane};

@@ -1,8 +1,8 @@
 //! Derivatives with respect to the data, called from Python.
 
 use crate::arrays::{in_order, room, zeros};
+use crate::curves::{EndOf, end};
 use crate::errors::invalid;
-use crate::fit::{EndOf, end};
 use crate::space::Handle;
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};

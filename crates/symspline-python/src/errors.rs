@@ -1,34 +1,56 @@
 //! The exceptions a user can catch.
 
-use pyo3::create_exception;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::import_exception;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-create_exception!(
-    symspline,
-    ValidationError,
-    PyValueError,
-    "The input is not what the call needs. The message names the index, the value and what to do."
-);
-create_exception!(
-    symspline,
-    CutLocusError,
-    PyValueError,
-    "Neighbouring points lie at or past each other's cut locus, where the geodesic between them is \
-     not unique. When raised by a fit of many curves, `spline` carries all the good ones."
-);
-create_exception!(
-    symspline,
-    ConvergenceError,
-    PyRuntimeError,
-    "The solver did not reach the tolerance. `spline` carries the best curve found."
-);
+// The classes are written in Python, where their fields have types and descriptions.
+import_exception!(symspline._exceptions, ValidationError);
+import_exception!(symspline._exceptions, CutLocusError);
+import_exception!(symspline._exceptions, ConvergenceError);
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = m.py();
     m.add("ValidationError", py.get_type::<ValidationError>())?;
     m.add("CutLocusError", py.get_type::<CutLocusError>())?;
     m.add("ConvergenceError", py.get_type::<ConvergenceError>())
+}
+
+/// An invalid input of a fit, with the curve and the node.
+pub struct Invalid {
+    /// The number of the curve among those that were given, and of its node.
+    pub curve: Option<usize>,
+    pub node: Option<usize>,
+    pub message: String,
+}
+
+impl Invalid {
+    pub fn new(curve: usize, node: Option<usize>, message: String) -> Self {
+        Invalid { curve: Some(curve), node, message }
+    }
+
+    /// The exception, whose `curve` is an index of the batch.
+    pub fn raise(self, py: Python, batch: &[usize]) -> PyErr {
+        let error = invalid(self.message);
+        let fields = error.value(py);
+        let index = self.curve.map(|curve| PyTuple::new(py, index_of(curve, batch)));
+        let set = index
+            .transpose()
+            .and_then(|index| fields.setattr("curve", index))
+            .and_then(|()| fields.setattr("node", self.node));
+        set.err().unwrap_or(error)
+    }
+}
+
+/// The index of an element in an array of a shape.
+fn index_of(mut element: usize, shape: &[usize]) -> Vec<usize> {
+    let mut index = Vec::with_capacity(shape.len());
+    for &size in shape.iter().rev() {
+        index.push(element % size);
+        element /= size;
+    }
+    index.reverse();
+    index
 }
 
 /// A number for a message: never hundreds of digits.
@@ -41,14 +63,9 @@ pub fn number(x: f64) -> String {
 }
 
 /// The index of an element of an array with a shape, as it is written in Python.
-pub fn place(mut index: usize, shape: &[usize]) -> String {
-    let mut axes: Vec<String> = Vec::with_capacity(shape.len());
-    for &size in shape.iter().rev() {
-        axes.push((index % size).to_string());
-        index /= size;
-    }
-    axes.reverse();
-    axes.join(",")
+pub fn place(element: usize, shape: &[usize]) -> String {
+    let index: Vec<String> = index_of(element, shape).iter().map(usize::to_string).collect();
+    index.join(",")
 }
 
 /// A [`ValidationError`] with a message.

@@ -93,7 +93,7 @@ pub fn lift_knots<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let space = handle.space.get();
     let curves = curves_of([&t, &points, &velocities])?;
-    let (nodes, k) = (curves.nodes, space.fibre());
+    let (nodes, k) = (curves.nodes, space.fiber_rank());
     let count = curves.points.len() / (nodes * space.point_len()).max(1);
     let out = zeros(py, &[count, nodes, k, k, 2])?;
     let mut write = out.readwrite();

@@ -1,33 +1,25 @@
 //! Fitting, called from Python.
 
-use crate::arrays::{in_order, require_room, room, zeros};
+use crate::arrays::{require_room, room, zeros};
+use crate::curves::{Array, Curves, EndOf, Fault, require_room_for_checks};
 use crate::errors::invalid;
 use crate::space::Handle;
-use crate::validate;
 use crate::watch::{is_heavy, watched};
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::fit::{End, Ends, Method, Options, Problem, Report, Solver, Status, fit as solve, memory};
-use symspline::space::Ambient;
+use symspline::fit::{Method, Options, Report, Solver, Status, fit as solve, memory};
+use symspline::space::{Ambient, Erased};
 
-type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
-/// A kind, and the vectors that it prescribes: one a curve.
-pub type EndOf<'py> = (String, Option<Array<'py>>);
+/// Points on the space, velocities, the columns of the report, and faults.
+type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<Fault>);
 
-/// What a fit gives back: points on the space, velocities, the columns of the report, and per failed
-/// curve (index, kind, message).
-type Fitted<'py> = (
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyArrayDyn<f64>>,
-    Columns<'py>,
-    Vec<(usize, &'static str, String)>,
-);
-
-/// Fits curves. `points` are contiguous with the point's numbers last; `offsets` are the nodes before
-/// each curve when they differ in length (then `points` is one long list of points). A dry run only
-/// validates.
+/// Fits curves. `offsets` are the nodes before each curve when they differ in length (then `points` is one long list of
+/// points). Curves whose `mask` is false are NaN. With `skip_invalid`, so are curves with points off the space.
 #[pyfunction]
-#[pyo3(signature = (handle, t, points, ends, method, tol, max_iter, check, point_tol, offsets=None, progress=None, dry=false))]
+#[pyo3(signature = (
+    handle, t, points, ends, method, tol, max_iter, check, point_tol, offsets=None, mask=None, skip_invalid=false,
+    progress=None
+))]
 pub fn fit<'py>(
     py: Python<'py>,
     handle: &Handle,
@@ -40,10 +32,63 @@ pub fn fit<'py>(
     check: bool,
     point_tol: f64,
     offsets: Option<Vec<usize>>,
+    mask: Option<Vec<bool>>,
+    skip_invalid: bool,
     progress: Option<Py<PyAny>>,
-    dry: bool,
 ) -> PyResult<Fitted<'py>> {
-    let name = method;
+    let options = options(method, tol, max_iter)?;
+    let mut curves = Curves::new(handle, &t, &points, &ends, offsets, mask)?;
+    let (space, all) = (curves.space, curves.offsets.len() - 1);
+    require_room_for_checks(handle, &curves)?;
+    require_room(memory(&space, curves.longest(), options.method), || {
+        let least = match options.method {
+            Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
+            _ => "",
+        };
+        (
+            format!("fitting {} points on {} with method='{method}'", curves.longest(), handle.described()),
+            least,
+        )
+    })?;
+    let mut own = Vec::new();
+    curves.gather_points(&mut own)?;
+    let mut faults = Vec::new();
+    if check {
+        faults = py
+            .detach(|| curves.check(&mut own, point_tol, skip_invalid))
+            .map_err(|fault| fault.raise(py, &curves.batch))?;
+    }
+    let velocities = zeros(py, points.shape())?;
+    let gathered = curves.gathered();
+    let problem = gathered.problem(curves.shared, &own);
+    let nodes = own.len() / space.point_len();
+    let mut velocities_write = velocities.readwrite();
+    let u = velocities_write.as_slice_mut()?;
+    let found = match &curves.chosen {
+        None => watched(py, progress, nodes, is_heavy(&space), |monitor| {
+            solve(&space, &problem, &options, monitor, u)
+        })?,
+        Some(_) => {
+            let mut own_velocities = room(own.len())?;
+            own_velocities.resize(own.len(), 0.0);
+            let found = watched(py, progress, nodes, is_heavy(&space), |monitor| {
+                solve(&space, &problem, &options, monitor, &mut own_velocities)
+            })?;
+            curves.scatter(&own_velocities, u);
+            found
+        }
+    };
+    drop((velocities_write, gathered));
+    let out = curves.points(py, own, points.shape())?;
+    let numbers: Vec<usize> = curves.chosen.clone().unwrap_or_else(|| (0..all).collect());
+    faults.extend(numbers.iter().zip(&found).filter_map(|(&number, report)| fault(&space, number, report)));
+    faults.sort_by_key(|fault| fault.0);
+    let mut reports: Vec<Option<&Report>> = vec![None; all];
+    numbers.iter().zip(&found).for_each(|(&number, report)| reports[number] = Some(report));
+    Ok((out, velocities, columns(py, &reports)?, faults))
+}
+
+fn options(method: &str, tol: f64, max_iter: Option<usize>) -> PyResult<Options> {
     let method = match method {
         "auto" => Method::Auto,
         "fixed-point" => Method::FixedPoint,
@@ -62,91 +107,14 @@ pub fn fit<'py>(
     if max_iter == Some(0) {
         return Err(invalid("max_iter must be at least 1"));
     }
-    let options = Options { method, tol, max_iter };
-    let len = handle.space.get().point_len();
-    let nodes = points.len() / len;
-    let t_slice = in_order(&t)?;
-    let different = offsets.is_some();
-    let (offsets, shared) = match offsets {
-        Some(offsets) => (offsets, false),
-        None => {
-            let n = t.shape()[t.ndim() - 1];
-            ((0..=nodes / n).map(|c| c * n).collect(), t.ndim() == 1)
-        }
-    };
-    let curves = offsets.len() - 1;
-    let lead = points.ndim() - handle.point_axes() - 1;
-    let batch = if different { vec![curves] } else { points.shape()[..lead].to_vec() };
-
-    // What the work itself needs, with some to spare: copies of ends, and the pieces and reports of curves.
-    drop(room::<f64>(nodes + curves * (64 + 4 * len))?);
-    let longest = offsets.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
-    if !dry {
-        require_room(memory(&handle.space.get(), longest, method), || {
-            let least = match method {
-                Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
-                _ => "",
-            };
-            (format!("fitting {longest} points on {} with method='{name}'", handle.described()), least)
-        })?;
-    }
-    let out = zeros(py, points.shape())?;
-    let velocities = zeros(py, points.shape())?;
-    let (mut out_write, mut velocities_write) = (out.readwrite(), velocities.readwrite());
-    let (p, u) = (out_write.as_slice_mut()?, velocities_write.as_slice_mut()?);
-    p.copy_from_slice(in_order(&points)?);
-
-    if check {
-        let count = if shared { 1 } else { curves };
-        for c in 0..count {
-            let t = if shared { t_slice } else { &t_slice[offsets[c]..offsets[c + 1]] };
-            validate::knots(t, c, if shared { &[] } else { &batch })?;
-        }
-        py.detach(|| validate::points(&handle.space.get(), p, &offsets, &batch, point_tol))?;
-        if ends.is_none() {
-            py.detach(|| validate::closed(&handle.space.get(), p, &offsets, &batch, point_tol))?;
-        }
-    }
-    let ends_now = match &ends {
-        None => Ends::Periodic,
-        Some([a, b]) => Ends::Open([end(a)?, end(b)?]),
-    };
-    let problem = Problem { t: t_slice, shared, points: p, offsets: &offsets, ends: ends_now };
-    if check {
-        py.detach(|| validate::ends(&handle.space.get(), &problem, &batch, point_tol))?;
-    }
-    if dry {
-        drop((out_write, velocities_write));
-        return Ok((out, velocities, columns(py, &[])?, Vec::new()));
-    }
-    let reports = watched(py, progress, nodes, is_heavy(&handle.space.get()), |monitor| {
-        solve(&handle.space.get(), &problem, &options, monitor, u)
-    })?;
-    let faults = faults(handle, &options, &reports, &batch);
-    drop((out_write, velocities_write));
-    Ok((out, velocities, columns(py, &reports)?, faults))
+    Ok(Options { method, tol, max_iter })
 }
 
-pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
-    Ok(match (kind.as_str(), value) {
-        ("natural", _) => End::Natural,
-        ("not-a-knot", _) => End::NotAKnot,
-        ("velocity", Some(v)) => End::Velocity(in_order(v)?),
-        ("acceleration", Some(v)) => End::Acceleration(in_order(v)?),
-        _ => return Err(invalid(format!("unknown end condition {kind:?}"))),
-    })
-}
-
-/// A length in a message, of so many digits that it is read.
-fn length(x: f64) -> String {
-    if x < 1e6 { format!("{x:.3}") } else { format!("{x:.3e}") }
-}
-
-/// The report as two tables with a row for each field, in the order of `INTEGERS` and `NUMBERS` in report.py, and a column
+/// The report as two tables with a row for each field, in the order of `INTEGERS` and `NUMBERS` in _report.py, and a column
 /// for each curve.
 type Columns<'py> = (Bound<'py, PyArrayDyn<i64>>, Bound<'py, PyArrayDyn<f64>>);
 
-fn columns<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Columns<'py>> {
+fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Columns<'py>> {
     const INTEGERS: [fn(&Report) -> i64; 4] = [
         |r| i64::from(r.status == Status::Converged),
         |r| r.iterations as i64,
@@ -164,102 +132,35 @@ fn columns<'py>(py: Python<'py>, reports: &[Report]) -> PyResult<Columns<'py>> {
         |r| r.alternative,
         |_| f64::NAN,
     ];
-    let integers = PyArray1::from_iter(py, INTEGERS.iter().flat_map(|f| reports.iter().map(f)));
-    let numbers = PyArray1::from_iter(py, NUMBERS.iter().flat_map(|f| reports.iter().map(f)));
+    let integer = |f: &fn(&Report) -> i64, r: &Option<&Report>| r.map_or(0, f);
+    let number = |f: &fn(&Report) -> f64, r: &Option<&Report>| r.map_or(f64::NAN, f);
+    let integers =
+        PyArray1::from_iter(py, INTEGERS.iter().flat_map(|f| reports.iter().map(move |r| integer(f, r))));
+    let numbers =
+        PyArray1::from_iter(py, NUMBERS.iter().flat_map(|f| reports.iter().map(move |r| number(f, r))));
     Ok((
         integers.reshape([INTEGERS.len(), reports.len()])?.to_dyn().clone(),
         numbers.reshape([NUMBERS.len(), reports.len()])?.to_dyn().clone(),
     ))
 }
 
-fn faults(
-    handle: &Handle,
-    options: &Options,
-    reports: &[Report],
-    batch: &[usize],
-) -> Vec<(usize, &'static str, String)> {
-    let limit = handle.space.get().cut_angle();
-    // Unit quaternions are the usual reason for antipodes.
-    let sign = if handle.space.name().0 == "sphere" { ", or check their sign" } else { "" };
-    let describe = |(c, r): (usize, &Report)| {
-        let of = validate::of_curve(c, batch);
-        let (kind, message) = match r.status {
-            Status::Stopped => return None,
-            Status::Converged => {
-                let (index, angle) = r.almost_cut?;
-                (
-                    "almost-cut",
-                    format!(
-                        "neighbours almost at the cut locus: between points[{index}] and points[{}]{of} the angle is \
-                         {angle}, limit {limit}; had it been a little more, the curve would go the other way round: put \
-                         a point between them",
-                        index + 1
-                    ),
-                )
-            }
-            Status::CutLocus { index, angle } => (
-                "cut-locus",
-                format!(
-                    "points[{index}] and points[{}]{of} lie at or past each other's cut locus: angle {angle}, \
-                     limit {limit}; put a point between them{sign}",
-                    index + 1
-                ),
-            ),
-            Status::LongLeg { index, angle } if limit.is_infinite() => (
-                "unconverged",
-                format!(
-                    "the control leg at points[{index}]{of} has length {angle:.1}, which rounding errors outgrow; \
-                     give times that suit the distances: the segments beside it differ too much in length"
-                ),
-            ),
-            Status::LongLeg { index, angle } => (
-                "cut-locus",
-                format!(
-                    "the control leg at points[{index}]{of} passes the cut locus: angle {angle}, limit {limit}; \
-                     put more points there, or give times that suit the distances"
-                ),
-            ),
-            Status::MiddleLeg { index, angle } => (
-                "cut-locus",
-                format!(
-                    "the control points between points[{index}] and points[{}]{of} lie at or past each other's cut \
-                     locus: angle {angle}, limit {limit}; put a point between them, or give times that suit the \
-                     distances",
-                    index + 1
-                ),
-            ),
-            Status::Unconverged if r.residual.is_infinite() && r.solver == Solver::Homotopy => (
-                "unconverged",
-                format!(
-                    "no convergence{of}: after {} iterations the homotopy had not come to these points (longest step \
-                     {}); try another method, put more points where steps are long, or choose times that suit the \
-                     distances",
-                    r.iterations,
-                    length(r.max_step)
-                ),
-            ),
-            Status::Unconverged if !r.residual.is_finite() => (
-                "unconverged",
-                format!(
-                    "no convergence{of}: after {} iterations the numbers were too large for doubles (longest step \
-                     {}); put more points where steps are long, or choose times that suit the distances",
-                    r.iterations,
-                    length(r.max_step)
-                ),
-            ),
-            Status::Unconverged => (
-                "unconverged",
-                format!(
-                    "no convergence{of}: residual {:.3e} after {} iterations (tol {:.1e}, longest step {}); \
-                     put more points where steps are long, choose times that suit the distances, or raise max_iter",
-                    r.residual,
-                    r.iterations,
-                    options.tol,
-                    length(r.max_step)
-                ),
-            ),
-        };
-        Some((c, kind, message))
-    };
-    reports.iter().enumerate().filter_map(describe).collect()
+/// The fault of a curve that was solved, if it has one.
+fn fault(space: &Erased, curve: usize, report: &Report) -> Option<Fault> {
+    let limit = space.cut_angle();
+    let at = |kind, (node, angle)| Some((curve, kind, Some(node), angle, limit, None));
+    match report.status {
+        Status::Stopped => None,
+        Status::Converged => at("almost-cut", report.almost_cut?),
+        Status::CutLocus { index, angle } => at("cut-locus", (index, angle)),
+        Status::LongHandle { index, angle } => at("outer-handle", (index, angle)),
+        Status::InnerHandle { index, angle } => at("inner-handles", (index, angle)),
+        Status::Unconverged => {
+            let kind = match report.solver {
+                Solver::Homotopy if report.residual.is_infinite() => "homotopy",
+                _ if !report.residual.is_finite() => "overflow",
+                _ => "unconverged",
+            };
+            Some((curve, kind, None, report.residual, f64::NAN, None))
+        }
+    }
 }

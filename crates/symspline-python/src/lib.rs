@@ -1,10 +1,12 @@
 //! The compiled module `symspline._core`: arrays in, arrays out, validation; no mathematics.
 
 mod arrays;
+mod curves;
 mod derivative;
 mod errors;
 mod evaluate;
 mod fit;
+mod hermite;
 mod smoothing;
 mod space;
 mod validate;
@@ -51,6 +53,8 @@ fn num_threads() -> usize {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<space::Handle>()?;
     m.add_function(wrap_pyfunction!(fit::fit, m)?)?;
+    m.add_function(wrap_pyfunction!(curves::check, m)?)?;
+    m.add_function(wrap_pyfunction!(hermite::hermite, m)?)?;
     m.add_function(wrap_pyfunction!(derivative::push, m)?)?;
     m.add_function(wrap_pyfunction!(derivative::pull, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)?;

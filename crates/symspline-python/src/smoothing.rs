@@ -1,8 +1,8 @@
 //! Smoothing, called from Python.
 
 use crate::arrays::{in_order, room, zeros};
+use crate::curves::EndOf;
 use crate::errors::invalid;
-use crate::fit::EndOf;
 use crate::space::Handle;
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -43,6 +43,7 @@ pub fn smooth<'py>(
     method: &str,
     tol: f64,
     max_iter: usize,
+    raise_lam: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Smoothed<'py>> {
     let options = Options {
@@ -55,12 +56,17 @@ pub fn smooth<'py>(
         },
         tier: match method {
             "auto" => Tier::Auto,
-            "flat" => Tier::Flat,
+            "linearized" => Tier::Linearized,
             "newton" => Tier::Newton,
-            _ => return Err(invalid(format!("method must be 'auto', 'flat' or 'newton', not {method:?}"))),
+            _ => {
+                return Err(invalid(format!(
+                    "method must be 'auto', 'linearized' or 'newton', not {method:?}"
+                )));
+            }
         },
         tol,
         max_iter,
+        raise_lam,
         ends: match &ends {
             None => Ends::Periodic,
             Some(kinds) => Ends::Open([kind(&kinds[0])?, kind(&kinds[1])?]),

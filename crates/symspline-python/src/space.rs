@@ -53,9 +53,9 @@ impl Handle {
     fn is_complex(&self) -> bool {
         self.space.get().is_complex()
     }
-    /// See `Ambient::fibre`.
+    /// See `Ambient::fiber_rank`.
     fn fibre(&self) -> usize {
-        self.space.get().fibre()
+        self.space.get().fiber_rank()
     }
     fn dim(&self) -> usize {
         self.space.get().dim()
@@ -87,7 +87,7 @@ impl Handle {
             "rounding" => Operation::Rounding,
             "project" => Operation::Project,
             "project_tangent" => Operation::ProjectTangent,
-            "scatter" => Operation::Scatter,
+            "scatter" => Operation::RandomPoint,
             "random_tangent" => Operation::RandomTangent,
             _ => return Err(invalid(format!("unknown operation {operation:?}"))),
         };
@@ -137,7 +137,7 @@ impl Handle {
         let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
         done.map_err(|(row, off, why)| {
             let which = if shape.is_empty() { "it".into() } else { format!("point {}", place(row, &shape)) };
-            off_space(&which, off, tol, &why)
+            invalid(off_space(&which, off, tol, &why))
         })
     }
 
@@ -158,16 +158,14 @@ impl Handle {
     }
 }
 
-/// The error for a point that is off its space.
-pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> PyErr {
+/// What is wrong with a point that is off its space.
+pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> String {
     if !off.is_finite() {
         // Nor has `space.project` an answer.
-        return invalid(format!(
-            "{which} is off the space: {why}. No point is close to it; mend it or leave it out"
-        ));
+        return format!("{which} is off the space: {why}. No point is close to it; mend it or leave it out");
     }
-    invalid(format!(
+    format!(
         "{which} is off the space by {off:.3e}: {why}. Points within {tol:.0e} are projected; use space.project(x) \
          if these are meant to be points"
-    ))
+    )
 }

@@ -1,23 +1,52 @@
 //! What every call checks before any work is done.
 
-use crate::errors::{invalid, number, place};
+use crate::errors::{Invalid, number, place};
 use crate::space::off_space;
-use pyo3::prelude::*;
 use symspline::fit::{End, Ends, Problem};
 use symspline::monitor::Monitor;
-use symspline::rows::{Operation, apply, leg_angle, project_points, tangent_defects};
+use symspline::rows::{Operation, apply, handle_angle, project_points, tangent_defects};
 use symspline::space::{Ambient, Erased};
+
+/// Names of curves in messages: their indices in the batch of the user, of which they may be a part.
+pub struct Names<'a> {
+    pub batch: &'a [usize],
+    /// Their numbers; None for the whole batch.
+    pub chosen: Option<&'a [usize]>,
+}
+
+impl Names<'_> {
+    /// The number of a curve in the batch.
+    pub fn number(&self, curve: usize) -> usize {
+        self.chosen.map_or(curve, |chosen| chosen[curve])
+    }
+
+    /// Words for a curve; empty for a single curve.
+    pub fn of(&self, curve: usize) -> String {
+        of_curve(self.number(curve), self.batch)
+    }
+
+    fn fault(&self, curve: usize, node: impl Into<Option<usize>>, message: String) -> Invalid {
+        Invalid::new(self.number(curve), node.into(), message)
+    }
+}
 
 /// Where a curve stands in a batch, for messages; nothing for a single curve.
 pub fn of_curve(curve: usize, batch: &[usize]) -> String {
     if batch.is_empty() { String::new() } else { format!(" of curve {}", place(curve, batch)) }
 }
 
-/// Knots must be finite and increasing.
-pub fn knots(t: &[f64], curve: usize, batch: &[usize]) -> PyResult<()> {
-    let of = if batch.is_empty() { String::new() } else { format!("[{}]", place(curve, batch)) };
+type Checked = Result<(), Invalid>;
+
+/// Knots must be finite and increasing; they are those of one curve, or, if `shared`, of all.
+pub fn knots(t: &[f64], curve: usize, names: &Names, shared: bool) -> Checked {
+    let of = if shared || names.batch.is_empty() {
+        String::new()
+    } else {
+        format!("[{}]", place(names.number(curve), names.batch))
+    };
+    let fault = |node, message| Err(names.fault(curve, node, message));
     if let Some(i) = t.iter().position(|x| !x.is_finite()) {
-        return Err(invalid(format!("t{of}[{i}] is {}; times must be finite", number(t[i]))));
+        return fault(Some(i), format!("t{of}[{i}] is {}; times must be finite", number(t[i])));
     }
     if let Some(i) = (1..t.len()).find(|&i| t[i] <= t[i - 1]) {
         let (a, b) = (t[i - 1], t[i]);
@@ -27,53 +56,49 @@ pub fn knots(t: &[f64], curve: usize, batch: &[usize]) -> PyResult<()> {
             "sort times and points together, e.g. order = np.argsort(t)"
         };
         let what = if a == b { "repeats" } else { "is before" };
-        return Err(invalid(format!(
-            "t{of}[{i}] = {} {what} t{of}[{}] = {}; times must increase: {hint}",
-            number(b),
-            i - 1,
-            number(a)
-        )));
+        let (earlier, later) = (number(a), number(b));
+        let before = i - 1;
+        return fault(
+            Some(i),
+            format!("t{of}[{i}] = {later} {what} t{of}[{before}] = {earlier}; times must increase: {hint}"),
+        );
     }
     if !(t[t.len() - 1] - t[0]).is_finite() {
-        return Err(invalid(format!("t{of} spans more than a double can hold")));
+        return fault(None, format!("t{of} spans more than a double can hold"));
     }
     Ok(())
 }
 
 /// Points are projected in place, or the first that is off the space is named.
-pub fn points(
-    space: &Erased,
-    points: &mut [f64],
-    offsets: &[usize],
-    batch: &[usize],
-    tol: f64,
-) -> PyResult<()> {
-    let which = |row: usize| {
+pub fn points(space: &Erased, points: &mut [f64], offsets: &[usize], names: &Names, tol: f64) -> Checked {
+    let fault = |row: usize, message: &dyn Fn(&str) -> String| {
         let curve = offsets.partition_point(|&o| o <= row) - 1;
-        format!("points[{}]{}", row - offsets[curve], of_curve(curve, batch))
+        let node = row - offsets[curve];
+        names.fault(curve, node, message(&format!("points[{node}]{}", names.of(curve))))
     };
-    project_points(space, points, tol).map_err(|(row, off, why)| off_space(&which(row), off, tol, &why))?;
+    project_points(space, points, tol)
+        .map_err(|(row, off, why)| fault(row, &|which| off_space(which, off, tol, &why)))?;
     if let Some((row, why)) = space.beyond_doubles(points) {
-        return Err(invalid(format!("{} {why}", which(row))));
+        return Err(fault(row, &|which| format!("{which} {why}")));
     }
     if !space.is_connected() {
-        one_component(space, points, offsets, batch)?;
+        one_component(space, points, offsets, names)?;
     }
     Ok(())
 }
 
 /// Neighbours must lie in the same part of a space that has two.
-fn one_component(space: &Erased, points: &[f64], offsets: &[usize], batch: &[usize]) -> PyResult<()> {
+fn one_component(space: &Erased, points: &[f64], offsets: &[usize], names: &Names) -> Checked {
     let len = space.point_len();
     for (curve, ends) in offsets.windows(2).enumerate() {
         let part = |i: usize| space.component(&points[i * len..(i + 1) * len]);
         if let Some(i) = (ends[0] + 1..ends[1]).find(|&i| part(i) != part(i - 1)) {
             let i = i - ends[0];
-            return Err(invalid(format!(
-                "points[{}] and points[{i}]{} have opposite determinants: no curve joins them",
-                i - 1,
-                of_curve(curve, batch)
-            )));
+            let (before, of) = (i - 1, names.of(curve));
+            let message = format!(
+                "points[{before}] and points[{i}]{of} have opposite determinants: no curve joins them"
+            );
+            return Err(names.fault(curve, before, message));
         }
     }
     Ok(())
@@ -81,13 +106,7 @@ fn one_component(space: &Erased, points: &[f64], offsets: &[usize], batch: &[usi
 
 /// Closed curves must be closed. What is left between last and first point goes: the last array becomes one of
 /// the first point.
-pub fn closed(
-    space: &Erased,
-    points: &mut [f64],
-    offsets: &[usize],
-    batch: &[usize],
-    tol: f64,
-) -> PyResult<()> {
+pub fn closed(space: &Erased, points: &mut [f64], offsets: &[usize], names: &Names, tol: f64) -> Checked {
     let len = space.point_len();
     let quiet = |_| true;
     let monitor = Monitor::new(&quiet);
@@ -100,12 +119,13 @@ pub fn closed(
         let (mut distance, mut way) = ([0.0], vec![0.0; len]);
         let _ = apply(space, Operation::Distance, &[&first, last], &[], &monitor, &mut distance);
         if !(distance[0] <= tol) {
-            return Err(invalid(format!(
+            let message = format!(
                 "bc_type='periodic' needs a closed curve, but first and last point{} are {:.3e} apart \
                  (allowed: {tol:.0e}); repeat the first point at the end",
-                of_curve(c, batch),
+                names.of(c),
                 distance[0]
-            )));
+            );
+            return Err(names.fault(c, ends[1] - ends[0] - 1, message));
         }
         let _ = apply(space, Operation::Log, &[last, &first], &[], &monitor, &mut way);
         let from = last.to_vec();
@@ -115,7 +135,7 @@ pub fn closed(
 }
 
 /// End vectors must be tangent and velocities not too fast.
-pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyResult<()> {
+pub fn ends(space: &Erased, problem: &Problem, names: &Names, tol: f64) -> Checked {
     let len = space.point_len();
     let curves = problem.offsets.len() - 1;
     let mut first = Vec::with_capacity(curves * len);
@@ -136,8 +156,9 @@ pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyR
             End::Natural | End::NotAKnot => continue,
         };
         if let Some(i) = v.iter().position(|x| !x.is_finite()) {
-            let of = of_curve(i / len, batch);
-            return Err(invalid(format!("the {name} {order}{of} holds {}; it must be finite", number(v[i]))));
+            let (of, value) = (names.of(i / len), number(v[i]));
+            let message = format!("the {name} {order}{of} holds {value}; it must be finite");
+            return Err(names.fault(i / len, None, message));
         }
         // In units of the segment, so that a vector as small as the rounding of the points passes.
         let mut scaled = v.to_vec();
@@ -148,33 +169,35 @@ pub fn ends(space: &Erased, problem: &Problem, batch: &[usize], tol: f64) -> PyR
         }
         let defects = tangent_defects(space, p, &scaled);
         if let Some(c) = defects.iter().position(|d| !(*d <= tol)) {
-            return Err(invalid(format!(
+            let message = format!(
                 "the {name} {order}{} is not tangent at its point: a part of {:.3e} of it points off the space \
                  (allowed: {tol:.0e}); use space.project_tangent(p, v)",
-                of_curve(c, batch),
+                names.of(c),
                 defects[c]
-            )));
+            );
+            return Err(names.fault(c, None, message));
         }
         if order == "velocity" && space.cut_angle().is_finite() {
             // The control leg h u/3, by its deciding angle.
             for (c, v) in scaled.chunks_exact_mut(len).enumerate() {
                 v.iter_mut().for_each(|x| *x /= 3.0);
-                let angle = leg_angle(space, &p[c * len..(c + 1) * len], v);
-                if angle >= space.longest_leg() {
+                let angle = handle_angle(space, &p[c * len..(c + 1) * len], v);
+                if angle >= space.longest_handle() {
                     let mut square = [0.0];
                     let (p, v) = (&p[c * len..(c + 1) * len], &*v);
                     let _ = apply(space, Operation::Inner, &[p, v, v], &[], &monitor, &mut square);
                     let h = end_segment(problem, c, e);
                     let speed = 3.0 * square[0].sqrt() / h;
-                    return Err(invalid(format!(
+                    let message = format!(
                         "the {name} velocity{} has speed {speed:.6}, too fast for its segment of length {}: its \
                          control leg would pass the cut locus, angle {angle:.6} of {:.6}; in this direction the \
                          speed must stay below {:.6}",
-                        of_curve(c, batch),
+                        names.of(c),
                         number(h),
-                        space.longest_leg(),
-                        speed * space.longest_leg() / angle,
-                    )));
+                        space.longest_handle(),
+                        speed * space.longest_handle() / angle,
+                    );
+                    return Err(names.fault(c, None, message));
                 }
             }
         }

@@ -5,7 +5,7 @@
 //!
 //! A curve is three plain arrays: knots t, points p and velocities u = γ'(t). [`fit`] finds the
 //! velocities, [`curve`] evaluates, [`space`] is the geometry, [`spaces`] the list of all spaces.
-//! [`derivative`] says how a curve follows its data, [`smoothing`] finds curves near noisy points.
+//! [`derivative`] computes the sensitivity of a curve to its data, [`smoothing`] finds curves close to noisy points.
 //!
 //! # A spline through unit quaternions
 //!

@@ -1,7 +1,7 @@
 //! All spaces, by name.
 
 use std::sync::Arc;
-use symspline_core::space::{Entry, Erased, Table};
+use symspline_core::space::{Entry, Erased, Kernels};
 
 pub use symspline_forms::{PositiveDefinite, Siegel};
 pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
@@ -30,7 +30,7 @@ const LARGEST: usize = 1 << 24;
 pub struct AnySpace {
     name: &'static str,
     parameters: Vec<usize>,
-    table: Arc<dyn Table>,
+    table: Arc<dyn Kernels>,
 }
 
 impl AnySpace {

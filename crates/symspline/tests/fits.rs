@@ -47,7 +47,7 @@ fn vector(space: &Erased, p: &[Lane], length: f64, next: &mut impl FnMut() -> f6
 /// Points a step apart, each in a direction of its own.
 fn walk(space: &Erased, step: f64, next: &mut impl FnMut() -> f64) -> Vec<f64> {
     let mut p: Vec<Lane> = (0..space.point_len()).map(|_| lane(next())).collect();
-    space.scatter(&mut p);
+    space.random_point(&mut p);
     let mut out = numbers(&p);
     for _ in 1..KNOTS.len() {
         let v = vector(space, &p, step, next);

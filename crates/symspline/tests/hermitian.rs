@@ -2,8 +2,8 @@
 //! eigenvectors where eigenvalues coincide or nearly do, and with both derivatives.
 
 use symspline::matrix::{
-    Matrix, Unary, arc, diagonalise, exp_minus_one, exp_skew_minus_one, function_of, log_one_plus,
-    orthogonalise, orthonormalise, reorthonormalise, trig,
+    Matrix, Unary, arc, diagonalize, exp_minus_one, exp_skew_minus_one, function_of, log_one_plus,
+    orthogonalize, orthonormalize, reorthonormalize, trig,
 };
 use symspline::scalar::{Dual, Jet, Lane, Scalar, lane};
 
@@ -23,7 +23,7 @@ impl Noise {
     /// A Hermitian matrix with given eigenvalues.
     fn with_eigenvalues<const D: usize>(&mut self, values: &[f64]) -> Matrix<Lane, D> {
         let mut q = self.matrix::<D>(values.len());
-        orthonormalise(&mut q);
+        orthonormalize(&mut q);
         let diagonal: Vec<Lane> = values.iter().map(|&x| lane(x)).collect();
         q.times(&Matrix::diagonal(&diagonal)).times_adjoint(&q).hermitian_part()
     }
@@ -52,7 +52,7 @@ fn log_by_eigenvectors<S: Scalar, const D: usize>(b: &Matrix<S, D>) -> Matrix<S,
         let y = x + Lane::ONE;
         [y.ln(), Lane::ONE / y, lane(-1.0) / (y * y)]
     };
-    function_of(b, &Unary { f: log, room: |x: Lane| (x + Lane::ONE).abs() })
+    function_of(b, &Unary { f: log, pole_distance: |x: Lane| (x + Lane::ONE).abs() })
 }
 
 fn series_and_eigenvectors_agree<S: Scalar, const D: usize>() {
@@ -131,8 +131,8 @@ fn trig_is_that_of_the_eigenvalues() {
         let g = noise.with_eigenvalues::<1>(&values);
         let [s, k] = trig(&g);
         let (mut s, mut k) = ([s], [k]);
-        diagonalise(&mut s);
-        diagonalise(&mut k);
+        diagonalize(&mut s);
+        diagonalize(&mut k);
         let sorted = |m: &Matrix<Lane, 1>| {
             let mut x: Vec<f64> = (0..values.len()).map(|i| m[(i, i)][0].to_array()[0]).collect();
             x.sort_by(f64::total_cmp);
@@ -166,7 +166,7 @@ fn arc_is_that_of_the_eigenvalues() {
         vec![0.7, 0.1, 0.3],
     ] {
         let mut f = [arc(&noise.with_eigenvalues::<2>(&values))];
-        diagonalise(&mut f);
+        diagonalize(&mut f);
         let mut found: Vec<f64> = (0..values.len()).map(|i| f[0][(i, i)][0].to_array()[0]).collect();
         let mut expected: Vec<f64> = values
             .iter()
@@ -210,7 +210,7 @@ fn columns_that_are_nearly_parallel_become_orthonormal_to_rounding() {
         let mut q = Matrix::<Lane, 2>::from_fn(4, 4, |i, j| {
             std::array::from_fn(|c| x[(i, 0)][c] + x[(i, j)][c] * lane(if j > 0 { apart } else { 0.0 }))
         });
-        orthonormalise(&mut q);
+        orthonormalize(&mut q);
         for off in defect(&q).to_array() {
             assert!(off <= 2e-15, "{apart} apart: {off}");
         }
@@ -222,10 +222,10 @@ fn a_step_squares_the_distance_to_orthonormal_columns() {
     let mut noise = Noise(8);
     for size in [1e-2, 1e-4, 1e-6] {
         let mut q = noise.matrix::<2>(4);
-        orthonormalise(&mut q);
+        orthonormalize(&mut q);
         q = &q + &noise.matrix::<2>(4).scaled(lane(size));
         let before = defect(&q);
-        reorthonormalise(&mut q);
+        reorthonormalize(&mut q);
         // Q*Q = 1 + D becomes (1 + D)(1 − D/2)² = 1 − ¾ D² + ¼ D³.
         for (off, before) in defect(&q).to_array().into_iter().zip(before.to_array()) {
             assert!(off <= 0.8 * before * before + 2e-15, "{before} off becomes {off}");
@@ -238,11 +238,11 @@ fn singular_values_keep_their_digits_in_graded_matrices() {
     let mut noise = Noise(6);
     for n in [2, 3, 6] {
         let mut q = noise.matrix::<1>(n);
-        orthonormalise(&mut q);
+        orthonormalize(&mut q);
         // Columns with lengths 1, 1e-4, 1e-8, …
         let mut a =
             Matrix::<Lane, 1>::from_fn(n, n, |i, j| [q[(i, j)][0] * lane(10_f64.powi(-4 * j as i32))]);
-        orthogonalise(&mut a, None);
+        orthogonalize(&mut a, None);
         for j in 0..n {
             let length = (0..n).fold(Lane::ZERO, |s, i| s + a[(i, j)][0] * a[(i, j)][0]).sqrt().to_array();
             for x in length {

@@ -279,7 +279,7 @@ fn the_spline_is_c2_at_the_knots() {
     let torus = Torus::new(2).unwrap();
     let torus = Erased(&torus);
     let points = point(&ANGLES.concat());
-    // A start so fast the wrong way that the first middle leg takes the other way round.
+    // A start so fast the wrong way that the first inner handle takes the other way round.
     let away = vector(&ANGLES[0], &[-8.5, 8.5]);
     for ends in [[End::NotAKnot; 2], [End::Velocity(&away), End::Natural]] {
         let u = spline(&torus, &points, ends).unwrap();

@@ -214,7 +214,7 @@ pub fn lift<const K: i32, const L: bool>(p: &[Lane], frame: &mut [Lane]) {
     }
 }
 
-/// Coordinates of log_p(q), and the frame carried to q.
+/// Coordinates of log_p(q), and the frame transported to q.
 #[inline(always)]
 pub fn step<const K: i32, const L: bool>(
     frame: &mut [Lane],
@@ -288,7 +288,7 @@ fn step_far<const K: i32, const L: bool>(
 
 /// Gram–Schmidt against p and the rows before.
 #[inline(always)]
-pub fn tidy<const K: i32, const L: bool>(frame: &mut [Lane], p: &[Lane]) {
+pub fn reorthonormalize<const K: i32, const L: bool>(frame: &mut [Lane], p: &[Lane]) {
     let n = p.len();
     for j in 0..n - 1 {
         let (before, row) = frame.split_at_mut(j * n);
@@ -341,7 +341,7 @@ pub fn prepare<const K: i32, const L: bool>(chord: &[Lane], prepared: &mut [Lane
 /// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only. With `PAIRS`
 /// x and −x are one point, and the nearer one is meant.
 #[inline(always)]
-pub fn legs<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
+pub fn inner_handles<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
     d: &[Lane],
     prepared: &[Lane],
     a: &[S],
@@ -363,9 +363,9 @@ pub fn legs<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
     let &[sd, kd, dd] = prepared else { unreachable!("prepared has CHORD_LEN numbers") };
     // cos θ_d = 1 + κ (cos θ_d − 1)/θ_d² · |d|²
     let chord = [sd, kd, kd.mul_add(dd, Lane::ONE)];
-    let (plus, height) = leg::<K, S>(chord, ta, tb, ab, ad, bd);
+    let (plus, height) = handle::<K, S>(chord, ta, tb, ab, ad, bd);
     // M⁻¹ = E(b) E(−d) E(a) is M with d, a, b replaced by −d, −b, −a.
-    let (minus, _) = leg::<K, S>(chord, tb, ta, ab, bd, ad);
+    let (minus, _) = handle::<K, S>(chord, tb, ta, ab, bd, ad);
     let away = if PAIRS { height.value().simd_lt(Lane::ZERO) } else { Lane::ZERO };
     let height = if PAIRS { S::select(away, -height, height) } else { height };
     let f = theta_over_sin(-height + Lane::ONE, || height.value() + Lane::ONE);
@@ -379,7 +379,7 @@ pub fn legs<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
 
 /// The point E(−a) E(d) E(−b)·o: its coefficients of d, a, b and its height cos θ.
 #[inline(always)]
-fn leg<const K: i32, S: Scalar>(
+fn handle<const K: i32, S: Scalar>(
     [sd, kd, cd]: [Lane; 3],
     ta: Trig<S>,
     tb: Trig<S>,

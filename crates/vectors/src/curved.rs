@@ -9,7 +9,51 @@ use symspline_core::space::{Ambient, Frame, Origin, Space, far_out};
 /// (K = −1), whose metric has one negative square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Curved<const K: i32, const L: bool> {
-    pub(crate) n: usize,
+    n: usize,
+}
+
+/// The unit sphere of dimension n.
+pub type Sphere = Curved<1, false>;
+
+impl Sphere {
+    /// The sphere in n + 1 dimensions.
+    pub fn new(n: usize) -> Result<Self, String> {
+        if n == 0 { Err("Sphere(n) needs n >= 1".into()) } else { Ok(Sphere { n }) }
+    }
+}
+
+/// Hyperbolic space of dimension n, as the hyperboloid with its time-like coordinate first.
+pub type Hyperbolic = Curved<-1, false>;
+
+impl Hyperbolic {
+    /// The hyperboloid in n + 1 dimensions.
+    pub fn new(n: usize) -> Result<Self, String> {
+        if n == 0 { Err("Hyperbolic(n) needs n >= 1".into()) } else { Ok(Hyperbolic { n }) }
+    }
+}
+
+/// De Sitter space of dimension n, with its time-like coordinate first.
+pub type DeSitter = Curved<1, true>;
+/// Anti-de Sitter space of dimension n, with its two time-like coordinates first.
+pub type AntiDeSitter = Curved<-1, true>;
+
+impl DeSitter {
+    /// The one-sheeted hyperboloid in n + 1 dimensions.
+    pub fn new(n: usize) -> Result<Self, String> {
+        at_least_two("DeSitter", n)
+    }
+}
+
+impl AntiDeSitter {
+    /// The quadric in n + 1 dimensions.
+    pub fn new(n: usize) -> Result<Self, String> {
+        at_least_two("AntiDeSitter", n)
+    }
+}
+
+/// In one dimension there is no indefinite metric, and de Sitter space has two parts.
+fn at_least_two<const K: i32>(name: &str, n: usize) -> Result<Curved<K, true>, String> {
+    if n < 2 { Err(format!("{name}(n) needs n >= 2, not {n}")) } else { Ok(Curved { n }) }
 }
 
 impl<const K: i32, const L: bool> Curved<K, L> {
@@ -72,7 +116,7 @@ impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         if Self::OPEN { hyperbolic::project_tangent::<K, L>(p, v) } else { sphere::project_tangent(p, v) }
     }
-    fn scatter(&self, noise: &mut [Lane]) {
+    fn random_point(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
     fn complaint(&self, x: &[f64]) -> String {
@@ -111,8 +155,8 @@ impl<const K: i32, const L: bool> Frame for Curved<K, L> {
         cc::step::<K, L>(frame, p, q, chord)
     }
     #[inline(always)]
-    fn tidy(&self, frame: &mut [Lane], p: &[Lane]) {
-        cc::tidy::<K, L>(frame, p);
+    fn reorthonormalize(&self, frame: &mut [Lane], p: &[Lane]) {
+        cc::reorthonormalize::<K, L>(frame, p);
     }
     #[inline(always)]
     fn coordinates(&self, frame: &[Lane], _p: &[Lane], v: &[Lane], x: &mut [Lane]) {
@@ -146,7 +190,7 @@ impl<const K: i32, const L: bool> Origin for Curved<K, L> {
         cc::prepare::<K, L>(chord, prepared);
     }
     #[inline(always)]
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         d: &[Lane],
         prepared: &[Lane],
@@ -155,7 +199,7 @@ impl<const K: i32, const L: bool> Origin for Curved<K, L> {
         w_plus: &mut [S],
         w_minus: &mut [S],
     ) {
-        cc::legs::<K, L, false, S>(d, prepared, a, b, w_plus, w_minus);
+        cc::inner_handles::<K, L, false, S>(d, prepared, a, b, w_plus, w_minus);
     }
     #[inline(always)]
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {

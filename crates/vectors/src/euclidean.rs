@@ -50,7 +50,7 @@ impl Ambient for Euclidean {
             out[i] = x[i] + v[i];
         }
     }
-    fn carry(&self, _p: &[Lane], _q: &[Lane], _v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+    fn parallel_transport(&self, _p: &[Lane], _q: &[Lane], _v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         out.copy_from_slice(x);
     }
     #[inline(always)]
@@ -67,7 +67,7 @@ impl Ambient for Euclidean {
     fn project_tangent(&self, _p: &[Lane], v: &mut [Lane]) -> Lane {
         self.project(v)
     }
-    fn scatter(&self, _noise: &mut [Lane]) {}
+    fn random_point(&self, _noise: &mut [Lane]) {}
     fn complaint(&self, _x: &[f64]) -> String {
         "any finite numbers are a point".into()
     }
@@ -108,7 +108,15 @@ impl Origin for Euclidean {
         0.0
     }
     #[inline(always)]
-    fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+    fn inner_handles<S: Scalar>(
+        &self,
+        d: &[Lane],
+        _: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    ) {
         for i in 0..self.n {
             w_plus[i] = -(a[i] + b[i]) + d[i];
             w_minus[i] = -w_plus[i];

@@ -1,19 +1,8 @@
 //! Hyperbolic space Hⁿ = {x ∈ Rⁿ⁺¹ : −x₀² + Σ xᵢ² = −1, x₀ > 0}, G = O(n,1), κ = −1.
 
 use crate::constant_curvature as cc;
-use crate::curved::Curved;
 use symspline_core::scalar::{Lane, dot, lane};
 use symspline_core::space::ROUNDING_SIZE;
-
-/// Hyperbolic space of dimension n, as the hyperboloid with its time-like coordinate first.
-pub type Hyperbolic = Curved<-1, false>;
-
-impl Hyperbolic {
-    /// The hyperboloid in n + 1 dimensions.
-    pub fn new(n: usize) -> Result<Self, String> {
-        if n == 0 { Err("Hyperbolic(n) needs n >= 1".into()) } else { Ok(Hyperbolic { n }) }
-    }
-}
 
 /// A ray's ambient vectors grow like e^d, and so do errors at its start.
 pub const LONGEST_RAY: f64 = 2.0;

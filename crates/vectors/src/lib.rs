@@ -7,11 +7,8 @@ mod hyperbolic;
 mod lorentzian;
 mod sphere;
 
-pub use curved::Curved;
+pub use curved::{AntiDeSitter, Curved, DeSitter, Hyperbolic, Sphere};
 pub use euclidean::Euclidean;
-pub use hyperbolic::Hyperbolic;
-pub use lorentzian::{AntiDeSitter, DeSitter};
-pub use sphere::Sphere;
 
 use symspline_core::space::{Entry, table};
 

@@ -5,32 +5,7 @@
 //! With c = κ⟨p,q⟩ the logarithm is f(c)(q − cp), f = θ/sin θ with cos θ = c, which is analytic across c = 1: there the
 //! geodesic is null, at c > 1 it is open. Points with c ≤ −1 are joined by no geodesic, or by many.
 
-use crate::curved::Curved;
 use symspline_core::scalar::{Lane, dot, lane};
-
-/// De Sitter space of dimension n, with its time-like coordinate first.
-pub type DeSitter = Curved<1, true>;
-/// Anti-de Sitter space of dimension n, with its two time-like coordinates first.
-pub type AntiDeSitter = Curved<-1, true>;
-
-impl DeSitter {
-    /// The one-sheeted hyperboloid in n + 1 dimensions.
-    pub fn new(n: usize) -> Result<Self, String> {
-        at_least_two("DeSitter", n)
-    }
-}
-
-impl AntiDeSitter {
-    /// The quadric in n + 1 dimensions.
-    pub fn new(n: usize) -> Result<Self, String> {
-        at_least_two("AntiDeSitter", n)
-    }
-}
-
-/// In one dimension there is no indefinite metric, and de Sitter space has two parts.
-fn at_least_two<const K: i32>(name: &str, n: usize) -> Result<Curved<K, true>, String> {
-    if n < 2 { Err(format!("{name}(n) needs n >= 2, not {n}")) } else { Ok(Curved { n }) }
-}
 
 /// The numbers of a point whose squares have the sign of κ.
 fn round<const K: i32, T>(x: &mut [T]) -> (&mut [T], &mut [T]) {

@@ -1,19 +1,8 @@
 //! The sphere Sⁿ = {x ∈ Rⁿ⁺¹ : |x| = 1}, G = O(n+1), κ = 1.
 
 use crate::constant_curvature as cc;
-use crate::curved::Curved;
 use symspline_core::scalar::{Lane, dot, lane};
 use symspline_core::space::ROUNDING_SIZE;
-
-/// The unit sphere of dimension n.
-pub type Sphere = Curved<1, false>;
-
-impl Sphere {
-    /// The sphere in n + 1 dimensions.
-    pub fn new(n: usize) -> Result<Self, String> {
-        if n == 0 { Err("Sphere(n) needs n >= 1".into()) } else { Ok(Sphere { n }) }
-    }
-}
 
 pub fn project(x: &mut [Lane]) -> Lane {
     let norm = dot(x, x).sqrt();

@@ -1,4 +1,14 @@
-"""The command line: ``symspline fit``, ``sample``, ``plot``, ``check`` and ``demo``."""
+"""Smooth C² curves through data in files, on spheres and other curved spaces
+
+example:
+  symspline fit track.csv --lonlat -o track.npz
+  symspline check track.npz
+  symspline sample track.npz --every 10min -o smooth.csv
+  symspline plot track.npz -o track.png
+
+See also `symspline VERB --help`. Exit codes: 0 success, 1 not converged or check failed, 2 invalid input or usage,
+130 interrupted. An output file appears only when it is complete; a failed run leaves an older file unchanged.
+"""
 
 from __future__ import annotations
 
@@ -7,38 +17,30 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from .._core import ConvergenceError, CutLocusError, ValidationError
-from ..version import VERSION
-from . import check, demo, fit, plot, sample
-from .errors import Problem, say, with_names
+from .._version import VERSION
+from . import _check, _fit, _plot, _sample
+from ._errors import Problem, with_names
+from ._terminal import say
 
+__all__ = ["main"]
+
+_COMMON: dict[str, Any] = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
 FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
-
-_DESCRIPTION = "Smooth C2 curves through data in files, on spheres and other curved spaces."
-_EPILOG = """\
-example:
-  symspline fit track.csv --lonlat -o track.npz
-  symspline check track.npz
-  symspline sample track.npz --every 10min -o smooth.csv
-  symspline plot track.npz -o track.png
-
-`symspline VERB --help` says more. Exit codes: 0 done, 1 not converged or check failed, 2 bad input or usage,
-130 interrupted. An output file appears only when it is complete; until then an older one stays as it was.
-"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
+    """Run the command line and return the exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # Names of curves may hold letters that a terminal has not got.
+        # Names of curves may hold letters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
+        # argparse makes an empty list of --option=--.
         if any(isinstance(value, list) for value in vars(options).values()):
-            # What argparse makes of --option=--
-            raise Problem("an option has the value --, which means nothing here")
+            raise Problem("an option has the value --, which has no meaning here")
         code: int = options.run(options)
         print(end="", flush=True)
         return code
@@ -46,29 +48,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _drop_output()
         return BROKEN_PIPE
     except KeyboardInterrupt:
-        return _say("interrupted", INTERRUPTED)
+        return _failed("interrupted", INTERRUPTED)
     except ConvergenceError as error:
-        return _say(error, FAILED)
+        return _failed(error, FAILED)
     except MemoryError:
-        return _say("there is not enough memory for this", BAD)
+        return _failed("there is not enough memory for this", BAD)
     except OSError as error:
         if error.filename is None:
             _drop_output()
-        return _say(f"cannot write {error.filename or 'the output'}: {error.strerror or error}", BAD)
+        return _failed(f"cannot write {error.filename or 'the output'}: {error.strerror or error}", BAD)
     except Problem as error:
-        return _say(error, error.code)
+        return _failed(error, error.code)
     except (ValidationError, CutLocusError) as error:
-        return _say(with_names(str(error)), BAD)
+        return _failed(with_names(str(error)), BAD)
 
 
-def _say(message: object, code: int) -> int:
-    """Print one line on stderr; returns the exit code."""
+def _failed(message: object, code: int) -> int:
     say(message)
     return code
 
 
 def _drop_output() -> None:
-    """Nobody reads on: what is still to be flushed at exit goes nowhere."""
+    """Discard what would be flushed at exit, as nobody reads it."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -78,22 +79,19 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> _Parser:
-    style = argparse.RawDescriptionHelpFormatter
-    parser = _Parser(
-        "symspline", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=style, allow_abbrev=False
-    )
+    parser = _Parser("symspline", **_texts(__doc__))
     parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    for verb in (fit, sample, plot, check, demo):
-        name = verb.__name__.rpartition(".")[2]
-        own = verbs.add_parser(
-            name,
-            help=verb.SUMMARY,
-            description=verb.DESCRIPTION,
-            epilog=verb.EPILOG,
-            formatter_class=style,
-            allow_abbrev=False,
-        )
+    for verb in (_fit, _sample, _plot, _check):
+        texts = _texts(verb.__doc__)
+        summary = texts["description"].partition("\n")[0]
+        own = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)
         verb.add_arguments(own)
         own.set_defaults(run=verb.run)
     return parser
+
+
+def _texts(doc: str | None) -> dict[str, Any]:
+    """Return the help texts in the docstring of a module, which is absent under ``python -OO``."""
+    description, _, examples = (doc or "").partition("\nexample")
+    return {"description": description, "epilog": f"example{examples}", **_COMMON}

@@ -1,21 +1,25 @@
-"""Other coordinates of points: models of hyperbolic space, projectors, reflections, density matrices, quaternions,
-spaces that lie in others.
+"""Conversions between representations of points.
 
-Every function works on arrays of points: leading axes stay as they are. Input of double precision may be
-off by 1e-8, of single precision by 1e-4; what comes out is exact to rounding.
+The representations are models of hyperbolic space, projectors, reflections, density matrices, quaternions, and
+totally geodesic submanifolds.
 
+All functions are vectorised over the leading axes. Input may deviate by 1e-8 in double precision and by 1e-4 in single
+precision; results are exact up to rounding errors.
+
+Examples
+--------
 >>> import numpy as np, symspline as ss
 >>> ss.convert.hyperboloid_to_ball([np.cosh(2), np.sinh(2)]).round(8)
 array([0.76159416])
 """
 
-from .embeddings import (
+from ._embeddings import (
     positive_definite_to_siegel,
     quaternions_to_subspace,
     siegel_to_positive_definite,
     subspace_to_quaternions,
 )
-from .models import (
+from ._models import (
     ball_to_half_space,
     ball_to_hyperboloid,
     half_space_to_ball,
@@ -23,9 +27,9 @@ from .models import (
     hyperboloid_to_ball,
     hyperboloid_to_half_space,
 )
-from .projectors import basis_to_projector, density_to_state, projector_to_basis, state_to_density
-from .quaternions import matrix_to_quaternion, quaternion_to_matrix
-from .reflections import basis_to_reflection, reflection_to_basis
+from ._projectors import basis_to_projector, density_to_state, projector_to_basis, state_to_density
+from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
+from ._reflections import basis_to_reflection, reflection_to_basis
 
 __all__ = [
     "ball_to_half_space",

@@ -10,8 +10,8 @@
 (3,)
 """
 
-from .casteljau import evaluate
-from .compiled import curve
-from .fitting import fit
+from ._casteljau import evaluate
+from ._compiled import curve
+from ._fitting import fit
 
 __all__ = ["curve", "evaluate", "fit"]

@@ -1,8 +1,8 @@
-"""Splines of many curves in xarray objects, by blocks in dask where these are dask's.
+"""Splines of many curves in xarray objects, block by block with dask.
 
-Curves do not depend on each other, so that an array of them is cut between curves and never along one. Every function
-here is one call of ``xarray.apply_ufunc``, of functions of plain arrays that any scheduler of dask can send to its
-workers. Dimensions are known by their names, and their order does not matter.
+Curves are independent of each other, so blocks contain whole curves. Each function calls ``xarray.apply_ufunc`` once,
+with functions of plain arrays that any dask scheduler can send to its workers. Dimensions are identified by name, in
+any order.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Any
 
 import xarray as xr
 
-from ..curves.curve import quantity_of
-from ..options import checked_policy, outside
-from ..spaces import Space
-from ..version import VERSION
-from .asked import asked_of, rehearse, times_with_names
-from .blocks import COLUMNS, Inputs, apply, fitted, resampled
-from .results import KNOTS, along, bare, timed_by
+from .._curves.curve import quantity_of
+from .._options import checked_extrapolate, outside
+from .._spaces import Space
+from .._version import VERSION
+from ._blocks import COLUMNS, Inputs, apply, fitted, resampled
+from ._results import KNOTS, along, bare, timed_by
+from ._spec import rehearse, spec_of, times_with_names
 
 __all__ = ["evaluate", "fit", "lift", "resample", "speed"]
 
@@ -27,9 +27,9 @@ __all__ = ["evaluate", "fit", "lift", "resample", "speed"]
 def fit(
     da: xr.DataArray,
     space: Space | str,
+    *,
     dim: str = "time",
     point_dims: Sequence[str] = ("q",),
-    *,
     bc_type: Any = "natural",
     method: str = "auto",
     tol: float = 1e-12,
@@ -39,30 +39,45 @@ def fit(
     atol: float | None = None,
     where: xr.DataArray | None = None,
 ) -> xr.Dataset:
-    """The C² splines through the points along one dimension of an array.
+    """Fit C² splines to the points along one dimension of an array.
 
-    Args:
-        da: the points. Of a dask array nothing is computed before it is asked for.
-        space: the space or its name; not a `Product`, whose factors are fitted each by itself.
-        dim: the dimension along the curves. Its coordinate holds the knots, numbers or ``datetime64`` (rates are then
-            per second); without one they are 0, 1, …, N, and another coordinate that looks like times is an error.
-        point_dims: the dimensions of a point's array, in their order: for matrices rows and columns.
-        bc_type: as for `CubicSpline`. Vectors have the shape of a point, or are DataArrays.
-        method, tol, max_iter, extrapolate, atol: as for `CubicSpline`.
-        on_failure: as for `CubicSpline`. With ``"ignore"`` a curve with a point that is none (NaN, off the space), or
-            a step beyond the cut locus, is NaN, one that did not converge keeps its best iterate, and ``converged``
-            is False for both. With ``"raise"`` the index in the message counts within one block of dask.
-        where: True for the curves that are wanted, with dimensions of the curves; the others are NaN.
+    Parameters
+    ----------
+    da : xarray.DataArray
+        Points. Dask arrays are computed lazily.
+    space : Space or str
+        Space or its name. Products are not supported: fit each factor separately.
+    dim : str, default "time"
+        Dimension along the curves. Its coordinate holds the knots, numbers or ``datetime64`` (rates are then per
+        second). Without a coordinate the knots are 0, 1, ...; another coordinate that looks like times raises an error.
+    point_dims : sequence of str, default ("q",)
+        Dimensions of a point's array in order, such as rows and columns of matrices.
+    bc_type : str, tuple or pair, default "natural"
+        End conditions, as for `CubicSpline`. Vectors have the shape of a point, or are DataArrays.
+    method, tol, max_iter, extrapolate, atol
+        As for `CubicSpline`.
+    on_failure : {"ignore", "warn", "raise"}, default "ignore"
+        As for `CubicSpline`. With ``"ignore"``, a curve with invalid points (NaN, off the space) or with a step beyond
+        the cut locus is NaN, a curve that did not converge keeps its best iterate, and ``converged`` is False for both.
+        With ``"raise"``, the message gives the index within one block of dask.
+    where : xarray.DataArray of bool, optional
+        Mask over the batch dimensions. Curves where it is False are not fitted and are NaN.
 
-    Returns:
-        A Dataset with ``points`` (moved onto the space) and ``velocities``, the dimensions of the curves first, then
-        ``dim`` and ``point_dims``; and the columns of `Report` for every curve. Coordinates are those of ``da``,
-        whose attributes the points keep. Attributes name the space and what else `evaluate`, `lift` and `speed` need,
-        also after the Dataset was stored and read again.
+    Returns
+    -------
+    xarray.Dataset
+        ``points`` (projected onto the manifold) and ``velocities``, with batch dimensions first, then `dim` and
+        `point_dims`; and the columns of `Report` for every curve. Coordinates are those of `da`, and the points keep
+        its attributes. Attributes of the Dataset hold the space and all other information that `evaluate`, `lift` and
+        `speed` need, also after the Dataset was stored and read again.
 
-    Raises:
-        ValidationError: names, shapes, times or options are wrong, or a curve is cut by chunks.
+    Raises
+    ------
+    ValidationError
+        If names, shapes, times or options are invalid, or chunks split a curve.
 
+    Examples
+    --------
     >>> import numpy as np, xarray as xr
     >>> import symspline.xarray
     >>> da = xr.DataArray(np.eye(3)[None], dims=("curve", "time", "q"), coords={"time": [0.0, 1.0, 3.0]})
@@ -70,7 +85,7 @@ def fit(
     >>> ds.velocities.dims, ds.converged.values
     (('curve', 'time', 'q'), array([ True]))
     """
-    asked = asked_of(
+    spec = spec_of(
         da,
         space,
         dim,
@@ -85,19 +100,19 @@ def fit(
         atol=atol,
     )
     axes: list[Hashable] = [dim, *point_dims]
-    dtype = asked.space.dtype
+    dtype = spec.space.dtype
     variables = apply(
         fitted,
-        asked.inputs,
+        spec.inputs,
         [axes, axes, *([] for _ in COLUMNS)],
         [dtype, dtype, *COLUMNS.values()],
-        **asked.options,
+        **spec.options,
     )
     ds = xr.Dataset(dict(zip(("points", "velocities", *COLUMNS), variables, strict=True)))
     ds.points.attrs = dict(da.attrs)
-    words = asked.options["kinds"]
+    words = spec.options["kinds"]
     ds.attrs = {
-        "space": str(asked.space),
+        "space": str(spec.space),
         "curve_dim": dim,
         "point_dims": list(point_dims),
         "bc_type": words if isinstance(words, str) else json.dumps(words),
@@ -108,22 +123,33 @@ def fit(
 
 
 def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
-    """The curves that `fit` found, at times x.
+    """Evaluate the curves of `fit`.
 
-    Args:
-        ds: what `fit` returned, or what was stored of it: points, velocities and attributes.
-        x: one time; a row of times, whose dimension is then that of the knots; or a DataArray with any dimensions. If
-            some are those of the curves, every curve has its own times.
-        nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
-        extrapolate: as for `CubicSpline`; None for what `fit` was told.
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of `fit`, or points, velocities and attributes that were stored and read again.
+    x : time, array_like or xarray.DataArray
+        One time, a one-dimensional array of times along `dim`, or a DataArray with any dimensions. If it has batch
+        dimensions, every curve has its own times.
+    nu : {0, 1, 2}, default 0
+        0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for `CubicSpline`. None means the policy passed to `fit`.
 
-    Returns:
-        The dimensions of the curves, then those of x, then those of a point. The times are a coordinate. Points have
-        the attributes of the data, rates none. Curves that were not found are NaN.
+    Returns
+    -------
+    xarray.DataArray
+        Batch dimensions, then those of `x`, then those of a point. The times are a coordinate. Points keep the
+        attributes of the data, rates do not. Curves that do not exist are NaN.
 
-    Raises:
-        ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None.
+    Raises
+    ------
+    ValidationError
+        If a time is not finite, or is outside the knots and `extrapolate` is None.
 
+    Examples
+    --------
     >>> import numpy as np, xarray as xr
     >>> import symspline.xarray
     >>> ds = symspline.xarray.fit(xr.DataArray(np.eye(3), dims=("time", "q")), "sphere:2")
@@ -134,12 +160,18 @@ def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | N
 
 
 def lift(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
-    """The curves by arrays that move continuously, see `CubicSpline.lift`. The arguments are those of `evaluate`."""
+    """Evaluate the curves by continuous representatives.
+
+    Parameters are those of `evaluate`. See `CubicSpline.lift`.
+    """
     return along(ds, x, quantity_of(nu), extrapolate, lifted=True)
 
 
 def speed(ds: xr.Dataset, x: Any, *, extrapolate: bool | str | None = None) -> xr.DataArray:
-    """|γ'| at times x. The arguments are those of `evaluate`; the result has no dimensions of a point."""
+    """Evaluate the speed of the curves, the norm of γ'.
+
+    Parameters are those of `evaluate`. The result does not have the dimensions of a point.
+    """
     return along(ds, x, "speed", extrapolate)
 
 
@@ -147,23 +179,41 @@ def resample(
     da: xr.DataArray,
     space: Space | str,
     to: Any,
+    *,
     dim: str = "time",
     point_dims: Sequence[str] = ("q",),
-    *,
     where: xr.DataArray | None = None,
     bc_type: Any = "natural",
     **options: Any,
 ) -> xr.DataArray:
-    """Points of the splines at other times, in one go: nothing else of the fit is kept.
+    """Fit splines and evaluate them at other times in one call.
 
-    Args:
-        da, space, dim, point_dims, where, bc_type, options: as for `fit`.
-        to: times, as x for `evaluate`.
+    Parameters
+    ----------
+    da : xarray.DataArray
+        Points, as for `fit`.
+    space : Space or str
+        Space or its name.
+    to : time, array_like or xarray.DataArray
+        New times, as `x` of `evaluate`.
+    dim : str, default "time"
+        Dimension along the curves.
+    point_dims : sequence of str, default ("q",)
+        Dimensions of a point's array.
+    where : xarray.DataArray of bool, optional
+        Mask over the batch dimensions.
+    bc_type : str, tuple or pair, default "natural"
+        End conditions.
+    **options
+        Other options of `fit`.
 
-    Returns:
-        Values as of `evaluate`, with name and attributes of ``da``. Curves that did not converge are NaN, as there is
-        no report that could say so.
+    Returns
+    -------
+    xarray.DataArray
+        Points as from `evaluate`, with name and attributes of `da`. Curves that did not converge are NaN.
 
+    Examples
+    --------
     >>> import numpy as np, xarray as xr
     >>> import symspline.xarray
     >>> days = np.array(["2021-08-28", "2021-08-29", "2021-08-30"], "datetime64[s]")
@@ -171,20 +221,20 @@ def resample(
     >>> symspline.xarray.resample(da, "sphere:2", to=["2021-08-28T12:00"]).values.round(4)
     array([[ 0.6131,  0.7637, -0.2023]])
     """
-    asked = asked_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
+    spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
     times, axes = times_with_names(to, dim, point_dims, curves)
-    policy = outside(checked_policy(options.get("extrapolate")), bc_type)
-    rehearse(times, asked.options["t"], da.sizes[dim], policy)
-    first, *rest = asked.inputs
+    policy = outside(checked_extrapolate(options.get("extrapolate")), bc_type)
+    rehearse(times, spec.options["t"], da.sizes[dim], policy)
+    first, *rest = spec.inputs
     inputs: Inputs = [(bare(first[0], dim), [KNOTS, *point_dims]), (times, axes), *rest]
     (values,) = apply(
         resampled,
         inputs,
         [[*axes, *point_dims]],
-        [asked.space.dtype],
+        [spec.space.dtype],
         x_axes=len(axes),
-        **asked.options,
+        **spec.options,
     )
     values.attrs = dict(da.attrs)
     return timed_by(values, times, dim).rename(da.name)

@@ -1,32 +1,32 @@
 //! De Casteljau's algorithm with geodesics, (8).
 
-use super::evaluate::Curves;
+use super::data::Curves;
 use crate::scalar::{Lane, Scalar, lane};
 use crate::space::Space;
 
-/// One cubic Bézier segment on each lane, by its end points and outer legs; reused.
+/// One cubic Bézier segment on each lane, by its end points and outer handles; reused.
 pub struct Segment<S> {
     /// `p_i` and `p_{i+1}`.
     pub ends: [Vec<Lane>; 2],
     /// `log_{p_i}(q⁺)` and `−log_{p_{i+1}}(q⁻)`: h/3 times the end velocities.
-    pub legs: [Vec<Lane>; 2],
+    pub handles: [Vec<Lane>; 2],
     /// The control points q⁺ and q⁻.
     controls: [Vec<Lane>; 2],
     /// `log_{q⁺}(q⁻)`.
     middle: Vec<Lane>,
-    /// Lanes in which that leg is too long for a ray, see [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
+    /// Lanes in which that handle is too long for a ray, see [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
     long: Lane,
     level: [Vec<S>; 3],
 }
 
 impl<S: Scalar> Segment<S> {
-    /// Room for points of `len` numbers.
+    /// Memory for points of `len` numbers.
     pub fn new(len: usize) -> Self {
         let lanes = || vec![Lane::ZERO; len];
         let points = || vec![S::constant(Lane::ZERO); len];
         Segment {
             ends: [lanes(), lanes()],
-            legs: [lanes(), lanes()],
+            handles: [lanes(), lanes()],
             controls: [lanes(), lanes()],
             middle: lanes(),
             long: Lane::ZERO,
@@ -42,12 +42,12 @@ impl<S: Scalar> Segment<S> {
             let row = (curve * curves.nodes + segment + e) * len;
             for j in 0..len {
                 self.ends[e][j] = lane(curves.points[row + j]);
-                self.legs[e][j] = lane(curves.velocities[row + j] * third);
+                self.handles[e][j] = lane(curves.velocities[row + j] * third);
             }
         }
     }
 
-    /// Computes control points and middle leg from ends and outer legs.
+    /// Computes control points and inner handle from ends and outer handles.
     #[inline(always)]
     pub fn prepare<M: Space>(&mut self, space: &M, len: usize) {
         self.prepare_chosen(space, len, |_, _| {});
@@ -63,7 +63,7 @@ impl<S: Scalar> Segment<S> {
         choose: impl FnOnce(&[Lane], [&mut [Lane]; 3]),
     ) {
         let [p0, p1] = self.ends.each_mut().map(|x| &mut x[..len]);
-        let [a, b] = self.legs.each_mut().map(|x| &mut x[..len]);
+        let [a, b] = self.handles.each_mut().map(|x| &mut x[..len]);
         let [q0, q1] = self.controls.each_mut().map(|x| &mut x[..len]);
         space.ray(p0, a, Lane::ONE, q0);
         space.ray(p1, b, lane(-1.0), q1);
@@ -78,11 +78,11 @@ impl<S: Scalar> Segment<S> {
     /// γ(t), for t in units of the segment.
     ///
     /// The first three geodesics start at fixed points with known velocities: the outer ones are
-    /// never put through a logarithm, which keeps legs exact that come near the cut locus.
+    /// never put through a logarithm, which keeps handles exact that come near the cut locus.
     #[inline(always)]
     pub fn at<M: Space>(&mut self, space: &M, len: usize, t: S, gamma: &mut [S]) {
         let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
-        let [a, b] = self.legs.each_ref().map(|x| &x[..len]);
+        let [a, b] = self.handles.each_ref().map(|x| &x[..len]);
         let [x, y, z] = self.level.each_mut().map(|x| &mut x[..len]);
         let gamma = &mut gamma[..len];
         space.ray(p0, a, t, x);

@@ -3,7 +3,7 @@
 //! A Bézier curve of degree d is the B-spline on the knots 0, …, 0, 1, …, 1 (d + 1 of each), for which de
 //! Boor's algorithm is de Casteljau's.
 
-use super::evaluate::Quantity;
+use super::data::Quantity;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, few, gather, max_or_nan, scatter};

@@ -1,64 +1,15 @@
 //! Values and derivatives of spline curves at many times.
 
 use super::bezier::Segment;
+use super::data::{Curves, Job, Outside, Quantity, Times};
 use super::locate::Locator;
-use super::places::Places;
+use super::sample_cursor::SampleCursor;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, Jet, LANES, Lane, Scalar, gather, lane, max_or_nan, scatter, scatter_apart};
 use crate::space::{Ambient, Covered, Erased, Origin, Space};
 use crate::with_size;
 use std::ops::DerefMut;
-
-/// Spline curves with equally many knots: the triple (t, p, u).
-pub struct Curves<'a> {
-    /// Knots of each curve, or of one for all.
-    pub t: &'a [f64],
-    /// Number of knots of a curve.
-    pub nodes: usize,
-    /// Points, curve after curve.
-    pub points: &'a [f64],
-    /// Velocities in the same layout.
-    pub velocities: &'a [f64],
-}
-
-/// Times to evaluate at.
-pub struct Times<'a> {
-    /// The times, of each curve or of all.
-    pub x: &'a [f64],
-    /// Times of one curve.
-    pub count: usize,
-}
-
-/// What to compute.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// γ
-    Point,
-    /// γ'
-    Velocity,
-    /// ∇γ'
-    Acceleration,
-    /// |γ'|
-    Speed,
-    /// |∇γ'|
-    Bend,
-    /// γ' as the body that moves along the curve has it, where a space knows ([`Covered::body`]): angular velocity.
-    BodyVelocity,
-    /// ∇γ' in the same way: angular acceleration.
-    BodyAcceleration,
-}
-
-/// What happens at times outside the knots.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outside {
-    /// The last Bézier segment goes on.
-    Continue,
-    /// The curve goes on with constant velocity.
-    Geodesic,
-    /// Time wraps around.
-    Wrap,
-}
 
 /// Samples evaluated by one thread at a time, at most.
 const BLOCK: usize = 2048;
@@ -67,42 +18,7 @@ const TOGETHER: usize = 4;
 /// Samples times numbers from which threads pay.
 const PARALLEL: usize = 1 << 16;
 
-impl Curves<'_> {
-    pub(super) fn knots(&self, curve: usize) -> &[f64] {
-        if self.t.len() == self.nodes {
-            self.t
-        } else {
-            &self.t[curve * self.nodes..(curve + 1) * self.nodes]
-        }
-    }
-
-    /// First and last knot of a curve.
-    pub fn domain(&self, curve: usize) -> (f64, f64) {
-        let t = self.knots(curve);
-        (t[0], t[self.nodes - 1])
-    }
-}
-
 impl Quantity {
-    /// Whether the result is one number, the length of a vector.
-    pub fn is_length(self) -> bool {
-        matches!(self, Quantity::Speed | Quantity::Bend)
-    }
-
-    /// Whether the result is a vector as the moving body has it.
-    pub fn is_of_body(self) -> bool {
-        matches!(self, Quantity::BodyVelocity | Quantity::BodyAcceleration)
-    }
-
-    /// Derivatives of the curve that are asked for.
-    pub fn order(self) -> usize {
-        match self {
-            Quantity::Point => 0,
-            Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity => 1,
-            Quantity::Acceleration | Quantity::Bend | Quantity::BodyAcceleration => 2,
-        }
-    }
-
     /// Numbers of a result, for a space of points of `len` numbers.
     pub fn len(self, space: &Erased) -> usize {
         match self {
@@ -156,23 +72,6 @@ pub fn evaluate(
     });
 }
 
-/// A block of samples.
-pub struct Job<'a> {
-    /// What is computed.
-    pub quantity: Quantity,
-    pub(super) curves: &'a Curves<'a>,
-    pub(super) times: &'a Times<'a>,
-    pub(super) outside: Outside,
-    pub(super) locator: Option<&'a Locator<'a>>,
-    /// The first sample of the block.
-    pub(super) first: usize,
-    /// Samples from one lane to the next: 1, or those of a curve.
-    pub(super) apart: usize,
-    /// Numbers in a row of the result, and of a point.
-    size: usize,
-    pub(super) len: usize,
-}
-
 impl Job<'_> {
     /// Evaluates the block, eight samples at a time, whatever segments they fall in.
     pub fn run<M: Space>(&self, space: &M, out: &mut [f64]) {
@@ -197,12 +96,12 @@ impl Job<'_> {
         self.each(
             out,
             len,
-            |places, segment: &mut Segment<S>| {
-                self.read(places, len, &mut segment.ends, &mut segment.legs);
+            |cursor, segment: &mut Segment<S>| {
+                self.read(cursor, len, &mut segment.ends, &mut segment.handles);
                 segment.prepare(space, len);
             },
-            |places, segment, gamma, vectors, out| {
-                let (p, vector) = self.sample(space, places, segment, gamma, vectors, len);
+            |cursor, segment, gamma, vectors, out| {
+                let (p, vector) = self.sample(space, cursor, segment, gamma, vectors, len);
                 match vector {
                     Some(v) if self.quantity.is_length() => out.write(&[norm(space, p, v)]),
                     vector => out.write(vector.unwrap_or(p)),
@@ -228,17 +127,17 @@ impl Job<'_> {
         self.each(
             out,
             len,
-            |places, segment: &mut Segment<S>| {
+            |cursor, segment: &mut Segment<S>| {
                 let (p, v) = buffer.split_at_mut(2 * ambient);
                 let ([p0, p1], [v0, v1]) = (two(p, ambient), two(v, ambient));
-                self.read(places, ambient, &mut [&mut *p0, &mut *p1], &mut [&mut *v0, &mut *v1]);
+                self.read(cursor, ambient, &mut [&mut *p0, &mut *p1], &mut [&mut *v0, &mut *v1]);
                 let [y, z] = &mut segment.ends;
-                let [a, b] = &mut segment.legs;
+                let [a, b] = &mut segment.handles;
                 space.enter([p0, p1], [v0, v1], [y, z], [a, b]);
                 segment.prepare_chosen(&cover, len, |from, over| space.choose(from, over));
             },
-            |places, segment, gamma, vectors, out| {
-                let (p, vector) = self.sample(&cover, places, segment, gamma, vectors, len);
+            |cursor, segment, gamma, vectors, out| {
+                let (p, vector) = self.sample(&cover, cursor, segment, gamma, vectors, len);
                 let [point, result] = two(&mut result, ambient);
                 if let (true, Some(w)) = (self.quantity.is_of_body(), vector) {
                     return out.write(space.body(p, w, result));
@@ -260,22 +159,22 @@ impl Job<'_> {
         &self,
         out: &mut [f64],
         len: usize,
-        mut enter: impl FnMut(&Places, &mut Segment<S>),
-        mut write: impl FnMut(&Places, &mut Segment<S>, &mut [S], &mut [Lane], Rows),
+        mut enter: impl FnMut(&SampleCursor, &mut Segment<S>),
+        mut write: impl FnMut(&SampleCursor, &mut Segment<S>, &mut [S], &mut [Lane], Rows),
     ) {
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
         let mut vectors = vec![Lane::ZERO; 3 * len];
-        let mut places = Places::new(self, out.len() / self.size);
+        let mut cursor = SampleCursor::new(self, out.len() / self.size);
         let stride = self.apart * self.size;
         for out in out.chunks_mut(LANES * stride) {
             let mut first = 0;
             while first < stride {
-                if places.advance() {
-                    enter(&places, &mut segment);
+                if cursor.advance() {
+                    enter(&cursor, &mut segment);
                 }
                 write(
-                    &places,
+                    &cursor,
                     &mut segment,
                     &mut gamma,
                     &mut vectors,
@@ -291,17 +190,17 @@ impl Job<'_> {
     fn sample<'v, S: Scalar, M: Space>(
         &self,
         space: &M,
-        places: &Places,
+        cursor: &SampleCursor,
         segment: &mut Segment<S>,
         gamma: &mut [S],
         vectors: &'v mut [Lane],
         len: usize,
     ) -> (&'v [Lane], Option<&'v [Lane]>) {
         // Exactly 1 at the last knot.
-        let tau = (places.x - places.knot) / places.h;
-        segment.at(space, len, S::from_parts([tau, places.rate, Lane::ZERO]), gamma);
-        if self.outside == Outside::Geodesic && places.beyond != [0.0; LANES] {
-            go_straight(space, places, segment, gamma);
+        let tau = (cursor.x - cursor.knot) / cursor.h;
+        segment.at(space, len, S::from_parts([tau, cursor.rate, Lane::ZERO]), gamma);
+        if self.outside == Outside::Geodesic && cursor.beyond != [0.0; LANES] {
+            go_straight(space, cursor, segment, gamma);
         }
         let (p, derivatives) = vectors.split_at_mut(len);
         let (d, dd) = derivatives.split_at_mut(len);
@@ -322,22 +221,22 @@ impl Job<'_> {
         }
     }
 
-    /// Gathers the ends of eight segments, and the legs there: h/3 times the velocities.
+    /// Gathers the ends of eight segments, and the handles there: h/3 times the velocities.
     #[inline(always)]
     fn read(
         &self,
-        places: &Places,
+        cursor: &SampleCursor,
         len: usize,
         ends: &mut [impl DerefMut<Target = [Lane]>; 2],
-        legs: &mut [impl DerefMut<Target = [Lane]>; 2],
+        handles: &mut [impl DerefMut<Target = [Lane]>; 2],
     ) {
-        let Places { at, h, .. } = places;
+        let SampleCursor { at, h, .. } = cursor;
         let third = *h * lane(1.0 / 3.0);
         let (p, u) = (self.curves.points, self.curves.velocities);
         for e in 0..2 {
             gather(at.map(|i| &p[i + e * len..][..len]), &mut ends[e][..len]);
-            gather(at.map(|i| &u[i + e * len..][..len]), &mut legs[e][..len]);
-            legs[e].iter_mut().for_each(|u| *u *= third);
+            gather(at.map(|i| &u[i + e * len..][..len]), &mut handles[e][..len]);
+            handles[e].iter_mut().for_each(|u| *u *= third);
         }
     }
 }
@@ -385,16 +284,16 @@ fn two(buffer: &mut [Lane], len: usize) -> [&mut [Lane]; 2] {
     [a, &mut b[..len]]
 }
 
-/// Replaces the lanes outside the knots by the geodesic that leaves the end.
+/// Recursor the lanes outside the knots by the geodesic that leaves the end.
 #[cold]
-fn go_straight<S: Scalar, M: Space>(space: &M, places: &Places, segment: &Segment<S>, gamma: &mut [S]) {
-    let Segment { ends: [p0, p1], legs: [a, b], .. } = segment;
-    let (beyond, third) = (Lane::new(places.beyond), places.h * lane(1.0 / 3.0));
+fn go_straight<S: Scalar, M: Space>(space: &M, cursor: &SampleCursor, segment: &Segment<S>, gamma: &mut [S]) {
+    let Segment { ends: [p0, p1], handles: [a, b], .. } = segment;
+    let (beyond, third) = (Lane::new(cursor.beyond), cursor.h * lane(1.0 / 3.0));
     let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
     let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
         x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
     };
-    let velocity: Vec<Lane> = pick(a, b).iter().map(|leg| *leg / third).collect();
+    let velocity: Vec<Lane> = pick(a, b).iter().map(|handle| *handle / third).collect();
     let mut straight = gamma.to_vec();
     space.ray(&pick(p0, p1), &velocity, S::from_parts([beyond, Lane::ONE, Lane::ZERO]), &mut straight);
     for (g, s) in gamma.iter_mut().zip(&straight) {

@@ -6,9 +6,10 @@
 
 use super::bezier::Segment;
 use super::collocation::{STAGES, end, legendre, nodes, solve, tail};
-use super::evaluate::{Curves, Outside, Quantity, Times, evaluate};
+use super::data::{Curves, Outside, Quantity, Times};
+use super::evaluate::evaluate;
 use super::locate::Locator;
-use super::places::inside;
+use super::sample_cursor::inside;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, LANES, Lane};
@@ -47,7 +48,7 @@ impl<'a> Track<'a> {
     fn new(space: &'a Erased<'a>) -> Self {
         let len = space.point_len();
         let gamma = vec![Dual { v: Lane::ZERO, d: Lane::ZERO }; len];
-        Track { space, segment: Segment::new(len), gamma, k: space.fibre(), len }
+        Track { space, segment: Segment::new(len), gamma, k: space.fiber_rank(), len }
     }
 
     /// Reads a segment of a curve.
@@ -147,7 +148,7 @@ fn factor(k: usize, numbers: &[f64]) -> Factor {
 /// Writes the factors g at the knots, 1 at the first one: k × k complex numbers for every knot of every curve. At
 /// the point p of a knot the lift that starts at the first point as it was given is p g.
 pub fn lift_knots(space: &Erased, curves: &Curves, monitor: &Monitor, out: &mut [f64]) {
-    let (k, nodes) = (space.fibre(), curves.nodes);
+    let (k, nodes) = (space.fiber_rank(), curves.nodes);
     let size = 2 * k * k;
     let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(SEGMENTS * size).enumerate().collect();
     let parallel = blocks.len() > 1;
@@ -194,7 +195,7 @@ pub fn lift(
     out: &mut [f64],
 ) {
     evaluate(space, curves, times, quantity, outside, monitor, out);
-    let (len, k) = (space.point_len(), space.fibre());
+    let (len, k) = (space.point_len(), space.fiber_rank());
     let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(BLOCK * len).enumerate().collect();
     let parallel = blocks.len() > 1;
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
@@ -256,7 +257,7 @@ fn place(curves: &Curves, times: &Times, outside: Outside, first: usize, row: us
 
 /// The factor from the representative of the first knot to that of the lift after some turns of a closed curve.
 fn turn(space: &Erased, curves: &Curves, [knots, start]: [&[f64]; 2], curve: usize, turns: i32) -> Factor {
-    let (len, k) = (space.point_len(), space.fibre());
+    let (len, k) = (space.point_len(), space.fiber_rank());
     let start = factor(k, &start[curve * 2 * k * k..][..2 * k * k]);
     if turns == 0 {
         return start;

@@ -3,14 +3,16 @@
 mod bezier;
 mod bspline;
 mod collocation;
+pub(crate) mod data;
 mod evaluate;
 mod lift;
 mod locate;
-mod places;
+mod sample_cursor;
 mod transport;
 
 pub use bezier::Segment;
 pub use bspline::{BSpline, evaluate_bspline};
-pub use evaluate::{Curves, Job, Outside, Quantity, Times, evaluate};
+pub use data::{Curves, Job, Outside, Quantity, Times};
+pub use evaluate::evaluate;
 pub use lift::{lift, lift_knots};
 pub use transport::transport;

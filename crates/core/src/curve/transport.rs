@@ -6,9 +6,9 @@
 
 use super::bezier::Segment;
 use super::collocation::{STAGES, integrate, nodes};
-use super::evaluate::{Curves, Outside};
+use super::data::{Curves, Outside};
 use super::locate::Locator;
-use super::places::inside;
+use super::sample_cursor::inside;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::{Dual, LANES, Lane, dot, lane};
@@ -33,7 +33,7 @@ const DEEPEST: usize = 12;
 /// Iterations, at most; each makes the error smaller by a tenth.
 const ITERATIONS: usize = 40;
 
-/// A vector that is carried along segments of a curve.
+/// A vector that is transported along segments of a curve.
 struct Carrier<'a> {
     space: &'a Erased<'a>,
     segment: Segment<Dual>,
@@ -65,7 +65,7 @@ impl<'a> Carrier<'a> {
         let mut way = vec![Lane::ZERO; q.len()];
         self.space.log(&self.place, q, &mut way);
         let x = self.vector.clone();
-        self.space.carry(&self.place, q, &way, &x, &mut self.vector);
+        self.space.parallel_transport(&self.place, q, &way, &x, &mut self.vector);
         self.place.copy_from_slice(q);
     }
 
@@ -83,7 +83,7 @@ impl<'a> Carrier<'a> {
             let [y, d] = self.at(Lane::new(s.map(|s| a + s * (b - a))));
             let (mut way, mut seen) = (vec![Lane::ZERO; len], vec![Lane::ZERO; len]);
             space.log(&y, &q, &mut way);
-            space.carry(&y, &q, &way, &d, &mut seen);
+            space.parallel_transport(&y, &q, &way, &d, &mut seen);
             let [mut v, mut w] = [(); 2].map(|_| vec![Lane::ZERO; dim]);
             space.coordinates(&frame, &q, &seen, &mut w);
             space.log(&q, &y, &mut way);

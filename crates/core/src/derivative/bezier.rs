@@ -10,9 +10,9 @@ use smallvec::smallvec;
 /// Four control points, and a frame at each.
 pub struct Bezier {
     points: [Few<Lane>; 4],
-    /// The frames of the knots, carried to q⁺ and q⁻ in parallel: vectors as columns.
+    /// The frames of the knots, transported to q⁺ and q⁻ in parallel: vectors as columns.
     bases: [Matrix; 4],
-    /// A length by which points move: one, and the length of the legs where space is flat, so that nothing is
+    /// A length by which points move: one, and the length of the handles where space is flat, so that nothing is
     /// lost beside large numbers.
     reach: f64,
 }
@@ -20,26 +20,26 @@ pub struct Bezier {
 impl Bezier {
     pub fn new(space: &Erased, nodes: &[Node], segment: &Segment) -> Self {
         let len = space.point_len();
-        let inner = |node: &Node, leg: &Vector, sign: f64| {
-            let x: Few<Lane> = leg.iter().map(|&x| lane(sign * x)).collect();
+        let inner = |node: &Node, handle: &Vector, sign: f64| {
+            let x: Few<Lane> = handle.iter().map(|&x| lane(sign * x)).collect();
             let zero: Few<Lane> = smallvec![Lane::ZERO; len];
             let (mut v, mut q, mut w) = (zero.clone(), zero.clone(), zero);
             space.tangent(&node.frame, &node.p, &x, &mut v);
             space.ray(&node.p, &v, Lane::ONE, &mut q);
             let basis = columns(len, space.dim(), |k, out| {
                 node.tangent(space, k, &mut w);
-                space.carry(&node.p, &q, &v, &w, out);
+                space.parallel_transport(&node.p, &q, &v, &w, out);
             });
             (q, basis)
         };
         let [p0, p1] = [&nodes[0], &nodes[1]];
-        let (q0, b0) = inner(p0, &segment.legs[0], 1.0);
-        let (q1, b1) = inner(p1, &segment.legs[1], -1.0);
+        let (q0, b0) = inner(p0, &segment.handles[0], 1.0);
+        let (q1, b1) = inner(p1, &segment.handles[1], -1.0);
         Bezier {
             points: [p0.p.clone(), q0, q1, p1.p.clone()],
             bases: [p0.basis(space), b0, b1, p1.basis(space)],
             reach: if space.scales() {
-                segment.legs.iter().map(Vector::norm).fold(0.0, f64::max).max(1.0)
+                segment.handles.iter().map(Vector::norm).fold(0.0, f64::max).max(1.0)
             } else {
                 1.0
             },
@@ -142,7 +142,7 @@ impl Bezier {
                 let [value, d, mut dd] = parts(&gamma);
                 space.acceleration(&value, &d, &mut dd);
                 space.log(&value, &here, &mut way);
-                space.carry(&value, &here, &way, &dd, &mut back);
+                space.parallel_transport(&value, &here, &way, &dd, &mut back);
                 let weight = lane(sign * WEIGHTS[k] / (STEP * self.reach));
                 out.iter_mut().zip(&back).for_each(|(out, x)| *out += *x * weight);
             }

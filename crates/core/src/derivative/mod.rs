@@ -72,11 +72,11 @@ impl Motion<'_> {
             out.columns_mut(2 * e * m, m).copy_from(&(columns.columns(3 * e * m, m) + inner * &f.cosh));
             out.columns_mut((2 * e + 1) * m, m).copy_from(&(inner * &f.stretch * third));
         }
-        if let (Some(seam), true) =
-            (&self.derivative.polygon.seam, self.segment + 1 == self.derivative.segments())
+        if let (Some(holonomy), true) =
+            (&self.derivative.polygon.holonomy, self.segment + 1 == self.derivative.segments())
         {
             for from in [2 * m, 3 * m] {
-                let turned = out.columns(from, m) * seam;
+                let turned = out.columns(from, m) * holonomy;
                 out.columns_mut(from, m).copy_from(&turned);
             }
         }
@@ -168,9 +168,9 @@ impl<'a> Derivative<'a> {
                 let (xi, f) = (&change.points[i + e], &segment.functions[e]);
                 // q⁺ = exp(h u/3), q⁻ = exp(−h u/3)
                 let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
-                let leg = &u[i + e] * (segment.h * sign) + &self.polygon.u[i + e] * (dh * sign);
+                let handle = &u[i + e] * (segment.h * sign) + &self.polygon.u[i + e] * (dh * sign);
                 z.rows_mut(3 * e * m, m).copy_from(xi);
-                z.rows_mut((1 + e) * m, m).copy_from(&(&f.cosh * xi + &f.stretch * leg));
+                z.rows_mut((1 + e) * m, m).copy_from(&(&f.cosh * xi + &f.stretch * handle));
             }
             z[4 * m] = -(dt + tau * dh) / segment.h;
             let moved = columns * z + by_h * dh;
@@ -201,9 +201,9 @@ impl<'a> Derivative<'a> {
                 let sign = if e == 0 { 1.0 } else { -1.0 } / 3.0;
                 let inner = z.rows((1 + e) * m, m);
                 gradient.points[i + e] += z.rows(3 * e * m, m) + f.cosh.tr_mul(&inner);
-                let leg = f.stretch.tr_mul(&inner) * sign;
-                gradient.lengths[i] += leg.dot(&self.polygon.u[i + e]);
-                u[i + e] += leg * segment.h;
+                let handle = f.stretch.tr_mul(&inner) * sign;
+                gradient.lengths[i] += handle.dot(&self.polygon.u[i + e]);
+                u[i + e] += handle * segment.h;
             }
             gradient.knots[i] -= z[4 * m] / segment.h;
             gradient.lengths[i] += by_h.dot(&cotangent) - tau * z[4 * m] / segment.h;
@@ -258,18 +258,18 @@ impl<'a> Derivative<'a> {
 
     /// The last node of a closed curve moves like the first.
     fn close(&self, x: &mut Vec<Vector>) {
-        if let Some(seam) = &self.polygon.seam {
+        if let Some(holonomy) = &self.polygon.holonomy {
             x.resize(self.segments() + 1, Vector::zeros(self.space.dim()));
-            let last = seam * &x[0];
+            let last = holonomy * &x[0];
             x[self.segments()] = last;
         }
     }
 
     /// The transpose of [`close`](Self::close).
     fn fold(&self, x: &mut [Vector]) {
-        if let Some(seam) = &self.polygon.seam {
+        if let Some(holonomy) = &self.polygon.holonomy {
             let last = std::mem::replace(&mut x[self.segments()], Vector::zeros(self.space.dim()));
-            x[0] += seam.tr_mul(&last);
+            x[0] += holonomy.tr_mul(&last);
         }
     }
 

@@ -19,7 +19,7 @@ pub struct Polygon {
     /// Velocities in the frames of the nodes.
     pub u: Vec<Vector>,
     /// Of a closed curve: from the frame of the first node to that of the last, which is the same point.
-    pub seam: Option<Matrix>,
+    pub holonomy: Option<Matrix>,
 }
 
 impl Polygon {
@@ -35,25 +35,25 @@ impl Polygon {
             let q = lanes(row);
             nodes.push(Node { p: p.clone(), frame: frame.clone() });
             space.step(&mut frame, &p, &q, &mut chord);
-            space.tidy(&mut frame, &q);
+            space.reorthonormalize(&mut frame, &q);
             chords.push(first(&chord));
             p = q;
         }
         nodes.push(Node { p, frame });
         let u =
             nodes.iter().zip(velocities.chunks(len)).map(|(node, u)| node.coordinates(space, u)).collect();
-        let seam = closed.then(|| {
+        let holonomy = closed.then(|| {
             let (start, end) = (&nodes[0], &nodes[nodes.len() - 1]);
             let still: Few<Lane> = smallvec![Lane::ZERO; len];
             let (mut here, mut there) = (still.clone(), still.clone());
             columns(m, m, |k, out| {
                 start.tangent(space, k, &mut here);
                 // One point, but maybe another array.
-                space.carry(&start.p, &end.p, &still, &here, &mut there);
+                space.parallel_transport(&start.p, &end.p, &still, &here, &mut there);
                 space.coordinates(&end.frame, &end.p, &there, out);
             })
         });
-        Polygon { nodes, chords, u, seam }
+        Polygon { nodes, chords, u, holonomy }
     }
 }
 

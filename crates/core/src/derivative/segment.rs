@@ -6,7 +6,7 @@
 //! E(εξ)E(a) = E(a + ε ad_a coth(ad_a) ξ)(1 − ε tanh(ad_a/2) ξ)     to first order
 //! ```
 //!
-//! (the parts in 𝔪 and 𝔥 of E(−a)ξE(a) = e^{−ad_a} ξ) the legs `w⁺ = log_o(E(−a)E(−εξ)E(d)E(εη)E(−b)·o)` are those of
+//! (the parts in 𝔪 and 𝔥 of E(−a)ξE(a) = e^{−ad_a} ξ) the handles `w⁺ = log_o(E(−a)E(−εξ)E(d)E(εη)E(−b)·o)` are those of
 //! two moved a and b, turned by an element of the isotropy group.
 
 use super::operators::{Few, Functions, Matrix, Vector, columns, curvature, splat, unit};
@@ -29,8 +29,8 @@ pub struct Side {
 pub struct Segment {
     pub h: f64,
     /// h u/3 at the two knots.
-    pub legs: [Vector; 2],
-    /// Functions of ad of the legs.
+    pub handles: [Vector; 2],
+    /// Functions of ad of the handles.
     pub functions: [Functions; 2],
     /// Seen from the two knots.
     pub sides: [Side; 2],
@@ -48,7 +48,7 @@ impl Segment {
             let own = [&a, &b][which];
             let w = w.rows(which * m, m).into_owned();
             let (at_a, at_b) = (block(which, 0), block(which, 1));
-            // p₀ moves a by ad coth ξ, p₁ moves b by −ad coth η; the nearer one turns the leg.
+            // p₀ moves a by ad coth ξ, p₁ moves b by −ad coth η; the nearer one turns the handle.
             let mut points = [&at_a * &functions[0].coth, -&at_b * &functions[1].coth];
             let turn = curvature(space, own, &w) * &functions[which].tanh;
             let sign = if which == 0 { 1.0 } else { -1.0 };
@@ -65,7 +65,7 @@ impl Segment {
             }
         };
         let sides = [side(0), side(1)];
-        Segment { h, legs: [a, b], functions, sides }
+        Segment { h, handles: [a, b], functions, sides }
     }
 }
 
@@ -82,7 +82,7 @@ fn logarithms(space: &Erased, chord: &Vector, a: &Vector, b: &Vector) -> (Vector
         };
         let zero: Few<Dual> = smallvec![Dual::constant(Lane::ZERO); m];
         let (mut plus, mut minus) = (zero.clone(), zero);
-        space.legs(&d, &prepared, &seeded(a, 0), &seeded(b, m), &mut plus, &mut minus);
+        space.inner_handles(&d, &prepared, &seeded(a, 0), &seeded(b, m), &mut plus, &mut minus);
         for (r, x) in plus.iter().chain(&minus).enumerate() {
             (w[r], out[r]) = (x.v.as_array()[0], x.d);
         }

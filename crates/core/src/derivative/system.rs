@@ -52,8 +52,8 @@ impl System {
         let both_not_a_knot =
             ends.as_ref().is_some_and(|e| e.iter().all(|(kind, _)| *kind == EndKind::NotAKnot));
         let mut system = System { segments, rows: Vec::new(), m, closed, both_not_a_knot };
-        if let (true, Some(seam)) = (closed, &polygon.seam) {
-            system.close(seam);
+        if let (true, Some(holonomy)) = (closed, &polygon.holonomy) {
+            system.close(holonomy);
         }
         let row = |i: usize| match &ends {
             Some([first, _]) if i == 0 => system.end(space, polygon, 0, first),
@@ -73,12 +73,12 @@ impl System {
     }
 
     /// Brings the last node's side of a closed curve into the frame of the first node.
-    fn close(&mut self, seam: &Matrix) {
-        let Some(back) = seam.clone().try_inverse() else { return };
+    fn close(&mut self, holonomy: &Matrix) {
+        let Some(back) = holonomy.clone().try_inverse() else { return };
         let Some(last) = self.segments.last_mut() else { return };
         let [start, end] = &mut last.sides;
         for block in [&mut start.u[1], &mut start.points[1], &mut end.u[1], &mut end.points[1]] {
-            *block = &*block * seam;
+            *block = &*block * holonomy;
         }
         for block in end.u.iter_mut().chain(&mut end.points) {
             *block = &back * &*block;
@@ -99,14 +99,16 @@ impl System {
         let u = &polygon.u[i];
         let (left, right) = (&before.sides[1], &behind.sides[0]);
         let mut row = Row::default();
-        let legs = [u * (before.h / 3.0), u * (behind.h / 3.0)];
-        // The seam of a closed curve lies between two frames.
+        let handles = [u * (before.h / 3.0), u * (behind.h / 3.0)];
+        // The holonomy of a closed curve lies between two frames.
         let stretched = [
-            if i > 0 { before.functions[1].stretch.clone() } else { stretch(space, &legs[0]) },
+            if i > 0 { before.functions[1].stretch.clone() } else { stretch(space, &handles[0]) },
             behind.functions[0].stretch.clone(),
         ];
-        let slopes =
-            [stretch_slope(space, &legs[0], &right.value), -stretch_slope(space, &legs[1], &left.value)];
+        let slopes = [
+            stretch_slope(space, &handles[0], &right.value),
+            -stretch_slope(space, &handles[1], &left.value),
+        ];
         row.side(&stretched[0], right, [r, r + 1].map(|k| self.node(k)), r);
         row.side(&-&stretched[1], left, [l, l + 1].map(|k| self.node(k)), l);
         for (slope, (segment, h)) in slopes.iter().zip([(l, before.h), (r, behind.h)]) {
@@ -124,10 +126,10 @@ impl System {
         match kind {
             EndKind::Velocity => row.end = Some((which, -identity)),
             EndKind::Acceleration => {
-                // The side that is there is S(leg) A/6.
+                // The side of the only segment is S(handle) A/6.
                 let segment = &self.segments[near];
-                let (sixth, leg) = (value / 6.0, &segment.legs[which]);
-                let slope = stretch_slope(space, leg, &sixth);
+                let (sixth, handle) = (value / 6.0, &segment.handles[which]);
+                let slope = stretch_slope(space, handle, &sixth);
                 row.u = vec![(node, &slope * (-segment.h / 3.0))];
                 row.lengths.push((near, &slope * &polygon.u[node] / -3.0));
                 row.side(&identity, &segment.sides[which], [near, near + 1], near);

@@ -1,18 +1,17 @@
 //! Which solver runs: the one asked for, or one after the other until one converges.
 
-use super::budget::{self, Costs, left};
+use super::budget::{self, Costs, NEWTON, left};
 use super::chain::Chain;
-use super::ends::ChainEnds;
+use super::end_kind::ChainEnds;
+use super::problem::{Method, Options, Solver};
 use super::solve::{Limits, Outcome, Workspace, solve};
-use super::{Method, Options, Solver};
-use super::{calm, fixed_point, homotopy};
+use super::{fixed_point, homotopy, minimum_energy};
 use crate::monitor::Monitor;
 use crate::scalar::{Lane, few, lane};
 use crate::space::Erased;
 
-/// Residuals after which the quasi-Newton iteration hands over, and steps of Newton's method.
+/// Residuals after which the quasi-Newton iteration hands over.
 const QUICK: f64 = 120.0;
-pub const NEWTON: f64 = 50.0;
 /// Steps of Newton's method by itself.
 const NEWTON_ALONE: f64 = 100.0;
 
@@ -34,15 +33,28 @@ pub fn run(
     work: &mut Workspace,
     monitor: &Monitor,
 ) -> Outcome {
-    let limits =
-        |most: f64| Limits { tol: options.tol, max_iter: lane(options.max_iter.map_or(most, |n| n as f64)) };
+    let limits = |most: f64| Limits {
+        tol: lane(options.tol),
+        max_iter: lane(options.max_iter.map_or(most, |n| n as f64)),
+    };
     match options.method {
         Method::Auto => {
             let costs = Costs::of(space, chain, ends);
             let (mut outcome, first) = in_turn(space, chain, ends, options, &costs, idle, work, monitor);
             // Pieces of one curve must not choose apart.
             if whole {
-                calm::settle(space, chain, ends, options, &costs, first, idle, work, monitor, &mut outcome);
+                minimum_energy::select(
+                    space,
+                    chain,
+                    ends,
+                    options,
+                    &costs,
+                    first,
+                    idle,
+                    work,
+                    monitor,
+                    &mut outcome,
+                );
             }
             outcome
         }
@@ -76,7 +88,7 @@ fn in_turn(
     work: &mut Workspace,
     monitor: &Monitor,
 ) -> (Outcome, Lane) {
-    let within = |rest: Lane, most: f64| Limits { tol: options.tol, max_iter: rest.min(lane(most)) };
+    let within = |rest: Lane, most: f64| Limits { tol: lane(options.tol), max_iter: rest.min(lane(most)) };
     // Where Newton's method costs too much, there is nothing to hand over to.
     let most = if costs.can_rescue(NEWTON) { QUICK } else { budget::PATIENT };
     let limits = within(left(options, &Default::default()), most);

@@ -4,17 +4,20 @@
 //! results can be repeated and a batch gives the same curves as single fits.
 
 use super::chain::Chain;
-use super::ends::ChainEnds;
-use super::{Options, Solver};
+use super::end_kind::ChainEnds;
+use super::problem::{Options, Solver};
 use crate::scalar::{LANES, Lane, lane};
 use crate::space::{Ambient, Erased};
 
 /// Steps of Newton's method, alone or in a trust region, up to this dimension. Beyond it their number falls with its
 /// square, as their cost grows.
 pub const STEPS: f64 = 120.0;
+/// Steps of Newton's method that take over from the quasi-Newton iteration.
+pub const NEWTON: f64 = 50.0;
 const DIMENSION: usize = 4;
-/// Sweeps of Algorithm 1, within `auto` and by itself.
+/// Sweeps of Algorithm 1: within `auto`, within `auto` where it is the last solver that can be afforded, and by itself.
 pub const SWEEPS: f64 = 2000.0;
+pub const SWEEPS_TO_RESCUE: f64 = 5000.0;
 pub const SWEEPS_ALONE: f64 = 10_000.0;
 /// Residuals of the quasi-Newton iteration when it runs by itself.
 pub const PATIENT: f64 = 300.0;
@@ -87,7 +90,7 @@ impl Costs {
 
     /// What each solver may cost where no curve was found.
     pub fn for_rescue(&self) -> f64 {
-        self.rescue.max(SWEEPS)
+        self.rescue.max(SWEEPS_TO_RESCUE)
     }
 }
 

@@ -48,7 +48,7 @@ pub fn contraction_bound(step: f64, curvature: f64, radius: f64) -> Option<f64> 
     Some(0.5 * (neighbours + own)).filter(|&alpha| alpha < 1.0)
 }
 
-/// The sweeps of Algorithm 1 from zero velocities after which all control legs are within `tol` times V of those of the
+/// The sweeps of Algorithm 1 from zero velocities after which all handles are within `tol` times V of those of the
 /// spline, which are at most V: the first k with αᵏ ≤ `tol`, which is taken to be no less than rounding.
 pub fn guaranteed_sweeps(alpha: f64, tol: f64) -> f64 {
     (tol.clamp(f64::EPSILON, 1.0).ln() / alpha.ln()).ceil()

@@ -12,56 +12,29 @@
 //! this is (13), whose logarithms are the w of (16) and, at all knots together, of (18).
 
 use super::chain::Chain;
-use super::ends::{self, ChainEnds};
+use super::end_kind::ChainEnds;
+use super::ends;
+use super::node::{C2Residual, NodeVectors};
+use super::vector::{length2, stretch_by};
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 use crate::space::{Erased, Space};
 use crate::with_size;
 
-/// How far a lane is from C²: the largest defect, and the largest speed to measure it by.
-#[derive(Clone, Copy)]
-pub struct Defect {
-    /// Largest defect, divided by 1/hᵢ₋₁ + 1/hᵢ: a velocity. At an end with not-a-knot it is that of the
-    /// velocity there, divided by 1 + h₀/h₁: so much its formula makes of rounding in the other velocities.
-    pub defect: Lane,
-    /// Largest |uᵢ|.
-    pub speed: Lane,
-    /// Largest |h uᵢ/3|, the longest outer leg.
-    pub leg: Lane,
-}
-
-/// Vectors of one node, kept between residuals.
-pub struct NodeVectors<S> {
-    pub(super) a: Vec<S>,
-    pub(super) b: Vec<S>,
-    pub(super) left: Vec<S>,
-    pub(super) right: Vec<S>,
-    next_left: Vec<S>,
-}
-
-impl<S> Default for NodeVectors<S> {
-    fn default() -> Self {
-        NodeVectors { a: vec![], b: vec![], left: vec![], right: vec![], next_left: vec![] }
-    }
-}
-
-impl<S: Scalar> NodeVectors<S> {
-    pub(super) fn resize(&mut self, m: usize) {
-        for vector in [&mut self.a, &mut self.b, &mut self.left, &mut self.right, &mut self.next_left] {
-            vector.resize(m, S::constant(Lane::ZERO));
-        }
-    }
-}
-
 const THIRD: Lane = lane(1.0 / 3.0);
 
 /// Fills `chain.r` with right side minus left side of the C² condition at every node.
-pub fn residual(space: &Erased, chain: &mut Chain, ends: &ChainEnds, work: &mut NodeVectors<Lane>) -> Defect {
+pub fn residual(
+    space: &Erased,
+    chain: &mut Chain,
+    ends: &ChainEnds,
+    work: &mut NodeVectors<Lane>,
+) -> C2Residual {
     chain.with_velocities(|chain, u| {
         let mut r = std::mem::take(&mut chain.r);
         let at_rest = u.iter().fold(Lane::ZERO.simd_eq(Lane::ZERO), |rest, u| rest & u.simd_eq(Lane::ZERO));
-        let defect = space.0.sweep(chain, ends, u, &mut r, work, at_rest);
+        let residual = space.0.sweep(chain, ends, u, &mut r, work, at_rest);
         chain.r = r;
-        defect
+        residual
     })
 }
 
@@ -75,7 +48,7 @@ pub fn sweep<S: Scalar, M: Space>(
     r: &mut [S],
     work: &mut NodeVectors<S>,
     at_rest: Lane,
-) -> Defect {
+) -> C2Residual {
     work.resize(chain.m);
     with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, at_rest, m))
 }
@@ -89,7 +62,7 @@ pub fn sweep_by_table(
     r: &mut [Lane],
     work: &mut NodeVectors<Lane>,
     at_rest: Lane,
-) -> Defect {
+) -> C2Residual {
     sweep(space, chain, ends, u, r, work, at_rest)
 }
 
@@ -103,12 +76,12 @@ fn inside<S: Scalar, M: Space>(
     work: &mut NodeVectors<S>,
     at_rest: Lane,
     m: usize,
-) -> Defect {
+) -> C2Residual {
     let (n, keep) = (chain.n, space.chord_len());
     let NodeVectors { a, b, left, right, next_left } = work;
     let (a, b) = (&mut a[..m], &mut b[..m]);
     let (mut left, right, mut next_left) = (&mut left[..m], &mut right[..m], &mut next_left[..m]);
-    let mut result = Defect { defect: Lane::ZERO, speed: Lane::ZERO, leg: Lane::ZERO };
+    let mut result = C2Residual { residual: Lane::ZERO, speed: Lane::ZERO, handle: Lane::ZERO };
     let mut first_right = Lane::ZERO;
     for i in 0..=n {
         let (h_left, h_right) = (chain.h[i.max(1) - 1], chain.h[i.min(n - 1)]);
@@ -121,7 +94,7 @@ fn inside<S: Scalar, M: Space>(
             }
             let (chord, prepared) = (&chain.chord[i * m..][..m], &chain.prepared[i * keep..][..keep]);
             if !at_rest.all() {
-                space.legs(chord, prepared, a, b, right, next_left);
+                space.inner_handles(chord, prepared, a, b, right, next_left);
             }
             if at_rest.any() {
                 for c in 0..m {
@@ -138,15 +111,15 @@ fn inside<S: Scalar, M: Space>(
         let speed2 = length2(&u[..m]);
         result.speed = max_or_nan(result.speed, speed2);
         let h = h_left.max(h_right) * THIRD;
-        result.leg = max_or_nan(result.leg, h * h * speed2);
+        result.handle = max_or_nan(result.handle, h * h * speed2);
 
         let r = &mut all_r[i * m..][..m];
         if i > 0 && i < n {
             join(space, h_left, h_right, &u[..m], left, right, r);
             let weight = h_left * h_right / (h_left + h_right);
-            result.defect = max_or_nan(result.defect, length2(r) * (weight * weight));
+            result.residual = max_or_nan(result.residual, length2(r) * (weight * weight));
         } else {
-            // An end: keep the side that is there, the end condition comes below.
+            // An end: keep the side of the only segment; the end condition comes below.
             r.copy_from_slice(if i == 0 { &*right } else { &*left });
             if i == 0 {
                 first_right = h_right;
@@ -157,22 +130,16 @@ fn inside<S: Scalar, M: Space>(
     let at_ends = match ends {
         ChainEnds::Periodic => close(&Erased(space), chain, all_u, all_r, work, first_right),
         ChainEnds::Open(kinds) => {
-            let first = ends::defect(&Erased(space), chain, all_u, all_r, work, 0, &kinds[0]);
-            max_or_nan(first, ends::defect(&Erased(space), chain, all_u, all_r, work, 1, &kinds[1]))
+            let first = ends::residual(&Erased(space), chain, all_u, all_r, work, 0, &kinds[0]);
+            max_or_nan(first, ends::residual(&Erased(space), chain, all_u, all_r, work, 1, &kinds[1]))
         }
     };
-    result.defect = max_or_nan(result.defect, at_ends).sqrt();
-    (result.speed, result.leg) = (result.speed.sqrt(), result.leg.sqrt());
+    result.residual = max_or_nan(result.residual, at_ends).sqrt();
+    (result.speed, result.handle) = (result.speed.sqrt(), result.handle.sqrt());
     result
 }
 
-/// Squared length of the value of a coordinate vector.
-#[inline(always)]
-pub fn length2<S: Scalar>(x: &[S]) -> Lane {
-    x.iter().fold(Lane::ZERO, |sum, x| x.value().mul_add(x.value(), sum))
-}
-
-/// The defect at a knot, `S(v⁻) right − S(v⁺) left`; `left` and `right` are overwritten.
+/// The residual at a knot, `S(v⁻) right − S(v⁺) left`; `left` and `right` are overwritten.
 #[inline(always)]
 fn join<S: Scalar, M: Space>(
     space: &M,
@@ -185,7 +152,7 @@ fn join<S: Scalar, M: Space>(
 ) {
     let m = u.len();
     // Spacing that is equal up to the rounding of the knots needs no S: it would change the
-    // defect by less than rounding.
+    // residual by less than rounding.
     let equal = (h_left - h_right).abs().simd_le(h_right * lane(4.0 * f64::EPSILON));
     for c in 0..m {
         r[c] = right[c] - left[c];
@@ -200,22 +167,7 @@ fn join<S: Scalar, M: Space>(
     }
 }
 
-/// `S(factor · u) x`.
-#[inline(always)]
-pub fn stretch_by<S: Scalar, M: Space>(space: &M, factor: Lane, u: &[S], x: &mut [S]) {
-    const SMALL: usize = 16;
-    if u.len() <= SMALL {
-        let mut v = [S::constant(Lane::ZERO); SMALL];
-        for c in 0..u.len() {
-            v[c] = u[c] * factor;
-        }
-        space.stretch(&v[..u.len()], x);
-    } else {
-        space.stretch(&u.iter().map(|&u| u * factor).collect::<Vec<_>>(), x);
-    }
-}
-
-/// The defect at the seam of a closed curve: the left side comes from the last node.
+/// The residual where a closed curve closes: the left side comes from the last node.
 fn close<S: Scalar>(
     space: &Erased,
     chain: &mut Chain,
@@ -228,7 +180,7 @@ fn close<S: Scalar>(
     let NodeVectors { left, right, b: r, .. } = work;
     left.copy_from_slice(&all_r[n * m..]);
     right.copy_from_slice(&all_r[..m]);
-    chain.across_seam(space, false, left);
+    chain.across_closure(space, false, left);
     let h_left = chain.h[n - 1];
     join(space, h_left, h_right, &all_u[..m], left, right, r);
     all_r[..m].copy_from_slice(r);

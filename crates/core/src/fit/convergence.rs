@@ -1,7 +1,7 @@
 //! When an iteration has arrived, and its best iterate in case that it does not.
 
 use super::chain::Chain;
-use super::condition::Defect;
+use super::node::C2Residual;
 use crate::scalar::{LANES, Lane, few, lane, mask_bits};
 use crate::space::Erased;
 
@@ -10,7 +10,7 @@ use crate::space::Erased;
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 /// But a residual above this is never called rounding.
 const ROUNDING_MOST: f64 = 1e-9;
-/// Velocities below this part of |d|/h count as rest: defects are measured against it then.
+/// Velocities below this part of |d|/h count as rest: residuals are measured against it then.
 const STANDSTILL: f64 = 1e-3;
 /// Residuals are brought to this part of the tolerance: the jump of the acceleration at a knot is
 /// about twelve times the residual.
@@ -29,12 +29,12 @@ pub struct Convergence {
     pub done: Lane,
     /// Lanes that have arrived.
     pub converged: Lane,
-    /// The C² defect, relative to the largest speed.
+    /// The C² residual, relative to the largest speed.
     now: Lane,
     /// The same where a lane ended.
     pub residual: Lane,
-    /// The longest outer leg |h u/3| where a lane is.
-    pub leg: Lane,
+    /// The longest outer handle |h u/3| where a lane is.
+    pub handle: Lane,
     /// Residual evaluations.
     pub iterations: [usize; LANES],
     /// The second residual, the one to fall below, and how long that has not happened.
@@ -45,18 +45,18 @@ pub struct Convergence {
 
 impl Convergence {
     /// At the start; lanes in `idle` take no part.
-    pub fn new(chain: &Chain, tol: f64, idle: Lane) -> Self {
+    pub fn new(chain: &Chain, tol: Lane, idle: Lane) -> Self {
         let infinity = lane(f64::INFINITY);
         let rounding = (chain.condition * lane(ROUNDING)).min(lane(ROUNDING_MOST));
         Convergence {
-            tol: lane(tol),
-            aim: lane(tol * AIM),
-            floor: rounding.max(lane(tol)),
+            tol,
+            aim: tol * lane(AIM),
+            floor: rounding.max(tol),
             done: idle,
             converged: Lane::ZERO,
             now: infinity,
             residual: infinity,
-            leg: Lane::ZERO,
+            handle: Lane::ZERO,
             iterations: [0; LANES],
             second: infinity,
             mark: infinity,
@@ -64,15 +64,15 @@ impl Convergence {
         }
     }
 
-    /// Takes in the next defect.
-    pub fn note(&mut self, iteration: usize, Defect { defect, speed, leg }: Defect, pace: Lane) {
-        // A curve that stands still has neither speed nor defect; one that goes there and back may stand
+    /// Takes in the next residual.
+    pub fn note(&mut self, iteration: usize, C2Residual { residual, speed, handle }: C2Residual, pace: Lane) {
+        // A curve that stands still has neither speed nor residual; one that goes there and back may stand
         // still at every knot, where rounding is all that there is of its velocities.
         let speed = speed.max(pace * lane(STANDSTILL));
-        let now = defect.simd_eq(Lane::ZERO).select(Lane::ZERO, defect / speed);
+        let now = residual.simd_eq(Lane::ZERO).select(Lane::ZERO, residual / speed);
         self.now = now;
         self.residual = self.done.select(self.residual, now);
-        self.leg = self.done.select(self.leg, leg);
+        self.handle = self.done.select(self.handle, handle);
         mask_bits(self.done).iter().zip(&mut self.iterations).for_each(|(done, i)| *i += usize::from(!done));
         let fallen = now.simd_lt(self.mark * lane(0.7));
         self.mark = fallen.select(now, self.mark);

@@ -1,74 +1,15 @@
-//! End conditions: what is asked for at an end, its row of the flat-space matrix T, and its defect.
+//! End conditions: the row of an end of the flat-space matrix T, and its residual.
 
-use super::End;
 use super::chain::Chain;
-use super::condition::{NodeVectors, length2, stretch_by};
-use crate::scalar::{LANES, Lane, Scalar, lane, mask_from};
+use super::end_kind::{ChainEnds, EndKind, of_kind};
+use super::node::NodeVectors;
+use super::vector::{length2, stretch_by};
+use crate::scalar::{LANES, Lane, Scalar, lane};
 use crate::space::{Erased, Origin};
 
 const ONE: Lane = Lane::ONE;
 const TWO: Lane = lane(2.0);
 const THIRD: Lane = lane(1.0 / 3.0);
-
-/// A condition at one end of an open curve, as it is solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EndKind {
-    /// The velocity is prescribed (the paper's clamped ends, (19)).
-    Velocity,
-    /// The covariant acceleration is prescribed; natural ends (20) prescribe zero.
-    Acceleration,
-    /// Not-a-knot in normal coordinates at the neighbouring knot.
-    NotAKnot,
-}
-
-/// The ends of eight chains: closed, or the kind at either end of each lane.
-#[derive(Clone, Copy)]
-pub enum ChainEnds {
-    /// The last node is the first one again.
-    Periodic,
-    /// First and last node, lane by lane.
-    Open([[EndKind; LANES]; 2]),
-}
-
-impl ChainEnds {
-    /// The lanes in which the velocity at a node of n segments is given.
-    pub fn given(&self, n: usize, node: usize) -> Lane {
-        match self {
-            ChainEnds::Open(kinds) if node == 0 => of_kind(&kinds[0], EndKind::Velocity),
-            ChainEnds::Open(kinds) if node == n => of_kind(&kinds[1], EndKind::Velocity),
-            _ => Lane::ZERO,
-        }
-    }
-}
-
-/// The lanes whose end is of a kind.
-pub fn of_kind(kinds: &[EndKind; LANES], kind: EndKind) -> Lane {
-    mask_from(|l| kinds[l] == kind)
-}
-
-impl<'a> End<'a> {
-    /// Whether Theorem 3.1 is about such ends.
-    pub fn is_of_the_theorem(&self) -> bool {
-        matches!(self, End::Natural | End::Velocity(_))
-    }
-
-    /// As it is solved.
-    pub fn kind(&self) -> EndKind {
-        match self {
-            End::Natural | End::Acceleration(_) => EndKind::Acceleration,
-            End::Velocity(_) => EndKind::Velocity,
-            End::NotAKnot => EndKind::NotAKnot,
-        }
-    }
-
-    /// The vectors that it prescribes.
-    pub fn values(&self) -> Option<&'a [f64]> {
-        match self {
-            End::Velocity(v) | End::Acceleration(v) => Some(v),
-            End::Natural | End::NotAKnot => None,
-        }
-    }
-}
 
 /// One of the ends of a chain of n segments: its node and the neighbour, the segment between them, and the next one.
 pub(super) struct Place {
@@ -101,8 +42,8 @@ pub fn row(chain: &Chain, which: usize, kinds: &[EndKind; LANES]) -> (Lane, Lane
     )
 }
 
-/// The defect at an open end; `all_r` holds the one side that is there. Returns its squared size.
-pub fn defect<S: Scalar>(
+/// The residual at an open end; `all_r` holds the side of its only segment. Returns its squared size.
+pub fn residual<S: Scalar>(
     space: &Erased,
     chain: &Chain,
     all_u: &[S],

@@ -6,7 +6,7 @@ use crate::matrix::GAUSS;
 use crate::scalar::{Jet, Lane, lane};
 use crate::space::{Ambient, Erased, Frame};
 
-/// The energy of each lane, in the units of the chain. Every segment is carried home in parallel to the
+/// The energy of each lane, in the units of the chain. Every segment is transported home in parallel to the
 /// first point, which changes no length where there is a metric; elsewhere lengths are those that frames see.
 pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
     let (n, m, len) = (chain.n, chain.m, space.point_len());
@@ -26,9 +26,9 @@ pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
             segment.ends[0].copy_from_slice(p);
             let [_, q] = &mut segment.ends;
             space.ray(p, &along, Lane::ONE, q);
-            space.tangent(frame, p, &third(i), &mut segment.legs[0]);
+            space.tangent(frame, p, &third(i), &mut segment.handles[0]);
             space.tangent(frame, p, &third(i + 1), &mut behind);
-            space.carry(p, &segment.ends[1], &along, &behind, &mut segment.legs[1]);
+            space.parallel_transport(p, &segment.ends[1], &along, &behind, &mut segment.handles[1]);
             segment.prepare(space, len);
             for (s, weight) in GAUSS {
                 segment.at(space, len, Jet { v: lane(s), d: Lane::ONE, dd: Lane::ZERO }, &mut gamma);

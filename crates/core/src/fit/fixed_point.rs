@@ -5,12 +5,15 @@
 //! r of `condition.rs`, (17) is one step of Jacobi's iteration on the flat-space matrix T,
 //! `uᵢ ← uᵢ + 3rᵢ/(2/hᵢ₋₁ + 2/hᵢ)`, which extends it to any knots and to closed curves.
 
-use super::Solver;
 use super::chain::Chain;
-use super::condition::{NodeVectors, residual, stretch_by};
+use super::condition::residual;
 use super::convergence::Convergence;
-use super::ends::{ChainEnds, EndKind, NotAKnot, Place, of_kind};
+use super::end_kind::{ChainEnds, EndKind, of_kind};
+use super::ends::{NotAKnot, Place};
+use super::node::NodeVectors;
+use super::problem::Solver;
 use super::solve::{Limits, Outcome, Workspace};
+use super::vector::stretch_by;
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, lane};
 use crate::space::{Erased, Origin};
@@ -39,7 +42,7 @@ pub fn solve(
         }
         let found = residual(space, chain, ends, &mut work.vectors);
         state.note(iteration, found, chain.pace);
-        broken |= !found.defect.is_finite() & !state.done;
+        broken |= !found.residual.is_finite() & !state.done;
         state.leave(broken | limits.reached(iteration));
         if state.done.all() || monitor.poll() {
             state.end();
@@ -111,9 +114,9 @@ fn end_velocity(
         }
         let (chord, prepared) = (&chain.chord[near * m..][..m], &chain.prepared[near * keep..][..keep]);
         if which == 0 {
-            space.legs(chord, prepared, a, b, left, right);
+            space.inner_handles(chord, prepared, a, b, left, right);
         } else {
-            space.legs(chord, prepared, b, a, right, left);
+            space.inner_handles(chord, prepared, b, a, right, left);
         }
         let mut pull = given.clone();
         if curved.any() {

@@ -4,9 +4,9 @@
 //! λ = 1 it is the one asked for; Newton's method follows it in between. Points that are far apart have
 //! several splines; this one is continued from points that are near.
 
-use super::Solver;
 use super::chain::Chain;
-use super::ends::ChainEnds;
+use super::end_kind::ChainEnds;
+use super::problem::Solver;
 use super::solve::{Limits, Outcome, Workspace, solve};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, lane, mask_from};
@@ -34,7 +34,7 @@ pub fn follow(
     let idle = outcome.settled(idle);
     // On the way curves need not be exact.
     let within = |used: Lane, most: usize, tol: f64| Limits {
-        tol: limits.tol.max(tol),
+        tol: limits.tol.max(lane(tol)),
         max_iter: (limits.max_iter - used).min(lane(most as f64)),
     };
     let (chords, values) = (chain.chord.clone(), chain.end_values.clone());

@@ -2,11 +2,12 @@
 
 use super::auto;
 use super::chain::{Chain, Run};
-use super::ends::{ChainEnds, EndKind, few_points, of_kind};
-use super::legs::noisy_legs;
-use super::pieces::Piece;
+use super::end_kind::{ChainEnds, EndKind, of_kind};
+use super::ends::few_points;
+use super::handles::noisy_handles;
+use super::piece::Piece;
+use super::problem::{Ends, Options, Problem, Report, Status};
 use super::solve::Workspace;
-use super::{Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, dot, few, lane, mask_from, scatter};
 use crate::space::{Ambient, Erased};
@@ -47,7 +48,7 @@ fn fit_in(
     let nodes = group[0].nodes;
     // Lanes that are left over repeat the first piece.
     let piece = |l: usize| &group[if l < group.len() { l } else { 0 }];
-    let runs: [Run; LANES] = few(|l| problem.run(piece(l), space.point_len()));
+    let runs: [Run; LANES] = few(|l| piece(l).run(problem, space.point_len()));
     let is_end = |l: usize| {
         let (p, last) = (piece(l), problem.segments(piece(l).curve));
         [p.first == 0, p.first + nodes == last + 1]
@@ -85,9 +86,9 @@ fn fit_in(
     let outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
     let alternative = (outcome.alternative * chain.unit_of_energy()).to_array();
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
-    let noisy = noisy_legs(space, chain, &runs, outcome.leg);
+    let noisy = noisy_handles(space, chain, &runs, outcome.handle);
     let steps = chain.max_step.to_array();
-    let given = given_legs(chain, &ends);
+    let given = given_handles(chain, &ends);
     let condition = chain.condition.to_array();
     for (l, p) in group.iter_mut().enumerate() {
         let status = if let Some((index, angle)) = cut[l] {
@@ -115,10 +116,10 @@ fn fit_in(
             condition: condition[l],
             ..Report::default()
         };
-        p.end_leg = given[l];
+        p.end_handle = given[l];
     }
     let runs: [Run; LANES] =
-        few(|l| problem.run(&group[if l < group.len() { l } else { 0 }], space.point_len()));
+        few(|l| group[if l < group.len() { l } else { 0 }].run(problem, space.point_len()));
     write_velocities(space, chain, &runs, group);
 }
 
@@ -139,15 +140,15 @@ fn write_velocities(space: &Erased, chain: &mut Chain, runs: &[Run; LANES], grou
     });
 }
 
-/// The longer of the legs h|u|/3 at ends with a given velocity, lane by lane.
-fn given_legs(chain: &Chain, ends: &ChainEnds) -> [f64; LANES] {
+/// The longer of the handles h|u|/3 at ends with a given velocity, lane by lane.
+fn given_handles(chain: &Chain, ends: &ChainEnds) -> [f64; LANES] {
     let ChainEnds::Open(kinds) = ends else { return [0.0; LANES] };
     let (n, m) = (chain.n, chain.m);
     let mut longest = Lane::ZERO;
     for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
         let u = &chain.velocities()[node * m..(node + 1) * m];
-        let leg = dot(u, u).sqrt() * chain.h[segment] * lane(1.0 / 3.0);
-        longest = of_kind(kinds, EndKind::Velocity).select(longest.max(leg), longest);
+        let handle = dot(u, u).sqrt() * chain.h[segment] * lane(1.0 / 3.0);
+        longest = of_kind(kinds, EndKind::Velocity).select(longest.max(handle), longest);
     }
     longest.to_array()
 }

@@ -1,19 +1,19 @@
-//! How far a step goes: half of one that makes the defect worse is taken back, and half of that again.
+//! How far a step goes: half of one that makes the residual worse is taken back, and half of that again.
 
 use crate::scalar::{Lane, lane, mask_from};
 
-/// By how much a mixed step may let the defect grow before it is taken back.
+/// By how much a mixed step may let the residual grow before it is taken back.
 const GROWTH_MIXED: f64 = 2.0;
 /// How often a step is halved before it is taken as it is.
 const MAX_TRIES: f64 = 6.0;
 
 /// Eight line searches.
 pub struct LineSearch {
-    /// The defect that must not be exceeded.
+    /// The residual that must not be exceeded.
     last: Lane,
     /// How often the step was taken back.
     tries: Lane,
-    /// That defect's quotient by the one before.
+    /// That residual's quotient by the one before.
     pub contraction: Lane,
 }
 
@@ -24,13 +24,13 @@ impl LineSearch {
     }
 
     /// The lanes whose last step must be taken back in part; lanes in `mixed` may grow a little.
-    pub fn judge(&mut self, iteration: usize, defect: Lane, mixed: Lane, done: Lane) -> Lane {
-        // The first two defects belong to no step that could be judged.
+    pub fn judge(&mut self, iteration: usize, residual: Lane, mixed: Lane, done: Lane) -> Lane {
+        // The first two residuals belong to no step that could be judged.
         let early = mask_from(|_| iteration <= 2);
         let allowed = self.last * mixed.select(lane(GROWTH_MIXED), Lane::ONE);
-        let worse = !defect.simd_le(allowed) & !done & self.tries.simd_lt(lane(MAX_TRIES)) & !early;
-        self.contraction = worse.select(self.contraction, defect / self.last);
-        self.last = worse.select(self.last, defect);
+        let worse = !residual.simd_le(allowed) & !done & self.tries.simd_lt(lane(MAX_TRIES)) & !early;
+        self.contraction = worse.select(self.contraction, residual / self.last);
+        self.last = worse.select(self.last, residual);
         self.tries = worse.select(self.tries + Lane::ONE, Lane::ZERO);
         worse
     }

@@ -1,13 +1,14 @@
 //! Newton's method: the Jacobian of the C² condition by dual numbers, block by block.
 //!
-//! The defect at a node depends on the velocities there and at its two neighbours, so that the Jacobian
+//! The residual at a node depends on the velocities there and at its two neighbours, so that the Jacobian
 //! is block tridiagonal, cyclic for closed curves. One sweep with dual numbers differentiates by one
 //! coordinate at every third node at once.
 
 use super::blocks::Blocks;
 use super::chain::Chain;
-use super::condition::{NodeVectors, sweep};
-use super::ends::ChainEnds;
+use super::condition::sweep;
+use super::end_kind::ChainEnds;
+use super::node::NodeVectors;
 use crate::monitor::checkpoint;
 use crate::scalar::{Dual, Lane, Scalar};
 use crate::space::Erased;
@@ -21,13 +22,13 @@ pub struct Newton {
     r: Vec<Dual>,
 }
 
-/// `step ← −J⁻¹ r` for the defect in `chain.r`.
+/// `step ← −J⁻¹ r` for the residual in `chain.r`.
 pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [Lane]) {
     newton.differentiate(space, chain, ends);
     solve(chain, ends, newton, step);
 }
 
-/// The same with the Jacobian that is there, which it overwrites.
+/// The same with an existing Jacobian, which it overwrites.
 pub fn solve(chain: &Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [Lane]) {
     step.copy_from_slice(&chain.r[..step.len()]);
     let (n, m) = (chain.n, chain.m);
@@ -41,7 +42,7 @@ pub fn solve(chain: &Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [L
 }
 
 impl Newton {
-    /// Fills the blocks with the derivatives of the defect.
+    /// Fills the blocks with the derivatives of the residual.
     pub(super) fn differentiate(&mut self, space: &Erased, chain: &mut Chain, ends: &ChainEnds) {
         let (n, m) = (chain.n, chain.m);
         let closed = matches!(ends, ChainEnds::Periodic);
@@ -49,7 +50,7 @@ impl Newton {
         self.blocks.clear(nodes, m);
         let zero = Dual::constant(Lane::ZERO);
         self.r.resize(chain.r.len(), zero);
-        // No node has two neighbours (itself included) of one colour; those before the seam are special.
+        // No node has two neighbours (itself included) of one colour; the last two of a closed curve are special.
         let color = |i: usize| if closed && i + 2 >= n { 3 + (n - 1 - i) } else { i % 3 };
         for c in 0..if closed { 5 } else { 3 } {
             if !(0..nodes).any(|i| color(i) == c) {
@@ -64,7 +65,7 @@ impl Newton {
                 if closed {
                     let (first, last) = self.u.split_at_mut(n * m);
                     let mut seed: Vec<Lane> = first[..m].iter().map(|u| u.d).collect();
-                    chain.across_seam(space, true, &mut seed);
+                    chain.across_closure(space, true, &mut seed);
                     last.iter_mut().zip(seed).for_each(|(u, d)| u.d = d);
                 }
                 checkpoint();

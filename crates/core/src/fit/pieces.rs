@@ -6,12 +6,12 @@
 
 use super::certificate::{contraction_bound, equally_spaced, guaranteed_sweeps, invariant_radius};
 use super::lanes::fit_lanes;
-use super::{End, Ends, Options, Problem, Report, Status};
+use super::piece::Piece;
+use super::problem::{End, Ends, Options, Problem, Report, Status};
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::LANES;
 use crate::space::{Ambient, Erased, Origin};
-use std::ops::Range;
 
 /// Nodes of a piece without its overlap, at most.
 const CORE: usize = 480;
@@ -19,28 +19,6 @@ const CORE: usize = 480;
 pub const OVERLAP: usize = 32;
 /// Nodes times dimensions from which threads pay: about a fifth of a millisecond's work.
 const PARALLEL: usize = 8192;
-
-/// Part of a curve: nodes `first..first + nodes`, of which `core` (counted from `first`) are its own.
-pub struct Piece<'a> {
-    /// Which curve.
-    pub curve: usize,
-    /// The first node.
-    pub first: usize,
-    /// Number of nodes.
-    pub nodes: usize,
-    /// The nodes of its own.
-    pub core: Range<usize>,
-    /// Where the velocities of the core go.
-    pub velocities: &'a mut [f64],
-    /// How it went.
-    pub report: Report,
-    /// The velocity just behind the core, which belongs to the next piece: they must agree.
-    pub next_velocity: Vec<f64>,
-    /// The largest number in the velocities of the core.
-    pub largest: f64,
-    /// The longer of the legs h|u|/3 at ends with a given velocity.
-    pub end_leg: f64,
-}
 
 /// Fits some curves, whole or in pieces with a given overlap; returns those whose pieces do not agree.
 pub fn fit_cut(
@@ -120,7 +98,7 @@ fn cut<'a>(
             report: Report::default(),
             next_velocity: Vec::new(),
             largest: 0.0,
-            end_leg: 0.0,
+            end_handle: 0.0,
         });
         from = to;
     }
@@ -163,8 +141,8 @@ fn merge(
         }
         if let ([first, .., last], Ends::Periodic) = (same, problem.ends) {
             // The last knot is the first again.
-            let carried = problem.across_seam(space, curve, &first.velocities[..len]);
-            for (a, b) in carried.iter().zip(&last.velocities[last.velocities.len() - len..]) {
+            let transported = problem.across_closure(space, curve, &first.velocities[..len]);
+            for (a, b) in transported.iter().zip(&last.velocities[last.velocities.len() - len..]) {
                 mismatch = mismatch.max((a - b).abs());
             }
         }
@@ -179,9 +157,9 @@ fn merge(
         report.almost_cut = report.almost_cut.map(|(index, angle)| (around(index), angle));
         let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
         if known && equally_spaced(problem.knots(curve)) {
-            let leg = same.iter().map(|p| p.end_leg).fold(0.0, f64::max);
+            let handle = same.iter().map(|p| p.end_handle).fold(0.0, f64::max);
             let curvature = space.curvature();
-            if let Some(radius) = invariant_radius(report.max_step, curvature, leg) {
+            if let Some(radius) = invariant_radius(report.max_step, curvature, handle) {
                 report.invariant_radius = radius;
                 if let Some(alpha) = contraction_bound(report.max_step, curvature, radius) {
                     report.contraction_bound = alpha;

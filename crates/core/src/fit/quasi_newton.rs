@@ -5,7 +5,7 @@
 //! factor is not small, Anderson mixing (type II; Walker & Ni 2011) of the last few updates takes over.
 
 use super::chain::Chain;
-use super::ends::ChainEnds;
+use super::end_kind::ChainEnds;
 use super::tridiagonal::Tridiagonal;
 use crate::scalar::{Lane, lane};
 use crate::space::Erased;

@@ -3,7 +3,7 @@
 //! Where spaces open up exponentially, velocities that are right to the last digit make a curve that is not: a
 //! segment's geodesics multiply rounding errors at its start by the exponential of its length.
 
-use super::Problem;
+use super::problem::Problem;
 use crate::curve::Segment;
 use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, max_or_nan};
 use crate::space::{Ambient, Erased};
@@ -39,8 +39,8 @@ pub fn missed(
         let h = Lane::new(at.map(|i| t[i + 1] - t[i]));
         for e in 0..2 {
             rows(problem.points, at.map(|i| first + i + e), &mut segment.ends[e]);
-            rows(velocities, at.map(|i| i + e), &mut segment.legs[e]);
-            segment.legs[e].iter_mut().for_each(|x| *x *= h / 3.0);
+            rows(velocities, at.map(|i| i + e), &mut segment.handles[e]);
+            segment.handles[e].iter_mut().for_each(|x| *x *= h / 3.0);
         }
         segment.prepare(space, len);
         segment.at(space, len, Dual::from_parts([Lane::ONE, Lane::ONE, Lane::ZERO]), &mut gamma);
@@ -53,7 +53,7 @@ pub fn missed(
         far = max_or_nan(far, space.inner(&p, &apart, &apart).abs().sqrt() / h);
         // As a vector at the array that stands for the next point.
         let still = vec![Lane::ZERO; len];
-        space.carry(&p, &segment.ends[1], &still, &v, &mut apart);
+        space.parallel_transport(&p, &segment.ends[1], &still, &v, &mut apart);
         rows(velocities, at.map(|i| i + 1), &mut u);
         apart.iter_mut().zip(&u).for_each(|(v, u)| *v -= *u);
         let length = |v: &[Lane]| space.inner(&segment.ends[1], v, v).abs().sqrt();

@@ -1,27 +1,28 @@
 //! The iteration that quasi-Newton and Newton share: residual, convergence lane by lane, step.
 
 use super::chain::Chain;
-use super::condition::{NodeVectors, residual};
+use super::condition::residual;
 use super::convergence::{Best, Convergence};
-use super::ends::ChainEnds;
-use super::legs::{long_legs, shorten};
+use super::end_kind::ChainEnds;
+use super::handles::{long_handles, shorten};
 use super::line_search::{LineSearch, halve};
 use super::newton::{self, Newton};
+use super::node::NodeVectors;
+use super::problem::{Solver, SolverSet, Status};
 use super::quasi_newton::{self, Anderson};
 use super::tridiagonal::Tridiagonal;
-use super::{Solver, Status};
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, few, lane, mask_bits, mask_from};
 use crate::space::{Ambient, Erased};
 
-/// Outer legs are kept within this part of the distance to the cut locus while iterating.
-const LEG_LIMIT: f64 = 0.95;
+/// Outer handles are kept within this part of the distance to the cut locus while iterating.
+const HANDLE_LIMIT: f64 = 0.95;
 
 /// How far an iteration goes.
 #[derive(Clone, Copy)]
 pub struct Limits {
     /// Largest residual that counts as converged.
-    pub tol: f64,
+    pub tol: Lane,
     /// Largest number of residual evaluations of each lane.
     pub max_iter: Lane,
 }
@@ -38,14 +39,14 @@ impl Limits {
 pub struct Outcome {
     /// Residual evaluations.
     pub iterations: [usize; LANES],
-    /// The C² defect, relative to the largest speed.
+    /// The C² residual, relative to the largest speed.
     pub residual: Lane,
-    /// Whether the residual is below the tolerance or at the rounding floor, and no leg too long.
+    /// Whether the residual is below the tolerance or at the rounding floor, and no handle too long.
     pub converged: [bool; LANES],
-    /// Legs that are too long although the residual is not.
+    /// Handles that are too long although the residual is not.
     pub fault: [Option<Status>; LANES],
-    /// The longest outer leg |h u/3|.
-    pub leg: Lane,
+    /// The longest outer handle |h u/3|.
+    pub handle: Lane,
     /// Mean contraction per iteration.
     pub rate: Lane,
     /// Which solver got there.
@@ -56,29 +57,18 @@ pub struct Outcome {
     pub skipped: [SolverSet; LANES],
 }
 
-/// A set of solvers, one bit for each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SolverSet(pub u8);
-
-impl SolverSet {
-    /// The solvers of either set.
-    pub fn union(self, other: Self) -> Self {
-        SolverSet(self.0 | other.0)
-    }
-}
-
 impl Outcome {
     /// How an iteration ended, whose last iterate the chain has.
     /// Control points are checked on the lanes of `suspect`.
     pub fn of(space: &Erased, chain: &mut Chain, state: &Convergence, solver: Solver, suspect: Lane) -> Self {
-        let fault = long_legs(space, chain, state.leg, suspect);
+        let fault = long_handles(space, chain, state.handle, suspect);
         let converged = mask_bits(state.converged);
         Outcome {
             iterations: state.iterations,
             residual: state.residual,
             converged: few(|l| converged[l] && fault[l].is_none()),
             fault,
-            leg: state.leg,
+            handle: state.handle,
             rate: state.rate(),
             solver: [solver; LANES],
             alternative: lane(f64::NAN),
@@ -105,7 +95,7 @@ impl Outcome {
             residual: lane(f64::INFINITY),
             converged: [false; LANES],
             fault: [None; LANES],
-            leg: Lane::ZERO,
+            handle: Lane::ZERO,
             rate: Lane::ZERO,
             solver: [solver; LANES],
             alternative: lane(f64::NAN),
@@ -150,7 +140,7 @@ impl Outcome {
         let (better, on) = (mask_bits(mask), mask_bits(on));
         self.residual = mask.select(found.residual, self.residual);
         self.rate = mask.select(found.rate, self.rate);
-        self.leg = mask.select(found.leg, self.leg);
+        self.handle = mask.select(found.handle, self.handle);
         for l in 0..LANES {
             self.iterations[l] += if on[l] { found.iterations[l] } else { 0 };
             if better[l] {
@@ -193,7 +183,7 @@ pub fn solve(
     for vector in [&mut *step, &mut *next_step] {
         vector.resize(chain.unknowns().len(), Lane::ZERO);
     }
-    let limit = space.cut_angle() * LEG_LIMIT;
+    let limit = space.cut_angle() * HANDLE_LIMIT;
     let mut state = Convergence::new(chain, limits.tol, idle);
     let mut search = LineSearch::new();
     for iteration in 1.. {
@@ -207,7 +197,7 @@ pub fn solve(
         }
 
         let done = state.done;
-        let worse = search.judge(iteration, found.defect, anderson.active(), done);
+        let worse = search.judge(iteration, found.residual, anderson.active(), done);
         if !worse.all() {
             match solver {
                 Solver::QuasiNewton => {
@@ -223,7 +213,7 @@ pub fn solve(
             anderson.forget(worse);
             halve(worse, step, next_step);
         }
-        let long = state.leg.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))) & !done;
+        let long = state.handle.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))) & !done;
         chain.update(space, |chain, u| {
             for ((u, s), n) in u.iter_mut().zip(&mut *step).zip(&*next_step) {
                 *u = done.select(*u, *u + *n);

@@ -4,7 +4,8 @@
 //! `1/hᵢ₋₁, 2/hᵢ₋₁ + 2/hᵢ, 1/hᵢ`: the matrix of the classical cubic spline.
 
 use super::chain::Chain;
-use super::ends::{self, ChainEnds};
+use super::end_kind::ChainEnds;
+use super::ends;
 use crate::scalar::{Lane, lane};
 use crate::space::Erased;
 use crate::with_size;
@@ -108,7 +109,7 @@ impl Tridiagonal {
             // rhs = f₀ − y₁/h₀ − H⁻¹ yₙ₋₁/hₙ₋₁
             self.rhs.clear();
             self.rhs.extend_from_slice(&f[(n - 1) * m..n * m]);
-            chain.across_seam(space, false, &mut self.rhs);
+            chain.across_closure(space, false, &mut self.rhs);
             for c in 0..m {
                 self.rhs[c] = f[c] - self.upper[0] * f[m + c] - self.lower[0] * self.rhs[c];
             }
@@ -121,14 +122,14 @@ impl Tridiagonal {
             self.x.extend(self.rhs.iter().map(|&x| x * inverse));
             for _ in 0..20 {
                 f[..m].copy_from_slice(&self.x);
-                chain.across_seam(space, true, &mut f[..m]);
-                chain.across_seam(space, false, &mut self.x);
+                chain.across_closure(space, true, &mut f[..m]);
+                chain.across_closure(space, false, &mut self.x);
                 for c in 0..m {
                     self.x[c] = (self.rhs[c] - coupling * (f[c] + self.x[c])) * inverse;
                 }
             }
             f[..m].copy_from_slice(&self.x);
-            chain.across_seam(space, true, &mut self.x);
+            chain.across_closure(space, true, &mut self.x);
             for i in 1..n {
                 for c in 0..m {
                     f[i * m + c] += alpha[i] * f[c] + beta[i] * self.x[c];

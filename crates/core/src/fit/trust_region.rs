@@ -1,21 +1,23 @@
-//! Least squares of the C² defect in a trust region: Powell's dogleg (1970) with the block tridiagonal Jacobian.
+//! Least squares of the C² residual in a trust region: Powell's dogleg (1970) with the block tridiagonal Jacobian.
 //!
 //! It gets from zero velocities to a curve where Newton's method is thrown about: every step is one that makes the
-//! defect smaller, in the region where its linear model was seen to hold.
+//! residual smaller, in the region where its linear model was seen to hold.
 
 use super::chain::Chain;
-use super::condition::{Defect, residual};
+use super::condition::residual;
 use super::convergence::Convergence;
-use super::ends::{ChainEnds, EndKind, of_kind};
-use super::legs::shorten;
+use super::end_kind::{ChainEnds, EndKind, of_kind};
+use super::handles::shorten;
+use super::newton;
+use super::node::C2Residual;
+use super::problem::Solver;
 use super::solve::{Limits, Outcome, Workspace};
-use super::{Solver, newton};
 use crate::monitor::Monitor;
 use crate::scalar::{Lane, dot, lane};
 use crate::space::{Ambient, Erased};
 
-/// Outer legs are kept within this part of the distance to the cut locus.
-const LEG_LIMIT: f64 = 0.999;
+/// Outer handles are kept within this part of the distance to the cut locus.
+const HANDLE_LIMIT: f64 = 0.999;
 /// Parts of the predicted gain from which on a step is taken, and the region made larger or smaller.
 const TAKEN: f64 = 1e-4;
 const POOR: f64 = 0.25;
@@ -25,9 +27,9 @@ const FIRST: f64 = 0.1;
 /// A region of this part of the velocities holds no further step.
 const SMALLEST: f64 = 1e-12;
 
-/// The linear model of the defect where an iteration stands.
+/// The linear model of the residual where an iteration stands.
 struct Model {
-    /// Half the gradient of the squared defect, and what the Jacobian makes of it.
+    /// Half the gradient of the squared residual, and what the Jacobian makes of it.
     gradient: Vec<Lane>,
     image2: Lane,
     /// The step of Newton's method.
@@ -46,13 +48,13 @@ pub fn solve(
 ) -> Outcome {
     let count = chain.unknowns().len();
     let weights = weights(chain, ends);
-    let limit = space.cut_angle() * LEG_LIMIT;
+    let limit = space.cut_angle() * HANDLE_LIMIT;
     let mut state = Convergence::new(chain, limits.tol, idle);
     let zeros = || vec![Lane::ZERO; count];
     let mut model = Model { gradient: zeros(), image2: Lane::ONE, newton: zeros() };
     let mut here = chain.unknowns().to_vec();
     let infinity = lane(f64::INFINITY);
-    let mut defect = Defect { defect: infinity, speed: Lane::ONE, leg: Lane::ZERO };
+    let mut reached = C2Residual { residual: infinity, speed: Lane::ONE, handle: Lane::ZERO };
     let (mut square, mut gain, mut length) = (infinity, infinity, Lane::ZERO);
     let mut radius = chain.pace * lane(FIRST);
     let least = chain.pace * lane(SMALLEST);
@@ -63,10 +65,10 @@ pub fn solve(
         let part = square.simd_eq(infinity).select(Lane::ONE, (square - now) / gain);
         let taken = part.simd_gt(lane(TAKEN)) & now.simd_lt(infinity) & !state.done;
         let keep = |new: Lane, old: Lane| taken.select(new, old);
-        defect = Defect {
-            defect: keep(found.defect, defect.defect),
-            speed: keep(found.speed, defect.speed),
-            leg: keep(found.leg, defect.leg),
+        reached = C2Residual {
+            residual: keep(found.residual, reached.residual),
+            speed: keep(found.speed, reached.speed),
+            handle: keep(found.handle, reached.handle),
         };
         for (h, u) in here.iter_mut().zip(chain.unknowns()) {
             *h = keep(*u, *h);
@@ -75,7 +77,7 @@ pub fn solve(
         let shrunk = !part.simd_ge(lane(POOR));
         let grown = part.simd_gt(lane(GOOD)) & length.simd_gt(radius * lane(0.99));
         radius = shrunk.select(length * lane(POOR), grown.select(radius * lane(2.0), radius));
-        state.note(iteration, defect, chain.pace);
+        state.note(iteration, reached, chain.pace);
         state.leave(radius.simd_le(least) | limits.reached(iteration));
         if state.done.all() || monitor.poll() {
             state.end();
@@ -100,14 +102,14 @@ pub fn solve(
     Outcome::of(space, chain, &state, Solver::TrustRegion, converged)
 }
 
-/// What the defect of a node is multiplied by to make it a velocity.
+/// What the residual of a node is multiplied by to make it a velocity.
 fn weights(chain: &Chain, ends: &ChainEnds) -> Vec<Lane> {
     let n = chain.n;
     let joint = |a: usize, b: usize| chain.h[a] * chain.h[b] / (chain.h[a] + chain.h[b]);
     let mut weights: Vec<Lane> = (0..=n).map(|i| joint((i + n - 1) % n, i % n)).collect();
     if let ChainEnds::Open(kinds) = ends {
         for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
-            // There the defect is a velocity, or a third of one.
+            // There the residual is a velocity, or a third of one.
             let given = of_kind(kinds, EndKind::Velocity) | of_kind(kinds, EndKind::NotAKnot);
             weights[node] = given.select(lane(3.0), chain.h[segment]);
         }
@@ -119,7 +121,7 @@ fn weighted2(r: &[Lane], weights: &[Lane], m: usize) -> Lane {
     r.chunks_exact(m).zip(weights).fold(Lane::ZERO, |sum, (r, w)| sum + dot(r, r) * *w * *w)
 }
 
-/// Makes the model of the defect in `chain.r` on the lanes of a mask.
+/// Makes the model of the residual in `chain.r` on the lanes of a mask.
 fn linearise(
     space: &Erased,
     chain: &mut Chain,
@@ -148,7 +150,7 @@ fn linearise(
     model.image2 = lanes.select(weighted2(&image, weights, m), model.image2);
 }
 
-/// A step `newton · n − gradient · g`, its length, and by how much it should lower the squared defect.
+/// A step `newton · n − gradient · g`, its length, and by how much it should lower the squared residual.
 struct Step {
     newton: Lane,
     gradient: Lane,

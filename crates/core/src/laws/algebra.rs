@@ -1,7 +1,7 @@
 //! Laws of the triple product.
 
 use super::draw::{Draw, combined, exp, minus, norm, rounding, scaled, tangent_at};
-use super::{Verdict, within};
+use super::verdict::{Verdict, within};
 use crate::scalar::{Lane, dot, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 
@@ -29,7 +29,7 @@ pub fn lie_triple(space: &Erased, draw: &mut Draw) -> Verdict {
 }
 
 pub fn holonomy(space: &Erased, draw: &mut Draw) -> Verdict {
-    // A vector that is carried around a small triangle turns by its area times the curvature; at both ways
+    // A vector that is transported around a small triangle turns by its area times the curvature; at both ways
     // round and two sizes, what is left is of the fourth order.
     let p = draw.point(space);
     let [a, b, c] = [(); 3].map(|()| draw.unit(space));
@@ -111,7 +111,7 @@ pub fn stretch(space: &Erased, draw: &mut Draw) -> Verdict {
         }
         let size = norm(&expected).max(Lane::ONE);
         within(norm(&minus(&found, &expected)), lane(50.0 * f64::EPSILON) * size, "S(v)x by its series")?;
-        // S(v) = E_p(−v) ∘ D exp_p(v): how the end moves, carried back, by differences of order eight.
+        // S(v) = E_p(−v) ∘ D exp_p(v): how the end moves, transported back, by differences of order eight.
         let p = draw.point(space);
         let at = |s: f64| exp(space, &p, &tangent_at(space, &p, &combined(&v, s, &x)));
         let q = at(0.0);

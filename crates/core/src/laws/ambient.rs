@@ -3,7 +3,7 @@
 use super::draw::{
     Draw, STEPS, combined, distance, exp, is_other, length, log, minus, norm, rounding, scaled, tangent_at,
 };
-use super::{Verdict, within};
+use super::verdict::{Verdict, within};
 use crate::scalar::{Jet, LANES, Lane, lane};
 use crate::space::{Ambient, Erased, Origin};
 
@@ -141,16 +141,16 @@ pub fn geodesics(space: &Erased, draw: &mut Draw) -> Verdict {
     Ok(())
 }
 
-/// A curve through a jet at t = 0.3 has the velocity v of its start, carried along, and no acceleration.
+/// A curve through a jet at t = 0.3 has the velocity v of its start, transported along, and no acceleration.
 fn motion(space: &Erased, gamma: &[Jet], [start, v]: [&[Lane]; 2], allowed: Lane, what: &str) -> Verdict {
     let part = |f: fn(&Jet) -> Lane| -> Vec<Lane> { gamma.iter().map(f).collect() };
     let (p, raw, mut dd) = (part(|x| x.v), part(|x| x.d), part(|x| x.dd));
     let mut d = raw.clone();
     space.velocity(&p, &mut d);
     space.acceleration(&p, &raw, &mut dd);
-    let mut carried = v.to_vec();
-    space.carry(start, &p, &scaled(v, 0.3), v, &mut carried);
-    within(length(space, &p, &minus(&d, &carried)), allowed, &format!("velocity of {what}"))?;
+    let mut transported = v.to_vec();
+    space.parallel_transport(start, &p, &scaled(v, 0.3), v, &mut transported);
+    within(length(space, &p, &minus(&d, &transported)), allowed, &format!("velocity of {what}"))?;
     within(length(space, &p, &dd), allowed * lane(10.0), &format!("acceleration of {what}"))
 }
 
@@ -183,38 +183,38 @@ pub fn transport(space: &Erased, draw: &mut Draw) -> Verdict {
         let q = draw.representative(space, &q);
         let (v, _) = log(space, &p, &q);
         let (a, b) = (draw.vector(space, &p, 0.1), draw.vector(space, &p, 0.1));
-        let carried = |a: &[Lane]| {
+        let transported = |a: &[Lane]| {
             let mut out = vec![Lane::ZERO; p.len()];
-            space.carry(&p, &q, &v, a, &mut out);
+            space.parallel_transport(&p, &q, &v, a, &mut out);
             out
         };
-        let (at, bt) = (carried(&a), carried(&b));
+        let (at, bt) = (transported(&a), transported(&b));
         let allowed = rounding(space, 300.0, &[&p, &q], &x) * lane(1.0 / (1.0 - part));
         // K is NaN where no metric belongs to the space.
         if !space.curvature().is_nan() {
             let change = (space.inner(&p, &a, &b) - space.inner(&q, &at, &bt)).abs();
-            within(change, allowed, "inner product of what is carried")?;
+            within(change, allowed, "inner product of what is transported")?;
         }
         let mut tangent = at.clone();
         space.velocity(&q, &mut tangent);
         within(
             norm(&minus(&tangent, &at)),
             allowed * norm(&at).max(Lane::ONE),
-            "normal part of what is carried",
+            "normal part of what is transported",
         )?;
         // A geodesic carries its own velocity: to minus the logarithm of the way back.
         let back = log(space, &q, &p).0;
         within(
-            length(space, &q, &combined(&carried(&v), 1.0, &back)),
+            length(space, &q, &combined(&transported(&v), 1.0, &back)),
             allowed * lane(10.0),
-            "velocity carried along",
+            "velocity transported along",
         )?;
     }
     Ok(())
 }
 
 pub fn turning(space: &Erased, draw: &mut Draw) -> Verdict {
-    let (k, d) = (space.fibre(), if space.is_complex() { 2 } else { 1 });
+    let (k, d) = (space.fiber_rank(), if space.is_complex() { 2 } else { 1 });
     if k == 0 {
         return Ok(());
     }
@@ -267,9 +267,9 @@ fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Ver
     let x = draw.coordinates(space, part);
     let w = tangent_at(space, &p, &x);
     let q = exp(space, &p, &w);
-    let carried = {
+    let transported = {
         let mut out = vec![Lane::ZERO; p.len()];
-        space.carry(&p, &q, &w, &v, &mut out);
+        space.parallel_transport(&p, &q, &w, &v, &mut out);
         out
     };
     let at = |s: f64| -> Vec<Jet> {
@@ -277,7 +277,7 @@ fn derivatives_at(space: &Erased, draw: &mut Draw, part: f64, loose: f64) -> Ver
         let mut ends =
             [&p, &q].map(|p| p.iter().map(|&v| Jet { v, d: Lane::ZERO, dd: Lane::ZERO }).collect::<Vec<_>>());
         space.ray(&p, &u, t, &mut ends[0]);
-        space.ray(&q, &carried, t, &mut ends[1]);
+        space.ray(&q, &transported, t, &mut ends[1]);
         let mut out = ends[0].clone();
         let tau = Jet { v: lane(0.4 + 0.1 * s), d: lane(0.1), dd: Lane::ZERO };
         space.geodesic(&ends[0], &ends[1], tau, &mut out);

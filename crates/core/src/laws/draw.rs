@@ -42,7 +42,7 @@ impl Draw {
     /// A point.
     pub fn point(&mut self, space: &Erased) -> Vec<Lane> {
         let mut p = self.noise(space.point_len());
-        space.scatter(&mut p);
+        space.random_point(&mut p);
         p
     }
 
@@ -74,7 +74,7 @@ impl Draw {
         tangent_at(space, p, &x)
     }
 
-    /// The same point at another representative, if it has any: carried around a triangle. If it has none, the
+    /// The same point at another representative, if it has any: transported around a triangle. If it has none, the
     /// same array.
     pub fn representative(&mut self, space: &Erased, p: &[Lane]) -> Vec<Lane> {
         let mut q = p.to_vec();

@@ -1,7 +1,7 @@
 //! Laws of moving frames, and of the C² condition at the origin.
 
 use super::draw::{Draw, combined, exp, length, log, minus, norm, rounding, scaled, tangent_at};
-use super::{Verdict, within};
+use super::verdict::{Verdict, within};
 use crate::scalar::{Dual, Lane, lane};
 use crate::space::{Ambient, Erased, Frame, Origin};
 
@@ -69,12 +69,12 @@ pub fn parallel(space: &Erased, draw: &mut Draw) -> Verdict {
         let allowed = rounding(space, 500.0, &[&p, &q], &x) * lane(1.0 / (1.0 - part));
         let chord = moving.step(&q);
         within(norm(&minus(&chord, &x)), allowed, &format!("chord at {part} of the largest step"))?;
-        let mut carried = vec![Lane::ZERO; p.len()];
-        space.carry(&p, &q, &log(space, &p, &q).0, &w, &mut carried);
+        let mut transported = vec![Lane::ZERO; p.len()];
+        space.parallel_transport(&p, &q, &log(space, &p, &q).0, &w, &mut transported);
         within(
-            norm(&minus(&moving.coordinates(&carried), &y)),
+            norm(&minus(&moving.coordinates(&transported), &y)),
             allowed * lane(10.0),
-            &format!("coordinates of what is carried at {part} of the largest step"),
+            &format!("coordinates of what is transported at {part} of the largest step"),
         )?;
     }
     Ok(())
@@ -92,7 +92,7 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
         moving.step(&p);
         // As often as the fit does.
         if knot % space.dim().max(8) == 0 {
-            space.tidy(&mut moving.frame, &moving.p);
+            space.reorthonormalize(&mut moving.frame, &moving.p);
         }
     }
     // An error of the frame goes eightfold into a jump of the acceleration. Frames of motions and of invertible
@@ -105,12 +105,12 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
     is_frame(&moving, draw, rounding(space, 10.0, &[&p], &[]) * grown)
 }
 
-/// A chord and two legs, and w⁺ and w⁻.
+/// A chord and two handles, and w⁺ and w⁻.
 fn segment(space: &Erased, draw: &mut Draw, part: f64) -> [Vec<Lane>; 5] {
     let d = draw.coordinates(space, part);
     let [a, b] = [(); 2].map(|()| {
-        let leg = draw.coordinates(space, 0.2 * part);
-        combined(&scaled(&d, 1.0 / 3.0), 1.0, &leg)
+        let handle = draw.coordinates(space, 0.2 * part);
+        combined(&scaled(&d, 1.0 / 3.0), 1.0, &handle)
     });
     let [plus, minus] = legs_of(space, &d, &a, &b);
     [d, a, b, plus, minus]
@@ -121,11 +121,11 @@ fn legs_of(space: &Erased, d: &[Lane], a: &[Lane], b: &[Lane]) -> [Vec<Lane>; 2]
     space.prepare(d, &mut prepared);
     let mut w = [vec![Lane::ZERO; d.len()], vec![Lane::ZERO; d.len()]];
     let [plus, minus] = &mut w;
-    space.legs(d, &prepared, a, b, plus, minus);
+    space.inner_handles(d, &prepared, a, b, plus, minus);
     w
 }
 
-pub fn legs(space: &Erased, draw: &mut Draw) -> Verdict {
+pub fn inner_handles(space: &Erased, draw: &mut Draw) -> Verdict {
     for part in [1e-6, 1e-2, 0.3, 0.6] {
         let [d, a, b, plus, minus_leg] = segment(space, draw, part);
         let p = draw.point(space);
@@ -134,13 +134,13 @@ pub fn legs(space: &Erased, draw: &mut Draw) -> Verdict {
         let mut last = Moving::at(space, &p);
         last.step(&q);
         // w = log_p(E_p(−v)·q⁻), v = log_p(q⁺), and mirrored: (16).
-        for (here, there, leg, other, w) in [
+        for (here, there, handle, other, w) in [
             (&first, &last, &a, scaled(&b, -1.0), &plus),
             (&last, &first, &scaled(&b, -1.0), a.clone(), &minus_leg),
         ] {
             let control = exp(space, &there.p, &there.tangent(&other));
             let mut moved = vec![Lane::ZERO; p.len()];
-            space.transvect(&here.p, &scaled(&here.tangent(leg), -1.0), &control, &mut moved);
+            space.transvect(&here.p, &scaled(&here.tangent(handle), -1.0), &control, &mut moved);
             let expected = here.coordinates(&log(space, &here.p, &moved).0);
             let allowed = rounding(space, 500.0, &[&p, &q, &control, &moved], &d);
             within(norm(&minus(w, &expected)), allowed, &format!("w at {part} of the largest step"))?;
@@ -159,7 +159,7 @@ pub fn duals(space: &Erased, draw: &mut Draw) -> Verdict {
     let mut w = [seeded(&d, &d), seeded(&d, &d)];
     {
         let [plus, minus] = &mut w;
-        space.legs(&d, &prepared, &seeded(&a, &x), &seeded(&b, &y), plus, minus);
+        space.inner_handles(&d, &prepared, &seeded(&a, &x), &seeded(&b, &y), plus, minus);
     }
     let step = 1e-3;
     // Richardson's extrapolation of central differences.

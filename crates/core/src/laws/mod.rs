@@ -10,14 +10,12 @@ mod algebra;
 mod ambient;
 mod draw;
 mod frame;
+mod verdict;
 
 pub use draw::Draw;
+pub use verdict::Verdict;
 
-use crate::scalar::Lane;
 use crate::space::Erased;
-
-/// What a law found wrong.
-pub type Verdict = Result<(), String>;
 
 /// One law.
 pub type Law = fn(&Erased, &mut Draw) -> Verdict;
@@ -36,8 +34,8 @@ pub static LAWS: &[(&str, Law)] = &[
     ("coordinates and tangent vectors are inverse", frame::coordinates),
     ("a frame moves in parallel", frame::parallel),
     ("a frame stays one for 600 knots", frame::long_walk),
-    ("legs are the logarithms of the C2 condition", frame::legs),
-    ("duals carry the derivatives of the legs", frame::duals),
+    ("handles are the logarithms of the C2 condition", frame::inner_handles),
+    ("duals carry the derivatives of the handles", frame::duals),
     ("the deciding angle is that of the logarithm", frame::angle),
     ("the condition bounds the growth of errors", frame::condition),
     ("the triple product is a Lie triple", algebra::lie_triple),
@@ -56,15 +54,4 @@ pub fn check(space: &Erased, seed: u64) -> Vec<String> {
         law(space, &mut draw).err().map(|why| format!("{name}: {why}"))
     };
     LAWS.iter().enumerate().filter_map(run).collect()
-}
-
-/// The largest lane of `found`, where it is more than `allowed`.
-fn within(found: Lane, allowed: Lane, what: &str) -> Verdict {
-    let (found, allowed) = (found.to_array(), allowed.to_array());
-    for (f, a) in found.into_iter().zip(allowed) {
-        if !(f <= a) {
-            return Err(format!("{what}: {f:.2e} where {a:.2e} is allowed"));
-        }
-    }
-    Ok(())
 }

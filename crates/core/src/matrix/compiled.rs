@@ -4,30 +4,34 @@
 //! larger members, where a call through a pointer costs nothing beside them; without this table they were a tenth of the
 //! machine code.
 
-use super::{Dynamic, Matrix, Storage, series};
+use super::base::{Compiled, Dynamic, Matrix, Storage};
+use super::series;
 use crate::scalar::{Dual, Jet, Lane, Scalar};
+use smallvec::{SmallVec, smallvec};
 use std::any::Any;
 
-type Function<S, const D: usize, A> = fn(&Matrix<S, D, A>) -> Matrix<S, D, A>;
-type Functions<S, const D: usize, A> = fn(&Matrix<S, D, A>) -> [Matrix<S, D, A>; 2];
-type Product<S, const D: usize, A> = fn(&Matrix<S, D, A>, &Matrix<S, D, A>) -> Matrix<S, D, A>;
-type Choice<S, const D: usize, A> = fn(Lane, &Matrix<S, D, A>, &Matrix<S, D, A>) -> Matrix<S, D, A>;
-
-/// The functions, by their names; those that end with `_here` are compiled where they are called.
-pub struct Compiled<S: Scalar, const D: usize, A: Storage> {
-    pub(super) times: Product<S, D, A>,
-    pub(super) adjoint_times: Product<S, D, A>,
-    pub(super) times_adjoint: Product<S, D, A>,
-    pub(super) times_adjoint_hermitian: Product<S, D, A>,
-    pub(super) compose: Product<S, D, A>,
-    pub(super) plus: Product<S, D, A>,
-    pub(super) minus: Product<S, D, A>,
-    pub(super) scaled: fn(&Matrix<S, D, A>, Lane) -> Matrix<S, D, A>,
-    pub(super) select: Choice<S, D, A>,
-    pub(super) trig: Functions<S, D, A>,
-    pub(super) exp_minus_one: Function<S, D, A>,
-    pub(super) log_one_plus: Function<S, D, A>,
-    pub(super) arc: Function<S, D, A>,
+impl Storage for Dynamic {
+    const ANY: bool = true;
+    type Shape = (usize, usize);
+    type Of<T: Copy> = SmallVec<[T; 16]>;
+    fn shape(rows: usize, cols: usize) -> Self::Shape {
+        (rows, cols)
+    }
+    #[inline(always)]
+    fn size(shape: Self::Shape) -> (usize, usize) {
+        shape
+    }
+    fn filled<T: Copy>((rows, cols): Self::Shape, x: T) -> Self::Of<T> {
+        smallvec![x; rows * cols]
+    }
+    #[inline(always)]
+    fn collected<T: Copy>((rows, cols): Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
+        (0..rows * cols).map(f).collect()
+    }
+    #[inline(always)]
+    fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
+        Compiled::table()
+    }
 }
 
 impl<S: Scalar, const D: usize> Compiled<S, D, Dynamic> {

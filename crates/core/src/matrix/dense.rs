@@ -1,10 +1,11 @@
 //! What a point may need once: orthonormal columns, determinants, triangular factors.
 
-use super::{Entry, Matrix, Storage, Unary, by_size, function_of, inner_add, mul_add};
+use super::base::{Matrix, Storage};
+use super::entry::{Entry, inner_add, mul_add};
 use crate::scalar::{Each, LANES, Lane, few, lane};
 
 /// Makes the columns orthonormal by Gram and Schmidt, twice, so that they are so to rounding.
-pub fn orthonormalise<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
+pub fn orthonormalize<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
     let (rows, cols) = (a.rows(), a.cols());
     for j in 0..cols {
         for _ in 0..2 {
@@ -32,24 +33,9 @@ pub fn orthonormalise<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
 
 /// One step of Newton's method (Schulz 1933) for the unitary factor of a nearly unitary matrix, or
 /// one with nearly orthonormal columns: an error e becomes about e².
-pub fn reorthonormalise<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
-    let defect = a.adjoint_times(a).plus_identity(lane(-1.0)).scaled(lane(-0.5));
-    *a = &a.times(&defect) + a;
-}
-
-/// The polar factor of a matrix whose columns are so far `off` orthonormal ones: the nearest such matrix.
-pub fn polar<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>, off: Lane) -> Matrix<Lane, D, A> {
-    by_size(off, &[1e-3], |tier| {
-        let mut u = if tier == 0 {
-            a.clone()
-        } else {
-            let inverse_root =
-                Unary { f: |x: Lane| [Lane::ONE / x.sqrt(), Lane::ZERO, Lane::ZERO], room: |x: Lane| x };
-            a.times(&function_of(&a.adjoint_times(a), &inverse_root))
-        };
-        (0..3).for_each(|_| reorthonormalise(&mut u));
-        u
-    })
+pub fn reorthonormalize<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
+    let correction = a.adjoint_times(a).plus_identity(lane(-1.0)).scaled(lane(-0.5));
+    *a = &a.times(&correction) + a;
 }
 
 /// The determinant.

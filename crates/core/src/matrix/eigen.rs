@@ -3,8 +3,10 @@
 //! Every lane rotates until it is done and then stays as it is, whatever its neighbours need. Larger
 //! matrices come nearly diagonal from a library, and are finished here.
 
-use super::large::{LARGE, eigenvectors, in_basis};
-use super::{Entry, Matrix, Storage, conjugate, inner_add, mul_add};
+use super::base::{Matrix, Storage};
+use super::blocked::LARGE;
+use super::entry::{Entry, conjugate, inner_add, mul_add};
+use super::large::{eigenvectors, in_basis};
 use crate::scalar::{Each, Lane, few, lane, max_or_nan};
 
 /// Jacobi's method needs five to eight sweeps; what is not done after so many is not finite.
@@ -61,12 +63,12 @@ fn rotate_rows<const D: usize>(a: &mut Matrix<Lane, D>, (p, q): (usize, usize), 
 /// With two matrices, real and imaginary part of a normal one, every rotation is that of the
 /// combination which is farthest from diagonal (Bunse-Gerstner, Byers & Mehrmann 1993): eigenvalues
 /// that coincide in one are told apart by the other.
-pub fn diagonalise<const D: usize, const M: usize, A: Storage>(
+pub fn diagonalize<const D: usize, const M: usize, A: Storage>(
     a: &mut [Matrix<Lane, D, A>; M],
 ) -> Matrix<Lane, D, A> {
     let n = a[0].rows();
     let mut numbers = a.each_ref().map(|a| a.entries().as_flattened().to_vec());
-    let v = diagonalise_numbers(D, n, &mut numbers);
+    let v = diagonalize_numbers(D, n, &mut numbers);
     for (a, x) in a.iter_mut().zip(&numbers) {
         *a = Matrix::read(n, n, x);
     }
@@ -74,11 +76,11 @@ pub fn diagonalise<const D: usize, const M: usize, A: Storage>(
 }
 
 /// Compiled once, whatever the matrices are stored in.
-fn diagonalise_numbers(d: usize, n: usize, a: &mut [Vec<Lane>]) -> Vec<Lane> {
-    if d == 1 { diagonalise_in::<1>(n, a) } else { diagonalise_in::<2>(n, a) }
+fn diagonalize_numbers(d: usize, n: usize, a: &mut [Vec<Lane>]) -> Vec<Lane> {
+    if d == 1 { diagonalize_in::<1>(n, a) } else { diagonalize_in::<2>(n, a) }
 }
 
-fn diagonalise_in<const D: usize>(n: usize, numbers: &mut [Vec<Lane>]) -> Vec<Lane> {
+fn diagonalize_in<const D: usize>(n: usize, numbers: &mut [Vec<Lane>]) -> Vec<Lane> {
     let mut all: Vec<Matrix<Lane, D>> = numbers.iter().map(|x| Matrix::read(n, n, x)).collect();
     let a = &mut all[..];
     let pair = a.len() > 1;
@@ -156,7 +158,7 @@ fn combination<const D: usize>(a: &[Matrix<Lane, D>], p: usize, q: usize) -> (La
 /// values are found to full relative accuracy where columns are badly scaled.
 ///
 /// `v`, if given, is multiplied by V.
-pub fn orthogonalise<const D: usize, A: Storage>(
+pub fn orthogonalize<const D: usize, A: Storage>(
     a: &mut Matrix<Lane, D, A>,
     v: Option<&mut Matrix<Lane, D, A>>,
 ) {

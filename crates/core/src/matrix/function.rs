@@ -5,19 +5,22 @@
 //! adds `2 Σₖ f[λᵢ,λₖ,λⱼ] H̃ᵢₖ H̃ₖⱼ`. Divided differences are integrals of derivatives over segment and
 //! triangle (Hermite & Genocchi), which is how they are computed where their arguments are close.
 
-use super::eigen::diagonalise;
-use super::{Matrix, Storage, mul_add};
+use super::base::{Matrix, Storage};
+use super::dense::reorthonormalize;
+use super::eigen::diagonalize;
+use super::entry::mul_add;
+use super::select::by_size;
 use crate::scalar::{Each, Lane, Scalar, few, lane};
 
 /// A function of a real variable for [`function_of`].
 pub struct Unary {
     /// f, f', f''
     pub f: fn(Lane) -> [Lane; 3],
-    /// How far f is smooth around x, up to a factor.
-    pub room: fn(Lane) -> Lane,
+    /// Distance from x to the nearest singularity of f, up to a factor.
+    pub pole_distance: fn(Lane) -> Lane,
 }
 
-/// Arguments closer than this part of their room count as close: the quadratures below are exact to
+/// Arguments closer than this part of their distance from a pole count as close: the quadratures below are exact to
 /// rounding for them, and quotients of others lose little more than a digit.
 const CLOSE: f64 = 0.1;
 
@@ -34,7 +37,7 @@ impl Unary {
     /// f[x, y]
     pub fn first(&self, x: Lane, y: Lane) -> Lane {
         let gap = y - x;
-        let close = gap.abs().simd_le(lane(CLOSE) * (self.room)(x).min((self.room)(y)));
+        let close = gap.abs().simd_le(lane(CLOSE) * (self.pole_distance)(x).min((self.pole_distance)(y)));
         let mut result = ((self.f)(y)[0] - (self.f)(x)[0]) / gap;
         if close.any() {
             let mut mean = Lane::ZERO;
@@ -54,8 +57,8 @@ impl Unary {
         let to_yz = yz.simd_gt(zx) & yz.simd_gt(xy);
         let (x, y, z) = (to_yz.select(y, x), to_xy.select(z, to_yz.select(x, y)), to_xy.select(y, z));
         let gap = z - x;
-        let room = (self.room)(x).min((self.room)(y)).min((self.room)(z));
-        let close = gap.abs().simd_le(lane(CLOSE) * room);
+        let pole_distance = (self.pole_distance)(x).min((self.pole_distance)(y)).min((self.pole_distance)(z));
+        let close = gap.abs().simd_le(lane(CLOSE) * pole_distance);
         let mut result = if close.all() { Lane::ZERO } else { (self.first(y, z) - self.first(x, y)) / gap };
         if close.any() {
             let mut mean = Lane::ZERO;
@@ -101,7 +104,7 @@ fn of_parts(d: usize, n: usize, parts: &[Vec<Lane>], f: &Unary) -> Vec<Vec<Lane>
 fn parts_in<const D: usize>(n: usize, parts: &[Vec<Lane>], f: &Unary) -> Vec<Vec<Lane>> {
     let part = |k: usize| Matrix::<Lane, D>::read(n, n, &parts[k]);
     let mut values = [part(0)];
-    let v = diagonalise(&mut values);
+    let v = diagonalize(&mut values);
     let eigenvalues: Vec<Lane> = (0..n).map(|i| values[0][(i, i)][0]).collect();
     let back = |m: &Matrix<Lane, D>| v.times(m).times_adjoint(&v).entries().as_flattened().to_vec();
     let diagonal: Vec<Lane> = eigenvalues.iter().map(|&x| (f.f)(x)[0]).collect();
@@ -134,4 +137,21 @@ fn parts_in<const D: usize>(n: usize, parts: &[Vec<Lane>], f: &Unary) -> Vec<Vec
         }
     }
     found
+}
+
+/// The polar factor of a matrix whose columns are so far `off` orthonormal ones: the nearest such matrix.
+pub fn polar<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>, off: Lane) -> Matrix<Lane, D, A> {
+    by_size(off, &[1e-3], |tier| {
+        let mut u = if tier == 0 {
+            a.clone()
+        } else {
+            let inverse_root = Unary {
+                f: |x: Lane| [Lane::ONE / x.sqrt(), Lane::ZERO, Lane::ZERO],
+                pole_distance: |x: Lane| x,
+            };
+            a.times(&function_of(&a.adjoint_times(a), &inverse_root))
+        };
+        (0..3).for_each(|_| reorthonormalize(&mut u));
+        u
+    })
 }

@@ -3,11 +3,12 @@
 //! The exponential is its series, and squared where its argument had to be halved. The logarithm is that of so many
 //! square roots (Higham 2008, chapters 6 and 11) that the series of `2 artanh(E(2 + E)⁻¹) = log(1 + E)` is short.
 
+use super::base::{Matrix, Storage};
 use super::function::{from_parts, parts_of};
 use super::inverse::{balance, inverse};
 use super::schur::{largest_argument, root};
+use super::select::{Select, by_size};
 use super::series::{Powers, exp_by, terms};
-use super::{Matrix, Select, Storage, by_size};
 use crate::scalar::{Lane, Scalar, lane, mask_bits};
 
 /// `exp(A) − 1`.

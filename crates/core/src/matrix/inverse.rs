@@ -1,6 +1,8 @@
 //! The inverse of a matrix, with its derivatives.
 
-use super::{Matrix, Storage, determinant, inner_add, mul_add};
+use super::base::{Matrix, Storage};
+use super::dense::determinant;
+use super::entry::{inner_add, mul_add};
 use crate::scalar::{Each, Lane, Scalar, few, lane};
 
 /// `A⁻¹`; not finite on lanes where A has none.

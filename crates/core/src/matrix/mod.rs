@@ -3,325 +3,33 @@
 //! An entry is `[S; D]`: a real number for D = 1, real and imaginary part for D = 2. Every formula is
 //! written once for both.
 
+mod base;
+mod blocked;
 mod compiled;
 mod dense;
 mod eigen;
+mod entry;
 mod function;
 mod general;
 mod inverse;
 mod large;
+mod moved;
 mod products;
 mod schur;
 mod select;
 mod series;
 mod storage;
 
-pub use compiled::Compiled;
-pub use dense::{cholesky, determinant, orthonormalise, polar, reorthonormalise, solve_lower};
-pub use eigen::{diagonalise, orthogonalise, sort_columns};
+pub use base::{Compiled, Dynamic, Matrix, Storage};
+pub use dense::{cholesky, determinant, orthonormalize, reorthonormalize, solve_lower};
+pub use eigen::{diagonalize, orthogonalize, sort_columns};
+pub use entry::{Entry, multiply_add};
 pub(crate) use function::GAUSS;
-pub use function::{Unary, from_parts, function_of, parts_of};
+pub use function::{Unary, from_parts, function_of, parts_of, polar};
 pub use general::{exp_any_minus_one, log_any_one_plus};
 pub use inverse::inverse;
-pub use products::multiply_add;
-use products::{inner_add, mul_add};
+pub use moved::Moved;
 pub use schur::{largest_argument, largest_imaginary};
 pub use select::{Select, by_size};
 pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};
-pub use storage::{Dynamic, Known, Small, Storage};
-
-use crate::scalar::{Each, Lane, Scalar, few, lane};
-use std::ops::{Add, Index, IndexMut, Neg, Sub};
-
-/// A real number (D = 1), or real and imaginary part of a complex one (D = 2).
-pub type Entry<S, const D: usize> = [S; D];
-
-#[inline(always)]
-fn conjugate<S: Scalar, const D: usize>(mut a: Entry<S, D>) -> Entry<S, D> {
-    if D > 1 {
-        a[D - 1] = -a[D - 1];
-    }
-    a
-}
-
-/// A matrix, row by row.
-pub struct Matrix<S: Scalar, const D: usize, A: Storage = Dynamic> {
-    shape: A::Shape,
-    data: A::Of<Entry<S, D>>,
-}
-
-/// A point on a curve of matrices, and where they are asked for its first and second derivative.
-pub struct Moved<const D: usize, A: Storage>(pub Matrix<Lane, D, A>, pub Option<[Matrix<Lane, D, A>; 2]>);
-
-impl<const D: usize, A: Storage> Moved<D, A> {
-    /// The point x = p e^{tΩ} of a curve with x' = xΩ, with so many derivatives as are asked for.
-    pub fn by_generator(x: Matrix<Lane, D, A>, omega: &Matrix<Lane, D, A>, order: usize) -> Self {
-        if order == 0 {
-            return Moved(x, None);
-        }
-        let d = x.times(omega);
-        let dd = if order > 1 { d.times(omega) } else { d.clone() };
-        Moved(x, Some([d, dd]))
-    }
-
-    /// Writes the curve at the parameter t, with the derivatives that t carries.
-    pub fn write<S: Scalar>(&self, t: S, out: &mut [S]) {
-        let Moved(x, rates) = self;
-        let Some([d, dd]) = rates else {
-            let entries = x.entries().as_flattened();
-            return out.iter_mut().zip(entries).for_each(|(out, &x)| *out = S::constant(x));
-        };
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = t.compose([x, d, dd].map(|m| m.entries()[i / D][i % D]));
-        }
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Clone for Matrix<S, D, A> {
-    #[inline(always)]
-    fn clone(&self) -> Self {
-        Matrix { shape: self.shape, data: self.data.clone() }
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
-    /// The same matrix, stored in another way.
-    pub fn stored<B: Storage>(&self) -> Matrix<S, D, B> {
-        Matrix::from_fn(self.rows(), self.cols(), |i, j| self[(i, j)])
-    }
-
-    /// The rows `from..to`.
-    pub fn some_rows(&self, from: usize, to: usize) -> Self {
-        Self::from_fn(to - from, self.cols(), |i, j| self[(from + i, j)])
-    }
-
-    /// The columns `from..to`.
-    pub fn some_cols(&self, from: usize, to: usize) -> Self {
-        Self::from_fn(self.rows(), to - from, |i, j| self[(i, from + j)])
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
-    /// All zeros.
-    pub fn zeros(rows: usize, cols: usize) -> Self {
-        let shape = A::shape(rows, cols);
-        Matrix { shape, data: A::filled(shape, [S::constant(Lane::ZERO); D]) }
-    }
-
-    /// The identity.
-    pub fn identity(n: usize) -> Self {
-        Self::zeros(n, n).plus_identity(Lane::ONE)
-    }
-
-    /// From numbers row by row, imaginary parts behind real ones.
-    #[inline]
-    pub fn read(rows: usize, cols: usize, numbers: &[S]) -> Self {
-        let entries = &numbers.as_chunks::<D>().0[..rows * cols];
-        Self::collected(A::shape(rows, cols), |i| entries[i])
-    }
-
-    /// Constants.
-    pub fn constant(rows: usize, cols: usize, numbers: &[Lane]) -> Self {
-        Self::from_fn(rows, cols, |i, j| {
-            let at = (i * cols + j) * D;
-            few(|c| S::constant(numbers[at + c]))
-        })
-    }
-
-    /// From a function of row and column.
-    pub fn from_fn(rows: usize, cols: usize, mut f: impl FnMut(usize, usize) -> Entry<S, D>) -> Self {
-        let mut m = Self::zeros(rows, cols);
-        for i in 0..rows {
-            for j in 0..cols {
-                m[(i, j)] = f(i, j);
-            }
-        }
-        m
-    }
-
-    /// From a function of the place of an entry, counted row by row.
-    #[inline(always)]
-    fn collected(shape: A::Shape, f: impl FnMut(usize) -> Entry<S, D>) -> Self {
-        Matrix { shape, data: A::collected(shape, [S::constant(Lane::ZERO); D], f) }
-    }
-
-    /// A function of the numbers of one matrix.
-    #[inline(always)]
-    fn each(&self, f: impl Fn(S) -> S) -> Self {
-        let x = self.entries();
-        Self::collected(self.shape, |i| x[i].each(&f))
-    }
-
-    /// A function of the numbers of two matrices.
-    #[inline(always)]
-    fn zip(&self, b: &Self, f: impl Fn(S, S) -> S) -> Self {
-        let (x, y) = (self.entries(), b.entries());
-        Self::collected(self.shape, |i| few(|c| f(x[i][c], y[i][c])))
-    }
-
-    /// A real diagonal matrix.
-    pub fn diagonal(entries: &[S]) -> Self {
-        let mut m = Self::zeros(entries.len(), entries.len());
-        for (i, &x) in entries.iter().enumerate() {
-            m[(i, i)][0] = x;
-        }
-        m
-    }
-
-    /// Writes the numbers as [`read`](Self::read) takes them.
-    pub fn write(&self, out: &mut [S]) {
-        for (out, x) in out.as_chunks_mut::<D>().0.iter_mut().zip(self.data.iter()) {
-            *out = *x;
-        }
-    }
-
-    /// Number of rows.
-    #[inline(always)]
-    pub fn rows(&self) -> usize {
-        A::size(self.shape).0
-    }
-
-    /// Number of columns.
-    #[inline(always)]
-    pub fn cols(&self) -> usize {
-        A::size(self.shape).1
-    }
-
-    /// All entries, row by row.
-    #[inline(always)]
-    pub fn entries(&self) -> &[Entry<S, D>] {
-        &self.data[..self.rows() * self.cols()]
-    }
-
-    /// `A*`.
-    pub fn adjoint(&self) -> Self {
-        Self::from_fn(self.cols(), self.rows(), |i, j| conjugate(self[(j, i)]))
-    }
-
-    /// `(A + A*)/2`, exactly Hermitian.
-    pub fn hermitian_part(&self) -> Self {
-        self.with_adjoint(Lane::ONE)
-    }
-
-    /// `(A − A*)/2`, exactly skew-Hermitian.
-    pub fn skew_part(&self) -> Self {
-        self.with_adjoint(lane(-1.0))
-    }
-
-    fn with_adjoint(&self, sign: Lane) -> Self {
-        let half = lane(0.5);
-        Self::from_fn(self.rows(), self.cols(), |i, j| {
-            let (a, b) = (self[(i, j)], conjugate(self[(j, i)]));
-            few(|c| (a[c] + b[c] * sign) * half)
-        })
-    }
-
-    /// `A + x`, x times the identity.
-    pub fn plus_identity(mut self, x: Lane) -> Self {
-        for i in 0..self.rows().min(self.cols()) {
-            self[(i, i)][0] = self[(i, i)][0] + x;
-        }
-        self
-    }
-
-    /// `x A`.
-    #[inline(always)]
-    pub fn scaled(&self, x: Lane) -> Self {
-        if A::ANY { (A::compiled().scaled)(self, x) } else { self.scaled_here(x) }
-    }
-
-    fn scaled_here(&self, x: Lane) -> Self {
-        self.each(|a| a * x)
-    }
-
-    fn select_here(mask: Lane, a: &Self, b: &Self) -> Self {
-        a.zip(b, |a, b| S::select(mask, a, b))
-    }
-
-    fn plus_here(&self, b: &Self) -> Self {
-        self.zip(b, |x, y| x + y)
-    }
-
-    fn minus_here(&self, b: &Self) -> Self {
-        self.zip(b, |x, y| x - y)
-    }
-
-    /// `x A` with a scalar that may carry derivatives.
-    pub fn times_scalar(&self, x: S) -> Self {
-        self.each(|a| a * x)
-    }
-
-    /// Frobenius norm of the values, a bound of all eigenvalues.
-    pub fn size(&self) -> Lane {
-        let mut sum = Lane::ZERO;
-        for a in self.entries().as_flattened() {
-            sum = a.value().mul_add(a.value(), sum);
-        }
-        sum.sqrt()
-    }
-
-    /// Real part of the trace.
-    pub fn trace(&self) -> S {
-        let mut sum = self[(0, 0)][0];
-        for i in 1..self.rows() {
-            sum = sum + self[(i, i)][0];
-        }
-        sum
-    }
-
-    /// The values without derivatives.
-    pub fn value(&self) -> Matrix<Lane, D, A> {
-        self.map(|x| x.value())
-    }
-
-    /// A function of every entry.
-    pub fn map_entries(&self, f: impl Fn(Entry<S, D>) -> Entry<S, D>) -> Self {
-        let x = self.entries();
-        Self::collected(self.shape, |i| f(x[i]))
-    }
-
-    /// A function of every number.
-    pub fn map<T: Scalar>(&self, f: impl Fn(S) -> T) -> Matrix<T, D, A> {
-        let x = self.entries();
-        Matrix::<T, D, A>::collected(self.shape, |i| x[i].each(&f))
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Index<(usize, usize)> for Matrix<S, D, A> {
-    type Output = Entry<S, D>;
-    #[inline(always)]
-    fn index(&self, (i, j): (usize, usize)) -> &Entry<S, D> {
-        &self.data[i * self.cols() + j]
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> IndexMut<(usize, usize)> for Matrix<S, D, A> {
-    #[inline(always)]
-    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut Entry<S, D> {
-        let cols = self.cols();
-        &mut self.data[i * cols + j]
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Add for &Matrix<S, D, A> {
-    type Output = Matrix<S, D, A>;
-    #[inline(always)]
-    fn add(self, b: Self) -> Matrix<S, D, A> {
-        if A::ANY { (A::compiled().plus)(self, b) } else { self.plus_here(b) }
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Sub for &Matrix<S, D, A> {
-    type Output = Matrix<S, D, A>;
-    #[inline(always)]
-    fn sub(self, b: Self) -> Matrix<S, D, A> {
-        if A::ANY { (A::compiled().minus)(self, b) } else { self.minus_here(b) }
-    }
-}
-
-impl<S: Scalar, const D: usize, A: Storage> Neg for Matrix<S, D, A> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        self.each(|x| -x)
-    }
-}
+pub use storage::{Known, Small};

@@ -1,42 +1,9 @@
 //! Products of matrices.
 
-use super::large::{self, LARGE};
-use super::{Entry, Matrix, Storage, conjugate};
+use super::base::{Matrix, Storage};
+use super::blocked::{self, LARGE};
+use super::entry::{Entry, conjugate, inner_add, mul_add};
 use crate::scalar::{Lane, Scalar, few};
-
-/// `a b + c`, or `a b* + c` with `CONJUGATE`.
-#[inline(always)]
-pub(super) fn mul_add<S: Scalar, const D: usize, const CONJUGATE: bool>(
-    a: Entry<S, D>,
-    b: Entry<S, D>,
-    c: Entry<S, D>,
-) -> Entry<S, D> {
-    let mut out = c;
-    if D == 1 {
-        out[0] = a[0].fma(b[0], c[0]);
-    } else {
-        let (ai, bi) = (a[D - 1], if CONJUGATE { -b[D - 1] } else { b[D - 1] });
-        out[0] = a[0].fma(b[0], (-ai).fma(bi, c[0]));
-        out[D - 1] = a[0].fma(bi, ai.fma(b[0], c[D - 1]));
-    }
-    out
-}
-
-/// `a b + c`.
-pub fn multiply_add<const D: usize>(
-    a: Entry<Lane, D>,
-    b: Entry<Lane, D>,
-    c: Entry<Lane, D>,
-) -> Entry<Lane, D> {
-    mul_add::<Lane, D, false>(a, b, c)
-}
-
-/// `Re a*b + c`.
-#[inline(always)]
-pub(super) fn inner_add<S: Scalar, const D: usize>(a: Entry<S, D>, b: Entry<S, D>, c: S) -> S {
-    let c = a[0].fma(b[0], c);
-    if D == 1 { c } else { a[D - 1].fma(b[D - 1], c) }
-}
 
 impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
     /// `A B`.
@@ -47,7 +14,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     pub(super) fn times_here(&self, b: &Self) -> Self {
         if A::ANY && b.is_large() {
-            return large::times(self, b);
+            return blocked::times(self, b);
         }
         let mut out = Self::zeros(self.rows(), b.cols());
         for i in 0..self.rows() {
@@ -76,7 +43,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     pub(super) fn adjoint_times_here(&self, b: &Self) -> Self {
         if A::ANY && b.is_large() {
-            return large::times(&self.adjoint(), b);
+            return blocked::times(&self.adjoint(), b);
         }
         let mut out = Self::zeros(self.cols(), b.cols());
         for k in 0..self.rows() {
@@ -99,7 +66,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
 
     pub(super) fn times_adjoint_here(&self, b: &Self) -> Self {
         if A::ANY && b.is_large() {
-            return large::times(self, &b.adjoint());
+            return blocked::times(self, &b.adjoint());
         }
         Self::from_fn(self.rows(), b.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
     }

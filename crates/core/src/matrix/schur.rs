@@ -1,6 +1,6 @@
 //! What needs the eigenvalues of a general matrix, one lane after the other by a library.
 
-use super::{Matrix, Storage};
+use super::base::{Matrix, Storage};
 use crate::scalar::{LANES, Lane, few};
 use nalgebra::{Complex, DMatrix, Schur};
 

@@ -1,6 +1,6 @@
 //! Picking lane by lane.
 
-use super::{Matrix, Storage};
+use super::base::{Matrix, Storage};
 use crate::scalar::{Lane, Scalar, lane};
 
 /// What can be picked lane by lane.

@@ -5,8 +5,10 @@
 //! Paterson & Stockmeyer (1973). Both carry derivatives along and are smooth where eigenvalues
 //! coincide. Beyond the radius of a series its argument is halved, or eigenvectors are used.
 
+use super::base::{Matrix, Storage};
+use super::entry::{inner_add, mul_add};
 use super::function::{Unary, function_of};
-use super::{Matrix, Select, Storage, by_size, inner_add, mul_add};
+use super::select::{Select, by_size};
 use crate::scalar::{LANES, Lane, Scalar, few, lane};
 use crate::special::{ARC, SINC, VERSINE, arc_full_range};
 
@@ -366,7 +368,7 @@ fn log_full_range<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) ->
         [y.ln(), inverse, -(inverse * inverse)]
     };
     // The function is singular at x = −1.
-    function_of(b, &Unary { f, room: |x: Lane| (x + Lane::ONE).abs() })
+    function_of(b, &Unary { f, pole_distance: |x: Lane| (x + Lane::ONE).abs() })
 }
 
 /// `θ/sin θ` as a function of the Hermitian `Y = 1 − cos θ`; `rest` is `2 − Y`, known to more digits.
@@ -388,7 +390,7 @@ pub(super) fn arc_here<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A
                     y,
                     &Unary {
                         f: |y: Lane| arc_full_range(y, lane(2.0) - y),
-                        room: |y: Lane| (lane(2.0) - y).abs().min(Lane::ONE),
+                        pole_distance: |y: Lane| (lane(2.0) - y).abs().min(Lane::ONE),
                     },
                 );
             }

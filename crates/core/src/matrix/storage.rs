@@ -1,59 +1,8 @@
-//! How the entries of a matrix are stored: any size, few of them, or a size that the compiler knows.
+//! Storage on the stack: of few entries, or of a size that the compiler knows.
 
-use super::Compiled;
-use crate::scalar::{Scalar, few};
-use smallvec::{SmallVec, smallvec};
+use super::base::Storage;
+use crate::scalar::few;
 use std::ops::{Deref, DerefMut};
-
-/// Where the entries of a matrix are, and how many.
-pub trait Storage: Copy + Send + Sync + 'static {
-    /// Whether matrices may be of any size: then functions of them are compiled once, see [`Compiled`].
-    const ANY: bool = false;
-    /// Rows and columns.
-    type Shape: Copy;
-    /// A container of entries.
-    type Of<T: Copy>: Clone + Deref<Target = [T]> + DerefMut;
-    /// A shape that is asked for.
-    fn shape(rows: usize, cols: usize) -> Self::Shape;
-    /// The numbers of rows and columns.
-    fn size(shape: Self::Shape) -> (usize, usize);
-    /// Equal entries.
-    fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
-    /// Entries from their places, row by row. Writes each once, where `filled` and a loop write twice.
-    fn collected<T: Copy>(shape: Self::Shape, spare: T, f: impl FnMut(usize) -> T) -> Self::Of<T>;
-    /// Functions of matrices of any size.
-    fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
-        unreachable!("matrices of any size only are stored there")
-    }
-}
-
-/// Any size. Up to sixteen entries live on the stack.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Dynamic;
-
-impl Storage for Dynamic {
-    const ANY: bool = true;
-    type Shape = (usize, usize);
-    type Of<T: Copy> = SmallVec<[T; 16]>;
-    fn shape(rows: usize, cols: usize) -> Self::Shape {
-        (rows, cols)
-    }
-    #[inline(always)]
-    fn size(shape: Self::Shape) -> (usize, usize) {
-        shape
-    }
-    fn filled<T: Copy>((rows, cols): Self::Shape, x: T) -> Self::Of<T> {
-        smallvec![x; rows * cols]
-    }
-    #[inline(always)]
-    fn collected<T: Copy>((rows, cols): Self::Shape, _: T, f: impl FnMut(usize) -> T) -> Self::Of<T> {
-        (0..rows * cols).map(f).collect()
-    }
-    #[inline(always)]
-    fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
-        Compiled::table()
-    }
-}
 
 /// Any shape of at most CAPACITY entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

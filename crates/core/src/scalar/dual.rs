@@ -1,16 +1,8 @@
 //! First-order duals: a value with its derivative in one direction.
 
-use super::{Lane, Row, RowMut, Scalar};
+use super::base::Scalar;
+use super::types::{Dual, Lane, Row, RowMut};
 use std::ops::{Add, Mul, Neg, Sub};
-
-/// A number `v + d ε` with `ε² = 0`.
-#[derive(Clone, Copy, Debug)]
-pub struct Dual {
-    /// The value.
-    pub v: Lane,
-    /// The derivative.
-    pub d: Lane,
-}
 
 impl Scalar for Dual {
     const ORDER: usize = 1;

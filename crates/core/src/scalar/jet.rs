@@ -1,18 +1,8 @@
 //! Second-order jets: a value with its first and second derivative in t.
 
-use super::{Lane, Row, RowMut, Scalar};
+use super::base::Scalar;
+use super::types::{Jet, Lane, Row, RowMut};
 use std::ops::{Add, Mul, Neg, Sub};
-
-/// A function of t near one t: its value, first and second derivative.
-#[derive(Clone, Copy, Debug)]
-pub struct Jet {
-    /// The value.
-    pub v: Lane,
-    /// The first derivative.
-    pub d: Lane,
-    /// The second derivative.
-    pub dd: Lane,
-}
 
 impl Scalar for Jet {
     const ORDER: usize = 2;

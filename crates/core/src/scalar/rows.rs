@@ -1,6 +1,7 @@
 //! Eight rows of numbers in memory, and the same numbers side by side in lanes.
 
-use super::{LANES, Lane, few};
+use super::few::few;
+use super::types::{LANES, Lane};
 use wide::bytemuck::cast;
 use wide::f64x4;
 

@@ -1,51 +1,60 @@
 //! A space as a table of its operations.
 
-use super::{Ambient, Frame, Origin, Space};
-use crate::curve::Job;
-use crate::fit::{Chain, ChainEnds, Defect, NodeVectors, Run, Visit};
+use super::traits::{Ambient, Frame, Origin, Space};
+use crate::curve::data::Job;
+use crate::fit::chain::{Chain, Run, Visit};
+use crate::fit::end_kind::ChainEnds;
+use crate::fit::node::{C2Residual, NodeVectors};
 use crate::scalar::{LANES, Lane, Row, RowMut, Scalar};
+
+/// The formulas of a [`Space`], and the loops over knots and samples that are made of them.
+///
+/// A space with cheap formulas has loops compiled for it alone; for others one copy calls the formulas through this
+/// table.
+pub trait Kernels: Geometry {
+    /// See `Chain::walk`.
+    fn walk(&self, chain: &mut Chain, runs: &[Run; LANES]);
+    /// See `Chain::walk_again`.
+    fn walk_again(&self, chain: &mut Chain, runs: &[Run; LANES], visit: Visit);
+    /// See `fit::sweep`.
+    fn sweep(
+        &self,
+        chain: &mut Chain,
+        ends: &ChainEnds,
+        u: &[Lane],
+        r: &mut [Lane],
+        work: &mut NodeVectors<Lane>,
+        at_rest: Lane,
+    ) -> C2Residual;
+    /// Evaluates a block of samples.
+    fn samples(&self, job: &Job, out: &mut [f64]);
+}
 
 /// A space known by its table of operations only.
 #[derive(Clone, Copy)]
-pub struct Erased<'a>(pub &'a dyn Table);
+pub struct Erased<'a>(pub &'a dyn Kernels);
 
-/// Makes table, the table of every space, and the space of every table, of a list of methods.
+/// Makes three things of a list of methods: the table, the table of every space, and the space of every table.
 macro_rules! table {
-    ($($room:ident { $(fn $name:ident(&self $(, $arg:ident: $kind:ty)*) $(-> $result:ty)?;)* })*) => {
-        /// The operations of a [`Space`] and its loops over knots and samples.
-        pub trait Table: Send + Sync {
-            $($(#[doc = concat!("See [`", stringify!($room), "`].")]
+    ($($part:ident { $(fn $name:ident(&self $(, $arg:ident: $kind:ty)*) $(-> $result:ty)?;)* })*) => {
+        /// The formulas of a [`Space`].
+        pub trait Geometry: Send + Sync {
+            $($(#[doc = concat!("See [`", stringify!($part), "`].")]
             fn $name(&self $(, $arg: $kind)*) $(-> $result)?;)*)*
             /// See [`Ambient::ray`].
             fn ray(&self, p: &[Lane], v: &[Lane], t: Row, out: RowMut);
             /// See [`Ambient::geodesic`].
             fn geodesic(&self, p: Row, q: Row, t: Row, out: RowMut);
-            /// See [`Origin::legs`].
-            fn legs(&self, chord: &[Lane], prepared: &[Lane], a: Row, b: Row, w_plus: RowMut, w_minus: RowMut);
+            /// See [`Origin::inner_handles`].
+            fn inner_handles(&self, chord: &[Lane], prepared: &[Lane], a: Row, b: Row, w_plus: RowMut, w_minus: RowMut);
             /// See [`Origin::triple`].
             fn triple(&self, a: Row, b: Row, c: Row, out: RowMut);
             /// See [`Origin::stretch`].
             fn stretch(&self, v: Row, x: RowMut);
-            /// See [`Chain::walk`].
-            fn walk(&self, chain: &mut Chain, runs: &[Run; LANES]);
-            /// See [`Chain::walk_again`].
-            fn walk_again(&self, chain: &mut Chain, runs: &[Run; LANES], visit: Visit);
-            /// See [`crate::fit::sweep`].
-            fn sweep(
-                &self,
-                chain: &mut Chain,
-                ends: &ChainEnds,
-                u: &[Lane],
-                r: &mut [Lane],
-                work: &mut NodeVectors<Lane>,
-                at_rest: Lane,
-            ) -> Defect;
-            /// Evaluates a block of samples.
-            fn samples(&self, job: &Job, out: &mut [f64]);
         }
 
-        impl<M: Space> Table for M {
-            $($(fn $name(&self $(, $arg: $kind)*) $(-> $result)? { $room::$name(self $(, $arg)*) })*)*
+        impl<M: Space> Geometry for M {
+            $($(fn $name(&self $(, $arg: $kind)*) $(-> $result)? { $part::$name(self $(, $arg)*) })*)*
             fn ray(&self, p: &[Lane], v: &[Lane], t: Row, out: RowMut) {
                 match (t, out) {
                     (Row::Lane(t), RowMut::Lane(out)) => Ambient::ray(self, p, v, t[0], out),
@@ -62,10 +71,10 @@ macro_rules! table {
                     _ => mixed(),
                 }
             }
-            fn legs(&self, chord: &[Lane], prepared: &[Lane], a: Row, b: Row, w_plus: RowMut, w_minus: RowMut) {
+            fn inner_handles(&self, chord: &[Lane], prepared: &[Lane], a: Row, b: Row, w_plus: RowMut, w_minus: RowMut) {
                 match (a, b, w_plus, w_minus) {
-                    (Row::Lane(a), Row::Lane(b), RowMut::Lane(x), RowMut::Lane(y)) => Origin::legs(self, chord, prepared, a, b, x, y),
-                    (Row::Dual(a), Row::Dual(b), RowMut::Dual(x), RowMut::Dual(y)) => Origin::legs(self, chord, prepared, a, b, x, y),
+                    (Row::Lane(a), Row::Lane(b), RowMut::Lane(x), RowMut::Lane(y)) => Origin::inner_handles(self, chord, prepared, a, b, x, y),
+                    (Row::Dual(a), Row::Dual(b), RowMut::Dual(x), RowMut::Dual(y)) => Origin::inner_handles(self, chord, prepared, a, b, x, y),
                     _ => mixed(),
                 }
             }
@@ -83,35 +92,11 @@ macro_rules! table {
                     _ => mixed(),
                 }
             }
-            fn walk(&self, chain: &mut Chain, runs: &[Run; LANES]) {
-                if M::HOT { chain.walk(self, runs) } else { chain.walk_by_table(&Erased(self), runs) }
-            }
-            fn walk_again(&self, chain: &mut Chain, runs: &[Run; LANES], visit: Visit) {
-                if M::HOT { chain.walk_again(self, runs, visit) } else { chain.walk_again_by_table(&Erased(self), runs, visit) }
-            }
-            fn sweep(
-                &self,
-                chain: &mut Chain,
-                ends: &ChainEnds,
-                u: &[Lane],
-                r: &mut [Lane],
-                work: &mut NodeVectors<Lane>,
-                at_rest: Lane,
-            ) -> Defect {
-                if M::HOT {
-                    crate::fit::sweep(self, chain, ends, u, r, work, at_rest)
-                } else {
-                    crate::fit::sweep_by_table(&Erased(self), chain, ends, u, r, work, at_rest)
-                }
-            }
-            fn samples(&self, job: &Job, out: &mut [f64]) {
-                Space::samples(self, job, out);
-            }
         }
 
-        table!(@rooms $($room { $(fn $name(&self $(, $arg: $kind)*) $(-> $result)?;)* })*);
+        table!(@erased $($part { $(fn $name(&self $(, $arg: $kind)*) $(-> $result)?;)* })*);
     };
-    (@rooms
+    (@erased
         Ambient { $(fn $a:ident(&self $(, $a_arg:ident: $a_kind:ty)*) $(-> $a_result:ty)?;)* }
         Frame { $(fn $f:ident(&self $(, $f_arg:ident: $f_kind:ty)*) $(-> $f_result:ty)?;)* }
         Origin { $(fn $o:ident(&self $(, $o_arg:ident: $o_kind:ty)*) $(-> $o_result:ty)?;)* }
@@ -131,8 +116,8 @@ macro_rules! table {
         }
         impl Origin for Erased<'_> {
             $(fn $o(&self $(, $o_arg: $o_kind)*) $(-> $o_result)? { self.0.$o($($o_arg),*) })*
-            fn legs<S: Scalar>(&self, chord: &[Lane], prepared: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
-                self.0.legs(chord, prepared, S::row(a), S::row(b), S::row_mut(w_plus), S::row_mut(w_minus));
+            fn inner_handles<S: Scalar>(&self, chord: &[Lane], prepared: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+                self.0.inner_handles(chord, prepared, S::row(a), S::row(b), S::row_mut(w_plus), S::row_mut(w_minus));
             }
             fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
                 self.0.triple(S::row(a), S::row(b), S::row(c), S::row_mut(out));
@@ -152,24 +137,24 @@ table! {
         fn point_len(&self) -> usize;
         fn point_shape(&self) -> Vec<usize>;
         fn is_complex(&self) -> bool;
-        fn fibre(&self) -> usize;
+        fn fiber_rank(&self) -> usize;
         fn is_connected(&self) -> bool;
         fn component(&self, p: &[f64]) -> bool;
         fn scales(&self) -> bool;
         fn cut_angle(&self) -> f64;
-        fn longest_leg(&self) -> f64;
+        fn longest_handle(&self) -> f64;
         fn injectivity_radius(&self) -> f64;
         fn longest_ray(&self) -> f64;
         fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
         fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane;
         fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
-        fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
+        fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
         fn velocity(&self, gamma: &[Lane], d: &mut [Lane]);
         fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]);
         fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
         fn project(&self, x: &mut [Lane]) -> Lane;
         fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane;
-        fn scatter(&self, noise: &mut [Lane]);
+        fn random_point(&self, noise: &mut [Lane]);
         fn complaint(&self, x: &[f64]) -> String;
         fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)>;
         fn rounding(&self, p: &[Lane]) -> Lane;
@@ -178,7 +163,7 @@ table! {
         fn frame_len(&self) -> usize;
         fn lift(&self, p: &[Lane], frame: &mut [Lane]);
         fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane;
-        fn tidy(&self, frame: &mut [Lane], p: &[Lane]);
+        fn reorthonormalize(&self, frame: &mut [Lane], p: &[Lane]);
         fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
         fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
     }
@@ -195,7 +180,7 @@ table! {
     }
 }
 
-/// A table is asked for kinds of numbers that no formula is called with.
+/// The table was called with kinds of numbers that no formula takes.
 #[cold]
 fn mixed() -> ! {
     unreachable!("numbers of one kind, with no more derivatives than the solvers ask for")

@@ -1,13 +1,13 @@
-//! The traits of a symmetric space: the paper's §2.1–2.4, in three rooms.
+//! The traits of a symmetric space: the paper's §2.1–2.4, in three parts.
 //!
-//! * [`Ambient`]: arrays as users have them: exponential, logarithm, geodesic, transvection; what a user
-//!   calls, and what evaluates a curve;
-//! * [`Frame`]: a *moving frame*, an element g of the group with g·o = p that is carried in parallel from
-//!   point to point. In frames every tangent vector is a coordinate vector of 𝔪 = T_oM and parallel
-//!   transport is the identity;
-//! * [`Origin`]: the origin o, on coordinates of 𝔪: there the C² condition is solved.
+//! * [`Ambient`]: arrays as users have them: exponential, logarithm, geodesic, transvection. A user calls these, and
+//!   they evaluate a curve.
+//! * [`Frame`]: a *moving frame*, an element g of the group with g·o = p, transported in parallel from point to point.
+//!   In frames every tangent vector is a coordinate vector of 𝔪 = T_oM and parallel transport is the identity.
+//! * [`Origin`]: the origin o, in coordinates of 𝔪. The C² condition is solved there.
 //!
-//! A [`Space`] has all three. Solvers see it as [`Erased`], through a table of these operations.
+//! A [`Space`] implements all three. Solvers see it as [`Erased`], through a table of function pointers in two layers:
+//! [`Geometry`] has the formulas, [`Kernels`] adds the loops over knots and samples that are made of them.
 
 mod algebra;
 mod erased;
@@ -15,240 +15,12 @@ mod far_out;
 mod model;
 mod part;
 mod registry;
+mod traits;
 
 pub use algebra::{Algebra, stretch_series};
-pub use erased::{Erased, Table};
+pub use erased::{Erased, Geometry, Kernels};
 pub use far_out::far_out;
 pub use model::Model;
 pub use part::{Part, Within};
 pub use registry::{Entry, Made, table};
-
-use crate::curve::Job;
-use crate::matrix::Matrix;
-use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
-
-/// Vectors of this size and smaller, at points of size one, may be rounding errors as to direction: a
-/// defect is measured against it where a vector is smaller still.
-pub const ROUNDING_SIZE: Lane = Lane::splat(1e-7);
-
-/// Points and tangent vectors as ambient arrays of [`point_len`](Ambient::point_len) numbers (a complex number
-/// is two).
-///
-/// The *deciding angle* of two points is what tells whether the geodesic between them is unique: it is
-/// below [`cut_angle`](Ambient::cut_angle) if so, and need be exact only near there; below it may be any
-/// upper bound. NaN in points must come back as NaN. What a lane gets must not depend on its neighbours.
-pub trait Ambient: Copy + Send + Sync {
-    /// Numbers in the array of a point.
-    fn point_len(&self) -> usize;
-    /// Shape of the array of a point.
-    fn point_shape(&self) -> Vec<usize> {
-        vec![self.point_len()]
-    }
-    /// Whether the numbers of a point are complex, real and imaginary part side by side.
-    fn is_complex(&self) -> bool {
-        false
-    }
-    /// The size k of the unitary factor up to which an array is a point: the k × k matrices on its right. 0 where a
-    /// point has one array only.
-    fn fibre(&self) -> usize {
-        0
-    }
-    /// Whether any two points are joined by a curve.
-    fn is_connected(&self) -> bool {
-        true
-    }
-    /// Tells the two parts of a space apart that no curve joins.
-    fn component(&self, _p: &[f64]) -> bool {
-        true
-    }
-    /// Whether multiplying all points by a number multiplies the curve by it. Then data of any size
-    /// are brought to size one first, so that squares neither overflow nor vanish.
-    fn scales(&self) -> bool {
-        false
-    }
-    /// The deciding angle at which the cut locus is met; infinite where there is none.
-    fn cut_angle(&self) -> f64;
-    /// The deciding angle that a control leg must not reach.
-    fn longest_leg(&self) -> f64 {
-        self.cut_angle()
-    }
-    /// Distance below which the logarithm is defined whatever the direction; other than the cut angle
-    /// where length and angle differ.
-    fn injectivity_radius(&self) -> f64 {
-        self.cut_angle()
-    }
-
-    /// Length from which a [`ray`](Ambient::ray) makes so much of rounding errors at its start that a geodesic
-    /// between its ends is better.
-    fn longest_ray(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// `exp_p(t v)`: the geodesic from p with velocity v.
-    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]);
-    /// `log_p(q)`, (11); returns the deciding angle.
-    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
-    /// Distance, given `log_p(q)` and the deciding angle; defined past the cut locus too.
-    fn distance(&self, p: &[Lane], _q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
-        max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt()
-    }
-    /// `[p, q]_t`, (7), between points that may move with t.
-    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]);
-    /// The transvection `E_p(v)` of (10) applied to a point x.
-    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);
-    /// Parallel transport of a tangent vector x from p to q = `exp_p(v)`: `E_p(v)` applied to it, at the
-    /// representative q.
-    fn carry(&self, p: &[Lane], _q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        self.transvect(p, v, x, out);
-    }
-    /// Turns the derivative of the ambient array at γ into the velocity γ', in place.
-    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]);
-    /// Turns the second derivative of the ambient array into the covariant acceleration ∇γ', in place;
-    /// `d` is the first derivative, as it comes from differentiating the array.
-    fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]);
-    /// Inner product of two tangent vectors at p.
-    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
-    /// Replaces x by a point of the space beside it; returns how far it was, relative to its size.
-    fn project(&self, x: &mut [Lane]) -> Lane;
-    /// Replaces v by its tangential part at p; returns how far it was, relative to its size (or to
-    /// [`ROUNDING_SIZE`]).
-    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
-        let [off, size] = make_tangent(self, p, v);
-        off / (size + ROUNDING_SIZE)
-    }
-    /// Turns independent standard normal numbers into a random point.
-    fn scatter(&self, noise: &mut [Lane]);
-    /// Says in words and numbers why x, which is finite, is not a point.
-    fn complaint(&self, x: &[f64]) -> String;
-    /// The first of some points that lies where doubles have too few digits, and that in words and numbers.
-    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
-        None
-    }
-    /// How far apart neighbouring floating-point points are at p, in units of a rounding error; 1 or more.
-    fn rounding(&self, _p: &[Lane]) -> Lane {
-        Lane::ONE
-    }
-}
-
-/// A moving frame: an element of the group that carries the origin to a point.
-pub trait Frame: Ambient + Origin {
-    /// Numbers in a frame.
-    fn frame_len(&self) -> usize;
-    /// A frame at p.
-    fn lift(&self, p: &[Lane], frame: &mut [Lane]);
-    /// Moves a frame at p along the geodesic to q, in parallel; `chord` becomes the coordinates of
-    /// `log_p(q)`. Returns the deciding angle.
-    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane;
-    /// Removes the rounding errors that a frame at p has gathered, where `step` leaves any.
-    fn tidy(&self, _frame: &mut [Lane], _p: &[Lane]) {}
-    /// Coordinates of a tangent vector at p.
-    fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
-    /// The tangent vector at p with given coordinates.
-    fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]);
-}
-
-/// The origin o: tangent vectors there are [`dim`](Origin::dim) coordinates, whose sum of squares is the squared
-/// length of the vector.
-pub trait Origin {
-    /// Dimension of the space.
-    fn dim(&self) -> usize;
-    /// Numbers that [`prepare`](Origin::prepare) keeps of a chord.
-    fn chord_len(&self) -> usize {
-        0
-    }
-    /// K of (22).
-    fn curvature(&self) -> f64;
-
-    /// Computes once for a chord what every call of [`legs`](Origin::legs) needs of it.
-    fn prepare(&self, _chord: &[Lane], _prepared: &mut [Lane]) {}
-    /// With `M = E(−a) E(d) E(−b)` for the chord d: `w⁺ = log_o(M·o)` and `w⁻ = log_o(M⁻¹·o)`.
-    ///
-    /// These are the two logarithms of the C² condition (13), w of (16), seen from either end of a
-    /// segment whose end velocities are `3a` and `3b`.
-    fn legs<S: Scalar>(
-        &self,
-        chord: &[Lane],
-        prepared: &[Lane],
-        a: &[S],
-        b: &[S],
-        w_plus: &mut [S],
-        w_minus: &mut [S],
-    );
-    /// `[a, [b, c]]`: the only algebra that 𝔪 has (its brackets lie outside). `ad_v²x` is `[v, [v, x]]`, the
-    /// curvature R(a, b)c is `[c, [a, b]]`.
-    fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]);
-    /// `S(v) x` with `S(v) = sinh(ad_v)/ad_v` of Lemma A.2; by its series unless a space knows better.
-    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
-        let values: Vec<Lane> = v.iter().map(|v| v.value()).collect();
-        // By (22) ad_v is at most K|v|.
-        let size = dot(&values, &values).sqrt() * lane(self.curvature());
-        let start = Matrix::<S, 1>::read(x.len(), 1, x);
-        stretch_series(size, &start, |term| {
-            let mut twice = vec![S::constant(Lane::ZERO); v.len()];
-            self.triple(v, v, term.entries().as_flattened(), &mut twice);
-            Matrix::read(v.len(), 1, &twice)
-        })
-        .write(x);
-    }
-    /// The deciding angle of `exp_o(v)`; grows in proportion to v.
-    fn angle(&self, v: &[Lane]) -> Lane {
-        dot(v, v).sqrt()
-    }
-    /// By how much rounding errors may grow in [`legs`](Origin::legs) over a chord.
-    fn condition(&self, _chord: &[Lane]) -> Lane {
-        Lane::ONE
-    }
-}
-
-/// A symmetric space.
-pub trait Space: Frame {
-    /// Whether its operations are so cheap that a call through a table would cost. Then the loops over knots and
-    /// samples are compiled for this space alone.
-    const HOT: bool = false;
-    /// Whether points are vectors of a few numbers, for which code of known sizes pays.
-    const VECTORS: bool = false;
-
-    /// The deciding angle of `exp_p(v)`.
-    fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
-        let (mut frame, mut x) = (vec![Lane::ZERO; self.frame_len()], vec![Lane::ZERO; self.dim()]);
-        self.lift(p, &mut frame);
-        self.coordinates(&frame, p, v, &mut x);
-        self.angle(&x)
-    }
-    /// Evaluates a block of samples of curves.
-    fn samples(&self, job: &Job, out: &mut [f64]) {
-        if Self::HOT { job.run(self, out) } else { job.run_by_table(&Erased(self), out) }
-    }
-}
-
-/// A space that is evaluated in another one that covers it locally.
-pub trait Covered: Space {
-    /// The covering space.
-    type Cover: Space;
-    /// The covering space.
-    fn cover(&self) -> Self::Cover;
-    /// Brings a segment of a curve into the cover: its end points and tangent vectors there.
-    fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]);
-    /// Of the points of the cover over a control point q takes the one nearest to the other control point, and with
-    /// it the end y of the segment and the tangent vector w there.
-    fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
-    /// A tangent vector w at y of the cover as the moving body has it, in the first numbers of `out`: the element ω
-    /// of the Lie algebra with p' = pω.
-    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane];
-    /// Brings a point of the cover and, if given, a tangent vector there back: writes the point, or the
-    /// vector.
-    fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);
-}
-
-/// Replaces v by its tangential part at p; returns how far it was, and its size, as arrays.
-fn make_tangent<M: Ambient>(space: &M, p: &[Lane], v: &mut [Lane]) -> [Lane; 2] {
-    let before = v.to_vec();
-    space.velocity(p, v);
-    let off2 = v.iter().zip(&before).fold(Lane::ZERO, |sum, (v, b)| (*v - *b).mul_add(*v - *b, sum));
-    [off2.sqrt(), dot(&before, &before).sqrt()]
-}
-
-/// `angle` less what angles lose to rounding: what is within of the cut locus is on it.
-pub fn below(angle: f64) -> Lane {
-    lane(angle * (1.0 - 4.0 * f64::EPSILON))
-}
+pub use traits::{Ambient, Covered, Evaluation, Frame, Origin, ROUNDING_SIZE, Space, below};

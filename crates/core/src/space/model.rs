@@ -1,14 +1,14 @@
-//! A space from few formulas: the first page of a new one.
+//! A space from few formulas: the first implementation of a new one.
 
-use super::{Ambient, Frame, Origin, ROUNDING_SIZE, Space, make_tangent};
+use super::traits::{Ambient, Frame, Origin, ROUNDING_SIZE, Space, make_tangent};
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 
-/// A space of which exponential, logarithm and transvection are known at any point and for any numbers. All
-/// three rooms follow: geodesics are exponentials of logarithms, a frame is a basis that transvections carry, and
-/// [`legs`](Origin::legs) is its own definition, in arrays at the origin.
+/// A space whose exponential, logarithm and transvection are known at any point and for any numbers. All three
+/// traits follow: geodesics are exponentials of logarithms, a frame is a basis moved by transvections, and
+/// [`inner_handles`](Origin::inner_handles) is its own definition, in arrays at the origin.
 ///
-/// That is right, and several times slower than formulas of its own for each operation. A page that is to be
-/// faster implements the rooms instead; the laws compare its formulas with the definitions that are used here.
+/// The results are right, and several times slower than specific formulas for each operation. For speed, implement
+/// the traits instead; the laws compare their formulas with the definitions used here.
 pub trait Model: Copy + Send + Sync {
     /// See [`Ambient::point_shape`]; of complex numbers, counted as one each.
     fn point_shape(&self) -> Vec<usize>;
@@ -16,14 +16,14 @@ pub trait Model: Copy + Send + Sync {
     fn is_complex(&self) -> bool {
         false
     }
-    /// See [`Ambient::fibre`].
-    fn fibre(&self) -> usize {
+    /// See [`Ambient::fiber_rank`].
+    fn fiber_rank(&self) -> usize {
         0
     }
     /// See [`Ambient::cut_angle`].
     fn cut_angle(&self) -> f64;
-    /// See [`Ambient::longest_leg`].
-    fn longest_leg(&self) -> f64 {
+    /// See [`Ambient::longest_handle`].
+    fn longest_handle(&self) -> f64 {
         self.cut_angle()
     }
     /// See [`Origin::dim`].
@@ -57,7 +57,7 @@ pub trait Model: Copy + Send + Sync {
         let (mut o, mut v) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; p.len()]);
         self.origin(&mut o);
         self.log(&o, p, &mut v);
-        carry(self, &o, p, &v, x);
+        parallel_transport(self, &o, p, &v, x);
     }
     /// Turns tangent vectors at a point into those at another array of the same point, q, in place.
     fn turn(&self, _p: &[Lane], _q: &[Lane], _x: &mut [Lane]) {}
@@ -75,8 +75,8 @@ pub trait Model: Copy + Send + Sync {
     }
     /// See [`Ambient::project`].
     fn project(&self, x: &mut [Lane]) -> Lane;
-    /// See [`Ambient::scatter`].
-    fn scatter(&self, noise: &mut [Lane]) {
+    /// See [`Ambient::random_point`].
+    fn random_point(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
     /// See [`Ambient::complaint`].
@@ -106,7 +106,7 @@ fn scaled<S: Scalar>(x: &[S], scale: S) -> Vec<S> {
 }
 
 /// Parallel transport of vectors from p to the array q of `exp_p(v)`.
-fn carry<M: Model>(space: &M, p: &[Lane], q: &[Lane], v: &[Lane], x: &mut [Lane]) {
+fn parallel_transport<M: Model>(space: &M, p: &[Lane], q: &[Lane], v: &[Lane], x: &mut [Lane]) {
     let mut there = zeros(p.len());
     space.transvect(p, v, x);
     space.exp(p, v, &mut there);
@@ -123,14 +123,14 @@ impl<M: Model> Ambient for M {
     fn is_complex(&self) -> bool {
         Model::is_complex(self)
     }
-    fn fibre(&self) -> usize {
-        Model::fibre(self)
+    fn fiber_rank(&self) -> usize {
+        Model::fiber_rank(self)
     }
     fn cut_angle(&self) -> f64 {
         Model::cut_angle(self)
     }
-    fn longest_leg(&self) -> f64 {
-        Model::longest_leg(self)
+    fn longest_handle(&self) -> f64 {
+        Model::longest_handle(self)
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         self.exp(&constant(p), &scaled(&constant(v), t), out);
@@ -147,9 +147,9 @@ impl<M: Model> Ambient for M {
         out.copy_from_slice(x);
         Model::transvect(self, p, v, out);
     }
-    fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         out.copy_from_slice(x);
-        carry(self, p, q, v, out);
+        parallel_transport(self, p, q, v, out);
     }
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         Model::velocity(self, gamma, d);
@@ -168,8 +168,8 @@ impl<M: Model> Ambient for M {
         // Rounding of v may be as much.
         off / (size * Model::rounding(self, p) + ROUNDING_SIZE)
     }
-    fn scatter(&self, noise: &mut [Lane]) {
-        Model::scatter(self, noise);
+    fn random_point(&self, noise: &mut [Lane]) {
+        Model::random_point(self, noise);
     }
     fn complaint(&self, x: &[f64]) -> String {
         Model::complaint(self, x)
@@ -201,7 +201,7 @@ impl<M: Model> Frame for M {
         let mut v = zeros(p.len());
         let angle = Model::log(self, p, q, &mut v);
         Frame::coordinates(self, frame, p, &v, chord);
-        carry(self, p, q, &v, frame);
+        parallel_transport(self, p, q, &v, frame);
         for e in frame.chunks_exact_mut(p.len()) {
             Model::velocity(self, q, e);
         }
@@ -237,7 +237,15 @@ impl<M: Model> Origin for M {
     fn curvature(&self) -> f64 {
         Model::curvature(self)
     }
-    fn legs<S: Scalar>(&self, d: &[Lane], _: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+    fn inner_handles<S: Scalar>(
+        &self,
+        d: &[Lane],
+        _: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    ) {
         let mut o = zeros(self.point_len());
         self.origin(&mut o);
         let o: Vec<S> = constant(&o);
@@ -248,7 +256,7 @@ impl<M: Model> Origin for M {
         };
         // E(−last) E(d) E(−first)·o and its logarithm.
         let d: Vec<S> = constant(d);
-        let leg = |first: &[S], last: &[S], sign: f64, w: &mut [S]| {
+        let handle = |first: &[S], last: &[S], sign: f64, w: &mut [S]| {
             let (mut x, mut log) = (zeros(o.len()), zeros(o.len()));
             self.exp(&o, &at(first, -sign), &mut x);
             Model::transvect(self, &o, &at(&d, sign), &mut x);
@@ -256,8 +264,8 @@ impl<M: Model> Origin for M {
             Model::log(self, &o, &x, &mut log);
             Model::coordinates(self, &log, w);
         };
-        leg(b, a, 1.0, w_plus);
-        leg(a, b, -1.0, w_minus);
+        handle(b, a, 1.0, w_plus);
+        handle(a, b, -1.0, w_minus);
     }
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
         Model::triple(self, a, b, c, out);

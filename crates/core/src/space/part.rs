@@ -1,12 +1,12 @@
-//! A totally geodesic part of a space: what an isometry of order two leaves where it is, or a component of that.
+//! A totally geodesic part of a space: the fixed points of an isometry of order two, or a component of them.
 //!
-//! Geodesics between points of the part stay there, so all formulas are those of the whole. A page of a part says
-//! which points and coordinates are its own.
+//! Geodesics between points of the part stay there, so all formulas are those of the whole. An implementation of a part
+//! gives its points and coordinates.
 
-use super::{Ambient, Frame, Origin, Space};
+use super::traits::{Ambient, Frame, Origin, Space};
 use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
-/// The points of a space that an isometry of order two, the mirror, leaves where they are.
+/// The fixed points of an isometry of order two, the mirror.
 pub trait Part: Copy + Send + Sync {
     /// The space that it is a part of.
     type Whole: Space;
@@ -33,11 +33,11 @@ pub trait Part: Copy + Send + Sync {
     fn contains(&self, _p: &[Lane]) -> Lane {
         Lane::ZERO.simd_eq(Lane::ZERO)
     }
-    /// See [`Ambient::scatter`].
-    fn scatter(&self, noise: &mut [Lane]) {
-        self.whole().scatter(noise);
+    /// See [`Ambient::random_point`].
+    fn random_point(&self, noise: &mut [Lane]) {
+        self.whole().random_point(noise);
     }
-    /// Says in words and numbers why a point of the whole is none of the part.
+    /// Describes why a point of the whole is not in the part.
     fn complaint(&self, p: &[Lane]) -> String;
 }
 
@@ -100,14 +100,14 @@ impl<P: Part> Ambient for Within<P> {
     fn is_complex(&self) -> bool {
         self.0.whole().is_complex()
     }
-    fn fibre(&self) -> usize {
-        self.0.whole().fibre()
+    fn fiber_rank(&self) -> usize {
+        self.0.whole().fiber_rank()
     }
     fn cut_angle(&self) -> f64 {
         self.0.whole().cut_angle()
     }
-    fn longest_leg(&self) -> f64 {
-        self.0.whole().longest_leg()
+    fn longest_handle(&self) -> f64 {
+        self.0.whole().longest_handle()
     }
     fn injectivity_radius(&self) -> f64 {
         self.0.injectivity_radius()
@@ -138,8 +138,8 @@ impl<P: Part> Ambient for Within<P> {
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         self.0.whole().transvect(p, v, x, out);
     }
-    fn carry(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
-        self.0.whole().carry(p, q, v, x, out);
+    fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        self.0.whole().parallel_transport(p, q, v, x, out);
     }
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
         self.0.whole().velocity(gamma, d);
@@ -157,8 +157,8 @@ impl<P: Part> Ambient for Within<P> {
         let off = max_or_nan(off, self.nearest(x));
         self.0.contains(x).select(off, lane(f64::NAN))
     }
-    fn scatter(&self, noise: &mut [Lane]) {
-        self.0.scatter(noise);
+    fn random_point(&self, noise: &mut [Lane]) {
+        self.0.random_point(noise);
         self.nearest(noise);
     }
     fn complaint(&self, x: &[f64]) -> String {
@@ -187,8 +187,8 @@ impl<P: Part> Frame for Within<P> {
         self.0.narrow(&wide, chord);
         angle
     }
-    fn tidy(&self, frame: &mut [Lane], p: &[Lane]) {
-        self.0.whole().tidy(frame, p);
+    fn reorthonormalize(&self, frame: &mut [Lane], p: &[Lane]) {
+        self.0.whole().reorthonormalize(frame, p);
     }
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
         let mut wide = self.zeros();
@@ -214,7 +214,7 @@ impl<P: Part> Origin for Within<P> {
     fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
         self.0.whole().prepare(&self.wide(chord), prepared);
     }
-    fn legs<S: Scalar>(
+    fn inner_handles<S: Scalar>(
         &self,
         chord: &[Lane],
         prepared: &[Lane],
@@ -225,7 +225,7 @@ impl<P: Part> Origin for Within<P> {
     ) {
         let (mut plus, mut minus) = (self.zeros(), self.zeros());
         let whole = self.0.whole();
-        whole.legs(&self.wide(chord), prepared, &self.wide(a), &self.wide(b), &mut plus, &mut minus);
+        whole.inner_handles(&self.wide(chord), prepared, &self.wide(a), &self.wide(b), &mut plus, &mut minus);
         self.0.narrow(&plus, w_plus);
         self.0.narrow(&minus, w_minus);
     }

@@ -1,10 +1,10 @@
 //! Spaces by name.
 
-use super::Table;
+use super::erased::Kernels;
 use std::sync::Arc;
 
 /// A space with parameters, or why they are bad.
-pub type Made = Result<Arc<dyn Table>, String>;
+pub type Made = Result<Arc<dyn Kernels>, String>;
 
 /// A kind of space, as a family lists it.
 pub struct Entry {
@@ -16,7 +16,7 @@ pub struct Entry {
     pub make: fn(&[usize]) -> Made,
 }
 
-/// A space as its table.
-pub fn table<M: Table + 'static>(space: Result<M, String>) -> Made {
+/// A space as its table of operations.
+pub fn table<M: Kernels + 'static>(space: Result<M, String>) -> Made {
     Ok(Arc::new(space?))
 }

@@ -1,0 +1,52 @@
+//! The loops over knots and samples, for every space: the layer above `fit` and `curve`.
+
+use crate::curve::Job;
+use crate::fit::{C2Residual, Chain, ChainEnds, NodeVectors, Run, Visit, sweep, sweep_by_table};
+use crate::scalar::{LANES, Lane};
+use crate::space::{Covered, Erased, Evaluation, Kernels, Space};
+
+impl<M: Space> Kernels for M {
+    fn walk(&self, chain: &mut Chain, runs: &[Run; LANES]) {
+        if M::HOT { chain.walk(self, runs) } else { chain.walk_by_table(&Erased(self), runs) }
+    }
+    fn walk_again(&self, chain: &mut Chain, runs: &[Run; LANES], visit: Visit) {
+        if M::HOT {
+            chain.walk_again(self, runs, visit)
+        } else {
+            chain.walk_again_by_table(&Erased(self), runs, visit)
+        }
+    }
+    fn sweep(
+        &self,
+        chain: &mut Chain,
+        ends: &ChainEnds,
+        u: &[Lane],
+        r: &mut [Lane],
+        work: &mut NodeVectors<Lane>,
+        at_rest: Lane,
+    ) -> C2Residual {
+        if M::HOT {
+            sweep(self, chain, ends, u, r, work, at_rest)
+        } else {
+            sweep_by_table(&Erased(self), chain, ends, u, r, work, at_rest)
+        }
+    }
+    fn samples(&self, job: &Job, out: &mut [f64]) {
+        self.evaluate_with(Samples { job, out });
+    }
+}
+
+/// A block of samples and where its results go.
+struct Samples<'a> {
+    job: &'a Job<'a>,
+    out: &'a mut [f64],
+}
+
+impl Evaluation for Samples<'_> {
+    fn direct<M: Space>(self, space: &M) {
+        if M::HOT { self.job.run(space, self.out) } else { self.job.run_by_table(&Erased(space), self.out) }
+    }
+    fn covered<C: Covered>(self, space: &C) {
+        self.job.run_covered(space, self.out);
+    }
+}

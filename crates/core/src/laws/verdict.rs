@@ -1,0 +1,17 @@
+//! What a law found.
+
+use crate::scalar::Lane;
+
+/// What a law found wrong.
+pub type Verdict = Result<(), String>;
+
+/// The largest lane of `found`, where it is more than `allowed`.
+pub fn within(found: Lane, allowed: Lane, what: &str) -> Verdict {
+    let (found, allowed) = (found.to_array(), allowed.to_array());
+    for (f, a) in found.into_iter().zip(allowed) {
+        if !(f <= a) {
+            return Err(format!("{what}: {f:.2e} where {a:.2e} is allowed"));
+        }
+    }
+    Ok(())
+}

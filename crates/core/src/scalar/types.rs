@@ -1,0 +1,49 @@
+//! The kinds of numbers, and slices of any one of them: how a formula that is generic over its numbers passes
+//! through a table of functions.
+
+/// Eight doubles side by side.
+pub type Lane = wide::f64x8;
+
+/// How many doubles a [`Lane`] holds.
+pub const LANES: usize = 8;
+
+/// A number `v + d ε` with `ε² = 0`.
+#[derive(Clone, Copy, Debug)]
+pub struct Dual {
+    /// The value.
+    pub v: Lane,
+    /// The derivative.
+    pub d: Lane,
+}
+
+/// A function of t near one t: its value, first and second derivative.
+#[derive(Clone, Copy, Debug)]
+pub struct Jet {
+    /// The value.
+    pub v: Lane,
+    /// The first derivative.
+    pub d: Lane,
+    /// The second derivative.
+    pub dd: Lane,
+}
+
+/// Numbers, all of one kind.
+#[derive(Clone, Copy)]
+pub enum Row<'a> {
+    /// Plain numbers.
+    Lane(&'a [Lane]),
+    /// Numbers with a derivative.
+    Dual(&'a [Dual]),
+    /// Numbers with two derivatives.
+    Jet(&'a [Jet]),
+}
+
+/// The same, to be written.
+pub enum RowMut<'a> {
+    /// Plain numbers.
+    Lane(&'a mut [Lane]),
+    /// Numbers with a derivative.
+    Dual(&'a mut [Dual]),
+    /// Numbers with two derivatives.
+    Jet(&'a mut [Jet]),
+}

@@ -1,0 +1,283 @@
+//! Full Gauss–Newton: a step for points and velocities together, under the linearised C² condition.
+//!
+//! With ξ, υ the moves of point and velocity at the knots, N and A those of the curve at the data and of its
+//! acceleration at quadrature points, and C the condition: `min Σ w|r − N(ξ, υ)|² + λ Σ ω|a + A(ξ, υ)|²` subject to
+//! `C(ξ, υ) = 0`. Everything is local to a segment: the unknowns of a knot, with the multiplier of its condition, make
+//! a block tridiagonal system.
+
+use crate::information::{self, Root};
+use crate::path::{Path, Place};
+use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
+use symspline_core::fit::Ends;
+use symspline_core::monitor::{Monitor, checkpoint};
+use symspline_core::parallel;
+use symspline_core::scalar::{LANES, Lane, few, lane};
+use symspline_core::space::{Ambient, Erased, Frame, Origin};
+
+/// Two Gauss points a segment: exact where the acceleration is linear, as in flat space.
+pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+/// What is known at the data: places and residuals, which are tangent vectors there.
+pub struct Pull<'a> {
+    /// Where they are.
+    pub places: &'a [Place],
+    /// The points of the curve there.
+    pub points: &'a [f64],
+    /// `log_γ y`.
+    pub vectors: &'a [f64],
+    /// Weights.
+    pub weights: &'a [f64],
+    /// By what a robust loss multiplies them; None for one.
+    pub factors: Option<&'a [f64]>,
+    /// Of weights that are matrices their roots, and the frames of the data transported to the curve.
+    pub information: Option<(&'a [Root], &'a [f64])>,
+}
+
+/// ∫ |∇γ'|² dt, by two points a segment.
+pub fn energy(space: &Erased, path: &Path) -> f64 {
+    let len = space.point_len();
+    let places = quadrature(path.t.len() - 1);
+    let (points, bends) = (path.at(space, &places), path.bends(space, &places));
+    let square = |i: usize| {
+        let [p, a] = [&points, &bends].map(|x| lanes(&x[i * len..][..len]));
+        space.inner(&p, &a, &a).as_array()[0]
+    };
+    let h = |i: usize| path.t[places[i].0 + 1] - path.t[places[i].0];
+    (0..places.len()).map(|i| 0.5 * h(i) * square(i)).sum()
+}
+
+fn quadrature(segments: usize) -> Vec<Place> {
+    (0..segments).flat_map(|i| GAUSS.map(|tau| (i, tau))).collect()
+}
+
+fn lanes(row: &[f64]) -> Vec<Lane> {
+    row.iter().map(|&x| lane(x)).collect()
+}
+
+/// The step of the points as tangent vectors. λ is in the units of the knots.
+pub fn step(
+    space: &Erased,
+    path: &Path,
+    ends: Ends,
+    pull: &Pull,
+    lam: f64,
+    monitor: &Monitor,
+    threads: bool,
+) -> Vec<f64> {
+    let (m, len, n) = (space.dim(), space.point_len(), path.t.len() - 1);
+    let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
+    // Velocities in units of the mean knot spacing, so that all unknowns are of one size.
+    let unit = (path.t[n] - path.t[0]) / n as f64;
+    // The last knot of a closed curve is the first again.
+    let closed = matches!(ends, Ends::Periodic);
+    let nodes = if closed { n } else { n + 1 };
+    let mut system = Tridiagonal::new(nodes, 3 * m);
+
+    let places = quadrature(n);
+    let between = path.at(space, &places);
+    let samples = [(pull.places, pull.points), (&places, &between)];
+    let bends = path.bends(space, &places);
+    let mut parts: Vec<(usize, Matrix, Vector)> =
+        (0..n).map(|i| (i, Matrix::zeros(4 * m, 4 * m), Vector::zeros(4 * m))).collect();
+    parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
+        checkpoint();
+        let motion = derivative.motion(*segment);
+        let at = |kind: usize, k: usize, of: Of, vectors: &[f64]| {
+            let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);
+            in_coordinates(space, &motion.point(tau), &motion.at(tau, of), p, vectors)
+        };
+        // With rows N of a weight: |N x|² and its pull on x.
+        let mut add = |mut matrix: Matrix, rows: Option<&Matrix>, pull: Vector, weight: f64| {
+            for e in 0..2 {
+                matrix.columns_mut((2 * e + 1) * m, m).scale_mut(1.0 / unit);
+            }
+            *right += matrix.tr_mul(&pull) * weight;
+            let weighed = rows.map_or(matrix.clone(), |rows| rows * &matrix);
+            *square += weighed.tr_mul(&weighed) * weight;
+        };
+        let first = pull.places.partition_point(|place| place.0 < *segment);
+        let here = pull.places[first..].iter().take_while(|place| place.0 == *segment).count();
+        for k in first..first + here {
+            let r = &pull.vectors[k * len..][..len];
+            let factor = pull.factors.map_or(1.0, |factors| factors[k]);
+            if let Some((roots, frames)) = pull.information {
+                let frame = &frames[k * m * len..][..m * len];
+                let (matrix, all) = at(0, k, Of::Point, &[r, frame].concat());
+                let (r, frame) = (all.column(0).into_owned(), all.columns(1, m).into_owned());
+                let (rows, _, own) = information::at(space, &roots[k].matrix, &frame, &r);
+                add(matrix, Some(&rows), own, factor);
+            } else {
+                let (matrix, r) = at(0, k, Of::Point, r);
+                add(matrix, None, r.column(0).into_owned(), pull.weights[k] * factor);
+            }
+        }
+        let h = path.t[*segment + 1] - path.t[*segment];
+        for k in 2 * *segment..2 * *segment + 2 {
+            let (matrix, bend) = at(1, k, Of::Acceleration, &bends[k * len..][..len]);
+            add(matrix, None, -bend.column(0), lam * h / 2.0);
+        }
+    });
+    for (segment, square, right) in &parts {
+        for a in 0..2 {
+            for b in 0..2 {
+                let block = square.view((2 * a * m, 2 * b * m), (2 * m, 2 * m));
+                let (row, column) = ((segment + a) % nodes, (segment + b) % nodes);
+                let mut place = system.block(row, column).view_mut((0, 0), (2 * m, 2 * m));
+                place += block;
+            }
+            let mut rows = system.right[(segment + a) % nodes].rows_mut(0, 2 * m);
+            rows += right.rows(2 * a * m, 2 * m);
+        }
+    }
+    for i in 0..nodes {
+        let row = derivative.condition(i);
+        for (from, list, scale) in [(0, &row.points, unit * unit), (m, &row.u, unit)] {
+            for (node, matrix) in list {
+                let block = matrix * scale;
+                let mut place = system.block(i, *node).view_mut((2 * m, from), (m, m));
+                place += &block;
+                let mut place = system.block(*node, i).view_mut((from, 2 * m), (m, m));
+                place += block.transpose();
+            }
+        }
+    }
+    let mut out = vec![0.0; (n + 1) * len];
+    let found = if closed { system.solve_cyclic() } else { system.solve() };
+    for (i, x) in found.iter().enumerate() {
+        derivative.tangent(i, &x.as_slice()[..m], &mut out[i * len..][..len]);
+    }
+    if closed {
+        let (first, last) = out.split_at_mut(n * len);
+        last.copy_from_slice(&first[..len]);
+    }
+    out
+}
+
+/// The columns of a matrix, tangent at q, and vectors at p in coordinates of one frame: p is the same point, but maybe
+/// another array.
+fn in_coordinates(
+    space: &Erased,
+    q: &[f64],
+    columns: &Matrix,
+    p: &[f64],
+    vectors: &[f64],
+) -> (Matrix, Matrix) {
+    let (m, len, p, q) = (space.dim(), p.len(), lanes(p), lanes(q));
+    let mut frame = vec![Lane::ZERO; space.frame_len()];
+    space.lift(&q, &mut frame);
+    let [still, mut v, mut there] = [(); 3].map(|_| vec![Lane::ZERO; len]);
+    let mut x = vec![Lane::ZERO; m];
+    let mut coordinates = |count: usize, number: &dyn Fn(usize, usize) -> f64, transported: bool| {
+        let mut all = Matrix::zeros(m, count);
+        for first in (0..count).step_by(LANES) {
+            for (row, v) in v.iter_mut().enumerate() {
+                *v = Lane::new(few(|l| number(row, (first + l).min(count - 1))));
+            }
+            if transported {
+                space.parallel_transport(&p, &q, &still, &v, &mut there);
+                v.copy_from_slice(&there);
+            }
+            space.coordinates(&frame, &q, &v, &mut x);
+            for l in 0..LANES.min(count - first) {
+                (0..m).for_each(|row| all[(row, first + l)] = x[row].as_array()[l]);
+            }
+        }
+        all
+    };
+    (
+        coordinates(columns.ncols(), &|row, c| columns[(row, c)], false),
+        coordinates(vectors.len() / len, &|row, c| vectors[c * len + row], true),
+    )
+}
+
+/// A block tridiagonal system; cyclic where the last node is a neighbour of the first.
+struct Tridiagonal {
+    /// Blocks left of, on and right of the diagonal.
+    sides: [Vec<Matrix>; 3],
+    right: Vec<Vector>,
+}
+
+impl Tridiagonal {
+    fn new(nodes: usize, size: usize) -> Self {
+        let zeros = || vec![Matrix::zeros(size, size); nodes];
+        Tridiagonal { sides: [zeros(), zeros(), zeros()], right: vec![Vector::zeros(size); nodes] }
+    }
+
+    fn block(&mut self, row: usize, column: usize) -> &mut Matrix {
+        let side = match (row, column) {
+            (0, column) if column > 1 => 0,
+            (row, 0) if row > 1 => 2,
+            _ => 1 + column - row,
+        };
+        &mut self.sides[side][row]
+    }
+
+    /// By elimination with exchanges inside the blocks.
+    fn solve(self) -> Vec<Vector> {
+        let Tridiagonal { sides: [lower, diagonal, upper], right } = self;
+        let right = right.into_iter().map(|x| Matrix::from_columns(&[x])).collect();
+        let found = eliminated(&lower, diagonal, upper, right);
+        found.iter().map(|x| x.column(0).into_owned()).collect()
+    }
+
+    /// The same of a closed curve: the last node comes at the end.
+    fn solve_cyclic(mut self) -> Vec<Vector> {
+        let last = self.right.len() - 1;
+        let size = self.right[last].len();
+        let take = |x: &mut Matrix| std::mem::replace(x, Matrix::zeros(size, size));
+        let [lower, diagonal, upper] = &mut self.sides;
+        // How the other nodes see the last one, and it them.
+        let (first_sees, before_sees) = (take(&mut lower[0]), take(&mut upper[last - 1]));
+        let (sees_before, sees_first, own) =
+            (take(&mut lower[last]), take(&mut upper[last]), take(&mut diagonal[last]));
+        let mut right: Vec<Matrix> = self.right[..last]
+            .iter()
+            .map(|x| {
+                let mut columns = Matrix::zeros(size, size + 1);
+                columns.set_column(size, x);
+                columns
+            })
+            .collect();
+        right[0].columns_mut(0, size).copy_from(&first_sees);
+        let mut before = right[last - 1].columns_mut(0, size);
+        before += &before_sees;
+        let [lower, mut diagonal, mut upper] = self.sides;
+        diagonal.truncate(last);
+        upper.truncate(last);
+        let found = eliminated(&lower, diagonal, upper, right);
+        let seen = &sees_before * &found[last - 1] + &sees_first * &found[0];
+        let rest = &self.right[last] - seen.column(size);
+        let x = (own - seen.columns(0, size)).lu().solve(&rest);
+        let x = x.unwrap_or_else(|| Vector::from_element(size, f64::NAN));
+        let mut out: Vec<Vector> =
+            found.iter().map(|found| found.column(size) - found.columns(0, size) * &x).collect();
+        out.push(x);
+        out
+    }
+}
+
+/// The solutions of a block tridiagonal system for some right sides.
+fn eliminated(
+    lower: &[Matrix],
+    mut diagonal: Vec<Matrix>,
+    mut upper: Vec<Matrix>,
+    mut right: Vec<Matrix>,
+) -> Vec<Matrix> {
+    for i in 0..right.len() {
+        if i > 0 {
+            let (above, from_above) = (&lower[i] * &upper[i - 1], &lower[i] * &right[i - 1]);
+            diagonal[i] -= above;
+            right[i] -= from_above;
+        }
+        let factors = std::mem::replace(&mut diagonal[i], Matrix::zeros(0, 0)).lu();
+        let whole = factors.solve_mut(&mut upper[i]) && factors.solve_mut(&mut right[i]);
+        if !whole {
+            right[i].fill(f64::NAN);
+        }
+    }
+    for i in (0..right.len() - 1).rev() {
+        let behind = &upper[i] * &right[i + 1];
+        right[i] -= behind;
+    }
+    right
+}

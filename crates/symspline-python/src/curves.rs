@@ -1,0 +1,302 @@
+//! The curves of a call from Python: masks, validation, and projection of their points onto the space.
+
+use crate::arrays::{in_order, room, zeros};
+use crate::errors::{Invalid, invalid};
+use crate::space::Handle;
+use crate::validate::{self, Names};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use symspline::fit::{End, Ends, Problem};
+use symspline::space::{Ambient, Erased};
+
+pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+/// A kind, and the vectors that it prescribes: one per curve.
+pub type EndOf<'py> = (String, Option<Array<'py>>);
+
+/// A fault of one curve: its number in the batch, the kind, the node, the value there, its limit, and for invalid points a
+/// message. `_faults.py` puts the other kinds into words.
+pub type Fault = (usize, &'static str, Option<usize>, f64, f64, Option<String>);
+
+/// Curves to fit. Points are contiguous, with the numbers of one point last.
+pub struct Curves<'a> {
+    pub space: Erased<'a>,
+    t: &'a [f64],
+    /// Whether all curves have the same knots.
+    pub shared: bool,
+    points: &'a [f64],
+    /// Nodes before each curve.
+    pub offsets: Vec<usize>,
+    ends: Ends<'a>,
+    /// Axes of the batch.
+    pub batch: Vec<usize>,
+    /// The numbers of the curves to fit; None for all.
+    pub chosen: Option<Vec<usize>>,
+}
+
+impl<'a> Curves<'a> {
+    pub fn new(
+        handle: &'a Handle,
+        t: &'a Array<'_>,
+        points: &'a Array<'_>,
+        ends: &'a Option<[EndOf<'_>; 2]>,
+        offsets: Option<Vec<usize>>,
+        mask: Option<Vec<bool>>,
+    ) -> PyResult<Self> {
+        let space = handle.space.get();
+        let nodes = points.len() / space.point_len();
+        let different = offsets.is_some();
+        let (offsets, shared) = match offsets {
+            Some(offsets) => (offsets, false),
+            None => {
+                let n = t.shape()[t.ndim() - 1];
+                ((0..=nodes / n).map(|c| c * n).collect(), t.ndim() == 1)
+            }
+        };
+        let curves = offsets.len() - 1;
+        let lead = points.ndim() - handle.point_axes() - 1;
+        Ok(Curves {
+            space,
+            t: in_order(t)?,
+            shared,
+            points: in_order(points)?,
+            batch: if different { vec![curves] } else { points.shape()[..lead].to_vec() },
+            ends: match ends {
+                None => Ends::Periodic,
+                Some([a, b]) => Ends::Open([end(a)?, end(b)?]),
+            },
+            offsets,
+            chosen: mask.map(|mask| (0..curves).filter(|&c| mask[c]).collect()),
+        })
+    }
+
+    /// The nodes of the longest curve.
+    pub fn longest(&self) -> usize {
+        self.offsets.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0)
+    }
+
+    /// Knots, offsets and ends of the curves to fit, one curve after the other.
+    pub fn gathered(&self) -> Gathered<'a> {
+        let Some(chosen) = &self.chosen else {
+            return Gathered {
+                t: Part::Whole(self.t),
+                offsets: self.offsets.clone(),
+                ends: match &self.ends {
+                    Ends::Periodic => None,
+                    Ends::Open(ends) => Some(ends.map(|end| parts(end, Part::Whole))),
+                },
+            };
+        };
+        let len = self.space.point_len();
+        let mut offsets = vec![0];
+        for &c in chosen {
+            offsets.push(offsets[offsets.len() - 1] + self.offsets[c + 1] - self.offsets[c]);
+        }
+        let rows = |all: &[f64], size: usize| {
+            chosen.iter().flat_map(|c| &all[c * size..(c + 1) * size]).copied().collect::<Vec<f64>>()
+        };
+        let knots = |c: &usize| &self.t[self.offsets[*c]..self.offsets[c + 1]];
+        Gathered {
+            t: if self.shared {
+                Part::Whole(self.t)
+            } else {
+                Part::Copy(chosen.iter().flat_map(knots).copied().collect())
+            },
+            offsets,
+            ends: match &self.ends {
+                Ends::Periodic => None,
+                Ends::Open(ends) => Some(ends.map(|end| parts(end, |v| Part::Copy(rows(v, len))))),
+            },
+        }
+    }
+
+    /// Their points.
+    pub fn gather_points(&self, points: &mut Vec<f64>) -> PyResult<()> {
+        let len = self.space.point_len();
+        points.clear();
+        match &self.chosen {
+            None => {
+                *points = room(self.points.len())?;
+                points.extend_from_slice(self.points);
+            }
+            Some(chosen) => {
+                for &c in chosen {
+                    points.extend_from_slice(&self.points[self.offsets[c] * len..self.offsets[c + 1] * len]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the curves that were fitted into the batch, and NaN into the others.
+    pub fn scatter(&self, found: &[f64], out: &mut [f64]) {
+        let len = self.space.point_len();
+        let Some(chosen) = &self.chosen else {
+            return out.copy_from_slice(found);
+        };
+        out.fill(f64::NAN);
+        let mut rest = found;
+        for &c in chosen {
+            let own = &mut out[self.offsets[c] * len..self.offsets[c + 1] * len];
+            let (first, others) = rest.split_at(own.len());
+            own.copy_from_slice(first);
+            rest = others;
+        }
+    }
+
+    /// The points of the whole batch as an array, with NaN for curves that were not fitted.
+    pub fn points<'py>(
+        &self,
+        py: Python<'py>,
+        own: Vec<f64>,
+        shape: &[usize],
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        if self.chosen.is_none() {
+            return Ok(PyArray1::from_vec(py, own).reshape(shape)?.to_dyn().clone());
+        }
+        let out = zeros(py, shape)?;
+        self.scatter(&own, out.readwrite().as_slice_mut()?);
+        Ok(out)
+    }
+
+    /// Validates the curves to fit and projects their points onto the space. With `skip`, curves with points off the space
+    /// are masked, and their faults are returned.
+    pub fn check(&mut self, points: &mut Vec<f64>, tol: f64, skip: bool) -> Result<Vec<Fault>, Invalid> {
+        let batch = self.batch.clone();
+        let mut own = self.gathered();
+        let names = Names { batch: &batch, chosen: self.chosen.as_deref() };
+        if self.shared {
+            validate::knots(self.t, 0, &names, true)?;
+        } else {
+            for (c, ends) in own.offsets.windows(2).enumerate() {
+                validate::knots(&own.t.get()[ends[0]..ends[1]], c, &names, false)?;
+            }
+        }
+        let mut faults = Vec::new();
+        if let Err(first) = validate::points(&self.space, points, &own.offsets, &names, tol) {
+            if !skip {
+                return Err(first);
+            }
+            faults = self.leave_out_invalid(tol);
+            // Some points were projected before the invalid one was found, so start again from the input.
+            own = self.gathered();
+            let _ = self.gather_points(points);
+            let names = Names { batch: &batch, chosen: self.chosen.as_deref() };
+            validate::points(&self.space, points, &own.offsets, &names, tol)?;
+        }
+        let names = Names { batch: &batch, chosen: self.chosen.as_deref() };
+        if own.ends.is_none() {
+            validate::closed(&self.space, points, &own.offsets, &names, tol)?;
+        }
+        validate::ends(&self.space, &own.problem(self.shared, points), &names, tol)?;
+        Ok(faults)
+    }
+
+    /// Masks the curves with points off the space, and returns their faults.
+    fn leave_out_invalid(&mut self, tol: f64) -> Vec<Fault> {
+        let len = self.space.point_len();
+        let (mut valid, mut faults) = (Vec::new(), Vec::new());
+        let wanted = self.chosen.take().unwrap_or_else(|| (0..self.offsets.len() - 1).collect());
+        for number in wanted {
+            let nodes = self.offsets[number]..self.offsets[number + 1];
+            let mut copy = self.points[nodes.start * len..nodes.end * len].to_vec();
+            let one = [number];
+            let names = Names { batch: &self.batch, chosen: Some(&one) };
+            match validate::points(&self.space, &mut copy, &[0, nodes.len()], &names, tol) {
+                Ok(()) => valid.push(number),
+                Err(fault) => {
+                    faults.push((number, "invalid", fault.node, f64::NAN, tol, Some(fault.message)));
+                }
+            }
+        }
+        self.chosen = Some(valid);
+        faults
+    }
+}
+
+/// Numbers of all curves, or a copy of those of some.
+pub enum Part<'a> {
+    Whole(&'a [f64]),
+    Copy(Vec<f64>),
+}
+
+impl Part<'_> {
+    fn get(&self) -> &[f64] {
+        match self {
+            Part::Whole(numbers) => numbers,
+            Part::Copy(numbers) => numbers,
+        }
+    }
+}
+
+/// The curves to fit of [`Curves`] without their points.
+pub struct Gathered<'a> {
+    t: Part<'a>,
+    offsets: Vec<usize>,
+    ends: Option<[(End<'static>, Part<'a>); 2]>,
+}
+
+impl Gathered<'_> {
+    pub fn problem<'b>(&'b self, shared: bool, points: &'b [f64]) -> Problem<'b> {
+        let ends = match &self.ends {
+            None => Ends::Periodic,
+            Some(ends) => Ends::Open([0, 1].map(|e| match ends[e].0 {
+                End::Velocity(_) => End::Velocity(ends[e].1.get()),
+                End::Acceleration(_) => End::Acceleration(ends[e].1.get()),
+                End::Natural => End::Natural,
+                End::NotAKnot => End::NotAKnot,
+            })),
+        };
+        Problem { t: self.t.get(), shared, points, offsets: &self.offsets, ends }
+    }
+}
+
+/// The kind of an end, and its vectors.
+fn parts<'a>(end: End<'a>, part: impl Fn(&'a [f64]) -> Part<'a>) -> (End<'static>, Part<'a>) {
+    match end {
+        End::Velocity(v) => (End::Velocity(&[]), part(v)),
+        End::Acceleration(v) => (End::Acceleration(&[]), part(v)),
+        End::Natural => (End::Natural, Part::Whole(&[])),
+        End::NotAKnot => (End::NotAKnot, Part::Whole(&[])),
+    }
+}
+
+/// Validates curves. Returns their points on the space, with NaN for masked curves, and the faults of skipped curves.
+#[pyfunction]
+#[pyo3(name = "validate", signature = (handle, t, points, ends, point_tol, offsets=None, mask=None, skip_invalid=false))]
+pub fn check<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    ends: Option<[EndOf<'py>; 2]>,
+    point_tol: f64,
+    offsets: Option<Vec<usize>>,
+    mask: Option<Vec<bool>>,
+    skip_invalid: bool,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<Fault>)> {
+    let mut curves = Curves::new(handle, &t, &points, &ends, offsets, mask)?;
+    require_room_for_checks(handle, &curves)?;
+    let mut own = Vec::new();
+    curves.gather_points(&mut own)?;
+    let faults = py
+        .detach(|| curves.check(&mut own, point_tol, skip_invalid))
+        .map_err(|fault| fault.raise(py, &curves.batch))?;
+    Ok((curves.points(py, own, points.shape())?, faults))
+}
+
+pub fn require_room_for_checks(handle: &Handle, curves: &Curves) -> PyResult<()> {
+    let len = handle.space.get().point_len();
+    // Copies of ends, and the reports of curves.
+    drop(room::<f64>(curves.points.len() / len + (curves.offsets.len() - 1) * (64 + 4 * len))?);
+    Ok(())
+}
+
+pub fn end<'a>((kind, value): &'a EndOf<'a>) -> PyResult<End<'a>> {
+    Ok(match (kind.as_str(), value) {
+        ("natural", _) => End::Natural,
+        ("not-a-knot", _) => End::NotAKnot,
+        ("velocity", Some(v)) => End::Velocity(in_order(v)?),
+        ("acceleration", Some(v)) => End::Acceleration(in_order(v)?),
+        _ => return Err(invalid(format!("unknown end condition {kind:?}"))),
+    })
+}

@@ -1,0 +1,94 @@
+//! Validation of curves with given velocities, called from Python.
+
+use crate::arrays::{in_order, room};
+use crate::curves::{Array, Curves, require_room_for_checks};
+use crate::errors::{CutLocusError, Invalid};
+use crate::space::Handle;
+use crate::validate;
+use crate::watch::{is_heavy, watched};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use symspline::rows::{Operation, apply, tangent_defects};
+use symspline::space::Ambient;
+
+/// Validates points and velocities, and requires a unique geodesic between the inner control points of every segment.
+/// Returns the points on the space and the tangential parts of the velocities.
+#[pyfunction]
+pub fn hermite<'py>(
+    py: Python<'py>,
+    handle: &Handle,
+    t: Array<'py>,
+    points: Array<'py>,
+    velocities: Array<'py>,
+    point_tol: f64,
+    tangent_tol: f64,
+) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 2]> {
+    let natural = || ("natural".to_owned(), None);
+    let ends = Some([natural(), natural()]);
+    let mut curves = Curves::new(handle, &t, &points, &ends, None, None)?;
+    require_room_for_checks(handle, &curves)?;
+    let (space, len) = (curves.space, curves.space.point_len());
+    let mut own = Vec::new();
+    curves.gather_points(&mut own)?;
+    let given = in_order(&velocities)?;
+    let mut tangent = room(given.len())?;
+    tangent.resize(given.len(), 0.0);
+    let t = in_order(&t)?;
+    let found = watched(py, None, own.len() / len, is_heavy(&space), |monitor| {
+        curves.check(&mut own, point_tol, false).map_err(Handles::Invalid)?;
+        // An empty batch has nothing more to check.
+        let nodes = curves.longest().max(1);
+        if let Some((row, part)) =
+            tangent_defects(&space, &own, given).into_iter().enumerate().find(|(_, d)| !(*d <= tangent_tol))
+        {
+            let node = row % nodes;
+            let of = validate::of_curve(row / nodes, &curves.batch);
+            let message = format!(
+                "velocities[{node}]{of} is not tangent at its point: a part of {part:.3e} of it points off the space \
+                 (allowed: {tangent_tol:.0e}); use space.project_tangent(p, v)"
+            );
+            return Err(Handles::Invalid(Invalid::new(row / nodes, Some(node), message)));
+        }
+        let _ = apply(&space, Operation::ProjectTangent, &[&own, given], &[], monitor, &mut tangent);
+        // The inner control points of all segments, first those after nodes, then those before.
+        let segments = own.len() / len / nodes * (nodes - 1);
+        let mut inner = [vec![0.0; segments * len], vec![0.0; segments * len]];
+        for (side, out) in inner.iter_mut().enumerate() {
+            let mut at = Vec::with_capacity(segments * len);
+            let mut handles = Vec::with_capacity(segments * len);
+            for segment in 0..segments {
+                let (curve, i) = (segment / (nodes - 1), segment % (nodes - 1));
+                let knots = if curves.shared { t } else { &t[curve * nodes..(curve + 1) * nodes] };
+                let third = (knots[i + 1] - knots[i]) / if side == 0 { 3.0 } else { -3.0 };
+                let node = (curve * nodes + i + side) * len;
+                at.extend_from_slice(&own[node..node + len]);
+                handles.extend(tangent[node..node + len].iter().map(|v| v * third));
+            }
+            let _ = apply(&space, Operation::Exp, &[&at, &handles], &[], monitor, out);
+        }
+        let mut between = vec![0.0; segments * len];
+        apply(&space, Operation::Log, &[&inner[0], &inner[1]], &[], monitor, &mut between)
+            .map_err(|(segment, angle)| Handles::Far { segment, angle, segments: nodes - 1 })
+    })?;
+    found.map_err(|fault| match fault {
+        Handles::Invalid(fault) => fault.raise(py, &curves.batch),
+        Handles::Far { segment, angle, segments } => {
+            let (curve, i, limit) = (segment / segments, segment % segments, space.cut_angle());
+            let of = validate::of_curve(curve, &curves.batch);
+            let after = i + 1;
+            CutLocusError::new_err(format!(
+                "segment {i}{of}, between t[{i}] and t[{after}]: its inner control points lie at or past each other's cut \
+                 locus: angle {angle}, limit {limit}; the geodesic between them is not unique; velocities are too large \
+                 for its time"
+            ))
+        }
+    })?;
+    let velocities = PyArray1::from_vec(py, tangent).reshape(points.shape())?.to_dyn().clone();
+    Ok([curves.points(py, own, points.shape())?, velocities])
+}
+
+/// Why there is no curve with given velocities.
+enum Handles {
+    Invalid(Invalid),
+    Far { segment: usize, angle: f64, segments: usize },
+}

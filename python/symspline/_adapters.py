@@ -1,0 +1,90 @@
+"""What the adapters for libraries of automatic differentiation share."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._arrays import cast
+from ._core import ValidationError
+from ._cubic import CubicSpline
+from ._curves.curve import CurveArrays
+from ._curves.derivatives import places
+from ._spaces import Array, Space
+from ._time import onto_ends
+
+# End conditions without their vectors: a word, or a pair of words and orders.
+Kinds = str | tuple[str | int, str | int]
+
+
+def split(bc_type: Any) -> tuple[Kinds, tuple[Any, Any]]:
+    """End conditions as something to hash, and the vectors in them (None where there is none)."""
+    if isinstance(bc_type, str):
+        return bc_type, (None, None)
+    try:
+        pair = [(end, None) if isinstance(end, str) else (int(end[0]), end[1]) for end in bc_type]
+        (first, a), (last, b) = pair
+    except (TypeError, ValueError, IndexError):
+        raise ValidationError(
+            "bc_type must be a word or a pair of words and (order, vector), as for CubicSpline"
+        ) from None
+    return (first, last), (a, b)
+
+
+def joined(kinds: Kinds, vectors: tuple[Any, Any]) -> Any:
+    """The inverse of `split`."""
+    if isinstance(kinds, str):
+        return kinds
+    return tuple(
+        kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True)
+    )
+
+
+def fitted(
+    t: Any, points: Any, vectors: tuple[Any, Any], space: Space, kinds: Kinds, options: dict[str, Any]
+) -> CubicSpline:
+    """The spline through the points of the space beside the given ones: numbers that an optimiser or a
+    finite difference makes are a little off it."""
+    projected = space.project(points)
+    ends = list(vectors)
+    for i, vector in enumerate(vectors):
+        if vector is not None:
+            axis = projected.ndim - len(space.point_shape) - 1
+            ends[i] = space.project_tangent(projected.take(-i, axis=axis), vector)
+    return CubicSpline(t, projected, space, bc_type=joined(kinds, (ends[0], ends[1])), **options)
+
+
+class Movable(NamedTuple):
+    """A fitted curve in a space that is no product, and the end conditions that it follows its data by."""
+
+    curve: CurveArrays
+    bc_type: Any
+
+    def push(self, x: Array, dx: Any, points: Any, t: Any, ends: Any) -> Array:
+        """How the curve at times x moves, with these times and with its data."""
+        at = places(self.curve.times, self.curve.batch, x, False, 0)
+        moved: Array = self.curve.push(at, self.bc_type, points, t, ends)
+        if dx is None:
+            return moved
+        moved += self._velocity(x) * dx.reshape(dx.shape + (1,) * len(self.curve.space.point_shape))
+        return moved
+
+    def pull(self, x: Array, cotangent: Array) -> tuple[Array, Array, Array, tuple[Any, Any]]:
+        """The transpose: gradients with respect to x, t, points and the vectors at the ends."""
+        at = places(self.curve.times, self.curve.batch, x, False, 0)
+        gradient = self.curve.pull(at, self.bc_type, cotangent)
+        axes = tuple(range(-len(self.curve.space.point_shape), 0))
+        along = np.sum((np.conj(cotangent) * self._velocity(x)).real, axis=axes)
+        return along.reshape(-1, *x.shape).sum(axis=0), gradient.t, gradient.points, gradient.ends
+
+    def _velocity(self, x: Array) -> Array:
+        curve = self.curve
+        times, per_curve = onto_ends(cast(x), curve.times, curve.batch, False, x.dtype)
+        velocity: Array = curve.evaluate(times, "velocity", "raise", per_curve)
+        return velocity
+
+
+def movable(spline: CubicSpline) -> Movable:
+    """A spline, not in a product, whose derivatives are wanted."""
+    return Movable(spline._solved(), spline.bc_type)

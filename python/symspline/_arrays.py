@@ -1,0 +1,123 @@
+"""Arrays as a user gives them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._core import ValidationError
+from ._input import refuse_objects, unwrapped
+
+
+def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
+    """The value as an array; ragged nested lists, masked numbers and objects are an error of the caller's."""
+    if type(value) is np.ndarray and value.dtype.kind != "O":
+        return value
+    value = unwrapped(value, name)
+    masked = _first_masked(value)
+    if masked is not None:
+        raise ValidationError(
+            f"{name}{list(masked) or ''} is masked: what stands below a mask is no number; leave out what is missing"
+        )
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValidationError(
+            f"{name} is not an array of equally long rows: rows differ in length or shape; give all of them the same"
+        ) from None
+    if array.dtype.kind == "O":
+        refuse_objects(array, name)
+    return array
+
+
+def _first_masked(value: Any) -> tuple[int, ...] | None:
+    """The index of the first masked number of an array, or of a list of arrays."""
+    if isinstance(value, np.ma.MaskedArray):
+        found = np.argwhere(np.ma.getmaskarray(value))
+        return tuple(found[0].tolist()) if len(found) else None
+    if isinstance(value, (list, tuple)) and any(
+        issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))
+    ):
+        for i, row in enumerate(value):
+            index = _first_masked(row)
+            if index is not None:
+                return i, *index
+    return None
+
+
+def short_repr(value: Any) -> str:
+    """A value in a message: on one line, and not too long."""
+    if isinstance(value, np.ndarray) and value.size > 1000:
+        # With many short axes NumPy would write out all of it.
+        return f"an array of shape {value.shape}"
+    return brief(repr(value))
+
+
+def brief(text: object, most: int = 150) -> str:
+    """A text on one line, and not too long."""
+    # More than is shown is not looked at, except for a space at its end.
+    line = " ".join(str(text)[: 4 * most].split())
+    # What a terminal would obey, such as an escape character of a name in a file, is written out.
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+    return line if len(line) <= most else f"{line[:most]}…"
+
+
+def cast(array: NDArray[Any], dtype: Any = np.float64) -> NDArray[Any]:
+    """The numbers in contiguous, aligned memory and of a type; those it cannot hold become infinite or zero."""
+    if array.dtype == dtype:
+        flags = array.flags
+        # Arrays in memory that others laid out, such as columns of packed records, may begin anywhere.
+        return array if flags.c_contiguous and flags.aligned else np.array(array, order="C")
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        return np.asarray(array, dtype=dtype, order="C")
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A view that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def whole_number(value: Any, name: str, least: int) -> int:
+    """A whole number that fits into a machine word."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ValidationError(f"{name} must be a whole number, not {short_repr(value)}")
+    if not least <= int(value) < 2**62:
+        raise ValidationError(f"{name} must be at least {least} and not beyond 2**62, not {value}")
+    return int(value)
+
+
+def checked_flag(value: Any, name: str) -> bool:
+    """True or False; of an array neither would be meant."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValidationError(f"{name} must be True or False, not {short_repr(value)}")
+    return bool(value)
+
+
+def is_single(dtype: Any) -> bool:
+    """Whether a type of results is single precision; it may be double precision, too."""
+    # Texts are read as Python is, and may be no Python.
+    with suppress(TypeError, ValueError, SyntaxError):
+        if np.dtype(dtype) in (np.float32, np.complex64):
+            return True
+        if np.dtype(dtype) in (np.float64, np.complex128):
+            return False
+    raise ValidationError(f"dtype must be 'float32' or 'float64', not {short_repr(dtype)}")
+
+
+def in_single(values: Any) -> Any:
+    """Numbers in single precision; those too large for it are infinite."""
+    if isinstance(values, tuple):
+        return tuple(map(in_single, values))
+    return cast(values, np.complex64 if values.dtype.kind == "c" else np.float32)
+
+
+def checked_atol(atol: Any) -> float:
+    """How far off a space points may be, if that is a number that makes sense."""
+    if isinstance(atol, bool) or not isinstance(atol, (int, float, np.number)) or not 0 <= atol < 1:
+        raise ValidationError(f"atol must be a number from 0 to 1, not {short_repr(atol)}")
+    return float(atol)

@@ -1,0 +1,115 @@
+"""What every kind of curve can do."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import short_repr
+from .._core import ValidationError
+from .._spaces import Space
+from .gradient import Gradient, Places
+from .integrals import EXACT
+from .solve import Progress
+
+Doubles = NDArray[np.float64]
+
+NORMS = ("speed", "bend")
+# What is no point or vector of the space.
+REAL = (*NORMS, "body velocity", "body acceleration")
+_QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
+
+
+def quantity_of(nu: Any) -> str:
+    """What the core calls a derivative of order nu."""
+    return _QUANTITIES[order_of(nu)]
+
+
+def order_of(nu: Any, most: int = 2) -> int:
+    """The order of a derivative as a whole number, at most ``most``; 1.0 is one, too.
+
+    Raises:
+        ValidationError: it is none.
+    """
+    number = isinstance(nu, (int, float, np.integer, np.floating)) and not isinstance(nu, bool)
+    if not number or nu not in range(most + 1):
+        words = "0, 1 or 2" if most == 2 else "0 or 1"
+        raise ValidationError(f"nu must be {words}, not {short_repr(nu)}")
+    return int(nu)
+
+
+class CurveArrays(ABC):
+    """Curves of a batch, made of knots, points and velocities, with times as the compiled core counts them.
+
+    Attributes:
+        space: where they run.
+        times: knots, shape (N+1,) or (..., N+1).
+        points, velocities: shape (..., N+1, *point_shape); in a product tuples of such arrays.
+        exact: to what relative error integrals of speed and acceleration are worth computing.
+    """
+
+    exact: float = EXACT
+    space: Space
+    times: Doubles
+    points: Any
+    velocities: Any
+
+    @property
+    @abstractmethod
+    def batch(self) -> tuple[int, ...]:
+        """The axes of the batch."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> tuple[CurveArrays, ...]:
+        """The curves in the factors of a product; a curve in another space is its only part."""
+
+    @abstractmethod
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        """A quantity at times x: ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|; of
+        rotations also ``"body velocity"`` and ``"body acceleration"``. ``outside`` the knots ``"raise"``,
+        ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+
+    @abstractmethod
+    def write(
+        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+    ) -> Any:
+        """The same of points or vectors, written into an array that takes them, which is returned."""
+
+    @abstractmethod
+    def lift(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Any,
+        progress: Progress | None = None,
+    ) -> Any:
+        """The same of the horizontal lift that starts at ``start``, see `symspline.CubicSpline.lift`."""
+
+    @abstractmethod
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
+        """Parallel transport of a tangent vector of each curve from one time to another, see
+        `symspline.CubicSpline.transport`."""
+
+    @abstractmethod
+    def control_points(self) -> Any:
+        """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
+
+    @abstractmethod
+    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
+        """How the curve moves with its data, see `symspline.CubicSpline.jvp`."""
+
+    @abstractmethod
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+        """The transpose, see `symspline.CubicSpline.vjp`."""
+
+    @abstractmethod
+    def picked(self, index: Any) -> CurveArrays:
+        """One curve, or a slice, along the first axis of the batch."""

@@ -1,0 +1,165 @@
+"""How curves follow their data."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._arrays import as_array, cast, short_repr
+from .._core import ValidationError
+from .._spaces import Array
+from .._time import onto_ends
+from .curve import CurveArrays, order_of
+from .ends import End, ends_of
+from .gradient import Gradient, Places
+
+
+def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> Places:
+    """Times of all curves, or with ``per_curve`` of each its own.
+
+    Raises:
+        ValidationError: a time is outside the knots.
+    """
+    nu = order_of(nu)
+    dtype = x.dtype if x.dtype.kind == "f" else np.dtype(np.float64)
+    x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
+    shape = x.shape if per_curve else batch + x.shape
+    own = np.broadcast_to(x, shape).reshape(math.prod(batch), math.prod(shape[len(batch) :]))
+    rows = _per_curve(knots, batch)
+    outside = ~((own >= rows[:, :1]) & (own <= rows[:, -1:]))
+    if outside.any():
+        curve, index = (int(i) for i in np.argwhere(outside)[0])
+        raise ValidationError(
+            f"x[{index}] = {own[curve, index]} is outside the knots [{rows[curve, 0]}, {rows[curve, -1]}]; "
+            "derivatives with respect to the data are known between the first and the last knot"
+        )
+    return Places(np.ascontiguousarray(own), shape, nu)
+
+
+class _Curves(NamedTuple):
+    """What the compiled core needs, curve after curve."""
+
+    t: NDArray[np.float64]
+    points: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    ends: list[End] | None
+    x: NDArray[np.float64]
+    curves: int
+    nu: int
+
+
+def push(curve: CurveArrays, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
+    """How the curve moves, see `symspline.CubicSpline.jvp`."""
+    space, times = curve.space, curve.times
+    if points is None:
+        motion = np.zeros_like(space._as_doubles(curve.points))
+    else:
+        motion = space._doubles(points, "points")
+        _same_shape(space._numbers(motion), curve.points.shape, "points")
+        motion = space._as_doubles(space.project_tangent(curve.points, space._numbers(motion)))
+    knots = np.zeros(times.shape) if t is None else as_array(t, "t").astype(np.float64)
+    _same_shape(knots, times.shape, "t")
+    vectors = [
+        _end_motion(curve, bc_type, end, name, which)
+        for which, (end, name) in enumerate(zip(pair_of(ends), ("start", "end"), strict=True))
+    ]
+    moved = _core.push(
+        space._handle,
+        _curves(curve, at, bc_type),
+        np.ascontiguousarray(motion),
+        _per_curve(knots, curve.batch),
+        vectors,
+    )
+    return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
+
+
+def pull(curve: CurveArrays, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+    """The transpose, see `symspline.CubicSpline.vjp`."""
+    space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
+    doubles = space._doubles(cotangent, "cotangent")
+    _same_shape(space._numbers(doubles), (*at.shape, *space.point_shape), "cotangent")
+    points, knots, *ends = _core.pull(
+        space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles)
+    )
+    knots = knots.reshape(*batch, nodes)
+    if curve.times.ndim == 1:
+        knots = knots.reshape(-1, nodes).sum(axis=0)
+    return Gradient(
+        space._numbers(points.reshape(*batch, nodes, *space._doubles_shape)),
+        knots,
+        (_end_gradient(curve, bc_type, ends[0], 0), _end_gradient(curve, bc_type, ends[1], 1)),
+    )
+
+
+def pair_of(ends: Any) -> tuple[Any, Any]:
+    """Changes of the vectors at the two ends; None where there is none."""
+    if ends is None:
+        return None, None
+    if not isinstance(ends, (tuple, list)) or len(ends) != 2:
+        raise ValidationError(f"ends must be a pair, not {short_repr(ends)}")
+    return ends[0], ends[1]
+
+
+def _curves(curve: CurveArrays, at: Places, bc_type: Any) -> _Curves:
+    space, batch = curve.space, curve.batch
+    points, velocities = (
+        space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities)
+    )
+    return _Curves(
+        _per_curve(curve.times, batch),
+        points,
+        velocities,
+        ends_of(bc_type, space, batch),
+        at.x,
+        math.prod(batch),
+        at.nu,
+    )
+
+
+def _per_curve(knots: Array, batch: tuple[int, ...]) -> NDArray[np.float64]:
+    """One row of knots a curve."""
+    nodes = knots.shape[-1]
+    rows = np.broadcast_to(knots, (*batch, nodes)).reshape(math.prod(batch), nodes)
+    return np.ascontiguousarray(rows, dtype=np.float64)
+
+
+def _same_shape(array: Array, shape: tuple[int, ...], name: str) -> None:
+    if array.shape != shape:
+        raise ValidationError(f"{name} has shape {array.shape}, but {shape} is needed")
+
+
+def _given(bc_type: Any, which: int) -> Array | None:
+    """The vector that was given at an end."""
+    return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
+
+
+def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: int) -> NDArray[np.float64]:
+    space, batch = curve.space, curve.batch
+    shape = batch + space._doubles_shape
+    if value is None:
+        return np.zeros(shape)
+    if _given(bc_type, which) is None:
+        raise ValidationError(f"no vector was given at the {name}, so that none can change")
+    doubles = space._doubles(value, f"the change at the {name}")
+    at = np.take(curve.points, -which, axis=len(batch))
+    vectors = np.broadcast_to(space._numbers(doubles), batch + space.point_shape)
+    return space._as_doubles(np.ascontiguousarray(space.project_tangent(at, vectors))).reshape(shape)
+
+
+def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: NDArray[np.float64], which: int) -> Any:
+    given = _given(bc_type, which)
+    if given is None:
+        return None
+    space = curve.space
+    full = space._numbers(gradient.reshape(curve.batch + space._doubles_shape))
+    # A vector that all curves share collects all their gradients.
+    extra = full.ndim - given.ndim
+    summed = full.sum(axis=tuple(range(extra)))
+    for axis, size in enumerate(given.shape):
+        if size == 1 and summed.shape[axis] != 1:
+            summed = summed.sum(axis=axis, keepdims=True)
+    return summed

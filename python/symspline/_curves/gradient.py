@@ -1,0 +1,41 @@
+"""Derivatives with respect to data: where they are wanted, and what comes of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._spaces import Array
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """The gradient of a number with respect to what a spline is made of, see `symspline.CubicSpline.vjp`.
+
+    Attributes:
+        points: tangent vectors at the points, of their shape.
+        t: one number a knot, of the shape of the knots.
+        ends: tangent vectors for the velocity or acceleration that was given at either end, of its shape; None
+            where none was given.
+    """
+
+    points: Any
+    t: Array
+    ends: tuple[Any, Any]
+
+
+class Places(NamedTuple):
+    """Where on the curves of a batch derivatives are wanted.
+
+    Attributes:
+        x: times, shape (curves, times of each).
+        shape: of a result, but for the axes of a point.
+        nu: of γ, γ' or ∇γ'.
+    """
+
+    x: NDArray[np.float64]
+    shape: tuple[int, ...]
+    nu: int

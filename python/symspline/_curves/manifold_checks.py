@@ -1,0 +1,144 @@
+"""What a curve on a manifold made of functions is given: points on it, tangent vectors, times."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import CutLocusError, ValidationError
+from .._faults import INVALID, Fault, of_curve
+from .._spaces import Array, Euclidean
+from ..manifolds import Manifold
+from .solve import Options, Task, validate, without
+
+_METHODS = ("auto", "quasi-newton")
+
+
+def validate_on_manifold(task: Task, options: Options) -> tuple[Task, list[Fault]]:
+    """Validate a task and project its points onto the space. Return the task and the faults of skipped curves.
+
+    Raises:
+        ValidationError: something is wrong with it.
+    """
+    space = task.space
+    assert isinstance(space, Manifold)
+    shape = space._doubles_shape
+    width = math.prod(shape)
+    if options.method not in _METHODS:
+        raise ValidationError(
+            f"method {options.method!r} is not made on a manifold that is made of functions, {space!r}; "
+            f"use {' or '.join(map(repr, _METHODS))}"
+        )
+    if task.tol is None:
+        return task._replace(points=task.points.copy()), []
+    # Numbers, times and whether the curve is closed do not depend on the space.
+    flat = task._replace(
+        space=Euclidean(width),
+        points=task.points.reshape(*task.points.shape[: -len(shape)], width),
+        ends=task.ends
+        and [
+            (kind, None if v is None else v.reshape(*v.shape[: -len(shape)], width)) for kind, v in task.ends
+        ],
+    )
+    flat, faults = validate(flat)
+    points = np.array(space._numbers(task.points))
+    rows = points.reshape(-1, *space.point_shape)
+    lengths = np.diff(task.offsets or [0, points.shape[-len(shape) - 1]])
+    curve_of_row = np.repeat(np.arange(math.prod(task.batch)), lengths)
+    wanted = np.ones(math.prod(task.batch), bool) if flat.mask is None else flat.mask.ravel().copy()
+    while True:
+        used = np.flatnonzero(wanted[curve_of_row])
+        off = space.operations.first_off(rows[used], task.tol) if used.size else None
+        if off is None:
+            break
+        curve = int(curve_of_row[used[off[0]]])
+        node = int(used[off[0]] - np.searchsorted(curve_of_row, curve))
+        fault = Fault(curve, INVALID, f"points[{node}]{{of}} is off the space{off[1]}", node=node)
+        if not task.skip_invalid:
+            error = ValidationError(fault.message(task.batch))
+            error.curve, error.node = fault.batch_index(task.batch), node
+            raise error
+        faults.append(fault)
+        wanted[curve] = False
+    if space.functions.project is not None and used.size:
+        rows[used] = space.operations.project(rows[used])
+    _check_ends(task, points, task.tol, np.flatnonzero(wanted))
+    if task.ends is None:
+        for start, stop in pairwise(task.offsets or [0, points.shape[-len(shape) - 1]]):
+            index = (..., stop - 1, *[slice(None)] * len(shape))
+            points[index] = points[(..., start, *[slice(None)] * len(shape))]
+    mask = without(flat.mask, faults, task.batch)
+    return task._replace(points=space._as_doubles(np.ascontiguousarray(points)), tol=None, mask=mask), faults
+
+
+def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]) -> None:
+    """Vectors at the ends of some curves are tangent, and no velocity carries its control handle past the cut locus."""
+    space, axes = task.space, len(task.space.point_shape)
+    assert isinstance(space, Manifold)
+    if task.offsets is None:
+        at = [np.take(points, i, axis=-1 - axes) for i in (0, -1)]
+        gaps = np.diff(task.times)
+        h = [gaps[..., 0], gaps[..., -1]]
+    else:
+        first, last = np.array(task.offsets[:-1]), np.array(task.offsets[1:]) - 1
+        at = [points[first], points[last]]
+        h = [task.times[first + 1] - task.times[first], task.times[last] - task.times[last - 1]]
+    for (kind, value), name, p, own in zip(task.ends or [], ("start", "end"), at, h, strict=False):
+        if value is None or not wanted.size:
+            continue
+        v = np.broadcast_to(space._numbers(value), p.shape)
+        rows = [np.ascontiguousarray(x).reshape(-1, *space.point_shape)[wanted] for x in (p, v)]
+        defect = space.operations.tangent_defects(*map(space._as_doubles, rows))
+        bad = np.flatnonzero(~(defect <= tol))
+        if bad.size:
+            raise ValidationError(
+                f"the {name} {kind}{of_curve(wanted[bad[0]], task.batch)} is not tangent at its point: a part of "
+                f"{defect[bad[0]]:.3e} of it points off the space (allowed: {tol:.0e}); use space.project_tangent(p, v)"
+            )
+        if kind == "velocity":
+            speed = space.operations.norm(*rows)
+            most = (3 * space.injectivity_radius / np.broadcast_to(own, task.batch)).ravel()[wanted]
+            bad = np.flatnonzero(~(speed < most))
+            if bad.size:
+                raise ValidationError(
+                    f"the {name} velocity{of_curve(wanted[bad[0]], task.batch)} has speed {speed[bad[0]]:.6g}, too "
+                    "fast for its segment: its control handle would be longer than the injectivity radius; the speed "
+                    f"must stay below {most[bad[0]]:.6g}"
+                )
+
+
+def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
+    """Points on the space and tangent velocities there, of curves whose control points are within reach.
+
+    Raises:
+        ValidationError: points or times are invalid, or a velocity is not tangent.
+        CutLocusError: inner control points of a segment lie at or past each other's cut locus.
+    """
+    space = task.space
+    assert isinstance(space, Manifold)
+    task, _ = validate_on_manifold(task, Options("auto", 0.0, None))
+    p = space._numbers(task.points)
+    space.check_tangent(p, velocities)
+    vectors = np.ascontiguousarray(space.project_tangent(p, velocities))
+    axis = len(task.batch)
+    before, after = (
+        np.take(p, range(*part), axis=axis) for part in ((0, p.shape[axis] - 1), (1, p.shape[axis]))
+    )
+    h = np.diff(task.times)
+    third = h.reshape(h.shape + (1,) * len(space.point_shape)) / 3
+    u, w = (
+        np.take(vectors, range(*part), axis=axis) for part in ((0, p.shape[axis] - 1), (1, p.shape[axis]))
+    )
+    try:
+        space._apply(
+            "log", p=space._apply("exp", p=before, v=third * u), q=space._apply("exp", p=after, v=-third * w)
+        )
+    except CutLocusError as error:
+        raise CutLocusError(
+            f"the inner control points of a segment have no unique geodesic between them: {error}; velocities are too "
+            "large for its time"
+        ) from None
+    return p, vectors

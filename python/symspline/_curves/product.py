@@ -1,0 +1,127 @@
+"""Curves in a product: one in every factor, on the same knots."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .._spaces import Product, parts_of, together
+from .core_curve import CoreCurve
+from .curve import NORMS, CurveArrays, Doubles
+from .derivatives import pair_of
+from .ends import ends_in_factors
+from .gradient import Gradient, Places
+from .solve import Progress
+
+Tuple = tuple[Any, ...]
+
+
+class ProductCurve(CurveArrays):
+    """Curves in a product of spaces."""
+
+    space: Product
+
+    def __init__(self, space: Product, parts: tuple[CoreCurve, ...]) -> None:
+        self.space, self._parts, self.times = space, parts, parts[0].times
+        self.exact = max(part.exact for part in parts)
+        self.points: Tuple = tuple(part.points for part in parts)
+        self.velocities: Tuple = tuple(part.velocities for part in parts)
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        return self._parts[0].batch
+
+    @property
+    def parts(self) -> tuple[CoreCurve, ...]:
+        return self._parts
+
+    def evaluate(
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
+    ) -> Any:
+        count = len(self._parts)
+        values = tuple(
+            part.evaluate(x, quantity, outside, per_curve, share(progress, i, count))
+            for i, part in enumerate(self._parts)
+        )
+        return together(values) if quantity in NORMS else values
+
+    def write(
+        self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
+    ) -> Any:
+        count = len(self._parts)
+        return tuple(
+            part.write(one, x, quantity, outside, per_curve, share(progress, i, count))
+            for i, (part, one) in enumerate(zip(self._parts, parts_of(out, self.space, "out"), strict=True))
+        )
+
+    def lift(
+        self,
+        x: Doubles,
+        quantity: str,
+        outside: str,
+        per_curve: bool,
+        start: Any,
+        progress: Progress | None = None,
+    ) -> Tuple:
+        count = len(self._parts)
+        starts = (None,) * count if start is None else parts_of(start, self.space, "start")
+        return tuple(
+            part.lift(x, quantity, outside, per_curve, one, share(progress, i, count))
+            for i, (part, one) in enumerate(zip(self._parts, starts, strict=True))
+        )
+
+    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Tuple:
+        each = zip(self._parts, parts_of(v, self.space, "v"), strict=True)
+        return tuple(part.transport(times, outside, one) for part, one in each)
+
+    def control_points(self) -> Tuple:
+        return tuple(part.control_points() for part in self._parts)
+
+    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Tuple:
+        count = len(self._parts)
+        moved = (None,) * count if points is None else parts_of(points, self.space, "points")
+        vectors = [
+            (None,) * count if end is None else parts_of(end, self.space, "an end vector")
+            for end in pair_of(ends)
+        ]
+        conditions = ends_in_factors(bc_type, self.space)
+        pieces = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
+        return tuple(part.push(at, bc, p, t, pair) for part, bc, p, pair in pieces)
+
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+        cotangents = parts_of(cotangent, self.space, "cotangent")
+        pieces = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
+        parts = [part.pull(at, bc, c) for part, bc, c in pieces]
+        first, last = (None if parts[0].ends[e] is None else tuple(g.ends[e] for g in parts) for e in (0, 1))
+        t = np.sum([g.t for g in parts], axis=0)
+        return Gradient(tuple(g.points for g in parts), t, (first, last))
+
+    def picked(self, index: Any) -> ProductCurve:
+        return ProductCurve(self.space, tuple(part.picked(index) for part in self._parts))
+
+    def __reduce__(self) -> Tuple:
+        return ProductCurve, (self.space, self._parts)
+
+
+def share(progress: Progress | None, i: int, count: int) -> Progress | None:
+    """Progress of the i-th of several works of one size, as progress of all."""
+    return progress and partial(_advance, progress, i, count)
+
+
+def _advance(progress: Progress, i: int, count: int, finished: int, total: int) -> object:
+    return progress(i * total + finished, count * total)
+
+
+def longest_step(curve: CurveArrays) -> Any:
+    """D of (21): distances of the factors add as in Pythagoras' theorem, step by step."""
+    index = (slice(None),) * len(curve.batch)
+    steps = [
+        part.space._apply(
+            "distance", p=part.points[(*index, slice(None, -1))], q=part.points[(*index, slice(1, None))]
+        )
+        for part in curve.parts
+    ]
+    longest = np.max(together(tuple(steps)), axis=-1)
+    return float(longest) if np.ndim(longest) == 0 else longest

@@ -1,0 +1,202 @@
+"""Calls of the compiled core that validate and fit curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._faults import Fault, from_core
+from .._report import Columns
+from .._spaces import Array, Space
+from .ends import End
+
+Progress = Callable[[int, int], object]
+Mask = NDArray[np.bool_]
+
+
+class Options(NamedTuple):
+    """How to solve, as `symspline.CubicSpline` takes it."""
+
+    method: str
+    tol: float
+    max_iter: int | None
+
+
+class Task(NamedTuple):
+    """Points to join by curves.
+
+    Attributes:
+        space: not a product.
+        times: knots, shape (N+1,), or (..., N+1) with one row per curve; with ``offsets`` all in one row.
+        points: contiguous floating-point numbers, shape (..., N+1, *numbers of a point).
+        ends: conditions at both ends, None for closed curves.
+        tol: how far off the space points may be; None if nothing is to be checked.
+        offsets: where curves of different lengths begin in one long row of points, and where the last ends.
+        mask: which curves are fitted, shape of the batch; the others are NaN. None for all.
+        skip_invalid: whether curves with points off the space are masked instead of an error.
+    """
+
+    space: Space
+    times: NDArray[np.float64]
+    points: NDArray[np.float64]
+    ends: list[End] | None
+    tol: float | None
+    offsets: list[int] | None = None
+    mask: Mask | None = None
+    skip_invalid: bool = False
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Shape of the batch."""
+        if self.offsets is not None:
+            return (len(self.offsets) - 1,)
+        return self.points.shape[: self.points.ndim - len(self.space._doubles_shape) - 1]
+
+
+class Solved(NamedTuple):
+    """Points on the space, velocities there, the columns of the report, and faults."""
+
+    points: Array
+    velocities: Array
+    columns: Columns
+    faults: list[Fault]
+
+
+def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
+    """Check and solve."""
+    space, times, points, ends, tol, offsets, mask, skip = task
+    found, velocities, tables, raw = _core.fit(
+        space._handle,
+        times,
+        points,
+        ends,
+        *options,
+        tol is not None,
+        tol or 0.0,
+        offsets,
+        None if mask is None else mask.ravel().tolist(),
+        skip,
+        progress,
+    )
+    columns = Columns(*tables)
+    faults = []
+    if raw:
+        quaternions = space._name == "sphere"
+        faults = [from_core(one, columns, options.tol, quaternions) for one in raw]
+    if space._complex:
+        found, velocities = space._numbers(found), space._numbers(velocities)
+    return Solved(found, velocities, columns, faults)
+
+
+def validate(task: Task) -> tuple[Task, list[Fault]]:
+    """Copy the points of a task and project them onto the space, so that no further validation is needed.
+
+    Returns
+    -------
+    task : Task
+        The task with projected points. Its mask excludes the curves that were skipped.
+    faults : list of Fault
+        The faults of skipped curves.
+
+    Raises
+    ------
+    ValidationError
+        If any other input is invalid.
+    """
+    space, times, points, ends, tol, offsets, mask, skip = task
+    if tol is None:
+        return task._replace(points=points.copy()), []
+    found, raw = _core.validate(
+        space._handle,
+        times,
+        points,
+        ends,
+        tol,
+        offsets,
+        None if mask is None else mask.ravel().tolist(),
+        skip,
+    )
+    faults = [from_core(one, Columns.empty(0), 0.0, False) for one in raw]
+    return task._replace(points=found, tol=None, mask=without(mask, faults, task.batch)), faults
+
+
+def without(mask: Mask | None, faults: list[Fault], batch: tuple[int, ...]) -> Mask | None:
+    """Remove the curves with faults from a mask."""
+    if not faults:
+        return mask
+    kept = np.ones(batch, bool) if mask is None else mask.copy()
+    kept.flat[[fault.curve for fault in faults]] = False
+    return kept
+
+
+def one_by_one(
+    task: Task,
+    options: Options,
+    progress: Progress | None,
+    solve_one: Callable[[Task, Options, Progress | None], Solved],
+) -> Solved:
+    """Solve curves of different lengths, stored one after the other, one at a time and without validation."""
+    offsets = task.offsets or []
+    velocities = np.full((offsets[-1], *task.space.point_shape), np.nan, task.space.dtype)
+    points = np.array(task.space._numbers(task.points))
+    columns, faults = Columns.empty(len(offsets) - 1), []
+    for i, (start, stop) in enumerate(pairwise(offsets)):
+        if task.mask is not None and not task.mask[i]:
+            points[start:stop] = np.nan
+            continue
+        ends = task.ends and [
+            (kind, None if value is None else value[i : i + 1]) for kind, value in task.ends
+        ]
+        one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
+        found = solve_one(one, options, progress and partial(_advance, progress, start, offsets[-1]))
+        velocities[start:stop] = found.velocities[0]
+        columns.put([i], found.columns)
+        faults += [fault._replace(curve=i) for fault in found.faults]
+    return Solved(points, velocities, columns, faults)
+
+
+def solve_some(
+    task: Task,
+    options: Options,
+    progress: Progress | None,
+    solve_all: Callable[[Task, Options, Progress | None], Solved],
+) -> Solved:
+    """Solve the unmasked curves by a solver without support for masks, without validation."""
+    if task.mask is None or task.mask.all():
+        return solve_all(task._replace(mask=None), options, progress)
+    space, chosen = task.space, np.flatnonzero(task.mask)
+
+    def rows(array: Array, axes: int) -> Array:
+        return np.ascontiguousarray(array.reshape(-1, *array.shape[array.ndim - axes :])[chosen])
+
+    axes = len(space._doubles_shape)
+    points = space._numbers(task.points)
+    whole = Solved(
+        np.full(points.shape, np.nan, space.dtype),
+        np.full(points.shape, np.nan, space.dtype),
+        Columns.empty(task.mask.size),
+        [],
+    )
+    if not chosen.size:
+        return whole
+    some = task._replace(
+        times=rows(task.times, 1) if task.times.ndim > 1 else task.times,
+        points=rows(task.points, 1 + axes),
+        ends=task.ends and [(kind, None if v is None else rows(v, axes)) for kind, v in task.ends],
+        mask=None,
+    )
+    found = solve_all(some, options, progress)
+    for all_rows, own in ((whole.points, found.points), (whole.velocities, found.velocities)):
+        all_rows.reshape(-1, *own.shape[1:])[chosen] = own
+    whole.columns.put(chosen, found.columns)
+    return whole._replace(faults=[fault._replace(curve=int(chosen[fault.curve])) for fault in found.faults])
+
+
+def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:
+    return progress(before + finished, total)

@@ -1,0 +1,72 @@
+"""Coordinates in the span of some points."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space
+
+
+class Span(NamedTuple):
+    """A large space, a small one, and an orthonormal basis of the span: shape (..., n, m). In hyperbolic
+    space the basis is of the space-like part; the time-like coordinate stays."""
+
+    large: Space
+    space: Space
+    basis: Array
+
+    def coordinates(self, x: Array) -> Array:
+        """Coordinates of points or vectors of one space, shape (..., knots, *point_shape)."""
+        time, columns, shape = _columns(self.space, x)
+        small = np.swapaxes(self.basis.conj(), -1, -2) @ columns
+        return _uncolumns(self.space, time, small, shape)
+
+    def embed(self, x: Array) -> Array:
+        """Points or vectors with given coordinates."""
+        time, columns, shape = _columns(self.space, x)
+        return _uncolumns(self.space, time, self.basis @ columns, shape)
+
+    def embed_samples(self, values: Array, batch: tuple[int, ...]) -> Array:
+        """Points or vectors of shape batch + times + (*point_shape) of the small space, back in the large."""
+        axes = len(self.space.point_shape)
+        times = values.shape[len(batch) : values.ndim - axes]
+        flat = values.reshape(*batch, math.prod(times), *self.space.point_shape)
+        return self.embed(flat).reshape(*batch, *times, *self.large.point_shape)
+
+
+def span_of(space: Space, *arrays: Array) -> Span:
+    """The span of arrays of points or vectors, each of shape batch + (knots, *point_shape)."""
+    columns = np.concatenate([_columns(space, array)[1] for array in arrays], axis=-1)
+    basis = np.linalg.qr(columns)[0]
+    return Span(space, _small(space, basis.shape[-1]), basis)
+
+
+def _small(space: Space, m: int) -> Space:
+    if isinstance(space, (Grassmannian, ComplexGrassmannian)):
+        return type(space)(space.point_shape[1], m)
+    if isinstance(space, Hyperbolic):
+        return Hyperbolic(m)
+    small: Space = type(space)(m - 1)
+    return small
+
+
+def _columns(space: Space, x: Array) -> tuple[Array | None, Array, tuple[int, ...]]:
+    """The columns of all knots side by side, shape (..., n, knots · width), and the time-like part."""
+    if len(space.point_shape) == 1:
+        time, rest = (x[..., :1], x[..., 1:]) if isinstance(space, Hyperbolic) else (None, x)
+        return time, np.swapaxes(rest, -1, -2), x.shape
+    moved = np.moveaxis(x, -3, -2)
+    *lead, knots, width = moved.shape
+    return None, moved.reshape(*lead, knots * width), x.shape
+
+
+def _uncolumns(space: Space, time: Array | None, columns: Array, shape: tuple[int, ...]) -> Array:
+    if len(space.point_shape) == 1:
+        rows = np.swapaxes(columns, -1, -2)
+        return np.ascontiguousarray(rows if time is None else np.concatenate([time, rows], axis=-1))
+    knots, width = shape[-3], shape[-1]
+    stacked = columns.reshape(*columns.shape[:-1], knots, width)
+    return np.ascontiguousarray(np.moveaxis(stacked, -2, -3))

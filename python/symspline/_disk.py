@@ -1,0 +1,136 @@
+"""Files that arguments name: which values name one, and how a file is replaced as a whole."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import secrets
+import stat
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ._arrays import short_repr
+from ._core import ValidationError
+
+# Characters of the file's own name in that of a temporary one: at most 128 bytes of the 255 that file systems allow.
+_TAIL = 32
+
+
+def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -> Path | None:
+    """The path that an argument names, or None if it is an open file.
+
+    Numbers are refused: Python opens 0, 1 and 2 as the standard streams.
+
+    Parameters
+    ----------
+    file : path or open file
+        The argument.
+    name : str
+        What the caller calls the argument.
+    method : {"read", "write"}
+        What an open file must have.
+    text : bool
+        Whether an open file must be open as text.
+
+    Raises
+    ------
+    TypeError
+        The argument is neither.
+    ValidationError
+        It is a text that cannot be the name of a file.
+    """
+    if callable(getattr(file, method, None)):
+        if isinstance(file, (io.RawIOBase, io.BufferedIOBase) if text else io.TextIOBase):
+            mode = "as text, without 'b' in its mode" if text else "in binary mode, with 'b'"
+            raise TypeError(f"{name} must be open {mode}; pass its name, or open it so")
+        return None
+    if not isinstance(file, (str, os.PathLike)):
+        raise TypeError(
+            f"{name} must be a path or an open file with a method {method}, not {short_repr(file)}"
+        )
+    path = os.fspath(file)
+    if not isinstance(path, str):
+        raise TypeError(f"{name} must be a path of text, not {short_repr(path)}")
+    if not path:
+        raise ValidationError(f"{name} is an empty text, which names no file")
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        raise ValidationError(
+            f"{name} = {short_repr(path)} is not the name of a file: it is not Unicode"
+        ) from None
+    if "\0" in path:
+        raise ValidationError(
+            f"{name} = {short_repr(path)} is not the name of a file: it holds a null character"
+        )
+    return Path(path)
+
+
+class replacing:
+    """Write a file as a whole: a context whose value is a temporary path, which takes the place of ``path``.
+
+    The temporary file lies in the same folder and has the same ending. If the body fails it is removed, and an
+    existing file stays as it was. If the body succeeds, its data are flushed to disk before it is renamed. An existing
+    file keeps its permissions and, where the system allows that, its owner. Of a symbolic link the target is
+    replaced.
+
+    Raises
+    ------
+    OSError
+        ``path`` is a folder, a device, a pipe or a socket, or cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __enter__(self) -> Path:
+        # Raises for links that go in circles; a link to nothing becomes a file where it points.
+        with suppress(FileNotFoundError):
+            os.stat(self.path)
+        self.target = Path(os.path.realpath(self.path))
+        self.old: os.stat_result | None = None
+        with suppress(FileNotFoundError):
+            self.old = os.stat(self.target)
+        if self.old is not None and not stat.S_ISREG(self.old.st_mode):
+            raise _not_regular(self.path, self.old.st_mode)
+        self.temporary = self.target.with_name(f".{secrets.token_hex(8)}{self.target.name[-_TAIL:]}")
+        # A new file has the permissions of any new file. One that replaces another gets those at the end, and until
+        # then nobody else may read it.
+        mode = 0o666 if self.old is None else 0o600
+        os.close(os.open(self.temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+        return self.temporary
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        try:
+            if kind is None:
+                self._finish()
+        finally:
+            with suppress(FileNotFoundError):
+                self.temporary.unlink()
+
+    def _finish(self) -> None:
+        with open(self.temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        if self.old is not None:
+            self._keep(self.old)
+        self.temporary.replace(self.target)
+
+    def _keep(self, old: os.stat_result) -> None:
+        """Owner and permissions of the file that is replaced."""
+        new = os.stat(self.temporary)
+        if hasattr(os, "chown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
+            with suppress(OSError):
+                os.chown(self.temporary, old.st_uid, old.st_gid)
+        os.chmod(self.temporary, stat.S_IMODE(old.st_mode))
+
+
+def _not_regular(path: Path, mode: int) -> OSError:
+    if stat.S_ISDIR(mode):
+        return IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+    return OSError(
+        errno.EINVAL,
+        "it is a device, a pipe or a socket, not a regular file; pass an open file instead",
+        str(path),
+    )

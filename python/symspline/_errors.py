@@ -1,0 +1,100 @@
+"""What is done about curves that failed, or that may go the wrong way round."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+
+from ._core import ConvergenceError, CutLocusError, ValidationError
+from ._faults import CUT_LOCUS, Fault
+from ._report import ConvergenceWarning
+
+_PACKAGE = os.path.dirname(__file__)
+# So many times shorter than its neighbours an interval is for the times to be the reason, and so many times faster.
+_CLOSE = 10
+_ERRORS: dict[str, type[Exception]] = {CUT_LOCUS: CutLocusError}
+
+
+def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
+    """Raise or warn, with the good curves attached.
+
+    Parameters
+    ----------
+    faults : list of Fault
+        In the order of curves.
+    on_failure : {"raise", "warn", "ignore"}
+    spline : curve, batch of curves, or list of curves
+        What was fitted.
+    """
+    batch = (len(spline),) if isinstance(spline, (list, tuple)) else spline._batch
+    failed = [fault for fault in faults if fault.failed]
+    if failed and on_failure != "ignore":
+        first = failed[0]
+        remedy = _remedy_for_close_times(first, batch, spline) or first.remedy
+        message = first._replace(remedy=remedy).message(batch) + _more(failed, "curves failed")
+        if on_failure == "raise":
+            error: Any = _ERRORS.get(first.kind, ConvergenceError)(message)
+            error.spline = spline
+            error.curve = first.batch_index(batch)
+            error.node, error.value, error.limit = first.node, first.value, first.limit
+            raise error
+        warnings.warn(message, ConvergenceWarning, stacklevel=callers_level())
+    almost = [fault for fault in faults if not fault.failed]
+    if almost:
+        message = almost[0].message(batch) + _more(almost, "curves")
+        warnings.warn(message, UserWarning, stacklevel=callers_level())
+
+
+def _remedy_for_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> str | None:
+    """The remedy of a failure whose reason is that two times lie too close together for their points; it names them.
+
+    Notes
+    -----
+    An interval of length h between points at a distance d asks for the speed d/h at both of its ends. Where h is far
+    shorter than its neighbours, this speed carries the curve in them much farther than their points are apart.
+    """
+    if not fault.about_times:
+        return None
+    single = isinstance(spline, (list, tuple))
+    curve = spline[fault.curve] if single else spline
+    index = np.unravel_index(fault.curve, batch) if batch and not single else ()
+    h = np.diff(curve._times[index] if curve._times.ndim > 1 else curve._times)
+    if len(h) < 2:
+        return None
+    around = np.minimum(np.append(np.inf, h[:-1]), np.append(h[1:], np.inf))
+    i = int(np.argmax(around / h))
+    steps = []
+    for part in curve._curve.parts:
+        points = part.points[index]
+        with np.errstate(all="ignore"):
+            try:
+                own = np.asarray(part.space.distance(points[:-1], points[1:]))
+            except (CutLocusError, ValidationError):
+                return None
+        if not own.max() <= 0.5 * part.space.injectivity_radius:
+            return None
+        steps.append(own)
+    step = np.linalg.norm(steps, axis=0)
+    if not (around[i] > _CLOSE * h[i] and step[i] / h[i] > _CLOSE * np.median(step / h)):
+        return None
+    t = curve._t[index] if curve._t.ndim > 1 else curve._t
+    return (
+        f"t[{i}] = {t[i]} and t[{i + 1}] = {t[i + 1]} are too close for the distance {step[i]:.3g} between "
+        "their points: merge the two samples, smooth the data with make_smoothing_spline, or correct the clock"
+    )
+
+
+def _more(faults: list[Fault], what: str) -> str:
+    return f" (and {len(faults) - 1} more {what})" if len(faults) > 1 else ""
+
+
+def callers_level() -> int:
+    """How many frames up the code is that called this package."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame, level = frame.f_back, level + 1
+    return level

@@ -1,0 +1,163 @@
+"""Faults of fitted curves. The messages for every kind of fault are in this module only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._report import Columns
+
+CUT_LOCUS, UNCONVERGED, INVALID, ALMOST_CUT = "cut-locus", "unconverged", "invalid", "almost-cut"
+
+
+class Fault(NamedTuple):
+    """A fault of one curve.
+
+    Attributes
+    ----------
+    curve : int
+        Number of the curve in the flattened batch.
+    kind : str
+        `CUT_LOCUS`, `UNCONVERGED`, `INVALID`, or `ALMOST_CUT` for a good curve that would turn the other way round
+        if its points moved a little.
+    what, remedy : str
+        The problem, and what to do about it. ``{of}`` stands for words that name the curve.
+    node : int or None
+        The node at which the problem was found.
+    value, limit : float
+        What was found there and how large it may be; NaN if there is no such number.
+    about_times : bool
+        Whether unsuitable times may be the reason.
+    """
+
+    curve: int
+    kind: str
+    what: str
+    remedy: str = ""
+    node: int | None = None
+    value: float = float("nan")
+    limit: float = float("nan")
+    about_times: bool = False
+
+    def batch_index(self, batch: Sequence[int]) -> tuple[int, ...]:
+        """The index of the curve in the batch; () for a single curve."""
+        return tuple(map(int, np.unravel_index(self.curve, batch))) if batch else ()
+
+    def problem(self, batch: Sequence[int]) -> str:
+        """The problem, which names the curve by its index in the batch."""
+        return self.what.replace("{of}", of_curve(self.curve, batch))
+
+    def message(self, batch: Sequence[int]) -> str:
+        """The problem and the remedy."""
+        return "; ".join(filter(None, (self.problem(batch), self.remedy)))
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no good curve."""
+        return self.kind != ALMOST_CUT
+
+
+CoreFault = tuple[int, str, int | None, float, float, str | None]
+"""A fault from the compiled core: curve, kind, node, value, limit, and the message for an invalid point."""
+
+
+def of_curve(number: int, batch: Sequence[int]) -> str:
+    """Words for a curve of a batch; none for a single curve."""
+    return f" of curve {','.join(map(str, np.unravel_index(number, batch)))}" if batch else ""
+
+
+def unconverged(number: int, columns: Columns, tol: float, more_advice: str = "") -> Fault:
+    """The fault of a curve whose residual stayed above the tolerance."""
+    residual, iterations, longest = (columns.row(x)[number] for x in ("residual", "iterations", "max_step"))
+    return Fault(
+        number,
+        UNCONVERGED,
+        f"no convergence{{of}}: residual {residual:.3e} after {iterations} iterations (tol {tol:.1e}, longest "
+        f"step {_length(longest)})",
+        f"put more points where steps are long, choose times that suit the distances, or raise max_iter{more_advice}",
+        value=float(residual),
+        limit=tol,
+        about_times=True,
+    )
+
+
+def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -> Fault:
+    """A fault of the compiled core, in words.
+
+    Parameters
+    ----------
+    columns : Columns
+        The reports of all curves.
+    tol : float
+        The tolerance of the fit.
+    quaternions : bool
+        Whether points may be unit quaternions, whose sign is the usual reason for antipodes.
+    """
+    number, kind, node, value, limit, why = raw
+    i, after = (node, node + 1) if node is not None else (None, None)
+    times = "give times that suit the distances"
+
+    def fault(kind: str, what: str, remedy: str, about_times: bool = False) -> Fault:
+        return Fault(number, kind, what, remedy, node, value, limit, about_times)
+
+    if kind == "invalid":
+        return fault(INVALID, str(why), "")
+    longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]
+    if kind == "almost-cut":
+        return fault(
+            ALMOST_CUT,
+            f"neighbours almost at the cut locus: between points[{i}] and points[{after}]{{of}} the angle is {value}, "
+            f"limit {limit}; had it been a little more, the curve would go the other way round: put a point between "
+            "them",
+            "",
+        )
+    if kind == "cut-locus":
+        return fault(
+            CUT_LOCUS,
+            f"points[{i}] and points[{after}]{{of}} lie at or past each other's cut locus: angle {value}, "
+            f"limit {limit}",
+            "put a point between them" + (", or check their sign" if quaternions else ""),
+        )
+    if kind == "outer-handle" and limit == float("inf"):
+        return fault(
+            UNCONVERGED,
+            f"the control handle at points[{i}]{{of}} has length {value:.1f}, which rounding errors outgrow",
+            f"{times}: the segments beside it differ too much in length",
+            about_times=True,
+        )
+    if kind == "outer-handle":
+        return fault(
+            CUT_LOCUS,
+            f"the control handle at points[{i}]{{of}} passes the cut locus: angle {value}, limit {limit}",
+            f"put more points there, or {times}",
+            about_times=True,
+        )
+    if kind == "inner-handles":
+        return fault(
+            CUT_LOCUS,
+            f"the control points between points[{i}] and points[{after}]{{of}} lie at or past each other's cut locus: "
+            f"angle {value}, limit {limit}",
+            f"put a point between them, or {times}",
+        )
+    if kind == "homotopy":
+        return fault(
+            UNCONVERGED,
+            f"no convergence{{of}}: after {iterations} iterations the homotopy had not come to these points (longest "
+            f"step {_length(longest)})",
+            "try another method, put more points where steps are long, or choose times that suit the distances",
+        )
+    if kind == "overflow":
+        return fault(
+            UNCONVERGED,
+            f"no convergence{{of}}: after {iterations} iterations numbers exceeded the floating-point range (longest "
+            f"step {_length(longest)})",
+            "put more points where steps are long, or choose times that suit the distances",
+            about_times=True,
+        )
+    return unconverged(number, columns, tol)
+
+
+def _length(x: Any) -> str:
+    return f"{x:.3f}" if x < 1e6 else f"{x:.3e}"

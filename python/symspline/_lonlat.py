@@ -1,0 +1,94 @@
+"""Places on a globe: longitude and latitude in degrees, and unit vectors of S²."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._arrays import as_array
+from ._core import ValidationError
+
+Array = NDArray[np.float64]
+
+
+def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
+    """The unit vectors of places on a globe.
+
+    Args:
+        lon, lat: degrees east and north, shape (...).
+
+    Returns:
+        Shape (..., 3): x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
+
+    Raises:
+        ValidationError: a latitude is beyond a pole, or a longitude ten turns away, as where the two are swapped or a
+            value stands for a missing one.
+
+    >>> from_lonlat(90, 0).round(15)
+    array([0., 1., 0.])
+    """
+    east, north = _degrees(lon, "lon", 3600), _degrees(lat, "lat", 90)
+    try:
+        east, north = np.broadcast_arrays(east, north)
+    except ValueError:
+        raise ValidationError(
+            f"lon of shape {east.shape} and lat of shape {north.shape} do not go together; give one of each per place"
+        ) from None
+    x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
+    return np.stack([x, y, z], axis=-1)
+
+
+def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
+    """Longitude in (-180, 180] and latitude, in degrees, of unit vectors of shape (..., 3).
+
+    >>> lon, lat = to_lonlat([0, 1, 0])
+    >>> float(lon), float(lat)
+    (90.0, 0.0)
+    """
+    x, y, z = np.moveaxis(_vectors(points), -1, 0)
+    return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
+
+
+def compass(points: ArrayLike) -> tuple[Array, Array]:
+    """Unit vectors to the east and to the north at unit vectors of shape (..., 3); at a pole, those of
+    0° E.
+
+    >>> east, north = compass([1, 0, 0])
+    >>> east + 0.0, north + 0.0
+    (array([0., 1., 0.]), array([0., 0., 1.]))
+    """
+    x, y, z = np.moveaxis(_vectors(points), -1, 0)
+    horizontal = np.hypot(x, y)
+    pole = horizontal == 0
+    cosine, sine = (np.where(pole, at, w / np.where(pole, 1, horizontal)) for at, w in ((1, x), (0, y)))
+    zero = np.zeros_like(x)
+    return np.stack([-sine, cosine, zero], axis=-1), np.stack([-z * cosine, -z * sine, horizontal], axis=-1)
+
+
+def _degrees(value: ArrayLike, name: str, most: float) -> Array:
+    """An angle in radians, of one in degrees."""
+    angles = _floats(value, name)
+    # Single precision may round up.
+    beyond = np.argwhere(np.abs(angles) > most * (1 + 1e-7))
+    if len(beyond):
+        place = tuple(map(int, beyond[0]))
+        where = name + "".join(f"[{i}]" for i in place)
+        raise ValidationError(
+            f"{where} is {angles[place]}: {name} must be from -{most} to {most} degrees; are lon and lat swapped, or "
+            "does it stand for a missing value?"
+        )
+    return np.radians(angles)
+
+
+def _vectors(points: ArrayLike) -> Array:
+    array = _floats(points, "points")
+    if array.shape[-1:] != (3,):
+        raise ValidationError(f"points must be unit vectors of shape (..., 3), not {array.shape}")
+    return array
+
+
+def _floats(value: ArrayLike, name: str) -> Array:
+    array = as_array(value, name)
+    if array.dtype.kind not in "iuf":
+        raise ValidationError(f"{name} must be real numbers, not {array.dtype}")
+    return array.astype(float)

@@ -1,0 +1,67 @@
+"""Options of a spline: what a user may write, checked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ._arrays import checked_atol, checked_flag, short_repr, whole_number
+from ._core import ValidationError
+from ._curves.ends import is_closed
+from ._curves.fit import Points
+from ._curves.solve import Options
+
+_RAISE = "raise"
+_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
+
+
+def options_of(method: str, tol: float, max_iter: int | None) -> Options:
+    """How to solve; the core checks method and tol."""
+    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
+
+
+def with_atol(data: list[Points], atol: float | None) -> list[Points]:
+    """Points that may be off the space by ``atol``; None leaves what their type allows."""
+    if atol is None:
+        return data
+    tol = checked_atol(atol)
+    return [part._replace(tol=tol) for part in data]
+
+
+def checked_extrapolate(extrapolate: Any) -> Any:
+    """What happens outside the knots, if it is one of the words for it."""
+    known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
+    if extrapolate is not None and extrapolate is not True and not known:
+        raise ValidationError(
+            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
+        )
+    return extrapolate
+
+
+def outside(policy: Any, bc_type: Any) -> str:
+    """The same as the core calls it; closed curves go on as they began."""
+    return "periodic" if policy is None and is_closed(bc_type) else _OUTSIDE[policy]
+
+
+def check_progress(progress: Any) -> None:
+    """Raise ValidationError unless it can be called, or is None."""
+    if progress is not None and not callable(progress):
+        raise ValidationError(f"progress must be a function of two numbers, not {short_repr(progress)}")
+
+
+def check_fit_options(extrapolate: Any, on_failure: Any, check: Any, progress: Any) -> None:
+    """Raise ValidationError unless all of these are valid. The defaults, which are usual, cost one call."""
+    if extrapolate is not None:
+        checked_extrapolate(extrapolate)
+    # Not ==, which would compare every number of an array.
+    if on_failure is not _RAISE:
+        check_on_failure(on_failure)
+    if check is not True:
+        checked_flag(check, "check")
+    if progress is not None:
+        check_progress(progress)
+
+
+def check_on_failure(on_failure: Any) -> None:
+    """Raise ValidationError unless it is one of the three words."""
+    if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
+        raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {short_repr(on_failure)}")

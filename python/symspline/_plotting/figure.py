@@ -1,0 +1,183 @@
+"""The figure: a heading, the picture of the space, and speed and acceleration against time.
+
+A new space adds a function that draws, and one line of `_DRAWN` or, for all sizes alike, of `_FAMILIES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from io import BytesIO
+from textwrap import shorten
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure, SubFigure
+
+from .._arrays import short_repr
+from .._core import ValidationError
+from .._disk import path_of, replacing
+from .._spaces import Product, Space, SpecialEuclidean, factors_of
+from . import chart, ellipses, frames, graphs, sphere
+from .bands import fill_band
+from .curves import Curve, Spline, curves_of
+from .disk import draw_disk
+from .style import DPI, INK, heading
+from .timeline import timelines
+
+_HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 4.0
+_FACTORS = 6
+_NORMAL = 1.96
+"""A normal variable is nearer to its mean than so many deviations with probability 95 %."""
+
+
+class Picture(NamedTuple):
+    """How curves in a space are drawn.
+
+    Attributes:
+        draw: draws curves into a panel, whatever its size.
+        width, height: of the panel in inches when the picture is the only one. Beside a panel that is much
+            wider than high there is no room for speed and acceleration: they go below.
+    """
+
+    draw: Callable[[SubFigure, Sequence[Curve]], None]
+    width: float = 5.2
+    height: float = 5.2
+
+
+_GRAPH, _ROWS = (10.5, 3.2), (10.5, 2.7)
+_DRAWN: list[tuple[str, Callable[[SubFigure, Sequence[Curve]], None], tuple[float, ...]]] = [
+    ("euclidean:1", graphs.draw_graph, _GRAPH),
+    ("euclidean:2", chart.draw_plane, ()),
+    ("euclidean:3", chart.draw_3d, ()),
+    ("sphere:1", graphs.draw_circle, _GRAPH),
+    ("sphere:2", sphere.draw_sphere, (11.4, 4.6)),
+    ("sphere:3", frames.draw_quaternions, _ROWS),
+    ("hyperbolic:2", draw_disk, ()),
+    ("rp:1 gr:1,2", graphs.draw_slope, _GRAPH),
+    ("rp:2 gr:1,3", sphere.draw_lines, ()),
+    ("gr:2,3", sphere.draw_normals, ()),
+    ("cp:1 cgr:1,2", sphere.draw_bloch, ()),
+    ("so:2 o:2", graphs.draw_turn, _GRAPH),
+    ("so:3 o:3", frames.draw_rotations, _ROWS),
+    ("u:1", graphs.draw_phase, _GRAPH),
+    ("su:2", frames.draw_spins, _ROWS),
+    ("spd:2", ellipses.draw_ellipses, _ROWS),
+    ("spd:3", ellipses.draw_ellipsoids, _ROWS),
+    ("se:2", frames.draw_flat_poses, ()),
+    ("se:3", frames.draw_poses, (6.2, 5.8)),
+]
+_PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
+_FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))
+_FAMILIES["ch"] = Picture(graphs.draw_ratios, 10.5, 3.8)
+_OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
+
+
+def picture_of(space: Space) -> Picture:
+    """The picture of a space or of its family; the components against time if it has none of its own."""
+    name = str(space)
+    return _PICTURES.get(name) or _FAMILIES.get(name.partition(":")[0], _OTHERS)
+
+
+class CurveFigure(Figure):
+    """A figure that notebooks show although pyplot does not hold it."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+def plot(spline: Spline, file: Any = None) -> Figure:
+    """The figure of a spline, saved if ``file`` is given. See `symspline.CubicSpline.plot`."""
+    curves, words = curves_of(spline)
+    picture = _of_factors(curves) if isinstance(spline.space, Product) else picture_of(spline.space)
+    wide = picture.width > 1.5 * picture.height
+    widths = [picture.width] if wide else [picture.width, _RATES_WIDTH]
+    heights = [_HEAD, picture.height, _RATES_HEIGHT][: 3 if wide else 2]
+    figure = CurveFigure(figsize=(sum(widths), sum(heights)), dpi=DPI, facecolor="white")
+    grid = figure.add_gridspec(len(heights), len(widths), width_ratios=widths, height_ratios=heights)
+    title = shorten(f"{spline._kind} on {spline.space!r}", int(6 * sum(widths)), placeholder=" …")
+    heading(figure, title, words + _description(spline, curves), 1 - 0.5 / sum(heights))
+    picture.draw(figure.add_subfigure(grid[1, 0]), curves)
+    _draw_rates(figure.add_subfigure(grid[2, 0] if wide else grid[1, 1]), curves)
+    if file is not None:
+        save(figure, file)
+    return figure
+
+
+def save(figure: Figure, file: Any) -> None:
+    """Write a figure to an open file, or replace a file by its name, whose ending says the format."""
+    path = path_of(file, method="write")
+    if path is None:
+        figure.savefig(file)
+        return
+    known = figure.canvas.get_supported_filetypes()
+    ending = path.suffix[1:].lower()
+    if not ending:
+        ending = figure.canvas.get_default_filetype()
+        path = path.with_name(f"{path.name}.{ending}")
+    if ending not in known:
+        raise ValidationError(
+            f"file = {short_repr(str(path))}: the name of a picture must end in .{', .'.join(sorted(known))}"
+        )
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=ending)
+
+
+def _description(spline: Spline, curves: Sequence[Curve]) -> str:
+    """The data, whether the solver converged, how many curves have bands, and how many bands mark missing points."""
+    words = [spline._made_of]
+    factors = len(factors_of(spline.space))
+    if factors > _FACTORS:
+        words.append(f"{_FACTORS} of {factors} factors")
+    if spline._unconverged:
+        words.append(f"{spline._unconverged} not converged" if spline._curve.batch else "not converged")
+    if curves[0].noise is not None:
+        banded = sum(curve.shown for curve in curves)
+        words.append("band 95 %" if banded == len(curves) else f"data and 95 % bands of {banded}")
+    gaps = sum(len(curve.gaps) for curve in curves)
+    if gaps:
+        words.append(f"{gaps} long gap{'s' if gaps > 1 else ''}")
+    return ", ".join(words)
+
+
+def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """|γ'| and |∇γ'| of every curve, and the band of the speed where noise is known."""
+    per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
+    # Rigid motions have no invariant lengths, see `SpecialEuclidean`.
+    rigid = isinstance(curves[0].space, SpecialEuclidean)
+    first, second = ("|(ω, v)|", "|(ω′, v′)|") if rigid else ("|γ′|", "|∇γ′|")
+    upper, lower = timelines(panel, curves, [f"speed\n{first}{per[0]}", f"acceleration\n{second}{per[1]}"])
+    top = highest = 0.0
+    for curve in curves:
+        speed, bend = curve.at("speed"), curve.at("bend")
+        look: Any = {"color": curve.color, "linewidth": 1.8 if curve.alone else 1.1}
+        upper.plot(curve.times, speed, **look)
+        lower.plot(curve.times, bend, **look)
+        top, highest = max(top, speed.max()), max(highest, bend.max())
+        if curve.noise is not None and curve.noise.speed is not None and curve.shown:
+            spread = _NORMAL * curve.noise.speed
+            fill_band(upper, curve, np.maximum(speed - spread, 0), speed + spread)
+            top = max(top, (speed + spread).max())
+    top = top or 1.0
+    unit = top / max(curve.x[-1] - curve.x[0] for curve in curves)
+    upper.set_ylim(0, 1.08 * top)
+    # The rounding of a geodesic is not magnified.
+    lower.set_ylim(0, 1.08 * (highest if highest > 1e-9 * unit else unit))
+
+
+def _of_factors(curves: Sequence[Curve]) -> Picture:
+    """The pictures of a product's factors, side by side."""
+    factors = factors_of(curves[0].space)[:_FACTORS]
+    rows = 1 if len(factors) <= 3 else 2
+    columns = -(-len(factors) // rows)
+
+    def draw(panel: SubFigure, curves: Sequence[Curve]) -> None:
+        cells = np.asarray(panel.subfigures(2 * rows, columns, height_ratios=[0.3, 4.3] * rows))
+        for i, factor in enumerate(factors):
+            row, column = divmod(i, columns)
+            caption, cell = cells[2 * row : 2 * row + 2, column]
+            caption.text(0.5, 0.3, repr(factor), ha="center", color=INK, fontsize=12)
+            picture_of(factor).draw(cell, [curve.part(i) for curve in curves])
+
+    return Picture(draw, 4.8 * columns, 4.6 * rows)

@@ -1,0 +1,111 @@
+"""Films of landmarks: a strip along the time axis, and small multiples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from .figure import CurveFigure, save
+from .frames import VIEW
+from .style import DATES, DPI, EDGE, HALO, INK, Array, heading, plain, show_dates, time_colors, window
+
+# Drawings in the strip, and in each row of the small multiples.
+_STRIP, _ROWS, _COLUMNS = 25, 2, 6
+_WIDTH, _HEIGHT = 11.4, 7.6
+
+
+def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], file: Any = None) -> Figure:
+    """The figure of a film, saved if ``file`` is given. See `symspline.shapes.AffineMorph.plot`.
+
+    Args:
+        t: the times of the given drawings.
+        landmarks: the given drawings, shape (N+1, landmarks, n).
+        film: drawings at times.
+    """
+    drawings, count, n = landmarks.shape
+    if n > 3:
+        raise ValidationError(f"pictures of landmarks are made in 2 or 3 dimensions, not in {n}")
+    strip, multiples = _times(t, _STRIP), _times(t, _ROWS * _COLUMNS)
+    seen = [film(x) if n == 2 else film(x) @ VIEW[:2].T for x in (t, strip, multiples)]
+    figure = CurveFigure(figsize=(_WIDTH, _HEIGHT), dpi=DPI, facecolor="white")
+    heading(
+        figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93
+    )
+    # Every drawing fits into a square of this size around its middle.
+    size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
+    _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
+    middle, half = window(seen[2].reshape(-1, 2), 1.25)
+    for i, (x, drawing) in enumerate(zip(multiples, seen[2], strict=True)):
+        row, column = divmod(i, _COLUMNS)
+        axes = figure.add_axes((0.03 + column * 0.157, 0.26 - row * 0.25, 0.15, 0.24), aspect="equal")
+        axes.set(xticks=[], yticks=[])
+        axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
+        _draw_one(axes, x, drawing, time_colors(i / (len(multiples) - 1)))
+    if file is not None:
+        save(figure, file)
+    return figure
+
+
+def _times(t: NDArray[Any], number: int) -> NDArray[Any]:
+    """Times from the first to the last, equally spaced."""
+    if t.dtype.kind == "M":
+        # Those in whole days would be rounded to days.
+        t = t.astype("datetime64[us]")
+    times: NDArray[Any] = t[0] + (t[-1] - t[0]) * np.arange(number) / (number - 1)
+    times[-1] = t[-1]
+    return times
+
+
+def _centred(drawings: Array) -> Array:
+    """Drawings around the middles of their rectangles."""
+    middles: Array = (drawings.max(axis=-2, keepdims=True) + drawings.min(axis=-2, keepdims=True)) / 2
+    return drawings - middles
+
+
+def _draw_strip(
+    axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, film: Array, size: float
+) -> None:
+    """Drawings beside one another, their middles on the time axis; the given ones filled."""
+    plain(axes)
+    axes.grid(visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.set(yticks=[], ylim=(-1, 1))
+    dates = t.dtype.kind == "M"
+    places, knots = (np.asarray(DATES.date2num(values) if dates else values, float) for values in (strip, t))
+    if dates:
+        show_dates(axes, 3, 8)
+    else:
+        axes.set_xlabel("t")
+    span = places[-1] - places[0]
+    # Half a drawing of the axes' height fits before the first time and behind the last.
+    box = axes.get_position()
+    share = box.height * _HEIGHT / (box.width * _WIDTH)
+    half = share * span / (1 - share) / 2
+    axes.set_xlim(places[0] - half, places[-1] + half)
+    # In these units height and width are the same on paper.
+    upright = np.array([half, 1]) * 1.9 / size
+    for times, drawings, bold in ((places, film, False), (knots, given, True)):
+        width, fill = (1.8, 0.25) if bold else (0.7, 0.0)
+        for place, (x, y) in zip(times, np.moveaxis(_centred(drawings) * upright, -1, 1), strict=True):
+            color = time_colors((place - places[0]) / span)
+            axes.fill(
+                place + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold
+            )
+
+
+def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
+    """One drawing, where it is, with the numbers of its landmarks."""
+    axes.spines[:].set(color=EDGE, linewidth=0.5)
+    axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
+    axes.plot(*drawing.T, "o", color=color, markersize=3)
+    look: Any = {"textcoords": "offset points", "fontsize": 7, "color": INK, "path_effects": HALO}
+    for number, place in enumerate(drawing):
+        axes.annotate(str(number), place, (3, 3), **look)
+    name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
+    axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=8, color=INK)

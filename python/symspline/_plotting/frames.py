@@ -1,0 +1,139 @@
+"""Rotations as frames along a time axis, as in Fig. 5 of Bogfjellmo, Modin and Verdier (2018), and rigid motions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from .._quaternions import rotation_rows
+from .chart import box, plane
+from .curves import Curve
+from .style import AXES, DATA, INK, Array, legend, size, window
+from .timeline import LEFT, RIGHT, row_axes
+
+VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
+"""Right, up and towards the viewer, for whom the first axis points forwards and the third up."""
+
+_ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
+"""A body of the plane that points along its first axis."""
+_MANY = 24
+"""The number of bodies of all curves together, or two each."""
+
+
+# ---- rotations ----
+
+
+def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """The columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis; the given ones bold."""
+    width, height = size(panel)
+    axes, rows = row_axes(panel, curves)
+    length = min(0.7, 0.4 * height / len(rows))
+    number = int((width - LEFT - RIGHT) / (0.5 * length))
+    for row, i in enumerate(rows):
+        for group, (times, points) in curves[i].samples(number).items():
+            _draw_arrows(axes, times, -row, length * matrices(points), group == "bold")
+    _explain(axes, curves, "" if len(rows) == len(curves) else f"; {len(rows)} of the curves")
+
+
+def rotations(quaternions: Array) -> Array:
+    """The rotation matrices of unit quaternions w, x, y, z; shape (..., 3, 3)."""
+    return np.moveaxis(np.array(rotation_rows(*np.moveaxis(quaternions, -1, 0))), (0, 1), (-2, -1))
+
+
+def quaternions(matrices: NDArray[Any]) -> Array:
+    """The unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
+    a, b = matrices[..., 0, 0], matrices[..., 1, 0]
+    return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
+
+
+# S³: unit quaternions, scalar first. SO(3) and O(3): matrices as they are. SU(2): the rotations of space.
+draw_quaternions = partial(_draw_rotations, rotations)
+draw_rotations = partial(_draw_rotations, np.asarray)
+draw_spins = partial(_draw_rotations, lambda matrices: rotations(quaternions(matrices)))
+
+
+def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) -> None:
+    """The columns of matrices, shape (m, 3, 3), in inches; nearer ones are drawn later."""
+    seen = VIEW @ frames
+    order = np.argsort(seen[:, 2], axis=-1)
+    right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
+    look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False}
+    look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2}
+    look |= (
+        {"width": 0.032, "alpha": 1, "zorder": 4} if bold else {"width": 0.014, "alpha": 0.55, "zorder": 3}
+    )
+    places = np.repeat(times, 3), np.full(3 * len(times), row)
+    axes.quiver(*places, right.ravel(), up.ravel(), color=np.array(AXES)[order.ravel()], **look)
+
+
+def _explain(axes: Axes, curves: Sequence[Curve], more: str, height: float = 1.0) -> None:
+    """A legend of the colours in a line at a height of the axes."""
+    handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
+    given = "bold: given" if curves[0].noise is None else "bold: curve, light: data"
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, height), "ncols": 4, "borderaxespad": 0.2}
+    handles.append(Line2D([], [], linestyle="none"))
+    labels = ["first axis", "second", "third", given + more]
+    legend(axes, handles, labels, handlelength=1.2, columnspacing=1.2, **place)
+
+
+# ---- rigid motions: the path of a body, and its orientation ----
+
+
+def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """SE(2): arrow heads that stand on the path and point along their first axis; the given ones filled."""
+    axes = plane(panel)
+    _, half = window(np.concatenate([curve.extent[:, :2, 2] for curve in curves]), 1.0)
+    number = max(2, _MANY // len(curves))
+
+    def draw(poses: Array, **look: Any) -> None:
+        turned = length * _ARROW @ poses[:, :2, :2].swapaxes(1, 2)
+        axes.add_collection(PolyCollection(list(turned + poses[:, None, :2, 2]), zorder=5, **look))
+
+    for curve in curves:
+        length = 0.07 * (half or 1.0) * (1 if curve.alone else 0.6)
+        curve.draw_line(axes, curve.points[:, :2, 2], linewidth=1.2, alpha=0.6)
+        groups = {group: poses for group, (_, poses) in curve.samples(number).items()}
+        edge, light = (INK, DATA) if curve.alone else (curve.color, curve.color)
+        if "data" in groups:
+            curve.draw_dots(axes, curve.given[:, :2, 2])
+            draw(groups["data"], facecolor="none", edgecolor=light, alpha=0.6)
+        draw(groups["between"], facecolor="none", edgecolor=curve.color)
+        draw(groups["bold"][1:], facecolor=edge, edgecolor=edge)
+        draw(groups["bold"][:1], facecolor="white", edgecolor=edge)
+    axes.autoscale_view()
+
+
+def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """SE(3): frames that stand on the path; the given ones bold."""
+    paths = [curve.points[:, :3, 3] for curve in curves]
+    axes = box(panel, paths, [curve.given[:, :3, 3] for curve in curves], 1.2, below=0.4)
+    number = max(2, _MANY // len(curves))
+    length = 0.12 * float(np.ptp(axes.get_xlim()))
+
+    def draw(poses: Array, length: float, **look: Any) -> None:
+        feet = poses[:, :3, 3]
+        for i, color in enumerate(AXES):
+            # One line of all sticks of a colour.
+            sticks = np.stack([feet, feet + length * poses[:, :3, i], np.full_like(feet, np.nan)], axis=1)
+            axes.plot(*sticks.reshape(-1, 3).T, color=color, zorder=5, **look)
+
+    for curve, path in zip(curves, paths, strict=True):
+        curve.draw_line(axes, path, linewidth=1.2)
+        for group, (_, poses) in curve.samples(number).items():
+            if group != "bold":
+                draw(poses, 0.8 * length, linewidth=0.8, alpha=0.55)
+                continue
+            draw(poses, length, linewidth=2.0 if curve.alone else 1.3)
+            if curve.noise is None:
+                curve.draw_dots(axes, poses[:, :3, 3], markersize=3.5 if curve.alone else 2)
+            else:
+                curve.draw_dots(axes, curve.given[:, :3, 3])
+    _explain(axes, curves, "", height=-0.06)

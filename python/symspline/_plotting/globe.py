@@ -1,0 +1,176 @@
+"""A globe seen from far away, with a graticule: for places, directions and all curves that live on S²."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.patches import Circle, Patch, Polygon
+
+from .._lonlat import from_lonlat, to_lonlat
+from .._spaces import Euclidean, Space
+from .style import EDGE, GRID, HALO, INK, PAPER, Array, closest
+
+SEA = LinearSegmentedColormap.from_list("sea", ["#c3d3de", "#dfe9ef", "#f4f8fa"])
+_STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(), [10, 15, 30, 45, 90])
+
+
+@dataclass(frozen=True)
+class View:
+    """A globe seen from far above a place: unit vectors to the east, to the north and up."""
+
+    east: Array
+    north: Array
+    up: Array
+
+    @classmethod
+    def above(cls, lon: float, lat: float) -> View:
+        """The view with a place in the middle."""
+        east, up = from_lonlat(lon + 90, 0), from_lonlat(lon, lat)
+        return cls(east, np.cross(up, east), up)
+
+    def flat(self, points: Array) -> Array:
+        """The orthographic projection, shape (..., 2)."""
+        return np.stack([points @ self.east, points @ self.north], axis=-1)
+
+    def visible(self, points: Array) -> Array:
+        """The projection of the near side; NaN, which breaks a line, on the far side."""
+        return np.where((points @ self.up > 0)[..., None], self.flat(points), np.nan)
+
+    def hidden(self, points: Array) -> Array:
+        """The projection of the far side; NaN on the near side."""
+        return np.where((points @ self.up > 0)[..., None], np.nan, self.flat(points))
+
+    def outline(self, ring: Array) -> Array:
+        """The projection of a ring of points, its far part pressed onto the horizon."""
+        flat = self.flat(ring)
+        horizon = flat / np.linalg.norm(flat, axis=-1, keepdims=True)
+        return np.where((ring @ self.up > 0)[..., None], flat, horizon)
+
+
+def centre_of(space: Space, points: Array) -> Array:
+    """The centre of the smallest ball around points of a space.
+
+    Bădoiu and Clarkson (2003): ever shorter steps to the farthest point.
+    """
+    centre = space.project(points.mean(axis=0))
+    for i in range(2, 200):
+        centre = space.geodesic(centre, points[space.distance(centre, points).argmax()], 1 / i)
+    return np.asarray(centre)
+
+
+def middle_of(points: Array) -> tuple[float, float]:
+    """Longitude and latitude of the place above which points, shape (m, 3), are seen well.
+
+    The middle of the smallest circle around them, their mean if they do not fit into one half of the globe, or,
+    where they are all around, a place from which the plane closest to them is seen obliquely.
+    """
+    points = points[:: 1 + len(points) // 2000]
+    middle = centre_of(Euclidean(3), points)
+    if np.linalg.norm(middle) < 0.25:
+        middle = points.mean(axis=0)
+    if np.linalg.norm(middle) < 0.25:
+        normal = np.linalg.svd(points, full_matrices=False)[2][2]
+        middle = middle + 0.2 * points[0]
+        middle -= (middle @ normal) * normal
+        middle = middle / np.linalg.norm(middle) + (0.6 if normal[2] >= 0 else -0.6) * normal
+    lon, lat = to_lonlat(middle)
+    return float(lon), float(lat)
+
+
+def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None:
+    """A shaded globe with a graticule, or its northern half above the rim."""
+    axes.set_axis_off()
+    axes.set(aspect="equal", xlim=(-1.06, 1.06), ylim=(-1.06, 1.06))
+    steps, south = np.linspace(-180, 180, 721), 0 if half else -90
+    outline: Patch = Circle((0, 0), 1)
+    if half:
+        rim = from_lonlat(steps, 0)
+        front = view.visible(rim)
+        front = front[np.isfinite(front[:, 0])]
+        arc = np.radians(np.linspace(0, 180, 181))
+        outline = Polygon([*zip(np.cos(arc), np.sin(arc), strict=True), *front[front[:, 0].argsort()]])
+        axes.plot(*view.hidden(rim).T, color=EDGE, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
+    # Light as on a ball of radius 1 around the middle.
+    x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
+    light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
+    image = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
+    outline.set(fill=False, edgecolor=EDGE, linewidth=1, zorder=3)
+    image.set_clip_path(axes.add_patch(outline))
+    lines = [from_lonlat(steps, lat) for lat in range(south + spacing, 90, spacing)]
+    lines += [from_lonlat(lon, np.linspace(south, 90, 721)) for lon in range(-180, 180, spacing)]
+    for line in lines:
+        axes.plot(*view.visible(line).T, color=GRID, linewidth=0.6, zorder=2)
+
+
+def label_directions(axes: Axes, view: View, directions: Mapping[str, tuple[float, float, float]]) -> None:
+    """Labelled half axes from the middle of a ball, those on the far side faint."""
+    for label, direction in directions.items():
+        end = np.array(direction)
+        alpha = 0.9 if end @ view.up > -1e-9 else 0.5
+        stick = view.flat(np.stack([0 * end, end]))
+        axes.plot(*stick.T, color=INK, linewidth=0.8, alpha=0.6 * alpha, zorder=3)
+        x, y = view.flat(1.17 * end)
+        text = axes.text(x, y, label, color=INK, fontsize=11, alpha=alpha, zorder=7)
+        text.set(ha="center", va="center", path_effects=HALO)
+
+
+def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:
+    """A square frame, with a graticule that is labelled at the left and at the bottom.
+
+    Args:
+        middle, half: where the frame is in the projection, and half its width.
+    """
+    (west, south), (east, north) = middle - half, middle + half
+    lon, lat = (float(value) for value in to_lonlat(view.up))
+    reach = np.arcsin(min(1.0, float(np.linalg.norm(middle)) + 1.45 * half))
+    aside = np.sin(reach) / np.cos(np.radians(lat))
+    around = np.degrees(np.arcsin(aside)) if aside < 1 else 180.0
+    reach = np.degrees(reach)
+    spacing = closest(_STEPS, np.degrees(2 * half) / 5), closest(_STEPS, around / 3.5) if around < 180 else 30
+    parallels = _multiples(spacing[0], max(lat - reach, -90), min(lat + reach, 90))
+    meridians = _multiples(spacing[1], lon - around, lon + around)
+    steps = np.linspace(-1, 1, 721)
+    bottom = [view.visible(from_lonlat(x, np.clip(lat + reach * steps, -90, 90))) for x in meridians]
+    left = [view.visible(from_lonlat(lon + around * steps, y)) for y in parallels]
+    for line in (*bottom, *left):
+        axes.plot(*line.T, color=GRID, linewidth=0.7, zorder=2)
+    axes.set_xticks(*_ticks(bottom, meridians, "EW", south, west, east))
+    axes.set_yticks(*_ticks([line[:, ::-1] for line in left], parallels, "NS", west, south, north))
+    axes.set(aspect="equal", xlim=(west, east), ylim=(south, north), facecolor=PAPER)
+    axes.tick_params(length=0, labelcolor=INK)
+
+
+def _multiples(step: float, low: float, high: float) -> list[float]:
+    """Multiples of a step that divides a turn, each direction once."""
+    numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    return [round(float(step * number), 9) for number in numbers if low + 360 - step * number > 1e-9]
+
+
+def _ticks(
+    lines: Iterable[Array], values: Iterable[float], letters: str, level: float, low: float, high: float
+) -> tuple[list[float], list[str]]:
+    """Where lines cross a level of the second coordinate, and labels, none of them too close to another."""
+    found = []
+    for line, value in zip(lines, values, strict=True):
+        above = line[:, 1] > level
+        (i,) = np.nonzero((above[1:] != above[:-1]) & np.isfinite(line[1:, 1] - line[:-1, 1]))
+        share = (level - line[i, 1]) / (line[i + 1, 1] - line[i, 1])
+        crossed = line[i, 0] + share * (line[i + 1, 0] - line[i, 0])
+        found += [(x, degrees(value, *letters)) for x in crossed.tolist()]
+    kept: dict[float, str] = {}
+    last = -np.inf
+    for x, label in sorted(found):
+        room = (0.02 + (0.018 * len(label) if letters == "EW" else 0.03)) * (high - low)
+        if low <= x <= high and x - last > room:
+            kept[x], last = label, x
+    return list(kept), list(kept.values())
+
+
+def degrees(value: float, positive: str, negative: str) -> str:
+    """``-30`` is 30°W or 30°S; 190 is 170°W."""
+    value = value - 360 * np.ceil((value - 180) / 360)
+    return f"{abs(value):.10g}°" + ("" if value in (0, 180) else positive if value > 0 else negative)

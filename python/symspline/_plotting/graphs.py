@@ -1,0 +1,168 @@
+"""Numbers against time: coordinates, angles, principal angles and the components of points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
+from .bands import draw_graph_of
+from .curves import Curve
+from .style import DISTINCT, INK, Array, Indices, legend, size
+from .timeline import LEFT, RIGHT, timelines
+
+SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
+_NAMED, _OTHERS = 12, 100
+
+
+# ---- one number ----
+
+
+def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """R¹: the graph."""
+    (axes,) = timelines(panel, curves, ["x"])
+    for curve in curves:
+        draw_graph_of(axes, curve, *curve.marked(np.ravel))
+
+
+def _draw_angle(
+    angles: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve], period: float = 2 * np.pi
+) -> None:
+    """An angle against time, without jumps."""
+    (axes,) = timelines(panel, curves, ["angle, degrees"])
+    for curve in curves:
+        line, given = curve.marked(angles)
+        line = np.unwrap(line, period=period)
+        given = given + period * np.rint((curve.beside(line) - given) / period)
+        draw_graph_of(axes, curve, np.degrees(line), np.degrees(given), np.degrees(1.0))
+
+
+# S¹: the angle of unit vectors. RP¹ and Gr(1, 2): that of a line, which is back after half a turn. SO(2) and O(2): the
+# angle by which the first axis is turned. U(1): the phase.
+draw_circle = partial(_draw_angle, lambda points: np.arctan2(points[:, 1], points[:, 0]))
+draw_slope = partial(_draw_angle, lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), period=np.pi)
+draw_turn = partial(_draw_angle, lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]))
+draw_phase = partial(_draw_angle, lambda numbers: np.angle(numbers[:, 0, 0]))
+
+
+# ---- several numbers ----
+
+
+def draw_numbers(
+    panel: SubFigure,
+    curves: Sequence[Curve],
+    label: str,
+    names: Sequence[str],
+    numbers: Callable[[Any, Any], Array],
+) -> None:
+    """Several numbers against time, the first twelve with their names.
+
+    Args:
+        label: of the vertical axis.
+        names: one per number; "Im ..." follows the real part of the same number.
+        numbers: a function of the first point of a curve and of points, one row per point.
+    """
+    in_row = min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9))
+    width = 1.8 if curves[0].alone else 0.9
+    looks = _looks(names[:_NAMED])
+    handles = [Line2D([], [], linewidth=width, **look) for look in looks]
+    labels = list(names[:_NAMED])
+    rest = np.arange(len(names))[_NAMED:]
+    if rest.size:
+        handles.append(Line2D([], [], color=INK, linewidth=0.4))
+        labels.append(f"{rest.size} others")
+        rest = rest[:: 1 + len(rest) // _OTHERS]
+    (axes,) = timelines(panel, curves, [label], top=0.25 + 0.22 * -(-len(labels) // in_row))
+    for curve in curves:
+        values, given = curve.marked(partial(numbers, curve.points[0]))
+        axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
+        for i, look in enumerate(looks):
+            axes.plot(curve.times, values[:, i], linewidth=width, **look)
+            places, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
+            if curve.alone and curve.noise is None:
+                axes.plot(*places.T, "o", color=color, markersize=3)
+            elif curve.alone:
+                curve.draw_dots(axes, places, color=color, alpha=0.4)
+    order = [i for column in range(in_row) for i in range(column, len(labels), in_row)]
+    place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
+    legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **place)
+
+
+def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
+    """Colour and line style of every number: an imaginary part is dashed in the colour of its real part."""
+    is_complex = any(name.startswith("Im ") for name in names)
+    made, entry = [], -1
+    for name in names:
+        imaginary = name.startswith("Im ")
+        entry += not imaginary
+        first, second = ("--", ":") if imaginary else ("-", "-." if is_complex else "--")
+        made.append({"color": DISTINCT[entry % 6], "linestyle": first if entry < 6 else second})
+    return made
+
+
+def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """The components of a point: the picture for spaces without a better one."""
+    space = curves[0].space
+    kept = independent(space)
+    names = component_names(space.point_shape, space.dtype.kind == "c")
+    numbers = lambda _, points: components(points)[:, kept]  # noqa: E731
+    draw_numbers(panel, curves, "components", [names[i] for i in kept], numbers)
+
+
+def components(points: NDArray[Any]) -> Array:
+    """One row per point; the real and the imaginary parts of complex numbers alternate."""
+    flat = np.ascontiguousarray(points.reshape(len(points), -1))
+    return flat.view(np.float64) if np.iscomplexobj(flat) else flat
+
+
+def component_names(shape: tuple[int, ...], is_complex: bool) -> list[str]:
+    """Names such as x₁, x₂ or, for matrices, x₁₁; counted from 1."""
+    comma = "," if max(shape) > 9 else ""
+    indices = [comma.join(str(i + 1) for i in index) for index in np.ndindex(*shape)]
+    names = [f"x{index.translate(SUBSCRIPTS)}" for index in indices]
+    return [f"{part} {name}" for name in names for part in ("Re", "Im")] if is_complex else names
+
+
+def independent(space: Space) -> Indices:
+    """The numbers of the components to draw: of a Hermitian matrix those that do not follow from others."""
+    whole = np.ones(space.point_shape)
+    if isinstance(space, SymmetricPositiveDefinite):
+        return np.flatnonzero(np.triu(whole))
+    if isinstance(space, HermitianPositiveDefinite):
+        return np.flatnonzero(np.stack([np.triu(whole), np.triu(whole, 1)], axis=-1))
+    return np.arange(whole.size * (2 if space.dtype.kind == "c" else 1))
+
+
+def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Complex hyperbolic space: the ratios zᵢ/z₀, which fill the unit ball whatever the phases, against time."""
+    n = curves[0].points.shape[1] - 1
+    names = [f"{part} z{i + 1}/z0".translate(SUBSCRIPTS) for i in range(n) for part in ("Re", "Im")]
+    ratios = lambda _, points: components(points[:, 1:] / points[:, :1])  # noqa: E731
+    draw_numbers(panel, curves, "coordinates\nin the unit ball", names, ratios)
+
+
+def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
+    """Grassmannians and projective spaces: the principal angles to the first point against time."""
+    n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
+    names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
+    numbers = lambda first, points: principal_angles(points, first)[:, : len(names)]  # noqa: E731
+    draw_numbers(panel, curves, "principal angles to\nfirst point, degrees", names, numbers)
+
+
+def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:
+    """Degrees between a subspace and others, the largest first; shape (m, k).
+
+    Of small angles the sines are exact, of large ones the cosines.
+    """
+    bases = points.reshape(*points.shape[:2], -1)
+    base = first.reshape(bases.shape[1:])
+    shadow = base.conj().T @ bases
+    cosines = np.linalg.svd(shadow, compute_uv=False)[:, ::-1]
+    sines = np.linalg.svd(bases - base @ shadow, compute_uv=False)
+    return np.degrees(np.arctan2(sines, cosines))

@@ -1,0 +1,30 @@
+"""Rotation matrices and unit quaternions: formulas for numbers, and for arrays of NumPy or JAX."""
+
+from __future__ import annotations
+
+from typing import Any
+
+Rows = tuple[tuple[Any, ...], ...]
+
+
+def rotation_rows(w: Any, x: Any, y: Any, z: Any) -> Rows:
+    """The rows of the rotation matrix of a unit quaternion."""
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def quaternion_rows(matrix: Any) -> Rows:
+    """The rows of 4qqᵀ for the unit quaternion q of a rotation matrix, shape (..., 3, 3).
+
+    All rows are multiples of q. In the one with the largest diagonal entry nothing cancels (Shepperd 1978).
+    """
+    (a, b, c), (d, e, f), (g, h, i) = ([matrix[..., row, column] for column in range(3)] for row in range(3))
+    return (
+        (1 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1 - a - e + i),
+    )

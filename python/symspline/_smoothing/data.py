@@ -1,0 +1,355 @@
+"""Noisy data as users give them."""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import as_array, short_repr
+from .._core import ValidationError
+from .._curves.ends import End
+from .._curves.fit import Points, read, read_ends, validated
+from .._faults import INVALID, Fault
+from .._input import times_of
+from .._options import with_atol
+from .._spaces import Array, Space, factors_of
+from .._time import TimeAxis, knots_of
+from .factors import grouped, smoothed_spaces, split
+from .precision import Precision, read_precision
+
+Doubles = NDArray[np.float64]
+
+
+# Segments that are longer than the whole over this get further knots where a curve was not found without them.
+_GAPS = 12
+
+
+class SmoothingData(NamedTuple):
+    """Noisy data of curves.
+
+    Attributes:
+        clock: how times are counted.
+        t: times, shape (N,) or (..., N), as they are shown.
+        times: the same in the core.
+        points: in every factor, on the space; data of weight zero stand for others. NaN for curves that are left out.
+        weighing: in every space in which data are smoothed.
+    """
+
+    clock: TimeAxis
+    t: Array
+    times: Doubles
+    points: list[Array]
+    weighing: list[Precision]
+    batch: tuple[int, ...]
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which data count in some factor, shape (N,) or (..., N)."""
+        return reduce(np.logical_or, [own.weights > 0 for own in self.weighing])
+
+
+class Knots(NamedTuple):
+    """Knots as they are shown, and in the core; shape (K,) or (..., K)."""
+
+    t: Array
+    times: Doubles
+
+    def of_curves(self, chosen: NDArray[np.intp] | None) -> Knots:
+        """The knots of these curves of a batch, None for all."""
+        if chosen is None or self.times.ndim == 1:
+            return self
+        t, times = (x.reshape(-1, x.shape[-1])[chosen] for x in (self.t, self.times))
+        return Knots(t, np.ascontiguousarray(times))
+
+
+def read_noisy(
+    t: ArrayLike | None,
+    points: Any,
+    space: Space,
+    weights: Any,
+    frames: Any,
+    bc_type: Any,
+    atol: float | None,
+) -> Given:
+    """The data as a user gives them, after all checks but those of points.
+
+    Raises:
+        ValidationError: something is wrong with them; it says where.
+    """
+    data = with_atol(read(points, space), atol)
+    batch, count = data[0].batch, data[0].nodes
+    clock, shown_times, times = _times_of(t, batch, count)
+    weighing = read_precision(weights, frames, space, data)
+    if weights is not None:
+        each = zip(data, grouped(space, weighing), strict=True)
+        data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
+    ends = read_ends(bc_type, space, batch)
+    for kind, _ in (end for own in ends for end in own or []):
+        if kind not in ("natural", "velocity"):
+            raise ValidationError(
+                f"bc_type {kind!r} is not an end condition of a smooth curve. Use 'natural', 'clamped', 'periodic' or "
+                "(1, velocity)."
+            )
+    return Given(clock, shown_times, times, data, weighing, ends, batch, None)
+
+
+class Given(NamedTuple):
+    """Noisy data before their points are checked, as `SmoothingData`.
+
+    Attributes:
+        data: points in every factor.
+        ends: conditions at the ends, in every factor.
+        chosen: the numbers of these curves in the batch of a user; None for all of them.
+    """
+
+    clock: TimeAxis
+    t: Array
+    times: Doubles
+    data: list[Points]
+    weighing: list[Precision]
+    ends: list[list[End] | None]
+    batch: tuple[int, ...]
+    chosen: NDArray[np.intp] | None
+
+    def sound(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
+        """The curves that are to be made, and what is wrong with others: unless ``strict`` those with points that are
+        none or too few are left out."""
+        chosen = np.ones(self.batch, bool) if mask is None else mask.copy()
+        faults: list[Fault] = []
+        if self.batch and not strict:
+            _, faults = validated(*self._plain(space), skip_invalid=True, mask=chosen)
+            chosen.flat[[fault.curve for fault in faults]] = False
+            for weighing in self.weighing:
+                for number in np.flatnonzero(chosen & ~_enough(self.times, weighing.weights, self.batch)):
+                    too_few = _too_few(weighing.weights, self.batch, int(number))
+                    faults.append(Fault(int(number), INVALID, too_few))
+                    chosen.flat[number] = False
+        if chosen.all():
+            return self, faults
+        return self._some(space, np.flatnonzero(chosen)), faults
+
+    def _plain(self, space: Space) -> tuple[Space, Doubles, list[Points], list[list[End] | None]]:
+        """What is to be checked of points only: times may repeat, knots need not be where data are, and the ends of a
+        closed curve are noisy, too, and differ."""
+        plain = np.arange(self.data[0].nodes, dtype=np.float64)
+        natural = read_ends("natural", space, self.batch)
+        ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
+        return space, plain, self.data, ends
+
+    def _some(self, space: Space, chosen: NDArray[np.intp]) -> Given:
+        """These curves alone, along one axis."""
+        lead = len(self.batch)
+
+        def rows(array: Any) -> Any:
+            return np.ascontiguousarray(array.reshape(-1, *array.shape[lead:])[chosen])
+
+        shared = self.times.ndim == 1
+        return Given(
+            self.clock,
+            self.t if self.t.ndim == 1 else rows(self.t),
+            self.times if shared else rows(self.times),
+            [part._replace(doubles=rows(part.doubles), batch=(len(chosen),)) for part in self.data],
+            [own.map(rows) for own in self.weighing],
+            [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
+            (len(chosen),),
+            chosen,
+        )
+
+    def checked(self, space: Space) -> SmoothingData:
+        """With points that are moved onto the space.
+
+        Raises:
+            ValidationError: some are none; it says where.
+        """
+        on_space, _ = validated(*self._plain(space))
+        for own in self.weighing:
+            enough = _enough(self.times, own.weights, self.batch)
+            if not np.all(enough):
+                number = int(np.flatnonzero(~enough)[0])
+                raise ValidationError(_too_few(own.weights, self.batch, number))
+        return SmoothingData(self.clock, self.t, self.times, on_space, self.weighing, self.batch)
+
+
+def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
+    clock, shown_times, times = knots_of(t, batch, count)
+    if not np.isfinite(times).all():
+        index = np.argwhere(~np.isfinite(times))[0].tolist()
+        raise ValidationError(f"t{index} is {times[tuple(index)]}; times must be finite")
+    back = np.argwhere(np.diff(times) < 0)
+    if len(back):
+        *curve, i = back[0].tolist()
+        raise ValidationError(
+            f"t{[*curve, i + 1]} is before t{[*curve, i]}; sort times and points together, e.g. "
+            "order = np.argsort(t)"
+        )
+    return clock, shown_times, times
+
+
+def _without_missing(part: Points, weights: list[Doubles]) -> Points:
+    """Points of weight zero, which may be NaN, stand for the nearest others before or after them."""
+    missing = reduce(
+        np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights]
+    )
+    if not missing.any():
+        return part
+    order = np.arange(part.nodes)
+    last = np.maximum.accumulate(np.where(missing, -1, order), axis=-1)
+    first = np.argmin(missing, axis=-1)[..., None]
+    found = np.where(last < 0, first, last)
+    axes = part.doubles.ndim - found.ndim
+    doubles = np.take_along_axis(part.doubles, found.reshape(*found.shape, *[1] * axes), axis=found.ndim - 1)
+    return part._replace(doubles=np.ascontiguousarray(doubles))
+
+
+def _enough(times: Doubles, weights: Doubles, batch: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Which curves have data at two different times at least."""
+    shape = (*batch, times.shape[-1])
+    used, own = np.broadcast_to(weights > 0, shape), np.broadcast_to(times, shape)
+    first, last = np.where(used, own, np.inf).min(-1), np.where(used, own, -np.inf).max(-1)
+    return np.asarray(last > first)
+
+
+def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
+    index = np.unravel_index(number, batch)
+    of = f" of curve {','.join(map(str, index))}" if batch else ""
+    own = weights[index] if weights.ndim > 1 else weights
+    if not np.any(own > 0):
+        return f"All weights of the data{of} are 0. A curve needs points at two times at least."
+    return f"The data{of} lie at one time. A curve needs points at two times at least."
+
+
+def knots_for(noisy: Given, knots: Any) -> Knots:
+    """Knots: None for all different times, a number of them, or the knots themselves."""
+    t, times = noisy.t, noisy.times
+    if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
+        return thin_knots(_different(t, times), int(knots))
+    if knots is None:
+        return _different(t, times)
+    if isinstance(knots, (str, bool)):
+        raise ValidationError(
+            f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}"
+        )
+    given = as_array(times_of(knots, "knots")[0], "knots")
+    if given.ndim != 1:
+        raise ValidationError("knots are those of all curves, shape (K,)")
+    found, _ = noisy.clock.at(knots, noisy.batch, False)
+    if found.shape[-1:] < (2,):
+        raise ValidationError("knots: a curve needs at least two")
+    if not np.all(np.diff(found) > 0):
+        index = int(np.argwhere(~(np.diff(found) > 0))[0][-1])
+        raise ValidationError(f"knots[{index + 1}] is not behind knots[{index}]; knots must increase")
+    ends = np.stack([found[..., 0], found[..., -1]], axis=-1)
+    data_ends = np.stack([times[..., 0], times[..., -1]], axis=-1)
+    size = np.abs(data_ends).max(axis=-1, keepdims=True)
+    if noisy.clock.origin is not None and not noisy.clock.dates:
+        size = size + np.abs(np.asarray(noisy.clock.origin, np.float64))[..., None]
+    # Knots made by linspace may end a few units in the last place before the data do.
+    beside = (ends != data_ends) & (np.abs(ends - data_ends) <= 4 * np.spacing(size))
+    if beside.any():
+        found = np.broadcast_to(
+            found, (*np.broadcast_shapes(found.shape[:-1], ends.shape[:-1]), found.shape[-1])
+        ).copy()
+        found[..., [0, -1]] = np.where(beside, data_ends, ends)
+    if np.any(found[..., 0] > times[..., 0]) or np.any(found[..., -1] < times[..., -1]):
+        raise ValidationError("knots must reach from the first to the last time of the data")
+    if noisy.clock.dates:
+        given = given.astype(np.promote_types(given.dtype, t.dtype))
+    elif noisy.clock.plain:
+        given = found
+    # Curves that count from a time of their own each have them.
+    return Knots(np.broadcast_to(given, found.shape).copy(), found)
+
+
+def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
+    """Whether there is a knot at every time of data that count."""
+    used = np.broadcast_to(noisy.used, (*noisy.batch, noisy.times.shape[-1]))
+    if noisy.times.ndim == 1:
+        used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
+    if knots.times.ndim == 1 and noisy.times.ndim == 1:
+        return bool(np.isin(noisy.times[used], knots.times).all())
+    return bool(
+        np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)])
+    )
+
+
+def _different(t: Array, times: Doubles) -> Knots:
+    if times.ndim == 1:
+        _, index = np.unique(times, return_index=True)
+        return Knots(t[index], times[index])
+    if np.any(np.diff(times) == 0):
+        raise ValidationError(
+            "times repeat, and curves have times of their own: give knots, which all curves have alike, or smooth "
+            "the curves one by one"
+        )
+    return Knots(t, times)
+
+
+def thin_knots(knots: Knots, count: int) -> Knots:
+    """So many of the knots, even in what is half their number and half time: neither crowds nor thin places get few."""
+    there = knots.times.shape[-1]
+    if count < 2:
+        raise ValidationError(f"knots must be at least 2, not {count}")
+    if count >= there:
+        return knots
+    place = np.linspace(0, 1, there)
+    if knots.times.ndim == 1:
+        place = 0.5 * (place + (knots.times - knots.times[0]) / np.ptp(knots.times))
+    index = np.searchsorted(place, np.linspace(0, 1, count) * (1 - 1e-12))
+    return _picked(knots, np.unique(np.append(index[:-1], there - 1)))
+
+
+def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> Knots:
+    """The knots without those that lie too near to each other: beside λ/h³ rounding makes the weights of data vanish.
+    None for a λ like a weight on knots at equal distances."""
+    most = 1e11
+    times = knots.times
+    if times.ndim > 1 or len(times) <= 16:
+        return knots
+    span = float(times[-1] - times[0])
+    mean = span / (len(times) - 1)
+    weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.weighing)
+    # In units of the mean distance nothing overflows.
+    ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
+    least = min(mean * (ratio / most) ** (1 / 3), span / 15)
+    if np.diff(times).min() >= least:
+        return knots
+    # From each knot to the first that is far enough.
+    following = np.searchsorted(times, times + least).tolist()
+    stop = int(np.searchsorted(times, times[-1] - least, side="right"))
+    kept, i = [], 0
+    while i < max(stop, 1):
+        kept.append(i)
+        i = following[i]
+    return _picked(knots, np.array([*kept, len(times) - 1]))
+
+
+def in_gaps(knots: Knots, given: Given) -> Knots:
+    """The knots with further ones in long gaps. There the curve of the space through two points that are far apart may
+    turn faster than one segment can."""
+    if knots.times.ndim > 1 or len(knots.times) < 3:
+        return knots
+    h = np.diff(knots.times)
+    parts = np.ceil(h * _GAPS / h.sum()).astype(int)
+    i = np.repeat(np.arange(len(h)), parts)
+    j = np.arange(len(i)) - np.repeat(np.cumsum(parts) - parts, parts)
+    # Dates are divided in their own unit.
+    first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
+    whole = step.dtype.kind in "ium"
+    shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
+    times, _ = given.clock.at(shown_times, (), False)
+    inner = np.flatnonzero(j == 0)
+    times[inner], times[-1] = knots.times[:-1], knots.times[-1]
+    return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots
+
+
+def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
+    return Knots(knots.t[..., index], np.ascontiguousarray(knots.times[..., index]))
+
+
+def points_of(noisy: SmoothingData, space: Space) -> list[tuple[Space, Array]]:
+    """Every space in which data are smoothed, with its points."""
+    points = [own for pair in zip(factors_of(space), noisy.points, strict=True) for own in split(*pair)]
+    return list(zip(smoothed_spaces(space), points, strict=True))

@@ -1,0 +1,88 @@
+"""The spaces in which noisy data are smoothed.
+
+Rigid motions have no metric that is invariant from both sides. In frames along a path, noise in the attitude turns into
+noise in the position that grows with the distance travelled. So poses are smoothed as a rotation and a position each,
+with a λ and a noise level of their own. That choice is invariant under a change of the fixed frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import islice
+from typing import Any, TypeVar
+
+import numpy as np
+
+from .._curves.ends import End
+from .._spaces import Array, Euclidean, Product, Space, SpecialEuclidean, SpecialOrthogonal, factors_of
+
+_T = TypeVar("_T")
+
+
+def parts_of_factor(space: Space) -> tuple[Space, ...]:
+    """The spaces in which points of a space that is no product are smoothed."""
+    if isinstance(space, SpecialEuclidean):
+        n = space.point_shape[0] - 1
+        return SpecialOrthogonal(n), Euclidean(n)
+    return (space,)
+
+
+def smoothed_spaces(space: Space) -> tuple[Space, ...]:
+    """The spaces in which points are smoothed, each with its own λ: the factors, and for poses rotations and
+    positions."""
+    return tuple(part for factor in factors_of(space) for part in parts_of_factor(factor))
+
+
+def is_several(space: Space) -> bool:
+    """Whether numbers that belong to the noise are tuples."""
+    return isinstance(space, Product) or len(smoothed_spaces(space)) > 1
+
+
+def grouped(space: Space, values: Iterable[_T]) -> list[list[_T]]:
+    """What belongs to the smoothed spaces, in lists for each factor."""
+    rest = iter(values)
+    return [list(islice(rest, len(parts_of_factor(factor)))) for factor in factors_of(space)]
+
+
+def split(space: Space, points: Array) -> list[Array]:
+    """Points of a factor, or tangent vectors at them, in the spaces in which they are smoothed."""
+    if isinstance(space, SpecialEuclidean):
+        return [np.ascontiguousarray(points[..., :-1, :-1]), np.ascontiguousarray(points[..., :-1, -1])]
+    return [points]
+
+
+def join(space: Space, parts: Sequence[Array], corner: float = 1.0) -> Array:
+    """Points of a factor from those in the spaces in which they were smoothed; tangent vectors have the corner 0."""
+    if not isinstance(space, SpecialEuclidean):
+        return parts[0]
+    rotations, positions = parts
+    n = positions.shape[-1]
+    out = np.zeros((*positions.shape[:-1], n + 1, n + 1))
+    out[..., :n, :n], out[..., :n, n], out[..., n, n] = rotations, positions, corner
+    return out
+
+
+def split_ends(space: Space, ends: list[End] | None) -> list[list[End] | None]:
+    """The conditions at the ends of a factor, in the spaces in which it is smoothed."""
+    parts = parts_of_factor(space)
+    if ends is None or len(parts) == 1:
+        return [ends] * len(parts)
+    vectors = [None if v is None else split(space, space._numbers(v)) for _, v in ends]
+    return [
+        [
+            (kind, None if own is None else np.ascontiguousarray(part._as_doubles(own[i])))
+            for (kind, _), own in zip(ends, vectors, strict=True)
+        ]
+        for i, part in enumerate(parts)
+    ]
+
+
+def coordinates_in_parts(space: Space, points: Array) -> Array:
+    """Matrices that turn coordinates in ``space.frame(points)`` into those in the frames of the parts, stacked."""
+    vectors = split(space, space.frame(points))
+    rows: list[Any] = []
+    for part, own, at in zip(parts_of_factor(space), vectors, split(space, points), strict=True):
+        frame = part.frame(at)
+        flat = [x.reshape(*x.shape[: own.ndim - len(part.point_shape)], -1) for x in (own, frame)]
+        rows.append(np.linalg.pinv(np.swapaxes(flat[1], -1, -2)) @ np.swapaxes(flat[0], -1, -2))
+    return np.concatenate(rows, axis=-2)

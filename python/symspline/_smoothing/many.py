@@ -1,0 +1,62 @@
+"""Smoothing splines of different lengths, one after the other."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from typing import Any
+
+from .._core import ConvergenceError, ValidationError
+from .._curves.solve import Progress
+from .._errors import callers_level, raise_or_warn
+from .._faults import UNCONVERGED, Fault
+from .._options import check_on_failure, check_progress
+from .._spaces import Space
+from .make import make_smoothing_spline
+from .spline import SmoothingSpline
+
+
+def smooth_many(
+    curves: Iterable[tuple[Any, Any, dict[str, Any]]],
+    space: Space,
+    *,
+    on_failure: str = "raise",
+    progress: Progress | None = None,
+    **options: Any,
+) -> list[SmoothingSpline]:
+    """One spline a curve of times, points and keywords of its own, each with a λ of its own.
+
+    Args:
+        options: those of `make_smoothing_spline`, for all curves alike.
+
+    Raises:
+        ValidationError: something is wrong with a curve; it says with which.
+        ConvergenceError: a curve failed; the exception's ``.spline`` is the list of all.
+    """
+    check_on_failure(on_failure)
+    check_progress(progress)
+    given = list(curves)
+    found: list[SmoothingSpline] = []
+    faults: list[Fault] = []
+    noted: list[tuple[int, Any]] = []
+    for number, (t, points, own) in enumerate(given):
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            try:
+                found.append(make_smoothing_spline(t, points, space, **own, **options))
+            except ConvergenceError as error:
+                found.append(error.spline)
+                faults.append(Fault(number, UNCONVERGED, f"curve {number}: {error}"))
+            except ValidationError as error:
+                raise ValidationError(f"curve {number}: {error}") from None
+        noted += [(number, note) for note in seen]
+        if progress is not None:
+            progress(number + 1, len(given))
+    # One warning of a kind for all curves.
+    for kind in dict.fromkeys(note.category for _, note in noted):
+        first, *more = [(number, note) for number, note in noted if note.category is kind]
+        others = f" (and {len(more)} more curves)" if more else ""
+        warnings.warn(f"curve {first[0]}: {first[1].message}{others}", kind, stacklevel=callers_level())
+    if faults:
+        raise_or_warn(faults, on_failure, found)
+    return found

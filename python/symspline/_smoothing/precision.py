@@ -1,0 +1,231 @@
+"""How much data count: numbers, or information matrices where some directions are better known than others."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import as_array, cast
+from .._core import ValidationError
+from .._curves.fit import Points
+from .._spaces import Array, Product, Space, factors_of
+from .._spaces.base import LARGE
+from .factors import coordinates_in_parts, parts_of_factor, split
+
+Doubles = NDArray[np.float64]
+# Parts of a matrix or of a vector that are rounding errors.
+_ROUNDING = 1e-8
+# Eigenvalues of a matrix, over the largest, that are zero to the core.
+_SINGULAR = 1e-10
+
+
+class Precision(NamedTuple):
+    """What data count in a space that is no product.
+
+    Attributes:
+        weights: shape (N,) or (..., N); of matrices the mean of the diagonal.
+        information: matrices in coordinates of ``space.frame(point)``, shape (N, m, m) or (..., N, m, m), or None.
+    """
+
+    weights: Doubles
+    information: Doubles | None
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether there are data of which some directions are unknown."""
+        if self.information is None:
+            return False
+        values = np.linalg.eigvalsh(self.information)
+        return bool(np.any((values[..., 0] <= _SINGULAR * values[..., -1]) & (values[..., -1] > 0)))
+
+    def map(self, function: Any) -> Precision:
+        """The same for a part of a batch."""
+        information = self.information
+        if information is not None and information.ndim > 3:
+            information = function(information)
+        return Precision(function(self.weights) if self.weights.ndim > 1 else self.weights, information)
+
+
+def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) -> list[Precision]:
+    """Weights or matrices in every space in which data are smoothed, after all checks.
+
+    Args:
+        weights: None, numbers (N,) or (..., N), or matrices (N, m, m) or (..., N, m, m); of a product a tuple with
+            one of these for every factor, or numbers for all of them; of poses perhaps a pair, for rotations and
+            positions.
+        frames: m tangent vectors at every point which matrices refer to, shape (..., N, m, *point_shape); None for
+            those of ``space.frame``. In a product a tuple.
+    """
+    factors = factors_of(space)
+    own = [weights] * len(factors)
+    if isinstance(space, Product) and isinstance(weights, tuple):
+        own = _one_a_factor(weights, "weights", len(factors))
+    own_frames = [frames] * len(factors)
+    if isinstance(space, Product) and frames is not None:
+        own_frames = _one_a_factor(frames, "frames", len(factors))
+    found: list[Precision] = []
+    for factor, given, frame, part in zip(factors, own, own_frames, data, strict=True):
+        spaces = parts_of_factor(factor)
+        if len(spaces) > 1 and isinstance(given, tuple):
+            each = _one_a_factor(given, "weights", len(spaces))
+            frames_of = (
+                [frame] * len(spaces) if frame is None else _one_a_factor(frame, "frames", len(spaces))
+            )
+            points = split(factor, factor._numbers(part.doubles))
+            for space_of, one, at, rows in zip(spaces, each, frames_of, points, strict=True):
+                doubles = np.ascontiguousarray(space_of._as_doubles(rows))
+                found.append(_in_factor(space_of, one, at, part._replace(doubles=doubles)))
+            continue
+        weighing = _in_factor(factor, given, frame, part)
+        found += [weighing] if len(spaces) == 1 else _in_parts(weighing, factor, part)
+    return found
+
+
+def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Precision:
+    array = None if given is None else as_array(given, "weights")
+    shape, lead = (space.dim, space.dim), (*data.batch, data.nodes)
+    if array is None or array.shape in ((data.nodes,), lead) or array.shape[-2:] != shape:
+        if frames is not None:
+            raise ValidationError(
+                "`frames` says what information matrices refer to, and `weights` are numbers. Leave `frames` out, or "
+                "pass matrices."
+            )
+        return Precision(checked_weights(given, data.batch, data.nodes, shape), None)
+    return _with_matrices(array, frames, space, data)
+
+
+def _in_parts(weighing: Precision, space: Space, data: Points) -> list[Precision]:
+    """The weighing of each part of poses: the inverse of its marginal covariance, a Schur complement."""
+    parts = parts_of_factor(space)
+    if weighing.information is None:
+        return [weighing] * len(parts)
+    lead = (*data.batch, data.nodes)
+    points = space._numbers(data.doubles).reshape(lead + space.point_shape)
+    good = np.isfinite(points).all(axis=(-2, -1))
+    into = np.zeros((*lead, space.dim, space.dim))
+    into[good] = np.linalg.inv(coordinates_in_parts(space, space.project(points[good])))
+    whole = np.swapaxes(into, -1, -2) @ weighing.information @ into
+    found, first = [], 0
+    for part in parts:
+        own = np.arange(space.dim)[first : first + part.dim]
+        rest = np.setdiff1d(np.arange(space.dim), own)
+        block = whole[..., own[:, None], own]
+        cross = whole[..., own[:, None], rest]
+        others = np.linalg.pinv(whole[..., rest[:, None], rest], rcond=_SINGULAR, hermitian=True)
+        matrix = block - cross @ others @ np.swapaxes(cross, -1, -2)
+        matrix = np.ascontiguousarray(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
+        found.append(Precision(np.trace(matrix, axis1=-2, axis2=-1) / part.dim, matrix))
+        first += part.dim
+    return found
+
+
+def _one_a_factor(values: Any, name: str, count: int) -> list[Any]:
+    if not isinstance(values, tuple) or len(values) != count:
+        raise ValidationError(
+            f"{name} of a product must be a tuple with {count} entries, one of every factor"
+        )
+    return list(values)
+
+
+def checked_weights(
+    weights: ArrayLike | None, batch: tuple[int, ...], count: int, matrix: tuple[int, ...] = ()
+) -> Doubles:
+    """Weights, one of every point.
+
+    Args:
+        matrix: the shape of matrices that would do as well.
+    """
+    if weights is None:
+        return np.ones(count)
+    found = _numbers(weights)
+    if found.shape != (count,) and found.shape != (*batch, count):
+        own = f" or {(*batch, count)}" if batch else ""
+        or_matrices = f", or as matrices {(count, *matrix)}" if matrix else ""
+        raise ValidationError(
+            f"weights has shape {found.shape}, but {count} points need {(count,)}{own}{or_matrices}"
+        )
+    bad = ~(np.isfinite(found) & (found >= 0))
+    if bad.any():
+        index = np.argwhere(bad)[0].tolist()
+        raise ValidationError(
+            f"weights{index} is {found[tuple(index)]}; weights are numbers >= 0, and 0 leaves a point out"
+        )
+    return found
+
+
+def _numbers(weights: ArrayLike) -> Doubles:
+    array = as_array(weights, "weights")
+    if array.dtype.kind not in "iufb":
+        raise ValidationError(f"weights must be numbers, not {array.dtype}")
+    return cast(array)
+
+
+def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) -> Precision:
+    matrices, m = _numbers(given), space.dim
+    batch, count = data.batch, data.nodes
+    if matrices.shape not in ((count, m, m), (*batch, count, m, m)):
+        own = f" or {(*batch, count, m, m)}" if batch else ""
+        raise ValidationError(
+            f"weights has shape {matrices.shape}, but matrices for {count} points of {space!r} have the shape "
+            f"{(count, m, m)}{own}"
+        )
+    if space.point_shape[0] >= LARGE:
+        raise ValidationError(f"in as many dimensions as {space!r} has, weights must be numbers")
+    finite = np.isfinite(matrices).all(axis=(-2, -1))
+    skew = np.abs(matrices - np.swapaxes(matrices, -1, -2)).max(axis=(-2, -1), initial=0.0)
+    _check(finite, "is not finite")
+    _check(skew <= _ROUNDING * np.abs(matrices).max(axis=(-2, -1), initial=0.0), "is not symmetric")
+    least, most = (np.linalg.eigvalsh(matrices)[..., i] for i in (0, -1))
+    _check(
+        least >= -_ROUNDING * np.maximum(most, 0.0),
+        "has a negative eigenvalue; it is the inverse of a covariance",
+    )
+    if frames is not None:
+        into = _inverse_frames(frames, space, data, np.any(matrices != 0, axis=(-2, -1)))
+        matrices = np.swapaxes(into, -1, -2) @ matrices @ into
+    matrices = 0.5 * (matrices + np.swapaxes(matrices, -1, -2))
+    return Precision(np.trace(matrices, axis1=-2, axis2=-1) / m, np.ascontiguousarray(matrices))
+
+
+def _check(good: Any, complaint: str, name: str = "weights", places: Any = None) -> None:
+    if not np.all(good):
+        bad = np.argwhere(~good)[0]
+        raise ValidationError(f"{name}{(bad if places is None else places[bad[0]]).tolist()} {complaint}")
+
+
+def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubles:
+    """Matrices that make coordinates in given frames of those in ``space.frame``; one where data are missing."""
+    m, axes = space.dim, len(space.point_shape)
+    given = space._numbers(space._doubles(frames, "frames"))
+    lead = (*data.batch, data.nodes)
+    if given.shape not in ((data.nodes, m, *space.point_shape), (*lead, m, *space.point_shape)):
+        raise ValidationError(
+            f"frames has shape {given.shape}, but {m} tangent vectors at every point of {space!r} have the shape "
+            f"{(*lead, m, *space.point_shape)}"
+        )
+    points = space._numbers(data.doubles).reshape(lead + space.point_shape)
+    # Invalid points are reported later.
+    used = np.broadcast_to(used, lead) & np.isfinite(points).all(axis=tuple(range(len(lead), points.ndim)))
+    vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]
+    finite = np.isfinite(vectors).all(axis=tuple(range(1, vectors.ndim)))
+    _check(finite, "are not finite", "frames", np.argwhere(used))
+    own = space.frame(space.project(points[used]))
+
+    def flat(x: Array) -> Doubles:
+        rows = space._as_doubles(np.ascontiguousarray(x))
+        return np.swapaxes(rows.reshape(*x.shape[: x.ndim - axes], -1), -1, -2)
+
+    columns = flat(vectors)
+    coordinates = np.linalg.pinv(flat(own)) @ columns
+    off = np.abs(flat(own) @ coordinates - columns).max(axis=(-2, -1))
+    size = np.abs(columns).max(axis=(-2, -1))
+    for bad, complaint in (
+        (~(off <= 1e-6 * size), "are not tangent at their point: use space.project_tangent"),
+        (np.linalg.cond(coordinates) > 1e8, "do not span the tangent space"),
+    ):
+        _check(~bad, complaint, "frames", np.argwhere(used))
+    found = np.broadcast_to(np.eye(m), (*lead, m, m)).copy()
+    found[used] = np.linalg.inv(coordinates)
+    return found

@@ -1,0 +1,166 @@
+"""Geodesic symmetries, and the actions of the groups G of the paper's Table 1, one class per kind of action."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import as_array, cast, short_repr
+from .._core import ValidationError
+from .base import Array, Space
+from .tolerance import point_tol
+
+
+def adjoint(x: Array) -> Array:
+    """Conjugate transposes."""
+    return np.swapaxes(x.conj(), -1, -2)
+
+
+def matrices(space: Space, g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:
+    """The argument `g` of `Space.act` as square matrices, and the tolerance that belongs to its type."""
+    array = as_array(g, "g")
+    if array.dtype.kind not in ("biufc" if np.dtype(dtype).kind == "c" else "biuf"):
+        numbers = "numbers" if np.dtype(dtype).kind == "c" else "real numbers"
+        raise ValidationError(
+            f"g has type {array.dtype}, but the group of {space!r} needs {numbers}. Pass matrices of {numbers}."
+        )
+    if array.shape[-2:] != (size, size):
+        raise ValidationError(
+            f"g has shape {array.shape}, but the group of {space!r} consists of {size} × {size} matrices. "
+            f"Pass an array of shape (..., {size}, {size})."
+        )
+    if not np.isfinite(array).all():
+        index = np.argwhere(~np.isfinite(array).all(axis=(-2, -1)))[0].tolist()
+        raise ValidationError(f"g{index or ''} has entries that are not finite. Pass finite numbers.")
+    return cast(array, np.dtype(dtype)), point_tol(array.dtype)
+
+
+def require(space: Space, defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
+    """Raise ValidationError for the first matrix whose defect exceeds what is allowed."""
+    bad = np.argwhere(~(np.isfinite(defects) & (defects <= allowed)))
+    if len(bad):
+        index = bad[0].tolist()
+        limit = np.broadcast_to(allowed, defects.shape)[tuple(index)]
+        raise ValidationError(
+            f"g{index or ''} is not in the group of {space!r}: {what} is {defects[tuple(index)]:.3e} "
+            f"(allowed: {limit:.0e}). {remedy}"
+        )
+
+
+def largest(x: Array) -> NDArray[np.float64]:
+    """The largest entry of every matrix by absolute value."""
+    sizes: NDArray[np.float64] = np.max(np.abs(x), axis=(-2, -1))
+    return sizes
+
+
+def preserves(space: Space, g: Array, form: Array, tol: float, remedy: str) -> None:
+    """Raise ValidationError unless g*Jg = J for the form J, to a tolerance relative to the squared size of g."""
+    defects = largest(adjoint(g) @ form @ g - form)
+    star = "*" if np.iscomplexobj(g) else "ᵀ"
+    what = f"|g{star}g − 1|" if np.array_equal(form, np.eye(len(form))) else f"|g{star}Jg − J|"
+    require(space, defects, tol * np.maximum(1.0, largest(g)) ** 2, what, remedy)
+
+
+class Preserving(Space):
+    """Vectors and bases of subspaces of a linear space with a form J: g acts as x ↦ gx, where g*Jg = J."""
+
+    # Entries of J that are −1; the others are 1.
+    _negative: tuple[int, ...] = ()
+
+    def _signs(self) -> NDArray[np.float64]:
+        signs = np.ones(self.point_shape[0])
+        signs[list(self._negative)] = -1.0
+        return signs
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        # 2P − 1 with the projection P = p (p*Jp)⁻¹ p*J onto p; p*Jp is 1, −1 or the unit matrix.
+        if len(self.point_shape) == 1:
+            dual = p.conj() * self._signs()
+            square = np.sign(np.sum(dual * p, axis=-1, keepdims=True).real)
+            return 2 * square * np.sum(dual * x, axis=-1, keepdims=True) * p - x
+        return 2 * p @ (adjoint(p) @ x) - x
+
+    def _element(self, g: Any) -> Any:
+        size = self.point_shape[0]
+        g, tol = matrices(self, g, size, self._dtype)
+        if self._negative:
+            remedy = f"Pass a matrix with g*Jg = J, J = diag({'−1, ' * len(self._negative)}1, …, 1)."
+        else:
+            remedy = "Pass a matrix with orthonormal columns, such as numpy.linalg.qr(g)[0]."
+        preserves(self, g, np.diag(self._signs()), tol, remedy)
+        return g
+
+    def _moved(self, g: Array, x: Array) -> Any:
+        return (g @ x[..., None])[..., 0] if len(self.point_shape) == 1 else g @ x
+
+
+class Congruent(Space):
+    """Positive definite matrices: g acts as x ↦ g x g*."""
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        # p x⁻¹ p by Cholesky factors, which keeps the digits of matrices with entries of very different size.
+        y = np.linalg.solve(np.linalg.cholesky(x), p)
+        return adjoint(y) @ y
+
+    def _element(self, g: Any) -> Any:
+        g, tol = matrices(self, g, self.point_shape[0], self._dtype)
+        sizes = np.linalg.svd(g, compute_uv=False)
+        require(
+            self, sizes[..., 0] / sizes[..., -1], 1e14, "its condition number", "Pass an invertible matrix."
+        )
+        self._require_subgroup(g, tol)
+        return g
+
+    def _require_subgroup(self, g: Array, tol: float) -> None:
+        """Nothing more is required of GL(n)."""
+
+    def _moved(self, g: Array, x: Array) -> Any:
+        return g @ x @ adjoint(g)
+
+
+class Group(Space):
+    """Groups as symmetric spaces: a pair (a, b) of elements acts as x ↦ a x b⁻¹."""
+
+    # Whether x⁻¹ = x*.
+    _unitary = False
+
+    def _inverse_times(self, x: Array, y: Array) -> Any:
+        return adjoint(x) @ y if self._unitary else np.linalg.solve(x, y)
+
+    def _reflected(self, p: Array, x: Array) -> Any:
+        return p @ self._inverse_times(x, p)
+
+    def _element(self, g: Any) -> Any:
+        if not isinstance(g, (tuple, list)) or len(g) != 2:
+            raise ValidationError(
+                f"g must be a pair (a, b) of elements of the group, which act on {self!r} as x ↦ a x b⁻¹, but it is "
+                f"{short_repr(g)}. Pass (g, numpy.eye({self.point_shape[0]})) for multiplication from the left."
+            )
+        for i, element in enumerate(g):
+            try:
+                self.check_point(element)
+            except ValidationError as error:
+                raise ValidationError(
+                    f"g[{i}] is not an element of the group of {self!r}: {error}. Pass a pair of points of the space."
+                ) from None
+        a, b = (self._numbers(self._doubles(element, f"g[{i}]")) for i, element in enumerate(g))
+        return a, b
+
+    def _moved(self, g: tuple[Array, Array], x: Array) -> Any:
+        a, b = g
+        # x b⁻¹ = (b⁻* x*)*.
+        return a @ (x @ adjoint(b) if self._unitary else adjoint(np.linalg.solve(adjoint(b), adjoint(x))))
+
+
+def homogeneous(space: Space, g: Any, dim: int) -> Array:
+    """Isometries of flat space as homogeneous matrices (A, b; 0, 1)."""
+    array, tol = matrices(space, g, dim + 1, np.float64)
+    remedy = "Pass [[A, b], [0, 1]] with an orthogonal matrix A and a vector b."
+    off = array[..., -1:, :] - np.eye(dim + 1)[-1]
+    require(space, largest(off), tol, "the distance of its last row from (0, …, 0, 1)", remedy)
+    linear = array[..., :-1, :-1]
+    defects = largest(adjoint(linear) @ linear - np.eye(dim))
+    require(space, defects, tol, "|AᵀA − 1| of its linear part A", remedy)
+    return array

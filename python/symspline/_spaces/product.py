@@ -1,0 +1,156 @@
+"""Products of spaces: points that have a part in each of several spaces."""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from .base import Space
+from .registry import spaces_named
+
+Tuple = tuple[Any, ...]
+
+
+class Product(Space):
+    """The product of spaces: a point is a tuple with one point of each.
+
+    Distances add as in Pythagoras' theorem; geodesics and splines run in every factor on its own.
+
+    >>> import symspline as ss
+    >>> ss.Product(ss.Sphere(3), ss.Euclidean(3))
+    Product(Sphere(3), Euclidean(3))
+    >>> str(ss.space("sphere:3 x r:3"))
+    'sphere:3 x euclidean:3'
+    """
+
+    def __init__(self, *factors: Space | str) -> None:
+        if len(factors) < 2:
+            raise ValidationError("a Product needs at least two factors")
+        given = [factors_of(f) if isinstance(f, Space) else spaces_named(f) for f in factors]
+        self.factors: tuple[Space, ...] = tuple(part for parts in given for part in parts)
+
+    @property
+    def point_shape(self) -> Tuple:
+        """Shapes of the arrays of one point, a tuple of tuples."""
+        return tuple(f.point_shape for f in self.factors)
+
+    @property
+    def dim(self) -> int:
+        """Sum of the factors' dimensions."""
+        return sum(f.dim for f in self.factors)
+
+    @property
+    def injectivity_radius(self) -> float:
+        """The smallest of the factors'."""
+        return min(f.injectivity_radius for f in self.factors)
+
+    @property
+    def curvature(self) -> float:
+        """The largest K of the factors; NaN if one of them has none."""
+        return float(np.max([f.curvature for f in self.factors]))
+
+    @property
+    def dtype(self) -> Tuple:
+        """Types of the numbers of one point, a tuple with one entry per factor.
+
+        >>> import symspline as ss
+        >>> ss.space("sphere:2 x cp:1").dtype
+        (dtype('float64'), dtype('complex128'))
+        """
+        return tuple(f.dtype for f in self.factors)
+
+    def __str__(self) -> str:
+        return " x ".join(map(str, self.factors))
+
+    def __repr__(self) -> str:
+        return f"Product({', '.join(map(repr, self.factors))})"
+
+    def __reduce__(self) -> Tuple:
+        return Product, self.factors
+
+    def norm(self, p: Any, v: Any) -> Any:
+        return together(self._each("norm", p, v))
+
+    def project(self, x: Any) -> Any:
+        return self._each("project", x)
+
+    def symmetry(self, p: Any, x: Any) -> Any:
+        return self._each("symmetry", p, x)
+
+    def act(self, g: Any, x: Any) -> Any:
+        if not isinstance(g, (tuple, list)) or len(g) != len(self.factors):
+            raise ValidationError(
+                f"g must be a tuple of {len(self.factors)} group elements, one per factor of {self!r}. "
+                "Pass one element for each factor, in the same order."
+            )
+        return self._each("act", g, x)
+
+    def rounding(self, p: Any) -> Any:
+        return np.max(np.stack(np.broadcast_arrays(*self._each("rounding", p))), axis=0)[()]
+
+    def check_point(self, p: Any) -> None:
+        self._each("check_point", p)
+
+    def check_tangent(self, p: Any, v: Any) -> None:
+        self._each("check_tangent", p, v)
+
+    def frame(self, p: Any) -> Any:
+        return self._each("frame", p)
+
+    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Any:
+        return tuple(factor.random_point(rng, shape) for factor in self.factors)
+
+    def random_tangent(self, rng: np.random.Generator, p: Any) -> Any:
+        check_tuple(p, self, "p")
+        return tuple(factor.random_tangent(rng, q) for factor, q in zip(self.factors, p, strict=True))
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
+        each = tuple(
+            factor._finite(operation, t, **dict(zip(inputs, part, strict=True)))
+            for factor, part in zip(self.factors, self._split(*inputs.values()), strict=True)
+        )
+        if operation == "distance":
+            return together(each)
+        return sum(each) if operation == "inner" else each
+
+    def _each(self, method: str, *arguments: Any) -> Tuple:
+        """Calls a method of every factor with its parts of the arguments."""
+        parts = zip(self.factors, self._split(*arguments), strict=True)
+        return tuple(getattr(factor, method)(*part) for factor, part in parts)
+
+    def _split(self, *arguments: Any) -> list[Tuple]:
+        """The arguments' parts in every factor."""
+        for value in arguments:
+            if not isinstance(value, (tuple, list)) or len(value) != len(self.factors):
+                raise ValidationError(f"{self!r} needs tuples of {len(self.factors)} arrays, one per factor")
+        return list(zip(*arguments, strict=True))
+
+
+def factors_of(space: Space) -> tuple[Space, ...]:
+    """The factors of a product; any other space is its own."""
+    return space.factors if isinstance(space, Product) else (space,)
+
+
+def check_tuple(points: Any, space: Space, name: str) -> None:
+    """Raise ValidationError unless there is one array a factor of the product."""
+    count = len(factors_of(space))
+    if not isinstance(points, (tuple, list)) or len(points) != count:
+        raise ValidationError(f"{name} must be a tuple of {count} arrays, one per factor of {space!r}")
+
+
+def parts_of(value: Any, space: Space, name: str) -> Tuple:
+    """What belongs to each factor; of a space that is no product, the value is the only one."""
+    if not isinstance(space, Product):
+        return (value,)
+    check_tuple(value, space, name)
+    return tuple(value)
+
+
+def together(lengths: Tuple) -> Any:
+    """What lengths in the factors are as one, by Pythagoras' theorem."""
+    with np.errstate(all="ignore"):
+        return reduce(np.hypot, lengths)

@@ -1,0 +1,116 @@
+"""Files of curves, with the names that their columns had in the table."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from .._archive import json_in, read
+from .._arrays import brief
+from .._cubic import CubicSpline
+from .._files import load, load_many, save_many
+from .._spaces import Space
+from ._errors import Problem, reading, refuse, writing
+from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
+
+ENDING = (".npz",)
+_COLUMNS = "columns"
+"""The entry of the file with the columns, which the library ignores."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Curves of one space by name, and their columns. The name of a single curve may be without meaning."""
+
+    splines: dict[str, CubicSpline]
+    named: bool
+    columns: Columns
+
+    def called(self, name: str) -> str:
+        """Refer to a curve in a message."""
+        return f"curve {name!r}" if self.named else "the curve"
+
+
+def write_curves(path: Path, curves: Curves) -> None:
+    """Write curves to a file that `symspline.load` or `symspline.load_many` also reads."""
+    with writing(path) as temporary:
+        with open(temporary, "wb") as file:
+            if curves.named:
+                save_many(curves.splines, file)
+            else:
+                next(iter(curves.splines.values())).save(file)
+        columns = np.array(json.dumps(asdict(curves.columns)))
+        with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
+            np.lib.format.write_array(entry, columns)
+
+
+def read_curves(path: Path, lonlat: bool = False) -> Curves:
+    """Read the curves in a file of ``symspline fit`` or of the library; ``lonlat`` as for ``symspline sample``."""
+    with reading(path), open(path, "rb") as file:
+        entries = _entries(path, file)
+        if "names.npy" in entries:
+            splines, named = load_many(file), True
+        else:
+            spline = load(file)
+            if not isinstance(spline, CubicSpline):
+                raise Problem(f"{path} is a HermiteSpline, whose acceleration jumps; use symspline.load")
+            splines = dict(_singles(spline))
+            named = len(splines) > 1
+        space = next(iter(splines.values())).space
+        if lonlat:
+            require_globe(space)
+        file.seek(0)
+        columns = _columns(path, file, space) if f"{_COLUMNS}.npy" in entries else Columns(labels(space))
+    if lonlat and not columns.lonlat:
+        columns = replace(columns, points=LONLAT, lonlat=True)
+    return Curves(splines, named, columns)
+
+
+def _entries(path: Path, file: BinaryIO) -> list[str]:
+    """The names of the entries of the file."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return archive.namelist()
+    except (zipfile.BadZipFile, NotImplementedError, ValueError):
+        raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes") from None
+    finally:
+        file.seek(0)
+
+
+def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
+    try:
+        columns = Columns(**json_in(read(file, lambda name: name == _COLUMNS), _COLUMNS))
+    except OSError:
+        raise
+    except Exception as error:
+        # Damage appears as errors of zipfile, of its decompressors and of NumPy.
+        raise Problem(f"{path} is damaged: {brief(error)}") from None
+    names, order = columns.points, columns.quaternion
+    count = len(labels(space)) if order is None else count_with_quaternion(space)
+    good = (
+        isinstance(names, list)
+        and len(names) == (len(LONLAT) if columns.lonlat else count)
+        and all(isinstance(name, str) for name in (*names, columns.time, columns.curve))
+        and isinstance(columns.lonlat, bool)
+        and (columns.utc is None or isinstance(columns.utc, bool))
+        and (order is None or (isinstance(order, list) and all(type(i) is int for i in order)))
+        and (order is None or sorted(order) == list(range(len(names))))
+        and not (columns.lonlat and (space != GLOBE or order is not None))
+    )
+    refuse(path, (not good, f" is damaged: its names of columns do not suit {space}"))
+    return columns
+
+
+def _singles(spline: CubicSpline, name: str = "") -> Iterator[tuple[str, CubicSpline]]:
+    """The curves of a batch, named by their indices."""
+    if not spline._batch:
+        yield name, spline
+        return
+    for i, part in enumerate(spline):
+        yield from _singles(part, f"{name},{i}" if name else str(i))

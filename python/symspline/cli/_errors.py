@@ -1,0 +1,99 @@
+"""Errors of the command line, and files that cannot be read or written."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+
+from .._disk import replacing
+from .._spaces.base import CLASSES
+
+_NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
+_SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\(([\w, ]+)\)")
+# Advice for Python only.
+_ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter| \(np\.[^()]*\)")
+
+
+class Problem(Exception):
+    """Invalid input or usage. The message is for the user."""
+
+    code = 2
+
+
+class Failure(Problem):
+    """The input is valid, but its check failed."""
+
+    code = 1
+
+
+def refuse(where: object, *checks: tuple[object, str]) -> None:
+    """Raise `Problem` for the first of these pairs of a condition and a message whose condition holds."""
+    for bad, message in checks:
+        if bad:
+            raise Problem(f"{where}{message}")
+
+
+def with_names(message: str) -> str:
+    """Write spaces in a message of the library as --space takes them: so:3, not SpecialOrthogonal(3)."""
+    return _SPACE.sub(lambda m: f"{_NAMES[m[1]]}:{m[2].replace(' ', '')}", message)
+
+
+def without_advice(message: str) -> str:
+    """Remove the advice from a message of the library that is for Python only."""
+    return _ADVICE.sub("", message)
+
+
+def did_you_mean(name: str, names: Sequence[str]) -> str:
+    """Suggest the name that was probably meant, or list all of them."""
+    plain = {known.lower(): known for known in names}
+    close = get_close_matches(name.lower(), plain, 1)
+    return f"did you mean {plain[close[0]]!r}?" if close else f"there are {listed(names)}"
+
+
+def first_duplicate(names: Sequence[str]) -> str | None:
+    """Return the first name that occurs more than once."""
+    return next((name for name, count in Counter(names).items() if count > 1), None)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Join names by commas, at most twelve of them."""
+    shown = ", ".join(names[:12])
+    return shown if len(names) <= 12 else f"{shown}, … ({len(names)})"
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Report a file that cannot be read."""
+    try:
+        yield
+    except OSError as error:
+        raise Problem(f"cannot read {path}: {error.strerror or error}") from None
+
+
+def check_target(path: Path) -> None:
+    """Raise `Problem` before any work is done if the output file cannot be written."""
+    # The target of a symbolic link is written.
+    folder = path.resolve().parent if path.is_symlink() else path.parent
+    special = path.exists() and not path.is_file()
+    refuse(
+        f"cannot write {path}: ",
+        (path.is_dir(), "it is a folder"),
+        (special, "it is a device, a pipe or a socket; give the name of a regular file"),
+        (not folder.is_dir(), f"there is no folder {folder}"),
+        (not os.access(folder, os.W_OK), f"no permission to write into {folder}"),
+    )
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """Yield a temporary file that replaces ``path`` if the body succeeds."""
+    try:
+        with replacing(path) as temporary:
+            yield temporary
+    except OSError as error:
+        raise Problem(f"cannot write {path}: {error.strerror or error}") from None

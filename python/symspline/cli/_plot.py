@@ -1,0 +1,48 @@
+"""Draw a curve
+
+The picture shows the curve, its speed and its acceleration. The ending of its name selects the format: .png, .pdf,
+.svg or another one that matplotlib can write.
+
+examples:
+  symspline plot track.npz -o track.png
+  symspline plot storms.npz --curve Ida -o ida.pdf
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ._curves import read_curves
+from ._errors import Problem, check_target, did_you_mean, listed, refuse, writing
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``symspline plot``."""
+    add = parser.add_argument
+    add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz")
+    add("--curve", metavar="NAME", help="which curve, if there are several")
+    add("-o", dest="output", type=Path, metavar="PICTURE", required=True, help="picture to write")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw the curve, and write the picture."""
+    check_target(options.output)
+    curves = read_curves(options.curves)
+    names, name = list(curves.splines), options.curve
+    several = f" has {len(names)} curves; say which with --curve: {listed(names)}"
+    refuse(options.curves, (name is None and len(names) > 1, several))
+    if name is not None and name not in names:
+        raise Problem(f"{options.curves} has no curve {name!r}; {did_you_mean(name, names)}")
+    name = names[0] if name is None else name
+    try:
+        figure = curves.splines[name].plot()
+    except ImportError as error:
+        raise Problem(str(error)) from None
+    known = sorted(figure.canvas.get_supported_filetypes())
+    ending = f": the name of a picture must end in .{', .'.join(known)}"
+    refuse(options.output, (options.output.suffix[1:].lower() not in known, ending))
+    with writing(options.output) as temporary:
+        figure.savefig(temporary)
+    print(f"{options.output}: a picture of {curves.called(name)}")
+    return 0

@@ -1,0 +1,250 @@
+"""Points in columns: number by number, as quaternions, or as longitude and latitude in degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from .._cubic import CubicSpline
+from .._lonlat import compass, from_lonlat, to_lonlat
+from .._pose_files import join, rotations_in_rows
+from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of
+from .._spaces import space as space_named
+from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
+from ._errors import Problem, with_names, without_advice
+from ._tables import IM, RE, Place
+
+Doubles = NDArray[np.float64]
+
+GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
+LONLAT = ["lon", "lat"]
+# From -180, from 0, or counted on where a track goes around the globe; 400 is a slip, and 999 a missing value.
+_LARGEST = (360, 90)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of columns, and what they hold.
+
+    Attributes
+    ----------
+    points : list of str
+        For every number of a point; for complex numbers without their endings.
+    time, curve : str
+        For times and for names of curves.
+    lonlat : bool
+        Whether points are longitude and latitude in degrees.
+    utc : bool or None
+        Whether dates had a time zone, and are written with a Z. None if that is not known.
+    quaternion : list of int or None
+        For rotations as quaternions the column of every number of a point, position first and scalar first.
+    """
+
+    points: list[str]
+    time: str = "time"
+    curve: str = "curve"
+    lonlat: bool = False
+    utc: bool | None = None
+    quaternion: list[int] | None = None
+
+
+def require_globe(space: Space) -> None:
+    """Raise `Problem` unless the points of a space have longitude and latitude."""
+    if space != GLOBE:
+        raise Problem(f"--lonlat is for sphere:2, not for {space}")
+
+
+# ---- names ----
+
+
+def is_complex(space: Space) -> bool:
+    """Whether points of a space, not a product, are complex."""
+    return bool(space.dtype.kind == "c")
+
+
+def complex_numbers(space: Space) -> list[bool]:
+    """For every number of a point whether it is complex."""
+    return [is_complex(factor) for factor in factors_of(space) for _ in range(math.prod(factor.point_shape))]
+
+
+def labels(space: Space) -> list[str]:
+    """Name the numbers of a point x0, x1, … in vectors, m11, m12, … in a matrix, m1_11, … in several matrices."""
+    matrices = [factor for factor in factors_of(space) if _is_matrix(factor)]
+    names: list[str] = []
+    vectors = number = 0
+    for factor in factors_of(space):
+        if _is_matrix(factor):
+            number += 1
+            start = f"m{number}_" if len(matrices) > 1 else "m"
+            between = "_" if max(factor.point_shape) > 9 else ""
+            names += [f"{start}{i + 1}{between}{j + 1}" for i, j in np.ndindex(*factor.point_shape)]
+        else:
+            (length,) = factor.point_shape
+            names += [f"x{i}" for i in range(vectors, vectors + length)]
+            vectors += length
+    return names
+
+
+def column_names(space: Space, columns: Columns, nu: int) -> list[str]:
+    """Name the columns of points, velocities or accelerations."""
+    end = f"_d{nu}" if nu else ""
+    if columns.lonlat:
+        return [f"east{end}", f"north{end}"] if nu else columns.points
+    if columns.quaternion is not None:
+        return [name + end for name in columns.points]
+    pairs = zip(columns.points, complex_numbers(space), strict=True)
+    return [name + end + part for name, two in pairs for part in ((RE, IM) if two else ("",))]
+
+
+def described(space: Space) -> str:
+    """Describe the numbers of a point and their order."""
+    parts = [_described(factor) for factor in factors_of(space)]
+    if len(parts) == 1:
+        return parts[0]
+    each = "; ".join(f"{factor}: {part}" for factor, part in zip(factors_of(space), parts, strict=True))
+    return f"{len(labels(space))} numbers ({each})"
+
+
+def _described(space: Space) -> str:
+    count = math.prod(space.point_shape)
+    text = f"{count} {'complex number' if is_complex(space) else 'number'}{'s' if count > 1 else ''}"
+    text += f", A{RE} and A{IM} each" if is_complex(space) else ""
+    return f"{text}, a {matrix(space)}" if _is_matrix(space) else text
+
+
+def matrix(space: Space) -> str:
+    """Describe a matrix in columns; empty for vectors."""
+    return f"{' x '.join(map(str, space.point_shape))} matrix row by row" if _is_matrix(space) else ""
+
+
+def _is_matrix(space: Space) -> bool:
+    return len(space.point_shape) > 1
+
+
+# ---- quaternions ----
+
+
+def count_with_quaternion(space: Space) -> int | None:
+    """Count the numbers of a point whose rotation is a quaternion; None without exactly one rotation in space."""
+    factors = factors_of(space)
+    if sum(factor in (ROTATIONS, POSES) for factor in factors) != 1 or any(map(is_complex, factors)):
+        return None
+    return sum(width(factor, True) for factor in factors)
+
+
+def width(space: Space, quaternion: bool) -> int:
+    """Count the columns of a point of a space, not a product."""
+    if quaternion and space in (ROTATIONS, POSES):
+        return 4 if space == ROTATIONS else 7
+    return math.prod(space.point_shape) * (2 if is_complex(space) else 1)
+
+
+# ---- numbers ----
+
+
+def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, place: Place) -> Any:
+    """Return the points of all rows, projected onto the space if they are off it by rounding in a file only.
+
+    Raises
+    ------
+    Problem
+        A point is farther off.
+    """
+    if columns.lonlat:
+        for name, values, largest in zip(("longitude", "latitude"), numbers.T, _LARGEST, strict=True):
+            wild = np.flatnonzero(np.abs(values) > largest)
+            if wild.size:
+                raise Problem(
+                    f"{file}, {place(int(wild[0]))}: {name} {values[wild[0]]:g} is not between -{largest} and "
+                    f"{largest} degrees; omit missing values, or say with --columns LON,LAT which is which"
+                )
+        return from_lonlat(*numbers.T)
+    if columns.quaternion is not None:
+        numbers = numbers[:, columns.quaternion]
+    parts, start = [], 0
+    for factor in factors_of(space):
+        own = np.ascontiguousarray(numbers[:, start : start + width(factor, columns.quaternion is not None)])
+        start += own.shape[1]
+        if columns.quaternion is not None and factor in (ROTATIONS, POSES):
+            turns = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
+            part = join(turns, own[:, :3]) if factor == POSES else turns
+        else:
+            part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)
+        of = f"the part in {factor} of " if isinstance(space, Product) else ""
+        parts.append(_projected(factor, part, file, place, of))
+    return tuple(parts) if isinstance(space, Product) else parts[0]
+
+
+def _projected(space: Space, points: NDArray[Any], file: object, place: Place, of: str) -> NDArray[Any]:
+    doubles = space._doubles(points, "points")
+    lead = space._lead(doubles)
+    try:
+        space._handle.check_points(space._rows(doubles, lead), lead, POINT_TOL_FLOAT32)
+    except ValidationError as error:
+        row, _, found = with_names(without_advice(str(error))).removeprefix("point ").partition(" ")
+        order = f"; the columns of the table are a {matrix(space)}" if matrix(space) else ""
+        raise Problem(f"{file}: {of}the point in {place(int(row))} {found}{order}") from None
+    return space.project(points)
+
+
+def numbers_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Doubles:
+    """Return points, velocities or accelerations at times x, shape (rows, columns).
+
+    Derivatives of a unit quaternion are those on S³, which covers the rotations without stretching angles.
+    """
+    values = spline(x, nu)
+    if columns.lonlat:
+        axes = compass(spline(x)) if nu else ()
+        return np.stack(
+            [np.degrees((values * axis).sum(axis=-1)) for axis in axes] or to_lonlat(values), axis=1
+        )
+    blocks = []
+    for factor, own in zip(factors_of(spline.space), parts_of(values, spline.space, "values"), strict=True):
+        if columns.quaternion is not None and factor in (ROTATIONS, POSES):
+            blocks += [own[:, :3, 3]] if factor == POSES else []
+            blocks.append(_quaternions(spline, x, nu))
+        else:
+            blocks.append(np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64))
+    found: Doubles = np.concatenate(blocks, axis=1)
+    return found if columns.quaternion is None else found[:, np.argsort(columns.quaternion)]
+
+
+def _quaternions(spline: CubicSpline, x: Any, nu: int) -> Doubles:
+    q = quaternion(spline, x, scalar_first=True)
+    return quaternion_velocity(q, (angular_velocity, angular_acceleration)[nu - 1](spline, x)) if nu else q
+
+
+# ---- standard deviations ----
+
+
+def std_names(space: Space, nu: int) -> list[str]:
+    """Name the standard deviations of points or velocities, one per factor, and two per pose."""
+    factors, end = factors_of(space), f"_d{nu}" if nu else ""
+    return [
+        f"std{number if len(factors) > 1 else ''}{part}{end}"
+        for number, factor in enumerate(factors, 1)
+        for part in (("_position", "_rotation") if factor._name == "se" else ("",))
+        if nu < 2
+    ]
+
+
+def std_numbers(spline: Any, x: Any, nu: int, columns: Columns) -> Doubles:
+    """Return these columns at times x, each in the unit of the columns next to it.
+
+    Numbers of a unit quaternion change half as much as the angle of its rotation.
+    """
+    found: list[Doubles] = []
+    half = 2 if columns.quaternion is not None else 1
+    stds: Sequence[Any] = parts_of(spline.std(x, nu), spline.space, "std") if nu < 2 else ()
+    for factor, std in zip(factors_of(spline.space), stds, strict=False):
+        if factor._name == "se":
+            found += [std[1], std[0] / half]
+        else:
+            found.append(std / half if factor == ROTATIONS else np.degrees(std) if columns.lonlat else std)
+    return np.stack(found, axis=-1) if found else np.empty((len(x), 0))

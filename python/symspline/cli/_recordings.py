@@ -1,0 +1,142 @@
+"""The rows of a table as curves to fit: sorted, merged and cut into segments as the user asked."""
+
+from __future__ import annotations
+
+import re
+from argparse import Namespace
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import CutLocusError
+from .._segments import cut
+from .._spaces import Space
+from ._errors import Problem, refuse, without_advice
+from ._tables import Rows
+from ._times import longest_gap
+
+Groups = Mapping[str, NDArray[np.int64]]
+Hint = Callable[[], str | None]
+
+
+class Recordings:
+    """The curves in the rows of a table.
+
+    Attributes
+    ----------
+    curves : list of tuple
+        Times and points of each curve.
+    groups : dict
+        The name of each curve, in the order in which they begin, and its rows.
+    named : bool
+        Whether these names have a meaning.
+    merged, alone, repeated : int
+        Rows with the time of another one that were merged with it, single points between gaps, which are omitted,
+        and rows with the time of another one that are smoothed.
+    """
+
+    def __init__(
+        self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint
+    ) -> None:
+        """``hint`` returns a column that may hold the names of several curves."""
+        self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
+        self._options, self._smooth = options, options.smooth is not None
+        self.named = rows.labels is not None or options.max_gap is not None
+        self.merged = self.alone = self.repeated = 0
+        self.curves: list[tuple[Any, Any]] = []
+        self.groups: dict[str, NDArray[np.int64]] = {}
+        asked = [name for name in ("sort", "dedup", "max_gap") if getattr(options, name)]
+        if asked and not rows.times.size:
+            option = asked[0].replace("_", "-")
+            raise Problem(f"--{option} needs times, and there is no column of times; say which with --time")
+        groups = group(rows)
+        for name, own in groups.items():
+            if options.sort:
+                own = own[np.argsort(rows.times[own], kind="stable")]
+            segments = self._segments(name, own)
+            for number, (curve, kept) in enumerate(segments, 1):
+                part = name if len(segments) == 1 else f"{name}/{number}"
+                new = name if options.max_gap is None else part if rows.labels is not None else str(number)
+                if new in self.groups or (new != name and new in groups):
+                    raise Problem(f"--max-gap: two curves would have the name {new!r}")
+                self.groups[new] = kept
+                self.curves.append(curve)
+        none_left = f": with --max-gap {options.max_gap} every point is alone; a curve needs two"
+        refuse(path, (not self.groups, none_left))
+
+    def located(self, message: str) -> str:
+        """Rewrite a message of the library with lines of the file and names of curves instead of numbers."""
+        found = re.search(r"\bcurve (\d+)", message)
+        name = list(self.groups)[int(found[1]) if found else 0]
+
+        def place(number: str) -> str:
+            return self._rows.place(int(self.groups[name][int(number)]))
+
+        text = re.sub(r"points\[(\d+)\]", lambda m: f"the point in {place(m[1])}", message)
+        text = re.sub(r"\bt\[(\d+)\] = (\S+)", lambda m: f"time {m[2]} in {place(m[1])}", text)
+        called = f"curve {name!r}" if self.named else "the curve"
+        text = text.replace(found[0], called) if found else text
+        return (f"{self._path}: " if text != message else "") + without_advice(text)
+
+    def _segments(self, name: str, own: NDArray[np.int64]) -> list[tuple[tuple[Any, Any], NDArray[np.int64]]]:
+        """The curves in the rows of one name, and the rows of each."""
+        times, options = self._rows.times, self._options
+        times = times[own] if times.size else times
+        of = f" of curve {name!r}" if self._rows.labels is not None else ""
+        again = np.append(False, times[1:] == times[:-1])
+        first = own if options.dedup is None or not times.size else own[~again]
+        self._check(first, of)
+        self.merged += len(own) - len(first)
+        self.repeated += int(again.sum()) if self._smooth and options.dedup is None else 0
+        points = _picked(self._points, own)
+        if options.dedup is None and options.max_gap is None:
+            return [((times if times.size else None, points), own)]
+        gap = np.inf if options.max_gap is None else longest_gap(options.max_gap, times.dtype.kind == "M")
+        used = np.ones(len(own), bool) if self._smooth else None
+        try:
+            found = cut(times, points, self._space, gap, 2, options.dedup or "raise", used)
+        except CutLocusError:
+            raise Problem(
+                f"{self._path}: points{of} with one time are too far apart to have a mean; --dedup first takes the "
+                "first of them"
+            ) from None
+        self.alone += len(first) - sum(map(len, found.rows))
+        return [(curve, own[kept]) for curve, kept in zip(found.curves, found.rows, strict=True)]
+
+    def _check(self, own: NDArray[np.int64], of: str) -> None:
+        """Raise `Problem` unless there are two points whose times increase, or do not decrease."""
+        if len(own) < 2:
+            where = f", {self._rows.place(int(own[0]))}" if len(own) else ""
+            raise Problem(f"{self._path}{where}: this is the only point{of}; a curve needs two")
+        if not self._rows.times.size:
+            return
+        times = self._rows.times[own]
+        bad = np.flatnonzero(~((times[1:] > times[:-1]) | (self._smooth & (times[1:] == times[:-1]))))
+        if bad.size:
+            i = bad[0]
+            before, here = self._rows.place(int(own[i])), self._rows.place(int(own[i + 1]))
+            column = self._hint()
+            curves = "" if column is None else f"--curve {column} makes a curve of each {column}, "
+            same = times[i + 1] == times[i]
+            repair = "--dedup first or mean makes one point of them" if same else "--sort puts rows in order"
+            raise Problem(
+                f"{self._path}, {here}: time {times[i + 1]}{of} does not come after {times[i]} in {before}; times must "
+                f"{'not decrease' if self._smooth else 'increase'}; {curves}{repair}"
+            )
+
+
+def group(rows: Rows) -> Groups:
+    """Return the rows of every curve, which is one curve named "" if rows have no labels."""
+    if rows.labels is None:
+        return {"": np.arange(max(len(rows.numbers), len(rows.times)))}
+    codes: dict[str, int] = {}
+    of_row = np.array([codes.setdefault(label, len(codes)) for label in rows.labels], dtype=np.int64)
+    order = np.argsort(of_row, kind="stable")
+    return dict(zip(codes, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True))
+
+
+def _picked(points: Any, own: NDArray[np.int64]) -> Any:
+    return tuple(part[own] for part in points) if isinstance(points, tuple) else points[own]

@@ -1,0 +1,249 @@
+"""Numbers, dates and durations in text, and sampling times along a curve."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import ValidationError
+from .._input import ISO_DATE, UTC_ZONE, times_of
+from ._errors import Problem, refuse
+
+Times = NDArray[Any]
+Fail = Callable[[int, str], Problem]
+"""Makes the problem of a row from a description of its cell."""
+
+# 2021-08-29, 29.8.2021, 8/29/21, 20210829T1655, 16:55, 29 Aug 2021, Aug 29, 2021
+_MONTH = r"(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*"
+_DATE_LIKE = re.compile(
+    r"\d{4}([-/.])\d{1,2}\1\d{1,2}(?!\d)|\d{1,2}([-/.])\d{1,2}\2(?:\d{4}|\d{2})(?!\d|\.\d)|\d{8}T\d{4}|\d{1,2}:\d{2}(?!\d)"
+    rf"|\d{{1,2}}[-. ]*{_MONTH}[-. ,]*\d{{2}}|{_MONTH}[-. ]*\d{{1,2}}\b",
+    re.IGNORECASE | re.ASCII,
+)
+_PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
+_DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
+_SECOND, _MINUTE = 10**9, 60 * 10**9
+_NANOSECONDS = {
+    **{"ns": 1, "us": 10**3, "ms": 10**6, "s": _SECOND},
+    **{"min": _MINUTE, "h": 60 * _MINUTE, "d": 24 * 60 * _MINUTE},
+}
+# Whole numbers up to here are exact as floating-point numbers.
+_EXACT = 2**53
+_MOST = 10**9
+# Exponents of floating-point numbers are smaller.
+_EXPONENT = 400
+
+
+# ---- text ----
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number, without the underscores and other scripts' digits that Python accepts."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return _is_usual(text)
+
+
+def numbers(texts: Sequence[str]) -> NDArray[np.float64]:
+    """Convert texts to numbers; raise ValueError if one of them is not a number."""
+    # One look at all letters takes no time compared with reading the numbers.
+    if not _is_usual("".join(texts)) and not all(map(is_number, texts)):
+        raise ValueError
+    return np.fromiter(map(float, texts), np.float64, len(texts))
+
+
+def _is_usual(text: str) -> bool:
+    return "_" not in text and text.strip().isascii()
+
+
+def number(text: str) -> float:
+    """Read a number in an option."""
+    if not is_number(text):
+        raise ValueError
+    return float(text)
+
+
+def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
+    """Read the times in a column: numbers if the first cell is one, otherwise ISO dates.
+
+    Returns
+    -------
+    times : ndarray
+        Numbers, or ``datetime64``.
+    utc : bool
+        Whether the dates had a Z or an offset. They are converted to UTC then.
+    """
+    style = _style(cells[0]) if cells else "number"
+    if style == "number":
+        with suppress(ValueError):
+            return _numeric_times(cells, fail), False
+    for i, own in enumerate(map(_style, cells)):
+        if own is None and style != "number":
+            raise fail(i, f"holds {cells[i]!r}, not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z")
+        if own != style:
+            raise fail(i, f"holds {cells[i]!r}, but {cells[0]!r} before; write all times in the same way")
+    try:
+        times, zone = times_of(list(cells), "time")
+    except ValidationError:
+        i = next(i for i, cell in enumerate(cells) if not _is_date(cell))
+        raise fail(i, f"holds {cells[i]!r}, which is not a date of the calendar") from None
+    return times, zone == UTC_ZONE
+
+
+def _numeric_times(cells: Sequence[str], fail: Fail) -> Times:
+    values = numbers(cells)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise fail(int(bad[0]), f"holds {cells[bad[0]]!r}, which is not a time")
+    if np.abs(values).max(initial=0) > _EXACT:
+        with suppress(ValueError, OverflowError):
+            return np.array([int(cell) for cell in cells], dtype=np.int64)
+    return values
+
+
+def _style(cell: str) -> object:
+    """What the times of a column must have in common; fractions and offsets may differ."""
+    match = ISO_DATE.fullmatch(cell)
+    if match is not None and (len(match["body"]) > 10 or not match["zone"]):
+        return match["body"][10:11], len(match["body"]) > 16, match["zone"] is None
+    return "number" if is_number(cell) else None
+
+
+def _is_date(cell: str) -> bool:
+    try:
+        times_of(cell, "time")
+    except ValidationError:
+        return False
+    return True
+
+
+def is_date_like(text: str) -> bool:
+    """Whether a text seems to be a date or a time of day, in any of the usual ways to write them."""
+    return _DATE_LIKE.match(text.strip()) is not None
+
+
+def is_packed_day(cell: str) -> bool:
+    """Whether a number looks like a day of these centuries: 20210829."""
+    return _PACKED_DAY.fullmatch(cell.strip()) is not None
+
+
+# ---- durations, and times along a curve ----
+
+
+def longest_gap(text: str, dates: bool) -> float:
+    """Read a duration such as ``"12h"``, in seconds, or in the unit of numeric times."""
+    count, unit = _duration(text, "--max-gap")
+    if unit and not dates:
+        raise Problem(f"--max-gap {text}: the times are numbers; give a gap without a unit")
+    return float(count * _NANOSECONDS[unit or "s"] / _SECOND if dates else count)
+
+
+def every(step: str, knots: Times) -> Times:
+    """Return times from the first knot to at most the last, one per step."""
+    count, unit = _duration(step, "--every")
+    kind = knots.dtype.kind
+    if unit and kind != "M":
+        raise Problem(f"--every {step}: the times of this curve are numbers; give a step without a unit")
+    if kind == "f":
+        length = float(count)
+        if not 0 < length < float("inf"):
+            raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
+        # A step that divides the curve up to rounding reaches its end.
+        samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
+        times: Times = np.minimum(knots[0] + length * np.arange(samples), knots[-1])
+        return times
+    if kind == "M":
+        count *= _NANOSECONDS[unit or "s"]
+    if count != int(count):
+        units = "a whole number of nanoseconds" if kind == "M" else "a whole number, as the times are"
+        raise Problem(f"--every {step}: a step must be {units}")
+    jump = int(count)
+    if kind == "M":
+        unit = next(unit for unit in ("s", "ms", "us", "ns") if jump % _NANOSECONDS[unit] == 0)
+        knots = _in_unit(knots, unit)
+        ticks = np.ones(1, f"datetime64[{unit}]").astype(knots.dtype).astype(np.int64)
+        jump = jump // _NANOSECONDS[unit] * int(ticks[0])
+    span = _span(knots)
+    samples = _samples(span // jump, step)
+    return _after(knots, np.uint64(min(jump, span)) * np.arange(samples, dtype=np.uint64))
+
+
+def spread(count: int, knots: Times) -> Times:
+    """Return equidistant times from the first to the last knot, dates to a microsecond."""
+    if knots.dtype.kind == "f":
+        return np.linspace(knots[0], knots[-1], count)
+    dates = knots.dtype.kind == "M"
+    knots = _in_unit(knots, "us") if dates else knots
+    span = _span(knots)
+    steps = np.rint(np.linspace(0, span, count)[: count - 1]).astype(np.uint64)
+    times = _after(knots, np.append(steps, np.uint64(span if count > 1 else 0)))
+    return _coarsest(times) if dates else times
+
+
+def _span(knots: Times) -> int:
+    """The exact difference between the last and the first knot."""
+    first, last = knots[[0, -1]].astype(np.int64 if knots.dtype.kind == "M" else knots.dtype).tolist()
+    return int(last - first)
+
+
+def _after(knots: Times, steps: NDArray[np.uint64]) -> Times:
+    """The first knot plus these whole numbers, exact because it is computed modulo 2**64."""
+    times: Times = (knots[:1].astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(knots.dtype)
+    return times
+
+
+def _in_unit(knots: Times, unit: Any) -> Times:
+    """The first and the last date, in this unit or a finer one."""
+    ends = knots[[0, -1]]
+    with suppress(OverflowError):
+        fine = ends.astype(np.promote_types(knots.dtype, f"datetime64[{unit}]"))
+        # NumPy reports an overflow between some units only.
+        if (fine.astype(knots.dtype) == ends).all():
+            return fine
+    tick = np.timedelta64(1, unit)
+    raise Problem(f"the dates from {ends[0]} to {ends[1]} cannot be counted in units of {tick}")
+
+
+def _coarsest(dates: Times) -> Times:
+    """The same dates in seconds if they are whole seconds, otherwise in the next finer unit that is exact."""
+    for unit in ("s", "ms", "us"):
+        # Attoseconds cannot become seconds.
+        with suppress(OverflowError):
+            coarse = dates.astype(f"datetime64[{unit}]")
+            if (coarse == dates).all():
+                return coarse
+    return dates
+
+
+def _samples(steps: float, option: str) -> int:
+    if steps >= _MOST:
+        raise Problem(f"--every {option}: that makes {float(steps):.1e} samples of one curve")
+    return int(steps) + 1
+
+
+def _duration(text: str, option: str) -> tuple[Decimal, str]:
+    """Split ``"10min"`` into 10 and ``"min"``."""
+    match = _DURATION.fullmatch(text.strip())
+    if match is None or match[2].lower() not in ("", *_NANOSECONDS):
+        raise Problem(
+            f"{option} {text}: a duration is a number such as 0.5, or one with a unit such as 10min; "
+            f"units are {', '.join(_NANOSECONDS)}"
+        )
+    try:
+        count = Decimal(match[1])
+    except InvalidOperation:
+        raise Problem(f"{option} {text}: the exponent is too large") from None
+    refuse(
+        f"{option} {text}: ",
+        (count == 0, "it must be larger than zero"),
+        (abs(count.adjusted()) > _EXPONENT, f"that is too {'long' if count > 1 else 'short'}"),
+    )
+    return count, match[2].lower()

@@ -1,0 +1,123 @@
+"""Validation of arrays that are to be converted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import as_array, cast
+from .._core import ValidationError
+from .._spaces import point_tol
+
+Array = NDArray[Any]
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def unmoved_by_underflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorate a function so that numbers too small for double precision become zero, whatever NumPy's error
+    settings."""
+
+    @wraps(function)
+    def quiet(*arguments: _P.args, **options: _P.kwargs) -> _T:
+        with np.errstate(under="ignore"):
+            return function(*arguments, **options)
+
+    return quiet
+
+
+def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
+    """Return a real or complex array in double precision, and the tolerance for its points.
+
+    Examples
+    --------
+    >>> numbers([1, 2], "x", 1)
+    (array([1., 2.]), 1e-08)
+    """
+    array = as_array(value, name)
+    if array.dtype.kind not in "biufc":
+        raise ValidationError(f"{name} must be an array of numbers, not of {array.dtype}")
+    if array.ndim < axes:
+        raise ValidationError(f"{name} has shape {array.shape}, but needs at least {axes} axes")
+    tol = point_tol(array.dtype)
+    array = cast(array.copy(), np.complex128 if array.dtype.kind == "c" else np.float64)
+    refuse(~np.isfinite(array), name, lambda i: f"is {array[i]}, but must be finite; remove missing values")
+    return array, tol
+
+
+def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> tuple[Array, float]:
+    """Return the same for real numbers with the given last axes; None allows any length except 0."""
+    array, tol = numbers(value, name, len(shape))
+    last = array.shape[array.ndim - len(shape) :]
+    fits = all(n == m or (m is None and n > 0) for n, m in zip(last, shape, strict=True))
+    if array.dtype.kind == "c" or not fits:
+        wanted = ", ".join("n" if m is None else str(m) for m in shape)
+        kind = "complex" if array.dtype.kind == "c" else "real"
+        raise ValidationError(
+            f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}"
+        )
+    return array, tol
+
+
+def square_matrices(value: ArrayLike, name: str) -> tuple[Array, float]:
+    """Return the same for square matrices, real or complex."""
+    array, tol = numbers(value, name, 2)
+    if array.shape[-1] != array.shape[-2] or array.shape[-1] == 0:
+        raise ValidationError(f"{name} must be square matrices, of shape (..., n, n), not {array.shape}")
+    return array, tol
+
+
+def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
+    """Normalise unit vectors.
+
+    Raises
+    ------
+    ValidationError
+        If the length of a vector is not 1.
+    """
+    lengths = length(np.abs(x))
+    refuse(
+        ~(np.abs(lengths - 1) <= tol),
+        name,
+        lambda i: f"is not {what}: its length is {lengths[i]}, not 1; divide it by its length",
+    )
+    return x / lengths[..., None]
+
+
+def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
+    """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
+    found = np.argwhere(bad)
+    if len(found):
+        index = tuple(found[0].tolist())
+        raise ValidationError(f"{name}{list(index) or ''} {say(index)}")
+
+
+def length(x: Array) -> Array:
+    """Return |x| of real vectors without intermediate overflow, shape of the leading axes."""
+    with np.errstate(over="ignore"):
+        result: Array = np.hypot.reduce(x, axis=-1)
+    return result
+
+
+def adjoint(x: Array) -> Array:
+    """Return conjugate transposes."""
+    result: Array = np.swapaxes(x, -1, -2).conj()
+    return result
+
+
+def off_one(x: Array) -> Array:
+    """Return the deviation of columns from orthonormal: the largest entry of |X*X − 1| of every matrix."""
+    # Of input that is far off.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return largest(adjoint(x) @ x - np.eye(x.shape[-1]))
+
+
+def largest(x: Array) -> Array:
+    """Return the largest entry of every matrix by magnitude."""
+    result: Array = np.abs(x).max(axis=(-2, -1))
+    return result

@@ -1,0 +1,129 @@
+"""The compiled spline as a differentiable function, on the CPU."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
+
+from .._adapters import split
+from .._curves.curve import order_of
+from .._curves.ends import ends_in_factors
+from .._spaces import Product, Space, parts_of
+from .._spaces import space as space_named
+from ..manifolds._manifold import refuse_functions
+from ._embedding import second_fundamental_form
+from ._primitives import Fixed, fit_p, push_p
+
+Array = jax.Array
+
+
+def curve(
+    x: Any,
+    t: Any,
+    points: Any,
+    space: Space | str,
+    *,
+    nu: int = 0,
+    bc_type: Any = "natural",
+    **options: Any,
+) -> Any:
+    """Evaluate a spline through points by the compiled core, with derivatives in JAX.
+
+    The result equals ``CubicSpline(t, points, space, ...)(x, nu)``. First derivatives with respect to x, t, points and
+    the vectors in `bc_type` are available in forward and reverse mode. `jax.jit` works, and `jax.vmap`, nested or of
+    derivatives, makes one call of the core.
+
+    Parameters
+    ----------
+    x : array
+        Times, any shape.
+    t : array, shape (n,) or (..., n)
+        Knots.
+    points : array, shape (..., n, *space.point_shape)
+        Points; for a `Product` a tuple. Points and end vectors are projected onto the manifold first, so an optimiser
+        may move them off it.
+    space : Space or str
+        Space or its name.
+    nu : {0, 1, 2}, default 0
+        0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+    bc_type : str, tuple or pair, default "natural"
+        End conditions, as for `CubicSpline`. Vectors may be JAX arrays.
+    **options
+        Other options of `CubicSpline`.
+
+    Returns
+    -------
+    array, shape ``(*batch axes, *x.shape, *space.point_shape)``
+        Values, in the precision of the points; for a `Product` a tuple. JAX differentiates these arrays, so the
+        derivative of a velocity also has a component normal to the manifold.
+
+    Raises
+    ------
+    NotImplementedError
+        If ∇γ' is differentiated with respect to x, or a second derivative is taken.
+
+    Notes
+    -----
+    Computations use double precision. Most uses need ``jax.config.update("jax_enable_x64", True)``.
+
+    Where many arrays represent the same point (projective spaces, Grassmannians), differentiate only functions that do
+    not depend on the representative.
+
+    With ``on_failure="ignore"`` or ``"warn"``, a curve that did not converge has the values of the best iterate. Its
+    derivatives are NaN, because they are derived from the C² condition, which the iterate does not satisfy.
+    """
+    nu = order_of(nu)
+    space = space_named(space)
+    refuse_functions(space, "derivatives with respect to the data are not made")
+    if isinstance(space, Product):
+        pieces = zip(
+            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
+        )
+        return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in pieces)
+    kinds, given = split(bc_type)
+    points = jnp.asarray(points)
+    points = points.astype(jnp.result_type(points, jnp.complex64 if space.dtype.kind == "c" else jnp.float32))
+    real = points.real.dtype
+    x, t = jnp.asarray(x, real), jnp.asarray(t, real)
+    vectors = tuple(jnp.asarray(v, points.dtype) for v in given if v is not None)
+    return _curve(Fixed(space, kinds, tuple(sorted(options.items()))), int(nu), x, t, points, *vectors)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _curve(fixed: Fixed, nu: int, x: Array, t: Array, points: Array, *vectors: Array) -> Any:
+    return fit_p.bind(x, t, points, *vectors, fixed=fixed, lead=0, orders=(nu,))[0]
+
+
+@partial(_curve.defjvp, symbolic_zeros=True)
+def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
+    x, *data = primals
+    dx, *changes = tangents
+    in_time = not isinstance(dx, SymbolicZero)
+    moving = tuple(not isinstance(change, SymbolicZero) for change in changes)
+    if in_time and nu == 2:
+        raise NotImplementedError(
+            "∇γ' is not differentiated in x, which would be a third derivative; symspline.jax.evaluate has it"
+        )
+    orders = tuple(range(nu + in_time + 1))
+    *found, velocities = fit_p.bind(*primals, fixed=fixed, lead=0, orders=orders)
+    point, value = found[0], found[nu]
+    moved = jnp.zeros_like(value)
+    if in_time:
+        ahead = found[nu + 1]
+        if nu:
+            ahead += second_fundamental_form(fixed.space, point, value, found[1])
+        moved += ahead * jnp.expand_dims(dx, tuple(range(-len(fixed.space.point_shape), 0)))
+    if any(moving):
+        # One vector: its transpose is asked for as a whole.
+        pieces = [jnp.ravel(c).astype(value.dtype) for c, m in zip(changes, moving, strict=True) if m]
+        push = partial(push_p.bind, jnp.concatenate(pieces), x, *data, velocities)
+        moved += push(fixed=fixed, lead=0, nu=nu, moving=moving)
+        if nu:
+            moved += second_fundamental_form(
+                fixed.space, point, value, push(fixed=fixed, lead=0, nu=0, moving=moving)
+            )
+    return value, moved

@@ -1,0 +1,226 @@
+"""The compiled core as primitives of JAX: fits, the sensitivity of curves to their data, and its transpose.
+
+Each is one call of the core, also under `jax.vmap`, however often. Every array has the axes of `jax.vmap` in front, of
+size one where it does not depend on them, so data shared by all curves are passed once.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import ShapedArray
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
+
+from .._adapters import Kinds, fitted, joined
+from .._curves.curve import CurveArrays
+from .._curves.derivatives import places
+from .._curves.fit import curve_of
+from .._spaces import Space
+from ._layout import Layout, Shape
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Arguments that are not differentiated, hashable for JAX."""
+
+    space: Space
+    kinds: Kinds
+    options: tuple[tuple[str, Any], ...]
+
+
+# ---- the spline ----
+
+
+def _fit_shapes(x: Any, *data: Any, fixed: Fixed, lead: int, orders: Shape) -> Any:
+    layout, points = _layout(fixed, lead, x, data), data[1]
+    values = _values(fixed, lead, layout, x, points)
+    return (*(values for _ in orders), ShapedArray((*layout.curves, *points.shape[lead:]), points.dtype))
+
+
+def _fit(x: Any, t: Any, points: Any, *vectors: Any, fixed: Fixed, lead: int, orders: Shape) -> Any:
+    """The curves at x, γ and its derivatives of the given orders, and the velocities at the knots from which
+    derivatives in the data are made."""
+    layout, core = _layout(fixed, lead, x, (t, points, *vectors)), len(fixed.space.point_shape)
+    ends = _ends(fixed.kinds, [layout.data(v, core) for v in vectors])
+    data = layout.knots(t), layout.data(points, core + 1)
+    spline = fitted(*data, ends, fixed.space, fixed.kinds, dict(fixed.options))
+    at, per_curve = layout.sample_times(x)
+    found = [layout.outward(spline(at, nu, per_curve=per_curve)) for nu in orders]
+    solved = spline._solved().velocities.reshape(*layout.curves, *points.shape[lead:])
+    return tuple(np.asarray(a, points.dtype) for a in (*found, solved))
+
+
+def _layout(fixed: Fixed, lead: int, x: Any, data: Any, *changes: Shape) -> Layout:
+    """The axes of times and data: of t, points, vectors and, where derivatives are made, velocities."""
+    points = data[1]
+    curves = np.broadcast_shapes(*(a.shape[:lead] for a in data), *changes)
+    batch = points.shape[lead : points.ndim - len(fixed.space.point_shape) - 1]
+    return Layout(curves, x.shape[:lead], batch)
+
+
+def _values(fixed: Fixed, lead: int, layout: Layout, x: Any, points: Any) -> ShapedArray:
+    shape = (*layout.full, *layout.batch, *x.shape[lead:], *fixed.space.point_shape)
+    return ShapedArray(shape, points.dtype)
+
+
+def _ends(kinds: Kinds, vectors: Any) -> tuple[Any, Any]:
+    """Vectors for both ends, None where none is given."""
+    left = iter(vectors)
+    first, last = (
+        None if isinstance(kind, str) else next(left)
+        for kind in ((kinds, kinds) if isinstance(kinds, str) else kinds)
+    )
+    return first, last
+
+
+# ---- its sensitivity to its data ----
+
+
+def _push_shape(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, **_: Any) -> Any:
+    return _values(fixed, lead, _layout(fixed, lead, x, data, change.shape[:lead]), x, data[1])
+
+
+def _push(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...]) -> Any:
+    """The change of γ, or of a derivative of it seen from the moving point, with the data.
+
+    Args:
+        change: of those of t, points and vectors that move, all in one vector.
+        data: t, points, vectors, and the velocities that a fit found.
+    """
+    layout = _layout(fixed, lead, x, data, change.shape[:lead])
+    curve, at, bc_type = _moved(fixed, layout, nu, x, data)
+    sizes = [math.prod(a.shape[lead:]) * moves for a, moves in zip(data, moving, strict=False)]
+    each = zip(
+        np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False
+    )
+    knots, steps, *ends = (
+        layout.data(_like(own, array).reshape(*change.shape[:lead], *array.shape[lead:]), core)
+        if moves
+        else None
+        for own, array, core, moves in each
+    )
+    found = curve.push(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
+    return np.asarray(layout.outward(found), data[1].dtype)
+
+
+def _pull_shape(_: Any, x: Any, *data: Any, lead: int, moving: Any, kept: Shape, **__: Any) -> Any:
+    sizes = (math.prod(a.shape[lead:]) for a, moves in zip(data, moving, strict=False) if moves)
+    return ShapedArray((*kept, sum(sizes)), data[1].dtype)
+
+
+def _pull(
+    cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape
+) -> Any:
+    """The transpose. JAX pairs complex numbers without conjugation.
+
+    Args:
+        kept: sizes of the axes of `jax.vmap` along which gradients are kept separate; 1 along those that are summed.
+    """
+    layout = _layout(fixed, lead, x, data, kept)
+    curve, at, bc_type = _moved(fixed, layout, nu, x, data)
+    wide = np.broadcast_to(cotangent, (*layout.full, *cotangent.shape[lead:]))
+    found = curve.pull(at, bc_type, np.conj(layout.inward(wide)))
+    parts = (found.t, found.points, *(end for end in found.ends if end is not None))
+    rows = [
+        layout.gradient(np.conj(part), core, kept, array.shape[lead:]).reshape(*kept, -1)
+        for part, core, array, moves in zip(parts, _cores(fixed, data), data, moving, strict=False)
+        if moves
+    ]
+    return np.concatenate(rows, axis=-1).astype(data[1].dtype)
+
+
+def _cores(fixed: Fixed, data: Any) -> list[int]:
+    """How many axes knots, points and vectors have behind those of a batch."""
+    core = len(fixed.space.point_shape)
+    return [1, core + 1, *(core for _ in data[2:])]
+
+
+def _moved(fixed: Fixed, layout: Layout, nu: int, x: Any, data: Any) -> tuple[CurveArrays, Any, Any]:
+    """Return curves with fitted velocities, sampling times, and their end conditions."""
+    space, core = fixed.space, len(fixed.space.point_shape)
+    t, points, *vectors, velocities = data
+    points = space.project(np.ascontiguousarray(layout.data(points, core + 1)))
+    found = np.array(layout.data(velocities, core + 1), points.dtype)
+    knots = np.array(layout.data(t, 1), np.float64)
+    at, per_curve = layout.sample_times(np.asarray(x))
+    curve = curve_of(space, knots, [(points, found)])
+    batch = points.shape[: points.ndim - core - 1]
+    bc_type = joined(fixed.kinds, _ends(fixed.kinds, [layout.data(v, core) for v in vectors]))
+    return curve, places(knots, batch, at, per_curve, nu), bc_type
+
+
+def _like(change: Any, array: Any) -> Any:
+    """Changes of real arrays are real."""
+    return change if np.iscomplexobj(array) else change.real
+
+
+# ---- rules of JAX for these primitives ----
+
+
+def _primitive(name: str, call: Any, shapes: Any, multiple: bool = False) -> Any:
+    """A primitive that is one call of the core."""
+    primitive = Primitive(name)
+    primitive.multiple_results = multiple
+
+    def now(*arguments: Any, **fixed: Any) -> Any:
+        return jax.tree.map(jnp.asarray, call(*map(np.asarray, arguments), **fixed))
+
+    def later(*arguments: Any, **fixed: Any) -> Any:
+        def back(*arrays: Any) -> Any:
+            return call(*map(np.asarray, arrays), **fixed)
+
+        made = jax.tree.map(lambda a: jax.ShapeDtypeStruct(a.shape, a.dtype), shapes(*arguments, **fixed))
+        return jax.pure_callback(back, made, *arguments)
+
+    primitive.def_impl(now)
+    primitive.def_abstract_eval(shapes)
+    mlir.register_lowering(primitive, mlir.lower_fun(later, multiple_results=multiple))
+    return primitive
+
+
+fit_p = _primitive("symspline_fit", _fit, _fit_shapes, multiple=True)
+push_p = _primitive("symspline_push", _push, _push_shape)
+pull_p = _primitive("symspline_pull", _pull, _pull_shape)
+
+
+def _mapped(primitive: Any, arguments: Any, axes: Any, *, lead: int, **fixed: Any) -> Any:
+    """The rule of `jax.vmap`: one more axis in front of every argument, of size one where there is none."""
+    pairs = list(zip(arguments, axes, strict=True))
+    moved = [jnp.expand_dims(a, 0) if i is None else jnp.moveaxis(a, i, 0) for a, i in pairs]
+    if primitive is pull_p:
+        fixed["kept"] = (next(a.shape[i] for a, i in pairs if i is not None), *fixed["kept"])
+    found = primitive.bind(*moved, lead=lead + 1, **fixed)
+    if primitive is not fit_p:
+        return found, 0
+    if any(axis is not None for axis in axes[1:]):
+        return found, (0,) * len(found)
+    # Only times differ: there is one curve.
+    *values, velocities = found
+    return (*values, jnp.squeeze(velocities, 0)), (*(0 for _ in values), None)
+
+
+def _second(*_: Any, **__: Any) -> Any:
+    raise NotImplementedError(
+        "symspline.jax.curve has derivatives of first order; symspline.jax.fit and symspline.jax.evaluate have those "
+        "of any order"
+    )
+
+
+for primitive in (fit_p, push_p, pull_p):
+    batching.primitive_batchers[primitive] = partial(_mapped, primitive)
+    ad.primitive_jvps[primitive] = _second
+
+
+def _transpose(cotangent: Any, change: Any, *data: Any, lead: int, **fixed: Any) -> Any:
+    kept = change.aval.shape[:lead]
+    return [pull_p.bind(cotangent, *data, lead=lead, kept=kept, **fixed), *(None for _ in data)]
+
+
+ad.primitive_transposes[push_p] = _transpose

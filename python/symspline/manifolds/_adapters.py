@@ -1,0 +1,114 @@
+"""Manifolds of other libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._core import ValidationError
+from .._spaces import Array
+from ._manifold import Manifold
+
+
+def from_geomstats(
+    space: Any, *, injectivity_radius: float | None = None, dtype: Any = np.float64
+) -> Manifold:
+    """A space of geomstats with its metric, on the NumPy backend.
+
+    Args:
+        space: a space with a metric that has ``exp``, ``log`` and ``inner_product``, such as
+            ``geomstats.geometry.stiefel.Stiefel(5, 2)``.
+        injectivity_radius: as for `Manifold`.
+        dtype: complex128 if its points are complex.
+
+    Raises:
+        ValidationError: it has no metric.
+    """
+    metric = getattr(space, "metric", None)
+    if metric is None:
+        raise ValidationError("the space has no metric: call equip_with_metric first")
+    return Manifold(
+        # Their tangent vectors come before the points at which they are.
+        exp=_PointLast(metric.exp),
+        log=_PointLast(metric.log),
+        project_tangent=_PointLast(space.to_tangent),
+        inner=_PointLast(metric.inner_product, real=True),
+        project=getattr(space, "projection", None),
+        injectivity_radius=injectivity_radius,
+        point_shape=tuple(space.shape),
+        dim=int(space.dim),
+        dtype=dtype,
+    )
+
+
+def from_pymanopt(manifold: Any, *, injectivity_radius: float | None = None) -> Manifold:
+    """A manifold of pymanopt that has ``exp`` and ``log``. Its functions take one point at a time, which is slow.
+
+    Velocities are as pymanopt has tangent vectors: those of groups are elements of the Lie algebra.
+
+    Args:
+        manifold: such as ``pymanopt.manifolds.Oblique(3, 4)``; of a product make a `symspline.Product` of its factors.
+        injectivity_radius: as for `Manifold`.
+
+    Raises:
+        ValidationError: its points are no arrays, or it has no ``exp`` or ``log``.
+    """
+    missing = [name for name in ("exp", "log") if not _has(manifold, name)]
+    if missing:
+        raise ValidationError(
+            f"{manifold} has no {' and no '.join(missing)}; give functions of your own to Manifold"
+        )
+    # Nothing else says what arrays points are; it is drawn from NumPy's global generator, which is put back.
+    state = np.random.get_state()  # noqa: NPY002
+    try:
+        point = manifold.random_point()
+    finally:
+        np.random.set_state(state)  # noqa: NPY002
+    if not isinstance(point, np.ndarray):
+        raise ValidationError(f"points of {manifold} are no arrays; make a symspline.Product of its factors")
+    project = manifold.to_tangent_space if _has(manifold, "to_tangent_space") else manifold.projection
+    return Manifold(
+        exp=_OneByOne(manifold.exp),
+        log=_OneByOne(manifold.log),
+        project_tangent=_OneByOne(project),
+        inner=_OneByOne(manifold.inner_product, real=True),
+        transport=_OneByOne(manifold.transport) if _has(manifold, "transport") else None,
+        injectivity_radius=injectivity_radius,
+        point_shape=point.shape,
+        dim=int(manifold.dim),
+        dtype=np.complex128 if np.iscomplexobj(point) else np.float64,
+    )
+
+
+def _has(manifold: Any, name: str) -> bool:
+    """Whether a manifold of pymanopt has what its base class only names."""
+    bases = [cls for cls in type(manifold).__mro__ if cls.__module__ == "pymanopt.manifolds.manifold"]
+    found = getattr(type(manifold), name, None)
+    return found is not None and found is not getattr(bases[-1], name, None)
+
+
+@dataclass(frozen=True)
+class _PointLast:
+    """A function whose last argument is the point."""
+
+    function: Callable[..., Any]
+    real: bool = False
+
+    def __call__(self, p: Array, *vectors: Array) -> Any:
+        found = self.function(*vectors, p)
+        return np.real(found) if self.real else found
+
+
+@dataclass(frozen=True)
+class _OneByOne:
+    """A function of single points, called for every row."""
+
+    function: Callable[..., Any]
+    real: bool = False
+
+    def __call__(self, *inputs: Array) -> Array:
+        found = np.array([self.function(*row) for row in zip(*inputs, strict=True)])
+        return found.real if self.real else found

@@ -1,0 +1,160 @@
+"""The C² condition on any manifold, in the form of Popiel and Noakes (J. Approx. Theory 148, 2007).
+
+The covariant acceleration of a cubic Bézier curve with control points p, q⁺, q⁻, … at p is
+
+    6/h² (D log_p(q⁺)[log_{q⁺}(q⁻)] − v),   v = log_p(q⁺),
+
+and C² means that those of both sides agree. On a symmetric space D log is S(v)⁻¹ E_p(−v), and this is (13) of the
+paper for equal knots; on others it is not, see docs/manifolds.md.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._spaces import Array
+from ._operations import Operations
+
+Doubles = NDArray[np.float64]
+
+
+class End(NamedTuple):
+    """A condition at one end of curves.
+
+    Attributes:
+        kind: "natural", "velocity", "acceleration" or "not-a-knot".
+        vector: what it prescribes, shape (curves, *point_shape).
+        logs: for not-a-knot the logarithms, at the point next to the end, of the end and of the point behind; shape
+            (2, curves, *point_shape).
+    """
+
+    kind: str
+    vector: Array | None = None
+    logs: Array | None = None
+
+    def some(self, chosen: NDArray[np.int64]) -> End:
+        """Of some of the curves."""
+        return End(
+            self.kind,
+            None if self.vector is None else self.vector[chosen],
+            None if self.logs is None else self.logs[:, chosen],
+        )
+
+
+class Problem(NamedTuple):
+    """Curves whose velocities are wanted.
+
+    Attributes:
+        h: times between the points, shape (curves, N).
+        p: points, shape (curves, N+1, *point_shape).
+        frames: orthonormal frames there, shape (curves, N+1, dim, numbers of a point).
+        ends: conditions at both ends, None for closed curves.
+    """
+
+    operations: Operations
+    h: Doubles
+    p: Array
+    frames: Array
+    ends: list[End] | None
+
+    def some(self, chosen: NDArray[np.int64]) -> Problem:
+        """Some of the curves."""
+        ends = self.ends and [end.some(chosen) for end in self.ends]
+        return self._replace(h=self.h[chosen], p=self.p[chosen], frames=self.frames[chosen], ends=ends)
+
+    def velocities(self, coordinates: Doubles) -> Array:
+        """Velocities at all points, of their coordinates in the frames."""
+        nodes = coordinates.shape[1]
+        u = np.einsum("cna,cnai->cni", coordinates, self.frames[:, :nodes])
+        u = u.reshape(*u.shape[:2], *self.p.shape[2:])
+        return np.concatenate([u, u[:, :1]], axis=1) if self.ends is None else u
+
+    def coordinates(self, vectors: Array, nodes: slice) -> Doubles:
+        """Coordinates of vectors at some nodes of every curve."""
+        frames = self.frames[:, nodes]
+        frames = frames.reshape(*frames.shape[:3], *self.p.shape[2:])
+        pairs = np.broadcast_to(self.p[:, nodes, None], frames.shape)
+        return self.operations.inner(pairs, frames, np.broadcast_to(vectors[:, :, None], frames.shape))
+
+
+class ControlPolygon(NamedTuple):
+    """The control polygon of segments: legs v from the points p to inner control points q, and the logarithm w from
+    each q to the other one; first those at the starts, then those at the ends, shape (2, curves, N, *point_shape)."""
+
+    p: Array
+    v: Array
+    q: Array
+    w: Array
+
+
+def control_polygons(operations: Operations, h: Doubles, p: Array, u: Array) -> ControlPolygon:
+    """The control polygons of curves with points and velocities; NaN where there is no logarithm."""
+    third = (h / 3).reshape(*h.shape, *[1] * (p.ndim - 2))
+    at = np.stack([p[:, :-1], p[:, 1:]])
+    v = np.stack([third * u[:, :-1], -third * u[:, 1:]])
+    q = operations.exp(at, v)
+    return ControlPolygon(at, v, q, operations.log(q, q[::-1]))
+
+
+def defects(problem: Problem, u: Array) -> Doubles:
+    """By how much velocities miss the conditions at every node, as coordinates: a sixth of the jump of acceleration,
+    and at an end with not-a-knot the error of the velocity there."""
+    legs = control_polygons(problem.operations, problem.h, problem.p, u)
+    return defects_of(problem, u, legs, problem.operations.dlog(*legs))
+
+
+def defects_of(problem: Problem, u: Array, legs: ControlPolygon, dlog: Array) -> Doubles:
+    """The same with the control polygon and D log, which were computed before."""
+    h = problem.h
+    square = (h * h).reshape(*h.shape, *[1] * (u.ndim - 2))
+    starts, stops = (dlog - legs.v) / square
+    if problem.ends is None:
+        jumps = np.concatenate([starts[:, :1] - stops[:, -1:], starts[:, 1:] - stops[:, :-1]], axis=1)
+        return problem.coordinates(jumps, slice(0, h.shape[1]))
+    jumps = np.concatenate([starts[:, :1], starts[:, 1:] - stops[:, :-1], -stops[:, -1:]], axis=1)
+    # A copy: inner products of other libraries may be read-only arrays.
+    found = np.array(problem.coordinates(jumps, slice(None)))
+    for which, end in enumerate(problem.ends):
+        sign, node = (1, 0) if which == 0 else (-1, h.shape[1])
+        if end.kind == "velocity":
+            found[:, node] = 0.0
+        elif end.logs is not None:
+            found[:, node] = _not_a_knot(problem, u, which, *end.logs)
+        elif end.vector is not None:
+            given = problem.coordinates(end.vector[:, None], slice(node, node + 1))
+            found[:, node] -= sign * given[:, 0] / 6
+    return found
+
+
+def is_parabola(problem: Problem) -> bool:
+    """Whether both ends of three points are not-a-knot: then the cubic is a parabola, which needs no velocity."""
+    return problem.h.shape[1] == 2 and all(end.kind == "not-a-knot" for end in problem.ends or [End("")])
+
+
+def not_a_knot(operations: Operations, p: Array, which: int) -> End:
+    """Not-a-knot at an end of curves with points p, three or more."""
+    end, mid, far = (0, 1, 2) if which == 0 else (-1, -2, -3)
+    logs = operations.log(np.stack([p[:, mid], p[:, mid]]), np.stack([p[:, end], p[:, far]]))
+    return End("not-a-knot", None, logs)
+
+
+def _not_a_knot(problem: Problem, u: Array, which: int, x0: Array, x2: Array) -> Doubles:
+    """In normal coordinates at the neighbouring knot the curve is one cubic c through three points, up to second
+    order: c'(t₀) − D log_{p₁}(p₀)[u₀], in the frame at p₁."""
+    operations, p = problem.operations, problem.p
+    end, mid = (0, 1) if which == 0 else (-1, -2)
+    # Seen from the last knot time runs backwards.
+    sign = 1.0 if which == 0 else -1.0
+    h0, h1 = (problem.h[:, i].reshape(-1, *[1] * (p.ndim - 2)) for i in ((0, 1) if which == 0 else (-1, -2)))
+    left, right = -x0 / h0, x2 / h1
+    bend = (right - left) / (h0 + h1)
+    slope = left - h0 * bend
+    if not is_parabola(problem):
+        # The parabola's slope in the middle is left + h0 * bend; a cubic term changes it to the given one.
+        slope = slope - (sign * u[:, mid] - left - h0 * bend) * (h0 + h1) / h1
+    wanted = sign * slope - operations.dlog(p[:, mid], x0, p[:, end], u[:, end])
+    index = 1 if which == 0 else p.shape[1] - 2
+    return problem.coordinates(wanted[:, None], slice(index, index + 1))[:, 0]

@@ -1,0 +1,245 @@
+"""The functions of a manifold as the table of operations that every space has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import short_repr
+from .._core import CutLocusError, ValidationError
+from .._spaces import Array
+
+Doubles = NDArray[np.float64]
+Function = Callable[..., Any]
+
+
+class Functions(NamedTuple):
+    """The functions that a manifold is made of, see `symspline.Manifold`."""
+
+    exp: Function
+    log: Function
+    project_tangent: Function
+    inner: Function
+    dlog: Function | None = None
+    transport: Function | None = None
+    project: Function | None = None
+
+
+class _Made(Protocol):
+    """What is asked of a manifold."""
+
+    functions: Functions
+    _radius: float
+    _dim: int | None
+    _complex: bool
+    _doubles_shape: tuple[int, ...]
+
+    @property
+    def point_shape(self) -> tuple[int, ...]: ...
+    @property
+    def dtype(self) -> Any: ...
+    def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array: ...
+    def _numbers(self, doubles: Doubles) -> Array: ...
+    def _as_doubles(self, numbers: Array) -> Doubles: ...
+
+
+class Operations:
+    """What the compiled core's `Handle` is to other spaces: operations on rows of doubles.
+
+    The methods with names of geometry take arrays of points with any equal leading axes, and call the functions with
+    one.
+    """
+
+    def __init__(self, space: _Made) -> None:
+        self.space = space
+
+    # ---- geometry, on arrays of numbers ----
+
+    def exp(self, p: Array, v: Array) -> Array:
+        return self._call("exp", p, v)
+
+    def log(self, p: Array, q: Array) -> Array:
+        """NaN where there is no logarithm."""
+        try:
+            found = self._call("log", p, q)
+        except CutLocusError:
+            # That of a space of this library raises for all rows if there is none for one.
+            found = self._log_each(p, q)
+        # Formulas that divide by the distance have nothing to say of equal points.
+        same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
+        if same.any():
+            # A copy: logarithms of other libraries may be read-only arrays.
+            found = found.copy()
+            found[same] = 0.0
+        return found
+
+    def project_tangent(self, p: Array, v: Array) -> Array:
+        return self._call("project_tangent", p, v)
+
+    def transport(self, p: Array, q: Array, v: Array) -> Array:
+        return self._call("transport", p, q, v)
+
+    def project(self, x: Array) -> Array:
+        return self._call("project", x)
+
+    def inner(self, p: Array, u: Array, v: Array) -> Doubles:
+        return self._call("inner", p, u, v)
+
+    def norm(self, p: Array, v: Array) -> Doubles:
+        result: Doubles = np.sqrt(np.maximum(self.inner(p, v, v), 0.0))
+        return result
+
+    def dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
+        """The derivative of log_p at q = exp_p(v) in the direction w."""
+        return self._applied("dlog", self.space._dlog, (p, v, q, w))
+
+    def _call(self, name: str, *inputs: Array) -> Array:
+        return self._applied(name, self._function(name), inputs)
+
+    def _applied(self, name: str, function: Callable[..., Any], inputs: tuple[Array, ...]) -> Array:
+        """What a function gives for rows of finite numbers, and NaN for others, which decompositions of matrices
+        refuse."""
+        space = self.space
+        lead = inputs[0].shape[: inputs[0].ndim - len(space.point_shape)]
+        count = math.prod(lead)
+        shape, dtype = ((), np.dtype(np.float64)) if name == "inner" else (space.point_shape, space.dtype)
+        rows = [x.reshape(count, *space.point_shape) for x in inputs]
+        axes = tuple(range(1, rows[0].ndim))
+        good = np.logical_and.reduce([np.isfinite(x).all(axis=axes) for x in rows])
+        if good.all() and count:
+            return self._of_rows(name, function, rows).reshape(lead + shape)
+        result = np.full((count, *shape), np.nan, dtype)
+        if good.any():
+            result[good] = self._of_rows(name, function, [x[good] for x in rows])
+        return result.reshape(lead + shape)
+
+    def _of_rows(self, name: str, function: Callable[..., Any], rows: list[Array]) -> Array:
+        shape = () if name == "inner" else self.space.point_shape
+        with np.errstate(all="ignore"):
+            found = np.asarray(function(*rows))
+        return self._checked(name, found, (len(rows[0]), *shape))
+
+    def _function(self, name: str) -> Callable[..., Any]:
+        function: Callable[..., Any] | None = getattr(self.space.functions, name)
+        if function is None:
+            raise ValidationError(f"{self.space!r} was made without {name}=, which is needed here")
+        return function
+
+    def _checked(self, name: str, found: Array, shape: tuple[int, ...]) -> Array:
+        if found.shape != shape:
+            raise ValidationError(
+                f"the function {name} of {self.space!r} gave an array of shape {found.shape} for {shape[0]} points; "
+                f"{shape} is needed"
+            )
+        real = name == "inner" or not self.space._complex
+        if found.dtype.kind not in ("iuf" if real else "iufc"):
+            raise ValidationError(
+                f"the function {name} of {self.space!r} gave numbers of type {found.dtype}; "
+                f"{'float64' if real else 'complex128'} is needed"
+            )
+        return np.ascontiguousarray(found, np.float64 if name == "inner" else self.space.dtype)
+
+    def _log_each(self, p: Array, q: Array) -> Array:
+        shape = self.space.point_shape
+        result = np.full(p.shape, np.nan, self.space.dtype)
+        rows = result.reshape(-1, *shape)
+        for i, (a, b) in enumerate(zip(p.reshape(-1, *shape), q.reshape(-1, *shape), strict=True)):
+            try:
+                rows[i] = self._call("log", a[None], b[None])[0]
+            except CutLocusError:
+                continue
+        return rows.reshape(p.shape)
+
+    # ---- what the classes of spaces ask of the compiled core ----
+
+    def dim(self) -> int:
+        if self.space._dim is None:
+            raise ValidationError(f"{self.space!r} was made without dim=, which is needed here")
+        return self.space._dim
+
+    def injectivity_radius(self) -> float:
+        return self.space._radius
+
+    def curvature(self) -> float:
+        return math.nan
+
+    def fibre(self) -> int:
+        return 0
+
+    def apply(self, operation: str, inputs: list[Doubles], t: Doubles | None = None) -> Doubles:
+        if operation == "rounding":
+            return np.ones(len(inputs[0]))
+        if operation == "transvection":
+            raise ValidationError(f"{self.space!r} is not known to be symmetric: it has no transvections")
+        shape = (len(inputs[0]), *self.space._doubles_shape)
+        points = [self.space._numbers(np.ascontiguousarray(x).reshape(shape)) for x in inputs]
+        work: dict[str, Callable[..., Array]] = {
+            "log": self._log,
+            "geodesic": lambda p, q: self.exp(p, _times(t, p) * self._log(p, q)),
+            "distance": lambda p, q: self.norm(p, self.log(p, q)),
+            "scatter": self.project,
+            "random_tangent": lambda p, noise: self.project_tangent(p, noise),
+        }
+        found = work[operation](*points) if operation in work else self._call(operation, *points)
+        flat: Doubles = found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1)
+        return flat
+
+    def _log(self, p: Array, q: Array) -> Array:
+        found = self.log(p, q)
+        bad = np.flatnonzero(~np.isfinite(found.reshape(len(found), -1)).all(axis=1))
+        if bad.size:
+            raise CutLocusError(
+                f"pair {bad[0]}: the points lie at or past each other's cut locus: the function log of "
+                f"{self.space!r} is not finite there"
+            )
+        return found
+
+    def check_points(self, points: Doubles, shape: Any, tol: float) -> None:
+        """Raise unless every row is a point within ``tol``; ``shape`` is how the rows were laid out."""
+        rows = self.space._numbers(np.ascontiguousarray(points).reshape(-1, *self.space._doubles_shape))
+        bad = self.first_off(rows, tol)
+        if bad is not None:
+            index = ",".join(map(str, np.unravel_index(bad[0], tuple(shape)))) if shape else ""
+            raise ValidationError(f"point{f' {index}' if index else ''} is off the space{bad[1]}")
+
+    def first_off(self, points: Array, tol: float) -> tuple[int, str] | None:
+        """The first of the points that is off the space by more than ``tol``, and why."""
+        rows = points.reshape(-1, *self.space.point_shape)
+        finite = np.isfinite(rows).reshape(len(rows), -1).all(axis=1)
+        if not finite.all():
+            return int(np.flatnonzero(~finite)[0]), ": it is not finite"
+        if self.space.functions.project is None:
+            near, how = self.exp(rows, np.zeros_like(rows)), "exp(p, 0) is another point"
+        else:
+            near, how = self.project(rows), "project(p) is another point"
+        size = np.maximum(1.0, np.abs(rows).reshape(len(rows), -1).max(axis=1))
+        off = np.abs(near - rows).reshape(len(rows), -1).max(axis=1)
+        bad = np.flatnonzero(~(off <= tol * size))
+        if not bad.size:
+            return None
+        return int(bad[0]), (
+            f" by {off[bad[0]]:.3e}: {how} (allowed: {tol:.0e}); use space.project(x) if this is meant to be a point"
+        )
+
+    def tangent_defects(self, points: Doubles, vectors: Doubles) -> Doubles:
+        """Which part of vectors is not tangent."""
+        shape = (len(points), *self.space._doubles_shape)
+        p, v = (self.space._numbers(np.ascontiguousarray(x).reshape(shape)) for x in (points, vectors))
+        size = np.abs(v).reshape(len(v), -1).max(axis=1)
+        off = np.abs(v - self.project_tangent(p, v)).reshape(len(v), -1).max(axis=1)
+        return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
+
+
+def _times(t: Doubles | None, p: Array) -> Doubles:
+    assert t is not None
+    times: Doubles = t.reshape(-1, *[1] * (p.ndim - 1))
+    return times
+
+
+def described(value: Any) -> str:
+    """A function in the name of a manifold."""
+    return str(getattr(value, "__qualname__", None) or short_repr(value))

@@ -1,0 +1,230 @@
+"""Surfaces given by an equation, with geodesics from their differential equation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import short_repr, whole_number
+from .._core import ValidationError
+from .._spaces import Array
+from ._geodesics import FINE, integrate, jacobian_by_differences
+from ._manifold import Manifold
+from ._operations import Function
+
+Doubles = NDArray[np.float64]
+
+# Newton's iterations, and the size of a step that is the last, relative to the distance.
+_MOST = 40
+_SMALL = 1e-7
+_ROUGH = 1e-5
+
+
+class Surface(Manifold):
+    """A level set F = 0 in Rⁿ with the metric of Rⁿ, see `from_surface`."""
+
+    def __init__(
+        self, f: Function, grad: Function, n: int, hess: Function | None, radius: float | None
+    ) -> None:
+        self._f, self._grad, self._given_hess = f, grad, hess
+        for name, function in (("F", f), ("grad", grad), ("hess", grad if hess is None else hess)):
+            if not callable(function):
+                raise ValidationError(f"{name} must be a function, not {short_repr(function)}")
+        super().__init__(
+            exp=self._exp,
+            log=self._log,
+            project_tangent=self._tangential,
+            inner=_inner,
+            project=self._nearest,
+            injectivity_radius=radius,
+            point_shape=whole_number(n, "n", 2),
+            dim=n - 1,
+        )
+
+    def _description(self) -> str:
+        return f"{getattr(self._f, '__qualname__', self._f)}, n={self.point_shape[0]}"
+
+    def _key(self) -> tuple[Any, ...]:
+        return self._f, self._grad, self._given_hess, self._radius, self._point_shape
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        radius = None if np.isinf(self._radius) else self._radius
+        return Surface, (self._f, self._grad, self._point_shape[0], self._given_hess, radius)
+
+    # ---- the functions of the manifold ----
+
+    def _exp(self, p: Array, v: Array) -> Array:
+        y = integrate(self._geodesic, np.stack([p, v], axis=1), self._turns(p, v))
+        return self._nearest(y[:, 0])
+
+    def _log(self, p: Array, q: Array) -> Array:
+        """Shooting: Newton's method for the velocity of a geodesic that arrives at q."""
+        v = self._tangential(p, q - p)
+        chord = np.linalg.norm(q - p, axis=1, keepdims=True)
+        size = np.linalg.norm(v, axis=1, keepdims=True)
+        v = v * np.divide(chord, size, out=np.ones_like(size), where=size > 0)
+        best, kept, step = np.full(len(p), np.inf), v.copy(), np.zeros_like(v)
+        found, left, halvings = np.full(p.shape, np.nan), np.arange(len(p)), np.zeros(len(p))
+        rough = True
+        for _ in range(_MOST):
+            # Far from the end of the iteration geodesics need not be exact.
+            x, basis, fields = self._spread(p[left], v[left], _ROUGH if rough else FINE)
+            error = np.linalg.norm(q[left] - x, axis=1)
+            better = error < best[left]
+            news = left[better]
+            best[news], kept[news], halvings[news] = error[better], v[news], 0
+            step[news] = _combined(basis, fields, self._tangential(x, q[left] - x))[better]
+            halvings[left[~better]] += 1
+            v[left] = kept[left] + 0.5 ** halvings[left, None] * step[left]
+            # What is left behind a small step of Newton's is its square.
+            there = better & (
+                np.linalg.norm(step[left], axis=1) <= _SMALL * np.maximum(chord[left, 0], _SMALL)
+            )
+            found[left[there]] = v[left[there]]
+            left = left[~there & (halvings[left] < 10) & np.isfinite(v[left]).all(axis=1)]
+            if not left.size and rough:
+                # Once more, from there.
+                rough, left = False, np.flatnonzero(np.isfinite(found).all(axis=1))
+                best[left], kept[left], v[left], halvings[left] = np.inf, found[left], found[left], 0
+                found[left] = np.nan
+            if not left.size:
+                break
+        return found
+
+    def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
+        """By Jacobi fields: the derivative of exp_p at v in a direction e is J(1) with J(0) = 0, J'(0) = e."""
+        _, basis, fields = self._spread(p, v)
+        return _combined(basis, fields, w)
+
+    def _tangential(self, p: Array, v: Array) -> Array:
+        normal = _unit(self._gradient(p))
+        return np.asarray(v - np.sum(v * normal, axis=1, keepdims=True) * normal)
+
+    def _nearest(self, x: Array, most: int = _MOST) -> Array:
+        """Newton's method along the gradient: near the surface, the nearest point up to the square of its distance."""
+        for _ in range(most):
+            g = self._gradient(x)
+            change = (np.asarray(self._f(x)) / np.sum(g * g, axis=1))[:, None] * g
+            x = x - change
+            if not (np.abs(change) > 1e-15 * np.maximum(1.0, np.abs(x))).any():
+                break
+        return x
+
+    # ---- differential equations ----
+
+    def _gradient(self, x: Array) -> Array:
+        return np.asarray(self._grad(x), float)
+
+    def _hess(self, x: Array) -> Array:
+        if self._given_hess is None:
+            return jacobian_by_differences(self._gradient, x)
+        return np.asarray(self._given_hess(x), float)
+
+    def _turns(self, p: Array, v: Array) -> Array:
+        """By what angle geodesics would turn with the curvature at their start."""
+        g = self._gradient(p)
+        turned = (self._hess(p) @ v[..., None])[..., 0]
+        return np.asarray(np.linalg.norm(turned, axis=1) / np.linalg.norm(g, axis=1))
+
+    def _geodesic(self, y: Array) -> Array:
+        """x'' is normal. Rows of place and velocity."""
+        x, t = y[:, 0], y[:, 1]
+        g = self._gradient(x)
+        rough = self._given_hess is None
+        turned = _along(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
+        pull = np.sum(t * turned, axis=1) / np.sum(g * g, axis=1)
+        return np.stack([t, -pull[:, None] * g], axis=1)
+
+    def _spread(self, p: Array, v: Array, tol: float = FINE) -> tuple[Array, Array, Array]:
+        """Where the geodesic with velocity v arrives, a basis at p, and what Jacobi fields that begin with velocities
+        of the basis are there: shapes (m, n), (m, n − 1, n) twice."""
+        basis = np.swapaxes(np.linalg.qr(self._gradient(p)[..., None], "complete").Q[..., 1:], 1, 2)
+        # Rows of place, velocity, fields and their covariant derivatives.
+        y = np.concatenate([p[:, None], v[:, None], np.zeros_like(basis), basis], axis=1)
+        y = integrate(self._jacobi, y, self._turns(p, v), tol)
+        return y[:, 0], basis, y[:, 2 : 2 + basis.shape[1]]
+
+    def _jacobi(self, y: Array) -> Array:
+        """The geodesic and Jacobi's equation D²J/dt² = −R(J, T)T, with Gauss's equation for R."""
+        count = (y.shape[1] - 2) // 2
+        x, moving = y[:, 0], y[:, 1:]
+        g, h = self._gradient(x), self._hess(x)
+        square = np.sum(g * g, axis=1)[:, None]
+        # Of T, the fields and their derivatives.
+        turned = moving @ h
+        along = (moving @ turned[:, 0, :, None])[..., 0]
+        across = (turned[:, : count + 1] @ g[..., None])[..., 0]
+        tt, jt = along[:, :1], along[:, 1 : count + 1]
+        result = np.empty_like(y)
+        result[:, 0], result[:, 1], result[:, 2 : count + 2] = moving[:, 0], 0.0, y[:, count + 2 :]
+        bent = jt[..., None] * turned[:, :1] - tt[..., None] * turned[:, 1 : count + 1]
+        result[:, count + 2 :] = bent / square[..., None]
+        # What turns with the surface, and what of the curvature is normal.
+        along[:, count + 1 :] += (jt * across[:, :1] - tt * across[:, 1:]) / square
+        result[:, 1:] -= along[..., None] * (g / square)[:, None]
+        return result
+
+
+def from_surface(
+    F: Function,
+    grad: Function,
+    n: int,
+    *,
+    hess: Function | None = None,
+    injectivity_radius: float | None = None,
+) -> Surface:
+    """The surface F = 0 in Rⁿ, such as an ellipsoid or a torus, with lengths as in Rⁿ.
+
+    Geodesics are integrated to rounding by an extrapolation method of order twelve, logarithms found by shooting, and
+    their derivatives by Jacobi's equation with Gauss's equation for the curvature.
+
+    Args:
+        F: a function of points, shape (m, n), with values of shape (m,); not only on the surface, but near it.
+        grad: its gradient, shape (m, n), nowhere zero on the surface.
+        n: dimension of the space that the surface is in.
+        hess: its second derivatives, shape (m, n, n). None for differences of the gradient of order four: slower, and
+            geodesics then have errors of some 1e-12.
+        injectivity_radius: as for `Manifold`.
+
+    >>> import numpy as np, symspline as ss
+    >>> axes = np.array([1.0, 1.2, 0.8])
+    >>> ellipsoid = ss.manifolds.from_surface(
+    ...     lambda x: np.sum((x / axes) ** 2, axis=-1) - 1, lambda x: 2 * x / axes**2, 3,
+    ...     hess=lambda x: np.broadcast_to(np.diag(2 / axes**2), (len(x), 3, 3)),
+    ... )
+    >>> spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1.2, 0], [0, 0, 0.8]], ellipsoid)
+    >>> bool(abs(np.sum((spline([0.3, 1.8]) / axes) ** 2, axis=-1) - 1).max() < 1e-14)
+    True
+    """
+    return Surface(F, grad, n, hess, injectivity_radius)
+
+
+def _inner(p: Array, u: Array, v: Array) -> Array:
+    return np.asarray(np.sum(u * v, axis=1))
+
+
+def _unit(g: Array) -> Array:
+    return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
+
+
+def _along(g: Any, x: Array, t: Array) -> Array:
+    """The derivative of the gradient in a direction, by differences of order four."""
+    size = np.linalg.norm(t, axis=1, keepdims=True)
+    step = 1e-3 * np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True))
+    unit = np.divide(t, size, out=np.zeros_like(t), where=size > 0)
+    near, far = (g(x + s * step * unit) - g(x - s * step * unit) for s in (1, 2))
+    return np.asarray((8 * near - far) / (12 * step) * size)
+
+
+def _combined(basis: Array, fields: Array, w: Array) -> Array:
+    """Σ cₐ eₐ where w = Σ cₐ Jₐ."""
+    gram = np.einsum("mai,mbi->mab", fields, fields)
+    right = np.einsum("mai,mi->ma", fields, w)
+    solvable = np.isfinite(gram).all(axis=(1, 2)) & (
+        np.linalg.cond(np.where(np.isfinite(gram), gram, 0.0)) < 1e15
+    )
+    c = np.full(right.shape, np.nan)
+    c[solvable] = np.linalg.solve(gram[solvable], right[solvable][..., None])[..., 0]
+    return np.asarray(np.einsum("ma,mai->mi", c, basis))

@@ -1,0 +1,241 @@
+"""Morphs between drawings along the spline of their affine shapes."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import as_array, read_only, short_repr
+from .._core import ValidationError
+from .._cubic import CubicSpline
+from .._input import times_of
+from .._spaces import Euclidean, SpecialOrthogonal, SymmetricPositiveDefinite
+from ..convert._reading import refuse
+from ._bases import Bases
+from ._landmarks import Array, orthonormal, place, placed, read, relative
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class AffineMorph:
+    """C² film through drawings of the same landmarks, along the spline of their affine shapes.
+
+    Parameters
+    ----------
+    t : array_like or None
+        Times of the drawings, as for `CubicSpline`.
+    landmarks : array_like, shape (n_drawings, k + 1, n)
+        Drawings of k + 1 landmarks in Rⁿ, with n >= 2 and k > n. Landmarks with the same index correspond to each
+        other. Between neighbouring drawings a film rotates by less than half a turn.
+    base : int, optional
+        See `from_landmarks`.
+    frame : {"all", "first"}, default "all"
+        ``"all"`` to interpolate the affine maps between the drawings, so that the film passes through every drawing;
+        ``"first"`` to keep the affine map of the first drawing, so that the film shows the change of shape only.
+    bc_type : str or pair of str, default "natural"
+        End conditions of all splines, as for `CubicSpline`. With ``"periodic"`` the last drawing must repeat the first.
+
+    Raises
+    ------
+    ValidationError
+        If the landmarks of a drawing lie in a hyperplane; or, with ``frame="all"``, a drawing is mirrored relative to
+        the previous ones, or the last drawing of a closed film differs from the first.
+    CutLocusError, ConvergenceError
+        As for `CubicSpline`.
+
+    Notes
+    -----
+    The shape at time t has a basis X(t), the horizontal lift of the spline (`CubicSpline.lift`), and the drawing is
+    X(t) A(t) plus a position. With ``frame="all"`` the polar factors of A are interpolated by splines on SO(n) and
+    SPD(n), and the position by a spline in Rⁿ. See §4.3 of the paper.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> kite = np.array([[0.0, 0], [1, 0], [1.5, 1.5], [0, 1]])
+    >>> morph = AffineMorph([0, 1], [square, kite])
+    >>> morph(1.0).round(8) + 0.0
+    array([[0. , 0. ],
+           [1. , 0. ],
+           [1.5, 1.5],
+           [0. , 1. ]])
+    """
+
+    def __init__(
+        self,
+        t: ArrayLike | None,
+        landmarks: ArrayLike,
+        *,
+        base: int | None = None,
+        frame: str = "all",
+        bc_type: Any = "natural",
+    ) -> None:
+        if not isinstance(frame, str) or frame not in ("all", "first"):
+            raise ValidationError(f"frame must be 'all' or 'first', not {short_repr(frame)}")
+        words = (bc_type,) if isinstance(bc_type, str) else bc_type
+        if not (isinstance(words, tuple) and all(isinstance(word, str) for word in words)):
+            raise ValidationError(f"bc_type must be a string or a pair of strings, not {short_repr(bc_type)}")
+        drawings = read(landmarks, "landmarks", base)
+        if drawings.ndim != 3 or drawings.shape[-1] < 2:
+            raise ValidationError(
+                f"landmarks must be of shape (drawings, landmarks, n) with n >= 2, not {drawings.shape}"
+            )
+        moved = relative(drawings, base)
+        self._bases = Bases(t, orthonormal(moved, "landmarks"), bc_type)
+        self._drawings, self._base = drawings, base
+        places = place(drawings, base).copy()
+        self._affine = (
+            _Constant(self._bases.start.T @ moved[0], places[0])
+            if frame == "first"
+            else _Between(self._bases, moved, places, bc_type)
+        )
+
+    def __call__(self, x: ArrayLike) -> Array:
+        """Evaluate the film.
+
+        Parameters
+        ----------
+        x : array_like
+            Times.
+
+        Returns
+        -------
+        ndarray, shape ``(*x.shape, k + 1, n)``
+            Drawings.
+
+        Raises
+        ------
+        ValidationError
+            If a time is outside the knots.
+        """
+        times = as_array(times_of(x, "x")[0], "x")
+        basis = self._bases(times)
+        matrix, at = self._affine(times)
+        return placed(basis @ matrix, at, self._base)
+
+    @property
+    def shape(self) -> CubicSpline:
+        """Spline of the shapes, on a Grassmannian."""
+        return self._bases.shape
+
+    @property
+    def t(self) -> Any:
+        """Times of the drawings."""
+        return self.shape.t
+
+    @property
+    def landmarks(self) -> Array:
+        """Drawings, shape (n_drawings, k + 1, n)."""
+        return read_only(self._drawings)
+
+    @property
+    def holonomy(self) -> Array:
+        """Linear map by which a closed film with ``frame="first"`` changes its first drawing after one period.
+
+        The map has shape (n, n): the last drawing, measured from its centre or base, is the first one times this
+        matrix. Its determinant is −1 if the film ends mirrored.
+
+        Raises
+        ------
+        ValidationError
+            If the film is not closed: ``bc_type`` is not ``"periodic"``.
+        """
+        if not self._bases.closed:
+            raise ValidationError("only a closed film has a holonomy; pass bc_type='periodic'")
+        # In the basis X(t₀) the first drawing has the coordinates A₀, and X comes back as X(t₀) h.
+        first = self._bases.start.T @ relative(self._drawings[0], self._base)
+        return np.linalg.solve(first, self._bases.turn() @ first)
+
+    def plot(self, file: Any = None) -> Figure:
+        """Plot a film strip and small multiples of the film, in the plane or in space.
+
+        Parameters
+        ----------
+        file : path or file object, optional
+            File to save the figure to, such as ``"morph.pdf"``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Figure, which you can change or save.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed.
+        ValidationError
+            If the landmarks have four or more dimensions.
+        """
+        if find_spec("matplotlib") is None:
+            raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")
+        from .._plotting.film import plot_film
+
+        figure: Figure = plot_film(self.t, self.landmarks, self, file)
+        return figure
+
+
+class _Constant:
+    """Affine map of the first drawing, for all times."""
+
+    def __init__(self, matrix: Array, place: Array) -> None:
+        self._matrix, self._place = matrix, place
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        return self._matrix, self._place
+
+
+class _Between:
+    """Affine maps A = S R from the bases of the shapes to the drawings, interpolated.
+
+    S scales in the basis and R rotates the drawing, so a film of a drawing that only rotates stays rigid.
+    """
+
+    def __init__(self, bases: Bases, moved: Array, places: Array, bc_type: Any) -> None:
+        t, n, closed = bases.shape.t, moved.shape[-1], bases.closed
+        if closed:
+            _check_closed(moved, places)
+        matrices = np.swapaxes(bases(t), -1, -2) @ moved
+        refuse(
+            ~(np.linalg.det(matrices) > 0),
+            "landmarks",
+            lambda i: (
+                "is mirrored: along the spline of shapes, the first drawing becomes its mirror image; number its "
+                "landmarks in the order of the others, mirror it (change the sign of a coordinate), add drawings "
+                "in between, or pass frame='first'"
+            ),
+        )
+        self._bases, self._group = bases, SpecialOrthogonal(n)
+        # The basis of a closed film comes back turned by h = exp(w), and A turned by its inverse; exp(τw) A is
+        # periodic, τ from 0 to 1.
+        self._twist = self._group.log(np.eye(n), bases.turn()) if closed else np.zeros((n, n))
+        left, sizes, right = np.linalg.svd(self._twisted(t, 1) @ matrices)
+        stretches, turns = left * sizes[:, None] @ np.swapaxes(left, -1, -2), left @ right
+        if closed:
+            for values in (stretches, turns, places):
+                values[-1] = values[0]
+        self._stretches = CubicSpline(t, stretches, SymmetricPositiveDefinite(n), bc_type=bc_type)
+        self._turns = CubicSpline(t, turns, self._group, bc_type=bc_type)
+        self._places = CubicSpline(t, places, Euclidean(n), bc_type=bc_type)
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        return self._twisted(x, -1) @ self._stretches(x) @ self._turns(x), self._places(x)
+
+    def _twisted(self, x: Array, sign: int) -> Array:
+        """Return exp(±τw) at times x."""
+        return self._group.exp(
+            np.eye(len(self._twist)), sign * self._bases.share(x)[..., None, None] * self._twist
+        )
+
+
+def _check_closed(moved: Array, places: Array) -> None:
+    off = max(np.abs(values[-1] - values[0]).max() for values in (moved, places))
+    if not off <= 1e-8 * max(np.abs(moved[0]).max(), np.abs(places[0]).max()):
+        raise ValidationError(
+            f"the last drawing of a closed film must equal the first, but differs by {off:.3e}; repeat the first "
+            "drawing at the end, or pass frame='first', which requires the same shape only"
+        )

@@ -1,0 +1,204 @@
+"""Volumes of diffusion tensors in NIfTI files, through nibabel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import as_array, brief, short_repr
+from .._core import ValidationError
+from .._disk import path_of, replacing
+from ._orders import Array, from_vectors, to_vectors
+
+File = str | PathLike[str]
+
+# nifti1.h: the lower triangle row by row along the fifth axis.
+_SYMMATRIX = 1005
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Tensors of the voxels inside a mask.
+
+    Attributes
+    ----------
+    tensors : ndarray, shape (V, 3, 3)
+        Tensors in the order of the True entries of the mask.
+    mask : ndarray of bool, shape (X, Y, Z)
+        Mask.
+    affine : ndarray, shape (4, 4)
+        Map from voxels to millimetres.
+    header : object, optional
+        Header of the file that was read. `write_nifti` keeps its units, codes and texts. None for a new volume.
+    """
+
+    tensors: Array
+    mask: NDArray[np.bool_]
+    affine: NDArray[np.float64]
+    header: Any = field(default=None, compare=False, repr=False)
+
+
+def read_nifti(file: File, *, order: str | None = None, mask: ArrayLike | File | None = None) -> Volume:
+    """Read diffusion tensors from a NIfTI file with six volumes.
+
+    Several files with V voxels in the same mask form a batch of curves: stack their ``tensors`` along axis 1 to shape
+    (V, n, 3, 3).
+
+    Parameters
+    ----------
+    file : path
+        File of shape (X, Y, Z, 6), or of shape (X, Y, Z, 1, 6) with the intent of symmetric matrices, as written by ITK
+        and ANTs.
+    order : {"dipy", "fsl", "mrtrix", "itk"}, optional
+        Order of the six numbers; see `from_vectors`. Omit it if the intent of the file is symmetric matrices, whose
+        order is defined by NIfTI as that of ``"dipy"``.
+    mask : array_like of shape (X, Y, Z), or path, optional
+        Voxels to read: the nonzero ones of an array or a file. None means those whose six numbers are finite and not
+        all zero. For several files, pass the mask of one of them to all.
+
+    Returns
+    -------
+    Volume
+        Tensors, mask and affine map. Single precision is preserved.
+
+    Raises
+    ------
+    ImportError
+        If nibabel is not installed.
+    ValidationError
+        If the file or the mask has another shape, the mask is negative, not finite, or a file with another affine map,
+        or the order is missing or contradicts the file.
+    """
+    path = _path(file)
+    image, numbers = _load(path)
+    if int(image.header["intent_code"]) == _SYMMATRIX:
+        if order not in (None, "dipy", "itk"):
+            raise ValidationError(
+                f"the intent of {path} is symmetric matrices in the order of NIfTI, not in that of "
+                f"{order!r}; omit order"
+            )
+        order = "dipy"
+    elif order is None:
+        raise ValidationError(
+            f"order is required, because {path} does not state the order of its six volumes; pass order='dipy', 'fsl' "
+            "or 'mrtrix', the program that wrote the file"
+        )
+    if numbers.ndim == 5 and numbers.shape[3] == 1:
+        numbers = numbers[:, :, :, 0]
+    if numbers.ndim != 4 or numbers.shape[3] != 6:
+        raise ValidationError(f"{path} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)")
+    inside = _mask(mask, numbers, image.affine)
+    return Volume(
+        from_vectors(numbers[inside], order=order), inside, np.asarray(image.affine, float), image.header
+    )
+
+
+def write_nifti(file: File, volume: Volume, *, order: str) -> None:
+    """Write diffusion tensors to a NIfTI file, with zeros outside the mask.
+
+    Parameters
+    ----------
+    file : path
+        File name that ends in .nii or .nii.gz.
+    volume : Volume
+        Tensors, mask, affine map, and header of the original file, whose units, codes and texts are kept. For new
+        tensors use ``dataclasses.replace(volume, tensors=...)``.
+    order : {"dipy", "fsl", "mrtrix", "itk"}
+        Program that will read the file; see `from_vectors`. For ``"itk"`` the file has five axes, and the intent and
+        order of symmetric matrices.
+
+    Raises
+    ------
+    ImportError
+        If nibabel is not installed.
+    ValidationError
+        If the number of tensors differs from the number of voxels in the mask, or a tensor is not symmetric.
+
+    Notes
+    -----
+    The numbers are reordered, but their axes do not change. FSL writes tensors in the axes of the voxels, MRtrix in
+    those of the scanner. To convert between such programs, rotate the tensors by the rotation of the affine map.
+    """
+    nibabel = _nibabel()
+    path = _path(file)
+    if not path.name.endswith((".nii", ".nii.gz")):
+        raise ValidationError(
+            f"file = {short_repr(str(path))}: the name of a NIfTI file must end in .nii or .nii.gz"
+        )
+    if not isinstance(volume, Volume):
+        raise TypeError(f"volume must be a symspline.tensors.Volume, not {short_repr(volume)}")
+    mask = np.asarray(volume.mask, bool)
+    if np.shape(volume.tensors) != (np.count_nonzero(mask), 3, 3):
+        raise ValidationError(
+            f"tensors have shape {np.shape(volume.tensors)}, but the mask has {np.count_nonzero(mask)} voxels, which "
+            f"need shape ({np.count_nonzero(mask)}, 3, 3)"
+        )
+    inside = to_vectors(volume.tensors, order="dipy" if order == "itk" else order)
+    numbers = np.zeros((*mask.shape, 6), inside.dtype)
+    numbers[mask] = inside
+    shaped = numbers[:, :, :, None] if order == "itk" else numbers
+    if volume.header is None:
+        image = nibabel.Nifti1Image(shaped, volume.affine)
+    else:
+        # Its type of numbers would round these.
+        image = nibabel.Nifti1Image(shaped, volume.affine, volume.header, dtype=numbers.dtype)
+    was = int(image.header["intent_code"]) == _SYMMATRIX
+    if order == "itk" or was:
+        code, rows = (_SYMMATRIX, 3) if order == "itk" else (0, 0)
+        image.header["intent_code"], image.header["intent_p1"] = code, rows
+    with replacing(path) as temporary:
+        nibabel.save(image, temporary)
+
+
+def _path(file: Any, name: str = "file") -> Path:
+    path = path_of(file, name, method="read")
+    if path is None:
+        raise TypeError(f"{name} must be the name of a file, because nibabel does not accept open files")
+    return path
+
+
+def _load(path: Path) -> tuple[Any, Array]:
+    """Return the image in a file, and its numbers."""
+    try:
+        image = _nibabel().load(path)
+        return image, np.asanyarray(image.dataobj)
+    except (OSError, MemoryError, ImportError):
+        raise
+    except Exception as error:
+        # Damaged files raise errors of nibabel, NumPy, zlib and other libraries that nibabel uses.
+        raise ValidationError(f"{path} is damaged or not a NIfTI file: {brief(error)}") from None
+
+
+def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if mask is None:
+        return np.asarray(np.isfinite(numbers).all(axis=-1) & numbers.any(axis=-1))
+    if isinstance(mask, (str, PathLike)):
+        image, voxels = _load(_path(mask, "mask"))
+        # Headers hold single precision.
+        if not np.allclose(image.affine, affine, rtol=1e-4, atol=1e-4):
+            raise ValidationError(
+                f"the mask {mask} has another affine map than the tensors; resample it to their voxels first"
+            )
+        mask = voxels
+    values = as_array(mask, "mask")
+    bad = np.argwhere(~(values >= 0))
+    if len(bad):
+        place = tuple(map(int, bad[0]))
+        raise ValidationError(f"mask[{', '.join(map(str, place))}] is {values[place]}; it must be 0 or more")
+    inside: NDArray[np.bool_] = values.astype(bool)
+    if inside.shape != numbers.shape[:3]:
+        raise ValidationError(f"the mask has shape {inside.shape}, but the volume {numbers.shape[:3]}")
+    return inside
+
+
+def _nibabel() -> Any:
+    try:
+        import nibabel
+    except ImportError:
+        raise ImportError("NIfTI files need nibabel; install it with: pip install nibabel") from None
+    return nibabel

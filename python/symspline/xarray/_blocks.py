@@ -1,0 +1,163 @@
+"""Blocks of curves: functions of plain arrays, and how they are called on those of dask."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from .._adapters import joined
+from .._base_curve import call_at_times, evaluated
+from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._cubic import CubicSpline
+from .._functional import given
+from .._spaces import Array, Space
+from .._threads import one_thread
+
+# Arrays with their core dimensions, which a block has all of.
+Inputs = list[tuple[xr.DataArray, Sequence[Hashable]]]
+
+# The columns of the report, one value per curve.
+COLUMNS = {
+    "converged": np.bool_,
+    "iterations": np.int64,
+    "residual": np.float64,
+    "max_step": np.float64,
+    "max_gap": np.float64,
+    "invariant_radius": np.float64,
+    "rate": np.float64,
+}
+
+
+def apply(
+    function: Any,
+    inputs: Inputs,
+    output_core_dims: list[list[Hashable]],
+    output_dtypes: list[Any],
+    **kwargs: Any,
+) -> tuple[xr.DataArray, ...]:
+    """The outputs of a function of blocks."""
+    arrays = _cut_alike([array for array, _ in inputs])
+    kwargs["function"] = function
+    # A worker of dask is one of many and uses one thread; other arrays are computed by all threads.
+    kwargs["alone"] = any(array.chunks is not None for array in arrays)
+    found = xr.apply_ufunc(
+        _block,
+        *arrays,
+        input_core_dims=[core for _, core in inputs],
+        output_core_dims=output_core_dims,
+        dask="parallelized",
+        # Types alone would be cast from that of the points, and dask warns where those are complex.
+        dask_gufunc_kwargs={"meta": tuple(np.empty(0, dtype) for dtype in output_dtypes)},
+        join="exact",
+        # Of coordinates, too; those of variables are set afterwards.
+        keep_attrs="override",
+        kwargs=kwargs,
+    )
+    outputs: tuple[xr.DataArray, ...] = found if isinstance(found, tuple) else (found,)
+    for output in outputs:
+        output.attrs = {}
+    return outputs
+
+
+def _cut_alike(arrays: list[xr.DataArray]) -> list[xr.DataArray]:
+    """Arrays of dask in the blocks of the first array; dimensions that it does not have are one chunk."""
+    first, *others = arrays
+    cuts = first.variable.chunksizes
+    return [
+        first,
+        *(a if a.chunks is None else a.chunk({d: cuts.get(d, -1) for d in a.dims}) for a in others),
+    ]
+
+
+def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
+    if not alone:
+        return function(*arrays, **kwargs)
+    with one_thread():
+        try:
+            return function(*arrays, **kwargs)
+        except (ConvergenceError, CutLocusError, ValidationError) as error:
+            # The good curves of one block are nothing to send to another process.
+            vars(error).pop("spline", None)
+            error.add_note("Indices of curves count within one block of the dask array.")
+            raise
+
+
+def spline_of(
+    points: Array,
+    rest: Sequence[Array],
+    space: Space,
+    t: Any,
+    kinds: Any,
+    names: list[str],
+    how: dict[str, Any],
+) -> CubicSpline:
+    """The splines of a block."""
+    named = dict(zip(names, rest, strict=True))
+    batch = points.shape[: points.ndim - 1 - len(space.point_shape)]
+    mask = np.broadcast_to(named["where"], batch) if "where" in named else None
+    bc_type = joined(kinds, (named.get("start"), named.get("end")))
+    return CubicSpline(t, points, space, bc_type=bc_type, where=mask, **how)
+
+
+def fitted(points: Array, *rest: Array, **options: Any) -> tuple[Array, ...]:
+    spline = spline_of(points, rest, **options)
+    columns: list[Array] = []
+    for name, dtype in COLUMNS.items():
+        value = getattr(spline.report, name)
+        columns.append(np.asarray(np.nan if value is None else value, dtype))
+    return spline.points, spline.velocities, *(np.broadcast_to(c, columns[0].shape) for c in columns)
+
+
+def resampled(points: Array, x: Array, *rest: Array, x_axes: int, **options: Any) -> Array:
+    spline = spline_of(points, rest, **options)
+    x, per_curve = _per_curve(x, spline._curve.batch, x_axes)
+    values: Array = spline(x, per_curve=per_curve)
+    values[~np.asarray(spline.report.converged)] = np.nan
+    return values
+
+
+def values_at(
+    points: Array,
+    velocities: Array,
+    x: Array,
+    *,
+    space: Space,
+    t: Array | None,
+    quantity: str,
+    policy: str,
+    x_axes: int,
+    lifted: bool = False,
+) -> Array:
+    """A quantity of the curves of a block; curves that were not fitted are NaN."""
+    lead = points.ndim - 1 - len(space.point_shape)
+    batch = points.shape[:lead]
+    x, per_curve = _per_curve(x, batch, x_axes)
+    good = np.isfinite(velocities).all(axis=tuple(range(lead, points.ndim)))
+    everyone = bool(good.all())
+    if not everyone:
+        points, velocities, x = points[good], velocities[good], x[good] if per_curve else x
+    shape = () if quantity == "speed" else space.point_shape
+    if not good.any():
+        return np.full(batch + x.shape[x.ndim - x_axes :] + shape, np.nan, space.dtype if shape else float)
+    clock, curve = given(t, points, velocities, space)
+    if lifted:
+        found = call_at_times(
+            curve, clock, x, per_curve, lambda curve, x, each: curve.lift(x, quantity, policy, each, None)
+        )
+    else:
+        found = evaluated(curve, clock, x, quantity, policy, per_curve, None)
+    if everyone:
+        return np.asarray(found)
+    values = np.full(batch + found.shape[1:], np.nan, found.dtype)
+    values[good] = found
+    return values
+
+
+def _per_curve(x: Array, batch: tuple[int, ...], axes: int) -> tuple[Array, bool]:
+    """Times for every curve, if they have its dimensions."""
+    if x.ndim == axes:
+        return x, False
+    return np.broadcast_to(x, batch + x.shape[x.ndim - axes :]), True

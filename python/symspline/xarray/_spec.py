@@ -1,0 +1,181 @@
+"""The specification of fits in an xarray object, checked before any block is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from .._adapters import joined, split
+from .._arrays import as_array, short_repr
+from .._core import ValidationError
+from .._cubic import CubicSpline
+from .._input import times_of
+from .._spaces import Array, Euclidean, Product, Space
+from .._spaces import space as space_named
+from ._blocks import Inputs, values_at
+
+# A curve of numbers that stands still raises for every invalid option.
+LINE = Euclidean(1)
+
+
+class FitSpec(NamedTuple):
+    """A fit that was checked as far as it can be without its points.
+
+    Attributes:
+        inputs: the points, then what else has dimensions of the curves, each with its core dimensions.
+        options: for `spline_of`.
+    """
+
+    space: Space
+    inputs: Inputs
+    options: dict[str, Any]
+
+
+def spec_of(
+    da: xr.DataArray,
+    space: Space | str,
+    dim: str,
+    point_dims: Sequence[str],
+    where: xr.DataArray | None,
+    bc_type: Any,
+    **options: Any,
+) -> FitSpec:
+    space = space_named(space)
+    if not isinstance(da, xr.DataArray):
+        raise ValidationError(f"da must be an xarray.DataArray, not {type(da).__name__}")
+    check_dims(da, space, dim, point_dims)
+    # Its type is refused or taken with the points.
+    space._doubles(np.zeros(space.point_shape, da.dtype), "da")
+    kinds, vectors = split(bc_type)
+    if dim not in da.coords:
+        _refuse_other_times(da, dim)
+    t = da[dim].values if dim in da.coords else None
+    still = np.zeros((da.sizes[dim], 1))
+    CubicSpline(
+        t,
+        still,
+        LINE,
+        bc_type=joined(kinds, (np.zeros(1), np.zeros(1))),
+        **options,
+    )
+    own = [dim, *point_dims]
+    curves = [d for d in da.dims if d not in own]
+    inputs: Inputs = [(da, own)]
+    names = []
+    if where is not None:
+        if not isinstance(where, xr.DataArray) or where.dtype != bool or not set(where.dims) <= set(curves):
+            raise ValidationError(
+                f"where must be a DataArray of bool whose dimensions are among {tuple(curves)}"
+            )
+        names.append("where")
+        inputs.append((where, []))
+    for name, vector in zip(("start", "end"), vectors, strict=True):
+        if vector is not None:
+            names.append(name)
+            inputs.append((_vector(vector, name, space, point_dims, curves), list(point_dims)))
+    return FitSpec(space, inputs, {"space": space, "t": t, "kinds": kinds, "names": names, "how": options})
+
+
+def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[str]) -> None:
+    if isinstance(space, Product):
+        raise ValidationError(
+            f"{space} is a product, whose factors are independent; fit each factor separately"
+        )
+    if not isinstance(point_dims, (tuple, list)) or len(point_dims) != len(space.point_shape):
+        raise ValidationError(
+            f"a point of {space} has shape {space.point_shape}, so point_dims must be {len(space.point_shape)} names "
+            f"in a tuple, not {short_repr(point_dims)}"
+        )
+    for name in (dim, *point_dims):
+        if name not in da.dims:
+            raise ValidationError(
+                f"da has the dimensions {da.dims}, but not {name!r}; pass dim= and point_dims="
+            )
+    if len({dim, *point_dims}) <= len(point_dims):
+        raise ValidationError(f"dim {dim!r} and point_dims {tuple(point_dims)} name a dimension twice")
+    found = tuple(da.sizes[name] for name in point_dims)
+    if found != space.point_shape:
+        raise ValidationError(
+            f"{tuple(point_dims)} have sizes {found}, but a point of {space} has shape {space.point_shape}"
+        )
+    for name in (dim, *point_dims):
+        # Not of its coordinates, which may be cut otherwise.
+        parts = da.variable.chunksizes.get(name, ())
+        if len(parts) > 1:
+            what = "a curve needs all of its points" if name == dim else "a point needs all of its numbers"
+            raise ValidationError(
+                f"{name!r} is cut into {len(parts)} chunks, but {what} at once; pass da.chunk({{{name!r}: -1}}), with "
+                "smaller chunks along other dimensions"
+            )
+
+
+def _refuse_other_times(da: xr.DataArray, dim: str) -> None:
+    """Raise ValidationError if another coordinate along the curves holds times, which would be ignored."""
+    found = [name for name, c in da.coords.items() if dim in c.dims and _are_times(name, c)]
+    if not found:
+        return
+    names = ", ".join(f"{name!r} with dimensions {da.coords[name].dims}" for name in found)
+    raise ValidationError(
+        f"{dim!r} has no coordinate of its own, which would hold the knots, but other coordinates look like times: "
+        f"{names}. If all curves have the same times, pass da.swap_dims({{{dim!r}: name}}) with dim=name. If every "
+        "curve has its own, call symspline.CubicSpline with one row of times per curve. For the knots 0, 1, 2, ... "
+        "pass da.drop_vars(names)."
+    )
+
+
+def _are_times(name: Hashable, coordinate: xr.DataArray) -> bool:
+    """Whether a coordinate holds times, by its type, its name, or its attributes of the CF conventions (4.4)."""
+    words = coordinate.attrs
+    return (
+        coordinate.dtype.kind in "mM"
+        or str(name).lower() in ("t", "time", "times")
+        or words.get("standard_name") == "time"
+        or words.get("axis") == "T"
+        or " since " in str(words.get("units", ""))
+    )
+
+
+def _vector(
+    vector: Any, name: str, space: Space, point_dims: Sequence[str], curves: list[Hashable]
+) -> xr.DataArray:
+    """A vector of an end condition."""
+    if not isinstance(vector, xr.DataArray):
+        array = as_array(vector, f"the {name} vector")
+        if array.shape != space.point_shape:
+            raise ValidationError(
+                f"the {name} vector has shape {array.shape}, a point of {space} {space.point_shape}; if every curve "
+                f"has its own, pass a DataArray, with the dimensions {tuple(point_dims)} and those of the curves"
+            )
+        return xr.DataArray(array, dims=point_dims)
+    if not set(point_dims) <= set(vector.dims) <= {*point_dims, *curves}:
+        raise ValidationError(
+            f"the {name} vector has the dimensions {vector.dims}; it needs {tuple(point_dims)}, and may have those of "
+            f"the curves, {tuple(curves)}"
+        )
+    return vector
+
+
+def times_with_names(
+    x: Any, dim: str, point_dims: Sequence[str], curves: list[Hashable]
+) -> tuple[xr.DataArray, list[Hashable]]:
+    """Times with names of their dimensions, and those of them that no curve has."""
+    if not isinstance(x, xr.DataArray):
+        array = as_array(times_of(x, "x")[0], "x")
+        if array.ndim > 1:
+            raise ValidationError(f"x has shape {array.shape}; pass a DataArray, which names its dimensions")
+        x = xr.DataArray(array, dims=[dim][: array.ndim], coords={dim: array} if array.ndim else None)
+    if both := set(x.dims) & set(point_dims):
+        raise ValidationError(f"x has the dimension {min(map(str, both))!r} of a point; rename it")
+    return x, [d for d in x.dims if d not in curves]
+
+
+def rehearse(times: xr.DataArray, t: Array | None, nodes: int, policy: str) -> None:
+    """Raise now what the curves would raise about their times."""
+    if times.chunks is None:
+        still = np.zeros((nodes, 1))
+        values_at(
+            still, still, times.values, space=LINE, t=t, quantity="point", policy=policy, x_axes=times.ndim
+        )

@@ -1,0 +1,177 @@
+"""Times in tables, and steps along a curve."""
+
+import numpy as np
+import pytest
+from tabular import AXES, table, write
+
+import symspline as ss
+
+
+def dated(cells):
+    write("a.csv", "time,x\n" + "".join(f"{cell},{i}\n" for i, cell in enumerate(cells)))
+
+
+def test_dates(run):
+    for cells, t in [
+        (["2020-01-01", "2020-02-29"], ["2020-01-01", "2020-02-29"]),
+        (["2020-01-01 12:00", "2020-02-29 06:30"], ["2020-01-01T12:00", "2020-02-29T06:30"]),
+        (
+            ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"],
+            ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"],
+        ),
+        (["2020-01-01T12:00Z", "2020-01-01T12:30+00:00"], ["2020-01-01T12:00", "2020-01-01T12:30"]),
+        (["2019-12-31T23:00-0300", "2020-01-01T05:00+02:30"], ["2020-01-01T02:00", "2020-01-01T02:30"]),
+        (
+            ["2020-01-01 00:00:00.5 +01", "2020-01-01 00:00:01 Z"],
+            ["2019-12-31T23:00:00.5", "2020-01-01T00:00:01"],
+        ),
+    ]:
+        dated(cells)
+        run("fit a.csv --space r:1 -o a.npz")
+        np.testing.assert_array_equal(ss.load("a.npz").t, np.array(t, "datetime64[ms]"))
+
+
+def test_invalid_times(fails):
+    for cells, found in [
+        (
+            ["2020-01-01", "2020-01-02T00:00"],
+            "line 3: column 'time' holds '2020-01-02T00:00', but '2020-01-01' before",
+        ),
+        (["2020-01-01T00:00", "2020-01-02 00:00"], "write all times in the same way"),
+        (["2020-01-01T00:00Z", "2020-01-02T00:00"], "write all times in the same way"),
+        (["2020-01-01", "2020-01-02", "7"], "line 4: column 'time' holds '7', but '2020-01-01' before"),
+        (["7", "2020-01-02"], "line 3: column 'time' holds '2020-01-02', but '7' before"),
+        (["2020-01-01", "soon"], "line 3: column 'time' holds 'soon', not a time: write 0.5, 2021-08-29 or"),
+        (["29.8.2021", "30.8.2021"], "line 2: column 'time' holds '29.8.2021', not a time"),
+        (["2020-01-01", "2020-02-30"], "line 3: column 'time' holds '2020-02-30', which is not a date"),
+        (["2020-01-01", ""], "line 3: column 'time' is empty"),
+        (["1", "nan"], "line 3: column 'time' holds 'nan', which is not a time"),
+        (["2020-01-02", "2020-01-01"], "line 3: time 2020-01-01 does not come after 2020-01-02 in line 2"),
+        (["1", "1"], "line 3: time 1.0 does not come after 1.0 in line 2; times must increase"),
+    ]:
+        dated(cells)
+        problem = fails("fit a.csv --space r:1 -o a.npz")
+        assert problem.startswith("a.csv, line ") and found in problem
+
+
+def test_large_whole_times_are_exact(run):
+    start = 1_630_000_000_000_000_001
+    dated([start, start + 1, start + 3])
+    run("fit a.csv --space r:1 -o a.npz")
+    assert ss.load("a.npz").t.tolist() == [start, start + 1, start + 3]
+    run("sample a.npz --every 1 -o b.csv")
+    assert table("b.csv")["time"] == [str(start + i) for i in range(4)]
+    run("sample a.npz -n 2 -o b.csv")
+    assert table("b.csv")["time"] == [str(start), str(start + 3)]
+
+
+def curve(knots):
+    """A curve with these knots, in a.npz."""
+    ss.CubicSpline(knots, np.zeros((len(knots), 1)), "r:1").save("a.npz")
+
+
+@pytest.fixture
+def along(run):
+    """The times of samples of a curve with given knots."""
+
+    def along(option, knots):
+        curve(knots)
+        run(f"sample a.npz {option} -o b.npz")
+        return np.load("b.npz")["time"]
+
+    return along
+
+
+def test_times_along_a_curve(along):
+    day = np.array(["2020-01-01", "2020-01-02"], "datetime64[D]")
+    assert len(along("--every 10min", day)) == 145
+    assert along("--every 6H", day)[-1] == day[-1]
+    assert along("--every 7h", day).tolist() == along("--every 25200", day).tolist()
+    assert len(along("--every 7h", day)) == 4
+    half = along("--every 0.5s", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
+    assert half.astype(str).tolist()[1] == "2020-01-01T00:00:00.500"
+    assert along("--every 1e30d", day).tolist() == along("--every 2d", day).tolist()
+    assert along("--every 2d", day).tolist() == [day[0].astype("datetime64[s]").item()]
+    np.testing.assert_array_equal(
+        along("--every 0.1", np.array([0.0, 1.0])), np.minimum(np.arange(11) * 0.1, 1)
+    )
+    assert along("--every 0.3", np.array([0.0, 1.0]))[-1] == 3 * 0.3
+    assert along("-n 3", day).astype(str).tolist()[1] == "2020-01-01T12:00:00"
+    thirds = along("-n 4", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
+    assert thirds.astype(str).tolist()[1] == "2020-01-01T00:00:00.333333"
+    for fine in ("ns", "ps"):
+        knots = np.array([0, 10**18 + 1], f"datetime64[{fine}]")
+        spread = along("-n 1000", knots)
+        assert (
+            spread[0] == knots[0] and spread[-1] == knots[-1] and (np.diff(spread) > np.timedelta64(0)).all()
+        )
+
+
+def test_invalid_steps(fails):
+    for step, found in [
+        ("0", "larger than zero"),
+        ("-1", "a duration is a number"),
+        ("ten", "a duration is a number"),
+        ("1y", "units are ns, us, ms, s, min, h, d"),
+        ("0.5ns", "whole number of nanoseconds"),
+        ("1e-12d", "whole number of nanoseconds"),
+        ("1ns", "samples of one curve"),
+        ("1e401", "too long"),
+        ("1e-999999999", "too short"),
+        ("1e99999999999999999999", "exponent is too large"),
+    ]:
+        curve(np.array(["2020-01-01", "2020-01-02"], "datetime64[D]"))
+        assert found in fails(f"sample a.npz --every={step} -o b.npz")
+
+
+def test_steps_of_numbers(fails, run):
+    write("axes.csv", AXES)
+    run("fit axes.csv --space s:2 -o a.npz")
+    assert "give a step without a unit" in fails("sample a.npz --every 10min -o b.csv")
+    assert "samples of one curve" in fails("sample a.npz --every 1e-300 -o b.csv")
+    assert "-n 0: the number of samples" in fails("sample a.npz -n 0 -o b.csv")
+    assert "too long" in fails("sample a.npz --every 1e350 -o b.csv")
+    assert "too short" in fails("sample a.npz --every 1e-350 -o b.csv")
+    curve(np.array([2**60, 2**60 + 5]))
+    assert "a step must be a whole number" in fails("sample a.npz --every 0.5 -o b.csv")
+
+
+def test_steps_of_large_whole_numbers(along):
+    for start, kind in [(2**60, ">i8"), (2**62, "<i8"), (-(2**63), "<i8"), (2**64 - 9, "<u8")]:
+        knots = np.array([start, start + 5, start + 8], kind)
+        assert along("--every 3", knots).tolist() == [start, start + 3, start + 6]
+        assert along("--every 99999999999999999999", knots).tolist() == [start]
+        assert along("-n 3", knots).tolist() == [start, start + 4, start + 8]
+
+
+def test_dates_out_of_range(along, fails):
+    far = np.array(["300000-01-01", "300000-01-03"], "datetime64[D]")
+    assert along("--every 1d", far).astype("datetime64[D]")[-1] == far[-1]
+    short = np.array([0, 10**9], "datetime64[ns]")
+    assert along("--every 200000d", short).tolist() == short[:1].tolist()
+    fine, long = np.array([1, 2], "datetime64[as]"), np.array([-(2**62) - 1, 2**62 + 1], "datetime64[s]")
+    assert along("-n 2", fine).tolist() == fine.tolist()
+    for knots, step, found in (
+        (far, "1ns", "cannot be counted"),
+        (fine, "1s", "cannot be counted"),
+        (long, "1s", "samples"),
+    ):
+        curve(knots)
+        assert found in fails(f"sample a.npz --every {step} -o b.npz")
+    for knots in (far + np.timedelta64(10**9), long):
+        curve(knots)
+        assert "cannot be counted in units of 1 microseconds" in fails("sample a.npz -n 3 -o b.npz")
+
+
+def test_times_with_and_without_a_zone_do_not_mix(run, fails):
+    for zone, other in [("", "+05:00"), ("Z", ""), ("+01:00", "")]:
+        dated([f"2021-08-{day}T00:00{zone}" for day in (28, 29, 30)])
+        run("fit a.csv --space r:1 -o a.npz")
+        write("at.csv", f"time\n2021-08-28T12:00{other}\n")
+        problem = fails("sample a.npz --at at.csv -o b.csv")
+        assert problem.startswith("at.csv: its times have ") and "which time is meant is in doubt" in problem
+        write("at.csv", f"time\n2021-08-28T12:00{zone}\n")
+        run("sample a.npz --at at.csv -o b.csv")
+        # Arrays of NumPy know of no zone.
+        np.savez("at.npz", time=np.array(["2021-08-28T12:00"], "M8[s]"))
+        run("sample a.npz --at at.npz -o b.csv")

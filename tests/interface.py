@@ -1,0 +1,53 @@
+"""The public interface as text: names, signatures, methods. `python tests/interface.py` writes it to interface.txt."""
+
+import importlib
+import inspect
+from pathlib import Path
+
+SNAPSHOT = Path(__file__).with_name("interface.txt")
+MODULES = [
+    "",
+    "convert",
+    "geo",
+    "jax",
+    "manifolds",
+    "poses",
+    "quantum",
+    "rotations",
+    "shapes",
+    "subspaces",
+    "tensors",
+]
+MODULES += ["testing", "xarray"]
+
+
+def signature(thing):
+    """Parameters and defaults, without types, which may be made more precise."""
+    try:
+        parameters = inspect.signature(thing).parameters.values()
+    except (TypeError, ValueError):
+        return "(...)"
+    return str(inspect.Signature([one.replace(annotation=inspect.Parameter.empty) for one in parameters]))
+
+
+def described():
+    """The lines of the interface."""
+    for module in MODULES:
+        name = ".".join(filter(None, ["symspline", module]))
+        found = importlib.import_module(name)
+        for public in sorted(found.__all__):
+            thing = getattr(found, public)
+            if inspect.ismodule(thing):
+                continue
+            if not callable(thing):
+                yield f"{name}.{public}"
+                continue
+            yield f"{name}.{public}{signature(thing)}"
+            if inspect.isclass(thing):
+                for member, value in sorted(vars(thing).items()):
+                    if not member.startswith("_") or member == "__call__":
+                        yield f"    .{member}{signature(value) if inspect.isfunction(value) else ''}"
+
+
+if __name__ == "__main__":
+    SNAPSHOT.write_text("\n".join(described()) + "\n", encoding="utf-8")
