@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -14,44 +15,13 @@ from ._core import CutLocusError
 from ._curves.curve import CurveArrays
 from ._errors import callers_level
 from ._report import FarPointsWarning, Report
-from ._spaces import (
-    Affine,
-    Array,
-    ComplexGeneralLinear,
-    ComplexGrassmannian,
-    ComplexProjective,
-    GeneralLinear,
-    Grassmannian,
-    Orthogonal,
-    RealProjective,
-    Similarity,
-    Space,
-    SpecialEuclidean,
-    SpecialLinear,
-    SpecialOrthogonal,
-    SpecialUnitary,
-    Sphere,
-    Symplectic,
-    Unitary,
-)
+from ._spaces import Array, Space, Unitary
+from .manifolds import Manifold
 
 # Parts of the way to the cut locus: from here on several C² curves are common, see docs/solvers.md.
 FAR = 0.6
 # Curves of fewer steps show no habit.
 _LEAST = 4
-_GROUPS = (
-    SpecialOrthogonal,
-    Orthogonal,
-    Unitary,
-    SpecialUnitary,
-    SpecialEuclidean,
-    GeneralLinear,
-    ComplexGeneralLinear,
-    Affine,
-    Similarity,
-    SpecialLinear,
-    Symplectic,
-)
 
 
 def warn_of_far_points(curves: Sequence[CurveArrays], reports: Sequence[Sequence[Report] | None]) -> None:
@@ -71,7 +41,7 @@ def warn_of_far_points(curves: Sequence[CurveArrays], reports: Sequence[Sequence
             # Deciding angles are at most as large as distances.
             if not limit < np.inf or (own is not None and _all_near(own[k].max_step, limit)):
                 continue
-            far = np.count_nonzero(_parts_of_the_way(part.space, part.points) > FAR, axis=-1)
+            far = np.count_nonzero(cut_fractions(part.space, part.points) > FAR, axis=-1)
             if own is not None:
                 # Failures of curves that did not converge are reported elsewhere, as `on_failure` demands.
                 far = np.where(own[k].converged, far, 0)
@@ -101,38 +71,38 @@ def _all_near(longest: Any, limit: float) -> bool:
     return not (longest > limit if isinstance(longest, float) else np.any(longest > limit))
 
 
-def _parts_of_the_way(space: Space, points: Array) -> NDArray[np.float64]:
-    """How far every point is on the way from the one before to the cut locus, by the angle that decides; NaN where a
-    point is none. Points have shape (..., N+1, *point_shape), the result (..., N)."""
+def cut_fractions(space: Space, points: Array) -> NDArray[np.float64]:
+    """The deciding angle between neighbouring points, divided by the angle at which the cut locus is met.
+
+    Parameters
+    ----------
+    space : Space
+        A space that is not a product.
+    points : ndarray, shape (..., N+1, *point_shape)
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        NaN where a point is not finite or the fraction is unknown.
+    """
     axes = len(space.point_shape)
     lead = (slice(None),) * (points.ndim - axes - 1)
-    p, q = points[(*lead, slice(None, -1))], points[(*lead, slice(1, None))]
-    if isinstance(space, (Sphere, RealProjective, ComplexProjective)):
-        cosines = np.einsum("...i,...i", p.conj(), q)
-        if not isinstance(space, Sphere):
-            cosines = np.abs(cosines)
-        return np.asarray(np.arccos(np.clip(cosines, -1, 1)) / space.injectivity_radius)
     finite = np.asarray(np.isfinite(points).all(axis=tuple(range(-axes, 0))))
     good = finite[..., :-1] & finite[..., 1:]
     result = np.full(good.shape, np.nan)
-    a, b = p[good], q[good]
-    if not len(a):
+    p, q = points[(*lead, slice(None, -1))][good], points[(*lead, slice(1, None))][good]
+    if not len(p):
         return result
-    if isinstance(space, _GROUPS):
-        # p⁻¹q has no logarithm nearby where an eigenvalue is negative. Lengths of translations do not count.
-        angles = np.abs(np.angle(np.linalg.eigvals(np.linalg.solve(a, b))))
-        largest = angles.max(axis=-1)
-        if isinstance(space, Unitary):
-            # Any global phase is less than 0.6 π too often: two of them count by distance, as two by two gates do.
-            largest = np.maximum(largest, math.sqrt(2) * np.sqrt(np.mean(angles**2, axis=-1)))
-        result[good] = largest / math.pi
-    elif isinstance(space, (Grassmannian, ComplexGrassmannian)):
-        cosines = np.linalg.svd(np.swapaxes(a.conj(), -1, -2) @ b, compute_uv=False)
-        result[good] = np.arccos(np.clip(cosines[..., -1], -1, 1)) / (math.pi / 2)
-    else:
-        try:
-            result[good] = space.distance(a, b) / space.injectivity_radius
-        except CutLocusError:
-            # On a manifold made of functions there may be none.
-            return result
+    if isinstance(space, Manifold):
+        # The distance may be unknown on a manifold that is made of functions.
+        with suppress(CutLocusError):
+            result[good] = space.distance(p, q) / space.injectivity_radius
+        return result
+    found = space._apply("cut_fraction", p=p, q=q)
+    if isinstance(space, Unitary):
+        # A random global phase alone is often below the limit. The root mean square of the angles, doubled, exceeds it
+        # more often.
+        rms = space.distance(p, q) / math.sqrt(space._parameters[0])
+        found = np.maximum(found, math.sqrt(2) * rms / math.pi)
+    result[good] = found
     return result
