@@ -25,6 +25,9 @@ from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
+# With fewer knots, all of them are read.
+_MANY = 64
+
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
     """The velocities of the C² spline through points, as plain arrays.
@@ -63,7 +66,8 @@ def evaluate(
         t: knots, as for `CubicSpline`.
         points, velocities: arrays of shape (..., N+1, *point_shape).
         space: the space or its name.
-        x: times, any shape and order.
+        x: times, any shape and order. Only the nodes from the first to the last segment that contain times are read
+            and checked, so that few times cost little.
         nu, extrapolate, per_curve, progress, out: as for calling a `CubicSpline`.
 
     Returns:
@@ -77,10 +81,48 @@ def evaluate(
     """
     space = space_named(space)
     check_progress(progress)
+    libraries = points, velocities, x
+    if not per_curve:
+        t, points, velocities = _nodes_around(t, points, velocities, space, x)
     clock, curve = given(t, points, velocities, space)
     where = outside(checked_extrapolate(extrapolate), "natural")
     values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress, out)
-    return values if out is not None else in_library(library_of(points, velocities, x), values)
+    return values if out is not None else in_library(library_of(*libraries), values)
+
+
+def _nodes_around(
+    t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
+) -> tuple[Any, Any, Any]:
+    """The knots, points and velocities of the segments that times lie in, or all of them where they are not plain
+    arrays, or where it would not pay.
+
+    Every segment is determined by its two ends, so that values are bit-identical.
+    """
+    everything = t, points, velocities
+    if type(t) is not np.ndarray or t.dtype != np.float64 or t.ndim != 1 or len(t) < _MANY:
+        return everything
+    times = np.asarray(x) if isinstance(x, (int, float, np.ndarray)) else None
+    if times is None or times.dtype.kind not in "iuf" or not 0 < times.size <= len(t):
+        return everything
+    first, last = times.min(), times.max()
+    # Invalid input raises further on. Comparisons are false for NaN.
+    if not (t[0] <= first and last <= t[-1] < np.inf and (t[1:] > t[:-1]).all()):
+        return everything
+    start, stop = int(t.searchsorted(first, "right")) - 1, int(t.searchsorted(last, "right")) + 1
+    start = min(start, len(t) - 2)
+    factors, arrays = factors_of(space), []
+    for value in (points, velocities):
+        each = value if isinstance(value, tuple) else (value,)
+        if len(each) != len(factors):
+            return everything
+        sliced = []
+        for factor, array in zip(factors, each, strict=True):
+            axis = array.ndim - len(factor.point_shape) - 1 if type(array) is np.ndarray else -1
+            if axis < 0 or array.shape[axis] != len(t):
+                return everything
+            sliced.append(array[(slice(None),) * axis + (slice(start, stop),)])
+        arrays.append(tuple(sliced) if isinstance(value, tuple) else sliced[0])
+    return t[start:stop], arrays[0], arrays[1]
 
 
 def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tuple[TimeAxis, CurveArrays]:
