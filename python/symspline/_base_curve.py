@@ -161,7 +161,8 @@ class Curve(ABC):
             self._clock,
             x,
             per_curve,
-            lambda curve, x, per_curve: curve.lift(x, quantity, where, per_curve, start, progress),
+            where,
+            lambda curve, x, per_curve, where: curve.lift(x, quantity, where, per_curve, start, progress),
         )
 
     def transport(self, x0: Any, x1: Any, v: Any) -> Any:
@@ -262,12 +263,12 @@ class Curve(ABC):
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
         curve = self._curve
         return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
+            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
         )
 
     def bending_energy(self) -> Any:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return bending_energy(self._curve, self._outside)
+        return bending_energy(self._curve)
 
     # ---- what it is made of ----
 
@@ -427,12 +428,12 @@ def evaluated(
 ) -> Any:
     """A quantity at times as the user gives them."""
 
-    def call(curve: CurveArrays, x: Doubles, per_curve: bool) -> Any:
+    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
         if out is None:
             return curve.evaluate(x, quantity, outside, per_curve, progress)
         return curve.write(out, x, quantity, outside, per_curve, progress)
 
-    return call_at_times(curve, clock, x, per_curve, call)
+    return call_at_times(curve, clock, x, per_curve, outside, call)
 
 
 def call_at_times(
@@ -440,9 +441,18 @@ def call_at_times(
     clock: TimeAxis,
     x: ArrayLike,
     per_curve: bool,
-    call: Callable[[CurveArrays, Doubles, bool], Any],
+    outside: str,
+    call: Callable[[CurveArrays, Doubles, bool, str], Any],
 ) -> Any:
-    """What a curve has at times as the user gives them."""
+    """What a curve has at times as the user gives them.
+
+    Parameters
+    ----------
+    outside : str
+        The extrapolation policy in the words of the core, or ``"nan"``, which this function implements.
+    call : callable
+        Takes the curve, times as the core counts them, `per_curve`, and a policy of the core.
+    """
     per_curve = checked_flag(per_curve, "per_curve")
     if clock.plain and type(x) is float:
         # A single time is worth a short way.
@@ -451,7 +461,31 @@ def call_at_times(
             times, per_curve = onto_ends(times, knots, curve.batch, per_curve)
     else:
         times, per_curve = clock.at(x, curve.batch, per_curve, curve.times)
+    beyond = None
+    if outside == "nan":
+        times, per_curve, beyond = _inside(curve, times, per_curve)
+        outside = "raise"
     try:
-        return call(curve, times, per_curve)
+        values = call(curve, times, per_curve, outside)
     except ValidationError as error:
         raise clock.explain(error) from None
+    if beyond is not None:
+        index = beyond if per_curve else (slice(None),) * len(curve.batch) + (beyond,)
+        for own in values if isinstance(values, tuple) else (values,):
+            own[index] = np.nan
+    return values
+
+
+def _inside(
+    curve: CurveArrays, times: Doubles, per_curve: bool
+) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
+    """Times of which those outside the knots are replaced by the first knot, and which these are, if any."""
+    first, last = curve.times[..., 0], curve.times[..., -1]
+    if curve.times.ndim > 1:
+        own = times.shape[len(curve.batch) :] if per_curve else times.shape
+        first, last = (end.reshape(curve.batch + (1,) * len(own)) for end in (first, last))
+    # Infinite times and NaN remain, and raise.
+    beyond = np.asarray(np.isfinite(times) & ((times < first) | (times > last)))
+    if not beyond.any():
+        return times, per_curve, None
+    return np.where(beyond, first, times), per_curve or beyond.ndim > times.ndim, beyond

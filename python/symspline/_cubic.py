@@ -267,7 +267,7 @@ class CubicSpline(Curve):
     def _product_report(self) -> Report:
         """The report of all factors, made when it is asked for: it costs more than a fit of few points."""
         curve, reports = self._curve, self._reports
-        other = alternative_energy(curve, reports, self._outside)
+        other = alternative_energy(curve, reports)
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property

@@ -11,7 +11,14 @@ from ._curves.fit import Points
 from ._curves.solve import Options
 
 _RAISE = "raise"
-_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
+_OUTSIDE = {
+    None: "raise",
+    "raise": "raise",
+    True: "continue",
+    False: "nan",
+    "geodesic": "geodesic",
+    "periodic": "periodic",
+}
 
 
 def with_atol(data: list[Points], atol: float | None) -> list[Points]:
@@ -25,9 +32,10 @@ def with_atol(data: list[Points], atol: float | None) -> list[Points]:
 def checked_extrapolate(extrapolate: Any) -> Any:
     """What happens outside the knots, if it is one of the words for it."""
     known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
-    if extrapolate is not None and extrapolate is not True and not known:
+    if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
-            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
+            "extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not "
+            f"{short_repr(extrapolate)}"
         )
     return extrapolate
 
