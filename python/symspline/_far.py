@@ -1,4 +1,4 @@
-"""Neighbours that are mostly far apart, as those of data are whose representatives do not fit each other."""
+"""Warning about neighbouring points that are mostly far apart, such as points in inconsistent representations."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from ._spaces import (
     Unitary,
 )
 
-# Parts of the way to the cut locus: from here on several C² curves are common, see docs/solvers.md.
+# Fraction of the distance to the cut locus from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6
-# Curves of fewer steps show no habit.
+# Fewer steps are too few to show a pattern.
 _LEAST = 4
 _GROUPS = (
     SpecialOrthogonal,
@@ -55,11 +55,15 @@ _GROUPS = (
 
 
 def warn_of_far_points(curves: Sequence[CurveArrays], reports: Sequence[Sequence[Report] | None]) -> None:
-    """Warn once if more than half of the steps of a curve are beyond 0.6 of the way to the cut locus.
+    """Warn once if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
-    Args:
-        curves: those of one fit; of a batch they are one.
-        reports: of each curve those in its factors, whose longest steps save a look at near points; None if unknown.
+    Parameters
+    ----------
+    curves : sequence of CurveArrays
+        Curves of one fit; a batch is one entry.
+    reports : sequence of sequence of Report or None
+        Reports of each curve in its factors, whose longest steps make the check cheap for near points. None if there
+        are no reports.
     """
     found: list[tuple[tuple[int, ...], int, int, Space]] = []
     for number, (curve, own) in enumerate(zip(curves, reports, strict=True)):
@@ -68,12 +72,12 @@ def warn_of_far_points(curves: Sequence[CurveArrays], reports: Sequence[Sequence
             continue
         for k, part in enumerate(curve.parts):
             limit = FAR * part.space.injectivity_radius
-            # Deciding angles are at most as large as distances.
+            # The deciding angle never exceeds the distance.
             if not limit < np.inf or (own is not None and _all_near(own[k].max_step, limit)):
                 continue
             far = np.count_nonzero(_parts_of_the_way(part.space, part.points) > FAR, axis=-1)
             if own is not None:
-                # Failures of curves that did not converge are reported elsewhere, as `on_failure` demands.
+                # Curves that did not converge are reported elsewhere, according to `on_failure`.
                 far = np.where(own[k].converged, far, 0)
             for index in np.argwhere(far > steps / 2).tolist():
                 place = tuple([number] * (len(curves) > 1) + index)
@@ -96,14 +100,26 @@ def warn_of_far_points(curves: Sequence[CurveArrays], reports: Sequence[Sequence
 
 
 def _all_near(longest: Any, limit: float) -> bool:
-    """Whether no longest step, which may be NaN, is beyond the limit. A single number is compared as it is, which takes
-    a tenth of the time."""
+    """Whether no longest step exceeds the limit. Steps may be NaN.
+
+    A single number is compared directly, which takes a tenth of the time.
+    """
     return not (longest > limit if isinstance(longest, float) else np.any(longest > limit))
 
 
 def _parts_of_the_way(space: Space, points: Array) -> NDArray[np.float64]:
-    """How far every point is on the way from the one before to the cut locus, by the angle that decides; NaN where a
-    point is none. Points have shape (..., N+1, *point_shape), the result (..., N)."""
+    """Return the step from every point to the next as a fraction of the distance to the cut locus.
+
+    The fraction refers to the angle that decides whether the geodesic is unique. It is NaN where a point is invalid.
+
+    Parameters
+    ----------
+    points : ndarray, shape (..., n, *point_shape)
+
+    Returns
+    -------
+    ndarray, shape (..., n - 1)
+    """
     axes = len(space.point_shape)
     lead = (slice(None),) * (points.ndim - axes - 1)
     p, q = points[(*lead, slice(None, -1))], points[(*lead, slice(1, None))]
@@ -123,7 +139,8 @@ def _parts_of_the_way(space: Space, points: Array) -> NDArray[np.float64]:
         angles = np.abs(np.angle(np.linalg.eigvals(np.linalg.solve(a, b))))
         largest = angles.max(axis=-1)
         if isinstance(space, Unitary):
-            # Any global phase is less than 0.6 π too often: two of them count by distance, as two by two gates do.
+            # The largest angle of a random global phase is often below 0.6 π. The root mean square counts as well, with
+            # the factor √2 that makes it the distance of 2 × 2 gates.
             largest = np.maximum(largest, math.sqrt(2) * np.sqrt(np.mean(angles**2, axis=-1)))
         result[good] = largest / math.pi
     elif isinstance(space, (Grassmannian, ComplexGrassmannian)):
@@ -133,6 +150,6 @@ def _parts_of_the_way(space: Space, points: Array) -> NDArray[np.float64]:
         try:
             result[good] = space.distance(a, b) / space.injectivity_radius
         except CutLocusError:
-            # On a manifold made of functions there may be none.
+            # The logarithm of a manifold made of functions may not exist.
             return result
     return result

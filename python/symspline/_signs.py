@@ -1,4 +1,4 @@
-"""Unit quaternions of opposite sign: one rotation, but two points of S³."""
+"""Warning about unit quaternions of opposite sign, which are one rotation but two points of S³."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ._curves.fit import Points
 from ._errors import callers_level
 from ._spaces import Array, Space, Sphere, factors_of
 
-# Points nearer to each other than this, a little less than π/2, have a positive inner product.
+# Points closer together than this, slightly less than π/2, have a positive inner product.
 _NEAR = 1.57
-# What a program may do about it.
+# Remedies for users of the Python interface.
 IN_PYTHON = (
-    "Curves of rotations are on so:3 (symspline.rotations.from_quaternions makes its points) or on rp:3, where signs "
-    "do not count. If these are no rotations: "
+    "For rotations, use so:3 (symspline.rotations.from_quaternions returns its points) or rp:3, where q and -q are the "
+    "same point. For other data, silence this warning with "
     "warnings.filterwarnings('ignore', message='neighbours of opposite sign')"
 )
 
@@ -26,12 +26,16 @@ IN_PYTHON = (
 def warn_of_signs(
     space: Space, curves: Sequence[list[Points] | None], steps: Sequence[Any] | None = None
 ) -> None:
-    """Warn once if neighbours on S³ are more than a quarter turn apart: as quaternions they are closer with the other
-    sign, and the curve between them turns the long way round.
+    """Warn once if neighbouring points on S³ are more than a quarter turn apart.
 
-    Args:
-        curves: the points of each curve in every factor; of a batch they are one; None for those left out.
-        steps: the longest distances of neighbours in every factor, where they are known: near ones need no look.
+    As quaternions they would be closer with the opposite sign. The curve between them turns the long way round.
+
+    Parameters
+    ----------
+    curves : sequence of list of Points or None
+        Points of each curve in every factor; a batch is one entry. None for masked curves.
+    steps : sequence, optional
+        Longest distances between neighbours in every factor, which make the check cheap for near points.
     """
     looked_at = [
         isinstance(factor, Sphere)
@@ -59,7 +63,8 @@ def warn_of_signs(
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
     warnings.warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
-        f"{product:.3g}{more}. As quaternions q and -q are one rotation, but here the curve turns the long way round. "
+        f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
+        f"round. "
         f"{IN_PYTHON}",
         UserWarning,
         stacklevel=callers_level(),
@@ -67,10 +72,10 @@ def warn_of_signs(
 
 
 def _longest(steps: Any) -> Any:
-    """The longest step of some curves, or of one."""
+    """Return the longest step of one curve or of several."""
     return steps if isinstance(steps, float) else np.max(steps, initial=0.0)
 
 
 def _opposite(points: Array) -> NDArray[np.intp]:
-    """Indices of points with a negative product with the next one."""
+    """Return the indices of points whose inner product with the next point is negative."""
     return np.argwhere(np.einsum("...i,...i", points[..., :-1, :], points[..., 1:, :]) < 0)
