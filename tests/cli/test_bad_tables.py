@@ -27,11 +27,7 @@ def test_invalid_tables(fails):
         (AXES, "--space foo:2", "unknown space 'foo:2'; known are"),
         (AXES + "4,1,0,n/a\n", "--space s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
         (AXES + "\n\n4,1,0,\n", "--space s:2", "a.csv, line 7: column 'z' is empty"),
-        (
-            AXES + "4,1,0,inf\n",
-            "--space s:2",
-            "a.csv, line 5: column 'z' holds inf, which is not a finite number",
-        ),
+        (AXES + "4,1,0,inf\n", "--space s:2", "a.csv, line 5: column 'z' holds inf, which is not a finite number"),
         (AXES + "4,1,0\n", "--space s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
         (AXES + '4,1,0,"0\n', "--space s:2", "a.csv, line 5: unexpected end of data"),
         (AXES + "4,1.001,0,0\n", "--space s:2", "a.csv: the point in line 5 is off the space by 1.000e-3"),
@@ -142,10 +138,7 @@ def test_a_line_of_units(fails):
     assert "line 2: column" in problem
     write("a.csv", "time,lon,lat\n0,degrees_east,degrees_north\n0,1,2\n1,2,3\n")
     problem = fails("fit a.csv --lonlat -o a.npz")
-    assert (
-        "line 2: column 'lon' holds 'degrees_east', which is not a number; if this line holds units"
-        in problem
-    )
+    assert "line 2: column 'lon' holds 'degrees_east', which is not a number; if this line holds units" in problem
 
 
 def test_parquet_columns_of_other_types(fails):

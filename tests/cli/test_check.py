@@ -30,11 +30,7 @@ def test_check_of_quotient_spaces(run, name):
     space, rng = ss.space(name), np.random.default_rng(6)
     p = points_on(space, 20, step=0.5)
     if len(space.point_shape) == 1:
-        p = (
-            p * np.exp(1j * rng.uniform(0, 6, (20, 1)))
-            if name[0] == "c"
-            else p * rng.choice([-1, 1], (20, 1))
-        )
+        p = p * np.exp(1j * rng.uniform(0, 6, (20, 1))) if name[0] == "c" else p * rng.choice([-1, 1], (20, 1))
     else:
         p = p @ ss.space("u:2" if name[0] == "c" else "o:2").random_point(rng, 20)
     ss.CubicSpline(None, p, space).save("a.npz")

@@ -135,9 +135,7 @@ def test_demo_writes_its_files(tmp_path, capsys):
         assert list(arrays) == list(rows[0]) == ["storm", "time", "lon", "lat", "speed_kmh"]
         assert len(rows) == len(arrays["time"]) == 6007
         np.testing.assert_array_equal([row["storm"] for row in rows], arrays["storm"])
-        np.testing.assert_array_equal(
-            np.array([row["time"] for row in rows], "datetime64[m]"), arrays["time"]
-        )
+        np.testing.assert_array_equal(np.array([row["time"] for row in rows], "datetime64[m]"), arrays["time"])
         for name, error in (("lon", 6e-6), ("lat", 6e-6), ("speed_kmh", 6e-4)):
             np.testing.assert_allclose([float(row[name]) for row in rows], arrays[name], rtol=0, atol=error)
         own = arrays["storm"] == "Gaston 2022"

@@ -15,9 +15,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".md", ".rst"))
 # Made by the build, where there was one.
-PAGES = [
-    path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)
-]
+PAGES = [path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)]
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
 OTHERS = {"adding-a-space.md", "derivatives.md", "jax.md", "smoothing.md", "shapes.md", "solvers.md"}
@@ -94,9 +92,7 @@ def test_every_figure_of_the_paper_has_an_entry():
         assert re.search(r"\(Figs?\. ", title) and numbers.split(",")[0] in title
 
 
-@pytest.mark.parametrize(
-    "page", [page for page in PAGES if blocks(page, "pycon")], ids=lambda page: page.stem
-)
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "pycon")], ids=lambda page: page.stem)
 def test_sessions_are_as_printed(page):
     session = "\n".join(blocks(page, "pycon"))
     test = doctest.DocTestParser().get_doctest(session, {}, page.name, str(page), 0)
@@ -107,9 +103,7 @@ def test_sessions_are_as_printed(page):
 
 
 @pytest.mark.parametrize(
-    "page",
-    [page for page in PAGES if blocks(page, "python") and page.name not in OTHERS],
-    ids=lambda page: page.stem,
+    "page", [page for page in PAGES if blocks(page, "python") and page.name not in OTHERS], ids=lambda page: page.stem
 )
 def test_code_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -139,11 +133,7 @@ def test_dead_links_are_found(tmp_path):
         '<a href="sub/b.html#none"></a><img src="none.png">'
     )
     (tmp_path / "sub/b.html").write_text('<a name="place"></a><a href="../a.html"></a><a href="c.html"></a>')
-    assert links.dead_links(tmp_path) == [
-        "c.html on sub/b.html",
-        "none.png on a.html",
-        "sub/b.html#none on a.html",
-    ]
+    assert links.dead_links(tmp_path) == ["c.html on sub/b.html", "none.png on a.html", "sub/b.html#none on a.html"]
 
 
 # ---- examples of the README ----

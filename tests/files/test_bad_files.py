@@ -11,9 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from curves import (
-    S2,
-)
+from curves import S2
 from refused import INF, NAN, P
 from stored import archive, load, npy, stored, with_arrays
 
@@ -61,14 +59,7 @@ def test_files_with_many_bad_bytes(kind):
         assert is_good_or_refused(bad.tobytes(), kind)
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        zipfile.ZIP_DEFLATED,
-        zipfile.ZIP_BZIP2,
-        zipfile.ZIP_LZMA,
-    ],
-)
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_compressed_files(method):
     file = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(stored())) as source, zipfile.ZipFile(file, "w", method) as target:
@@ -113,13 +104,7 @@ def test_messages_name_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "data",
-    [
-        npy(np.eye(3)),
-        archive(readme__txt="hello"),
-        stored()[:500],
-    ],
-    ids=["array", "archive", "truncated"],
+    "data", [npy(np.eye(3)), archive(readme__txt="hello"), stored()[:500]], ids=["array", "archive", "truncated"]
 )
 def test_files_are_closed_when_refused(tmp_path, data):
     (tmp_path / "curve.npz").write_bytes(data)
@@ -270,9 +255,7 @@ def bomb(name, method, size=2**26, **more):
     """A small archive with an entry of 64 MiB, zeros all of them."""
     file = io.BytesIO(with_arrays(**{name: None} | more))
     with zipfile.ZipFile(file, "a", method) as target, target.open(f"{name}.npy", "w") as entry:
-        np.lib.format.write_array_header_1_0(
-            entry, {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
-        )
+        np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)})
         for _ in range(size // 2**20):
             entry.write(bytes(2**20))
     return file.getvalue()
@@ -284,9 +267,7 @@ def test_archives_that_unpack_to_far_more_than_their_size(name, method):
     data = bomb(name, method)
     tracemalloc.start()
     try:
-        with pytest.raises(
-            ss.ValidationError, match=rf"the file: entry '{name}' would take 671\d+ bytes of memory"
-        ):
+        with pytest.raises(ss.ValidationError, match=rf"the file: entry '{name}' would take 671\d+ bytes of memory"):
             load(data)
         assert tracemalloc.get_traced_memory()[1] < 2**24
     finally:
@@ -306,9 +287,7 @@ def test_unknown_entries_are_not_read():
 def test_arrays_that_are_smaller_than_their_header_says():
     file = io.BytesIO(with_arrays(points=None))
     with zipfile.ZipFile(file, "a") as target, target.open("points.npy", "w") as entry:
-        np.lib.format.write_array_header_1_0(
-            entry, {"descr": "<f8", "fortran_order": False, "shape": (2**40, 3)}
-        )
+        np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False, "shape": (2**40, 3)})
     with pytest.raises(ss.ValidationError, match="entry 'points' is damaged: it has 0 bytes"):
         load(file.getvalue())
 
@@ -324,20 +303,14 @@ def test_arrays_that_are_smaller_than_their_header_says():
         ({"version": True}, "entry 'version' is True"),
         ({"space": "klein:2"}, "entry 'space': unknown space 'klein"),
         ({"space": 5.0}, "entry 'space': entry 'space' is not a text|entry 'space' is not a text"),
-        (
-            {"extrapolate": '"wrap"'},
-            "entry 'extrapolate': extrapolate must be None, True, 'geodesic' or 'periodic'",
-        ),
+        ({"extrapolate": '"wrap"'}, "entry 'extrapolate': extrapolate must be None, True, 'geodesic' or 'periodic'"),
         ({"extrapolate": "{"}, "entry 'extrapolate' is not JSON"),
         ({"bc_type": '"foo"'}, "entry 'bc_type': bc_type is 'natural'"),
         ({"bc_type": "5"}, "entry 'bc_type': "),
         ({"bc_type": '[[1, "x"], "natural"]'}, "entry 'bc_type': "),
         ({"report": "5"}, "entry 'report': it must be a list with one report for each of 1 factors"),
         ({"report": "[5]"}, "entry 'report': "),
-        (
-            {"report": report_with(method="magic")},
-            "entry 'report': the method is 'magic', but must be one of fixed",
-        ),
+        ({"report": report_with(method="magic")}, "entry 'report': the method is 'magic', but must be one of fixed"),
         ({"report": report_with(method=5)}, "entry 'report': the method is 5"),
         ({"report": report_with(surprise=5)}, "entry 'report': there is no field 'surprise'"),
         ({"report": report_with(max_gap=5)}, "entry 'report': there is no field 'max_gap'"),
@@ -371,10 +344,7 @@ def many_with(**changes):
 @pytest.mark.parametrize(
     "changes, message",
     [
-        (
-            {"format": "symspline-hermite"},
-            "this file holds one curve or a batch; read it with symspline.load",
-        ),
+        ({"format": "symspline-hermite"}, "this file holds one curve or a batch; read it with symspline.load"),
         ({"format": "other"}, "entry 'format' is 'other', but must be 'symspline-curves'"),
         ({"names": '["a"]'}, "entry 'names' must be a list with one value for each of 2 curves"),
         ({"names": '["a", "a"]'}, "entry 'names' must hold texts, none of them twice"),

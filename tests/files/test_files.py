@@ -6,19 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    at_node,
-    every_kind,
-    failing,
-    parts,
-    points_on,
-    same,
-    same_curve,
-    tangents_at,
-)
+from curves import KNOTS, S2, THREE, at_node, every_kind, failing, parts, points_on, same, same_curve, tangents_at
 
 import symspline as ss
 
@@ -43,9 +31,7 @@ def saved_curves():
         "own ends": ss.CubicSpline([0, 1, 3], THREE, S2, bc_type=((1, v), "not-a-knot"), extrapolate=True),
         "periodic": ss.CubicSpline(None, [*THREE, THREE[0]], S2, bc_type="periodic", extrapolate="geodesic"),
         "batch": ss.CubicSpline(KNOTS, points_on(S2, 6, (2, 3)), S2),
-        "own times": ss.CubicSpline(
-            [[0, 1, 2], [0, 2, 3.0]], [THREE, THREE], S2, bc_type=((2, [v, -v]), "natural")
-        ),
+        "own times": ss.CubicSpline([[0, 1, 2], [0, 2, 3.0]], [THREE, THREE], S2, bc_type=((2, [v, -v]), "natural")),
         "dates": ss.CubicSpline(hour + np.array([0, 1, 3]), THREE, S2),
         "own dates": ss.CubicSpline(hour + np.array([[0, 1, 3], [1, 2, 3]]), [THREE, THREE], S2),
         "nanoseconds": ss.CubicSpline(np.int64(EPOCH) + np.array([0, 1, 3]), THREE, S2),
@@ -177,12 +163,7 @@ def test_files_of_given_velocities_that_are_damaged():
     HERMITES["one"].save(file)
     file.seek(0)
     arrays = dict(np.load(file))
-    bad = {
-        "velocities": np.array(THREE, float),
-        "points": 2.0 * np.array(THREE),
-        "t": [0, 2, 1],
-        "version": 9,
-    }
+    bad = {"velocities": np.array(THREE, float), "points": 2.0 * np.array(THREE), "t": [0, 2, 1], "version": 9}
     for key, value in [*bad.items(), ("velocities", np.full((3, 3), np.nan))]:
         file = io.BytesIO()
         np.savez(file, **arrays | {key: value})

@@ -24,9 +24,7 @@ import symspline as ss
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
-every_smooth = pytest.mark.parametrize(
-    "case", [c for c in CASES if c.smooth and not c.few], ids=lambda case: case.name
-)
+every_smooth = pytest.mark.parametrize("case", [c for c in CASES if c.smooth and not c.few], ids=lambda case: case.name)
 
 
 @pytest.fixture
@@ -188,6 +186,4 @@ def test_flat_space_is_scipy(ends, n, rng):
     for nu in range(3):
         assert np.abs(ours(x, nu) - flat(x, nu)).max() <= 200 * EPS * np.abs(p).max() / h**nu
     outside = [t[0] - 0.5, t[-1] + 0.7]
-    assert np.allclose(
-        ours(outside, extrapolate=True), flat(outside, extrapolate=True), rtol=1e-11, atol=1e-11
-    )
+    assert np.allclose(ours(outside, extrapolate=True), flat(outside, extrapolate=True), rtol=1e-11, atol=1e-11)

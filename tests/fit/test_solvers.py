@@ -70,10 +70,7 @@ def test_newton_takes_one_step_in_flat_space(dim, n, rng):
 def test_newton_converges_quadratically(name, step, ends, rng):
     space = ss.space(name)
     p = (closed_walk if ends == "periodic" else walk)(space, step, 12, rng)
-    found = [
-        fit(p, space, bc_type=ends, method="newton", tol=0.0, max_iter=k).report.residual
-        for k in range(2, 13)
-    ]
+    found = [fit(p, space, bc_type=ends, method="newton", tol=0.0, max_iter=k).report.residual for k in range(2, 13)]
     near = next(k for k, r in enumerate(found) if r < 0.03)
     for before, after in zip(found[near:], found[near + 1 :], strict=False):
         assert after <= 10 * before**2 + 20 * EPS * condition(space, p), found
@@ -171,8 +168,7 @@ def test_auto_is_quasi_newton_where_that_is_quick(rng):
 
 
 @pytest.mark.parametrize(
-    ("points", "method"),
-    [(zigzag(1.0), "quasi-newton"), (zigzag(2.0), "fixed-point"), (zigzag(2.8), "trust-region")],
+    ("points", "method"), [(zigzag(1.0), "quasi-newton"), (zigzag(2.0), "fixed-point"), (zigzag(2.8), "trust-region")]
 )
 def test_auto_reports_the_successful_solver(points, method):
     spline = ss.CubicSpline(None, points, S2)
@@ -459,9 +455,7 @@ def test_other_ends_and_unequal_knots_converge_to_the_same_curve(kind):
         p[-1] = p[0]
     if kind == "acceleration":
         bc_type = ((2, 0.4 * space.log(p[0], p[1])), (2, 0.3 * space.random_tangent(rng, p[-1])))
-    one, other = (
-        ss.CubicSpline(t, p, space, bc_type=bc_type, method=m) for m in ("fixed-point", "quasi-newton")
-    )
+    one, other = (ss.CubicSpline(t, p, space, bc_type=bc_type, method=m) for m in ("fixed-point", "quasi-newton"))
     assert np.abs(one.velocities - other.velocities).max() <= 1e-11
 
 

@@ -91,10 +91,7 @@ def test_flat_space_is_scipy(kind, degree, rng):
     h = np.diff(np.unique(knots)).min()
     for nu in range(3):
         expected = np.moveaxis(flat(x, nu), 1, 0)
-        assert (
-            np.abs(ours(x, nu) - expected).max()
-            <= 100 * degree * EPS * np.abs(points).max() * (degree / h) ** nu
-        )
+        assert np.abs(ours(x, nu) - expected).max() <= 100 * degree * EPS * np.abs(points).max() * (degree / h) ** nu
     assert np.allclose(ours.speed(x), np.linalg.norm(ours(x, 1), axis=-1), rtol=1e-13, atol=1e-13)
 
 
@@ -198,14 +195,7 @@ def test_derivatives_agree_with_differences(case, degree, rng):
 
 
 FAR = [
-    *(
-        ("sphere:2", 2.2),
-        ("hyperbolic:2", 2.2),
-        ("so:3", 2.4),
-        ("rp:2", 1.3),
-        ("gr:2,5", 1.3),
-        ("cgr:2,4", 1.3),
-    ),
+    *(("sphere:2", 2.2), ("hyperbolic:2", 2.2), ("so:3", 2.4), ("rp:2", 1.3), ("gr:2,5", 1.3), ("cgr:2,4", 1.3)),
     *(("so:5", 2.2), ("o:4", 2.2), ("u:1", 2.2), ("u:2", 2.2), ("u:5", 2.2), ("su:2", 2.8), ("su:3", 2.8)),
     *(("spd:2", 3.0), ("spd:3", 3.0), ("hpd:2", 3.0), ("hpd:5", 3.0), ("se:2", 2.6), ("se:3", 2.6)),
 ]
@@ -268,9 +258,7 @@ def test_the_array_of_a_point_does_not_matter(name, rng):
     space = ss.space(name)
     points = control_points(space, 6, rng)
     if len(space.point_shape) == 1:
-        turn = np.array([1, -1, -1, 1, -1, 1])[:, None] * (
-            np.exp(1j * np.arange(6))[:, None] if name[0] == "c" else 1
-        )
+        turn = np.array([1, -1, -1, 1, -1, 1])[:, None] * (np.exp(1j * np.arange(6))[:, None] if name[0] == "c" else 1)
         other = points * turn
     else:
         group = (ss.Unitary if name[0] == "c" else ss.Orthogonal)(2)

@@ -129,11 +129,7 @@ def test_a_bezier_curve_is_a_bspline(rng):
         (list("aaabbb"), 2, r"knots must be a row of real numbers, not <U1"),
         (np.array(CLAMPED, "M8[s]"), 2, r"knots must be a row of real numbers, not datetime64"),
         ([[0, 0], [1]], 2, r"knots is not an array of equally long rows"),
-        (
-            [0, 0, 0, 0, 1, 1],
-            2,
-            r"knots repeat 0\.0 4 times; with degree 2 a knot may repeat at most 3 times",
-        ),
+        ([0, 0, 0, 0, 1, 1], 2, r"knots repeat 0\.0 4 times; with degree 2 a knot may repeat at most 3 times"),
         ([0, 1, 2, 2, 3, 4], 2, r"the curve lives between knots\[2\] and knots\[3\], which are equal"),
         ([-1e308] * 3 + [1e308] * 3, 2, r"knots span more than a double can hold"),
         (CLAMPED, 3, r"degree 3 needs at least 4 control points, got 3"),
@@ -175,9 +171,7 @@ def test_knots_and_degrees(knots, degree, match):
 )
 def test_control_points(kind, points, match):
     with pytest.raises(ss.ValidationError, match=match):
-        ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(
-            points, "sphere:2"
-        )
+        ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(points, "sphere:2")
 
 
 def test_control_points_of_two_parts():

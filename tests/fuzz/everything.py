@@ -71,9 +71,7 @@ def methods(thing):
     """Names of the public methods of an object."""
     kind = type(thing)
     names = [name for name in dir(thing) if not name.startswith("_") and name not in LEFT_OUT]
-    names += [
-        name for name in ("__call__", "__getitem__") if any(name in vars(base) for base in kind.__mro__)
-    ]
+    names += [name for name in ("__call__", "__getitem__") if any(name in vars(base) for base in kind.__mro__)]
     return [name for name in names if callable(inspect.getattr_static(kind, name, None))]
 
 
@@ -95,9 +93,7 @@ def functions():
             value = getattr(module, key)
             error = isinstance(value, type) and issubclass(value, (Warning, Exception))
             if callable(value) and key not in LEFT_OUT and not error:
-                found.setdefault(
-                    f"{name.removeprefix('symspline.')}.{key}" if name != "symspline" else key, value
-                )
+                found.setdefault(f"{name.removeprefix('symspline.')}.{key}" if name != "symspline" else key, value)
     return found
 
 
@@ -107,9 +103,7 @@ def table():
         import pandas as pd
     except ImportError:
         return None
-    return pd.DataFrame(
-        {"time": pd.to_datetime(DAYS), "lon": [1.0, 2, 3], "lat": [4.0, 5, 6], "name": ["a"] * 3}
-    )
+    return pd.DataFrame({"time": pd.to_datetime(DAYS), "lon": [1.0, 2, 3], "lat": [4.0, 5, 6], "name": ["a"] * 3})
 
 
 def labelled():

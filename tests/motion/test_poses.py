@@ -261,9 +261,7 @@ def test_euroc_files(tmp_path):
 
 def test_dates_in_tum_files():
     file = io.StringIO()
-    poses.write_tum(
-        file, np.array(["1970-01-01T00:00:01.5", "1970-01-02"], "M8[ms]"), np.stack([np.eye(4)] * 2)
-    )
+    poses.write_tum(file, np.array(["1970-01-01T00:00:01.5", "1970-01-02"], "M8[ms]"), np.stack([np.eye(4)] * 2))
     assert file.getvalue().splitlines()[1].startswith("86400.0 0.0 0.0 0.0 0.0 0.0 0.0 1.0")
 
 
@@ -272,23 +270,11 @@ def test_dates_in_tum_files():
     [
         (poses.read_tum, "", "no numbers"),
         (poses.read_tum, "# nothing\n", "no numbers"),
-        (
-            poses.read_tum,
-            "\n0 0 0 0 0 0 1\n",
-            "line 2: 7 numbers, but a line of a TUM trajectory has 8: time tx",
-        ),
+        (poses.read_tum, "\n0 0 0 0 0 0 1\n", "line 2: 7 numbers, but a line of a TUM trajectory has 8: time tx"),
         (poses.read_tum, "# x\n0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n", "the file, line 3: 7 numbers, but a line"),
-        (
-            poses.read_tum,
-            "# x\n0 0 0 0 0 0 0 one\n",
-            "line 2: column 'qw' holds 'one', which is not a number",
-        ),
+        (poses.read_tum, "# x\n0 0 0 0 0 0 0 one\n", "line 2: column 'qw' holds 'one', which is not a number"),
         (poses.read_tum, "0 0 0 0 0 0 0 1\n\n1 0 0 nan 0 0 0 1\n", "line 3: column 'tz' holds nan"),
-        (
-            poses.read_tum,
-            "0 0 0 0 0 0 0 1\n# x\n1 0 0 0 0 0 1 1\n",
-            r"line 3: the quaternion has length 1\.41421",
-        ),
+        (poses.read_tum, "0 0 0 0 0 0 0 1\n# x\n1 0 0 0 0 0 1 1\n", r"line 3: the quaternion has length 1\.41421"),
         (poses.read_euroc, "# x\n1,0,0,0,1,1,0,0\n", r"line 2: the quaternion has length 1\.41421, not 1"),
         (poses.read_tum, "0 0 0 0 0 0 0 1.01\n", r"line 1: the quaternion has length 1\.01"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1.01 0\n", r"pose \[0\] has no rotation"),
@@ -307,10 +293,7 @@ def test_bad_files(read, text, match):
 @pytest.mark.parametrize(
     ("call", "match"),
     [
-        (
-            lambda f: poses.write_tum(f, [0.0], np.stack([np.eye(4)] * 2)),
-            r"t has shape \(1,\), but there are 2 poses",
-        ),
+        (lambda f: poses.write_tum(f, [0.0], np.stack([np.eye(4)] * 2)), r"t has shape \(1,\), but there are 2 poses"),
         (lambda f: poses.write_tum(f, ["a", "b"], np.stack([np.eye(4)] * 2)), r"t\[0\] is 'a', no date"),
         (lambda f: poses.write_tum(f, [True, False], np.stack([np.eye(4)] * 2)), "numbers or datetime64"),
         (lambda f: poses.write_tum(f, [0.0], 2 * np.eye(4)[None]), "off the space"),
@@ -330,9 +313,7 @@ def test_bad_poses(tmp_path, call, match):
 def test_files_take_no_parts_of_seconds_for_seconds(write, scale):
     given = curve("se:3").points
     t = scale * (1_700_000_000 + np.arange(len(given)))
-    with pytest.raises(
-        ss.ValidationError, match=r"t\[0\] is 1.*, which can be no seconds; of nanoseconds make"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"t\[0\] is 1.*, which can be no seconds; of nanoseconds make"):
         write(io.StringIO(), t, given)
 
 
@@ -364,7 +345,5 @@ def test_times_to_write_in_any_form(write):
 
 def test_curves_with_control_points_have_no_readings():
     curve = ss.BezierCurve(np.stack([np.eye(4)] * 4), "se:3")
-    with pytest.raises(
-        TypeError, match=r"spline must be a curve, such as a symspline.CubicSpline, not <BezierCurve"
-    ):
+    with pytest.raises(TypeError, match=r"spline must be a curve, such as a symspline.CubicSpline, not <BezierCurve"):
         ss.poses.imu(curve, 0.5)

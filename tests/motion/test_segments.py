@@ -85,10 +85,7 @@ def test_what_scipy_and_lists_hold():
 @pytest.mark.parametrize(
     ("match", "changes"),
     [
-        (
-            r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\); duplicates='first'",
-            {"t": [0, 1, 1, 1, 2]},
-        ),
+        (r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\); duplicates='first'", {"t": [0, 1, 1, 1, 2]}),
         (r"t\[2\] = 0.5 is before t\[1\] = 1.0; sort", {"t": [0, 1, 0.5, 2, 3]}),
         (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
         (r"t has shape \(4,\), but there are 5 points", {"t": range(4)}),
@@ -203,9 +200,7 @@ def test_failed_noisy_segments_are_all_kept():
     assert [len(piece.t) for piece in caught.value.spline] == [30, 30]
     with pytest.warns(ss.ConvergenceWarning, match="curve 0: "):
         ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="warn")
-    assert (
-        len(ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="ignore")) == 2
-    )
+    assert len(ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="ignore")) == 2
 
 
 @pytest.mark.parametrize(

@@ -131,14 +131,7 @@ def test_unconverged_curve_is_drawn_and_named():
 
 @pytest.mark.parametrize(
     "name, unit, step",
-    [
-        ("r:1", "us", 500),
-        ("r:2", "s", 3),
-        ("r:1", "m", 70),
-        ("r:2", "h", 10),
-        ("r:1", "D", 1),
-        ("r:2", "D", 300),
-    ],
+    [("r:1", "us", 500), ("r:2", "s", 3), ("r:1", "m", 70), ("r:2", "h", 10), ("r:1", "D", 1), ("r:2", "D", 300)],
 )
 def test_dates(name, unit, step):
     t = np.datetime64("2024-02-27", unit) + step * np.array([0, 1, 2, 4, 5]).astype(f"timedelta64[{unit}]")

@@ -15,9 +15,7 @@ def test_quaternions_as_rotations():
     np.testing.assert_allclose(frames.rotations(np.array([half, 0, 0, half])), about_z, atol=1e-15)
     q = ss.Sphere(3).random_point(np.random.default_rng(6), 20)
     matrices = frames.rotations(q)
-    np.testing.assert_allclose(
-        matrices @ matrices.swapaxes(1, 2), np.broadcast_to(np.eye(3), (20, 3, 3)), atol=1e-14
-    )
+    np.testing.assert_allclose(matrices @ matrices.swapaxes(1, 2), np.broadcast_to(np.eye(3), (20, 3, 3)), atol=1e-14)
     np.testing.assert_allclose(np.linalg.det(matrices), 1)
     np.testing.assert_allclose(frames.rotations(-q), matrices)
     np.testing.assert_allclose(frames.VIEW @ frames.VIEW.T, np.eye(3), atol=1e-3)
@@ -66,9 +64,7 @@ def test_principal_angles(name):
     p = space.random_point(rng, 5)
     turn = ss.Orthogonal(k) if k > 1 and not np.iscomplexobj(p) else ss.Unitary(k)
     turned = p.reshape(5, n, k) @ turn.random_point(rng, 5)
-    np.testing.assert_allclose(
-        graphs.principal_angles(turned, turned[0]), graphs.principal_angles(p, p[0]), atol=1e-12
-    )
+    np.testing.assert_allclose(graphs.principal_angles(turned, turned[0]), graphs.principal_angles(p, p[0]), atol=1e-12)
 
 
 def test_outlines_of_positive_definite_matrices():

@@ -122,9 +122,7 @@ def test_gauss_newton_reaches_the_minimum(name):
     here = objective(space, t, noisy, exact.points, lam, w)
     for _ in range(3):
         v = space.random_tangent(rng, exact.points)
-        up, down = (
-            objective(space, t, noisy, space.exp(exact.points, s * 1e-4 * v), lam, w) for s in (1, -1)
-        )
+        up, down = (objective(space, t, noisy, space.exp(exact.points, s * 1e-4 * v), lam, w) for s in (1, -1))
         bend = (up + down - 2 * here) / 1e-8
         assert bend > 0 and abs(up - down) / 2e-4 / bend < 1e-7
     flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=w, method="linearized", **TIGHT)
@@ -146,11 +144,7 @@ def test_poor_directions_do_little_harm(name):
         noisy = scattered(space, points, w, 0.03, np.random.default_rng(seed))
         # The frames of the data are nearly those of the points.
         informed = ss.make_smoothing_spline(
-            t,
-            noisy,
-            space,
-            weights=w,
-            frames=space.transport(points[:, None], noisy[:, None], space.frame(points)),
+            t, noisy, space, weights=w, frames=space.transport(points[:, None], noisy[:, None], space.frame(points))
         )
         plain = ss.make_smoothing_spline(t, noisy, space)
         assert all(report.converged for report in each(informed.report))
@@ -259,9 +253,7 @@ def test_a_product_takes_one_of_every_factor(tmp_path):
     w = matrices(rng, 30, 3)
     for weights in ((None, w), (w, None), (w, rng.uniform(1, 2, 30)), (w, w[::-1])):
         both = ss.make_smoothing_spline(t, (places, turns), "r:3 x so:3", weights=weights)
-        for factor, points, own, part in zip(
-            (first, second), (places, turns), weights, both.points, strict=True
-        ):
+        for factor, points, own, part in zip((first, second), (places, turns), weights, both.points, strict=True):
             alone = ss.make_smoothing_spline(t, points, factor, weights=own)
             assert np.array_equal(part, alone.points)
         file = tmp_path / "both.npz"

@@ -63,9 +63,7 @@ def test_gauss_newton_keeps_given_velocities():
     space, t, noisy, _ = example("sphere:2", 0.05, n=20, segments=3)
     start = 0.2 * space.random_tangent(np.random.default_rng(1), noisy[0])
     ways = [
-        ss.make_smoothing_spline(
-            t, noisy, space, 0.3, bc_type=((1, start), "natural"), method=method, tol=1e-5
-        )
+        ss.make_smoothing_spline(t, noisy, space, 0.3, bc_type=((1, start), "natural"), method=method, tol=1e-5)
         for method in ("linearized", "newton")
     ]
     assert space.distance(ways[0].points, ways[1].points).max() < 1e-4
@@ -118,9 +116,7 @@ def test_gauss_newton_fits_closed_curves(name):
     t, noisy = np.append(t, 10.0), np.append(noisy, beside(space, noisy[:1], 0.05), axis=0)
     knots = np.r_[0:8:1.0, 8.5, 10.0]
     flat, exact = (
-        ss.make_smoothing_spline(
-            t, noisy, space, 0.3, knots=knots, bc_type="periodic", method=method, **TIGHT
-        )
+        ss.make_smoothing_spline(t, noisy, space, 0.3, knots=knots, bc_type="periodic", method=method, **TIGHT)
         for method in ("linearized", "newton")
     )
     assert exact.report.converged and exact.report.method == "newton" and exact.report.iterations <= 15
@@ -185,9 +181,7 @@ def test_their_deviations_come_back_from_files(bc_type, tmp_path):
     spline.save(tmp_path / "curve.npz")
     back = ss.load(tmp_path / "curve.npz")
     assert back == spline and np.array_equal(back.std(t), spline.std(t))
-    batch = ss.make_smoothing_spline(
-        t, np.stack([noisy] * 2), space, 0.1, knots=np.append(t, 10.0), bc_type=bc_type
-    )
+    batch = ss.make_smoothing_spline(t, np.stack([noisy] * 2), space, 0.1, knots=np.append(t, 10.0), bc_type=bc_type)
     assert np.array_equal(batch[1].std(t), spline.std(t)) and np.array_equal(batch.std(t)[0], spline.std(t))
 
 
@@ -199,9 +193,7 @@ def test_the_first_point_repeated_at_the_end_counts_once():
     noisy = beside(space, truth, 0.05)
     noisy[-1] = noisy[0]
     closed = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic")
-    once = ss.make_smoothing_spline(
-        t, noisy, space, bc_type="periodic", weights=np.where(t < 1, 1.0, 0.0), knots=t
-    )
+    once = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic", weights=np.where(t < 1, 1.0, 0.0), knots=t)
     assert not closed.report.at_bound and closed.sigma == pytest.approx(0.05, rel=0.2)
     assert closed.lam == pytest.approx(once.lam, rel=1e-12)
     np.testing.assert_allclose(closed.points, once.points, rtol=0, atol=1e-13)
@@ -231,6 +223,4 @@ def test_a_repeated_end_may_differ_by_rounding():
     t, noisy = np.append(t, 10.0), np.append(noisy, noisy[:1], axis=0)
     once = ss.make_smoothing_spline(t, noisy, space, bc_type="periodic")
     noisy[-1] = space.project(noisy[0] + 1e-11 * np.array([1.0, 2.0, 3.0]))
-    assert ss.make_smoothing_spline(t, noisy, space, bc_type="periodic").df == pytest.approx(
-        once.df, rel=1e-9
-    )
+    assert ss.make_smoothing_spline(t, noisy, space, bc_type="periodic").df == pytest.approx(once.df, rel=1e-9)

@@ -15,9 +15,7 @@ S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
 WEIGHTS = np.where(np.arange(40) == 3, 0.0, np.linspace(0.5, 2, 40))
 DATES = np.datetime64("2024-03-01") + (T * 60).astype("timedelta64[s]")
 TEXTS = DATES[8::8].astype(str)
-ZONED = [
-    datetime.datetime(2024, 3, 1, tzinfo=datetime.UTC) + datetime.timedelta(minutes=i) for i in range(40)
-]
+ZONED = [datetime.datetime(2024, 3, 1, tzinfo=datetime.UTC) + datetime.timedelta(minutes=i) for i in range(40)]
 
 
 def saved_curves():

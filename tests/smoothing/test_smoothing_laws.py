@@ -68,9 +68,7 @@ def test_time_unit_does_not_matter(name, unit):
     other = ss.make_smoothing_spline(unit * t, noisy, space, **TIGHT)
     assert np.divide(each(other.lam), unit**3) == pytest.approx(each(spline.lam), rel=1e-6)
     assert space.distance(other.points, spline.points).max() < 1e-7
-    assert np.multiply(each(other.std(3.3 * unit, 1)), unit) == pytest.approx(
-        each(spline.std(3.3, 1)), rel=1e-5
-    )
+    assert np.multiply(each(other.std(3.3 * unit, 1)), unit) == pytest.approx(each(spline.std(3.3, 1)), rel=1e-5)
 
 
 @every
@@ -81,9 +79,7 @@ def test_small_lam_goes_through_the_data_and_large_lam_straight_on(name):
     exact = ss.make_smoothing_spline(t, noisy, space, 0.0)
     assert space.distance(exact.points, noisy).max() < 1e-12
     parts = len(each(exact.df))
-    assert each(exact.df) == pytest.approx([25] * parts) and each(through.df) == pytest.approx(
-        [25] * parts, abs=1e-5
-    )
+    assert each(exact.df) == pytest.approx([25] * parts) and each(through.df) == pytest.approx([25] * parts, abs=1e-5)
     straight = ss.make_smoothing_spline(t, noisy, space, 1e9, tol=1e-3, max_iter=100)
     assert all(report.converged for report in each(straight.report))
     assert each(straight.df) == pytest.approx([2] * parts, abs=1e-3)
@@ -119,9 +115,7 @@ def test_gauss_newton_reaches_the_minimum(name):
     for _ in range(3):
         v = space.random_tangent(rng, exact.points)
         step = 1e-4
-        up, down = (
-            objective(space, t, noisy, space.exp(exact.points, s * step * v), lam, weights) for s in (1, -1)
-        )
+        up, down = (objective(space, t, noisy, space.exp(exact.points, s * step * v), lam, weights) for s in (1, -1))
         # The slope of a quadratic with the curvature that the two show: the distance to its minimum.
         slope, bend = (up - down) / (2 * step), (up + down - 2 * here) / step**2
         assert bend > 0 and abs(slope / bend) < 1e-6
@@ -249,9 +243,7 @@ def test_the_search_ends_where_nothing_is_left_to_compare():
     through = ss.make_smoothing_spline(np.linspace(0, 1, 60), y, "r:1", 0.0)
     assert np.abs(through.points - y).max() < 1e-12 and np.isnan(through.sigma)
     for loss in ("linear", "huber", "cauchy"):
-        still = ss.make_smoothing_spline(
-            np.arange(30.0), np.tile([0.0, 0, 1], (30, 1)), "sphere:2", loss=loss
-        )
+        still = ss.make_smoothing_spline(np.arange(30.0), np.tile([0.0, 0, 1], (30, 1)), "sphere:2", loss=loss)
         assert np.abs(still.points - [0, 0, 1]).max() < 1e-12
 
 

@@ -156,9 +156,7 @@ def test_band_and_deviation_check_their_arguments():
         ss.SmoothingSpline()
 
 
-@pytest.mark.parametrize(
-    "options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}]
-)
+@pytest.mark.parametrize("options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}])
 def test_between_two_knots_there_is_the_nearest_geodesic(options):
     two = ss.make_smoothing_spline([3.0, 5e6], NOISY[:2], S2, **options)
     assert np.abs(two.points - NOISY[:2]).max() < 1e-12 and two.df == pytest.approx(2)
@@ -184,9 +182,7 @@ def test_squares_beyond_doubles_are_no_result(size):
 def test_data_all_over_a_space_are_told(name, seed):
     space, rng = ss.space(name), np.random.default_rng(seed)
     points = space.random_point(rng, 200)
-    with pytest.warns(
-        UserWarning, match=r"half of the data are \d.* half of random points of .* would be \d"
-    ):
+    with pytest.warns(UserWarning, match=r"half of the data are \d.* half of random points of .* would be \d"):
         spline = ss.make_smoothing_spline(None, points, space, lam=1e6)
     # Of a batch the curve is named; weights of zero do not count.
     if name == "sphere:2":

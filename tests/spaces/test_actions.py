@@ -2,26 +2,13 @@
 
 import numpy as np
 import pytest
-from cases import (
-    CASES,
-    EPS,
-    apart,
-    base_point,
-    condition,
-    every_family,
-    has_metric,
-    loop_over,
-    unit_tangent,
-    walk,
-)
+from cases import CASES, EPS, apart, base_point, condition, every_family, has_metric, loop_over, unit_tangent, walk
 from lie import Lie
 
 import symspline as ss
 
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-one_per_family = pytest.mark.parametrize(
-    "case", [c for c in CASES if c.interface], ids=lambda case: case.name
-)
+one_per_family = pytest.mark.parametrize("case", [c for c in CASES if c.interface], ids=lambda case: case.name)
 
 
 @pytest.fixture
@@ -58,9 +45,7 @@ AT_THE_CUT_LOCUS = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("name", "p", "x", "image"), AT_THE_CUT_LOCUS, ids=[row[0] for row in AT_THE_CUT_LOCUS]
-)
+@pytest.mark.parametrize(("name", "p", "x", "image"), AT_THE_CUT_LOCUS, ids=[row[0] for row in AT_THE_CUT_LOCUS])
 def test_symmetry_at_the_cut_locus(name, p, x, image):
     space = ss.space(name)
     assert apart(space, space.symmetry(p, x), image) <= 4 * EPS

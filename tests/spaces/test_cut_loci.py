@@ -207,9 +207,7 @@ def test_points_at_the_cut_locus(name):
     at, limit = REACH[name]
     angle = LIMIT[limit]
     p = np.array([at(0), at(0.3 * limit), at(1.3 * limit)])
-    match = (
-        rf"points\[1\] and points\[2\] lie at or past .*cut locus: angle {angle}, limit {angle}; put a point"
-    )
+    match = rf"points\[1\] and points\[2\] lie at or past .*cut locus: angle {angle}, limit {angle}; put a point"
     fails(match, p, name, ss.CutLocusError)
     space = ss.space(name)
     with pytest.raises(ss.CutLocusError, match=rf"pair 1: .*angle {angle}, limit {angle}"):

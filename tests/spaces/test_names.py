@@ -166,10 +166,7 @@ def test_poses_have_no_curvature_in_products():
 @pytest.mark.parametrize(
     "space, match",
     [
-        (
-            "spere:2",
-            r"unknown space 'spere:2'; did you mean 'sphere:2'\? known are .*sphere.*, e\.g\. 'sphere:2'",
-        ),
+        ("spere:2", r"unknown space 'spere:2'; did you mean 'sphere:2'\? known are .*sphere.*, e\.g\. 'sphere:2'"),
         ("", r"unknown space ''"),
         ("sphere:2 x klein:2", r"unknown space 'klein:2'"),
         ("sphere", r"'sphere' is a family of spaces; give its dimension, such as Sphere\(2\) or 'sphere:2'"),
@@ -244,9 +241,7 @@ def test_invalid_sizes_raise(kind, value):
 def test_missing_sizes_raise(cls):
     names = [*inspect.signature(cls).parameters]
     for numbers in ((), (2, 4, 5)):
-        with pytest.raises(
-            TypeError, match=rf"^{cls.__name__} takes {' and '.join(names)}, such as "
-        ) as caught:
+        with pytest.raises(TypeError, match=rf"^{cls.__name__} takes {' and '.join(names)}, such as ") as caught:
             cls(*numbers)
     call, name = re.search(r"such as (.*) or '(.*)': \w.* \S", str(caught.value)).groups()
     made = ss.space(name)
@@ -286,9 +281,7 @@ def test_misspelt_names_get_a_guess(name, meant):
 @pytest.mark.parametrize("given", [ss.Sphere, "Sphere", "sphere"])
 def test_classes_instead_of_spaces_raise(given):
     for call in (lambda: ss.space(given), lambda: ss.CubicSpline(None, np.eye(3), given)):
-        with pytest.raises(
-            ss.ValidationError, match=r"give its dimension, such as Sphere\(2\) or 'sphere:2'"
-        ):
+        with pytest.raises(ss.ValidationError, match=r"give its dimension, such as Sphere\(2\) or 'sphere:2'"):
             call()
     with pytest.raises(ss.ValidationError, match=r"Grassmannian\(2, 4\) or 'gr:2,4'"):
         ss.space(ss.Grassmannian)

@@ -145,10 +145,7 @@ def test_project_and_check(space):
     assert off(space, projected, p) < 1e-4
     assert off(space, space.project(projected), projected) < 20 * EPS
     noise = each(
-        lambda a: (
-            rng.standard_normal(a.shape) + (1j * rng.standard_normal(a.shape) if a.dtype.kind == "c" else 0)
-        ),
-        p,
+        lambda a: rng.standard_normal(a.shape) + (1j * rng.standard_normal(a.shape) if a.dtype.kind == "c" else 0), p
     )
     v = space.project_tangent(p, noise)
     assert space.check_tangent(p, v) is None

@@ -24,9 +24,7 @@ def test_columns_that_are_not_orthonormal(name):
     columns = ss.space(name).point_shape[1]
     # |1.01² − 1| √columns
     size = f"{0.0201 * np.sqrt(columns):.3e}".replace("e-0", "e-")
-    match = (
-        rf"points\[2\] is off the space by .*columns are not orthonormal: \|{product} - 1\| = {size}{PROJECT}"
-    )
+    match = rf"points\[2\] is off the space by .*columns are not orthonormal: \|{product} - 1\| = {size}{PROJECT}"
     fails(match, spoiled(name, 2, lambda x: 1.01 * x), name)
     fails(r"points\[1\] is off the space.* 1\.\d+e0", spoiled(name, 1, lambda x: 0 * x), name)
 
@@ -94,9 +92,7 @@ def test_matrices_that_are_not_symmetric(name):
         return x + 1e-2 * np.eye(*x.shape, k=1)
 
     what = "symmetric" if name[:3] == "spd" else "Hermitian"
-    match = (
-        rf"points\[1\] is off the space by .*it is not {what}: the skew part is \d\.\d+e-\d of it{PROJECT}"
-    )
+    match = rf"points\[1\] is off the space by .*it is not {what}: the skew part is \d\.\d+e-\d of it{PROJECT}"
     fails(match, spoiled(name, 1, skew), name)
     # The symmetric part is what is close.
     ss.CubicSpline(None, ss.space(name).project(spoiled(name, 1, skew)), name)
@@ -140,16 +136,10 @@ def test_a_matrix_that_is_singular_to_rounding_is_refused(name):
     for _ in range(20):
         a = rng.normal(size=(n, n - 1))
         points = np.array([np.eye(n), a @ a.T], dtype=ss.space(name).dtype)
-        fails(
-            r"points\[1\] is off the space: it is not positive definite: its smallest eigenvalue",
-            points,
-            name,
-        )
+        fails(r"points\[1\] is off the space: it is not positive definite: its smallest eigenvalue", points, name)
     units = 10.0 ** rng.uniform(-6, 6, n)
     regular = np.eye(n) + 0.3
-    assert ss.CubicSpline(
-        None, np.array([np.eye(n), regular * units * units[:, None]]), name
-    ).report.converged
+    assert ss.CubicSpline(None, np.array([np.eye(n), regular * units * units[:, None]]), name).report.converged
 
 
 @pytest.mark.parametrize("name", POSES)
@@ -171,11 +161,7 @@ def test_the_rotation_of_a_pose(name):
         x[:-1, :-1] *= 1.01
         return x
 
-    fails(
-        r"points\[2\] is off .*in its rotation, its columns are not orthonormal",
-        spoiled(name, 2, stretched),
-        name,
-    )
+    fails(r"points\[2\] is off .*in its rotation, its columns are not orthonormal", spoiled(name, 2, stretched), name)
 
 
 # ---- spheres and hyperbolic space ----
@@ -187,11 +173,7 @@ OFF = r" is off the space"
 @pytest.mark.parametrize(
     "space, points, match",
     [
-        (
-            "sphere:2",
-            changed(2, [0, 0, 1.1]),
-            r"points\[2\] is off the space by 1\.000e-1: its norm is 1\.1, not 1",
-        ),
+        ("sphere:2", changed(2, [0, 0, 1.1]), r"points\[2\] is off the space by 1\.000e-1: its norm is 1\.1, not 1"),
         ("sphere:2", changed(1, 0), r"points\[1\] is off the space by 1\.000e0: it is the zero vector"),
         (
             "hyperbolic:2",
@@ -207,18 +189,14 @@ def test_points_off_the_space(space, points, match):
 
 
 def test_error_names_the_point_of_a_batch():
-    fit_error(
-        r"points\[2\] of curve 1 is off the space by 5\.000e-1", points=changed((1, 2), [0, 0, 1.5], TWO)
-    )
+    fit_error(r"points\[2\] of curve 1 is off the space by 5\.000e-1", points=changed((1, 2), [0, 0, 1.5], TWO))
     with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
         ss.fit_many([(None, P), (None, changed(1, [0, 2, 0])[:2])], S2)
 
 
 @pytest.mark.parametrize("dtype, tol", [("f8", "1e-8"), ("f4", "1e-4")])
 def test_how_far_off_is_allowed(dtype, tol):
-    fit_error(
-        rf"off the space by 1\.0\d*e-2.*Points within {tol} are projected", points=(P * 1.01).astype(dtype)
-    )
+    fit_error(rf"off the space by 1\.0\d*e-2.*Points within {tol} are projected", points=(P * 1.01).astype(dtype))
 
 
 def test_a_bad_point_is_found_before_a_long_fit():
@@ -249,9 +227,7 @@ def test_points_that_are_not_finite_raise(name, value):
 
 
 @pytest.mark.parametrize("value", [NAN, INF, -INF])
-@pytest.mark.parametrize(
-    "space, points", [("sphere:2", P), ("euclidean:3", P), ("hyperbolic:2", P[[0, 0, 0]])]
-)
+@pytest.mark.parametrize("space, points", [("sphere:2", P), ("euclidean:3", P), ("hyperbolic:2", P[[0, 0, 0]])])
 def test_points_that_are_not_finite(space, points, value):
     fit_error(
         rf"points\[1\]{OFF}.*(NaN|inf|not finite).*No point is close to it; mend it or leave it out",

@@ -122,12 +122,8 @@ def test_grassmannian_in_the_orthogonal_group():
     # The reflections 2pp* − 1.
     p = points_on(ss.Grassmannian(2, 5), 6, step=0.5)
     spline = ss.CubicSpline(KNOTS, p, "gr:2,5", bc_type="not-a-knot")
-    reflected = ss.CubicSpline(
-        KNOTS, 2 * convert.basis_to_projector(p) - np.eye(5), "o:5", bc_type="not-a-knot"
-    )
-    np.testing.assert_allclose(
-        reflected(X), 2 * convert.basis_to_projector(spline(X)) - np.eye(5), atol=1e-12
-    )
+    reflected = ss.CubicSpline(KNOTS, 2 * convert.basis_to_projector(p) - np.eye(5), "o:5", bc_type="not-a-knot")
+    np.testing.assert_allclose(reflected(X), 2 * convert.basis_to_projector(spline(X)) - np.eye(5), atol=1e-12)
 
 
 def test_siegel_of_one_dimension_is_the_half_plane():
@@ -184,8 +180,7 @@ def hopf(q):
 
 
 @pytest.mark.parametrize(
-    ("part", "whole", "step"),
-    [("sspd:3", "spd:3", 0.6), ("siegel:2", "spd:4", 0.6), ("hp:2", "cgr:2,6", 0.4)],
+    ("part", "whole", "step"), [("sspd:3", "spd:3", 0.6), ("siegel:2", "spd:4", 0.6), ("hp:2", "cgr:2,6", 0.4)]
 )
 @pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", "clamped"])
 def test_a_part_has_the_curves_of_the_whole(part, whole, step, bc_type):
@@ -207,9 +202,7 @@ def test_complex_hyperbolic_in_positive_definite():
     for bc_type in ("natural", "not-a-knot"):
         lines = ss.CubicSpline(KNOTS, z, "ch:2", bc_type=bc_type)(X)
         matrices = ss.CubicSpline(KNOTS, definite(z), "hpd:3", bc_type=bc_type)(X)
-        np.testing.assert_allclose(
-            definite(lines), matrices, rtol=0, atol=1e-13 * np.abs(matrices).max() ** 2
-        )
+        np.testing.assert_allclose(definite(lines), matrices, rtol=0, atol=1e-13 * np.abs(matrices).max() ** 2)
 
 
 def test_quaternionic_projective_space_is_blind_to_units():

@@ -31,9 +31,7 @@ def test_a_batch_is_a_sequence(space):
         one = ss.CubicSpline(KNOTS, pick(p, index), space, bc_type=own)
         assert same_curve(spline[index], one)
         assert all(same(a[1], b[1]) for a, b in zip(spline[index].bc_type, one.bc_type, strict=True))
-    assert same_curve(
-        spline[2][1], ss.CubicSpline(KNOTS, pick(p, (2, 1)), space, bc_type=spline[2][1].bc_type)
-    )
+    assert same_curve(spline[2][1], ss.CubicSpline(KNOTS, pick(p, (2, 1)), space, bc_type=spline[2][1].bc_type))
 
 
 def test_a_batch_ends():
@@ -63,15 +61,7 @@ def test_single_curve_is_not_a_sequence():
             batch[index]
 
 
-@pytest.mark.parametrize(
-    "shape",
-    [
-        (2, 3),
-        (3,),
-        (1, 3),
-    ],
-    ids=str,
-)
+@pytest.mark.parametrize("shape", [(2, 3), (3,), (1, 3)], ids=str)
 def test_picked_curves_know_their_end_conditions(shape):
     v = np.broadcast_to([0, 0.1, 0.2], shape)
     spline = ss.CubicSpline(None, [THREE, THREE], S2, bc_type=((1, v), (2, np.zeros(shape))))

@@ -81,10 +81,7 @@ def test_algorithm_1_stays_within(name, kd, ends, rng):
         bc = ends
         if ends == "velocity":
             # Three times the velocity of the nearest step: the leg h u/3 is as long as the step.
-            bc = (
-                (1, 3 * space.log(p[0], p[1])),
-                (1, 3 * unit_tangent(space, p[-1], rng) * kd / space.curvature),
-            )
+            bc = ((1, 3 * space.log(p[0], p[1])), (1, 3 * unit_tangent(space, p[-1], rng) * kd / space.curvature))
         options = {"bc_type": bc, "method": "fixed-point", "on_failure": "ignore"}
         radius = ss.CubicSpline(None, p, space, bc_type=bc).report.invariant_radius
         for sweeps in range(1, 11):
@@ -112,9 +109,7 @@ def alpha(kd, kv):
 @pytest.mark.parametrize("kd", [1e-3, 0.1, 0.2, 0.25, 0.2605])
 def test_bound_of_the_contraction(kd, rng):
     report = ss.CubicSpline(None, steps(S2, kd, rng), S2).report
-    assert report.contraction_bound == pytest.approx(
-        alpha(report.max_step, report.invariant_radius), rel=1e-12
-    )
+    assert report.contraction_bound == pytest.approx(alpha(report.max_step, report.invariant_radius), rel=1e-12)
     expected = {0.1: 0.533, 0.2: 0.665, 0.25: 0.857}.get(kd)
     assert expected is None or report.contraction_bound == pytest.approx(expected, abs=1e-3)
     assert report.guaranteed_sweeps == np.ceil(np.log(1e-12) / np.log(report.contraction_bound))
@@ -367,9 +362,7 @@ def test_control_polygons_of_a_product_stay_within_the_radii(rng):
     spline = ss.CubicSpline(None, tuple(parts), ss.Product(*spaces))
     assert spline.report.invariant_radius == pytest.approx(np.linalg.norm(radii), rel=1e-15)
     assert "(Theorem 3.1)" in str(spline.report)
-    legs = (
-        np.sqrt(sum(s.norm(p, u) ** 2 for s, p, u in zip(spaces, parts, spline.velocities, strict=True))) / 3
-    )
+    legs = np.sqrt(sum(s.norm(p, u) ** 2 for s, p, u in zip(spaces, parts, spline.velocities, strict=True))) / 3
     assert legs.max() <= spline.report.invariant_radius
 
 
@@ -377,7 +370,5 @@ def test_a_product_with_a_factor_of_far_points_has_none(rng):
     near, far = steps(S2, 0.2, rng), steps(S2, 0.5, rng)
     product = ss.Product(S2, S2)
     assert ss.CubicSpline(None, (near, far), product).report.invariant_radius is None
-    radius = ss.CubicSpline(
-        None, (np.stack([near, near]), np.stack([near, far])), product
-    ).report.invariant_radius
+    radius = ss.CubicSpline(None, (np.stack([near, near]), np.stack([near, far])), product).report.invariant_radius
     assert np.isnan(radius).tolist() == [False, True]

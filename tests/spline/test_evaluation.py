@@ -6,19 +6,7 @@ import re
 import numpy as np
 import pytest
 from cases import loop_over
-from curves import (
-    KNOTS,
-    S2,
-    each,
-    every_batch,
-    every_common,
-    every_kind,
-    found,
-    pick,
-    points_on,
-    same,
-    shaped,
-)
+from curves import KNOTS, S2, each, every_batch, every_common, every_kind, found, pick, points_on, same, shaped
 from refused import INF, NAN, TWO, P
 
 import symspline as ss
@@ -150,9 +138,7 @@ def test_error_names_the_curve_of_a_bad_time():
 
 def test_dates_and_numbers_do_not_mix():
     spline = ss.CubicSpline(np.datetime64("2024-01-01") + np.arange(3), P, S2)
-    with pytest.raises(
-        ss.ValidationError, match=r"the knots are dates, so x must be datetime64, not float64"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"the knots are dates, so x must be datetime64, not float64"):
         spline(0.5)
     with pytest.raises(ss.ValidationError, match=r"x\[1\] is NaT"):
         spline(np.array(["2024-01-01", "NaT"], "M8[D]"))

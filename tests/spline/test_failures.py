@@ -6,17 +6,8 @@ import warnings
 
 import numpy as np
 import pytest
-from cases import (
-    EPS,
-)
-from curves import (
-    S2,
-    failing,
-    largest_difference,
-    points_on,
-    same,
-    same_curve,
-)
+from cases import EPS
+from curves import S2, failing, largest_difference, points_on, same, same_curve
 
 import symspline as ss
 
@@ -236,8 +227,7 @@ def test_bad_points_of_one_of_many_curves(where):
 
 BEGIN = "neighbours almost at the cut locus"
 MARK = pytest.mark.parametrize(
-    "name",
-    ["sphere:2", "sphere:4", "rp:2", "cp:2", "gr:2,5", "cgr:2,4", "so:3", "so:5", "u:2", "su:3", "se:3"],
+    "name", ["sphere:2", "sphere:4", "rp:2", "cp:2", "gr:2,5", "cgr:2,4", "so:3", "so:5", "u:2", "su:3", "se:3"]
 )
 
 

@@ -108,9 +108,7 @@ def test_times_with_and_without_a_zone_do_not_mix():
         ss.CubicSpline(aware, P, S2)(NAIVE[1])
     with pytest.raises(ss.ValidationError, match="x has a time zone, but the knots have none"):
         ss.CubicSpline(NAIVE, P, S2)("2021-08-29T06:00Z")
-    with pytest.raises(
-        ss.ValidationError, match=r"t\[1\] is 2021-08-29 06:00:00, but .* before has a time zone"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"t\[1\] is 2021-08-29 06:00:00, but .* before has a time zone"):
         ss.CubicSpline([aware[0], *NAIVE[1:]], P, S2)
     with pytest.raises(ss.ValidationError, match=r"t\[2\] is '7'"):
         ss.CubicSpline(["2021-08-29", "2021-08-30", "7"], P, S2)
@@ -146,9 +144,7 @@ def test_time_zones_are_kept(zone, kind):
             for x in (middle, middle.astimezone(EAST), middle.astimezone(KOLKATA).isoformat()):
                 assert np.array_equal(curve(x), P[1]) and np.array_equal(curve([x])[0], P[1])
             for x in (middle.replace(tzinfo=None), "2026-01-01T06:00"):
-                with pytest.raises(
-                    ss.ValidationError, match=r"no time zone, but the knots have one.*both with"
-                ):
+                with pytest.raises(ss.ValidationError, match=r"no time zone, but the knots have one.*both with"):
                     curve(x)
         else:
             for x in (middle.replace(tzinfo=KOLKATA), "2026-01-01T06:00Z"):
@@ -173,8 +169,7 @@ def test_max_gap_accepts_durations():
 
 
 @pytest.mark.parametrize(
-    "t",
-    [[timedelta(0), timedelta(milliseconds=500), timedelta(seconds=2)], np.array([0, 500, 2000], "m8[ms]")],
+    "t", [[timedelta(0), timedelta(milliseconds=500), timedelta(seconds=2)], np.array([0, 500, 2000], "m8[ms]")]
 )
 def test_durations_are_seconds(t):
     spline = ss.CubicSpline(t, P, S2)
@@ -196,9 +191,7 @@ def test_tensors():
     assert ss.CubicSpline(None, [Tensor(row) for row in P], S2) == SPLINE_OF_NUMBERS
     assert np.array_equal(SPLINE_OF_NUMBERS(Tensor([0.5])), SPLINE_OF_NUMBERS([0.5]))
     for points in (Tensor(P, True), [Tensor(row, i == 1) for i, row in enumerate(P)]):
-        with pytest.raises(
-            ss.ValidationError, match=r"points(\[1\])? requires a gradient.*symspline\.torch\.curve"
-        ):
+        with pytest.raises(ss.ValidationError, match=r"points(\[1\])? requires a gradient.*symspline\.torch\.curve"):
             ss.CubicSpline(None, points, S2)
 
 
@@ -209,9 +202,7 @@ def test_quantum_objects():
     assert ss.CubicSpline(None, [states, states], "cp:1") == ss.CubicSpline(None, [kets, kets], "cp:1")
     unitary = ss.SpecialUnitary(2).random_point(np.random.default_rng(0), 3)
     assert ss.CubicSpline(None, list(map(Qobj, unitary)), "su:2") == ss.CubicSpline(None, unitary, "su:2")
-    assert ss.ComplexProjective(1).distance(states[0], states[1]) == ss.ComplexProjective(1).distance(
-        *kets[:2]
-    )
+    assert ss.ComplexProjective(1).distance(states[0], states[1]) == ss.ComplexProjective(1).distance(*kets[:2])
     with pytest.raises(ss.ValidationError, match=r"points\[1\] is a bra; pass the ket"):
         ss.CubicSpline(None, [states[0], Qobj(kets[1][None]), states[2]], "cp:1")
 
@@ -225,14 +216,8 @@ def test_quantum_objects():
             [[1, 0, 0], [0, 1, None], [0, 0, 1]],
             r"points\[1, 2\] must be an array of numbers, not of object: it is a NoneType",
         ),
-        (
-            [[1, 0, 0], [0, Decimal(1), 0]],
-            r"points\[1, 1\] .* it is a decimal\.Decimal; leave it out, or convert",
-        ),
-        (
-            [[1, 0, 0], [0, Quantity(), 0]],
-            r"points\[1\]\[1\] has the unit km, which would be lost; .*magnitude",
-        ),
+        ([[1, 0, 0], [0, Decimal(1), 0]], r"points\[1, 1\] .* it is a decimal\.Decimal; leave it out, or convert"),
+        ([[1, 0, 0], [0, Quantity(), 0]], r"points\[1\]\[1\] has the unit km, which would be lost; .*magnitude"),
         (Quantity(), r"points has the unit km"),
         (object(), r"points must be an array of numbers, not of object: it is a object; leave it out"),
     ],

@@ -150,14 +150,10 @@ def test_outside_the_knots():
     with pytest.raises(ss.ValidationError, match="outside"):
         found(5.0)
     assert (
-        np.abs(
-            found(4.5 + 0.3, extrapolate="geodesic") - S2.exp(found.points[-1], 0.3 * found.velocities[-1])
-        ).max()
+        np.abs(found(4.5 + 0.3, extrapolate="geodesic") - S2.exp(found.points[-1], 0.3 * found.velocities[-1])).max()
         < 1e-14
     )
-    assert np.array_equal(
-        curve(S2, extrapolate="geodesic").speed(4.8), found.speed(4.8, extrapolate="geodesic")
-    )
+    assert np.array_equal(curve(S2, extrapolate="geodesic").speed(4.8), found.speed(4.8, extrapolate="geodesic"))
 
 
 def test_dates():
@@ -207,9 +203,7 @@ def test_control_points_beyond_reach_are_refused(batch):
     velocities = np.zeros(points.shape)
     # The second segment's inner points are (1, 0, 0) and its antipode.
     velocities[..., 2, 0] = 1.5 * np.pi
-    with pytest.raises(
-        ss.CutLocusError, match=r"segment 1.*between t\[1\] and t\[2\].*velocities are too large"
-    ):
+    with pytest.raises(ss.CutLocusError, match=r"segment 1.*between t\[1\] and t\[2\].*velocities are too large"):
         ss.HermiteSpline(None, points, velocities, S2)
 
 
@@ -255,8 +249,6 @@ def test_an_empty_batch_and_velocities_in_single_precision():
     # Off the tangent space by what single precision may round.
     rounded = np.array([[1e-6, 0.5, 0], [0, 0, 0.5], [0, 0, 0]])
     assert ss.HermiteSpline(None, np.eye(3), rounded.astype(np.float32), "sphere:2").velocities[0, 0] == 0
-    with pytest.raises(
-        ss.ValidationError, match=r"velocities\[0\] is not tangent .* \(allowed: 1e-8\)"
-    ) as caught:
+    with pytest.raises(ss.ValidationError, match=r"velocities\[0\] is not tangent .* \(allowed: 1e-8\)") as caught:
         ss.HermiteSpline(None, np.eye(3), rounded, "sphere:2")
     assert caught.value.curve == () and caught.value.node == 0

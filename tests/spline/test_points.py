@@ -172,10 +172,7 @@ def test_splines_copy_their_input(space):
     [
         (np.ones((3, 4)), r"points has shape \(3, 4\), but Sphere\(2\) needs shape \(\.\.\., 3\)"),
         (np.ones((3, 1)), r"points has shape \(3, 1\), but Sphere\(2\) needs"),
-        (
-            np.ones(3),
-            r"shape \(3,\), which is one point; a curve needs shape \(\.\.\., N\+1, \*point_shape\)",
-        ),
+        (np.ones(3), r"shape \(3,\), which is one point; a curve needs shape \(\.\.\., N\+1, \*point_shape\)"),
         (np.ones(()), r"no points given; a curve needs at least two"),
         ([], r"no points given; a curve needs at least two"),
         (np.ones((0, 3)), r"no points given; a curve needs at least two"),

@@ -43,9 +43,7 @@ def test_max_step_of_a_product():
 def test_another_curve_of_a_product_is_another_curve_of_a_factor(batch):
     far, near = zigzag(2.5), points_on(S2, len(zigzag(2.5)))
     p = np.array([far, near]) if batch else far
-    factors = [
-        ss.CubicSpline(None, x, S2) for x in (p, p[..., ::-1, :], np.broadcast_to([0, 0, 1.0], p.shape))
-    ]
+    factors = [ss.CubicSpline(None, x, S2) for x in (p, p[..., ::-1, :], np.broadcast_to([0, 0, 1.0], p.shape))]
     report = ss.CubicSpline(None, tuple(f.points for f in factors), "s:2 x s:2 x s:2").report
     total = sum(f.bending_energy() for f in factors)
     other = total + np.minimum(*(f.report.alternative_energy - f.bending_energy() for f in factors[:2]))
@@ -71,11 +69,7 @@ FLAT = np.zeros((3, 1))
 @pytest.mark.parametrize(
     "points, options, match",
     [
-        (
-            P,
-            {},
-            r"points must be a tuple of 2 arrays, one per factor of Product\(Sphere\(2\), Euclidean\(1\)\)",
-        ),
+        (P, {}, r"points must be a tuple of 2 arrays, one per factor of Product\(Sphere\(2\), Euclidean\(1\)\)"),
         ((P,), {}, r"points must be a tuple of 2 arrays"),
         ((P, FLAT, FLAT), {}, r"points must be a tuple of 2 arrays"),
         ((FLAT, P), {}, r"points has shape \(3, 1\), but Sphere\(2\) needs"),

@@ -5,17 +5,7 @@ import json
 import numpy as np
 import pytest
 from cases import has_metric
-from curves import (
-    KNOTS,
-    S2,
-    at_node,
-    every_batch,
-    every_common,
-    every_kind,
-    every_single,
-    failing,
-    points_on,
-)
+from curves import KNOTS, S2, at_node, every_batch, every_common, every_kind, every_single, failing, points_on
 
 import symspline as ss
 

@@ -223,9 +223,7 @@ def test_the_two_times_are_named(close):
         ss.CubicSpline(t, points, "sphere:2")
     message = str(caught.value)
     assert f"t[20] = {t[20]} and t[21] = {t[21]} are too close for the distance 0.0958 " in message
-    assert (
-        "merge the two samples, smooth the data with make_smoothing_spline, or correct the clock" in message
-    )
+    assert "merge the two samples, smooth the data with make_smoothing_spline, or correct the clock" in message
     assert "long" not in message.partition("t[20]")[2]
 
 
@@ -444,9 +442,7 @@ def test_jax():
         i = BEYOND[0]
         points = jax.numpy.asarray(THREE, float)
         found = jax.grad(lambda p: sj.curve(LAST[i], knots(i), p, "sphere:2").sum())(points)
-        assert np.array_equal(
-            found, jax.grad(lambda p: sj.curve(END[i], knots(i), p, "sphere:2").sum())(points)
-        )
+        assert np.array_equal(found, jax.grad(lambda p: sj.curve(END[i], knots(i), p, "sphere:2").sum())(points))
         for values in (
             sj.evaluate(knots(i), points, sj.fit(knots(i), points, "sphere:2")[0], "sphere:2", x)
             for x in (LAST[i], END[i])
@@ -455,9 +451,7 @@ def test_jax():
     t = np.array([0.0, 0.1, 0.3], np.float32)
     late = np.nextafter(t[-1], np.float32(1))
     assert np.isfinite(sj.curve(late, t, points.astype(np.float32), "sphere:2")).all()
-    assert np.isfinite(
-        jax.grad(lambda p: sj.curve(late, t, p, "sphere:2").sum())(points.astype(np.float32))
-    ).all()
+    assert np.isfinite(jax.grad(lambda p: sj.curve(late, t, p, "sphere:2").sum())(points.astype(np.float32))).all()
 
 
 def test_the_command_line(tmp_path, monkeypatch, capsys):

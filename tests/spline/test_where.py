@@ -55,9 +55,7 @@ def test_a_bad_sensor_stops_no_other(name, value):
     keep = np.delete(np.arange(50), [17, 30])
     assert np.array_equal(some.velocities[keep], good.velocities[keep])
     assert np.isnan(some(X)[[17, 30]]).all() and np.count_nonzero(some.report.converged) == 48
-    with pytest.warns(
-        ss.ConvergenceWarning, match=r"points\[2\] of curve 17 is (off|not).*and 1 more curves failed"
-    ):
+    with pytest.warns(ss.ConvergenceWarning, match=r"points\[2\] of curve 17 is (off|not).*and 1 more curves failed"):
         ss.CubicSpline(None, p, name, on_failure="warn")
     with pytest.raises(ss.ValidationError, match=r"points\[2\] of curve 17"):
         ss.CubicSpline(None, p, name)
@@ -116,18 +114,14 @@ def test_errors_name_the_curve_in_the_whole_list():
     bad[2] = (None, (1 + 1e-6) * np.eye(3))
     with pytest.raises(ss.ValidationError, match=r"^curve 2: points\[0\] is off"):
         ss.fit_many(bad, "s:2", where=mask)
-    with pytest.raises(
-        ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"):
         ss.fit_many(bad, "s:2", where=mask[:2])
 
 
 @pytest.mark.parametrize("where", [[True], [1, 0], [True, False, True], True])
 def test_bad_masks(where):
     fit_error(
-        r"where must be True or False for every curve, of shape \(2,\)",
-        points=np.stack([np.eye(3)] * 2),
-        where=where,
+        r"where must be True or False for every curve, of shape \(2,\)", points=np.stack([np.eye(3)] * 2), where=where
     )
 
 
