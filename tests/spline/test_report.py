@@ -95,7 +95,7 @@ def test_report_describes_the_failure():
     assert "NOT converged" in str(spline[1].report)
 
 
-def test_state_is_described_by_plain_json():
-    # Used by whoever logs reports.
+def test_report_of_one_curve_is_plain_json():
+    # For those who log reports.
     report = ss.CubicSpline(None, np.eye(3), S2).report
     assert json.loads(json.dumps(vars(report)))["converged"] is True
