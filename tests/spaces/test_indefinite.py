@@ -312,24 +312,33 @@ def test_bases_and_reflections(name, rng):
     np.testing.assert_allclose(ss.convert.basis_to_reflection(mixed, negative=p), points, rtol=0, atol=1e-11)
 
 
-def test_invalid_subspaces_raise(rng):
-    null = [[1.0], [1.0], [0.0]]
-    with pytest.raises(ss.ValidationError, match="the form is degenerate on it"):
-        ss.convert.basis_to_reflection(null, negative=1)
-    with pytest.raises(ss.ValidationError, match="linearly independent columns"):
-        ss.convert.basis_to_reflection(np.ones((3, 2)), negative=1)
-    with pytest.raises(ss.ValidationError, match="negative must be a whole number from 0 to 3, not 4"):
-        ss.convert.basis_to_reflection(null, negative=4)
-    with pytest.raises(ss.ValidationError, match="does not preserve the form"):
-        ss.convert.reflection_to_basis([[0.0, 1.0], [1.0, 0.0]], negative=1)
+NULL = [[1.0], [1.0], [0.0]]
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda: ss.convert.basis_to_reflection(NULL, negative=1), "the form is degenerate on it"),
+        (lambda: ss.convert.basis_to_reflection(np.ones((3, 2)), negative=1), "linearly independent columns"),
+        (lambda: ss.convert.basis_to_reflection(NULL, negative=4), "must be a whole number from 0 to 3, not 4"),
+        (lambda: ss.convert.reflection_to_basis(np.eye(2)[::-1], negative=1), "does not preserve the form"),
+        (lambda: ss.convert.reflection_to_basis(np.eye(2), negative=1), "must leave a proper subspace fixed"),
+        (lambda: ss.convert.reflection_to_basis(-np.eye(2), negative=1), "must leave a proper subspace fixed"),
+        (lambda: ss.space("igr:0,1,1,2").check_point(2 * np.eye(3)), "the form with 1 negative squares first"),
+    ],
+)
+def test_invalid_subspaces_raise(call, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        call()
+
+
+def test_reflections_of_another_space_raise(rng):
     for name in ("igr:1,0,1,2", "igr:1,1,1,2", "igr:0,2,1,2"):
         point = ss.space("igr:0,1,1,2").random_point(rng)
         with pytest.raises(ss.ValidationError, match="form has another signature than"):
             ss.space(name).check_point(point)
     with pytest.raises(ss.ValidationError, match="it is not a reflection"):
         ss.space("igr:0,1,1,2").check_point(group_element(np.array([-1.0, 1, 1]), rng))
-    with pytest.raises(ss.ValidationError, match="does not preserve the form with 1 negative squares first"):
-        ss.space("igr:0,1,1,2").check_point(2 * np.eye(3))
 
 
 @pytest.mark.parametrize(
