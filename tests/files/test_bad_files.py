@@ -151,14 +151,11 @@ def report_with(**changes):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"format": "other"},
         {"version": 99},
         {"version": "one"},
-        {"space": "klein:2"},
         {"space": "sphere:3"},
         {"space": "sphere:" + "9" * 30},
         {"space": "sphere:2 x sphere:2"},
-        {"t": [0.0, 2, 1]},
         {"t": [0.0, 1, 1]},
         {"t": [0.0, NAN, 1]},
         {"t": [0.0, 1, INF]},
@@ -171,7 +168,6 @@ def report_with(**changes):
         {"t_unit": "parsec", "t": [0, 1, 2]},
         {"t_unit": "s CET", "t": [0, 1, 2]},
         {"t_unit": "s", "t": [0, 1, np.iinfo(np.int64).min]},
-        {"points": 2 * P},
         {"points": NAN * P},
         {"points": P + 0j},
         {"points": 3.0},
@@ -180,44 +176,23 @@ def report_with(**changes):
         {"velocities": P[:2]},
         {"velocities": NAN * P},
         {"bc_type": "{"},
-        {"bc_type": "5"},
         {"bc_type": "null"},
         {"extrapolate": '"foo"'},
         {"extrapolate": "[1]"},
         {"report": "[]"},
         {"report": "{}"},
         {"report": "[{}]"},
-        {"report": "5"},
         {"report": "[" * 100_000},
-        {"report": report_with(surprise=1)},
+        {"report": report_with(converged="no", rate={}, method=5)},
+        {"t": [0.0], "points": P[:1], "velocities": P[:1]},
+        {"bc_type": "{}"},
+        {"bc_type": '[["x", 1], "natural"]'},
     ],
     ids=lambda changes: str(changes)[:40],
 )
 def test_files_with_a_wrong_array(changes):
     with pytest.raises(ss.ValidationError):
         load(with_arrays(**changes))
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"t": [0.0], "points": P[:1], "velocities": P[:1]},
-        {"bc_type": '"foo"'},
-        {"bc_type": "{}"},
-        {"bc_type": '[["x", 1], "natural"]'},
-        {"velocities": P},
-        {"report": report_with(converged="no", rate={}, method=5)},
-    ],
-    ids=lambda changes: str(changes)[:40],
-)
-def test_files_with_a_wrong_array_that_are_read_all_the_same(changes):
-    with pytest.raises(ss.ValidationError):
-        load(with_arrays(**changes))
-
-
-def test_newer_files_say_so():
-    with pytest.raises(ss.ValidationError, match=r"entry 'version' is 99; this symspline reads version 1"):
-        load(with_arrays(version=99))
 
 
 def test_files_that_cannot_be_read(tmp_path):
@@ -297,6 +272,7 @@ def test_arrays_that_are_smaller_than_their_header_says():
     [
         ({"format": "other"}, "entry 'format' is 'other', but must be 'symspline-curve'"),
         ({"format": 3}, "entry 'format' is not a text: it holds int64"),
+        ({"version": 99}, "entry 'version' is 99; this symspline reads version 1"),
         ({"version": 1.5}, "entry 'version' is 1.5; this symspline reads version 1"),
         ({"version": 0}, "entry 'version' is 0; this symspline reads version 1"),
         ({"version": [1, 1]}, r"entry 'version' is \[1, 1\]"),
@@ -335,9 +311,9 @@ def many_with(**changes):
     file = io.BytesIO()
     curve = ss.CubicSpline(None, P, S2)
     ss.save_many({"a": curve, "b": curve}, file)
-    arrays = dict(np.load(io.BytesIO(file.getvalue()))) | changes
-    file = io.BytesIO()
-    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    file.seek(0)
+    arrays, file = dict(np.load(file)) | changes, io.BytesIO()
+    np.savez(file, **arrays)
     return io.BytesIO(file.getvalue())
 
 

@@ -27,18 +27,11 @@ def test_segments_are_fitted_independently(space):
 
 
 @every_kind
-def test_first_of_duplicate_times_is_kept(space):
+def test_duplicate_times_keep_the_first_point_or_the_mean(space):
     p = points_on(space, 8, step=0.3)
     t = [0, 1, 1, 1, 2, 3, 3, 4]
     (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="first")
-    kept = [0, 1, 4, 5, 7]
-    assert found == ss.CubicSpline(np.arange(5.0), each(lambda a: a[kept], p), space)
-
-
-@every_kind
-def test_merged_point_is_the_mean(space):
-    p = points_on(space, 8, step=0.3)
-    t = [0, 1, 1, 1, 2, 3, 3, 4]
+    assert found == ss.CubicSpline(np.arange(5.0), each(lambda a: a[[0, 1, 4, 5, 7]], p), space)
     (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="mean")
     for factor, given, means in zip(factors(space), parts(p), parts(found.points), strict=True):
         for i, own in ((1, slice(1, 4)), (3, slice(5, 7))):
@@ -46,8 +39,8 @@ def test_merged_point_is_the_mean(space):
         # The mean of two points is half way.
         middle = factor.geodesic(given[5], given[6], 0.5)
         assert factor.norm(middle, factor.log(middle, means[3])) < 5e-15
-    alone = [0, 4, 7]
-    assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), each(lambda a: a[alone], p)) < 1e-15
+    single = each(lambda a: a[[0, 4, 7]], p)
+    assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), single) < 1e-15
 
 
 def test_times_close_together_are_not_one():
