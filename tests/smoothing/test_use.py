@@ -1,7 +1,5 @@
 """What people hand over, and what they get back."""
 
-import pickle
-
 import numpy as np
 import pytest
 from noisy import example, rms
@@ -34,16 +32,6 @@ def test_is_a_cubic_spline():
     t, points = spline.data
     assert np.array_equal(t, T) and np.allclose(points, NOISY)
     assert "40 data" in repr(spline) and "degrees of freedom" in str(spline.report)
-
-
-def test_comes_back_from_a_pickle():
-    for spline in (
-        ss.make_smoothing_spline(T, NOISY, S2),
-        ss.make_smoothing_spline(T, (NOISY, NOISY), ss.Product(S2, S2)),
-        ss.make_smoothing_spline(T, np.stack([NOISY, NOISY]), S2),
-    ):
-        back = pickle.loads(pickle.dumps(spline))
-        assert back == spline and np.array_equal(back.std(T), spline.std(T))
 
 
 def test_progress_is_shown():
