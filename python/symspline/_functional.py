@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import checked_flag, read_only, short_repr
+from ._arrays import read_only, short_repr
 from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -17,11 +17,10 @@ from ._curves.curve import CurveArrays, quantity_of
 from ._curves.ends import freeze_bc_type, picked
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._far import warn_of_far_points
 from ._input import in_library, library_of
-from ._options import check_on_failure, check_progress, checked_extrapolate, options_of, outside, with_atol
+from ._options import check_progress, checked_extrapolate, fit_options, outside, with_atol
 from ._report import Report
-from ._signs import warn_of_signs
+from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -149,14 +148,11 @@ def fit_many(
     >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
     [4, 2]
     """
-    space, check = space_named(space), checked_flag(check, "check")
+    space = space_named(space)
+    options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
     pairs = list(curves)
-    policy = checked_extrapolate(extrapolate)
-    check_on_failure(on_failure)
-    check_progress(progress)
-    options = options_of(method, tol, max_iter)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
             raise ValidationError(f"curve {number} must be a pair (t, points)")
@@ -176,16 +172,16 @@ def fit_many(
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
     problem = fitting.ManyProblem(
-        space, times, points, ends, options, check, mask, skip_invalid=on_failure != "raise"
+        space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
     fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
     fitted = [
-        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)
+        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), extrapolate, found)
         for i, ((clock, t, _), found) in enumerate(zip(knots, fits, strict=True))
     ]
     if faults:
         raise_or_warn(faults, on_failure, fitted)
-    warn_of_signs(space, [own if mask is None or mask[i] else None for i, own in enumerate(points)])
-    warn_of_far_points([found.curve for found in fits], [found.reports for found in fits])
+    wanted = [own if mask is None or mask[i] else None for i, own in enumerate(points)]
+    warn_of_representatives(space, wanted, [found.curve for found in fits], [found.columns for found in fits])
     return fitted

@@ -162,6 +162,7 @@ OPTIONAL = (
     "velocity_error",
 )
 NUMBERS = ("residual", "max_step", "rate", *OPTIONAL)
+MAX_STEP = NUMBERS.index("max_step")
 
 
 class Columns(NamedTuple):
