@@ -270,3 +270,22 @@ def test_the_nearest_rotation_is_the_factor_of_the_polar_decomposition():
     np.testing.assert_array_equal(ss.space("se:3").project(poses)[:, :3, :3], found)
     with pytest.raises(ss.ValidationError, match="reflection"):
         space.check_point(-rotations[0])
+
+
+@pytest.mark.parametrize("name", ["cp:1", "cp:3"])
+@pytest.mark.parametrize(
+    ("matrices", "hint"),
+    [
+        ([np.diag([0.5, 0.5])] * 3, True),
+        ([[[0.6, 0.2j], [-0.2j, 0.4]]] * 3, True),
+        ([[[0.6, 0.2], [0.1, 0.4]]] * 3, False),
+        ([np.diag([0.5, 0.6])] * 3, False),
+        # The purity of a state is 1 at most.
+        ([np.diag([1.5, -0.5])] * 3, False),
+        ([np.diag([0.5, 0.5]), np.diag([0.5, 0.6])], False),
+    ],
+)
+def test_only_density_matrices_get_the_advice_for_them(name, matrices, hint):
+    with pytest.raises(ss.ValidationError) as caught:
+        ss.CubicSpline(None, matrices, name)
+    assert ("looks like density matrices, Hermitian of trace 1" in str(caught.value)) == hint

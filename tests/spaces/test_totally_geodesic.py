@@ -145,10 +145,15 @@ def test_siegel_there_and_back():
     p = convert.siegel_to_positive_definite(z)
     j = symplectic(3)
     assert np.abs(turned(p) @ j @ p - j).max() <= 1e-12 * np.abs(p).max() ** 2
-    np.testing.assert_allclose(convert.positive_definite_to_siegel(p), z, atol=1e-11)
+    back = convert.positive_definite_to_siegel(p)
+    np.testing.assert_allclose(back, z, atol=1e-11)
+    assert np.array_equal(back, turned(back))
     # Symplectic maps act by Möbius transformations on one side, by congruence on the other: here z ↦ −z⁻¹.
     moved = convert.siegel_to_positive_definite(-np.linalg.inv(z))
     np.testing.assert_allclose(moved, j @ p @ j.T, rtol=0, atol=1e-11 * np.abs(p).max())
+    # Where the condition is 1e12 rounding may be 1e-4.
+    far = convert.positive_definite_to_siegel(convert.siegel_to_positive_definite([[1e3 + 1j]]))
+    np.testing.assert_allclose(far, [[1e3 + 1j]], rtol=1e-12)
 
 
 def test_quaternionic_lines():
