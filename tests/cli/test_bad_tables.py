@@ -159,3 +159,17 @@ def test_parquet_columns_of_other_types(fails):
             more = "" if option == "--columns" else "--columns x"
             problem = fails(f"fit a.parquet --space r:1 {option} odd {more} -o a.npz")
             assert "a.parquet" in problem and ("'odd'" in problem or "of curve" in problem)
+
+
+@pytest.mark.parametrize("cell", ["1_000", "١٢", "1_0.5", "１２"])
+def test_numbers_in_unusual_notation_are_refused(run, fails, cell):
+    for text, options, problem in [
+        (f"t,x\n0,1\n1,2\n2,{cell}\n", "", f"line 4: column 'x' holds {cell!r}, which is not a number"),
+        (f"t,x\n0,1\n1,2\n{cell},3\n", "", f"line 4: column 't' holds {cell!r}"),
+        ("t,x\n0,1\n1,2\n", "--tol 1_0", "--tol: invalid number value: '1_0'"),
+    ]:
+        write("a.csv", text)
+        assert problem in fails(f"fit a.csv --space r:1 {options} -o a.npz")
+    write("a.csv", "t,x\n0,1\n1, 2.5 \n")
+    run("fit a.csv --space r:1 -o a.npz")
+    assert "1_0" in fails("sample a.npz -n 1_0 -o b.csv")
