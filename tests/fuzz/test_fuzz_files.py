@@ -108,17 +108,9 @@ def test_files_with_other_arrays(data):
             arrays[key] = np.array(draw(damaged_json(str(array))))
         elif array.ndim == 0:
             words = [
-                "symspline-curve",
-                "symspline-curves",
-                "symspline-smoothing",
-                "sphere:2",
-                "s:2 x s:2",
-                "r:1",
-                "ns",
-                "generic",
-                "Y",
-                "10s",
-            ]
+                "symspline-curve", "symspline-curves", "symspline-smoothing", "sphere:2", "s:2 x s:2", "r:1", "ns",
+                "generic", "Y", "10s",
+            ]  # fmt: skip
             arrays[key] = np.array(draw(st.one_of(st.sampled_from(words), st.text(max_size=9), st.integers(-2, 3))))
         else:
             value = draw(array_like(array, BAD))

@@ -10,21 +10,9 @@ from curves import KNOTS, S2, at_node, every_batch, every_common, every_kind, ev
 import symspline as ss
 
 FIELDS = [
-    "method",
-    "converged",
-    "iterations",
-    "residual",
-    "max_step",
-    "max_gap",
-    "curvature",
-    "invariant_radius",
-    "rate",
-    "alternative_energy",
-    "contraction_bound",
-    "guaranteed_sweeps",
-    "skipped",
-    "velocity_error",
-]
+    "method", "converged", "iterations", "residual", "max_step", "max_gap", "curvature", "invariant_radius", "rate",
+    "alternative_energy", "contraction_bound", "guaranteed_sweeps", "skipped", "velocity_error",
+]  # fmt: skip
 
 
 @every_kind
