@@ -425,3 +425,14 @@ def jumps(spline):
             difference = np.abs(left - right).reshape(len(left), -1).max(axis=1, initial=0.0)
         found.append(float((difference / allowed).max(initial=0.0)))
     return found
+
+
+def by_differences(space, curve, x, h):
+    """Velocity and covariant acceleration, by Richardson's extrapolation of central differences at h and h/2."""
+    y = curve(x)
+
+    def differences(h):
+        plus, minus = (space.log(y, curve(x + s * h)) for s in (1, -1))
+        return (plus - minus) / (2 * h), (plus + minus) / h**2
+
+    return tuple((4 * half - whole) / 3 for whole, half in zip(differences(h), differences(h / 2), strict=True))

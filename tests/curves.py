@@ -158,3 +158,8 @@ def pair_of_curves(space):
     axes = np.eye(3)
     points = np.stack([axes, axes[[1, 0, 2]]])
     return ss.CubicSpline(None, (points, points) if isinstance(space, ss.Product) else points, space)
+
+
+def clamped(interior, degree, end=3.0):
+    """Knots of a B-spline from 0 to ``end`` at which it starts and ends in its control points."""
+    return np.concatenate([[0.0] * (degree + 1), interior, [end] * (degree + 1)])
