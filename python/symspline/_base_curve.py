@@ -111,7 +111,7 @@ class Curve(ABC):
             a time zone, pass times with any time zone, or ``datetime64`` in UTC; otherwise pass times without one.
         nu : {0, 1, 2}, default 0
             Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
-        extrapolate : {None, True, "geodesic", "periodic"}, default None
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy for this call. None means the policy of the curve.
         per_curve : bool, default False
             True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
@@ -173,7 +173,7 @@ class Curve(ABC):
         nu : {0, 1, 2}, default 0
             Order of the derivative: 0 for representatives, 1 for the velocity γ', 2 for the covariant acceleration
             ∇γ'. Velocities are the derivatives of the representatives.
-        extrapolate : {None, True, "geodesic", "periodic"}, default None
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy for this call. None means the policy of the curve.
         per_curve : bool, default False
             True if every curve of a batch has its own times.
@@ -214,7 +214,8 @@ class Curve(ABC):
             self._clock,
             x,
             per_curve,
-            lambda curve, x, per_curve: curve.lift(x, quantity, where, per_curve, start, progress),
+            where,
+            lambda curve, x, per_curve, where: curve.lift(x, quantity, where, per_curve, start, progress),
         )
 
     def transport(self, x0: Any, x1: Any, v: Any) -> Any:
@@ -318,7 +319,7 @@ class Curve(ABC):
         ----------
         x : array_like of float or datetime64
             Times, of any shape and in any order, as in a call of the curve.
-        extrapolate : {None, True, "geodesic", "periodic"}, default None
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy for this call. None means the policy of the curve.
         per_curve : bool, default False
             True if every curve of a batch has its own times.
@@ -382,7 +383,7 @@ class Curve(ABC):
         """
         curve = self._curve
         return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
+            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
         )
 
     def bending_energy(self) -> Any:
@@ -410,7 +411,7 @@ class Curve(ABC):
         >>> round(float(wave.bending_energy()), 8)
         6.0
         """
-        return bending_energy(self._curve, self._outside)
+        return bending_energy(self._curve)
 
     # ---- data ----
 
@@ -582,12 +583,12 @@ def evaluated(
 ) -> Any:
     """Evaluate a quantity at times as a user passes them."""
 
-    def call(curve: CurveArrays, x: Doubles, per_curve: bool) -> Any:
+    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
         if out is None:
             return curve.evaluate(x, quantity, outside, per_curve, progress)
         return curve.write(out, x, quantity, outside, per_curve, progress)
 
-    return call_at_times(curve, clock, x, per_curve, call)
+    return call_at_times(curve, clock, x, per_curve, outside, call)
 
 
 def call_at_times(
@@ -595,9 +596,18 @@ def call_at_times(
     clock: TimeAxis,
     x: ArrayLike,
     per_curve: bool,
-    call: Callable[[CurveArrays, Doubles, bool], Any],
+    outside: str,
+    call: Callable[[CurveArrays, Doubles, bool, str], Any],
 ) -> Any:
-    """Call a function of a curve with times as a user passes them."""
+    """Call a function of a curve with times as a user passes them.
+
+    Parameters
+    ----------
+    outside : str
+        Extrapolation policy by its name in the core, or ``"nan"``, which this function implements.
+    call : callable
+        Function of the curve, times as the core counts them, `per_curve`, and a policy of the core.
+    """
     per_curve = checked_flag(per_curve, "per_curve")
     if clock.plain and type(x) is float:
         # Single times are frequent, and the general conversion would cost more than the evaluation.
@@ -606,7 +616,31 @@ def call_at_times(
             times, per_curve = onto_ends(times, knots, curve.batch, per_curve)
     else:
         times, per_curve = clock.at(x, curve.batch, per_curve, curve.times)
+    beyond = None
+    if outside == "nan":
+        times, per_curve, beyond = _inside(curve, times, per_curve)
+        outside = "raise"
     try:
-        return call(curve, times, per_curve)
+        values = call(curve, times, per_curve, outside)
     except ValidationError as error:
         raise clock.explain(error) from None
+    if beyond is not None:
+        index = beyond if per_curve else (slice(None),) * len(curve.batch) + (beyond,)
+        for own in values if isinstance(values, tuple) else (values,):
+            own[index] = np.nan
+    return values
+
+
+def _inside(
+    curve: CurveArrays, times: Doubles, per_curve: bool
+) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
+    """Replace times outside the knots by the first knot, and return which times these are, if any."""
+    first, last = curve.times[..., 0], curve.times[..., -1]
+    if curve.times.ndim > 1:
+        own = times.shape[len(curve.batch) :] if per_curve else times.shape
+        first, last = (end.reshape(curve.batch + (1,) * len(own)) for end in (first, last))
+    # Infinite times and NaN remain, and raise.
+    beyond = np.asarray(np.isfinite(times) & ((times < first) | (times > last)))
+    if not beyond.any():
+        return times, per_curve, None
+    return np.where(beyond, first, times), per_curve or beyond.ndim > times.ndim, beyond

@@ -15,15 +15,14 @@ from ._curves.curve import CurveArrays
 from ._curves.derivatives import places
 from ._curves.ends import ends_in_factors, freeze_bc_type, picked
 from ._curves.energy import alternative_energy
-from ._curves.fit import FitProblem, curve_of, fit, mask_of, read, read_ends
+from ._curves.fit import Fit, FitProblem, curve_of, fit, mask_of, read, read_ends
 from ._curves.gradient import Gradient, Places
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._far import warn_of_far_points
-from ._options import check_fit_options, options_of, outside, with_atol
+from ._options import fit_options, outside, with_atol
 from ._report import Report, combined
-from ._signs import warn_of_signs
+from ._representatives import warn_of_representatives
 from ._spaces import Array, Space
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -65,10 +64,10 @@ class CubicSpline(Curve):
         Largest relative C² residual of a converged curve, see `Report.residual`.
     max_iter : int, optional
         Largest number of iterations. By default each solver has its own limit.
-    extrapolate : {None, True, "geodesic", "periodic"}, default None
-        Extrapolation policy for times beyond the knots. None raises `ValidationError`, except for closed curves,
-        which are evaluated periodically. True continues the first and last segments. ``"geodesic"`` continues with
-        constant velocity. ``"periodic"`` repeats the curve.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. ``"raise"`` raises `ValidationError`, and so does None,
+        except for closed curves, which are repeated. True continues the first and last segments. False gives NaN.
+        ``"geodesic"`` continues with constant velocity. ``"periodic"`` repeats the curve.
     on_failure : {"raise", "warn", "ignore"}, default "raise"
         Action if a curve does not converge or meets a cut locus. ``"warn"`` issues a `ConvergenceWarning`. An
         unconverged curve keeps its best iterate (the last one with ``method="fixed-point"``). A curve that meets a
@@ -160,8 +159,7 @@ class CubicSpline(Curve):
         progress: Progress | None = None,
     ) -> None:
         space = space_named(space)
-        check_fit_options(extrapolate, on_failure, check, progress)
-        options = options_of(method, tol, max_iter)
+        options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
         data = read(points, space)
         if atol is not None:
             data = with_atol(data, atol)
@@ -170,17 +168,23 @@ class CubicSpline(Curve):
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         problem = FitProblem(
-            space, times, data, ends, options, bool(check), mask_of(where, batch), skip_invalid
+            space,
+            times,
+            data,
+            ends,
+            options,
+            bool(check),
+            None if where is None else mask_of(where, batch),
+            skip_invalid,
         )
         try:
-            curve, reports, faults = fit(problem, progress)
+            found = fit(problem, progress)
         except ValidationError as error:
             raise clock.explain(error) from None
-        self._fill(clock, shown_times, curve, freeze_bc_type(bc_type), extrapolate, reports)
-        if faults:
-            raise_or_warn(faults, on_failure, self)
-        warn_of_signs(space, [data], [report.max_step for report in reports])
-        warn_of_far_points([curve], [reports])
+        self._fill(clock, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
+        if found.faults:
+            raise_or_warn(found.faults, on_failure, self)
+        warn_of_representatives(space, [data], [found.curve], [found.columns])
 
     def _fill(
         self,
@@ -189,10 +193,14 @@ class CubicSpline(Curve):
         curve: CurveArrays,
         bc_type: Any,
         extrapolate: Any,
-        reports: list[Report],
+        reports: list[Report] | Fit,
     ) -> None:
         self._clock, self._t, self._curve = clock, t, curve
-        self._bc_type, self._extrapolate, self._reports = bc_type, extrapolate, reports
+        self._bc_type, self._extrapolate = bc_type, extrapolate
+        if isinstance(reports, Fit):
+            self._fit = reports
+        else:
+            self._reports = reports
         self._outside = outside(extrapolate, bc_type)
 
     @classmethod
@@ -337,6 +345,11 @@ class CubicSpline(Curve):
         """End conditions, as passed to the constructor."""
         return self._bc_type
 
+    @cached_property
+    def _reports(self) -> list[Report]:
+        """Reports in every factor, created on demand because they cost up to a third of a fit of few points."""
+        return self._fit.reports()
+
     @property
     def report(self) -> Report:
         """Report of the fit: convergence, solver, residual and step lengths."""
@@ -348,7 +361,7 @@ class CubicSpline(Curve):
     def _product_report(self) -> Report:
         """Report of all factors, computed on first access because it costs more than a fit of few points."""
         curve, reports = self._curve, self._reports
-        other = alternative_energy(curve, reports, self._outside)
+        other = alternative_energy(curve, reports)
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property

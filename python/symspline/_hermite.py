@@ -11,10 +11,9 @@ from ._base_curve import Curve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
-from ._far import warn_of_far_points
 from ._functional import velocities_of
 from ._options import checked_extrapolate, outside, with_atol
-from ._signs import warn_of_signs
+from ._representatives import warn_of_far_points, warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -40,9 +39,10 @@ class HermiteSpline(Curve):
         those of rotations from angular velocities.
     space : Space or str
         A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
-    extrapolate : {None, True, "geodesic", "periodic"}, default None
-        Extrapolation policy for times beyond the knots. None raises `ValidationError`. True continues the first and
-        last segments. ``"geodesic"`` continues with constant velocity. ``"periodic"`` repeats the curve.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True continues
+        the first and last segments. False gives NaN. ``"geodesic"`` continues with constant velocity. ``"periodic"``
+        repeats the curve.
     atol : float, optional
         Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
 
@@ -118,7 +118,7 @@ class HermiteSpline(Curve):
         curve = curve_of(space, times, arrays, fitted=False)
         self._fill(clock, shown_times, curve, policy)
         warn_of_signs(space, [data])
-        warn_of_far_points([curve], [None])
+        warn_of_far_points([curve])
 
     def _fill(self, clock: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate

@@ -11,12 +11,14 @@ from ._curves.fit import Points
 from ._curves.solve import Options
 
 _RAISE = "raise"
-_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
-
-
-def options_of(method: str, tol: float, max_iter: int | None) -> Options:
-    """Return solver options. The core validates `method` and `tol`."""
-    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
+_OUTSIDE = {
+    None: "raise",
+    "raise": "raise",
+    True: "continue",
+    False: "nan",
+    "geodesic": "geodesic",
+    "periodic": "periodic",
+}
 
 
 def with_atol(data: list[Points], atol: float | None) -> list[Points]:
@@ -30,9 +32,10 @@ def with_atol(data: list[Points], atol: float | None) -> list[Points]:
 def checked_extrapolate(extrapolate: Any) -> Any:
     """Return the extrapolation policy, or raise ValidationError if it is invalid."""
     known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
-    if extrapolate is not None and extrapolate is not True and not known:
+    if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
-            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
+            "extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not "
+            f"{short_repr(extrapolate)}"
         )
     return extrapolate
 
@@ -48,8 +51,19 @@ def check_progress(progress: Any) -> None:
         raise ValidationError(f"progress must be a function of two numbers, not {short_repr(progress)}")
 
 
-def check_fit_options(extrapolate: Any, on_failure: Any, check: Any, progress: Any) -> None:
-    """Raise ValidationError unless all of these are valid. The defaults, which are frequent, cost one call."""
+def fit_options(
+    method: str,
+    tol: float,
+    max_iter: int | None,
+    extrapolate: Any,
+    on_failure: Any,
+    check: Any,
+    progress: Any,
+) -> Options:
+    """Return the options of the solver, after validation of all options of a fit.
+
+    The compiled core validates ``method`` and ``tol``. The usual defaults take no further function call.
+    """
     if extrapolate is not None:
         checked_extrapolate(extrapolate)
     # == would compare every element of an array.
@@ -59,6 +73,7 @@ def check_fit_options(extrapolate: Any, on_failure: Any, check: Any, progress: A
         checked_flag(check, "check")
     if progress is not None:
         check_progress(progress)
+    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
 
 
 def check_on_failure(on_failure: Any) -> None:

@@ -220,6 +220,7 @@ OPTIONAL = (
     "velocity_error",
 )
 NUMBERS = ("residual", "max_step", "rate", *OPTIONAL)
+MAX_STEP = NUMBERS.index("max_step")
 
 
 class Columns(NamedTuple):

@@ -21,7 +21,7 @@ Array = NDArray[Any]
 # From this ambient dimension on, frames of the whole tangent space are not computed.
 LARGE = 256
 # Operations whose result is one number per point.
-_NUMBERS = ("distance", "inner", "rounding")
+_NUMBERS = ("distance", "cut_fraction", "inner", "rounding")
 # Largest number of entries of a point: 8 TB.
 _MOST = 2**40
 
