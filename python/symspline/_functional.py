@@ -236,7 +236,7 @@ def fit_many(
         Pairs ``(t, points)``, one per curve, as for `CubicSpline`. Each pair is a single curve, not a batch.
     space : Space or str
         Space of all curves, or its name.
-    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol
+    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol : optional
         As for `CubicSpline`. They apply to all curves.
     where : array_like of bool, optional
         Mask over the curves. Curves where it is False are not fitted and evaluate to NaN.
