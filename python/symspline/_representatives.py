@@ -18,6 +18,8 @@ from ._report import MAX_STEP, Columns, FarPointsWarning
 from ._spaces import Array, Space, Sphere, Unitary, factors_of
 from .manifolds import Manifold
 
+Doubles = NDArray[np.float64]
+
 # The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6
 # Fewer steps are too few to show a pattern.
@@ -36,23 +38,28 @@ def warn_of_representatives(
     space: Space,
     points: Sequence[list[Points] | None],
     curves: Sequence[CurveArrays],
-    columns: Sequence[Sequence[Columns]],
+    longest_steps: Sequence[Sequence[Columns | Doubles]],
 ) -> None:
     """Warn about signs and about far points, for curves through their points.
 
     Parameters
     ----------
-    points, curves, columns
+    points, curves, longest_steps
         As for `warn_of_signs` and `warn_of_far_points`.
     """
     factors = factors_of(space)
-    for each in columns:
+    for each in longest_steps:
         for factor, own in zip(factors, each, strict=True):
             limit = factor.__dict__.get("_longest_near_step") or _longest_near_step(factor)
-            if np.count_nonzero(own.numbers[MAX_STEP] > limit):
+            if np.count_nonzero(_longest(own) > limit):
                 warn_of_signs(space, points)
-                warn_of_far_points(curves, columns)
+                warn_of_far_points(curves, longest_steps)
                 return
+
+
+def _longest(steps: Columns | Doubles) -> Doubles:
+    """Return the longest step of every curve."""
+    return steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
 
 
 def _longest_near_step(space: Space) -> float:
@@ -116,7 +123,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 
 
 def warn_of_far_points(
-    curves: Sequence[CurveArrays], columns: Sequence[Sequence[Columns]] | None = None
+    curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]
 ) -> None:
     """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
@@ -124,8 +131,8 @@ def warn_of_far_points(
     ----------
     curves : sequence of CurveArrays
         The curves of one fit.
-    columns : sequence of sequence of Columns, optional
-        The reports of each curve in every factor. Points whose longest step is short need not be examined.
+    longest_steps : sequence of sequence of Columns or ndarray
+        The longest steps of each curve in every factor, or its reports. Points need not be examined if these are short.
     """
     found: list[tuple[tuple[int, ...], int, int, Space]] = []
     for number, curve in enumerate(curves):
@@ -134,12 +141,12 @@ def warn_of_far_points(
             continue
         for k, part in enumerate(curve.parts):
             limit = FAR * part.space.injectivity_radius
-            own = None if columns is None else columns[number][k]
+            own = longest_steps[number][k]
             # The deciding angle never exceeds the distance.
-            if not limit < math.inf or (own is not None and not (own.numbers[MAX_STEP] > limit).any()):
+            if not (_longest(own) > limit).any():
                 continue
             far = np.count_nonzero(cut_fractions(part.space, part.points) > FAR, axis=-1)
-            if own is not None:
+            if isinstance(own, Columns):
                 # Curves that did not converge are reported elsewhere, according to `on_failure`.
                 far = np.where(own.row("converged").reshape(curve.batch), far, 0)
             for index in np.argwhere(far > steps / 2).tolist():
