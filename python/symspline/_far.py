@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from ._core import CutLocusError
 from ._curves.curve import CurveArrays
-from ._errors import callers_level
+from ._errors import warn
 from ._report import FarPointsWarning, Report
 from ._spaces import Array, Space, Unitary
 from .manifolds import Manifold
@@ -54,14 +53,14 @@ def warn_of_far_points(curves: Sequence[CurveArrays], reports: Sequence[Sequence
     of = f" of curve {','.join(map(str, place))}" if place else ""
     others = len({place for place, *_ in found}) - 1
     more = f" (and of {others} more curves)" if others else ""
-    warnings.warn(
+    warn(
         f"more than half of the steps are long: {count} of {steps} steps between neighbouring points{of}{more} are "
         f"beyond {FAR} of the way to the cut locus of {space!r}, where several C² curves may exist. Where points have "
         "equivalent representatives, as orientations of crystals do, take the one nearest to the previous point. Where "
         "phases, signs or bases do not count, remove them, or use a projective space or a Grassmannian. Otherwise put "
         "points in between.",
         FarPointsWarning,
-        stacklevel=callers_level(),
+        place,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._curves.fit import Points
-from ._errors import callers_level
+from ._errors import warn
 from ._spaces import Array, Space, Sphere, factors_of
 
 # Points nearer to each other than this, a little less than π/2, have a positive inner product.
@@ -57,12 +56,13 @@ def warn_of_signs(
     of = f" of curve {','.join(map(str, curve))}" if curve else ""
     more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
-    warnings.warn(
+    warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. As quaternions q and -q are one rotation, but here the curve turns the long way round. "
         f"{IN_PYTHON}",
         UserWarning,
-        stacklevel=callers_level(),
+        tuple(curve),
+        i,
     )
 
 

@@ -42,8 +42,8 @@ from typing import Any
 
 import numpy as np
 
-from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
+from .._exceptions import SymsplineError
 from .._functional import fit_many
 from .._report import long_gaps
 from .._signs import IN_PYTHON
@@ -155,10 +155,10 @@ def _fitted(
                 fitted = fit_many(data.curves, space, bc_type=ends, method=options.method, **tol, **common)
             else:
                 fitted = smooth_many([(*curve, {}) for curve in data.curves], space, **common, **smooth)
-    except (ValidationError, CutLocusError, ConvergenceError) as error:
-        raise type(error)(data.located(str(error))) from None
+    except SymsplineError as error:
+        raise error._with_message(data.located(error)) from None
     for note in noted:
-        say(data.located(str(note.message).replace(IN_PYTHON, _FOR_ROTATIONS)))
+        say(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS))
     return fitted
 
 

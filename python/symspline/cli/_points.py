@@ -17,7 +17,7 @@ from .._pose_files import join, rotations_in_rows
 from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of
 from .._spaces import space as space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
-from ._errors import Problem, with_names, without_advice
+from ._errors import Problem, for_command_line
 from ._tables import IM, RE, Place
 
 Doubles = NDArray[np.float64]
@@ -187,7 +187,7 @@ def _projected(space: Space, points: NDArray[Any], file: object, place: Place, o
     try:
         space._handle.check_points(space._rows(doubles, lead), lead, POINT_TOL_FLOAT32)
     except ValidationError as error:
-        row, _, found = with_names(without_advice(str(error))).removeprefix("point ").partition(" ")
+        row, _, found = for_command_line(error).removeprefix("point ").partition(" ")
         order = f"; the columns of the table are a {matrix(space)}" if matrix(space) else ""
         raise Problem(f"{file}: {of}the point in {place(int(row))} {found}{order}") from None
     return space.project(points)
