@@ -1,4 +1,4 @@
-"""Curves with bands around them in pictures of two dimensions; a band is made of discs."""
+"""Curves with bands around them in two-dimensional pictures. A band is a union of discs."""
 
 from __future__ import annotations
 
@@ -17,27 +17,26 @@ from .style import Array, Indices, evenly
 ALPHA = 0.22
 _ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 CIRCLE: Array = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
-"""Places around a disc."""
+"""Positions on the unit circle."""
 
 
 def draw_in_plane(
     axes: Axes, curve: Curve, flat: Callable[[Any], Array], rims: Callable[[Array, Array], Array]
 ) -> None:
-    """A curve in a map of a surface, with its band and its points.
+    """Draw a curve in a map of a surface, with its band and its points.
 
-    Args:
-        flat: places of points in the map.
-        rims: discs around places, with radii, shape (m, k, 2).
+    ``flat`` returns positions of points in the map. ``rims`` returns discs of given radii around such positions, shape
+    (m, k, 2).
     """
     if curve.radii is not None:
-        some = places_of_discs(curve)
+        some = disc_indices(curve)
         draw_tube(axes, curve, rims(flat(curve.points[some]), curve.radii[some]))
     curve.draw_line(axes, flat(curve.points))
     curve.draw_dots(axes, flat(curve.given))
 
 
 def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: float = 1.0) -> None:
-    """Numbers over time, with their band and those of the given points. Radii are multiplied by ``unit``."""
+    """Draw numbers against time with their band, and those of the given points. Radii are multiplied by ``unit``."""
     if curve.radii is not None:
         fill_band(axes, curve, line - unit * curve.radii, line + unit * curve.radii, zorder=3)
     curve.draw_line(axes, np.column_stack([curve.times, line]))
@@ -45,21 +44,20 @@ def draw_graph_of(axes: Axes, curve: Curve, line: Array, given: Array, unit: flo
 
 
 def fill_band(axes: Axes, curve: Curve, low: Array, high: Array, **look: Any) -> None:
-    """A band over time."""
+    """Draw a band against time."""
     look |= {"color": curve.color, "alpha": ALPHA, "linewidth": 0, "label": "band"}
     axes.fill_between(curve.times, low, high, **look)
 
 
-def places_of_discs(curve: Curve) -> Indices:
-    """At which samples of a curve discs are close enough."""
+def disc_indices(curve: Curve) -> Indices:
+    """Return the samples of a curve at which a band has discs."""
     return evenly(len(curve.x), 500)
 
 
 def draw_tube(axes: Axes, curve: Curve, rings: Array) -> None:
-    """Fill discs along a curve, and the space between neighbours.
+    """Fill discs along a curve, and the areas between neighbouring discs.
 
-    Args:
-        rings: the rim of every disc, shape (m, k, 2); NaN where there is none.
+    ``rings`` are the rims of the discs, shape (m, k, 2). They are NaN where a disc is missing.
     """
     good: NDArray[np.bool_] = np.all(np.isfinite(rings), axis=(1, 2))
     if not good.any():
@@ -68,9 +66,9 @@ def draw_tube(axes: Axes, curve: Curve, rings: Array) -> None:
     polygons = [_turned_left(rings[good])]
     if pairs.any():
         polygons.append(_between(rings[:-1][pairs], rings[1:][pairs]))
-    # All go round to the left, so that an area that several of them cover is filled once.
+    # All polygons have the same orientation, so that overlapping areas are filled once.
     path = Path.make_compound_path(*map(Path.make_compound_path_from_polys, polygons))
-    # ``add_patch`` would go through all sides one by one to see how far they reach.
+    # ``add_patch`` would compute the extent of every side in a slow loop.
     axes.update_datalim(rings[good].reshape(-1, 2))
     axes.add_artist(PathPatch(path, facecolor=curve.color, alpha=ALPHA, linewidth=0, zorder=3, label="band"))
 
@@ -82,7 +80,7 @@ def _turned_left(rings: Array) -> Array:
 
 
 def _between(first: Array, second: Array) -> Array:
-    """The quadrangles that touch two discs on either side."""
+    """Return the quadrangles that touch two neighbouring discs on both sides."""
     along = second.mean(axis=1) - first.mean(axis=1)
     corners = []
     for rings in (first, second):

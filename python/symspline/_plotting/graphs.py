@@ -1,4 +1,4 @@
-"""Numbers against time: coordinates, angles, principal angles and the components of points."""
+"""Graphs of coordinates, angles, principal angles and components of points against time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NAMED, _OTHERS = 12, 100
 
 
 def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """R¹: the graph."""
+    """Draw the graphs of curves in R¹."""
     (axes,) = timelines(panel, curves, ["x"])
     for curve in curves:
         draw_graph_of(axes, curve, *curve.marked(np.ravel))
@@ -34,7 +34,7 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def _draw_angle(
     angles: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve], period: float = 2 * np.pi
 ) -> None:
-    """An angle against time, without jumps."""
+    """Draw an angle against time, without jumps."""
     (axes,) = timelines(panel, curves, ["angle, degrees"])
     for curve in curves:
         line, given = curve.marked(angles)
@@ -43,8 +43,8 @@ def _draw_angle(
         draw_graph_of(axes, curve, np.degrees(line), np.degrees(given), np.degrees(1.0))
 
 
-# S¹: the angle of unit vectors. RP¹ and Gr(1, 2): that of a line, which is back after half a turn. SO(2) and O(2): the
-# angle by which the first axis is turned. U(1): the phase.
+# Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.
+# Points of SO(2) and O(2) have the angle of the first axis, and points of U(1) their phase.
 draw_circle = partial(_draw_angle, lambda points: np.arctan2(points[:, 1], points[:, 0]))
 draw_slope = partial(_draw_angle, lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), period=np.pi)
 draw_turn = partial(_draw_angle, lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]))
@@ -61,12 +61,20 @@ def draw_numbers(
     names: Sequence[str],
     numbers: Callable[[Any, Any], Array],
 ) -> None:
-    """Several numbers against time, the first twelve with their names.
+    """Draw several numbers against time, the first twelve with their names.
 
-    Args:
-        label: of the vertical axis.
-        names: one per number; "Im ..." follows the real part of the same number.
-        numbers: a function of the first point of a curve and of points, one row per point.
+    Parameters
+    ----------
+    panel : SubFigure
+        Panel to draw into.
+    curves : sequence of Curve
+        Curves to draw.
+    label : str
+        Label of the vertical axis.
+    names : sequence of str
+        Names of the numbers. The name "Im ..." follows that of the real part.
+    numbers : callable
+        Function of the first point of a curve and of several points, with one row per point.
     """
     in_row = min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9))
     width = 1.8 if curves[0].alone else 0.9
@@ -84,18 +92,18 @@ def draw_numbers(
         axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
         for i, look in enumerate(looks):
             axes.plot(curve.times, values[:, i], linewidth=width, **look)
-            places, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
+            positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
             if curve.alone and curve.noise is None:
-                axes.plot(*places.T, "o", color=color, markersize=3)
+                axes.plot(*positions.T, "o", color=color, markersize=3)
             elif curve.alone:
-                curve.draw_dots(axes, places, color=color, alpha=0.4)
+                curve.draw_dots(axes, positions, color=color, alpha=0.4)
     order = [i for column in range(in_row) for i in range(column, len(labels), in_row)]
-    place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
-    legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **place)
+    anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
+    legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **anchor)
 
 
 def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
-    """Colour and line style of every number: an imaginary part is dashed in the colour of its real part."""
+    """Return colour and line style of every number. An imaginary part is dashed in the colour of its real part."""
     is_complex = any(name.startswith("Im ") for name in names)
     made, entry = [], -1
     for name in names:
@@ -107,7 +115,7 @@ def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """The components of a point: the picture for spaces without a better one."""
+    """Draw the components of points, for spaces without a picture of their own."""
     space = curves[0].space
     kept = independent(space)
     names = component_names(space.point_shape, space.dtype.kind == "c")
@@ -116,13 +124,13 @@ def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def components(points: NDArray[Any]) -> Array:
-    """One row per point; the real and the imaginary parts of complex numbers alternate."""
+    """Return one row per point, in which the real and imaginary parts of complex numbers alternate."""
     flat = np.ascontiguousarray(points.reshape(len(points), -1))
     return flat.view(np.float64) if np.iscomplexobj(flat) else flat
 
 
 def component_names(shape: tuple[int, ...], is_complex: bool) -> list[str]:
-    """Names such as x₁, x₂ or, for matrices, x₁₁; counted from 1."""
+    """Return names such as x₁, x₂ or, for matrices, x₁₁."""
     comma = "," if max(shape) > 9 else ""
     indices = [comma.join(str(i + 1) for i in index) for index in np.ndindex(*shape)]
     names = [f"x{index.translate(SUBSCRIPTS)}" for index in indices]
@@ -130,7 +138,7 @@ def component_names(shape: tuple[int, ...], is_complex: bool) -> list[str]:
 
 
 def independent(space: Space) -> Indices:
-    """The numbers of the components to draw: of a Hermitian matrix those that do not follow from others."""
+    """Return the indices of the components to draw, which determine a Hermitian matrix."""
     whole = np.ones(space.point_shape)
     if isinstance(space, SymmetricPositiveDefinite):
         return np.flatnonzero(np.triu(whole))
@@ -140,7 +148,7 @@ def independent(space: Space) -> Indices:
 
 
 def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Complex hyperbolic space: the ratios zᵢ/z₀, which fill the unit ball whatever the phases, against time."""
+    """Draw the ratios zᵢ/z₀ of points of complex hyperbolic space, which do not depend on the phase."""
     n = curves[0].points.shape[1] - 1
     names = [f"{part} z{i + 1}/z0".translate(SUBSCRIPTS) for i in range(n) for part in ("Re", "Im")]
     ratios = lambda _, points: components(points[:, 1:] / points[:, :1])  # noqa: E731
@@ -148,7 +156,7 @@ def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Grassmannians and projective spaces: the principal angles to the first point against time."""
+    """Draw the principal angles to the first point, for Grassmannians and projective spaces."""
     n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
     numbers = lambda first, points: principal_angles(points, first)[:, : len(names)]  # noqa: E731
@@ -156,9 +164,9 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:
-    """Degrees between a subspace and others, the largest first; shape (m, k).
+    """Return the principal angles between a subspace and others in degrees, the largest first; shape (m, k).
 
-    Of small angles the sines are exact, of large ones the cosines.
+    The sines are accurate for small angles, and the cosines for large ones.
     """
     bases = points.reshape(*points.shape[:2], -1)
     base = first.reshape(bases.shape[1:])

@@ -1,4 +1,4 @@
-"""Axes over time, with the knots marked."""
+"""Axes with a time axis, on which knots are marked."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .curves import Curve
 from .style import EDGE, GAP, Indices, evenly, inside, plain, show_dates, size
 
 LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
-"""Margins in inches: panels above one another have their time axes aligned."""
+"""Margins in inches, which align the time axes of several panels."""
 
 _LINES, _TICKS = 60, 2000
 
@@ -21,7 +21,7 @@ _LINES, _TICKS = 60, 2000
 def timelines(
     panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], top: float = TOP
 ) -> list[Axes]:
-    """Axes above one another over the same times, one per label of the vertical axis."""
+    """Add a column of axes with the same time axis, one per label of the vertical axis."""
     height = (size(panel)[1] - BOTTOM - top) / len(labels)
     made = []
     for i, label in enumerate(labels):
@@ -37,9 +37,9 @@ def timelines(
 
 
 def row_axes(panel: SubFigure, curves: Sequence[Curve], top: float = 0.4) -> tuple[Axes, Indices]:
-    """Axes for pictures along the time axis, and the numbers of the curves that get a row: as many as fit.
+    """Add axes for rows of pictures along the time axis, and return the indices of the curves that have a row.
 
-    Row i is at height −i.
+    Row i is at height −i. There are as many rows as fit.
     """
     rows = evenly(len(curves), int(size(panel)[1] // 0.8))
     (axes,) = timelines(panel, curves, [""], top=top)
@@ -52,7 +52,7 @@ def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) 
     first, last = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
     axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
     if curves[0].dates:
-        # With more at least, or fewer at most, the locator finds no interval for some spans.
+        # For some spans the locator does not find an interval between narrower limits.
         show_dates(axes, *((3, 10) if width > 7 else (2, 5)))
     axes.set_xlabel(curves[0].time_name if lowest else "")
     axes.tick_params(labelbottom=lowest)
@@ -60,9 +60,9 @@ def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) 
 
 
 def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Thin lines at the knots, or at noisy data; short ticks where lines would be too many.
+    """Mark knots or noisy data by thin lines, or by short ticks if lines would be too many.
 
-    Bands mark missing points, where a curve is a guess.
+    Bands mark long gaps between points.
     """
     knots = np.unique(np.concatenate([curve.marks for curve in curves]))
     height = 1.0 if len(knots) <= _LINES else 0.04

@@ -34,7 +34,7 @@ FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # Names of curves may hold letters that the terminal cannot show.
+        # Names of curves may contain characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
@@ -67,7 +67,7 @@ def _failed(message: object, code: int) -> int:
 
 
 def _drop_output() -> None:
-    """Discard what would be flushed at exit, as nobody reads it."""
+    """Discard output that would be flushed at exit, as its reader has stopped."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

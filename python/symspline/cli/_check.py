@@ -42,7 +42,7 @@ _MEASURES = ("distance", "position", "velocity", "acceleration")
 _RELATIVE = 1e-12
 _OF_FUNCTIONS = 1e-7
 _ROUNDING = 100 * float(np.finfo(np.float64).eps)
-# Lengths of their metric are relative to the matrices: 1 m² and 10⁶ mm² are the same.
+# Their metric is relative: it does not depend on the unit of the matrices.
 _POSITIVE = (SymmetricPositiveDefinite, HermitianPositiveDefinite)
 
 
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     line("curve", "points", *_MEASURES)
     failed = []
     for name, spline in curves.splines.items():
-        # The worst factor of a product counts.
+        # The largest values of all factors of a product count.
         measured = [_measure(part) for part in spline._parts]
         values = np.max([values for values, _ in measured], axis=0)
         line(brief(name), len(spline.t), *(f"{value:.1e}" for value in values))

@@ -29,18 +29,18 @@ class Recordings:
     curves : list of tuple
         Times and points of each curve.
     groups : dict
-        The name of each curve, in the order in which they begin, and its rows.
+        Name and rows of each curve, in the order in which the curves begin.
     named : bool
         Whether these names have a meaning.
     merged, alone, repeated : int
-        Rows with the time of another one that were merged with it, single points between gaps, which are omitted,
-        and rows with the time of another one that are smoothed.
+        Numbers of rows: those merged with another row of the same time, single points between gaps, which are omitted,
+        and those that share their time with another row of noisy data.
     """
 
     def __init__(
         self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint
     ) -> None:
-        """``hint`` returns a column that may hold the names of several curves."""
+        """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
         self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
         self._options, self._smooth = options, options.smooth is not None
         self.named = rows.labels is not None or options.max_gap is not None
@@ -87,7 +87,7 @@ class Recordings:
         return f"{self._path}: {text}" if text != str(note) else text
 
     def _segments(self, name: str, own: NDArray[np.int64]) -> list[tuple[tuple[Any, Any], NDArray[np.int64]]]:
-        """The curves in the rows of one name, and the rows of each."""
+        """Return the curves in the rows of one name, and the rows of each."""
         times, options = self._rows.times, self._options
         times = times[own] if times.size else times
         of = f" of curve {name!r}" if self._rows.labels is not None else ""
