@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 
-from .bands import CIRCLE, disc_indices, draw_in_plane
-from .curves import Curve
+from .curves import CIRCLE, Curve, disc_indices, draw_in_plane
 from .style import EDGE, GRID, INK, Array, inside, plain, window
 
 

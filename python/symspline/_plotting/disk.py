@@ -12,8 +12,7 @@ from matplotlib.figure import SubFigure
 from matplotlib.patches import Circle
 
 from .._spaces import Hyperbolic
-from .bands import CIRCLE, draw_in_plane
-from .curves import Curve
+from .curves import CIRCLE, Curve, draw_in_plane
 from .globe import centre_of
 from .style import EDGE, GRID, PAPER, Array, closest, inside, note
 

@@ -20,8 +20,8 @@ from matplotlib.transforms import Affine2D
 
 from .curves import Curve
 from .frames import VIEW
+from .graphs import LEFT, RIGHT, row_axes
 from .style import INK, Array, size, time_colors
-from .timeline import LEFT, RIGHT, row_axes
 
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)

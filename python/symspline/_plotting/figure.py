@@ -19,11 +19,10 @@ from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Product, Space, SpecialEuclidean, factors_of
 from . import chart, ellipses, frames, graphs, sphere
-from .bands import fill_band
-from .curves import Curve, curves_of
+from .curves import Curve, curves_of, fill_band
 from .disk import draw_disk
+from .graphs import timelines
 from .style import DPI, INK, heading
-from .timeline import timelines
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 4.0
 _FACTORS = 6

@@ -100,20 +100,18 @@ def _draw_strip(
     upright = np.array([half, 1]) * 1.9 / size
     for times, drawings, bold in ((positions, film, False), (knots, given, True)):
         width, fill = (1.8, 0.25) if bold else (0.7, 0.0)
-        for position, (x, y) in zip(times, np.moveaxis(_centred(drawings) * upright, -1, 1), strict=True):
-            color = time_colors((position - positions[0]) / span)
-            axes.fill(
-                position + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold
-            )
+        for at, (x, y) in zip(times, np.moveaxis(_centred(drawings) * upright, -1, 1), strict=True):
+            color = time_colors((at - positions[0]) / span)
+            axes.fill(at + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold)
 
 
 def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
-    """Draw one drawing at its position, with the numbers of its landmarks."""
+    """Draw one drawing at its at, with the numbers of its landmarks."""
     axes.spines[:].set(color=EDGE, linewidth=0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=3)
     look: Any = {"textcoords": "offset points", "fontsize": 7, "color": INK, "path_effects": HALO}
-    for number, position in enumerate(drawing):
-        axes.annotate(str(number), position, (3, 3), **look)
+    for number, at in enumerate(drawing):
+        axes.annotate(str(number), at, (3, 3), **look)
     name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
     axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=8, color=INK)

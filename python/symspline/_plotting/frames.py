@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from .._quaternions import rotation_rows
 from .chart import box, plane
 from .curves import Curve
+from .graphs import LEFT, RIGHT, row_axes
 from .style import AXES, DATA, INK, Array, legend, size, window
-from .timeline import LEFT, RIGHT, row_axes
 
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
 """Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""

@@ -16,8 +16,7 @@ from matplotlib.figure import SubFigure
 from numpy.typing import NDArray
 
 from .._lonlat import to_lonlat
-from .bands import CIRCLE, disc_indices, draw_tube
-from .curves import Curve
+from .curves import CIRCLE, Curve, disc_indices, draw_tube
 from .globe import View, degrees, draw_frame, draw_globe, label_directions, middle_of
 from .style import GRID, PAPER, Array, inside, note, plain, size, window
 
