@@ -1,4 +1,4 @@
-"""What is done about curves that failed, or that may go the wrong way round."""
+"""Errors and warnings about curves that failed, or that are close to a cut locus."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from ._faults import CUT_LOCUS, Fault
 from ._report import ConvergenceWarning
 
 _PACKAGE = os.path.dirname(__file__)
-# So many times shorter than its neighbours an interval is for the times to be the reason, and so many times faster.
+# The times are considered the reason if an interval is shorter than its neighbours by this factor, and if its speed
+# exceeds the median by the same factor.
 _CLOSE = 10
 _ERRORS: dict[str, type[Exception]] = {CUT_LOCUS: CutLocusError}
 
 
 def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
-    """Raise or warn, with the good curves attached.
+    """Raise an error or warn about failed curves, with the fitted curves attached.
 
     Parameters
     ----------
     faults : list of Fault
-        In the order of curves.
+        Faults in the order of curves.
     on_failure : {"raise", "warn", "ignore"}
+        Policy of the user.
     spline : curve, batch of curves, or list of curves
-        What was fitted.
+        The fitted curves, which become the attribute ``spline`` of the error.
     """
     batch = (len(spline),) if isinstance(spline, (list, tuple)) else spline._batch
     failed = [fault for fault in faults if fault.failed]
@@ -61,14 +63,14 @@ def warn(
 
 
 def _explained_by_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> Fault:
-    """Replace the remedy if two times are too close together for their points.
+    """Return the fault with a remedy that names two times too close together for their points, if there are any.
 
-    The remedy names both times. They become the node of a fault that has none.
+    The first of the two times becomes the node of a fault that has none.
 
     Notes
     -----
-    An interval of length h between points at a distance d asks for the speed d/h at both of its ends. Where h is far
-    shorter than its neighbours, this speed carries the curve in them much farther than their points are apart.
+    An interval of length h between points at a distance d requires the speed d/h at both of its ends. Where h is far
+    shorter than its neighbours, this speed moves the curve in them much farther than their points are apart.
     """
     if not fault.about_times:
         return fault
@@ -97,7 +99,7 @@ def _explained_by_close_times(fault: Fault, batch: tuple[int, ...], spline: Any)
     t = curve._t[index] if curve._t.ndim > 1 else curve._t
     remedy = (
         f"t[{i}] = {t[i]} and t[{i + 1}] = {t[i + 1]} are too close for the distance {step[i]:.3g} between "
-        "their points: merge the two samples, smooth the data with make_smoothing_spline, or correct the clock"
+        "their points: merge the two samples, smooth the data with make_smoothing_spline, or correct the times"
     )
     return fault._replace(remedy=remedy, node=i if fault.node is None else fault.node)
 
@@ -107,7 +109,7 @@ def _more(faults: list[Fault], what: str) -> str:
 
 
 def callers_level() -> int:
-    """How many frames up the code is that called this package."""
+    """Return the number of frames between this function and the code that called the package."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         frame, level = frame.f_back, level + 1

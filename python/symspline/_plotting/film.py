@@ -106,7 +106,7 @@ def _draw_strip(
 
 
 def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
-    """Draw one drawing at its at, with the numbers of its landmarks."""
+    """Draw one drawing at its position, with the numbers of its landmarks."""
     axes.spines[:].set(color=EDGE, linewidth=0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=3)
