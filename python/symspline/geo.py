@@ -231,12 +231,12 @@ def resample(
         own = rows[np.argsort(utc[rows], kind="stable")]
         try:
             used = np.ones(len(own), bool) if smooth else None
-            pieces = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
+            segments = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
         except ValidationError as error:
             of = f"{_named(keys, label)}, rows in the order of time: " if keys else ""
             raise ValidationError(f"{of}{error}") from None
-        curves += pieces
-        owners += [label] * len(pieces)
+        curves += segments
+        owners += [label] * len(segments)
     if not curves and len(frame):
         raise ValidationError(
             f"every track has fewer than {min_points} positions between gaps longer than max_gap={short_repr(max_gap)} "

@@ -33,8 +33,8 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
     """Draw the surface at given distances from a curve in R³."""
-    some = disc_indices(curve)[::2]
-    along = np.gradient(curve.points[some], axis=0)
+    discs = disc_indices(curve)[::2]
+    along = np.gradient(curve.points[discs], axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     aside = np.empty_like(along)
     last = np.eye(3)[np.abs(along[0]).argmin()]
@@ -43,8 +43,8 @@ def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
         last = last - (last @ direction) * direction
         last = aside[i] = last / np.linalg.norm(last)
     frame = np.stack([aside, np.cross(along, aside)], axis=1)
-    ring = np.concatenate([CIRCLE, CIRCLE[:1]]) @ frame * radii[some, None, None]
-    x, y, z = np.moveaxis(curve.points[some, None] + ring, -1, 0)
+    ring = np.concatenate([CIRCLE, CIRCLE[:1]]) @ frame * radii[discs, None, None]
+    x, y, z = np.moveaxis(curve.points[discs, None] + ring, -1, 0)
     look: Any = {"color": curve.color, "alpha": 0.08, "linewidth": 0, "shade": False}
     axes.plot_surface(x, y, z, rstride=1, cstride=2, antialiased=False, **look)
 

@@ -166,7 +166,7 @@ class Curve:
         after = np.clip(np.searchsorted(self.x, x), 1, len(self.x) - 1)
         return np.where(x - self.x[after - 1] < self.x[after] - x, after - 1, after)
 
-    def beside(self, line: Array) -> Array:
+    def closest_samples(self, line: Array) -> Array:
         """Return the rows of samples of the curve that are closest in time to the given points."""
         return line[self._nearest(self.given_x)]
 
@@ -274,8 +274,8 @@ def draw_in_plane(
     (m, k, 2).
     """
     if curve.radii is not None:
-        some = disc_indices(curve)
-        draw_tube(axes, curve, rims(flat(curve.points[some]), curve.radii[some]))
+        discs = disc_indices(curve)
+        draw_tube(axes, curve, rims(flat(curve.points[discs]), curve.radii[discs]))
     curve.draw_line(axes, flat(curve.points))
     curve.draw_dots(axes, flat(curve.given))
 

@@ -29,17 +29,17 @@ _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 
 def outlines(matrices: Array) -> Array:
     """Return the ellipses of matrices or the outlines of ellipsoids, shape (m, 97, 2)."""
-    roots, turn = _half_axes(matrices[:, :2, :2])
-    ellipses: Array = _CIRCLE[:, :2] * roots[:, None] @ turn
+    roots, axes = _half_axes(matrices[:, :2, :2])
+    ellipses: Array = _CIRCLE[:, :2] * roots[:, None] @ axes
     return ellipses
 
 
 def sections(matrices: Array) -> Array:
     """Return the near halves of the sections through two semi-axes, shape (m, 3, 97, 2); the far halves are NaN."""
-    roots, turn = (array[:, None] for array in _half_axes(matrices))
+    roots, axes = (array[:, None] for array in _half_axes(matrices))
     rings = np.stack([np.roll(_CIRCLE[:, [1, 0, 2]], i + 1, axis=1) for i in range(3)])
-    normals = rings / roots[..., None, :] @ turn
-    near: Array = np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ turn)[..., :2], np.nan)
+    normals = rings / roots[..., None, :] @ axes
+    near: Array = np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ axes)[..., :2], np.nan)
     return near
 
 

@@ -102,7 +102,7 @@ def _draw_angle(
     for curve in curves:
         line, given = curve.marked(angles)
         line = np.unwrap(line, period=period)
-        given = given + period * np.rint((curve.beside(line) - given) / period)
+        given = given + period * np.rint((curve.closest_samples(line) - given) / period)
         draw_graph_of(axes, curve, np.degrees(line), np.degrees(given), np.degrees(1.0))
 
 

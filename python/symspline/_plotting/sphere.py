@@ -76,7 +76,10 @@ def _draw_on_half(
     for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
         given = shown[curve.knots]
         if curve.noise is not None:
-            near, given = curve.beside(line) if is_part else np.array([0.0, 0.0, 1.0]), vectors(curve.given)
+            near, given = (
+                curve.closest_samples(line) if is_part else np.array([0.0, 0.0, 1.0]),
+                vectors(curve.given),
+            )
             given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
         whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line), None)
         _draw_on_globe(axes, view, curve, whole, given, radii)
@@ -101,8 +104,8 @@ def _draw_on_globe(
     radii of a band at the samples.
     """
     if radii is not None:
-        some = disc_indices(curve)
-        rings = caps(line[some], radii[some])
+        discs = disc_indices(curve)
+        rings = caps(line[discs], radii[discs])
         seen = np.max(rings @ view.up, axis=1)[:, None, None] > 0
         draw_tube(axes, curve, np.where(seen, view.outline(rings), np.nan))
     curve.draw_line(axes, view.hidden(line), linewidth=1, linestyle=(0, (2, 2)), alpha=0.6)
@@ -235,16 +238,16 @@ def _draw_map(panel: SubFigure, curves: Sequence[Curve], left: float) -> None:
 
 def _draw_band(axes: Axes, curve: Curve, positions: Array, radii: Array) -> None:
     """Draw the band on the map, on both sides of the date line. Caps around a pole have no rim there."""
-    some = disc_indices(curve)
-    lon, lat = to_lonlat(caps(curve.points[some], radii[some]))
-    middle = np.unwrap(positions[some, 0], period=360)[:, None]
+    discs = disc_indices(curve)
+    lon, lat = to_lonlat(caps(curve.points[discs], radii[discs]))
+    middle = np.unwrap(positions[discs, 0], period=360)[:, None]
     lon = middle + (lon - middle + 180) % 360 - 180
     lon[np.ptp(lon, axis=1) > 180] = np.nan
-    turns = np.unique(np.rint(middle / 360))
+    windings = np.unique(np.rint(middle / 360))
     # All copies are one polygon, so that overlaps are filled once. Copies beyond the map are omitted.
     copies = []
-    for turn in np.arange(turns[0] - 1, turns[-1] + 2):
-        moved = lon - 360 * turn
+    for winding in np.arange(windings[0] - 1, windings[-1] + 2):
+        moved = lon - 360 * winding
         seen = (moved.max(axis=1) > -180) & (moved.min(axis=1) < 180)
         ring = np.where(seen[:, None, None], np.stack([moved, lat], axis=-1), np.nan)
         copies += [ring, np.full_like(ring[:1], np.nan)]

@@ -81,16 +81,16 @@ def _measure(spline: CubicSpline) -> tuple[list[float], float]:
     """Return the numbers of the table, and the largest of them divided by what is allowed."""
     if not np.isfinite(spline.velocities).all():
         return [np.nan] * len(_MEASURES), np.inf
-    pieces = segments_of(spline)
+    segments = segments_of(spline)
     closed = is_closed(spline.bc_type)
     steps = np.diff(spline._times)
     shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
     relative = _OF_FUNCTIONS if isinstance(spline.space, Manifold) else _RELATIVE
     floor = _ROUNDING * float(spline.space.rounding(spline.points).max())
-    distance = float(spline.space.distance(pieces.at(pieces.t), pieces.points).max())
+    distance = float(spline.space.distance(segments.at(segments.t), segments.points).max())
     values, excess = [distance], [distance / (relative + floor)]
     for nu in range(3):
-        jumps = pieces.jumps(nu, closed)
+        jumps = segments.jumps(nu, closed)
         if nu == 0 and isinstance(spline.space, _POSITIVE):
             jumps = replace(jumps, largest=1.0)
         rounding = floor / shorter**nu

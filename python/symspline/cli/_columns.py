@@ -278,8 +278,8 @@ def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
     quaternion = [scalars[0][:-1] + letter for letter in "wxyz"] if len(scalars) == 1 else []
     if not quaternion or any(plain.count(name) != 1 for name in quaternion):
         return None
-    turn = [plain.index(name) for name in quaternion]
-    rest = [i for i in range(len(names)) if i not in turn]
+    scalar_first = [plain.index(name) for name in quaternion]
+    rest = [i for i in range(len(names)) if i not in scalar_first]
     columns: list[int] = []
     for factor in factors_of(space):
         count = width(factor, True) - (4 if factor in (ROTATIONS, POSES) else 0)
@@ -289,5 +289,5 @@ def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
             own = by_letter
         elif factor == POSES:
             return None
-        columns += own + (turn if factor in (ROTATIONS, POSES) else [])
+        columns += own + (scalar_first if factor in (ROTATIONS, POSES) else [])
     return columns

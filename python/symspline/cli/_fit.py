@@ -76,11 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help="column of names: the rows with one name are one curve")
     add("--lonlat", action="store_true", help="points on sphere:2 are longitude and latitude in degrees")
-    add(
-        "--quaternion",
-        choices=ORDERS,
-        help="order of a quaternion, if the names do not show it",
-    )
+    add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
     add(

@@ -162,8 +162,8 @@ def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, pl
         own = np.ascontiguousarray(numbers[:, start : start + width(factor, columns.quaternion is not None)])
         start += own.shape[1]
         if columns.quaternion is not None and factor in (ROTATIONS, POSES):
-            turns = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
-            part = join(turns, own[:, :3]) if factor == POSES else turns
+            rotations = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
+            part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:
             part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)
         of = f"the part in {factor} of " if isinstance(space, Product) else ""

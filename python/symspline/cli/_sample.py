@@ -157,9 +157,9 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
     spline, called = curves.splines[name], curves.called(name)
     times, knots = rows.times[own], spline.t
     dates = knots.dtype.kind == "M"
-    wanted, found = ("dates", "numbers") if dates else ("numbers", "dates")
+    expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
-    kinds = f": the times of {called} are {wanted}, but these are {found}"
+    kinds = f": the times of {called} are {expected}, but these are {found}"
     zones = f": its times have {these}, but those of {called} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
     refuse(
