@@ -74,14 +74,14 @@ class Recordings:
         curve, node, fitted = (getattr(note, field, None) for field in ("curve", "node", "spline"))
         number = curve[0] if curve else 0
         name, own = list(self.groups.items())[number]
+        times = fitted[number].t if isinstance(fitted, list) else ()
         text = str(note)
         # A message is about a node and its neighbours.
         for i in () if node is None else range(max(node - 1, 0), min(node + 2, len(own))):
             place = self._rows.place(int(own[i]))
             text = text.replace(f"points[{i}]", f"the point in {place}")
-            if fitted is not None:
-                time = fitted[number].t[i]
-                text = text.replace(f"t[{i}] = {time}", f"time {time} in {place}")
+            if i < len(times):
+                text = text.replace(f"t[{i}] = {times[i]}", f"time {times[i]} in {place}")
         if curve:
             text = text.replace(f"curve {number}", f"curve {name!r}" if self.named else "the curve")
         return f"{self._path}: {text}" if text != str(note) else text
