@@ -291,7 +291,7 @@ def fit_many(
             points.append(data)
             knots.append(knots_of(t, (), data[0].nodes))
         except (ValidationError, TypeError, ValueError) as error:
-            raise ValidationError(f"curve {number}: {error}") from None
+            raise ValidationError(str(error))._of_curve(number) from None
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
     problem = fitting.ManyProblem(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from ._core import CutLocusError
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points
-from ._errors import callers_level
+from ._errors import warn
 from ._report import MAX_STEP, Columns, FarPointsWarning
 from ._spaces import Array, Space, Sphere, Unitary, factors_of
 from .manifolds import Manifold
@@ -104,13 +103,14 @@ def warn_of_signs(space: Space, curves: Sequence[list[Points] | None]) -> None:
     of = f" of curve {','.join(map(str, curve))}" if curve else ""
     more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
-    warnings.warn(
+    warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
         f"round. "
         f"{IN_PYTHON}",
         UserWarning,
-        stacklevel=callers_level(),
+        tuple(curve),
+        i,
     )
 
 
@@ -158,14 +158,14 @@ def warn_of_far_points(
     of = f" of curve {','.join(map(str, place))}" if place else ""
     others = len({place for place, *_ in found}) - 1
     more = f" (and of {others} more curves)" if others else ""
-    warnings.warn(
+    warn(
         f"more than half of the steps are long: {count} of {steps} steps between neighbouring points{of}{more} are "
         f"beyond {FAR} of the way to the cut locus of {space!r}, where several C² curves may exist. Where points have "
         "equivalent representatives, as orientations of crystals do, take the one nearest to the previous point. Where "
         "phases, signs or bases do not count, remove them, or use a projective space or a Grassmannian. Otherwise put "
         "points in between.",
         FarPointsWarning,
-        stacklevel=callers_level(),
+        place,
     )
 
 

@@ -381,6 +381,6 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
                     )
                 except ValidationError as error:
                     if not skip:
-                        raise ValidationError(f"curve {number}: {error}") from None
+                        raise error._of_curve(number) from None
                     faults.setdefault(number, Fault(number, INVALID, f"curve {number}: {error}"))
     return list(faults.values())
