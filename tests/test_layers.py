@@ -28,8 +28,8 @@ LAYERS = [
     ["manifolds"],
     ["_curves"],
     ["_errors", "_far", "_options", "_plotting", "_signs"],
-    ["_base_curve", "_bspline"],
     ["_archive"],
+    ["_base_curve", "_bspline"],
     ["_cubic"],
     ["_functional"],
     [

@@ -24,7 +24,7 @@ from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads
 from ._cubic import CubicSpline  # noqa: E402
 from ._curves.gradient import Gradient  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
-from ._files import load, load_many, save_many  # noqa: E402
+from ._files import load, save  # noqa: E402
 from ._functional import evaluate, fit, fit_many  # noqa: E402
 from ._hermite import HermiteSpline  # noqa: E402
 from ._report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
@@ -130,7 +130,6 @@ __all__ = [
     "fit_segments",
     "geo",
     "load",
-    "load_many",
     "make_lsq_spline",
     "make_smoothing_spline",
     "manifolds",
@@ -138,7 +137,7 @@ __all__ = [
     "poses",
     "quantum",
     "rotations",
-    "save_many",
+    "save",
     "set_num_threads",
     "shapes",
     "show_config",

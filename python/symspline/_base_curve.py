@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
 from ._curves.band import UncertaintyBand
@@ -37,6 +38,12 @@ class Curve(ABC):
 
     # What a plot says of it.
     _kind: ClassVar[str]
+    # The name of its format in files and pickles.
+    _format: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        if "_format" in vars(cls):
+            _archive.FORMATS[cls._format] = cls
 
     @property
     @abstractmethod
@@ -339,6 +346,24 @@ class Curve(ABC):
         return (self[i] for i in range(len(self)))
 
     # ---- as a value ----
+
+    def save(self, file: Any) -> None:
+        """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
+        _archive.write(file, self._state())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _archive.restore, (self._state(),)
+
+    def _state(self) -> dict[str, Any]:
+        """What files and pickles hold."""
+        return _archive.segments_state(
+            self._format, self.space, self._t, self._clock, self._extrapolate, self._curve
+        )
+
+    @classmethod
+    @abstractmethod
+    def _from_state(cls, state: _archive.Entries) -> Self:
+        """Make the curve that a state describes."""
 
     def __eq__(self, other: object) -> bool:
         """Equal space, knots, points and velocities, to the last bit."""

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _archive
+from ._archive import Entries, read_fitted
 from ._base_curve import Curve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
@@ -282,15 +282,15 @@ class CubicSpline(Curve):
 
     # ---- as a value ----
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return CubicSpline._of, (
-            self._clock,
-            self._t,
-            self._curve,
-            self._bc_type,
-            self._extrapolate,
-            self._reports,
-        )
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {
+            "bc_type": self._bc_type,
+            "report": [vars(report) for report in self._reports],
+        }
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        return cls._of(*read_fitted(state))
 
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
@@ -298,16 +298,9 @@ class CubicSpline(Curve):
         bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
         return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
 
-    def save(self, file: Any) -> None:
-        """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        _archive.write(file, self._arrays())
-
-    def _arrays(self) -> dict[str, Any]:
-        """What stands in a file."""
-        return _archive.fitted_arrays(self, self._reports)
-
     # What a plot says of it.
     _kind = "C² spline"
+    _format = "symspline-curve"
 
     @property
     def _ends(self) -> str:

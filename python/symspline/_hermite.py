@@ -6,7 +6,7 @@ from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
-from . import _archive
+from ._archive import Entries, check_curves, read_segments
 from ._base_curve import Curve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
@@ -49,6 +49,7 @@ class HermiteSpline(Curve):
     """
 
     _kind = "C¹ Hermite spline"
+    _format = "symspline-hermite"
     _ends = "given velocities"
     _unconverged = 0
     _bc_type = "natural"  # such curves are not closed
@@ -93,17 +94,16 @@ class HermiteSpline(Curve):
         self._fill(*parts)
         return self
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return HermiteSpline._of, (self._clock, self._t, self._curve, self._extrapolate)
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        clock, knots, curve, extrapolate = read_segments(state, fitted=False)
+        check_curves(state, curve, [True] * len(curve.parts))
+        return cls._of(clock, knots, curve, extrapolate)
 
     def __repr__(self) -> str:
         batch = self._curve.batch
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
-
-    def save(self, file: Any) -> None:
-        """Write the curve to an NPZ file, which `symspline.load` reads back."""
-        _archive.write(file, _archive.arrays_of(self, _archive.HERMITE))
 
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> HermiteSpline:
         return HermiteSpline._of(clock, t, curve, self._extrapolate)

@@ -90,7 +90,7 @@ def test_check_finds_perturbed_curves(run, fails, capsys):
     assert max(position, velocity) < 1e-14 and 1e-7 < acceleration < 1e-4
     bent, lost = ss.load("bent.npz"), np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0.0]])
     lost = ss.CubicSpline(None, lost, "s:2", on_failure="ignore")
-    ss.save_many({"good": good, "bent": bent, "lost": lost}, "many.npz")
+    ss.save({"good": good, "bent": bent, "lost": lost}, "many.npz")
     problem = fails("check many.npz", code=1)
     assert problem == "many.npz: more than rounding allows in 2 of 3 curves: bent, lost"
 

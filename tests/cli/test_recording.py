@@ -31,7 +31,7 @@ def test_sort(run, fails):
 def test_sort_within_every_curve(run):
     line([5, 0, 1, 4], id=[*"abba"])
     run("fit a.csv --space r:1 --curve id --sort -o a.npz")
-    found = ss.load_many("a.npz")
+    found = ss.load("a.npz")
     assert found["a"] == ss.CubicSpline([4, 5], [[3], [0]], "r:1")
     assert found["b"] == ss.CubicSpline([0, 1], [[1], [2]], "r:1")
 
@@ -90,7 +90,7 @@ def test_max_gap(run, fails):
     assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith(
         "; 1 row alone between gaps omitted\n"
     )
-    found = ss.load_many("a.npz")
+    found = ss.load("a.npz")
     assert {name: spline.t.tolist() for name, spline in found.items()} == {
         "1": [0, 1, 2],
         "2": [12, 13],
@@ -101,7 +101,7 @@ def test_max_gap(run, fails):
     assert table("b.csv")["curve"] == [*"1112233"]
     # As long as the limit is no gap.
     run("fit a.csv --space r:1 --max-gap 27 -o a.npz")
-    assert list(ss.load_many("a.npz")) == ["1"]
+    assert list(ss.load("a.npz")) == ["1"]
     assert "every point is alone" in fails("fit a.csv --space r:1 --max-gap 0.5 -o c.npz")
     assert "give a gap without a unit" in fails("fit a.csv --space r:1 --max-gap 5s -o c.npz")
     assert "--max-gap soon: a duration is a number" in fails("fit a.csv --space r:1 --max-gap soon -o c.npz")
@@ -111,9 +111,9 @@ def test_max_gap_of_dates_and_of_named_curves(run, fails):
     days = [f"2021-08-{day:02}" for day in (1, 2, 9, 10, 1, 2)]
     line(days, id=[*"aaaabb"])
     run("fit a.csv --space r:1 --curve id --max-gap 36h -o a.npz")
-    assert list(ss.load_many("a.npz")) == ["a/1", "a/2", "b"]
+    assert list(ss.load("a.npz")) == ["a/1", "a/2", "b"]
     run("fit a.csv --space r:1 --curve id --max-gap 604800 -o a.npz")
-    assert list(ss.load_many("a.npz")) == ["a", "b"]
+    assert list(ss.load("a.npz")) == ["a", "b"]
     line(days, id=["a", "a", "a", "a", "a/1", "a/1"])
     assert "two curves would have the name 'a/1'" in fails(
         "fit a.csv --space r:1 --curve id --max-gap 36h -o b.npz"

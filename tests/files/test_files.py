@@ -2,6 +2,7 @@
 
 import io
 import os
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,13 @@ def test_files_keep_everything(name):
         assert read.bc_type == spline.bc_type
     for ours, theirs in zip(spline.bc_type, read.bc_type, strict=True):
         assert isinstance(ours, str) or (ours[0] == theirs[0] and same(tuple(ours[1]), tuple(theirs[1])))
+
+
+def test_files_and_pickles_keep_durations():
+    spline = ss.CubicSpline(np.array([0, 1000, 3000], "m8[ms]"), THREE, S2)
+    half = np.timedelta64(500, "ms")
+    for made in (spline, round_trip(spline), pickle.loads(pickle.dumps(spline))):
+        assert same(made(half), spline(0.5)) and made.t.tolist() == [0.0, 1.0, 3.0]
 
 
 def test_files_keep_dates_that_count_in_tens():
@@ -198,42 +206,45 @@ def test_files_of_given_velocities_that_are_damaged():
 def test_many_curves_in_one_file(space):
     curves = {str(n): ss.CubicSpline(None, points_on(space, n, step=0.5), space) for n in (2, 5, 3)}
     file = io.BytesIO()
-    ss.save_many(curves, file)
+    ss.save(curves, file)
     file.seek(0)
-    read = ss.load_many(file)
+    read = ss.load(file)
     assert list(read) == list(curves)
     assert all(same_curve(read[name], curves[name]) for name in curves)
 
 
 def test_collections_in_python(tmp_path):
     one, other = ss.fit_many([(None, np.eye(3)), ([1, 2], np.eye(3)[:2])], "s:2", bc_type="not-a-knot")
-    ss.save_many({"": one, "b\0é": other}, tmp_path / "c.npz")
-    loaded = ss.load_many(tmp_path / "c.npz")
+    ss.save({"": one, "b\0é": other}, tmp_path / "c.npz")
+    loaded = ss.load(tmp_path / "c.npz")
     assert loaded == {"": one, "b\0é": other}
     assert loaded[""].report == one.report and loaded[""].bc_type == "not-a-knot"
     product = ss.space("s:2 x r:1")
     v = (np.array([0.0, 1, 0]), np.array([2.0]))
     both = ss.CubicSpline(None, (np.eye(3), np.eye(3)[:, :1]), product, bc_type=((1, v), "natural"))
-    ss.save_many({"p": both, "q": both}, tmp_path / "p.npz")
-    assert ss.load_many(tmp_path / "p.npz")["q"] == both
-    with pytest.raises(ss.ValidationError, match="of one space"):
-        ss.save_many({"p": both, "q": one}, tmp_path / "d.npz")
-    with pytest.raises(ss.ValidationError, match="of one space"):
-        ss.save_many({}, tmp_path / "d.npz")
+    ss.save({"p": both, "q": both}, tmp_path / "p.npz")
+    assert ss.load(tmp_path / "p.npz")["q"] == both
     pair = ss.fit_many([(None, np.eye(3)), (None, np.eye(3))], "s:2", where=[True, False])
-    ss.save_many(dict(zip("ab", pair, strict=True)), tmp_path / "some.npz")
-    assert ss.load_many(tmp_path / "some.npz") == dict(zip("ab", pair, strict=True))
-    with pytest.raises(TypeError, match="objects of CubicSpline"):
-        ss.save_many({"a": HERMITES["one"]}, tmp_path / "d.npz")
-    with pytest.raises(ss.ValidationError, match="single curves"):
-        ss.save_many({"a": ss.CubicSpline(None, [np.eye(3)] * 2, "s:2")}, tmp_path / "d.npz")
-    with pytest.raises(ss.ValidationError, match=r"read them with symspline\.load_many"):
-        ss.load(tmp_path / "c.npz")
-    one.save(tmp_path / "one.npz")
-    with pytest.raises(ss.ValidationError, match=r"read it with symspline\.load"):
-        ss.load_many(tmp_path / "one.npz")
+    ss.save(dict(zip("ab", pair, strict=True)), tmp_path / "some.npz")
+    assert ss.load(tmp_path / "some.npz") == dict(zip("ab", pair, strict=True))
+    ss.save({"a": HERMITES["one"], "b": HERMITES["one"]}, tmp_path / "d.npz")
+    assert ss.load(tmp_path / "d.npz")["b"] == HERMITES["one"]
+    batch = ss.CubicSpline(None, [np.eye(3)] * 2, "s:2")
+    for curves, message in [
+        ({"p": both, "q": one}, r"curves\['q'\] and curves\['p'\] differ in .* Save them in separate files"),
+        ({"p": one, "q": HERMITES["one"]}, "of one class and of one space"),
+        ({"a": batch}, r"curves\['a'\] is a batch"),
+        ({}, "at least one curve"),
+        ({5: one}, "whose keys are text"),
+    ]:
+        with pytest.raises(ss.ValidationError, match=message):
+            ss.save(curves, tmp_path / "e.npz")
+    for wrong in ({"a": 5}, [one], 5):
+        with pytest.raises(TypeError, match="curves must be a Curve or a mapping of names to Curves"):
+            ss.save(wrong, tmp_path / "e.npz")
+    assert not (tmp_path / "e.npz").exists()
     arrays = dict(np.load(tmp_path / "c.npz"))
-    for key, value in {"knots": [3, 3], "names": '["a"]', "format": "other", "report": "[]"}.items():
+    for key, value in {"rows": "{}", "names": '["a"]', "format": "other", "report": "[]"}.items():
         np.savez(tmp_path / "bad.npz", **arrays | {key: value})
         with pytest.raises(ss.ValidationError, match=r"bad\.npz"):
-            ss.load_many(tmp_path / "bad.npz")
+            ss.load(tmp_path / "bad.npz")
