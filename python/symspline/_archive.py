@@ -104,7 +104,7 @@ def write(file: Any, state: Mapping[str, Any]) -> None:
         "curves are not saved (files hold no functions: pickle them, or keep t, points and velocities)",
         named=True,
     )
-    arrays = {
+    arrays: dict[str, Any] = {
         name: value if name in TEXTS or isinstance(value, np.ndarray) else json.dumps(value, default=_as_json)
         for name, value in state.items()
     }
