@@ -15,15 +15,14 @@ from ._curves.curve import CurveArrays
 from ._curves.derivatives import places
 from ._curves.ends import ends_in_factors, freeze_bc_type, picked
 from ._curves.energy import alternative_energy
-from ._curves.fit import FitProblem, curve_of, fit, mask_of, read, read_ends
+from ._curves.fit import Fit, FitProblem, curve_of, fit, mask_of, read, read_ends
 from ._curves.gradient import Gradient, Places
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._far import warn_of_far_points
-from ._options import check_fit_options, options_of, outside, with_atol
+from ._options import fit_options, outside, with_atol
 from ._report import Report, combined
-from ._signs import warn_of_signs
+from ._representatives import warn_of_representatives
 from ._spaces import Array, Space
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -109,8 +108,7 @@ class CubicSpline(Curve):
         progress: Progress | None = None,
     ) -> None:
         space = space_named(space)
-        check_fit_options(extrapolate, on_failure, check, progress)
-        options = options_of(method, tol, max_iter)
+        options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
         data = read(points, space)
         if atol is not None:
             data = with_atol(data, atol)
@@ -119,17 +117,23 @@ class CubicSpline(Curve):
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         problem = FitProblem(
-            space, times, data, ends, options, bool(check), mask_of(where, batch), skip_invalid
+            space,
+            times,
+            data,
+            ends,
+            options,
+            bool(check),
+            None if where is None else mask_of(where, batch),
+            skip_invalid,
         )
         try:
-            curve, reports, faults = fit(problem, progress)
+            found = fit(problem, progress)
         except ValidationError as error:
             raise clock.explain(error) from None
-        self._fill(clock, shown_times, curve, freeze_bc_type(bc_type), extrapolate, reports)
-        if faults:
-            raise_or_warn(faults, on_failure, self)
-        warn_of_signs(space, [data], [report.max_step for report in reports])
-        warn_of_far_points([curve], [reports])
+        self._fill(clock, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
+        if found.faults:
+            raise_or_warn(found.faults, on_failure, self)
+        warn_of_representatives(space, [data], [found.curve], [found.columns])
 
     def _fill(
         self,
@@ -138,10 +142,14 @@ class CubicSpline(Curve):
         curve: CurveArrays,
         bc_type: Any,
         extrapolate: Any,
-        reports: list[Report],
+        reports: list[Report] | Fit,
     ) -> None:
         self._clock, self._t, self._curve = clock, t, curve
-        self._bc_type, self._extrapolate, self._reports = bc_type, extrapolate, reports
+        self._bc_type, self._extrapolate = bc_type, extrapolate
+        if isinstance(reports, Fit):
+            self._fit = reports
+        else:
+            self._reports = reports
         self._outside = outside(extrapolate, bc_type)
 
     @classmethod
@@ -242,6 +250,11 @@ class CubicSpline(Curve):
     def bc_type(self) -> Any:
         """The end conditions, as they were given."""
         return self._bc_type
+
+    @cached_property
+    def _reports(self) -> list[Report]:
+        """The reports in every factor, made on demand: they cost as much as a third of a fit of few points."""
+        return self._fit.reports()
 
     @property
     def report(self) -> Report:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import checked_flag, read_only, short_repr
+from ._arrays import read_only, short_repr
 from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -17,14 +17,16 @@ from ._curves.curve import CurveArrays, quantity_of
 from ._curves.ends import freeze_bc_type, picked
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._far import warn_of_far_points
 from ._input import in_library, library_of
-from ._options import check_on_failure, check_progress, checked_extrapolate, options_of, outside, with_atol
+from ._options import check_progress, checked_extrapolate, fit_options, outside, with_atol
 from ._report import Report
-from ._signs import warn_of_signs
+from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+
+# With fewer knots, all of them are read.
+_MANY = 64
 
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
@@ -64,7 +66,8 @@ def evaluate(
         t: knots, as for `CubicSpline`.
         points, velocities: arrays of shape (..., N+1, *point_shape).
         space: the space or its name.
-        x: times, any shape and order.
+        x: times, any shape and order. Only the nodes from the first to the last segment that contain times are read
+            and checked, so that few times cost little.
         nu, extrapolate, per_curve, progress, out: as for calling a `CubicSpline`.
 
     Returns:
@@ -78,10 +81,48 @@ def evaluate(
     """
     space = space_named(space)
     check_progress(progress)
+    libraries = points, velocities, x
+    if not per_curve:
+        t, points, velocities = _nodes_around(t, points, velocities, space, x)
     clock, curve = given(t, points, velocities, space)
     where = outside(checked_extrapolate(extrapolate), "natural")
     values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress, out)
-    return values if out is not None else in_library(library_of(points, velocities, x), values)
+    return values if out is not None else in_library(library_of(*libraries), values)
+
+
+def _nodes_around(
+    t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
+) -> tuple[Any, Any, Any]:
+    """The knots, points and velocities of the segments that times lie in, or all of them where they are not plain
+    arrays, or where it would not pay.
+
+    Every segment is determined by its two ends, so that values are bit-identical.
+    """
+    everything = t, points, velocities
+    if type(t) is not np.ndarray or t.dtype != np.float64 or t.ndim != 1 or len(t) < _MANY:
+        return everything
+    times = np.asarray(x) if isinstance(x, (int, float, np.ndarray)) else None
+    if times is None or times.dtype.kind not in "iuf" or not 0 < times.size <= len(t):
+        return everything
+    first, last = times.min(), times.max()
+    # Invalid input raises further on. Comparisons are false for NaN.
+    if not (t[0] <= first and last <= t[-1] < np.inf and (t[1:] > t[:-1]).all()):
+        return everything
+    start, stop = int(t.searchsorted(first, "right")) - 1, int(t.searchsorted(last, "right")) + 1
+    start = min(start, len(t) - 2)
+    factors, arrays = factors_of(space), []
+    for value in (points, velocities):
+        each = value if isinstance(value, tuple) else (value,)
+        if len(each) != len(factors):
+            return everything
+        sliced = []
+        for factor, array in zip(factors, each, strict=True):
+            axis = array.ndim - len(factor.point_shape) - 1 if type(array) is np.ndarray else -1
+            if axis < 0 or array.shape[axis] != len(t):
+                return everything
+            sliced.append(array[(slice(None),) * axis + (slice(start, stop),)])
+        arrays.append(tuple(sliced) if isinstance(value, tuple) else sliced[0])
+    return t[start:stop], arrays[0], arrays[1]
 
 
 def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tuple[TimeAxis, CurveArrays]:
@@ -149,14 +190,11 @@ def fit_many(
     >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
     [4, 2]
     """
-    space, check = space_named(space), checked_flag(check, "check")
+    space = space_named(space)
+    options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
     pairs = list(curves)
-    policy = checked_extrapolate(extrapolate)
-    check_on_failure(on_failure)
-    check_progress(progress)
-    options = options_of(method, tol, max_iter)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
             raise ValidationError(f"curve {number} must be a pair (t, points)")
@@ -176,16 +214,16 @@ def fit_many(
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
     problem = fitting.ManyProblem(
-        space, times, points, ends, options, check, mask, skip_invalid=on_failure != "raise"
+        space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
     fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
     fitted = [
-        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)
+        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), extrapolate, found)
         for i, ((clock, t, _), found) in enumerate(zip(knots, fits, strict=True))
     ]
     if faults:
         raise_or_warn(faults, on_failure, fitted)
-    warn_of_signs(space, [own if mask is None or mask[i] else None for i, own in enumerate(points)])
-    warn_of_far_points([found.curve for found in fits], [found.reports for found in fits])
+    wanted = [own if mask is None or mask[i] else None for i, own in enumerate(points)]
+    warn_of_representatives(space, wanted, [found.curve for found in fits], [found.columns for found in fits])
     return fitted

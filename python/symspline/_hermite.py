@@ -11,10 +11,9 @@ from ._base_curve import Curve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
-from ._far import warn_of_far_points
 from ._functional import velocities_of
 from ._options import checked_extrapolate, outside, with_atol
-from ._signs import warn_of_signs
+from ._representatives import warn_of_far_points, warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -81,7 +80,7 @@ class HermiteSpline(Curve):
         curve = curve_of(space, times, arrays, fitted=False)
         self._fill(clock, shown_times, curve, policy)
         warn_of_signs(space, [data])
-        warn_of_far_points([curve], [None])
+        warn_of_far_points([curve])
 
     def _fill(self, clock: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate

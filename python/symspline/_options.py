@@ -14,11 +14,6 @@ _RAISE = "raise"
 _OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
 
 
-def options_of(method: str, tol: float, max_iter: int | None) -> Options:
-    """How to solve; the core checks method and tol."""
-    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
-
-
 def with_atol(data: list[Points], atol: float | None) -> list[Points]:
     """Points that may be off the space by ``atol``; None leaves what their type allows."""
     if atol is None:
@@ -48,8 +43,19 @@ def check_progress(progress: Any) -> None:
         raise ValidationError(f"progress must be a function of two numbers, not {short_repr(progress)}")
 
 
-def check_fit_options(extrapolate: Any, on_failure: Any, check: Any, progress: Any) -> None:
-    """Raise ValidationError unless all of these are valid. The defaults, which are usual, cost one call."""
+def fit_options(
+    method: str,
+    tol: float,
+    max_iter: int | None,
+    extrapolate: Any,
+    on_failure: Any,
+    check: Any,
+    progress: Any,
+) -> Options:
+    """The options of the solver, after validation of all options of a fit.
+
+    The compiled core validates ``method`` and ``tol``. The usual defaults take no further function call.
+    """
     if extrapolate is not None:
         checked_extrapolate(extrapolate)
     # Not ==, which would compare every number of an array.
@@ -59,6 +65,7 @@ def check_fit_options(extrapolate: Any, on_failure: Any, check: Any, progress: A
         checked_flag(check, "check")
     if progress is not None:
         check_progress(progress)
+    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
 
 
 def check_on_failure(on_failure: Any) -> None:

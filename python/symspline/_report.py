@@ -166,6 +166,7 @@ NUMBERS = (
 )
 OPTIONAL = tuple(own.name for own in fields(Report) if own.metadata.get("optional"))
 _UNKNOWN = {name: None if name in OPTIONAL else np.nan for name in NUMBERS}
+MAX_STEP = NUMBERS.index("max_step")
 
 
 class Columns(NamedTuple):

@@ -14,9 +14,8 @@ from .._curves.ends import End, freeze_bc_type, is_closed
 from .._curves.fit import FitProblem, Points, fit, mask_of
 from .._curves.solve import Options, Progress
 from .._errors import raise_or_warn
-from .._far import warn_of_far_points
 from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._signs import warn_of_signs
+from .._representatives import warn_of_far_points, warn_of_signs
 from .._spaces import Product, Space, factors_of
 from .._spaces import space as space_named
 from ..manifolds._manifold import refuse_functions
@@ -260,10 +259,17 @@ def make_smoothing_spline(
         for factor, own in zip(factors_of(space), at_knots, strict=True)
     ]
     good = None if chosen is None else _flags(given.batch, chosen)
-    curve, reports, _ = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
+    fitted = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
     noise = [part.map(lambda column: _at_places(column, given.batch, chosen)) for _, part, _ in found]
     spline = SmoothingSpline._of(
-        given.clock, at.t, curve, _conditions(bc_type, conditions, space), policy, reports, whole, noise
+        given.clock,
+        at.t,
+        fitted.curve,
+        _conditions(bc_type, conditions, space),
+        policy,
+        fitted.reports(),
+        whole,
+        noise,
     )
     faults += next((own for _, _, own in found if own), [])
     if faults:
@@ -274,18 +280,13 @@ def make_smoothing_spline(
         [_at_places(np.isnan(own), given.batch, chosen) for own in lams],
         [np.sum(own.weights > 0, axis=-1) for own in given.weighing],
     )
-    warn_of_spread(space, curve, whole, [part.report.df for part in noise])
-    nodes = given.times.shape[-1]
-    warn_of_signs(
-        space,
-        [
-            [
-                Points(one._as_doubles(own), 0.0, given.batch, nodes)
-                for one, own in zip(factors_of(space), whole.points, strict=True)
-            ]
-        ],
-    )
-    warn_of_far_points([curve], [reports])
+    warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
+    data = [
+        Points(one._as_doubles(own), 0.0, given.batch, given.times.shape[-1])
+        for one, own in zip(factors_of(space), whole.points, strict=True)
+    ]
+    warn_of_signs(space, [data])
+    warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
 
 

@@ -23,10 +23,11 @@ from .subspaces import (
     QuaternionicProjective,
     RealProjective,
 )
-from .tolerance import POINT_TOL_FLOAT32, point_tol
+from .tolerance import POINT_TOL, POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
 
 __all__ = [
+    "POINT_TOL",
     "POINT_TOL_FLOAT32",
     "Affine",
     "AntiDeSitter",

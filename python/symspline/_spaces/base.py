@@ -21,7 +21,7 @@ Array = NDArray[Any]
 # From this ambient dimension on nothing is made that needs a frame of all tangent vectors.
 LARGE = 256
 # Operations that give one number a row, not a point.
-_NUMBERS = ("distance", "inner", "rounding")
+_NUMBERS = ("distance", "cut_fraction", "inner", "rounding")
 # So many numbers are 8 TB.
 _MOST = 2**40
 
