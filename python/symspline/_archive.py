@@ -374,7 +374,7 @@ def check_curves(state: Entries, curve: CurveArrays, converged: list[Any]) -> No
         if not (finite | ~np.asarray(good)).all():
             raise ValidationError("entries 'points' and 'velocities' must be finite")
         off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
-        allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space.rounding(points).max(initial=1.0))
+        allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space._rounding(points).max(initial=1.0))
         if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):
             raise ValidationError("entry 'velocities': the vectors are not tangent at the points")
 

@@ -142,7 +142,7 @@ def check(
         base = np.asarray(point, space.dtype)
     longest = min(0.5, space.injectivity_radius / 2) if length is None else length
     found = Conformance(space)
-    rounding = float(np.max(space.rounding(base)))
+    rounding = float(np.max(space._rounding(base)))
     sample = _Sample(space, base, longest, max(tol, 1e-14 * rounding), rng)
     _operations(found, sample)
     # K is NaN where no metric belongs to a group, and of manifolds made of functions.

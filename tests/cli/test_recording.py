@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cases import COMMON
 from curves import each, parts, points_on, same
+from rounding import rounding
 from tabular import numbered, table, write, write_table
 
 import symspline as ss
@@ -59,7 +60,7 @@ def test_means_of_two_points_lie_halfway(run, name):
     left, right = (each(lambda part, i=i: part[i], p) for i in ([1, 4], [2, 5]))
     halfway = space.geodesic(left, right, 0.5)
     middle = each(lambda part: part[[1, 3]], found)
-    assert np.max(space.distance(middle, halfway)) < 1e-14 * np.max(space.rounding(halfway))
+    assert np.max(space.distance(middle, halfway)) < 1e-14 * np.max(rounding(space, halfway))
     assert same(
         parts(each(lambda part: part[[0, 2]], found))[0], parts(each(lambda part: part[[0, 3]], p))[0]
     )
@@ -75,7 +76,7 @@ def test_logarithms_at_a_mean_add_up_to_zero(run, name):
     assert same(found[0], p[0])
     for centre, own in ((found[1], p[1:5]), (found[2], p[5:])):
         sums = space.log(centre, own).sum(axis=0)
-        assert space.norm(centre, sums) < 1e-13 * space.rounding(centre)
+        assert space.norm(centre, sums) < 1e-13 * rounding(space, centre)
 
 
 def test_points_without_a_mean(fails):

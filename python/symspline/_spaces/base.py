@@ -362,15 +362,10 @@ class Space:
         """The tangential part of v at p."""
         return self._finite("project_tangent", p=p, v=v)
 
-    def rounding(self, p: ArrayLike) -> Any:
-        """By how much rounding counts at points p: how far apart neighbouring floating-point points are, in units of
-        2.2e-16, shape of the leading axes. |p|² in hyperbolic space, tr p · tr p⁻¹ (about the condition) of positive
-        definite matrices, the length of vectors and translations; 1 or more.
-
-        >>> import symspline as ss
-        >>> ss.Sphere(1).rounding([1.0, 0.0]), ss.Hyperbolic(1).rounding([1.25, 0.75])
-        (np.float64(1.0), np.float64(2.125))
-        """
+    def _rounding(self, p: ArrayLike) -> Any:
+        """The distance between neighbouring floating-point points at p in units of 2.2e-16, shape of the leading axes:
+        |p|² in hyperbolic space, tr p · tr p⁻¹ (about the condition) of positive definite matrices, the length of
+        vectors and translations; 1 or more."""
         return self._apply("rounding", p=p)
 
     def check_point(self, p: ArrayLike) -> None:
