@@ -29,6 +29,7 @@ LAYERS = [
     ["_curves"],
     ["_errors", "_options", "_plotting", "_representatives"],
     ["_archive"],
+    ["_curve"],
     ["_base_curve", "_bspline"],
     ["_cubic"],
     ["_functional"],

@@ -17,11 +17,11 @@ from . import _cpu
 _cpu.load(_Path(__file__).parent)
 
 from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
-from ._base_curve import Curve  # noqa: E402
 from ._bspline import BezierCurve, BSpline  # noqa: E402
 from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from ._cubic import CubicSpline  # noqa: E402
+from ._curve import Curve  # noqa: E402
 from ._curves.gradient import Gradient  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
 from ._files import load, save  # noqa: E402

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from base64 import b64encode
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
+from ._curve import Curve
 from ._curves.band import UncertaintyBand
 from ._curves.curve import CurveArrays, Doubles, quantity_of
-from ._curves.energy import bending_energy
-from ._curves.integrals import integrate
 from ._curves.solve import Progress
 from ._input import times_of
 from ._options import check_progress, checked_extrapolate, outside
@@ -33,17 +32,11 @@ if TYPE_CHECKING:
 _DOTS = 60
 
 
-class Curve(ABC):
-    """A curve, or a batch of them, by knots, points and velocities there."""
+class SegmentedCurve(Curve):
+    """A curve of cubic Bézier segments, or a batch of them, by knots, points and velocities there."""
 
     # What a plot says of it.
     _kind: ClassVar[str]
-    # The name of its format in files and pickles.
-    _format: ClassVar[str]
-
-    def __init_subclass__(cls) -> None:
-        if "_format" in vars(cls):
-            _archive.FORMATS[cls._format] = cls
 
     @property
     @abstractmethod
@@ -265,17 +258,6 @@ class Curve(ABC):
             self._outside if extrapolate is None else outside(checked_extrapolate(extrapolate), self._bc_type)
         )
 
-    def length(self) -> Any:
-        """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
-        curve = self._curve
-        return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
-        )
-
-    def bending_energy(self) -> Any:
-        """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return bending_energy(self._curve, self._outside)
-
     # ---- what it is made of ----
 
     @property
@@ -311,48 +293,19 @@ class Curve(ABC):
         return self._extrapolate
 
     @property
-    def _batch(self) -> tuple[int, ...]:
-        return self._curve.batch
-
-    @property
     def _times(self) -> NDArray[np.float64]:
         """The knots as the core counts them."""
         return self._curve.times
 
-    # ---- a batch as a sequence ----
+    @property
+    def domain(self) -> tuple[Any, Any]:
+        return self._t[..., 0][()], self._t[..., -1][()]
 
-    def __len__(self) -> int:
-        if not self._batch:
-            raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
-        return self._batch[0]
-
-    def __getitem__(self, index: Any) -> Self:
-        """A curve, or a slice of curves, of a batch."""
-        if not self._batch:
-            raise TypeError("this is one curve; only a batch of curves can be indexed")
-        if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(
-                f"a curve is picked by a whole number or a slice as index, not {short_repr(index)}"
-            )
-        if not isinstance(index, slice) and not -len(self) <= index < len(self):
-            raise IndexError(f"index {short_repr(index)} is out of range: there are {len(self)} curves")
+    def _picked(self, index: Any) -> Self:
         t = self._t[index] if self._times.ndim > 1 else self._t
         return self._with(self._clock.picked(index), t, self._curve.picked(index), index)
 
-    def __bool__(self) -> bool:
-        return True
-
-    def __iter__(self) -> Iterator[Self]:
-        return (self[i] for i in range(len(self)))
-
     # ---- as a value ----
-
-    def save(self, file: Any) -> None:
-        """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
-        _archive.write(file, self._state())
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _archive.restore, (self._state(),)
 
     def _state(self) -> dict[str, Any]:
         """What files and pickles hold."""
@@ -360,14 +313,9 @@ class Curve(ABC):
             self._format, self.space, self._t, self._clock, self._extrapolate, self._curve
         )
 
-    @classmethod
-    @abstractmethod
-    def _from_state(cls, state: _archive.Entries) -> Self:
-        """Make the curve that a state describes."""
-
     def __eq__(self, other: object) -> bool:
         """Equal space, knots, points and velocities, to the last bit."""
-        if type(self) is not type(other) or not isinstance(other, Curve):
+        if type(self) is not type(other) or not isinstance(other, SegmentedCurve):
             return NotImplemented
         return (
             self.space == other.space
@@ -379,8 +327,6 @@ class Curve(ABC):
                 for a, b in zip(self._curve.parts, other._curve.parts, strict=True)
             )
         )
-
-    __hash__ = None  # type: ignore[assignment]
 
     def _repr_html_(self) -> str:
         """What notebooks show: a small picture, where matplotlib is there to draw it."""
@@ -436,8 +382,9 @@ class Curve(ABC):
 
 def check_curve(spline: Any, name: str = "spline") -> None:
     """Raise TypeError unless an argument is a curve that was fitted."""
-    if not isinstance(spline, Curve):
-        raise TypeError(f"{name} must be a curve, such as a symspline.CubicSpline, not {short_repr(spline)}")
+    if not isinstance(spline, SegmentedCurve):
+        what = "a curve with knots and velocities, such as a symspline.CubicSpline"
+        raise TypeError(f"{name} must be {what}, not {short_repr(spline)}")
 
 
 def evaluated(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._archive import Entries, read_fitted
-from ._base_curve import Curve
+from ._base_curve import SegmentedCurve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.derivatives import places
@@ -28,7 +28,7 @@ from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
 
-class CubicSpline(Curve):
+class CubicSpline(SegmentedCurve):
     """The C² cubic spline through points of a space.
 
     Between two points the curve is a cubic Bézier curve made of geodesics (de Casteljau's algorithm,

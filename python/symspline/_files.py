@@ -9,8 +9,8 @@ import numpy as np
 
 from ._archive import TEXTS, Entries, Stored, read_state, restore, write
 from ._arrays import brief, short_repr
-from ._base_curve import Curve
 from ._core import ValidationError
+from ._curve import Curve
 from ._disk import path_of
 
 # The same for all curves of a file.

@@ -7,7 +7,7 @@ from typing import Any, Self
 from numpy.typing import ArrayLike
 
 from ._archive import Entries, check_curves, read_segments
-from ._base_curve import Curve
+from ._base_curve import SegmentedCurve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
@@ -19,7 +19,7 @@ from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
 
-class HermiteSpline(Curve):
+class HermiteSpline(SegmentedCurve):
     """The cubic curve through points with given velocities there, such as measured ones.
 
     Between two points it is the same Bézier curve as that of a `CubicSpline`, whose control points follow from the

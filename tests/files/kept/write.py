@@ -32,6 +32,8 @@ def curves():
         "complex": ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1", bc_type=((1, [0, 0.5j]), "natural")),
         "hermite": ss.HermiteSpline([0, 1], P[:2], [[0, 0.5, 0], [0.25, 0, 0]], "sphere:2"),
         "smoothing": smooth,
+        "bspline": ss.BSpline([0, 0, 0, 1, 2, 2, 2], [*P, P[0]], 2, "sphere:2"),
+        "bezier": ss.BezierCurve([P, P[::-1]], "sphere:2"),
         "several": {"a": spline, "b": spline},
         "several_smoothing": {"a": smooth, "b": smooth},
     }
@@ -42,7 +44,7 @@ def values(found):
     if isinstance(found, dict):
         return {name: values(curve) for name, curve in found.items()}
     numbers = {"class": type(found).__name__, "space": str(found.space), "repr": repr(found)}
-    start, end = found.t.ravel()[0], found.t.ravel()[-1]
+    start, end = np.ravel(found.domain[0])[0], np.ravel(found.domain[1])[-1]
     for nu in range(3):
         factors = found(start + (end - start) // 2, nu)
         numbers[f"nu={nu}"] = [plain(part) for part in (factors if isinstance(factors, tuple) else [factors])]
