@@ -36,8 +36,6 @@ class Curve(ABC):
     # The name of its format in files and pickles.
     _format: ClassVar[str]
     _curve: Evaluable
-    # The extrapolation policy in the words of the core.
-    _outside: str = "raise"
 
     def __init_subclass__(cls) -> None:
         if "_format" in vars(cls):
@@ -45,7 +43,7 @@ class Curve(ABC):
 
     @abstractmethod
     def __call__(self, x: ArrayLike, nu: int = 0) -> Any:
-        """Evaluate the curve at times x: its points, or for `nu` 1 or 2 its velocity or covariant acceleration."""
+        """Evaluate the curve at times x, or for `nu` 1 or 2 its velocity or covariant acceleration."""
 
     @abstractmethod
     def speed(self, x: ArrayLike) -> Any:
@@ -62,17 +60,53 @@ class Curve(ABC):
         """First and last time; arrays with the batch axes where every curve has times of its own."""
 
     def length(self) -> Any:
-        """Length of the curve over its domain, ∫ |γ'| dt; shape of the batch axes."""
+        r"""Compute the length of the curve from the first to the last knot.
+
+        Returns
+        -------
+        ndarray or float, shape ``batch axes``
+            The integral of the speed, :math:`\int \lVert\gamma'\rVert \, dt`.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
+        >>> round(float(quarter.length()), 8)
+        1.57079633
+        """
         curve = self._curve
         return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
+            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
         )
 
     def bending_energy(self) -> Any:
-        """Bending energy ∫ ‖∇γ'‖² dt, (1) of the paper, which Riemannian cubics minimise; shape of the batch axes."""
-        return bending_energy(self._curve, self._outside)
+        r"""Compute the bending energy of the curve.
 
-    # ---- a batch as a sequence ----
+        Returns
+        -------
+        ndarray or float, shape ``batch axes``
+            The integral of the squared covariant acceleration.
+
+        Notes
+        -----
+        The bending energy is :math:`\int \lVert\nabla_{\gamma'}\gamma'\rVert^2 \, dt`, equation (1) of the paper.
+        Riemannian cubics minimise it.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (1).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> wave = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
+        >>> round(float(wave.bending_energy()), 8)
+        6.0
+        """
+        return bending_energy(self._curve)
+
+    # ---- batches ----
 
     @property
     def _batch(self) -> tuple[int, ...]:
@@ -80,7 +114,7 @@ class Curve(ABC):
 
     @abstractmethod
     def _picked(self, index: Any) -> Self:
-        """A curve, or a slice of curves, of a batch."""
+        """Return one curve of a batch, or a slice of the batch."""
 
     def __len__(self) -> int:
         if not self._batch:
@@ -88,13 +122,11 @@ class Curve(ABC):
         return self._batch[0]
 
     def __getitem__(self, index: Any) -> Self:
-        """A curve, or a slice of curves, of a batch."""
+        """Return one curve of a batch, or a slice of the batch."""
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
         if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(
-                f"a curve is picked by a whole number or a slice as index, not {short_repr(index)}"
-            )
+            raise TypeError(f"the index of a curve must be an integer or a slice, not {short_repr(index)}")
         if not isinstance(index, slice) and not -len(self) <= index < len(self):
             raise IndexError(f"index {short_repr(index)} is out of range: there are {len(self)} curves")
         return self._picked(index)
@@ -105,12 +137,42 @@ class Curve(ABC):
     def __iter__(self) -> Iterator[Self]:
         return (self[i] for i in range(len(self)))
 
-    # ---- as a value ----
+    # ---- files and pickles ----
 
     __hash__ = None  # type: ignore[assignment]
 
     def save(self, file: Any) -> None:
-        """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
+        """Write the curve to an NPZ file.
+
+        `load` reads it back without a new fit.
+
+        Parameters
+        ----------
+        file : str, path or file object
+            Name of the file, or a binary file that is open for writing. An existing file of this name is replaced only
+            when the new one is complete.
+
+        Raises
+        ------
+        ValidationError
+            If the space is a `Manifold` made of functions, which cannot be stored.
+        OSError
+            If the file cannot be written.
+
+        See Also
+        --------
+        load : Read a curve.
+        save : Write several curves to one file.
+
+        Examples
+        --------
+        >>> import io, symspline as ss
+        >>> file = io.BytesIO()
+        >>> ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2").save(file)
+        >>> _ = file.seek(0)
+        >>> ss.load(file)
+        <CubicSpline on Sphere(2): 2 points, natural>
+        """
         _archive.write(file, self._state())
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""Splines as functions of plain arrays, and many of different lengths at once."""
+"""Splines as functions of plain arrays, and fits of many curves of different lengths."""
 
 from __future__ import annotations
 
@@ -30,14 +30,39 @@ _MANY = 64
 
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
-    """The velocities of the C² spline through points, as plain arrays.
+    """Compute the velocities of a C² cubic spline as plain arrays.
 
-    Takes the arguments of `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots. None means 0, 1, ..., n - 1.
+    points : array_like, shape (..., n, *space.point_shape)
+        Points to interpolate. For a `Product`, a tuple with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    **options
+        Keyword arguments of `CubicSpline`.
 
-    Returns:
-        The velocities, of the shape of the points, and the report. Where the points are arrays of another library that
-        follows the array API standard, and on the CPU, velocities are of it, too.
+    Returns
+    -------
+    velocities : ndarray or tuple of ndarray
+        Velocities at the knots, with the shape of the points. If the points are arrays of another library that
+        follows the array API standard, on the CPU, so are the velocities.
+    report : Report
+        Report of the fit.
 
+    Raises
+    ------
+    ValidationError, CutLocusError, ConvergenceError
+        As for `CubicSpline`.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points by a C² curve.
+    evaluate : Evaluate a curve given by plain arrays.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
     >>> u.shape, report.converged
@@ -60,19 +85,50 @@ def evaluate(
     progress: Progress | None = None,
     out: Any = None,
 ) -> Any:
-    """The curve with given knots, points and velocities at times x, as plain arrays.
+    """Evaluate a curve that is given by knots, points and velocities.
 
-    Args:
-        t: knots, as for `CubicSpline`.
-        points, velocities: arrays of shape (..., N+1, *point_shape).
-        space: the space or its name.
-        x: times, any shape and order. Only the nodes from the first to the last segment that contain times are read
-            and checked, so that few times cost little.
-        nu, extrapolate, per_curve, progress, out: as for calling a `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots. None means 0, 1, ..., n - 1.
+    points, velocities : array_like, shape (..., n, *space.point_shape)
+        Points and velocities at the knots. For a `Product`, tuples with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    x : array_like of float or datetime64
+        Times, of any shape and in any order. Only the nodes from the first to the last segment that contain times are
+        read and checked, so that few times cost little.
+    nu : {0, 1, 2}, default 0
+        Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. False gives NaN,
+        as in SciPy. True continues the first and last segments. ``"geodesic"`` continues with constant velocity.
+        ``"periodic"`` repeats the curve.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
+    out : ndarray or tuple of ndarray, optional
+        Array into which the result is written, and which is returned.
 
-    Returns:
-        Values as of calling a `CubicSpline`, as arrays of the library that points, velocities or x come from.
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        Points or tangent vectors, shape ``(*batch axes, *x.shape, *point_shape)``. If `points`, `velocities` or `x`
+        are arrays of another library that follows the array API standard, on the CPU, so is the result.
 
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+
+    See Also
+    --------
+    fit : Compute the velocities of a C² cubic spline as plain arrays.
+    HermiteSpline : Interpolate points and given velocities.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> u, _ = ss.fit(None, p, "sphere:2")
@@ -126,7 +182,7 @@ def _nodes_around(
 
 
 def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tuple[TimeAxis, CurveArrays]:
-    """The curve with given knots, points and velocities, and how it counts times."""
+    """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
     read = [
@@ -144,7 +200,7 @@ def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tu
 
 
 def velocities_of(space: Space, points: Array, velocities: Any) -> Array:
-    """Velocities for points in doubles, not in a product, as an array that has flags of its own."""
+    """Return velocities in one factor as a read-only array, after checks of their shape and numbers."""
     doubles = space._doubles(velocities, "velocities")
     array = read_only(space._numbers(doubles))
     if doubles.shape != points.shape:
@@ -174,17 +230,38 @@ def fit_many(
 ) -> list[CubicSpline]:
     """Fit curves of different lengths in one parallel call.
 
-    Args:
-        curves: pairs (t, points), one a curve; see `CubicSpline`.
-        space: the space of all curves, or its name.
-        bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol, progress: as for `CubicSpline`, for all
-            curves alike.
-        where: True for the curves that are wanted, one a curve: the others are NaN, whatever their points are.
+    Parameters
+    ----------
+    curves : iterable of pair
+        Pairs ``(t, points)``, one per curve, as for `CubicSpline`. Each pair is a single curve, not a batch.
+    space : Space or str
+        Space of all curves, or its name.
+    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol
+        As for `CubicSpline`. They apply to all curves.
+    where : array_like of bool, optional
+        Mask over the curves. Curves where it is False are not fitted and evaluate to NaN.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
 
-    Returns:
-        One `CubicSpline` a curve. If curves fail and ``on_failure="raise"``, the exception's ``.spline``
-        is this list.
+    Returns
+    -------
+    list of CubicSpline
+        One spline per curve.
 
+    Raises
+    ------
+    ValidationError, CutLocusError, ConvergenceError
+        As for `CubicSpline`. The message names the curve. The attribute ``spline`` of a `CutLocusError` or
+        `ConvergenceError` is the list of all splines.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points, or a batch of curves of equal length.
+    fit_segments : Fit a recording with gaps.
+    save : Write several curves to one file.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, 1]]
     >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
@@ -197,7 +274,7 @@ def fit_many(
     pairs = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
-            raise ValidationError(f"curve {number} must be a pair (t, points)")
+            raise ValidationError(f"curve {number} must be a pair (t, points), not {short_repr(curve)}")
     if not pairs:
         return []
     mask = fitting.mask_of(where, (len(pairs),))
@@ -206,7 +283,7 @@ def fit_many(
         try:
             data = with_atol(fitting.read(p, space), atol)
             if data[0].batch:
-                raise ValidationError(f"points has shape {np.shape(p)}; each curve here is a single one")
+                raise ValidationError(f"points has shape {np.shape(p)}, but each pair must be a single curve")
             points.append(data)
             knots.append(knots_of(t, (), data[0].nodes))
         except (ValidationError, TypeError, ValueError) as error:

@@ -20,14 +20,14 @@ from .manifolds import Manifold
 
 # The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6
-# With fewer steps, "more than half of them" would not mean much.
+# Fewer steps are too few to show a pattern.
 _LEAST = 4
 # Points closer to each other than this, slightly less than π/2, have a positive inner product.
 _NEAR = 1.57
-# What a program may do about quaternions of opposite sign.
+# Remedies for users of the Python interface.
 IN_PYTHON = (
-    "Curves of rotations are on so:3 (symspline.rotations.from_quaternions makes its points) or on rp:3, where signs "
-    "do not count. If these are no rotations: "
+    "For rotations, use so:3 (symspline.rotations.from_quaternions returns its points) or rp:3, where q and -q are the "
+    "same point. For other data, silence this warning with "
     "warnings.filterwarnings('ignore', message='neighbours of opposite sign')"
 )
 
@@ -99,8 +99,8 @@ def warn_of_signs(space: Space, curves: Sequence[list[Points] | None]) -> None:
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
     warnings.warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
-        f"{product:.3g}{more}. As quaternions q and -q are one rotation, but here the curve turns the long way round. "
-        f"{IN_PYTHON}",
+        f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
+        f"round. {IN_PYTHON}",
         UserWarning,
         stacklevel=callers_level(),
     )
