@@ -55,9 +55,8 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         named = isinstance(found, dict)
         for curve in found.values() if named else [found]:
             if not isinstance(curve, CubicSpline):
-                raise Problem(
-                    f"{path} holds a {type(curve).__name__}, which is not a C² spline; use symspline.load"
-                )
+                kind = type(curve).__name__
+                raise Problem(f"{path} is a {kind}, whose acceleration jumps at knots; use symspline.load")
         splines = found if named else dict(_singles(found))
         named = named or len(splines) > 1
         space = next(iter(splines.values())).space
