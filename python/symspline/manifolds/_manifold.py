@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -173,19 +174,9 @@ class Manifold(Space):
         return hash(self._key())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (
-            self.functions,
-            None if np.isinf(self._radius) else self._radius,
-            self._point_shape,
-            self._dim,
-            self._dtype,
-        )
-
-
-def _remade(
-    functions: Functions, radius: float | None, shape: tuple[int, ...], dim: int | None, dtype: Any
-) -> Manifold:
-    return Manifold(**functions._asdict(), injectivity_radius=radius, point_shape=shape, dim=dim, dtype=dtype)
+        radius = None if np.isinf(self._radius) else self._radius
+        options = self.functions._asdict() | {"injectivity_radius": radius, "point_shape": self._point_shape}
+        return partial(Manifold, **options, dim=self._dim, dtype=self._dtype), ()
 
 
 def _shape(value: Any) -> tuple[int, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -64,11 +66,7 @@ class Operations:
 
     def log(self, p: Array, q: Array) -> Array:
         """NaN where there is no logarithm."""
-        try:
-            found = self._call("log", p, q)
-        except CutLocusError:
-            # That of a space of this library raises for all rows if there is none for one.
-            found = self._log_each(p, q)
+        found = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
         # Formulas that divide by the distance have nothing to say of equal points.
         same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
         if same.any():
@@ -142,17 +140,6 @@ class Operations:
                 f"{'float64' if real else 'complex128'} is needed"
             )
         return np.ascontiguousarray(found, np.float64 if name == "inner" else self.space.dtype)
-
-    def _log_each(self, p: Array, q: Array) -> Array:
-        shape = self.space.point_shape
-        result = np.full(p.shape, np.nan, self.space.dtype)
-        rows = result.reshape(-1, *shape)
-        for i, (a, b) in enumerate(zip(p.reshape(-1, *shape), q.reshape(-1, *shape), strict=True)):
-            try:
-                rows[i] = self._call("log", a[None], b[None])[0]
-            except CutLocusError:
-                continue
-        return rows.reshape(p.shape)
 
     # ---- what the classes of spaces ask of the compiled core ----
 
@@ -232,6 +219,20 @@ class Operations:
         size = np.abs(v).reshape(len(v), -1).max(axis=1)
         off = np.abs(v - self.project_tangent(p, v)).reshape(len(v), -1).max(axis=1)
         return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
+
+
+def rows_or_nan(
+    log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)
+) -> Array:
+    """Logarithms of rows, NaN where there are none. Functions of this library raise for all rows then."""
+    try:
+        return np.asarray(log(p, q))
+    except errors:
+        found = np.full(q.shape, np.nan, q.dtype)
+    for i in range(len(q)):
+        with suppress(*errors):
+            found[i] = log(p[i : i + 1], q[i : i + 1])[0]
+    return found
 
 
 def _times(t: Doubles | None, p: Array) -> Doubles:

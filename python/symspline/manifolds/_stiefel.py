@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from .._arrays import short_repr
 from .._core import CutLocusError, ValidationError
 from .._spaces import Array, Space, SpecialOrthogonal
 from ._manifold import Manifold
+from ._operations import rows_or_nan
 
 # Of Rentmeesters, Algorithms for data fitting on some common homogeneous spaces (2013), Theorem 5.5.
 _RADIUS = np.sqrt(0.8) * np.pi
@@ -187,8 +187,13 @@ def _generator_to(rotations: SpecialOrthogonal, first: Array, k: int) -> Array:
     rest = first.shape[-2] - k
     found = np.full(turn.shape, np.nan)
     left = np.arange(len(turn))
+
+    def log(p: Array, q: Array) -> Array:
+        return rotations._apply("log", p=p, q=q)
+
     for _ in range(_MOST):
-        logs = _log_or_nan(rotations, turn[left])
+        eye = np.broadcast_to(np.eye(k + rest), turn[left].shape)
+        logs = rows_or_nan(log, eye, turn[left], (CutLocusError, ValidationError))
         size = np.abs(logs[..., k:, k:]).reshape(len(left), -1).max(axis=1, initial=0.0)
         there = size <= _TOL
         found[left[there]] = logs[there]
@@ -219,16 +224,3 @@ def _completed(first: Array, k: int) -> Array:
     other = columns @ _transposed(flipped @ v)
     turn[..., k:] = np.where((np.linalg.det(turn) < 0)[:, None, None], other, last)
     return turn
-
-
-def _log_or_nan(rotations: SpecialOrthogonal, turn: Array) -> Array:
-    """Logarithms of rotations, NaN of those with an eigenvalue −1."""
-    eye = np.eye(turn.shape[-1])
-    try:
-        return rotations._apply("log", p=eye, q=turn)
-    except (CutLocusError, ValidationError):
-        found = np.full(turn.shape, np.nan)
-    for i, one in enumerate(turn):
-        with suppress(CutLocusError, ValidationError):
-            found[i] = rotations._apply("log", p=eye, q=one)
-    return found

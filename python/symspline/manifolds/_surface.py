@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from .._arrays import short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array
-from ._geodesics import FINE, integrate, jacobian_by_differences
+from ._differences import directional_derivative, jacobian
+from ._geodesics import FINE, integrate
 from ._manifold import Manifold
 from ._operations import Function
 
@@ -119,7 +120,7 @@ class Surface(Manifold):
 
     def _hess(self, x: Array) -> Array:
         if self._given_hess is None:
-            return jacobian_by_differences(self._gradient, x)
+            return jacobian(self._gradient, x)
         return np.asarray(self._given_hess(x), float)
 
     def _turns(self, p: Array, v: Array) -> Array:
@@ -133,7 +134,9 @@ class Surface(Manifold):
         x, t = y[:, 0], y[:, 1]
         g = self._gradient(x)
         rough = self._given_hess is None
-        turned = _along(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
+        turned = (
+            directional_derivative(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
+        )
         pull = np.sum(t * turned, axis=1) / np.sum(g * g, axis=1)
         return np.stack([t, -pull[:, None] * g], axis=1)
 
@@ -207,15 +210,6 @@ def _inner(p: Array, u: Array, v: Array) -> Array:
 
 def _unit(g: Array) -> Array:
     return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
-
-
-def _along(g: Any, x: Array, t: Array) -> Array:
-    """The derivative of the gradient in a direction, by differences of order four."""
-    size = np.linalg.norm(t, axis=1, keepdims=True)
-    step = 1e-3 * np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True))
-    unit = np.divide(t, size, out=np.zeros_like(t), where=size > 0)
-    near, far = (g(x + s * step * unit) - g(x - s * step * unit) for s in (1, 2))
-    return np.asarray((8 * near - far) / (12 * step) * size)
 
 
 def _combined(basis: Array, fields: Array, w: Array) -> Array:

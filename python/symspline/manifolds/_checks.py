@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import CutLocusError, ValidationError
+from .._curves.solve import Options, Task, validate, without
 from .._faults import INVALID, Fault, of_curve
 from .._spaces import Array, Euclidean
-from ..manifolds import Manifold
-from .solve import Options, Task, validate, without
+from ._condition import control_polygons
+from ._manifold import Manifold
 
 _METHODS = ("auto", "quasi-newton")
 
@@ -123,22 +124,15 @@ def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
     p = space._numbers(task.points)
     space.check_tangent(p, velocities)
     vectors = np.ascontiguousarray(space.project_tangent(p, velocities))
-    axis = len(task.batch)
-    before, after = (
-        np.take(p, range(*part), axis=axis) for part in ((0, p.shape[axis] - 1), (1, p.shape[axis]))
-    )
-    h = np.diff(task.times)
-    third = h.reshape(h.shape + (1,) * len(space.point_shape)) / 3
-    u, w = (
-        np.take(vectors, range(*part), axis=axis) for part in ((0, p.shape[axis] - 1), (1, p.shape[axis]))
-    )
-    try:
-        space._apply(
-            "log", p=space._apply("exp", p=before, v=third * u), q=space._apply("exp", p=after, v=-third * w)
-        )
-    except CutLocusError as error:
+    nodes = p.shape[len(task.batch)]
+    rows = (x.reshape(-1, nodes, *space.point_shape) for x in (p, vectors))
+    h = np.broadcast_to(np.diff(task.times), (*task.batch, nodes - 1)).reshape(-1, nodes - 1)
+    inner = control_polygons(space.operations, h, *rows).w[0]
+    bad = np.argwhere(~np.isfinite(inner.reshape(*h.shape, -1)).all(axis=2)).tolist()
+    if bad:
+        curve, i = bad[0]
         raise CutLocusError(
-            f"the inner control points of a segment have no unique geodesic between them: {error}; velocities are too "
-            "large for its time"
-        ) from None
+            f"the inner control points between points[{i}] and points[{i + 1}]{of_curve(curve, task.batch)} have no "
+            "unique geodesic between them: the velocities are too large for the time of the segment"
+        )
     return p, vectors

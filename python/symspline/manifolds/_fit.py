@@ -8,16 +8,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from .._curves.curve import Doubles
+from .._curves.solve import Options, Progress, Solved, Task
 from .._faults import CUT_LOCUS, Fault, unconverged
 from .._report import SOLVERS, Columns
 from .._spaces import Array
-from ..manifolds import Manifold
-from ..manifolds._certificate import velocity_errors
-from ..manifolds._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
-from ..manifolds._frames import frames_along
-from ..manifolds._iteration import FLOOR, iterate
-from .curve import Doubles
-from .solve import Options, Progress, Solved, Task
+from ._certificate import velocity_errors
+from ._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
+from ._frames import frames_along
+from ._iteration import FLOOR, iterate
+from ._manifold import Manifold
 
 # Rounding of points in residuals of speed, for points that are so near to each other that it is more than `FLOOR`.
 _ROUNDING = 1e3 * np.finfo(float).eps
