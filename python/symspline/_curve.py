@@ -33,7 +33,7 @@ class Curve(ABC):
     [3.1923, 2.2214]
     """
 
-    # The name of its format in files and pickles.
+    # Name of the format in files and pickles.
     _format: ClassVar[str]
     _curve: Evaluable
 
@@ -43,21 +43,58 @@ class Curve(ABC):
 
     @abstractmethod
     def __call__(self, x: ArrayLike, nu: int = 0) -> Any:
-        """Evaluate the curve at times x, or for `nu` 1 or 2 its velocity or covariant acceleration."""
+        """Evaluate the curve or its derivatives.
+
+        Parameters
+        ----------
+        x : array_like
+            Times, of any shape and in any order.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative: 0 for points, 1 for the velocity, 2 for the covariant acceleration.
+
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            Points or tangent vectors, shape ``(*batch axes, *x.shape, *point_shape)``.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.BezierCurve([[0.0], [3.0]], "r:1")([0.5, 1.0], nu=1)
+        array([[3.],
+               [3.]])
+        """
 
     @abstractmethod
     def speed(self, x: ArrayLike) -> Any:
-        """Evaluate the speed, the norm of the velocity, at times x."""
+        """Compute the speed of the curve, the norm of the velocity.
+
+        Parameters
+        ----------
+        x : array_like
+            Times, of any shape and in any order.
+
+        Returns
+        -------
+        ndarray, shape ``(*batch axes, *x.shape)``
+            The speed.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.BezierCurve([[0.0], [3.0]], "r:1").speed([0.5, 1.0])
+        array([3., 3.])
+        """
 
     @property
     @abstractmethod
     def space(self) -> Space:
-        """The space."""
+        """Space of the curve."""
 
     @property
     @abstractmethod
     def domain(self) -> tuple[Any, Any]:
-        """First and last time; arrays with the batch axes where every curve has times of its own."""
+        """First and last time. They are arrays with the batch axes if every curve has its own times."""
 
     def length(self) -> Any:
         r"""Compute the length of the curve from the first to the last knot.
@@ -180,9 +217,9 @@ class Curve(ABC):
 
     @abstractmethod
     def _state(self) -> dict[str, Any]:
-        """What files and pickles hold."""
+        """Return the entries of files and pickles."""
 
     @classmethod
     @abstractmethod
     def _from_state(cls, state: _archive.Entries) -> Self:
-        """Make the curve that a state describes."""
+        """Return the curve of a state."""

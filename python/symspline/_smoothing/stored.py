@@ -21,7 +21,7 @@ from .solve import Smoothed
 
 
 def noise_state(space: Space, noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
-    """The entries that a smoothing spline has in addition to those of a `CubicSpline`."""
+    """Return the entries of a smoothing spline in addition to those of a `CubicSpline`."""
     state: dict[str, Any] = {
         **times_state("data_t", noisy.t, noisy.clock),
         "noise": [
@@ -45,21 +45,23 @@ def noise_state(space: Space, noisy: SmoothingData, smoothed: list[Smoothed]) ->
 
 
 def _suffix(space: Space, i: int) -> str:
-    """The end of the names of entries that belong to the i-th space in which data were smoothed."""
+    """Return the suffix of entries for the i-th space in which data were smoothed."""
     return f"_{i}" if is_several(space) else ""
 
 
 def read_noise(
-    state: Entries, clock: TimeAxis, t: NDArray[Any], curve: CurveArrays, closed: bool
+    state: Entries, axis: TimeAxis, t: NDArray[Any], curve: CurveArrays, closed: bool
 ) -> tuple[SmoothingData, list[Smoothed]]:
-    """The data of a curve, and what is kept of the smoothing.
+    """Return the data of a curve and the results of the smoothing.
 
     Parameters
     ----------
     state : Entries
         State of the smoothing spline.
-    clock, t
-        Time axis and times of the data.
+    axis : TimeAxis
+        Time axis of the data.
+    t : ndarray
+        Times of the data, as shown.
     curve : CurveArrays
         The curve.
     closed : bool
@@ -70,13 +72,13 @@ def read_noise(
     ValidationError
         If the entries do not match.
     """
-    space, batch, times = curve.space, curve.batch, clock.knots(t)
+    space, batch, times = curve.space, curve.batch, axis.knots(t)
     count, knots = times.shape[-1], curve.times.shape[-1]
     with entry("data_t"):
         if times.shape not in ((count,), (*batch, count)):
             raise ValidationError(f"the times of the data have shape {times.shape}")
         if not (np.isfinite(times).all() and (np.diff(times) >= 0).all()):
-            raise ValidationError("the times of the data go back")
+            raise ValidationError("the times of the data are not finite, or decrease")
         if np.any(times[..., 0] < curve.times[..., 0]) or np.any(times[..., -1] > curve.times[..., -1]):
             raise ValidationError("there are data before the first or after the last knot")
     points = [read_array(state, "data" + suffix_of(space, i), own) for i, own in enumerate(factors_of(space))]
@@ -110,11 +112,11 @@ def read_noise(
             if not isinstance(between, bool):
                 raise ValidationError(f"between is {short_repr(between)}")
             smoothed.append(Smoothed(report, band, lam, scale, between))
-    return SmoothingData(clock, t, times, points, weighing, batch), smoothed
+    return SmoothingData(axis, t, times, points, weighing, batch), smoothed
 
 
 def _number(name: str, value: Any, batch: tuple[int, ...]) -> Any:
-    """A number of every curve."""
+    """Return a number per curve after a check of its type and shape."""
     array = np.asarray(value, np.float64 if 0 in batch else None)
     if array.shape != batch or array.dtype.kind != "f":
         raise ValidationError(f"{name} is {short_repr(value)}")
