@@ -139,7 +139,7 @@ def read_state(file: Any) -> Stored:
 # ---- archives ----
 
 
-def read(file: Any, wanted: Callable[[str], object]) -> Entries:
+def read(file: Any, selected: Callable[[str], object]) -> Entries:
     """The arrays of an NPZ file with these names; the others are not read.
 
     Sizes are taken from the archive's index before any array is read: compression makes a file of any size from a few
@@ -149,7 +149,7 @@ def read(file: Any, wanted: Callable[[str], object]) -> Entries:
     ----------
     file : open file
         In binary mode, one that can seek.
-    wanted : function
+    selected : callable
         Whether the array of a name is to be read.
 
     Raises
@@ -165,7 +165,7 @@ def read(file: Any, wanted: Callable[[str], object]) -> Entries:
         members = {
             member.filename.removesuffix(".npy"): member
             for member in archive.infolist()
-            if member.filename.endswith(".npy") and wanted(member.filename.removesuffix(".npy"))
+            if member.filename.endswith(".npy") and selected(member.filename.removesuffix(".npy"))
         }
         most, total = max(_SMALL, _RATIO * length), 0
         for name, member in members.items():

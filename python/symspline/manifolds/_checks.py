@@ -1,4 +1,4 @@
-"""What a curve on a manifold made of functions is given: points on it, tangent vectors, times."""
+"""Validation of the points, tangent vectors and times of curves on manifolds made of functions."""
 
 from __future__ import annotations
 
@@ -19,18 +19,14 @@ _METHODS = ("auto", "quasi-newton")
 
 
 def validate_on_manifold(task: Task, options: Options) -> tuple[Task, list[Fault]]:
-    """Validate a task and project its points onto the space. Return the task and the faults of skipped curves.
-
-    Raises:
-        ValidationError: something is wrong with it.
-    """
+    """Validate a task and project its points onto the space. Return the task and the faults of skipped curves."""
     space = task.space
     assert isinstance(space, Manifold)
     shape = space._doubles_shape
     width = math.prod(shape)
     if options.method not in _METHODS:
         raise ValidationError(
-            f"method {options.method!r} is not made on a manifold that is made of functions, {space!r}; "
+            f"method {options.method!r} is not available on a manifold made of functions, {space!r}; "
             f"use {' or '.join(map(repr, _METHODS))}"
         )
     if task.tol is None:
@@ -76,7 +72,7 @@ def validate_on_manifold(task: Task, options: Options) -> tuple[Task, list[Fault
 
 
 def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]) -> None:
-    """Vectors at the ends of some curves are tangent, and no velocity carries its control handle past the cut locus."""
+    """Raise unless the end vectors are tangent and the control handles of velocities end inside the cut locus."""
     space, axes = task.space, len(task.space.point_shape)
     assert isinstance(space, Manifold)
     if task.offsets is None:
@@ -112,11 +108,14 @@ def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]
 
 
 def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
-    """Points on the space and tangent velocities there, of curves whose control points are within reach.
+    """Return points on the space and tangent velocities of a Hermite spline.
 
-    Raises:
-        ValidationError: points or times are invalid, or a velocity is not tangent.
-        CutLocusError: inner control points of a segment lie at or past each other's cut locus.
+    Raises
+    ------
+    ValidationError
+        If points or times are invalid, or a velocity is not tangent.
+    CutLocusError
+        If the inner control points of a segment are at or past each other's cut locus.
     """
     space = task.space
     assert isinstance(space, Manifold)

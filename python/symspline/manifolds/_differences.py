@@ -16,7 +16,7 @@ Doubles = NDArray[np.float64]
 # Steps along the geodesic at q, as parts of the injectivity radius, or of the distance of p and q and the length of
 # the direction: where errors of order four are as large as those of rounding.
 _OF_RADIUS = 5e-4
-_OF_LEGS = 4e-3
+_OF_HANDLES = 4e-3
 _PLACES = np.array([-2.0, -1.0, 1.0, 2.0])
 _WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
@@ -33,7 +33,9 @@ def dlog_by_differences(
     """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic;
     ``stretch`` multiplies their steps."""
     size = operations.norm(q, w)
-    step = _OF_RADIUS * radius if math.isfinite(radius) else _OF_LEGS * np.hypot(size, operations.norm(p, v))
+    step = (
+        _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
+    )
     step = stretch * step
     # Times along the geodesic with velocity w.
     s = np.divide(step, size, out=np.zeros_like(size), where=size > 0)

@@ -22,7 +22,7 @@ def integrate(f: Callable[[Array], Array], y: Array, turns: Array, tol: float = 
     """y(1) of y' = f(y), of rows y: each by as many steps of order twelve as it needs; NaN where 64 are too few.
 
     Args:
-        turns: by about what angle the solution turns, one a row: how many steps are tried first.
+        turns: approximate angle by which the solution turns, one per row; it sets the first number of steps.
         tol: largest error of order ten.
     """
     result = np.full_like(y, np.nan)

@@ -101,7 +101,7 @@ class OnManifold(CoreCurve):
         h = t[number, i + 1] - t[number, i]
         tau = (x - t[number, i]) / h
         straight = np.full(len(x), outside == "geodesic") & ((x < first) | (x > last))
-        return Rows(tau, h, ControlPolygon(*(part[:, curve, i] for part in self._legs)), straight)
+        return Rows(tau, h, self._polygon.at((curve, i)), straight)
 
     @cached_property
     def _knots(self) -> Doubles:
@@ -110,7 +110,7 @@ class OnManifold(CoreCurve):
         return np.broadcast_to(self.times, (*self.batch, nodes)).reshape(-1, nodes)
 
     @cached_property
-    def _legs(self) -> ControlPolygon:
+    def _polygon(self) -> ControlPolygon:
         """Control polygons of all segments; kept from the first use on."""
         nodes, shape = self.times.shape[-1], self.space.point_shape
         rows = [a.reshape(-1, nodes, *shape) for a in (self.points, self.velocities)]

@@ -32,7 +32,7 @@ class Functions(NamedTuple):
 
 
 class _Made(Protocol):
-    """What is asked of a manifold."""
+    """The attributes of a manifold that are used here."""
 
     functions: Functions
     _radius: float
@@ -50,7 +50,7 @@ class _Made(Protocol):
 
 
 class Operations:
-    """What the compiled core's `Handle` is to other spaces: operations on rows of doubles.
+    """The counterpart of the `Handle` of the compiled core: operations on rows of floating-point numbers.
 
     The methods with names of geometry take arrays of points with any equal leading axes, and call the functions with
     one.
@@ -67,7 +67,7 @@ class Operations:
     def log(self, p: Array, q: Array) -> Array:
         """NaN where there is no logarithm."""
         found = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
-        # Formulas that divide by the distance have nothing to say of equal points.
+        # Formulas that divide by the distance are undefined at equal points.
         same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
         if same.any():
             # A copy: logarithms of other libraries may be read-only arrays.
@@ -141,7 +141,7 @@ class Operations:
             )
         return np.ascontiguousarray(found, np.float64 if name == "inner" else self.space.dtype)
 
-    # ---- what the classes of spaces ask of the compiled core ----
+    # ---- the interface of a handle of the compiled core ----
 
     def dim(self) -> int:
         if self.space._dim is None:
@@ -213,7 +213,7 @@ class Operations:
         )
 
     def tangent_defects(self, points: Doubles, vectors: Doubles) -> Doubles:
-        """Which part of vectors is not tangent."""
+        """Return the relative size of the normal part of vectors."""
         shape = (len(points), *self.space._doubles_shape)
         p, v = (self.space._numbers(np.ascontiguousarray(x).reshape(shape)) for x in (points, vectors))
         size = np.abs(v).reshape(len(v), -1).max(axis=1)
