@@ -22,9 +22,7 @@ MODULES = [
 # Not every object has related ones (SA01), or more to say than its summary (ES01).
 IGNORED = {"ES01", "SA01"}
 # Objects whose docstrings have not been revised yet. The goal is none.
-PENDING = (
-    "symspline.num_threads",
-)
+PENDING = ("symspline.num_threads",)
 
 
 def fields_of(cls):

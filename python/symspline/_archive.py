@@ -14,7 +14,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,17 +47,8 @@ _RATIO, _SMALL = 100, 2**24
 _Report = TypeVar("_Report")
 
 
-class Storable(Protocol):
-    """What a class of curves needs for files and pickles."""
-
-    def _state(self) -> dict[str, Any]: ...
-
-    @classmethod
-    def _from_state(cls, state: Entries) -> Self: ...
-
-
-# The classes of curves by the name of their format.
-FORMATS: dict[str, type[Storable]] = {}
+# The classes of curves by the name of their format. They have the methods `_state` and `_from_state`.
+FORMATS: dict[str, type[Any]] = {}
 
 
 class Entries(dict[str, Any]):
@@ -401,17 +392,19 @@ def read_report(kind: type[_Report], plain: Any, batch: tuple[int, ...]) -> _Rep
     known = {own.name: own.metadata for own in fields(kind)}  # type: ignore[arg-type]
     if unknown := set(plain) - set(known):
         raise ValidationError(f"there is no field {short_repr(min(unknown))}")
-    return kind(**{name: _read_field(name, plain[name], batch, **own) for name, own in known.items()})
+    return kind(**{name: read_field(name, plain[name], batch, **own) for name, own in known.items()})
 
 
-def _read_field(
+def read_field(
     name: str,
     value: Any,
     batch: tuple[int, ...],
+    *,
     dtype: Any = None,
     words: tuple[str, ...] = (),
     optional: bool = False,
 ) -> Any:
+    """Return the value of a field of a report: one of `words`, or one number per curve of type `dtype`."""
     if words and value not in words:
         raise ValidationError(f"the {name} is {short_repr(value)}, but must be one of {', '.join(words)}")
     if dtype is None:

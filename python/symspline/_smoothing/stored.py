@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._archive import Entries, Stored, entry, read_array, read_report, suffix_of, times_state
-from .._arrays import short_repr
+from .._archive import Entries, Stored, entry, read_array, read_field, read_report, suffix_of, times_state
 from .._core import ValidationError
 from .._curves.curve import CurveArrays
 from .._spaces import Space, factors_of
@@ -103,24 +102,16 @@ def read_noise(
                 raise ValidationError("the weights must be numbers >= 0")
             weighing.append(Precision(weights, information))
             band, numbers = state["band" + suffix], dict(numbers)
-            scale, lam, between = (numbers.pop(key) for key in ("scale", "band_lam", "between"))
+            lam, scale = (
+                read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale")
+            )
+            between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.
             good = np.asarray(report.converged)
             _check("bands", band, (*batch, knots + (2 if closed else 0), 4), finite=good)
-            lam, scale = (_number(key, value, batch) for key, value in (("band_lam", lam), ("scale", scale)))
-            if not isinstance(between, bool):
-                raise ValidationError(f"between is {short_repr(between)}")
             smoothed.append(Smoothed(report, band, lam, scale, between))
     return SmoothingData(axis, t, times, points, weighing, batch), smoothed
-
-
-def _number(name: str, value: Any, batch: tuple[int, ...]) -> Any:
-    """Return a number per curve after a check of its type and shape."""
-    array = np.asarray(value, np.float64 if 0 in batch else None)
-    if array.shape != batch or array.dtype.kind != "f":
-        raise ValidationError(f"{name} is {short_repr(value)}")
-    return array if batch else value
 
 
 def _check(what: str, array: NDArray[Any], *shapes: tuple[int, ...], finite: Any = True) -> None:
