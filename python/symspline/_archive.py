@@ -68,7 +68,7 @@ def check_version(state: Entries) -> None:
     if isinstance(version, np.ndarray):
         version = version.tolist()
     if type(version) is not int or version < 1:
-        raise ValidationError(f"entry 'version' is {short_repr(version)}, but must be a whole number from 1")
+        raise ValidationError(f"entry 'version' is {short_repr(version)}, but must be a positive integer")
     if version > VERSION:
         raise ValidationError(
             f"the format has version {version}, but symspline {LIBRARY} reads versions up to {VERSION}. Install a "
@@ -115,7 +115,7 @@ def _as_json(value: Any) -> Any:
 
 
 def read_state(file: Any) -> Stored:
-    """The entries of an open file of curves."""
+    """Return the entries of an open file of curves."""
     try:
         arrays = read(file, lambda name: name in TEXTS or name in _JSON or _ARRAY.fullmatch(name))
     except zipfile.BadZipFile:
@@ -131,7 +131,7 @@ def read_state(file: Any) -> Stored:
 
 
 def read(file: Any, selected: Callable[[str], object]) -> Entries:
-    """The arrays of an NPZ file with these names; the others are not read.
+    """Read the arrays of an NPZ file with these names, and no others.
 
     Sizes are taken from the archive's index before any array is read: compression makes a file of any size from a few
     kilobytes.
@@ -189,7 +189,7 @@ def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> N
 
 
 def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
-    """An entry that is one text.
+    """Return an entry that is one text.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
 
 
 def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
-    """An entry that is a text in JSON.
+    """Return an entry that is a text in JSON.
 
     Raises
     ------
@@ -229,13 +229,13 @@ def entry(name: str) -> Iterator[None]:
         raise ValidationError(f"entry {name!r}: {brief(what, 500)}") from None
 
 
-# ---- what all curves through points have ----
+# ---- curves of cubic segments ----
 
 
 def segments_state(
     format: str, space: Space, t: Array, clock: TimeAxis, extrapolate: Any, curve: CurveArrays
 ) -> dict[str, Any]:
-    """The entries of curves of any class through points, or of a batch of them."""
+    """Return the entries of curves of cubic segments, of any class."""
     parts = {
         name + suffix_of(space, i): getattr(part, name)
         for i, part in enumerate(curve.parts)
@@ -248,7 +248,7 @@ def segments_state(
 def read_segments(
     state: Entries, counted: TimeAxis | None = None, *, fitted: bool = True
 ) -> tuple[TimeAxis, Array, CurveArrays, Any]:
-    """The time axis, the knots as shown, the curve and the extrapolation policy.
+    """Return the time axis, the knots as shown, the curve and the extrapolation policy.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def read_segments(
 
 
 def read_fitted(state: Entries, counted: TimeAxis | None = None) -> tuple[Any, ...]:
-    """The same of fitted curves, as `CubicSpline._fill` takes it: with end conditions and reports."""
+    """Return the arguments of `CubicSpline._fill`: the same with end conditions and reports."""
     clock, knots, curve, extrapolate = read_segments(state, counted)
     space = curve.space
     with entry("bc_type"):
@@ -293,19 +293,22 @@ def read_fitted(state: Entries, counted: TimeAxis | None = None) -> tuple[Any, .
 
 
 def suffix_of(space: Space, i: int) -> str:
-    """The end of the names of entries that belong to the i-th factor."""
+    """Return the suffix of the names of entries of the i-th factor."""
     return f"_{i}" if isinstance(space, Product) else ""
 
 
 def read_space(state: Entries) -> Space:
-    """The space; a pickle holds it as an object."""
+    """Return the space, which is a name in a file and an object in a pickle."""
     with entry("space"):
         return space_named(state["space"])
 
 
 def times_state(name: str, t: NDArray[Any], clock: TimeAxis) -> dict[str, Any]:
-    """Times as numbers, and their unit: "ns", or "10m" for dates that count in tens of minutes; with what is known of
-    their zone: "ns UTC"; "duration" for durations."""
+    """Return times as numbers, and their unit.
+
+    Examples of units are "ns", "10m" for dates that count in tens of minutes, "ns UTC" for dates with a time zone, and
+    "duration".
+    """
     if not clock.dates:
         return {name: t, f"{name}_unit": "duration" if clock.durations else ""}
     unit, step = np.datetime_data(t.dtype)
@@ -314,7 +317,7 @@ def times_state(name: str, t: NDArray[Any], clock: TimeAxis) -> dict[str, Any]:
 
 
 def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
-    """The time axis, and times as shown."""
+    """Return the time axis, and times as shown."""
     unit, _, zone = state[f"{name}_unit"].partition(" ")
     with entry(f"{name}_unit"):
         if zone not in ("", UTC_ZONE, NO_ZONE):
@@ -333,7 +336,7 @@ def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
 def _read_nodes(
     factor: Space, state: Entries, suffix: str, times: NDArray[np.float64]
 ) -> tuple[Array, Array]:
-    """Points and velocities in a factor."""
+    """Return points and velocities in a factor."""
     points, velocities = (read_array(state, name + suffix, factor) for name in ("points", "velocities"))
     nodes = points.shape[: points.ndim - len(factor.point_shape)]
     if points.shape != velocities.shape or not nodes or times.shape not in ((nodes[-1],), nodes):
@@ -346,7 +349,7 @@ def _read_nodes(
 
 
 def read_array(state: Entries, name: str, space: Space) -> Array:
-    """An array of points or vectors of a space."""
+    """Return an array of points or vectors of a space."""
     return space._numbers(space._doubles(state[name], name))
 
 
@@ -371,7 +374,7 @@ def check_curves(state: Entries, curve: CurveArrays, converged: list[Any]) -> No
 
 
 def _read_bc_type(value: Any, space: Space) -> Any:
-    """End conditions; in a product vectors are tuples of arrays."""
+    """Return end conditions; in a product vectors are tuples of arrays."""
     if isinstance(value, str):
         return value
 
@@ -388,7 +391,7 @@ def _vector(plain: Any) -> Any:
 
 
 def read_report(kind: type[_Report], plain: Any, batch: tuple[int, ...]) -> _Report:
-    """A report from the values of its fields, `vars` of a report."""
+    """Return a report from the values of its fields, `vars` of a report."""
     known = {own.name: own.metadata for own in fields(kind)}  # type: ignore[arg-type]
     if unknown := set(plain) - set(known):
         raise ValidationError(f"there is no field {short_repr(min(unknown))}")

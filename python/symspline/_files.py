@@ -13,7 +13,7 @@ from ._core import ValidationError
 from ._curve import Curve
 from ._disk import path_of
 
-# The same for all curves of a file.
+# Entries with one value for all curves of a file.
 _SHARED = (*TEXTS, "version")
 
 
@@ -111,7 +111,7 @@ def load(file: Any) -> Any:
 
 
 def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
-    """The state of several curves: rows of arrays follow each other, all else is in lists."""
+    """Return the state of several curves: arrays are concatenated, all else is in lists."""
     if not curves or not all(isinstance(name, str) for name in curves):
         raise ValidationError("curves must be a mapping with at least one curve, whose keys are text")
     for name, curve in curves.items():
@@ -140,7 +140,7 @@ def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
 
 
 def _layout(state: Mapping[str, Any]) -> dict[str, Any]:
-    """What the curves of a file have in common."""
+    """Return the parts of a state that all curves of a file must share."""
     return {
         key: value
         if key in _SHARED
@@ -164,7 +164,7 @@ def _restored(state: Stored) -> Any:
 
 
 def _states(state: Stored) -> Iterator[tuple[str, Entries]]:
-    """The names and states of several curves."""
+    """Yield the names and states of several curves."""
     names, rows = state["names"], state["rows"]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValidationError("entry 'names' must be a list of texts")

@@ -281,8 +281,8 @@ def test_arrays_that_are_smaller_than_their_header_says():
     [
         ({"format": "other"}, "entry 'format' is 'other', but must be one of .*'symspline-curve'"),
         ({"format": 3}, "entry 'format' is not a text: it holds int64"),
-        ({"version": 1.5}, "entry 'version' is 1.5, but must be a whole number from 1"),
-        ({"version": 0}, "entry 'version' is 0, but must be a whole number from 1"),
+        ({"version": 1.5}, "entry 'version' is 1.5, but must be a positive integer"),
+        ({"version": 0}, "entry 'version' is 0, but must be a positive integer"),
         (
             {"version": 99},
             "the format has version 99, but symspline .* reads versions up to 1. Install a newer symspline",
