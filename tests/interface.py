@@ -30,6 +30,13 @@ def signature(thing):
     return str(inspect.Signature([one.replace(annotation=inspect.Parameter.empty) for one in parameters]))
 
 
+def members(kind):
+    """What a class defines itself, or inherits from a base class that is not public."""
+    public = vars(importlib.import_module("symspline")).values()
+    bases = [base for base in kind.__mro__ if base.__module__.startswith("symspline") and base not in public]
+    return {name: value for base in [*reversed(bases), kind] for name, value in vars(base).items()}
+
+
 def described():
     """The lines of the interface."""
     for module in MODULES:
@@ -44,7 +51,7 @@ def described():
                 continue
             yield f"{name}.{public}{signature(thing)}"
             if inspect.isclass(thing):
-                for member, value in sorted(vars(thing).items()):
+                for member, value in sorted(members(thing).items()):
                     if not member.startswith("_") or member == "__call__":
                         yield f"    .{member}{signature(value) if inspect.isfunction(value) else ''}"
 

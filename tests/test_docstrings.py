@@ -22,20 +22,7 @@ MODULES = [
 # Not every object has related ones (SA01), or more to say than its summary (ES01).
 IGNORED = {"ES01", "SA01"}
 # Objects whose docstrings have not been revised yet. The goal is none.
-PENDING = (
-    "symspline.Manifold",
-    "symspline.Stiefel",
-    "symspline.load",
-    "symspline.load_many",
-    "symspline.manifolds.",
-    "symspline.num_threads",
-    "symspline.poses.join",
-    "symspline.poses.read_",
-    "symspline.poses.split",
-    "symspline.poses.write_",
-    "symspline.save_many",
-    "symspline.xarray.",
-)
+PENDING = ("symspline.num_threads",)
 
 
 def fields_of(cls):

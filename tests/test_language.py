@@ -137,7 +137,6 @@ RETIRED = [
 ALLOWED = [
     ("python/symspline/_smoothing/data.py", "clock : timeaxis"),
     ("python/symspline/_smoothing/data.py", "weighing : list of precision"),
-    ("python/symspline/_smoothing/stored.py", "clock, t"),
 ]
 
 

@@ -17,14 +17,14 @@ from . import _cpu
 _cpu.load(_Path(__file__).parent)
 
 from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
-from ._base_curve import Curve  # noqa: E402
 from ._bspline import BezierCurve, BSpline  # noqa: E402
 from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from ._cubic import CubicSpline  # noqa: E402
+from ._curve import Curve  # noqa: E402
 from ._curves.gradient import Gradient  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
-from ._files import load, load_many, save_many  # noqa: E402
+from ._files import load, save  # noqa: E402
 from ._functional import evaluate, fit, fit_many  # noqa: E402
 from ._hermite import HermiteSpline  # noqa: E402
 from ._report import ConvergenceWarning, FarPointsWarning, Report  # noqa: E402
@@ -130,7 +130,6 @@ __all__ = [
     "fit_segments",
     "geo",
     "load",
-    "load_many",
     "make_lsq_spline",
     "make_smoothing_spline",
     "manifolds",
@@ -138,7 +137,7 @@ __all__ = [
     "poses",
     "quantum",
     "rotations",
-    "save_many",
+    "save",
     "set_num_threads",
     "shapes",
     "show_config",

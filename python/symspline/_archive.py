@@ -1,4 +1,8 @@
-"""How curves stand in an NPZ file, and writing them there."""
+"""The states of curves, which files and pickles hold, and NPZ files of them.
+
+A state has the entries of `ENTRIES` by name. In a file texts and arrays are stored as they are and all else as JSON. A
+pickle holds the state itself, with the space as an object.
+"""
 
 from __future__ import annotations
 
@@ -9,71 +13,93 @@ import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import brief
-from ._base_curve import Curve
+from ._arrays import brief, short_repr
 from ._core import ValidationError
+from ._curves.curve import CurveArrays
+from ._curves.ends import freeze_bc_type
+from ._curves.fit import curve_of, read_ends
 from ._disk import path_of, replacing
+from ._input import NO_ZONE, UTC_ZONE
+from ._options import checked_extrapolate
 from ._report import Report
-from ._spaces import Product, Space
-from ._time import TimeAxis
+from ._spaces import Array, Product, Space, factors_of
+from ._spaces import space as space_named
+from ._time import Moments, TimeAxis, time_axis_of
+from ._version import VERSION as LIBRARY
 from .manifolds._manifold import refuse_functions
 
-FORMAT = "symspline-curve"
-HERMITE = "symspline-hermite"
-SMOOTHING = "symspline-smoothing"
-MANY = "symspline-curves"
-LISTS = ("bc_type", "extrapolate", "report", "noise")
+# Raise it when the entries change, and keep reading files of all earlier versions.
 VERSION = 1
-_KNOWN = re.compile(
-    r"format|version|space|t|t_unit|bc_type|extrapolate|report|names|knots|samples|noise|data_t|data_t_unit"
-    r"|(?:points|velocities|data|data_weights|data_information|band)(?:_\d{1,9})?"
+# Texts are the same for all curves of a file.
+TEXTS = ("format", "space", "t_unit", "data_t_unit")
+_JSON = ("bc_type", "extrapolate", "report", "noise", "degree", "names", "rows")
+_ARRAY = re.compile(
+    r"(?:version|t|data_t|knots)|(?:points|velocities|control_points|data|data_weights|data_information|band)(?:_\d{1,9})?"
 )
-# What is compressed is at most this much larger than the file, or of this size.
+# Compressed entries are at most this much larger than the file, or of this size.
 _RATIO, _SMALL = 100, 2**24
+_Report = TypeVar("_Report")
 
 
-def fitted_arrays(spline: Curve, reports: list[Report]) -> dict[str, Any]:
-    """The arrays of one fitted curve, or of a batch, and how the fit went in every factor."""
-    return arrays_of(spline, FORMAT) | {
-        "bc_type": json.dumps(plain(spline._bc_type)),
-        "report": json.dumps([_plain_report(report) for report in reports]),
-    }
+# The classes of curves by the name of their format. They have the methods `_state` and `_from_state`.
+FORMATS: dict[str, type[Any]] = {}
 
 
-def arrays_of(spline: Curve, format: str) -> dict[str, Any]:
-    """The arrays of one curve, or of a batch; the format says which kind of curve it is."""
+class Entries(dict[str, Any]):
+    """The entries of a state by name; a missing entry raises ValidationError."""
+
+    def __missing__(self, name: str) -> Any:
+        raise ValidationError(f"entry {name!r} is missing")
+
+
+class Stored(Entries):
+    """The entries of a file, which may hold any points and vectors."""
+
+
+def check_version(state: Entries) -> None:
+    """Raise ValidationError if a newer symspline wrote the curve."""
+    version = state["version"]
+    if isinstance(version, np.ndarray):
+        version = version.tolist()
+    if type(version) is not int or version < 1:
+        raise ValidationError(f"entry 'version' is {short_repr(version)}, but must be a positive integer")
+    if version > VERSION:
+        raise ValidationError(
+            f"the format has version {version}, but symspline {LIBRARY} reads versions up to {VERSION}. Install a "
+            "newer symspline: pip install --upgrade symspline"
+        )
+
+
+def restore(state: Mapping[str, Any]) -> Any:
+    """Make the curve that a state describes. Pickles refer to this function by its name."""
+    entries = state if isinstance(state, Entries) else Entries(state)
+    check_version(entries)
+    kind = entries["format"]
+    if kind not in FORMATS:
+        raise ValidationError(
+            f"entry 'format' is {short_repr(kind)}, but must be one of {', '.join(map(repr, FORMATS))}"
+        )
+    return FORMATS[kind]._from_state(entries)
+
+
+def write(file: Any, state: Mapping[str, Any]) -> None:
+    """Write a state to an open file, or replace a file by its name (`_disk.replacing`)."""
     refuse_functions(
-        spline.space,
+        state["space"],
         "curves are not saved (files hold no functions: pickle them, or keep t, points and velocities)",
         named=True,
     )
     arrays: dict[str, Any] = {
-        "format": format,
-        "version": VERSION,
-        "space": str(spline.space),
-        **times_arrays("t", spline._t, spline._clock),
-        "extrapolate": json.dumps(spline.extrapolate),
+        name: value if name in TEXTS or isinstance(value, np.ndarray) else json.dumps(value, default=_as_json)
+        for name, value in state.items()
     }
-    for i, part in enumerate(spline._curve.parts):
-        suffix = f"_{i}" if isinstance(spline.space, Product) else ""
-        arrays["points" + suffix] = part.points
-        arrays["velocities" + suffix] = part.velocities
-    return arrays
-
-
-def times_arrays(name: str, t: NDArray[Any], clock: TimeAxis) -> dict[str, Any]:
-    """Times as numbers, and the unit of dates."""
-    unit = _unit(t.dtype, clock.zone) if clock.dates else ""
-    return {name: t.astype(np.int64) if unit else t, f"{name}_unit": unit}
-
-
-def write(file: Any, arrays: dict[str, Any]) -> None:
-    """Write arrays to an open file, or replace a file by its name (`disk.replacing`)."""
+    arrays |= {"space": str(state["space"]), "version": state["version"]}
     path = path_of(file, method="write")
     if path is None:
         np.savez(file, **arrays)
@@ -82,18 +108,30 @@ def write(file: Any, arrays: dict[str, Any]) -> None:
         np.savez(out, **arrays)
 
 
-# ---- reading ----
+def _as_json(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+        return {"re": value.real.tolist(), "im": value.imag.tolist()}
+    return value.tolist()
 
 
-class Entries(dict[str, NDArray[Any]]):
-    """Arrays of an archive by name; one that is missing is an error of the file."""
+def read_state(file: Any) -> Stored:
+    """Return the entries of an open file of curves."""
+    try:
+        arrays = read(file, lambda name: name in TEXTS or name in _JSON or _ARRAY.fullmatch(name))
+    except zipfile.BadZipFile:
+        raise ValidationError("this is damaged or not a symspline curve: it is not an NPZ file") from None
+    if "format" not in arrays:
+        raise ValidationError("this is not a symspline curve")
+    check_version(arrays)
+    decode = dict.fromkeys(TEXTS, text_in) | dict.fromkeys(_JSON, json_in)
+    return Stored((name, decode.get(name, Entries.get)(arrays, name)) for name in arrays)
 
-    def __missing__(self, name: str) -> NDArray[Any]:
-        raise ValidationError(f"entry {name!r} is missing")
+
+# ---- archives ----
 
 
-def read(file: Any, wanted: Callable[[str], object]) -> Entries:
-    """The arrays of an NPZ file whose names are wanted; of the others nothing is read.
+def read(file: Any, selected: Callable[[str], object]) -> Entries:
+    """Read the arrays of an NPZ file with these names, and no others.
 
     Sizes are taken from the archive's index before any array is read: compression makes a file of any size from a few
     kilobytes.
@@ -102,15 +140,15 @@ def read(file: Any, wanted: Callable[[str], object]) -> Entries:
     ----------
     file : open file
         In binary mode, one that can seek.
-    wanted : function
-        Says of a name whether its array is wanted.
+    selected : callable
+        Whether the array of a name is to be read.
 
     Raises
     ------
     ValidationError
-        An array is too large for the size of the file, or does not have the size that its header says.
+        If an array is too large for the size of the file, or does not have the size that its header states.
     Exception
-        Damage shows as errors of zipfile, of its decompressors and of NumPy.
+        Damage appears as errors of zipfile, of its decompressors and of NumPy.
     """
     length = file.seek(0, os.SEEK_END)
     file.seek(0)
@@ -118,7 +156,7 @@ def read(file: Any, wanted: Callable[[str], object]) -> Entries:
         members = {
             member.filename.removesuffix(".npy"): member
             for member in archive.infolist()
-            if member.filename.endswith(".npy") and wanted(member.filename.removesuffix(".npy"))
+            if member.filename.endswith(".npy") and selected(member.filename.removesuffix(".npy"))
         }
         most, total = max(_SMALL, _RATIO * length), 0
         for name, member in members.items():
@@ -150,18 +188,13 @@ def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> N
     return array
 
 
-def is_curve(name: str) -> bool:
-    """Whether a curve has an entry of this name."""
-    return _KNOWN.fullmatch(name) is not None
-
-
 def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
-    """An entry that is one text.
+    """Return an entry that is one text.
 
     Raises
     ------
     ValidationError
-        It is something else.
+        If it is something else.
     """
     array = arrays[name]
     if array.ndim or array.dtype.kind != "U":
@@ -170,12 +203,12 @@ def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
 
 
 def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
-    """An entry that is a text in JSON.
+    """Return an entry that is a text in JSON.
 
     Raises
     ------
     ValidationError
-        It is something else.
+        If it is something else.
     """
     try:
         return json.loads(text_in(arrays, name))
@@ -187,56 +220,203 @@ def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
 
 @contextmanager
 def entry(name: str) -> Iterator[None]:
-    """Says in which entry something is wrong."""
+    """Name the entry in which something is wrong."""
     try:
         yield
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
-        # Of values of other types than those that are written anything may be found wrong.
+        # Values of other types than those that are written can cause any of these.
         what = error if isinstance(error, ValidationError) else f"{type(error).__name__}: {error}"
         raise ValidationError(f"entry {name!r}: {brief(what, 500)}") from None
 
 
-def _unit(dtype: np.dtype[Any], zone: str | None) -> str:
-    """The unit of dates: "ns", or "10m" if they count in tens of minutes; and what is known of their zone: "ns UTC"."""
-    unit, step = np.datetime_data(dtype)
-    counted = unit if step == 1 else f"{step}{unit}"
-    return counted if zone is None else f"{counted} {zone}"
+# ---- curves of cubic segments ----
 
 
-def _plain_report(report: Report) -> dict[str, Any]:
-    """All but the longest gap, which the knots show."""
-    return {key: plain(value) for key, value in vars(report).items() if key != "max_gap"}
+def segments_state(
+    format: str, space: Space, t: Array, clock: TimeAxis, extrapolate: Any, curve: CurveArrays
+) -> dict[str, Any]:
+    """Return the entries of curves of cubic segments, of any class."""
+    parts = {
+        name + suffix_of(space, i): getattr(part, name)
+        for i, part in enumerate(curve.parts)
+        for name in ("points", "velocities")
+    }
+    head = {"format": format, "version": VERSION, "space": space, "extrapolate": extrapolate}
+    return head | times_state("t", t, clock) | parts
 
 
-def plain(value: Any) -> Any:
-    """As JSON can hold it: arrays become lists, complex ones two."""
-    if isinstance(value, np.ndarray):
-        if value.dtype.kind == "c":
-            return {"re": value.real.tolist(), "im": value.imag.tolist()}
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [plain(item) for item in value]
-    return value
+def read_segments(
+    state: Entries, counted: TimeAxis | None = None, *, fitted: bool = True
+) -> tuple[TimeAxis, Array, CurveArrays, Any]:
+    """Return the time axis, the knots as shown, the curve and the extrapolation policy.
+
+    Parameters
+    ----------
+    state : Entries
+        State of a curve.
+    counted : TimeAxis, optional
+        The time axis, unless times are counted from the first knot.
+    fitted : bool
+        Whether the velocities are those of a C² curve.
+    """
+    space = read_space(state)
+    with entry("extrapolate"):
+        extrapolate = checked_extrapolate(state["extrapolate"])
+    clock, knots = read_times(state, "t")
+    if counted is not None:
+        if counted.dates != clock.dates:
+            raise ValidationError("the times of the knots and of the data are of different kinds")
+        clock = counted
+    times = clock.knots(knots)
+    if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
+        raise ValidationError("entry 't': the knots do not increase")
+    arrays = [
+        _read_nodes(factor, state, suffix_of(space, i), times) for i, factor in enumerate(factors_of(space))
+    ]
+    return clock, knots, curve_of(space, times, arrays, fitted), extrapolate
 
 
-def rich(value: Any, space: Space) -> Any:
-    """End conditions back from JSON; in a product vectors are tuples of arrays."""
+def read_fitted(state: Entries, counted: TimeAxis | None = None) -> tuple[Any, ...]:
+    """Return the arguments of `CubicSpline._fill`: the same with end conditions and reports."""
+    clock, knots, curve, extrapolate = read_segments(state, counted)
+    space = curve.space
+    with entry("bc_type"):
+        bc_type = freeze_bc_type(_read_bc_type(state["bc_type"], space))
+        read_ends(bc_type, space, curve.batch)
+    with entry("report"):
+        plain = state["report"]
+        if not isinstance(plain, list) or len(plain) != len(curve.parts):
+            raise ValidationError(f"it must be a list with one report for each of {len(curve.parts)} factors")
+        reports = [read_report(Report, own, curve.batch) for own in plain]
+    check_curves(state, curve, [report.converged for report in reports])
+    return clock, knots, curve, bc_type, extrapolate, reports
+
+
+def suffix_of(space: Space, i: int) -> str:
+    """Return the suffix of the names of entries of the i-th factor."""
+    return f"_{i}" if isinstance(space, Product) else ""
+
+
+def read_space(state: Entries) -> Space:
+    """Return the space, which is a name in a file and an object in a pickle."""
+    with entry("space"):
+        return space_named(state["space"])
+
+
+def times_state(name: str, t: NDArray[Any], clock: TimeAxis) -> dict[str, Any]:
+    """Return times as numbers, and their unit.
+
+    Examples of units are "ns", "10m" for dates that count in tens of minutes, "ns UTC" for dates with a time zone, and
+    "duration".
+    """
+    if not clock.dates:
+        return {name: t, f"{name}_unit": "duration" if clock.durations else ""}
+    unit, step = np.datetime_data(t.dtype)
+    words = [unit if step == 1 else f"{step}{unit}", clock.zone or ""]
+    return {name: t.astype(np.int64), f"{name}_unit": " ".join(words).strip()}
+
+
+def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
+    """Return the time axis, and times as shown."""
+    unit, _, zone = state[f"{name}_unit"].partition(" ")
+    with entry(f"{name}_unit"):
+        if zone not in ("", UTC_ZONE, NO_ZONE):
+            raise ValidationError(f"the zone of the times is {short_repr(zone)}, but must be UTC or none")
+        kind = np.dtype(f"datetime64[{unit}]") if unit not in ("", "duration") else None
+    times = state[name]
+    with entry(name):
+        if kind is None:
+            clock, shown = time_axis_of(Moments(times, zone or None))
+            return (TimeAxis(durations=True) if unit else clock), shown
+        if times.dtype.kind not in "iu":
+            raise ValidationError(f"dates are counted in whole numbers, not in {times.dtype}")
+        return time_axis_of(Moments(times.astype(kind), zone or None))
+
+
+def _read_nodes(
+    factor: Space, state: Entries, suffix: str, times: NDArray[np.float64]
+) -> tuple[Array, Array]:
+    """Return points and velocities in a factor."""
+    points, velocities = (read_array(state, name + suffix, factor) for name in ("points", "velocities"))
+    nodes = points.shape[: points.ndim - len(factor.point_shape)]
+    if points.shape != velocities.shape or not nodes or times.shape not in ((nodes[-1],), nodes):
+        raise ValidationError(
+            f"shapes do not fit: t {times.shape}, points {points.shape}, velocities {velocities.shape}"
+        )
+    if nodes[-1] < 2:
+        raise ValidationError("a curve needs at least two points")
+    return points, velocities
+
+
+def read_array(state: Entries, name: str, space: Space) -> Array:
+    """Return an array of points or vectors of a space."""
+    return space._numbers(space._doubles(state[name], name))
+
+
+def check_curves(state: Entries, curve: CurveArrays, converged: list[Any]) -> None:
+    """Raise ValidationError if points of a file are off the space, or velocities are not tangent. Only curves that
+    failed or are masked can be NaN."""
+    if not isinstance(state, Stored):
+        return
+    for part, good in zip(curve.parts, converged, strict=True):
+        space, points, velocities = part.space, part.points, part.velocities
+        axes = tuple(range(-1 - len(space.point_shape), 0))
+        there, finite = (np.isfinite(array).all(axis=axes) for array in (points, velocities))
+        with entry("points"):
+            space.check_point(points[there])
+        finite &= there
+        if not (finite | ~np.asarray(good)).all():
+            raise ValidationError("entries 'points' and 'velocities' must be finite")
+        off = velocities[finite] - space.project_tangent(points[finite], velocities[finite])
+        allowed = 1e-8 + 100 * np.finfo(np.float64).eps * float(space._rounding(points).max(initial=1.0))
+        if np.abs(off).max(initial=0.0) > allowed * np.abs(velocities[finite]).max(initial=1e-8):
+            raise ValidationError("entry 'velocities': the vectors are not tangent at the points")
+
+
+def _read_bc_type(value: Any, space: Space) -> Any:
+    """Return end conditions; in a product vectors are tuples of arrays."""
     if isinstance(value, str):
         return value
 
     def vectors(plain: Any) -> Any:
-        return tuple(map(_array, plain)) if isinstance(space, Product) else _array(plain)
+        return tuple(map(_vector, plain)) if isinstance(space, Product) else _vector(plain)
 
     return tuple(end if isinstance(end, str) else (end[0], vectors(end[1])) for end in value)
 
 
-def _array(plain: Any) -> NDArray[Any]:
+def _vector(plain: Any) -> Any:
     if isinstance(plain, dict):
-        numbers = np.empty(np.shape(plain["re"]), np.complex128)
-        numbers.real, numbers.imag = plain["re"], plain["im"]
-        return numbers
-    return np.asarray(plain, dtype=np.float64)
+        return np.asarray(plain["re"], np.float64) + 1j * np.asarray(plain["im"], np.float64)
+    return plain if isinstance(plain, np.ndarray) else np.asarray(plain, np.float64)
+
+
+def read_report(kind: type[_Report], plain: Any, batch: tuple[int, ...]) -> _Report:
+    """Return a report from the values of its fields, `vars` of a report."""
+    known = {own.name: own.metadata for own in fields(kind)}  # type: ignore[arg-type]
+    if unknown := set(plain) - set(known):
+        raise ValidationError(f"there is no field {short_repr(min(unknown))}")
+    return kind(**{name: read_field(name, plain[name], batch, **own) for name, own in known.items()})
+
+
+def read_field(
+    name: str,
+    value: Any,
+    batch: tuple[int, ...],
+    *,
+    dtype: Any = None,
+    words: tuple[str, ...] = (),
+    optional: bool = False,
+) -> Any:
+    """Return the value of a field of a report: one of `words`, or one number per curve of type `dtype`."""
+    if words and value not in words:
+        raise ValidationError(f"the {name} is {short_repr(value)}, but must be one of {', '.join(words)}")
+    if dtype is None:
+        return tuple(map(str, value)) if isinstance(value, list) else value
+    if optional and value is None:
+        return None
+    # The list of an empty batch does not show its type.
+    array = np.asarray(value, dtype if 0 in batch else None)
+    kinds = {"b": "b", "i": "i", "f": "fi" if optional else "f"}[np.dtype(dtype).kind]
+    if array.shape != batch or array.dtype.kind not in kinds:
+        raise ValidationError(f"{name} is {short_repr(value)}")
+    return array if batch else value

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from base64 import b64encode
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
+from ._curve import Curve
 from ._curves.band import UncertaintyBand
 from ._curves.curve import CurveArrays, Doubles, quantity_of
-from ._curves.energy import bending_energy
-from ._curves.integrals import integrate
 from ._curves.solve import Progress
 from ._input import times_of
 from ._options import check_progress, checked_extrapolate, outside
@@ -32,24 +32,8 @@ if TYPE_CHECKING:
 _DOTS = 60
 
 
-class Curve(ABC):
-    """Base class of curves that are given by knots, points and velocities.
-
-    A curve object holds a single curve or a batch. The classes of curves differ in the origin of the velocities.
-
-    See Also
-    --------
-    CubicSpline : Interpolate points by a C² curve.
-    HermiteSpline : Interpolate points and given velocities.
-    SmoothingSpline : Result of a smoothing fit.
-
-    Examples
-    --------
-    >>> import symspline as ss
-    >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
-    >>> isinstance(quarter, ss.Curve), quarter.space
-    (True, Sphere(2))
-    """
+class SegmentedCurve(Curve):
+    """Base class of curves of cubic Bézier segments, which are given by knots, points and velocities."""
 
     # Title of plots.
     _kind: ClassVar[str]
@@ -366,53 +350,6 @@ class Curve(ABC):
             self._outside if extrapolate is None else outside(checked_extrapolate(extrapolate), self._bc_type)
         )
 
-    def length(self) -> Any:
-        r"""Compute the length of the curve from the first to the last knot.
-
-        Returns
-        -------
-        ndarray or float, shape ``batch axes``
-            The integral of the speed, :math:`\int \lVert\gamma'\rVert \, dt`.
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
-        >>> round(float(quarter.length()), 8)
-        1.57079633
-        """
-        curve = self._curve
-        return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
-        )
-
-    def bending_energy(self) -> Any:
-        r"""Compute the bending energy of the curve.
-
-        Returns
-        -------
-        ndarray or float, shape ``batch axes``
-            The integral of the squared covariant acceleration.
-
-        Notes
-        -----
-        The bending energy is :math:`\int \lVert\nabla_{\gamma'}\gamma'\rVert^2 \, dt`, equation (1) of the paper.
-        Riemannian cubics minimise it.
-
-        References
-        ----------
-        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
-        Anal. 56 (2018), equation (1).
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> wave = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
-        >>> round(float(wave.bending_energy()), 8)
-        6.0
-        """
-        return bending_energy(self._curve)
-
     # ---- data ----
 
     @property
@@ -449,43 +386,28 @@ class Curve(ABC):
         return self._extrapolate
 
     @property
-    def _batch(self) -> tuple[int, ...]:
-        return self._curve.batch
-
-    @property
     def _times(self) -> NDArray[np.float64]:
         """Knots as the core counts them."""
         return self._curve.times
 
-    # ---- batches ----
+    @property
+    def domain(self) -> tuple[Any, Any]:
+        return self._t[..., 0][()], self._t[..., -1][()]
 
-    def __len__(self) -> int:
-        if not self._batch:
-            raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
-        return self._batch[0]
-
-    def __getitem__(self, index: Any) -> Self:
-        """Return one curve of a batch, or a slice of the batch."""
-        if not self._batch:
-            raise TypeError("this is one curve; only a batch of curves can be indexed")
-        if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(f"the index of a curve must be an integer or a slice, not {short_repr(index)}")
-        if not isinstance(index, slice) and not -len(self) <= index < len(self):
-            raise IndexError(f"index {short_repr(index)} is out of range: there are {len(self)} curves")
+    def _picked(self, index: Any) -> Self:
         t = self._t[index] if self._times.ndim > 1 else self._t
         return self._with(self._clock.picked(index), t, self._curve.picked(index), index)
 
-    def __bool__(self) -> bool:
-        return True
-
-    def __iter__(self) -> Iterator[Self]:
-        return (self[i] for i in range(len(self)))
+    def _state(self) -> dict[str, Any]:
+        return _archive.segments_state(
+            self._format, self.space, self._t, self._clock, self._extrapolate, self._curve
+        )
 
     # ---- comparison, text and plots ----
 
     def __eq__(self, other: object) -> bool:
         """Whether spaces, knots, points and velocities are equal, bit by bit."""
-        if type(self) is not type(other) or not isinstance(other, Curve):
+        if type(self) is not type(other) or not isinstance(other, SegmentedCurve):
             return NotImplemented
         return (
             self.space == other.space
@@ -497,8 +419,6 @@ class Curve(ABC):
                 for a, b in zip(self._curve.parts, other._curve.parts, strict=True)
             )
         )
-
-    __hash__ = None  # type: ignore[assignment]
 
     def _repr_html_(self) -> str:
         """Return the representation for notebooks, with a small plot if Matplotlib is installed."""
@@ -566,9 +486,10 @@ class Curve(ABC):
 
 
 def check_curve(spline: Any, name: str = "spline") -> None:
-    """Raise TypeError unless an argument is a curve."""
-    if not isinstance(spline, Curve):
-        raise TypeError(f"{name} must be a curve, such as a symspline.CubicSpline, not {short_repr(spline)}")
+    """Raise TypeError unless an argument is a curve of cubic segments."""
+    if not isinstance(spline, SegmentedCurve):
+        what = "a curve with knots and velocities, such as a symspline.CubicSpline"
+        raise TypeError(f"{name} must be {what}, not {short_repr(spline)}")
 
 
 def evaluated(

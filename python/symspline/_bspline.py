@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from ._archive import VERSION, Entries, Stored, entry, read_array, read_space
 from ._arrays import as_array, cast, whole_number
 from ._core import ValidationError
+from ._curve import Curve
 from ._curves.control import checked_knots, checked_points, control_array
-from ._curves.curve import quantity_of
+from ._curves.curve import NORMS, quantity_of
+from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
 from ._spaces import Array, Product, Space
 from ._spaces import space as space_named
@@ -19,7 +22,7 @@ from ._time import onto_ends
 from .manifolds._manifold import refuse_functions
 
 
-class BSpline:
+class BSpline(Curve):
     """Construct a B-spline curve from control points.
 
     The curve is evaluated by de Boor's algorithm with geodesics in place of straight lines. On a Euclidean space the
@@ -67,13 +70,15 @@ class BSpline:
     array([0.40824829, 0.81649658, 0.40824829])
     """
 
+    _format = "symspline-bspline"
+    _curve: ControlledCurve
+
     def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space | str) -> None:
-        self._space = space = _factor(space)
-        self._degree = whole_number(degree, "degree", 1)
+        space = _factor(space)
+        degree = whole_number(degree, "degree", 1)
         doubles, tol = control_array(control_points, space, 2)
-        self._knots = checked_knots(knots, space._lead(doubles)[-1], self._degree)
-        self._control_points = checked_points(space, doubles, tol)
-        self._control_points.flags.writeable = self._knots.flags.writeable = False
+        knots = checked_knots(knots, space._lead(doubles)[-1], degree)
+        self._curve = ControlledCurve(space, knots, checked_points(space, doubles, tol), degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> Array:
         """Evaluate the curve or its derivatives.
@@ -95,7 +100,8 @@ class BSpline:
         ValidationError
             If a time is not finite or lies outside the domain of the curve.
         """
-        return self._evaluate(x, quantity_of(nu))
+        quantity = quantity_of(nu)
+        return self._curve.evaluate(self._times(x), quantity)
 
     def speed(self, x: ArrayLike) -> Array:
         """Compute the speed of the curve.
@@ -122,18 +128,7 @@ class BSpline:
         >>> line.speed([0.5, 1.0])
         array([1.5, 1.5])
         """
-        return self._evaluate(x, "speed")[()]
-
-    def _evaluate(self, x: ArrayLike, quantity: str) -> Array:
-        times = self._times(x)
-        space, control, span = reduced(self._space, self._control_points)
-        values = _core.evaluate_bspline(
-            space._handle, self._knots, space._as_doubles(control), self._degree, times, quantity
-        )
-        if quantity == "speed":
-            return values
-        batch = control.shape[: control.ndim - len(space.point_shape) - 1]
-        return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), batch)
+        return self._curve.evaluate(self._times(x), "speed")[()]
 
     def _times(self, x: ArrayLike) -> NDArray[np.float64]:
         """Return times in the domain of the curve as float64."""
@@ -153,48 +148,118 @@ class BSpline:
     @property
     def domain(self) -> tuple[float, float]:
         """First and last time of the curve."""
-        return float(self._knots[self._degree]), float(self._knots[-self._degree - 1])
+        return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
 
     @property
     def knots(self) -> NDArray[np.float64]:
         """Knots, shape (n + degree + 1,)."""
-        return self._knots
+        return self._curve.knots
 
     @property
     def control_points(self) -> Array:
         """Control points, shape (..., n, *point_shape)."""
-        return self._control_points
+        return self._curve.control_points
 
     @property
     def degree(self) -> int:
         """Degree of the curve."""
-        return self._degree
+        return self._curve.degree
 
     @property
     def space(self) -> Space:
         """Space of the curve."""
-        return self._space
+        return self._curve.space
+
+    def _picked(self, index: Any) -> Self:
+        return self._of(self.space, self.knots, np.ascontiguousarray(self.control_points[index]), self.degree)
+
+    @classmethod
+    def _of(cls, *parts: Any) -> Self:
+        """A curve that was checked before."""
+        self = cls.__new__(cls)
+        self._curve = ControlledCurve(*parts)
+        return self
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "format": self._format,
+            "version": VERSION,
+            "space": self.space,
+            "knots": self.knots,
+            "control_points": self.control_points,
+            "degree": self.degree,
+        }
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        space, degree = _factor(read_space(state)), state["degree"]
+        control, knots = read_array(state, "control_points", space), state["knots"]
+        if isinstance(state, Stored):
+            with entry("control_points"):
+                # They keep the values that they had after projection.
+                checked_points(space, *control_array(control, space, 2))
+            with entry("degree"):
+                degree = whole_number(degree, "degree", 1)
+            with entry("knots"):
+                knots = checked_knots(
+                    knots, space._lead(space._doubles(control, "control_points"))[-1], degree
+                )
+        return cls._of(space, knots, control, degree)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, BSpline):
             return NotImplemented
         return (
-            self._space == other._space
-            and self._degree == other._degree
-            and np.array_equal(self._knots, other._knots)
-            and np.array_equal(self._control_points, other._control_points)
+            self.space == other.space
+            and self.degree == other.degree
+            and np.array_equal(self.knots, other.knots)
+            and np.array_equal(self.control_points, other.control_points)
         )
 
-    __hash__ = None  # type: ignore[assignment]
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        # Unpickled arrays can be written to.
-        self._control_points.flags.writeable = self._knots.flags.writeable = False
-
     def __repr__(self) -> str:
-        count = self._control_points.shape[-1 - len(self._space.point_shape)]
-        return f"<{type(self).__name__} on {self._space!r}: {count} control points, degree {self._degree}>"
+        count = self.control_points.shape[-1 - len(self.space.point_shape)]
+        curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
+        return (
+            f"<{type(self).__name__} on {self.space!r}: {curves}{count} control points, degree {self.degree}>"
+        )
+
+
+class ControlledCurve:
+    """Knots, control points and degree of B-spline curves, and evaluation in the core.
+
+    Attributes
+    ----------
+    times : ndarray
+        The distinct knots of the domain, between which the curve is smooth.
+    """
+
+    exact = EXACT
+
+    def __init__(self, space: Space, knots: NDArray[np.float64], control_points: Array, degree: int) -> None:
+        self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
+        self.times = np.unique(knots[degree : knots.size - degree])
+        control_points.flags.writeable = knots.flags.writeable = False
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        shape = self.control_points.shape
+        return shape[: len(shape) - len(self.space.point_shape) - 1]
+
+    def evaluate(
+        self, x: NDArray[np.float64], quantity: str, outside: str = "raise", per_curve: bool = False
+    ) -> Array:
+        """A quantity at times in the domain; with ``per_curve`` x has the batch axes, along which it is constant."""
+        if per_curve:
+            x = np.ascontiguousarray(x[(0,) * len(self.batch)])
+        space, control, span = reduced(self.space, self.control_points)
+        values = _core.evaluate_bspline(
+            space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity
+        )
+        if quantity in NORMS:
+            return values
+        return (
+            space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
+        )
 
 
 class BezierCurve(BSpline):
@@ -244,10 +309,22 @@ class BezierCurve(BSpline):
     array([0.        , 3.14159265, 0.        ])
     """
 
+    _format = "symspline-bezier"
+
     def __init__(self, control_points: ArrayLike, space: Space | str) -> None:
         space = _factor(space)
         count = space._lead(control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        curve = super()._from_state(state)
+        count = curve.degree + 1
+        if curve.knots.tolist() != [0.0] * count + [1.0] * count:
+            raise ValidationError(
+                "entry 'knots' must be zeros and ones, as many of either as there are points"
+            )
+        return curve
 
 
 def _factor(space: Space | str) -> Space:

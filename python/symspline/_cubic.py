@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _archive
-from ._base_curve import Curve
+from ._archive import Entries, read_fitted
+from ._base_curve import SegmentedCurve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.derivatives import places
@@ -28,7 +28,7 @@ from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
 
-class CubicSpline(Curve):
+class CubicSpline(SegmentedCurve):
     r"""Interpolate points on a space by a C² cubic spline.
 
     Each segment is a cubic Bézier curve built from geodesics. At every knot the values, velocities and covariant
@@ -387,17 +387,17 @@ class CubicSpline(Curve):
             [report.map(lambda column: column[index]) for report in self._reports],
         )
 
-    # ---- pickling, text and files ----
+    # ---- files, pickles and text ----
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return CubicSpline._of, (
-            self._clock,
-            self._t,
-            self._curve,
-            self._bc_type,
-            self._extrapolate,
-            self._reports,
-        )
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {
+            "bc_type": self._bc_type,
+            "report": [vars(report) for report in self._reports],
+        }
+
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        return cls._of(*read_fitted(state))
 
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
@@ -405,46 +405,9 @@ class CubicSpline(Curve):
         bc = self._bc_type if isinstance(self._bc_type, str) else "custom end conditions"
         return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
 
-    def save(self, file: Any) -> None:
-        """Write the curve to an NPZ file.
-
-        `load` reads it back without a new fit.
-
-        Parameters
-        ----------
-        file : str, path or file object
-            Name of the file, or a binary file that is open for writing. An existing file of this name is replaced only
-            when the new one is complete.
-
-        Raises
-        ------
-        ValidationError
-            If the space is a `Manifold` made of functions, which cannot be stored.
-        OSError
-            If the file cannot be written.
-
-        See Also
-        --------
-        load : Read a curve.
-        save_many : Write several curves to one file.
-
-        Examples
-        --------
-        >>> import io, symspline as ss
-        >>> file = io.BytesIO()
-        >>> ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2").save(file)
-        >>> _ = file.seek(0)
-        >>> ss.load(file)
-        <CubicSpline on Sphere(2): 2 points, natural>
-        """
-        _archive.write(file, self._arrays())
-
-    def _arrays(self) -> dict[str, Any]:
-        """Return the entries of the NPZ file."""
-        return _archive.fitted_arrays(self, self._reports)
-
     # Title of plots.
     _kind = "C² spline"
+    _format = "symspline-curve"
 
     @property
     def _ends(self) -> str:

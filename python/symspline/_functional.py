@@ -262,7 +262,7 @@ def fit_many(
     --------
     CubicSpline : Interpolate points, or a batch of curves of equal length.
     fit_segments : Fit a recording with gaps.
-    save_many : Write several curves to one file.
+    save : Write several curves to one file.
 
     Examples
     --------

@@ -6,8 +6,8 @@ from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
-from . import _archive
-from ._base_curve import Curve
+from ._archive import Entries, check_curves, read_segments
+from ._base_curve import SegmentedCurve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
@@ -19,7 +19,7 @@ from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
 
-class HermiteSpline(Curve):
+class HermiteSpline(SegmentedCurve):
     r"""Interpolate points and velocities by a C¹ cubic Hermite spline.
 
     Each segment is the cubic Bézier curve of a `CubicSpline`, with control points that follow from the given
@@ -87,6 +87,7 @@ class HermiteSpline(Curve):
     """
 
     _kind = "C¹ Hermite spline"
+    _format = "symspline-hermite"
     _ends = "given velocities"
     _unconverged = 0
     _bc_type = "natural"  # Hermite splines are never closed.
@@ -133,46 +134,16 @@ class HermiteSpline(Curve):
         self._fill(*parts)
         return self
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return HermiteSpline._of, (self._clock, self._t, self._curve, self._extrapolate)
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        clock, knots, curve, extrapolate = read_segments(state, fitted=False)
+        check_curves(state, curve, [True] * len(curve.parts))
+        return cls._of(clock, knots, curve, extrapolate)
 
     def __repr__(self) -> str:
         batch = self._curve.batch
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
-
-    def save(self, file: Any) -> None:
-        """Write the curve to an NPZ file.
-
-        `load` reads it back.
-
-        Parameters
-        ----------
-        file : str, path or file object
-            Name of the file, or a binary file that is open for writing. An existing file of this name is replaced only
-            when the new one is complete.
-
-        Raises
-        ------
-        ValidationError
-            If the space is a `Manifold` made of functions, which cannot be stored.
-        OSError
-            If the file cannot be written.
-
-        See Also
-        --------
-        load : Read a curve.
-
-        Examples
-        --------
-        >>> import io, symspline as ss
-        >>> file = io.BytesIO()
-        >>> ss.HermiteSpline(None, [[0.0], [1.0]], [[0.0], [0.0]], "r:1").save(file)
-        >>> _ = file.seek(0)
-        >>> ss.load(file)
-        <HermiteSpline on Euclidean(1): 2 points>
-        """
-        _archive.write(file, _archive.arrays_of(self, _archive.HERMITE))
 
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> HermiteSpline:
         return HermiteSpline._of(clock, t, curve, self._extrapolate)

@@ -21,7 +21,7 @@ from .convert._reading import length, off_one, refuse
 
 Doubles = NDArray[np.float64]
 
-# What stands in a line of a TUM trajectory.
+# Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
 _SO3, _SE3 = SpecialOrthogonal(3), SpecialEuclidean(3)
 # Files have rounded numbers, some with three decimals.
@@ -37,20 +37,43 @@ _EUROC = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []"
 
 
 def read_tum(file: Any) -> tuple[Doubles, Array]:
-    """Poses from a file in the format of TUM's RGB-D benchmark: lines of ``time x y z qx qy qz qw``.
+    """Read poses in the format of TUM's RGB-D benchmark, lines of ``time x y z qx qy qz qw``.
 
-    Source: Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM Systems (IROS 2012). Comments begin with #.
+    Parameters
+    ----------
+    file : path or text file
+        File to read. Comments begin with #. Files whose names end with .gz are decompressed.
 
-    Args:
-        file: its name, or an open file of text; names that end with .gz are decompressed.
+    Returns
+    -------
+    t : ndarray, shape (n,)
+        Times in seconds, as in the file; repeated times are kept (see `symspline.fit_segments`).
+    poses : ndarray, shape (n, 4, 4)
+        Points of ``se:3``. Rounded quaternions are normalised.
 
-    Returns:
-        Times in seconds, shape (n,), and poses, points of ``se:3``, shape (n, 4, 4). Rounded quaternions are made unit
-        vectors; times are as in the file, repeated ones too (see `symspline.fit_segments`).
+    Raises
+    ------
+    ValidationError
+        If a line does not have eight numbers, or its quaternion is not a unit quaternion. The message has the number of
+        the line.
+    OSError
+        If the file cannot be read.
 
-    Raises:
-        ValidationError: a line has not eight numbers, or the four of a quaternion are none; it is named.
-        OSError: the file cannot be read.
+    See Also
+    --------
+    write_tum : Write poses.
+
+    References
+    ----------
+    J. Sturm, N. Engelhard, F. Endres, W. Burgard, D. Cremers, A Benchmark for the Evaluation of RGB-D SLAM Systems,
+    IROS 2012.
+
+    Examples
+    --------
+    >>> import io, symspline as ss
+    >>> t, poses = ss.poses.read_tum(io.StringIO("0 1 2 3 0 0 0 1"))
+    >>> poses[0, :3, 3].tolist()
+    [1.0, 2.0, 3.0]
     """
     rows, place = tum_rows(file)
     check_seconds(rows[:, 0], f"{_name(file)}: time")
@@ -59,11 +82,14 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
 
 
 def tum_rows(file: Any) -> tuple[Doubles, Callable[[int], str]]:
-    """The numbers of a TUM trajectory as they stand there, shape (n, 8), and where a row is: "line 7".
+    """Return the numbers of a TUM trajectory, shape (n, 8), and a function that names the line of a row: "line 7".
 
-    Raises:
-        ValidationError: a line has not eight numbers that are finite.
-        OSError: the file cannot be read.
+    Raises
+    ------
+    ValidationError
+        If a line does not have eight finite numbers.
+    OSError
+        If the file cannot be read.
     """
     name, lines = _name(file), _lines(file)
     form = f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"
@@ -85,7 +111,7 @@ def tum_rows(file: Any) -> tuple[Doubles, Callable[[int], str]]:
 
 
 def _bad_line(lines: list[Line], name: str, form: str) -> str | None:
-    """What is wrong with the first line that is no pose."""
+    """Describe the error in the first line that is not a pose."""
     for number, text in lines:
         cells = text.partition("#")[0].split()
         if len(cells) != len(TUM):
@@ -99,15 +125,33 @@ def _bad_line(lines: list[Line], name: str, form: str) -> str | None:
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
-    """Write poses as lines of ``time x y z qx qy qz qw``, so that `read_tum` gets every number back.
+    """Write poses as lines of ``time x y z qx qy qz qw``, from which `read_tum` restores every number.
 
-    Args:
-        file: its name, or an open file of text.
-        t: times in seconds, shape (n,); dates become seconds since 1970.
-        poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
+    Parameters
+    ----------
+    file : path or text file
+        File to write.
+    t : array_like, shape (n,)
+        Times in seconds. Dates become seconds since 1970.
+    poses : array_like, shape (n, 4, 4), or pair of rotations (n, 3, 3) and positions (n, 3)
+        Poses to write.
 
-    Raises:
-        ValidationError: the arrays are not what is described above.
+    Raises
+    ------
+    ValidationError
+        If the arrays do not meet the requirements above.
+
+    See Also
+    --------
+    read_tum : Read poses.
+
+    Examples
+    --------
+    >>> import io, numpy as np, symspline as ss
+    >>> file = io.StringIO()
+    >>> ss.poses.write_tum(file, [0.5], np.eye(4)[None])
+    >>> file.getvalue()
+    '0.5 0.0 0.0 0.0 0.0 0.0 0.0 1.0\n'
     """
     r, x = split(_checked(poses))
     write_tum_rows(
@@ -121,7 +165,7 @@ def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
     Raises
     ------
     ValidationError
-        Dates are finer than nanoseconds, or too far from 1970 to be counted in them.
+        If dates are finer than nanoseconds, or too far from 1970 to be counted in them.
     """
     times = list(map(repr, t.tolist())) if t.dtype.kind != "M" else _exact_seconds(t)
     rows = (f"{time} {' '.join(map(repr, pose))}\n" for time, pose in zip(times, poses.tolist(), strict=True))
@@ -139,21 +183,43 @@ def _exact_seconds(dates: Array) -> list[str]:
 
 
 def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
-    """Poses from a file in the format of KITTI's odometry benchmark: lines with the twelve numbers of [R | x].
+    """Read poses in the format of KITTI's odometry benchmark, lines with the twelve numbers of [R | x].
 
-    Source: Geiger, Lenz & Urtasun, Are we ready for Autonomous Driving? (CVPR 2012).
+    Parameters
+    ----------
+    file : path or text file
+        File to read.
+    times : path or text file, optional
+        File of the times, ``times.txt``, with one time per line. By default the times are 0, 1, 2, ...
 
-    Args:
-        file: its name, or an open file of text.
-        times: the file of their times, ``times.txt``, one a line; None for 0, 1, 2, …
+    Returns
+    -------
+    t : ndarray, shape (n,)
+        Times.
+    poses : ndarray, shape (n, 4, 4)
+        Points of ``se:3``, with the rotations nearest to the rounded ones.
 
-    Returns:
-        Times, shape (n,), and poses, points of ``se:3``, shape (n, 4, 4), with the nearest rotations to the rounded
-        ones.
+    Raises
+    ------
+    ValidationError
+        If a line does not have twelve numbers, nine of them are not a rotation, or the number of times differs.
+    OSError
+        If a file cannot be read.
 
-    Raises:
-        ValidationError: a line has not twelve numbers, nine of them are no rotation, or the times are not as many.
-        OSError: a file cannot be read.
+    See Also
+    --------
+    write_kitti : Write poses.
+
+    References
+    ----------
+    A. Geiger, P. Lenz, R. Urtasun, Are we ready for Autonomous Driving? The KITTI Vision Benchmark Suite, CVPR 2012.
+
+    Examples
+    --------
+    >>> import io, symspline as ss
+    >>> t, poses = ss.poses.read_kitti(io.StringIO("1 0 0 5 0 1 0 6 0 0 1 7"))
+    >>> poses[0, :3, 3].tolist()
+    [5.0, 6.0, 7.0]
     """
     rows = _numbers(file, 12, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
     r = rows[:, :, :3]
@@ -172,11 +238,28 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
 
 
 def write_kitti(file: Any, poses: Any) -> None:
-    """Write poses as lines with the twelve numbers of [R | x]; KITTI has times in a file of their own.
+    """Write poses as lines with the twelve numbers of [R | x].
 
-    Args:
-        file: its name, or an open file of text.
-        poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
+    KITTI stores times in a separate file.
+
+    Parameters
+    ----------
+    file : path or text file
+        File to write.
+    poses : array_like, shape (n, 4, 4), or pair of rotations (n, 3, 3) and positions (n, 3)
+        Poses to write.
+
+    See Also
+    --------
+    read_kitti : Read poses.
+
+    Examples
+    --------
+    >>> import io, numpy as np, symspline as ss
+    >>> file = io.StringIO()
+    >>> ss.poses.write_kitti(file, np.eye(4)[None])
+    >>> file.getvalue()
+    '1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0 0.0\n'
     """
     _write(file, _checked(poses)[:, :3].reshape(-1, 12).tolist(), " ")
 
@@ -185,25 +268,47 @@ def write_kitti(file: Any, poses: Any) -> None:
 
 
 def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
-    """Poses from a file in the format of the EuRoC data sets: ``nanoseconds,x,y,z,qw,qx,qy,qz``, and more columns that
-    are not read.
+    """Read poses in the format of the EuRoC data sets, lines of ``nanoseconds,x,y,z,qw,qx,qy,qz``.
 
-    Source: Burri et al., The EuRoC micro aerial vehicle datasets (IJRR 2016).
+    Further columns are ignored.
 
-    Args:
-        file: its name, or an open file of text.
+    Parameters
+    ----------
+    file : path or text file
+        File to read.
 
-    Returns:
-        Times as ``datetime64[ns]``, exact, with which rates are per second, shape (n,), and poses, points of ``se:3``,
-        shape (n, 4, 4).
+    Returns
+    -------
+    t : ndarray of datetime64[ns], shape (n,)
+        Exact times. Rates of a curve with these knots are per second.
+    poses : ndarray, shape (n, 4, 4)
+        Points of ``se:3``.
 
-    Raises:
-        ValidationError: a line has fewer numbers, a time is no whole number, or the four of a quaternion are none.
-        OSError: the file cannot be read.
+    Raises
+    ------
+    ValidationError
+        If a line has fewer numbers, a time is not an integer, or a quaternion is not a unit quaternion.
+    OSError
+        If the file cannot be read.
+
+    See Also
+    --------
+    write_euroc : Write poses.
+
+    References
+    ----------
+    M. Burri et al., The EuRoC micro aerial vehicle datasets, Int. J. Robotics Research 35 (2016).
+
+    Examples
+    --------
+    >>> import io, symspline as ss
+    >>> t, poses = ss.poses.read_euroc(io.StringIO("1000000000,1,2,3,1,0,0,0"))
+    >>> t.astype(str).tolist(), poses[0, :3, 3].tolist()
+    (['1970-01-01T00:00:01.000000000'], [1.0, 2.0, 3.0])
     """
     form = "EuRoC poses are lines of 'nanoseconds,x,y,z,qw,qx,qy,qz'"
     lines = _lines(file)
-    # Doubles do not hold nanoseconds since 1970.
+    # Double precision cannot represent nanoseconds since 1970.
     ns = _parsed(lines, file, form, delimiter=",", usecols=0, dtype=np.int64, ndmin=1)
     rows = _parsed(lines, file, form, delimiter=",", usecols=range(1, 8), ndmin=2)
     _check_rows(rows, file, form)
@@ -214,10 +319,26 @@ def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
 def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
     """Write poses as lines of ``nanoseconds,x,y,z,qw,qx,qy,qz``.
 
-    Args:
-        file: its name, or an open file of text.
-        t: ``datetime64``, or seconds since 1970 as numbers, which are rounded to nanoseconds; shape (n,).
-        poses: shape (n, 4, 4), or a pair of rotations (n, 3, 3) and positions (n, 3).
+    Parameters
+    ----------
+    file : path or text file
+        File to write.
+    t : array_like of datetime64 or float, shape (n,)
+        Times. Numbers are seconds since 1970 and are rounded to nanoseconds.
+    poses : array_like, shape (n, 4, 4), or pair of rotations (n, 3, 3) and positions (n, 3)
+        Poses to write.
+
+    See Also
+    --------
+    read_euroc : Read poses.
+
+    Examples
+    --------
+    >>> import io, numpy as np, symspline as ss
+    >>> file = io.StringIO()
+    >>> ss.poses.write_euroc(file, [0.5], np.eye(4)[None])
+    >>> file.getvalue().splitlines()[1]
+    '500000000,0.0,0.0,0.0,1.0,0.0,0.0,0.0'
     """
     r, x = split(_checked(poses))
     times = _moments(t, len(x))
@@ -233,14 +354,29 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
 
 
 def join(rotations: Any, positions: ArrayLike) -> Array:
-    """Poses [[R, x], [0, 1]] of rotations and positions.
+    """Combine rotations and positions into poses [[R, x], [0, 1]].
 
-    Args:
-        rotations: points of ``so:3``, shape (..., 3, 3), or a SciPy ``Rotation``.
-        positions: shape (..., 3).
+    Parameters
+    ----------
+    rotations : array_like, shape (..., 3, 3), or scipy.spatial.transform.Rotation
+        Points of ``so:3``.
+    positions : array_like, shape (..., 3)
+        Positions.
 
-    Returns:
-        Points of ``se:3``, shape (..., 4, 4).
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        Points of ``se:3``.
+
+    See Also
+    --------
+    split : The inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> ss.poses.join(np.eye(3), [1.0, 2.0, 3.0])[:3, 3].tolist()
+    [1.0, 2.0, 3.0]
     """
     r, x = _SO3._array(rotations, "rotations"), as_array(positions, "positions")
     if r.shape[-2:] != (3, 3) or x.shape != (*r.shape[:-2], 3):
@@ -253,13 +389,30 @@ def join(rotations: Any, positions: ArrayLike) -> Array:
 
 
 def split(poses: ArrayLike) -> tuple[Array, Array]:
-    """Rotations and positions of poses: points of ``so:3 x r:3``.
+    """Split poses into rotations and positions, points of ``so:3 x r:3``.
 
-    Args:
-        poses: points of ``se:3``, shape (..., 4, 4).
+    Parameters
+    ----------
+    poses : array_like, shape (..., 4, 4)
+        Points of ``se:3``.
 
-    Returns:
-        Shapes (..., 3, 3) and (..., 3).
+    Returns
+    -------
+    rotations : ndarray, shape (..., 3, 3)
+        Rotations.
+    positions : ndarray, shape (..., 3)
+        Positions.
+
+    See Also
+    --------
+    join : The inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> rotation, position = ss.poses.split(np.eye(4))
+    >>> position.tolist()
+    [0.0, 0.0, 0.0]
     """
     g = as_array(poses, "poses")
     if g.shape[-2:] != (4, 4):
@@ -287,7 +440,7 @@ def _moments(t: ArrayLike, count: int) -> Array:
         raise ValidationError(f"t has shape {times.shape}, but there are {count} poses")
     if times.dtype.kind not in "Miuf":
         raise ValidationError(f"t must be numbers or datetime64, not {times.dtype}")
-    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}, which is no time")
+    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}, which is not a time")
     check_seconds(times, "t")
     return times
 
@@ -300,13 +453,13 @@ def _seconds(t: ArrayLike, count: int) -> Doubles:
 
 
 def check_seconds(times: Array, name: str) -> None:
-    """Raise if numbers look like milliseconds since 1970, or smaller parts, where seconds are meant."""
+    """Raise if numbers look like milliseconds since 1970, or smaller units, where seconds are expected."""
     if times.dtype.kind in "iuf":
         refuse(
             np.abs(times.astype(np.float64)) > _FAR,
             name,
             lambda i: (
-                f"is {times[i]}, which can be no seconds; of nanoseconds make dates, .astype('datetime64[ns]')"
+                f"is {times[i]}, which cannot be seconds; convert nanoseconds to dates, .astype('datetime64[ns]')"
             ),
         )
 
@@ -315,7 +468,7 @@ def check_seconds(times: Array, name: str) -> None:
 
 
 def rotations_in_rows(q: Doubles, place: Callable[[int], str], atol: float = _ROUNDED) -> Array:
-    """The rotations of quaternions, scalar first, as they stand rounded in a file, each at its place."""
+    """Return the rotations of rounded quaternions, scalar first; `place` names the line of a row in messages."""
     sizes = length(q)
     bad = np.flatnonzero(~(np.abs(sizes - 1) <= atol))
     if len(bad):
@@ -341,14 +494,14 @@ def _check_rows(rows: Doubles, file: Any, form: str) -> None:
 
 
 class Line(NamedTuple):
-    """A line of a file: its number, counted from 1, and what stands there."""
+    """A line of a file: its number, counted from 1, and its text."""
 
     number: int
     text: str
 
 
 def _lines(file: Any, name: str = "file") -> list[Line]:
-    """The lines that are no comments; ``name`` is the argument's."""
+    """Return the lines that are not comments; `name` is the name of the argument."""
     path = path_of(file, name, method="read", text=True)
     if path is None:
         text = file.read()
@@ -383,7 +536,7 @@ def _parsed(lines: list[Line], file: Any, form: str, **options: Any) -> Any:
 
 
 def _bad_row(lines: list[Line], name: str, form: str, options: dict[str, Any]) -> str:
-    """What is wrong with the first line that is none of this form."""
+    """Describe the error in the first line that does not have this form."""
     for line in lines:
         try:
             np.loadtxt([line.text], **options)
@@ -398,7 +551,7 @@ def _name(file: Any) -> str:
 
 
 def _write(file: Any, rows: Iterable[list[Any]], separator: str, head: str = "") -> None:
-    # The shortest text that reads back as the same double.
+    # The shortest text from which the same number is read.
     _write_lines(file, (f"{separator.join(map(repr, row))}\n" for row in rows), head)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,15 @@ from numpy.typing import NDArray
 Number = float | NDArray[np.float64]
 # A gap between points is long if it exceeds the median by this factor.
 _LONG = 10
+
+
+# In the order of their numbers in the compiled core.
+SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
+
+# What stands in the fields of reports: one value per curve of a type, or one of a few words. An optional number is NaN
+# where it is undefined, and the field is None where it is undefined for all curves.
+BOOL, INT, FLOAT = ({"dtype": dtype} for dtype in (np.bool_, np.int64, np.float64))
+_MAYBE = FLOAT | {"optional": True}
 
 
 class ConvergenceWarning(UserWarning):
@@ -105,20 +114,20 @@ class Report:
     ('quasi-newton', True, 1.5708)
     """
 
-    method: str
-    converged: bool | NDArray[np.bool_]
-    iterations: int | NDArray[np.int64]
-    residual: Number
-    max_step: Number
-    max_gap: Number
+    method: str = field(metadata={"words": SOLVERS})
+    converged: bool | NDArray[np.bool_] = field(metadata=BOOL)
+    iterations: int | NDArray[np.int64] = field(metadata=INT)
+    residual: Number = field(metadata=FLOAT)
+    max_step: Number = field(metadata=FLOAT)
+    max_gap: Number = field(metadata=FLOAT)
     curvature: float
-    invariant_radius: Number | None
-    rate: Number
-    alternative_energy: Number | None = None
-    contraction_bound: Number | None = None
-    guaranteed_sweeps: Number | None = None
+    invariant_radius: Number | None = field(metadata=_MAYBE)
+    rate: Number = field(metadata=FLOAT)
+    alternative_energy: Number | None = field(default=None, metadata=_MAYBE)
+    contraction_bound: Number | None = field(default=None, metadata=_MAYBE)
+    guaranteed_sweeps: Number | None = field(default=None, metadata=_MAYBE)
     skipped: tuple[str, ...] = ()
-    velocity_error: Number | None = None
+    velocity_error: Number | None = field(default=None, metadata=_MAYBE)
 
     def __str__(self) -> str:
         converged = np.asarray(self.converged)
@@ -147,12 +156,9 @@ class Report:
         return "" if self.velocity_error is None else f", velocities within {_worst(self.velocity_error):.1e}"
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Report):
-            return NotImplemented
-        names = [field.name for field in fields(self)]
-        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
+        return same_report(self, other) if isinstance(other, Report) else NotImplemented
 
-    def map(self, function: Any) -> Report:
+    def map(self, function: Callable[[Any], Any]) -> Report:
         """Apply a function to all fields that have one value per curve.
 
         Parameters
@@ -173,27 +179,7 @@ class Report:
         >>> bool(curves.report.map(lambda field: field[0]).iterations == curves[0].report.iterations)
         True
         """
-
-        def known(value: Any) -> Any:
-            part = None if value is None else function(value)
-            return None if part is None or (np.ndim(part) == 0 and np.isnan(part)) else part
-
-        return Report(
-            self.method,
-            function(self.converged),
-            function(self.iterations),
-            function(self.residual),
-            function(self.max_step),
-            function(self.max_gap),
-            self.curvature,
-            known(self.invariant_radius),
-            function(self.rate),
-            known(self.alternative_energy),
-            known(self.contraction_bound),
-            _count(known(self.guaranteed_sweeps)),
-            self.skipped,
-            known(self.velocity_error),
-        )
+        return replace(self, **_without_nan(mapped_columns(self, function)))
 
 
 def _worst(values: Any) -> Any:
@@ -201,25 +187,45 @@ def _worst(values: Any) -> Any:
     return np.fmax.reduce(np.ravel(values))
 
 
-def _same(a: Any, b: Any) -> bool:
-    if a is None or b is None or isinstance(a, (str, tuple)):
-        return bool(a == b)
-    return np.array_equal(a, b, equal_nan=True)
+def columns_of(kind: type) -> dict[str, type]:
+    """The fields of a report that have one value per curve, and their types, in their order."""
+    return {own.name: own.metadata["dtype"] for own in fields(kind) if "dtype" in own.metadata}
 
 
-# In the order of their numbers in the compiled core.
-SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
+def mapped_columns(report: Any, function: Callable[[Any], Any]) -> dict[str, Any]:
+    """The fields that are per curve with a function applied; None stays None."""
+    values = {name: getattr(report, name) for name in columns_of(type(report))}
+    return {name: None if value is None else function(value) for name, value in values.items()}
 
+
+def same_report(ours: Any, theirs: Any) -> bool:
+    """Whether two reports of one class are equal, with NaN equal to NaN."""
+    each = ((getattr(ours, own.name), getattr(theirs, own.name)) for own in fields(ours))
+    return all(
+        bool(a == b)
+        if a is None or b is None or isinstance(a, (str, tuple))
+        else np.array_equal(a, b, equal_nan=True)
+        for a, b in each
+    )
+
+
+def _without_nan(columns: dict[str, Any]) -> dict[str, Any]:
+    """Fields of one curve with None for undefined numbers, and a whole number of sweeps; arrays stay."""
+    for name in OPTIONAL:
+        if np.ndim(columns[name]) == 0 and columns[name] is not None and np.isnan(columns[name]):
+            columns[name] = None
+    columns["guaranteed_sweeps"] = _count(columns["guaranteed_sweeps"])
+    return columns
+
+
+# The rows of the two tables of the compiled core.
 INTEGERS = ("converged", "iterations", "solver", "skipped")
-# Fields that are NaN where they are unknown.
-OPTIONAL = (
-    "invariant_radius",
-    "contraction_bound",
-    "guaranteed_sweeps",
-    "alternative_energy",
-    "velocity_error",
+NUMBERS = (
+    *("residual", "max_step", "rate", "invariant_radius", "contraction_bound"),
+    *("guaranteed_sweeps", "alternative_energy", "velocity_error"),
 )
-NUMBERS = ("residual", "max_step", "rate", *OPTIONAL)
+OPTIONAL = tuple(own.name for own in fields(Report) if own.metadata.get("optional"))
+_UNKNOWN = {name: None if name in OPTIONAL else np.nan for name in NUMBERS}
 MAX_STEP = NUMBERS.index("max_step")
 
 
@@ -323,25 +329,19 @@ def shaped(
     gap = longest_gap(times, batch)
     if batch == ():
         converged, iterations, solver, bits = columns.integers[:, 0].tolist()
-        residual, step, rate, *rest = columns.numbers[:, 0].tolist()
-        radius, bound, sweeps, other, error = [None if x != x else x for x in rest]
+        # NaN differs from itself.
+        known = {name: x for name, x in zip(NUMBERS, columns.numbers[:, 0].tolist(), strict=True) if x == x}
+        if "guaranteed_sweeps" in known:
+            known["guaranteed_sweeps"] = int(known["guaranteed_sweeps"])
         return Report(
-            SOLVERS[solver],
-            bool(converged),
-            iterations,
-            residual,
-            step,
-            gap,
-            curvature,
-            radius,
-            rate,
-            other,
-            bound,
-            _count(sweeps),
-            _skipped(bits),
-            error,
+            method=SOLVERS[solver],
+            converged=bool(converged),
+            iterations=iterations,
+            max_gap=gap,
+            curvature=curvature,
+            skipped=_skipped(bits),
+            **_UNKNOWN | known,
         )
-    # Rows are reshaped one by one, because a batch may be empty.
     integers = {name: columns.row(name).reshape(batch) for name in INTEGERS}
     numbers: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in NUMBERS}
     solvers = integers["solver"]

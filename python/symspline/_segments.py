@@ -311,7 +311,7 @@ def _means(space: Space, points: Array, group: NDArray[np.intp]) -> Array:
     starts = np.flatnonzero(np.diff(group, prepend=-1))
     counts = np.diff(np.append(starts, len(points))).reshape(-1, *[1] * len(space.point_shape))
     means: Array = points[starts]
-    floor = 8 * np.finfo(np.float64).eps * space.rounding(means)
+    floor = 8 * np.finfo(np.float64).eps * space._rounding(means)
     for _ in range(_STEPS):
         step = np.add.reduceat(space.log(means[group], points), starts, axis=0) / counts
         means = space.exp(means, step)

@@ -41,11 +41,11 @@ __all__ = [
     "angular_acceleration",
     "angular_velocity",
     "as_quaternions",
+    "as_rotation_6d",
     "as_rotation_vectors",
-    "as_six_numbers",
     "from_quaternions",
+    "from_rotation_6d",
     "from_rotation_vectors",
-    "from_six_numbers",
     "quaternion",
     "rotation",
     "velocities",
@@ -519,8 +519,8 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
     return _SO3.exp(np.eye(3), _hat(real_numbers(vectors, "vectors", (3,))[0]))
 
 
-def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None) -> Array:
-    """Convert rotations to the six-number representation of machine learning.
+def as_rotation_6d(rotations: ArrayLike | Rotation, *, order: str | None = None) -> Array:
+    """Convert rotations to the 6-D representation of machine learning.
 
     The representation consists of two columns, or rows, of the matrix. It is continuous over all rotations [1]_.
 
@@ -537,13 +537,17 @@ def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None)
     ndarray, shape (..., 6)
         Six numbers per rotation.
 
+    See Also
+    --------
+    from_rotation_6d : The inverse.
+
     References
     ----------
     .. [1] Zhou, Barnes, Lu, Yang & Li, "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019.
 
     Examples
     --------
-    >>> as_six_numbers([[0, -1, 0], [1, 0, 0], [0, 0, 1]], order="columns")
+    >>> as_rotation_6d([[0, -1, 0], [1, 0, 0], [0, 0, 1]], order="columns")
     array([ 0.,  1.,  0., -1.,  0.,  0.])
     """
     _check_six(order)
@@ -554,8 +558,8 @@ def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None)
     return six.reshape(*r.shape[:-2], 6)
 
 
-def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
-    """Convert the six-number output of a neural network to rotations.
+def from_rotation_6d(numbers: ArrayLike, *, order: str | None = None) -> Array:
+    """Convert the 6-D representation, such as the output of a neural network, to rotations.
 
     The two vectors are orthonormalised by the Gram–Schmidt process ([1]_, equation 15).
 
@@ -564,7 +568,7 @@ def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
     numbers : array_like, shape (..., 6)
         Two vectors of any length that are not parallel.
     order : {"columns", "rows", "interleaved"}
-        Required. See `as_six_numbers`.
+        Required. See `as_rotation_6d`.
 
     Returns
     -------
@@ -582,7 +586,7 @@ def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
 
     Examples
     --------
-    >>> from_six_numbers([2, 0, 0, 1, 1, 0], order="columns")
+    >>> from_rotation_6d([2, 0, 0, 1, 1, 0], order="columns")
     array([[1., 0., 0.],
            [0., 1., 0.],
            [0., 0., 1.]])

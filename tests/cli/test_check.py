@@ -84,7 +84,7 @@ def test_check_finds_perturbed_curves(run, fails, capsys):
     position, velocity, acceleration = map(float, out.splitlines()[1].split()[2:])
     assert max(position, velocity) < 1e-14 and 1e-7 < acceleration < 1e-4
     lost = ss.CubicSpline(None, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]], "s:2", on_failure="ignore")
-    ss.save_many({"good": good, "bent": ss.load("bent.npz"), "lost": lost}, "many.npz")
+    ss.save({"good": good, "bent": ss.load("bent.npz"), "lost": lost}, "many.npz")
     problem = fails("check many.npz", code=1)
     assert problem == "many.npz: more than rounding allows in 2 of 3 curves: bent, lost"
 

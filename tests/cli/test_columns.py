@@ -44,7 +44,7 @@ def test_many_curves_of_every_space(run, name):
     run(f"fit a.npz --space '{name}' --curve id -o b.npz")
     first, second = each(lambda part: part[::2], p), each(lambda part: part[1::2], p)
     fitted = ss.fit_many([([0, 1, 2], first), ([0, 1, 2], second)], space)
-    assert ss.load_many("b.npz") == dict(zip("ab", fitted, strict=True))
+    assert ss.load("b.npz") == dict(zip("ab", fitted, strict=True))
     run("sample b.npz --every 1 --nu 1 -o c.npz")
     rates = [numbered(spline([0, 1, 2], 1), "_d1") for spline in fitted]
     found = read_table("c.npz")

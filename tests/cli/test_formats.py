@@ -85,7 +85,7 @@ def test_parquet_of_all_kinds(run, fails):
     }
     parquet.write_table(pa.table(columns), "a.parquet")
     run("fit a.parquet --space r:2 --curve id --columns x,y -o a.npz")
-    made = ss.load_many("a.npz")
+    made = ss.load("a.npz")
     assert list(made) == ["a", "b"]
     np.testing.assert_array_equal(made["b"].points, [[3, 1.5], [4, 1.5]])
     assert str(made["a"].t[1]) == "2020-01-02"

@@ -14,7 +14,7 @@ def test_curves_in_one_file(run):
     assert out.startswith("pair.npz: 2 curves through 5 points of sphere:2, converged: ")
     e = np.eye(3)
     fitted = ss.fit_many([([0, 2, 3], e[[0, 2, 1]]), ([1, 2], e[1:])], "s:2")
-    assert ss.load_many("pair.npz") == dict(zip("ab", fitted, strict=True))
+    assert ss.load("pair.npz") == dict(zip("ab", fitted, strict=True))
     run("sample pair.npz --every 0.5 -o out.csv")
     columns = table("out.csv")
     assert list(columns) == ["t", "id", "x", "y", "z"]
@@ -29,7 +29,7 @@ def test_curves_in_one_file(run):
 def test_one_curve_with_a_name_is_a_collection_too(run):
     write("pair.csv", "\n".join(line for line in PAIR.splitlines() if not line.startswith("b")))
     run("fit pair.csv --space s:2 --curve id -o one.npz")
-    assert list(ss.load_many("one.npz")) == ["a"]
+    assert list(ss.load("one.npz")) == ["a"]
     run("sample one.npz -n 2 -o out.csv")
     assert table("out.csv")["id"] == ["a", "a"]
     run("plot one.npz -o one.png")

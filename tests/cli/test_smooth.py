@@ -75,12 +75,12 @@ def test_segments_and_several_curves(run):
     assert out.startswith("a.npz: 3 curves near 58 points") and " to " in out
     assert out.endswith("; 2 rows alone between gaps omitted\n")
     pieces = ss.fit_segments(t, PLACES, "sphere:2", max_gap=5, smooth=True)
-    for found, expected in zip(ss.load_many("a.npz").values(), pieces, strict=True):
+    for found, expected in zip(ss.load("a.npz").values(), pieces, strict=True):
         near(found, expected)
     rows = "".join(f"{'ab'[i % 2]},{i},{LON[i]}\n" for i in range(60))
     write("b.csv", "id,t,x\n" + rows)
     run("fit b.csv --space r:1 --curve id --smooth reml -o b.npz")
-    for i, found in enumerate(ss.load_many("b.npz").values()):
+    for i, found in enumerate(ss.load("b.npz").values()):
         near(found, ss.make_smoothing_spline(T[i::2], LON[i::2, None], "r:1", criterion="reml"))
 
 
@@ -108,7 +108,7 @@ def test_segments_of_two_points(run):
     write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
     for more in ("", "--robust", "--sigma 0.01"):
         run(f"fit a.csv --lonlat --smooth --max-gap 5 {more} -o a.npz")
-        piece = ss.load_many("a.npz")["2"]
+        piece = ss.load("a.npz")["2"]
         assert np.abs(piece.points - PLACES[30:32]).max() < 1e-10
 
 

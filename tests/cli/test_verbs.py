@@ -104,7 +104,7 @@ def test_as_a_module():
 def test_samples_at_given_times(run, fails):
     write("pair.csv", PAIR)
     run("fit pair.csv --space s:2 --curve id -o pair.npz")
-    a, b = ss.load_many("pair.npz").values()
+    a, b = ss.load("pair.npz").values()
     write("at.csv", "id,t\nb,1.5\na,0.5\nb,1.25\n")
     run("sample pair.npz --at at.csv -o out.csv")
     columns = table("out.csv")

@@ -31,7 +31,7 @@ def test_equal_times_of_several_tracks_suggest_their_column_first(run, fails):
                 assert message.index("--curve") < max(message.find("--dedup"), message.find("--sort"))
                 if order == "by time" and not options:
                     run("fit ships.csv --lonlat --curve ship -o a.npz")
-                    assert len(ss.load_many("a.npz")) == 3
+                    assert len(ss.load("a.npz")) == 3
 
 
 def test_merged_tracks_are_reported(run):

@@ -2,6 +2,7 @@
 
 import io
 import os
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,13 @@ def test_files_keep_everything(name):
         assert read.bc_type == spline.bc_type
     for ours, theirs in zip(spline.bc_type, read.bc_type, strict=True):
         assert isinstance(ours, str) or (ours[0] == theirs[0] and same(tuple(ours[1]), tuple(theirs[1])))
+
+
+def test_files_and_pickles_keep_durations():
+    spline = ss.CubicSpline(np.array([0, 1000, 3000], "m8[ms]"), THREE, S2)
+    half = np.timedelta64(500, "ms")
+    for made in (spline, round_trip(spline), pickle.loads(pickle.dumps(spline))):
+        assert same(made(half), spline(0.5)) and made.t.tolist() == [0.0, 1.0, 3.0]
 
 
 def test_files_keep_dates_that_count_in_tens():
@@ -172,9 +180,9 @@ def test_many_curves_in_one_file(space):
 def collection(curves):
     """Curves saved into one file and read again."""
     file = io.BytesIO()
-    ss.save_many(curves, file)
+    ss.save(curves, file)
     file.seek(0)
-    return ss.load_many(file)
+    return ss.load(file)
 
 
 def test_collections_keep_names_and_end_conditions():
@@ -189,19 +197,22 @@ def test_collections_keep_names_and_end_conditions():
     assert collection(pair) == pair
 
 
-def test_invalid_collections_raise():
+def test_collections_of_any_class():
+    curves = {"a": HERMITES["one"], "b": HERMITES["one"]}
+    assert collection(curves) == curves
+
+
+def test_invalid_collections_raise(tmp_path):
     one, flat = ss.CubicSpline(None, np.eye(3), S2), ss.CubicSpline(None, np.eye(3), "r:3")
     for curves, kind, match in (
-        ({"p": flat, "q": one}, ss.ValidationError, "of one space"),
-        ({}, ss.ValidationError, "of one space"),
-        ({"a": HERMITES["one"]}, TypeError, "objects of CubicSpline"),
-        ({"a": SAVED["batch"]}, ss.ValidationError, "single curves"),
+        ({"p": flat, "q": one}, ss.ValidationError, r"curves\['q'\] and curves\['p'\] differ in .* in separate files"),
+        ({"p": one, "q": HERMITES["one"]}, ss.ValidationError, "of one class and of one space"),
+        ({}, ss.ValidationError, "at least one curve"),
+        ({5: one}, ss.ValidationError, "whose keys are text"),
+        ({"a": SAVED["batch"]}, ss.ValidationError, r"curves\['a'\] is a batch"),
+        ({"a": 5}, TypeError, "curves must be a Curve or a mapping of names to Curves"),
+        ([one], TypeError, "curves must be a Curve or a mapping of names to Curves"),
     ):
         with pytest.raises(kind, match=match):
-            ss.save_many(curves, io.BytesIO())
-    file = io.BytesIO()
-    ss.save_many({"a": one}, file)
-    with pytest.raises(ss.ValidationError, match=r"read them with symspline\.load_many"):
-        load(file.getvalue())
-    with pytest.raises(ss.ValidationError, match=r"read it with symspline\.load"):
-        ss.load_many(io.BytesIO(stored(one)))
+            ss.save(curves, tmp_path / "curves.npz")
+    assert not (tmp_path / "curves.npz").exists()

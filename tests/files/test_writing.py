@@ -37,7 +37,7 @@ WRITERS = {
     "curve.npz": SPLINE.save,
     "hermite.npz": ss.HermiteSpline(None, P, np.zeros((3, 3)), S2).save,
     "smooth.npz": ss.make_smoothing_spline(None, P, S2, 0.1).save,
-    "many.npz": lambda file: ss.save_many({"a": SPLINE}, file),
+    "many.npz": lambda file: ss.save({"a": SPLINE}, file),
     "poses.txt": lambda file: ss.poses.write_tum(file, [0, 1, 2], POSES),
     "poses.kitti": lambda file: ss.poses.write_kitti(file, POSES),
     "poses.csv": lambda file: ss.poses.write_euroc(file, [0, 1, 2], POSES),
@@ -166,7 +166,6 @@ def test_pictures_have_an_ending(tmp_path, monkeypatch):
 
 READERS = {
     "load": ss.load,
-    "load_many": ss.load_many,
     "read_tum": ss.poses.read_tum,
     "read_kitti": ss.poses.read_kitti,
     "read_euroc": ss.poses.read_euroc,

@@ -105,6 +105,73 @@ def test_a_bezier_curve_is_a_bspline(rng):
     assert curve.domain == (0.0, 1.0) and isinstance(curve, ss.BSpline)
 
 
+def test_control_point_curves_are_curves(rng, tmp_path):
+    points = np.stack([walk(ss.Sphere(2), 0.4, 5, rng) for _ in range(3)])
+    curve = ss.BSpline(clamped([1.0], 3), points, 3, "sphere:2")
+    assert isinstance(curve, ss.Curve) and len(curve) == 3
+    assert repr(curve) == "<BSpline on Sphere(2): 3 curves, 5 control points, degree 3>"
+    for i, one in enumerate(curve):
+        assert one == curve[i] == ss.BSpline(curve.knots, points[i], 3, "sphere:2")
+    assert curve[1:] == ss.BSpline(curve.knots, points[1:], 3, "sphere:2")
+    assert type(ss.BezierCurve(points, "sphere:2")[0]) is ss.BezierCurve
+    with pytest.raises(TypeError, match="only a batch of curves can be indexed"):
+        curve[0][0]
+    with pytest.raises(IndexError, match="there are 3 curves"):
+        curve[3]
+    curves = {"batch": curve, "bezier": ss.BezierCurve(points[0], "sphere:2")}
+    for name, one in curves.items():
+        one.save(tmp_path / f"{name}.npz")
+        read = ss.load(tmp_path / f"{name}.npz")
+        assert type(read) is type(one) and read == one
+        assert np.array_equal(read(0.3, nu=2), one(0.3, nu=2))
+    several = {"short": ss.BSpline(clamped([], 3), points[0, :4], 3, "sphere:2"), "long": curve[1]}
+    ss.save(several, tmp_path / "several.npz")
+    assert ss.load(tmp_path / "several.npz") == several
+    for missing in ("plot", "lift", "transport", "velocities", "t", "report"):
+        assert not hasattr(curve, missing)
+
+
+def test_damaged_files_of_control_points_raise(rng, tmp_path):
+    points = walk(ss.Sphere(2), 0.4, 4, rng)
+    for curve, changes in (
+        (ss.BSpline(clamped([], 3), points, 3, "sphere:2"), {"knots": np.arange(8.0)[::-1]}),
+        (ss.BSpline(clamped([], 3), points, 3, "sphere:2"), {"degree": "2.5"}),
+        (ss.BezierCurve(points, "sphere:2"), {"control_points": 2 * points}),
+        (ss.BezierCurve(points, "sphere:2"), {"knots": np.r_[np.zeros(4), 2 * np.ones(4)]}),
+        (ss.BezierCurve(points, "sphere:2"), {"space": "sphere:2 x r:1"}),
+    ):
+        curve.save(tmp_path / "good.npz")
+        np.savez(tmp_path / "bad.npz", **dict(np.load(tmp_path / "good.npz")) | changes)
+        name = next(iter(changes))
+        with pytest.raises(ss.ValidationError, match=f"bad.npz: .*({name}|Product)"):
+            ss.load(tmp_path / "bad.npz")
+
+
+def test_length_and_energy_of_flat_curves(rng):
+    """Against SciPy, on knots at which the acceleration jumps."""
+    from scipy.integrate import quad
+    from scipy.interpolate import BSpline
+
+    points, knots = rng.standard_normal((2, 6, 3)), clamped([1.0, 1.5], 3)
+    curve = ss.BSpline(knots, points, 3, "r:3")
+    assert curve.length().shape == curve.bending_energy().shape == (2,)
+    for one, length, energy in zip(points, curve.length(), curve.bending_energy(), strict=True):
+        flat = [BSpline(knots, one, 3).derivative(nu) for nu in (1, 2)]
+        expected = [
+            sum(quad(f, a, b, epsabs=1e-12)[0] for a, b in ((0, 1), (1, 1.5), (1.5, 3)))
+            for f in (lambda x, d=flat[0]: np.linalg.norm(d(x)), lambda x, d=flat[1]: np.sum(d(x) ** 2))
+        ]
+        assert (length, energy) == pytest.approx(tuple(expected), rel=1e-9)
+
+
+def test_a_great_circle_has_its_length():
+    half = ss.BezierCurve([[1, 0, 0], [0, 1, 0]], "sphere:2")
+    assert half.length() == pytest.approx(np.pi / 2, rel=1e-14)
+    assert half.bending_energy() == pytest.approx(0, abs=1e-20)
+    big = np.eye(400)[:3]
+    assert ss.BezierCurve(big, "sphere:399").length() == pytest.approx(ss.BezierCurve(np.eye(3), "s:2").length())
+
+
 # ---- bad input ----
 
 

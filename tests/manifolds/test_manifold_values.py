@@ -122,11 +122,11 @@ def test_pickles_and_files():
         (lambda s: s.jvp(0.5, points=0 * POINTS), "derivatives with respect to the data"),
         (lambda s: s.vjp(0.5, POINTS[0]), "derivatives with respect to the data"),
         (lambda s: s.save("no.npz"), "curves are not saved"),
-        (lambda s: ss.save_many({"a": s}, "no.npz"), "curves are not saved"),
+        (lambda s: ss.save({"a": s}, "no.npz"), "curves are not saved"),
         (lambda s: ss.BezierCurve(POINTS, s.space), "B-spline and Bézier curves are not made"),
         (lambda s: ss.make_smoothing_spline(None, POINTS, s.space), "smoothing splines are not made"),
         (lambda s: ss.make_lsq_spline(None, POINTS, 3, s.space), "smoothing splines are not made"),
-        (lambda s: ss.CubicSpline(None, POINTS, s.space, method="newton"), "method 'newton' is not made"),
+        (lambda s: ss.CubicSpline(None, POINTS, s.space, method="newton"), "method 'newton' is not available"),
         (lambda s: ss.rotations.angular_velocity(s, 0.5), "so:3|rotations"),
     ],
 )

@@ -259,12 +259,12 @@ def test_forms_of_rotations():
 )
 def test_six_numbers(order, entries):
     m = Rotation.random(100, rng=6).as_matrix().reshape(4, 25, 3, 3)
-    six = rotations.as_six_numbers(m, order=order)
+    six = rotations.as_rotation_6d(m, order=order)
     assert np.array_equal(six, np.stack([m[..., i, j] for i, j in entries], axis=-1))
-    assert np.abs(rotations.from_six_numbers(six, order=order) - m).max() < 2e-15
+    assert np.abs(rotations.from_rotation_6d(six, order=order) - m).max() < 2e-15
     # Any two vectors: the first keeps its direction, the second its half plane.
     raw = np.random.default_rng(0).standard_normal((50, 6))
-    found = rotations.from_six_numbers(raw, order=order)
+    found = rotations.from_rotation_6d(raw, order=order)
     SO3.check_point(found)
     a, b = (
         np.moveaxis(raw.reshape(50, 3, 2), -1, 0)
@@ -278,14 +278,14 @@ def test_six_numbers(order, entries):
 
 @pytest.mark.parametrize("order", ["columns", "rows"])
 def test_six_numbers_of_nearly_parallel_vectors(order):
-    near = rotations.from_six_numbers([1, 0, 0, 1, 1e-5, 0], order=order)
+    near = rotations.from_rotation_6d([1, 0, 0, 1, 1e-5, 0], order=order)
     assert np.abs(near - np.eye(3)).max() < 1e-9
     # What cancels in the second vector does not show in the matrix.
     a, b = np.random.default_rng(4).standard_normal((2, 3))
-    r = rotations.from_six_numbers([*a, *(a + 1e-5 * b)], order=order)
+    r = rotations.from_rotation_6d([*a, *(a + 1e-5 * b)], order=order)
     assert np.abs(r.T @ r - np.eye(3)).max() < 1e-15
     with pytest.raises(ss.ValidationError, match="not parallel"):
-        rotations.from_six_numbers([1, 0, 0, 1, 1e-8, 0], order=order)
+        rotations.from_rotation_6d([1, 0, 0, 1, 1e-8, 0], order=order)
 
 
 # ---- what is refused ----
@@ -297,10 +297,10 @@ def test_six_numbers_of_nearly_parallel_vectors(order):
         (lambda s: rotations.angular_velocity(s, 0.5, "inertial"), "'body' or 'world', not 'inertial'"),
         (lambda s: rotations.quaternion(s, 0.5), "scalar_first"),
         (lambda s: rotations.as_quaternions(np.eye(3)), "scalar_first"),
-        (lambda s: rotations.as_six_numbers(np.eye(3)), "order='columns'"),
-        (lambda s: rotations.as_six_numbers(2 * np.eye(3), order="rows"), "off the space"),
-        (lambda s: rotations.from_six_numbers(np.ones((2, 6)), order="rows"), r"numbers\[0\] are .* not parallel"),
-        (lambda s: rotations.from_six_numbers(np.zeros(6), order="rows"), "must be nonzero"),
+        (lambda s: rotations.as_rotation_6d(np.eye(3)), "order='columns'"),
+        (lambda s: rotations.as_rotation_6d(2 * np.eye(3), order="rows"), "off the space"),
+        (lambda s: rotations.from_rotation_6d(np.ones((2, 6)), order="rows"), r"numbers\[0\] are .* not parallel"),
+        (lambda s: rotations.from_rotation_6d(np.zeros(6), order="rows"), "must be nonzero"),
         (lambda s: rotations.velocities(2 * np.eye(3), [0, 0, 1]), "off the space"),
         (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
         (lambda s: rotations.from_rotation_vectors([1, 2, np.nan]), "nan"),

@@ -1,5 +1,7 @@
 """Curves in xarray objects are those of plain arrays, bit for bit, whatever the order of dimensions."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -29,6 +31,8 @@ def test_numbers_are_those_of_the_spline(space, turned):
     ds = sx.fit(da, space, point_dims=dims, bc_type="not-a-knot")
     assert same(numbers(ds.points, "time", *dims), expected.points)
     assert same(numbers(ds.velocities, "time", *dims), expected.velocities)
+    columns = {field.name for field in dataclasses.fields(ss.Report)} - {"method", "curvature", "skipped"}
+    assert set(ds.data_vars) == {"points", "velocities", *columns}
     for name in ("converged", "iterations", "residual", "max_step", "max_gap", "rate"):
         assert same(numbers(ds[name]), getattr(expected.report, name))
         assert ds[name].dtype == getattr(expected.report, name).dtype

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,7 +11,20 @@ from .curve import CurveArrays, Doubles
 from .integrals import integrate
 
 
-def bending_energy(curve: CurveArrays) -> Any:
+class Evaluable(Protocol):
+    """What lengths and energies need of a curve: times between which it is smooth, batch axes, and its norms."""
+
+    @property
+    def times(self) -> Doubles: ...
+    @property
+    def batch(self) -> tuple[int, ...]: ...
+    @property
+    def exact(self) -> float: ...
+
+    def evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool) -> Any: ...
+
+
+def bending_energy(curve: Evaluable) -> Any:
     """∫ |∇γ'|² dt, (1); shape of the batch axes."""
     # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
     times = curve.times

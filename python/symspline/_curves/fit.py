@@ -21,11 +21,11 @@ from .._faults import INVALID, Fault
 from .._report import Columns, Report, shaped
 from .._spaces import POINT_TOL, Array, Product, Space, factors_of, parts_of, point_tol
 from ..manifolds import Manifold
+from ..manifolds._checks import hermite_on_manifold
+from ..manifolds._on_manifold import OnManifold
 from .core_curve import CoreCurve
 from .curve import CurveArrays
 from .ends import End, ends_in_factors, ends_of
-from .manifold_checks import hermite_on_manifold
-from .on_manifold import OnManifold
 from .product import ProductCurve, share
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Progress, Solved, Task, solve, without

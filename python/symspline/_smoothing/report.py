@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+
+from .._report import BOOL, FLOAT, INT, mapped_columns, same_report
+
+METHODS = ("linearized", "newton")
 
 
 @dataclass(frozen=True)
@@ -51,15 +56,15 @@ class SmoothingReport:
     ('linearized', True, False)
     """
 
-    method: str
-    converged: Any
-    iterations: Any
-    step: Any
-    rate: Any
-    lam: Any
-    at_bound: Any
-    df: Any
-    sigma: Any
+    method: str = field(metadata={"words": METHODS})
+    converged: Any = field(metadata=BOOL)
+    iterations: Any = field(metadata=INT)
+    step: Any = field(metadata=FLOAT)
+    rate: Any = field(metadata=FLOAT)
+    lam: Any = field(metadata=FLOAT)
+    at_bound: Any = field(metadata=BOOL)
+    df: Any = field(metadata=FLOAT)
+    sigma: Any = field(metadata=FLOAT)
 
     def __str__(self) -> str:
         good = np.asarray(self.converged)
@@ -97,14 +102,9 @@ class SmoothingReport:
         return bool(np.asarray(self.df)[index] < 2.5)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, SmoothingReport):
-            return NotImplemented
-        (ours, *columns), (theirs, *others) = vars(self).values(), vars(other).values()
-        return ours == theirs and all(
-            np.array_equal(a, b, equal_nan=True) for a, b in zip(columns, others, strict=True)
-        )
+        return same_report(self, other) if isinstance(other, SmoothingReport) else NotImplemented
 
-    def map(self, function: Any) -> SmoothingReport:
+    def map(self, function: Callable[[Any], Any]) -> SmoothingReport:
         """Apply a function to all fields that have one value per curve.
 
         Parameters
@@ -126,5 +126,4 @@ class SmoothingReport:
         >>> curves.report.map(lambda field: field[0]) == curves[0].report
         True
         """
-        method, *columns = vars(self).values()
-        return SmoothingReport(method, *map(function, columns))
+        return replace(self, **mapped_columns(self, function))

@@ -8,19 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from .._archive import Entries, read_fitted, read_times
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.band import UncertaintyBand
 from .._curves.curve import CurveArrays, order_of
-from .._curves.ends import fixed_velocities
+from .._curves.ends import fixed_velocities, is_closed
 from .._report import Report
 from .._spaces import Array, Product, Space, factors_of
 from .._time import TimeAxis
 from .data import Doubles, SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
 from .solve import Smoothed
-from .stored import noisy_arrays
+from .stored import noise_state, read_noise
 
 
 class SmoothingSpline(CubicSpline):
@@ -50,6 +51,7 @@ class SmoothingSpline(CubicSpline):
     """
 
     _kind = "Smoothing spline"
+    _format = "symspline-smoothing"
 
     def __init__(self) -> None:
         raise TypeError("SmoothingSpline has no public constructor. Use symspline.make_smoothing_spline.")
@@ -323,12 +325,15 @@ class SmoothingSpline(CubicSpline):
         )
         return cls._of(*parts, noisy, smoothed)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        _, parts = super().__reduce__()
-        return SmoothingSpline._of, (*parts, self._noisy, self._smoothed)
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | noise_state(self.space, self._noisy, self._smoothed)
 
-    def _arrays(self) -> dict[str, Any]:
-        return super()._arrays() | noisy_arrays(self.space, self._noisy, self._smoothed)
+    @classmethod
+    def _from_state(cls, state: Entries) -> Self:
+        clock, t = read_times(state, "data_t")
+        parts = read_fitted(state, clock)
+        _, _, curve, bc_type, *_ = parts
+        return cls._of(*parts, *read_noise(state, clock, t, curve, is_closed(bc_type)))
 
     def __repr__(self) -> str:
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""

@@ -667,29 +667,11 @@ class Space:
         """
         return self._finite("project_tangent", p=p, v=v)
 
-    def rounding(self, p: ArrayLike) -> Any:
-        """Compute the spacing of floating-point numbers at points p.
+    def _rounding(self, p: ArrayLike) -> Any:
+        """Return the distance between neighbouring floating-point points at p in units of 2.2e-16.
 
-        Parameters
-        ----------
-        p : array_like, shape (..., *point_shape)
-            Points.
-
-        Returns
-        -------
-        ndarray or float, shape (...)
-            Distance between neighbouring floating-point points in units of the machine epsilon, 2.2e-16; at least 1.
-
-        Notes
-        -----
-        The spacing is |p|² on hyperbolic space, tr p · tr p⁻¹ (about the condition number) for positive definite
-        matrices, and the length of vectors and translations.
-
-        Examples
-        --------
-        >>> import symspline as ss
-        >>> ss.Sphere(1).rounding([1.0, 0.0]), ss.Hyperbolic(1).rounding([1.25, 0.75])
-        (np.float64(1.0), np.float64(2.125))
+        The result has the shape of the leading axes. It is |p|² in hyperbolic space, tr p · tr p⁻¹ (about the
+        condition) for positive definite matrices, the length of vectors and translations, and at least 1.
         """
         return self._apply("rounding", p=p)
 

@@ -114,8 +114,8 @@ class Product(Space):
             )
         return self._each("act", g, x)
 
-    def rounding(self, p: Any) -> Any:
-        return np.max(np.stack(np.broadcast_arrays(*self._each("rounding", p))), axis=0)[()]
+    def _rounding(self, p: Any) -> Any:
+        return np.max(np.stack(np.broadcast_arrays(*self._each("_rounding", p))), axis=0)[()]
 
     def check_point(self, p: Any) -> None:
         self._each("check_point", p)

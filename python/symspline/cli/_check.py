@@ -86,7 +86,7 @@ def _measure(spline: CubicSpline) -> tuple[list[float], float]:
     steps = np.diff(spline._times)
     shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
     relative = _OF_FUNCTIONS if isinstance(spline.space, Manifold) else _RELATIVE
-    floor = _ROUNDING * float(spline.space.rounding(spline.points).max())
+    floor = _ROUNDING * float(spline.space._rounding(spline.points).max())
     distance = float(spline.space.distance(segments.at(segments.t), segments.points).max())
     values, excess = [distance], [distance / (relative + floor)]
     for nu in range(3):

@@ -15,7 +15,7 @@ import numpy as np
 from .._archive import json_in, read
 from .._arrays import brief
 from .._cubic import CubicSpline
-from .._files import load, load_many, save_many
+from .._files import load, save
 from .._spaces import Space
 from ._errors import Problem, reading, refuse, writing
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
@@ -39,13 +39,10 @@ class Curves:
 
 
 def write_curves(path: Path, curves: Curves) -> None:
-    """Write curves to a file that `symspline.load` or `symspline.load_many` also reads."""
+    """Write curves to a file that `symspline.load` also reads."""
     with writing(path) as temporary:
         with open(temporary, "wb") as file:
-            if curves.named:
-                save_many(curves.splines, file)
-            else:
-                next(iter(curves.splines.values())).save(file)
+            save(curves.splines if curves.named else next(iter(curves.splines.values())), file)
         columns = np.array(json.dumps(asdict(curves.columns)))
         with zipfile.ZipFile(temporary, "a") as archive, archive.open(f"{_COLUMNS}.npy", "w") as entry:
             np.lib.format.write_array(entry, columns)
@@ -55,15 +52,18 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
     """Read the curves in a file of ``symspline fit`` or of the library; ``lonlat`` as for ``symspline sample``."""
     with reading(path), open(path, "rb") as file:
         entries = _entries(path, file)
-        if "names.npy" in entries:
-            splines, named = load_many(file), True
+        found = load(file)
+        named = isinstance(found, dict)
+        for curve in found.values() if named else [found]:
+            if not isinstance(curve, CubicSpline):
+                kind = type(curve).__name__
+                raise Problem(f"{path} is a {kind}, whose acceleration jumps at knots; use symspline.load")
+        if named:
+            splines = found
         else:
-            spline = load(file)
-            if not isinstance(spline, CubicSpline):
-                raise Problem(f"{path} is a HermiteSpline, whose acceleration jumps; use symspline.load")
             # The curves of a batch are named by their indices.
-            indices = np.ndindex(spline._batch)
-            splines = {",".join(map(str, index)): reduce(getitem, index, spline) for index in indices}
+            indices = np.ndindex(found._batch)
+            splines = {",".join(map(str, index)): reduce(getitem, index, found) for index in indices}
             named = len(splines) > 1
         space = next(iter(splines.values())).space
         if lonlat:

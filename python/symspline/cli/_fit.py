@@ -28,7 +28,7 @@ examples:
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
 
-symspline.load reads the curve in Python; with --curve or --max-gap, symspline.load_many reads all of them.
+symspline.load reads the curve in Python; with --curve or --max-gap, it returns a dictionary of all curves by name.
 """
 
 from __future__ import annotations

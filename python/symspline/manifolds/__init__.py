@@ -1,4 +1,4 @@
-"""Manifolds that are not symmetric spaces, or that users bring: curves on them are made in Python."""
+"""Manifolds that are defined by functions, in Python: Stiefel manifolds, surfaces, and those of other libraries."""
 
 from ._adapters import from_geomstats, from_pymanopt
 from ._manifold import Manifold

@@ -16,22 +16,38 @@ from ._manifold import Manifold
 def from_geomstats(
     space: Any, *, injectivity_radius: float | None = None, dtype: Any = np.float64
 ) -> Manifold:
-    """A space of geomstats with its metric, on the NumPy backend.
+    """Use a space of geomstats with its metric, on the NumPy backend.
 
-    Args:
-        space: a space with a metric that has ``exp``, ``log`` and ``inner_product``, such as
-            ``geomstats.geometry.stiefel.Stiefel(5, 2)``.
-        injectivity_radius: as for `Manifold`.
-        dtype: complex128 if its points are complex.
+    Parameters
+    ----------
+    space : geomstats space
+        A space with a metric that has ``exp``, ``log`` and ``inner_product``, such as
+        ``geomstats.geometry.stiefel.Stiefel(5, 2)``.
+    injectivity_radius : float, optional
+        As for `Manifold`.
+    dtype : {float64, complex128}, default float64
+        Type of the numbers of a point.
 
-    Raises:
-        ValidationError: it has no metric.
+    Returns
+    -------
+    Manifold
+        The manifold.
+
+    Raises
+    ------
+    ValidationError
+        If the space has no metric.
+
+    Examples
+    --------
+    >>> from geomstats.geometry.hypersphere import Hypersphere  # doctest: +SKIP
+    >>> symspline.manifolds.from_geomstats(Hypersphere(2))  # doctest: +SKIP
     """
     metric = getattr(space, "metric", None)
     if metric is None:
         raise ValidationError("the space has no metric: call equip_with_metric first")
     return Manifold(
-        # Their tangent vectors come before the points at which they are.
+        # In geomstats tangent vectors come before their points.
         exp=_PointLast(metric.exp),
         log=_PointLast(metric.log),
         project_tangent=_PointLast(space.to_tangent),
@@ -45,30 +61,48 @@ def from_geomstats(
 
 
 def from_pymanopt(manifold: Any, *, injectivity_radius: float | None = None) -> Manifold:
-    """A manifold of pymanopt that has ``exp`` and ``log``. Its functions take one point at a time, which is slow.
+    """Use a manifold of pymanopt that has ``exp`` and ``log``.
 
-    Velocities are as pymanopt has tangent vectors: those of groups are elements of the Lie algebra.
+    Parameters
+    ----------
+    manifold : pymanopt manifold
+        Such as ``pymanopt.manifolds.Oblique(3, 4)``. For a product, make a `symspline.Product` of its factors.
+    injectivity_radius : float, optional
+        As for `Manifold`.
 
-    Args:
-        manifold: such as ``pymanopt.manifolds.Oblique(3, 4)``; of a product make a `symspline.Product` of its factors.
-        injectivity_radius: as for `Manifold`.
+    Returns
+    -------
+    Manifold
+        The manifold.
 
-    Raises:
-        ValidationError: its points are no arrays, or it has no ``exp`` or ``log``.
+    Raises
+    ------
+    ValidationError
+        If its points are not arrays, or it has no ``exp`` or ``log``.
+
+    Notes
+    -----
+    The functions take one point at a time, which is slow. Velocities are tangent vectors as pymanopt defines them:
+    those of groups are elements of the Lie algebra.
+
+    Examples
+    --------
+    >>> from pymanopt.manifolds import Oblique  # doctest: +SKIP
+    >>> symspline.manifolds.from_pymanopt(Oblique(3, 4))  # doctest: +SKIP
     """
     missing = [name for name in ("exp", "log") if not _has(manifold, name)]
     if missing:
         raise ValidationError(
-            f"{manifold} has no {' and no '.join(missing)}; give functions of your own to Manifold"
+            f"{manifold} has no {' and no '.join(missing)}; pass functions of your own to Manifold"
         )
-    # Nothing else says what arrays points are; it is drawn from NumPy's global generator, which is put back.
+    # Only a random point has the shape and the type of points. NumPy's global generator is restored.
     state = np.random.get_state()  # noqa: NPY002
     try:
         point = manifold.random_point()
     finally:
         np.random.set_state(state)  # noqa: NPY002
     if not isinstance(point, np.ndarray):
-        raise ValidationError(f"points of {manifold} are no arrays; make a symspline.Product of its factors")
+        raise ValidationError(f"points of {manifold} are not arrays; make a symspline.Product of its factors")
     project = manifold.to_tangent_space if _has(manifold, "to_tangent_space") else manifold.projection
     return Manifold(
         exp=_OneByOne(manifold.exp),
@@ -84,7 +118,7 @@ def from_pymanopt(manifold: Any, *, injectivity_radius: float | None = None) -> 
 
 
 def _has(manifold: Any, name: str) -> bool:
-    """Whether a manifold of pymanopt has what its base class only names."""
+    """Whether a manifold of pymanopt overrides a method of its base class."""
     bases = [cls for cls in type(manifold).__mro__ if cls.__module__ == "pymanopt.manifolds.manifold"]
     found = getattr(type(manifold), name, None)
     return found is not None and found is not getattr(bases[-1], name, None)

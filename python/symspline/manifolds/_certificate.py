@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._spaces import Array
-from ._condition import ControlPolygon, Problem, control_polygons, defects, defects_of
+from ._condition import ControlPolygon, Problem, c2_residuals, c2_residuals_of, control_polygons
 from ._differences import dlog_by_differences
 from ._operations import Operations
 from ._tridiagonal import Tridiagonal
@@ -61,18 +61,18 @@ def _bounds(problem: Problem, matrix: Tridiagonal, x: Doubles, pace: Doubles) ->
     reach = np.where(reach > 0, reach, _STEP)
     # Four points on a line through x in the direction of the first step: slope and noise.
     u = problem.velocities(x)
-    legs = control_polygons(problem.operations, problem.h, problem.p, u)
-    dlog = problem.operations.dlog(*legs)
-    first = defects_of(problem, u, legs, dlog)
+    polygon = control_polygons(problem.operations, problem.h, problem.p, u)
+    dlog = problem.operations.dlog(*polygon)
+    first = c2_residuals_of(problem, u, polygon, dlog)
     term = matrix.step(first)
     size = _largest(term)
     unit = np.where(size[:, None, None] > 0, _unit(term), _unit(matrix.step(_free(problem, first))))
     line = problem.some(np.tile(curves, 3))
     places = np.concatenate([x + k * reach[:, None, None] * unit for k in (1, 2, 3)])
-    ahead = defects(line, line.velocities(places)).reshape(3, *x.shape)
+    ahead = c2_residuals(line, line.velocities(places)).reshape(3, *x.shape)
     third = ahead[2] - 3 * ahead[1] + 3 * ahead[0] - first
     noise = _NOISE * _most(np.linalg.norm(third, axis=-1) / matrix.weight)[:, None] * matrix.weight
-    noise += _inconsistency(problem, u, legs, dlog)
+    noise += _inconsistency(problem, u, polygon, dlog)
     # The series Σ Mᵏ A F(u), M = 1 + A F', whose ratios estimate the norm of M.
     slope = matrix.step(ahead[0] - first) / reach[:, None, None]
     total, contraction = term.copy(), np.zeros(len(x))
@@ -86,9 +86,9 @@ def _bounds(problem: Problem, matrix: Tridiagonal, x: Doubles, pace: Doubles) ->
         if k + 1 < _TERMS:
             # As far as the terms reach themselves, so that a curve far from its solution shows how M varies.
             away = np.maximum(reach, size)[:, None, None]
-            moved = defects(problem, problem.velocities(x + away * unit))
+            moved = c2_residuals(problem, problem.velocities(x + away * unit))
             slope = matrix.step(moved - first) / away
-    rest = _largest(matrix.step(defects(problem, problem.velocities(x + total))))
+    rest = _largest(matrix.step(c2_residuals(problem, problem.velocities(x + total))))
     bound = _largest(total) + (_CAUTION * rest + matrix.largest_step(noise)) / (1 - contraction)
     return np.where(contraction < _LARGEST, bound, np.inf)
 
@@ -110,7 +110,7 @@ def _unit(x: Doubles) -> Doubles:
 
 
 def _free(problem: Problem, like: Doubles) -> Doubles:
-    """Defects that are one where velocities are unknown, for curves whose own defects are exactly zero."""
+    """Return residuals that are one where velocities are unknown, for curves whose own residuals are exactly zero."""
     free = np.ones_like(like)
     for which, end in enumerate(problem.ends or []):
         if end.kind == "velocity":
@@ -118,11 +118,13 @@ def _free(problem: Problem, like: Doubles) -> Doubles:
     return free
 
 
-def _inconsistency(problem: Problem, u: Array, legs: ControlPolygon, dlog: Array) -> Doubles:
-    """By how much defects at every knot may be wrong since exp, log and dlog do not fit each other: log(exp(v)) is not
-    v, exp(log(q)) is not q, and D log is not the derivative of log by other differences."""
+def _inconsistency(problem: Problem, u: Array, polygon: ControlPolygon, dlog: Array) -> Doubles:
+    """Return bounds for the errors of the residuals at every knot that are due to inconsistent functions.
+
+    log(exp(v)) differs from v, exp(log(q)) from q, and D log from the derivative of log by other differences.
+    """
     operations, h = problem.operations, problem.h
-    p, v, q, w = legs
+    p, v, q, w = polygon
     norm = operations.norm
     back = norm(p, operations.log(p, q) - v)
     ratio = norm(q, w) / norm(p, v)

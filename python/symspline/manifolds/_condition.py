@@ -10,7 +10,7 @@ paper for equal knots; on others it is not, see docs/manifolds.md.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,14 @@ Doubles = NDArray[np.float64]
 class End(NamedTuple):
     """A condition at one end of curves.
 
-    Attributes:
-        kind: "natural", "velocity", "acceleration" or "not-a-knot".
-        vector: what it prescribes, shape (curves, *point_shape).
-        logs: for not-a-knot the logarithms, at the point next to the end, of the end and of the point behind; shape
-            (2, curves, *point_shape).
+    Attributes
+    ----------
+    kind : {"natural", "velocity", "acceleration", "not-a-knot"}
+        Kind of condition.
+    vector : ndarray, shape (curves, *point_shape), or None
+        Prescribed vector.
+    logs : ndarray, shape (2, curves, *point_shape), or None
+        For not-a-knot, the logarithms of the end and of the third point, at the point next to the end.
     """
 
     kind: str
@@ -45,13 +48,18 @@ class End(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """Curves whose velocities are wanted.
+    """Curves with unknown velocities.
 
-    Attributes:
-        h: times between the points, shape (curves, N).
-        p: points, shape (curves, N+1, *point_shape).
-        frames: orthonormal frames there, shape (curves, N+1, dim, numbers of a point).
-        ends: conditions at both ends, None for closed curves.
+    Attributes
+    ----------
+    h : ndarray, shape (curves, N)
+        Times between the points.
+    p : ndarray, shape (curves, N+1, *point_shape)
+        Points.
+    frames : ndarray, shape (curves, N+1, dim, numbers of a point)
+        Orthonormal frames at the points.
+    ends : list of End, or None
+        Conditions at both ends, None for closed curves.
     """
 
     operations: Operations
@@ -81,13 +89,19 @@ class Problem(NamedTuple):
 
 
 class ControlPolygon(NamedTuple):
-    """The control polygon of segments: legs v from the points p to inner control points q, and the logarithm w from
-    each q to the other one; first those at the starts, then those at the ends, shape (2, curves, N, *point_shape)."""
+    """The control polygon of segments: handles v from the points p to the inner control points q, and the logarithm w
+    from each q to the other one. The first axis, of length 2, has the starts and the ends; the shape is
+    (2, curves, N, *point_shape)."""
 
     p: Array
     v: Array
     q: Array
     w: Array
+
+    def at(self, index: Any) -> ControlPolygon:
+        """Return the control polygons at an index of the axes after the first."""
+        index = index if isinstance(index, tuple) else (index,)
+        return ControlPolygon(*(part[(slice(None), *index)] for part in self))
 
 
 def control_polygons(operations: Operations, h: Doubles, p: Array, u: Array) -> ControlPolygon:
@@ -99,18 +113,18 @@ def control_polygons(operations: Operations, h: Doubles, p: Array, u: Array) -> 
     return ControlPolygon(at, v, q, operations.log(q, q[::-1]))
 
 
-def defects(problem: Problem, u: Array) -> Doubles:
-    """By how much velocities miss the conditions at every node, as coordinates: a sixth of the jump of acceleration,
-    and at an end with not-a-knot the error of the velocity there."""
-    legs = control_polygons(problem.operations, problem.h, problem.p, u)
-    return defects_of(problem, u, legs, problem.operations.dlog(*legs))
+def c2_residuals(problem: Problem, u: Array) -> Doubles:
+    """Return the C² residuals at every node as coordinates: a sixth of the jump of the acceleration, and at an end with
+    not-a-knot the error of the velocity."""
+    polygon = control_polygons(problem.operations, problem.h, problem.p, u)
+    return c2_residuals_of(problem, u, polygon, problem.operations.dlog(*polygon))
 
 
-def defects_of(problem: Problem, u: Array, legs: ControlPolygon, dlog: Array) -> Doubles:
-    """The same with the control polygon and D log, which were computed before."""
+def c2_residuals_of(problem: Problem, u: Array, polygon: ControlPolygon, dlog: Array) -> Doubles:
+    """Return the same from the control polygon and D log."""
     h = problem.h
     square = (h * h).reshape(*h.shape, *[1] * (u.ndim - 2))
-    starts, stops = (dlog - legs.v) / square
+    starts, stops = (dlog - polygon.v) / square
     if problem.ends is None:
         jumps = np.concatenate([starts[:, :1] - stops[:, -1:], starts[:, 1:] - stops[:, :-1]], axis=1)
         return problem.coordinates(jumps, slice(0, h.shape[1]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ Doubles = NDArray[np.float64]
 # Steps along the geodesic at q, as parts of the injectivity radius, or of the distance of p and q and the length of
 # the direction: where errors of order four are as large as those of rounding.
 _OF_RADIUS = 5e-4
-_OF_LEGS = 4e-3
+_OF_HANDLES = 4e-3
 _PLACES = np.array([-2.0, -1.0, 1.0, 2.0])
 _WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
@@ -32,7 +33,9 @@ def dlog_by_differences(
     """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic;
     ``stretch`` multiplies their steps."""
     size = operations.norm(q, w)
-    step = _OF_RADIUS * radius if math.isfinite(radius) else _OF_LEGS * np.hypot(size, operations.norm(p, v))
+    step = (
+        _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
+    )
     step = stretch * step
     # Times along the geodesic with velocity w.
     s = np.divide(step, size, out=np.zeros_like(size), where=size > 0)
@@ -60,3 +63,18 @@ def second_derivative(values: Array, step: Array) -> Array:
 def eighth_difference(values: Array) -> Array:
     """What polynomials of degree seven have none of: large where a function is not smooth on the scale of the steps."""
     return np.asarray(np.tensordot(_EIGHTH, values[4:] + values[3::-1], 1))
+
+
+def directional_derivative(g: Callable[[Array], Array], x: Array, t: Array) -> Array:
+    """The derivative of a function of rows x in the directions t, by differences of order four."""
+    size = np.linalg.norm(t, axis=1, keepdims=True)
+    step = 1e-3 * np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True))
+    unit = np.divide(t, size, out=np.zeros_like(t), where=size > 0)
+    near, far = (g(x + s * step * unit) - g(x - s * step * unit) for s in (1, 2))
+    return np.asarray((8 * near - far) / (12 * step) * size)
+
+
+def jacobian(g: Callable[[Array], Array], x: Array) -> Array:
+    """The derivatives of a function of rows x in all directions, shape (rows, numbers of g, numbers of x)."""
+    units = (np.broadcast_to(unit, x.shape) for unit in np.eye(x.shape[1]))
+    return np.stack([directional_derivative(g, x, unit) for unit in units], axis=-1)

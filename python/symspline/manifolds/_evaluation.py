@@ -24,44 +24,46 @@ ROUGH, NOISE, HALVINGS = 1e-8, 1e-9, 7
 
 
 class Rows(NamedTuple):
-    """Places on segments, one a row.
+    """Positions on segments, one per row.
 
-    Attributes:
-        tau: 0 at the start of the segment and 1 at its end.
-        h: duration of the segment.
-        legs: its control polygon, see `ControlPolygon`, rows in place of curves and segments.
-        straight: where the curve goes on as a geodesic: before the start of the segment, or behind its end.
+    Attributes
+    ----------
+    tau : ndarray, shape (rows,)
+        0 at the start of the segment and 1 at its end.
+    h : ndarray, shape (rows,)
+        Duration of the segment.
+    polygon : ControlPolygon
+        Control polygon of the segment, with rows in place of curves and segments.
+    straight : ndarray of bool, shape (rows,)
+        Whether the curve continues as a geodesic, before the start of the segment or after its end.
     """
 
     tau: Doubles
     h: Doubles
-    legs: ControlPolygon
+    polygon: ControlPolygon
     straight: NDArray[np.bool_]
 
     def at(self, chosen: NDArray[np.int64]) -> Rows:
         """Some of the rows."""
-        legs = ControlPolygon(*(part[:, chosen] for part in self.legs))
-        return Rows(self.tau[chosen], self.h[chosen], legs, self.straight[chosen])
+        return Rows(self.tau[chosen], self.h[chosen], self.polygon.at(chosen), self.straight[chosen])
 
 
 def points(operations: Operations, rows: Rows) -> Array:
     """The curve (8), by its control polygon."""
-    legs = rows.legs
+    polygon = rows.polygon
     if not rows.straight.any():
-        return _bezier(operations, rows.tau, legs)
-    result: Array = np.empty_like(legs.p[0])
+        return _bezier(operations, rows.tau, polygon)
+    result: Array = np.empty_like(polygon.p[0])
     for chosen, work in ((~rows.straight, _bezier), (rows.straight, _geodesic)):
-        result[chosen] = work(
-            operations, rows.tau[chosen], ControlPolygon(*(part[:, chosen] for part in legs))
-        )
+        result[chosen] = work(operations, rows.tau[chosen], polygon.at(chosen))
     return result
 
 
-def _bezier(operations: Operations, tau: Doubles, legs: ControlPolygon) -> Array:
-    t = tau.reshape(-1, *[1] * (legs.p.ndim - 2))
-    # The outer legs go by their velocities, which is exact for long ones, too.
-    starts = np.stack([legs.p[0], legs.q[0], legs.p[1]])
-    a, b, c = operations.exp(starts, np.stack([t * legs.v[0], t * legs.w[0], (1 - t) * legs.v[1]]))
+def _bezier(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> Array:
+    t = tau.reshape(-1, *[1] * (polygon.p.ndim - 2))
+    # The outer handles are given by their velocities, which is exact for long ones, too.
+    starts = np.stack([polygon.p[0], polygon.q[0], polygon.p[1]])
+    a, b, c = operations.exp(starts, np.stack([t * polygon.v[0], t * polygon.w[0], (1 - t) * polygon.v[1]]))
     d, e = _between(operations, np.stack([a, b]), np.stack([b, c]), t)
     return _between(operations, d, e, t)
 
@@ -70,11 +72,12 @@ def _between(operations: Operations, p: Array, q: Array, t: Array) -> Array:
     return operations.exp(p, t * operations.log(p, q))
 
 
-def _geodesic(operations: Operations, tau: Doubles, legs: ControlPolygon) -> Array:
-    before = (tau < 0.5).reshape(-1, *[1] * (legs.p.ndim - 2))
+def _geodesic(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> Array:
+    before = (tau < 0.5).reshape(-1, *[1] * (polygon.p.ndim - 2))
     t = tau.reshape(before.shape)
     return operations.exp(
-        np.where(before, legs.p[0], legs.p[1]), 3 * np.where(before, t * legs.v[0], (1 - t) * legs.v[1])
+        np.where(before, polygon.p[0], polygon.p[1]),
+        3 * np.where(before, t * polygon.v[0], (1 - t) * polygon.v[1]),
     )
 
 
@@ -104,7 +107,7 @@ def derivative(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Arra
 
 
 def _around(operations: Operations, rows: Rows, here: Array, step: float) -> Array:
-    """The logarithms of the curve at `STEPS` from places `here`."""
+    """Return the logarithms of the curve at `STEPS` from the points `here`."""
     shape = (len(STEPS), *here.shape)
     tau = rows.tau + np.multiply.outer(STEPS * step, np.ones_like(rows.tau))
 
@@ -115,7 +118,7 @@ def _around(operations: Operations, rows: Rows, here: Array, step: float) -> Arr
     around = Rows(
         tau.ravel(),
         np.tile(rows.h, len(STEPS)),
-        ControlPolygon(*map(repeated, rows.legs)),
+        ControlPolygon(*map(repeated, rows.polygon)),
         np.tile(rows.straight, len(STEPS)),
     )
     return operations.log(np.broadcast_to(here, shape), points(operations, around).reshape(shape))

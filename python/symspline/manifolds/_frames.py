@@ -74,7 +74,7 @@ def products(operations: Operations, p: Array, a: Array, b: Array) -> Array:
 
 
 def frames_along(operations: Operations, p: Array) -> Array:
-    """Frames at the points of curves, p of shape (curves, nodes, ...), each carried from the one before.
+    """Frames at the points of curves, p of shape (curves, nodes, ...), each transported from the one before.
 
     Returns:
         Shape (curves, nodes, dim, numbers of a point).

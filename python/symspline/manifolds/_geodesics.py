@@ -4,7 +4,6 @@ Ordinary Differential Equations I, II.9)."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ def integrate(f: Callable[[Array], Array], y: Array, turns: Array, tol: float = 
     """y(1) of y' = f(y), of rows y: each by as many steps of order twelve as it needs; NaN where 64 are too few.
 
     Args:
-        turns: by about what angle the solution turns, one a row: how many steps are tried first.
+        turns: approximate angle by which the solution turns, one per row; it sets the first number of steps.
         tol: largest error of order ten.
     """
     result = np.full_like(y, np.nan)
@@ -72,14 +71,3 @@ def _midpoint(f: Callable[[Array], Array], y: Array, start: Array, h: float, n: 
     for _ in range(n - 1):
         before, now = now, before + 2 * h * f(now)
     return np.asarray((before + now + h * f(now)) / 2)
-
-
-def jacobian_by_differences(g: Callable[[Array], Any], x: Array) -> Array:
-    """Derivatives of a function of rows of numbers, by differences of order four: shape (..., numbers of g, of x)."""
-    step = 1e-3 * np.maximum(1.0, np.abs(x).max(axis=-1, keepdims=True))
-    columns = []
-    for unit in np.eye(x.shape[-1]):
-        near = np.asarray(g(x + step * unit)) - g(x - step * unit)
-        far = np.asarray(g(x + 2 * step * unit)) - g(x - 2 * step * unit)
-        columns.append((8 * near - far) / (12 * step))
-    return np.stack(columns, axis=-1)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._spaces import Array
-from ._condition import Problem, defects
+from ._condition import Problem, c2_residuals
 from ._tridiagonal import Tridiagonal
 
 Doubles = NDArray[np.float64]
@@ -25,7 +25,7 @@ _WILD = 10.0
 
 
 class Found(NamedTuple):
-    """What came of the iteration, for every curve.
+    """Result of the iteration for every curve.
 
     Attributes:
         velocities: at all points, the best that were found.
@@ -78,11 +78,11 @@ class _State:
             self._mix(step)
 
     def _go_back(self) -> None:
-        """To the best place, and half as far from there as before."""
+        """Return to the best velocities, and halve the step from there."""
         self._halvings += 1
         self._steps, self._moves, self._last = [], [], None
         self.x = self.best_x + 0.5**self._halvings * self.best_step
-        # From zero velocities there may be no step at all.
+        # Zero velocities may not have a finite step.
         self.done = not np.isfinite(self.best) or self._halvings > 20
 
     def _mix(self, step: Doubles) -> None:
@@ -114,7 +114,7 @@ def iterate(
 
     Args:
         start: coordinates of velocities to begin with.
-        pace: the largest distance over time between neighbours, one a curve.
+        pace: the largest distance over time between neighbours, one per curve.
         floor: residuals at which a curve may rest.
         advance: called with the number of finished curves.
     """
@@ -130,7 +130,7 @@ def iterate(
             part = problem.some(chosen)
             matrix = Tridiagonal(part)
         u = part.velocities(np.stack([states[i].x for i in chosen]))
-        found = defects(part, u)
+        found = c2_residuals(part, u)
         rest = residuals(part, matrix, u, found, pace[chosen])
         with np.errstate(all="ignore"):
             steps = matrix.step(np.where(np.isfinite(found), found, 0.0))
@@ -151,7 +151,7 @@ def iterate(
 
 
 def residuals(problem: Problem, matrix: Tridiagonal, u: Array, found: Doubles, pace: Doubles) -> Doubles:
-    """The largest defect of each curve, see `symspline.Report.residual`."""
+    """Return the largest relative residual of each curve, see `symspline.Report.residual`."""
     sizes = np.linalg.norm(found, axis=-1) / matrix.weight
     speed = problem.operations.norm(problem.p, u).max(axis=1)
     scale = np.maximum(speed, 1e-3 * pace)

@@ -1,7 +1,8 @@
-"""Manifolds that users bring."""
+"""Manifolds that are defined by functions."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,39 +19,72 @@ _NEEDED = ("exp", "log", "project_tangent", "inner")
 
 
 class Manifold(Space):
-    """Any Riemannian manifold, by its functions: `symspline.CubicSpline` makes C² curves on it.
+    """Define a Riemannian manifold by functions of your own.
 
-    The curves are those of Popiel and Noakes (J. Approx. Theory 148, 2007): de Casteljau's algorithm with geodesics,
-    with covariant accelerations that agree at the points. No symmetry is needed.
+    `CubicSpline` fits C² curves on it. The manifold does not have to be symmetric. The curves are those of Popiel and
+    Noakes [1]_: de Casteljau's algorithm with geodesics, with covariant accelerations that agree at the points.
 
-    All functions take arrays of points and of tangent vectors, shape (m, *point_shape) with one m for all, and return
-    the same; ``inner`` returns shape (m,). Tangent vectors are arrays of the shape of points, real multiples and sums
-    of which are tangent vectors; they need not be derivatives of those arrays. What they return in double precision
-    should be exact to some 1e-15: the curve is C² as far as they are.
+    All functions take arrays of points and of tangent vectors, shape (m, *point_shape) with the same m, and return an
+    array of this shape; `inner` returns shape (m,).
 
-    Args:
-        exp: exp(p, v), the point reached from p in unit time on the geodesic with velocity v.
-        log: log(p, q), the velocity at p of the geodesic that reaches q in unit time; NaN where there is none.
-        project_tangent: project_tangent(p, v), linear, the tangent vector at p nearest to an array v; v itself if it
-            is tangent.
-        inner: inner(p, u, v), the inner product of tangent vectors at p.
-        dlog: dlog(p, q, w), the derivative of log(p, ·) at q in the direction w, a tangent vector at q; the result
-            is tangent at p. None for differences of order four, which lose about three digits: with an exact log
-            relative accelerations are good to some 1e-12, where points are closer than a hundredth of the injectivity
-            radius worse in proportion, unless that radius is given.
-        transport: transport(p, q, v), parallel transport of v along the geodesic from p to q, or what comes near to
-            it. It only speeds up the solver, which solves the same equations with any: None for projection.
-        injectivity_radius: distance below which geodesics are known to be unique; points and control points farther
-            apart are an error. None for no limit: then it is ``log`` that decides.
-        point_shape: the shape of the array of one point.
-        project: project(x), the point near an array x, for x near the manifold. Given points are checked and moved by
-            it. None if there is none: then a point is what ``exp(p, 0)`` leaves where it is.
-        dim: the dimension, if `Space.dim` is asked for.
-        dtype: float64, or complex128 if points have complex numbers.
+    Parameters
+    ----------
+    exp : callable
+        ``exp(p, v)``, the point reached from p in unit time on the geodesic with velocity v.
+    log : callable
+        ``log(p, q)``, the velocity at p of the geodesic that reaches q in unit time, or NaN if there is none.
+    project_tangent : callable
+        ``project_tangent(p, v)``, the tangent vector at p nearest to an array v. It must be linear in v, and return v
+        if v is tangent.
+    inner : callable
+        ``inner(p, u, v)``, the inner product of tangent vectors at p.
+    dlog : callable, optional
+        ``dlog(p, q, w)``, the derivative of ``log(p, ·)`` at q in the direction w, a tangent vector at q. The result is
+        tangent at p. By default it is computed by differences of order four.
+    transport : callable, optional
+        ``transport(p, q, v)``, the parallel transport of v along the geodesic from p to q, or an approximation. It
+        makes the solver faster and does not change the solution. By default vectors are projected.
+    injectivity_radius : float, optional
+        Distance below which geodesics are unique. Points and control points farther apart raise `CutLocusError`. By
+        default there is no limit, and `log` decides.
+    point_shape : int or tuple of int
+        Shape of the array of one point.
+    project : callable, optional
+        ``project(x)``, the point near an array x, for x near the manifold. Given points are compared with it and
+        replaced by it. Without it, ``exp(p, 0)`` must return p.
+    dim : int, optional
+        Dimension of the manifold, which `Space.dim` returns.
+    dtype : {float64, complex128}, default float64
+        Type of the numbers of a point.
 
-    Raises:
-        ValidationError: an argument is not what is described above.
+    Raises
+    ------
+    ValidationError
+        If an argument does not meet the requirements above.
 
+    See Also
+    --------
+    symspline.manifolds.from_surface : Define a surface by an equation.
+    symspline.manifolds.from_geomstats : Use a manifold of geomstats.
+    symspline.manifolds.from_pymanopt : Use a manifold of pymanopt.
+    symspline.testing.check : Check the functions.
+
+    Notes
+    -----
+    Tangent vectors are arrays with the shape of points. Real multiples and sums of them must be tangent vectors, but
+    they do not have to be derivatives of the arrays of points. The curve is C² up to the errors of the functions, which
+    should be about 1e-15.
+
+    Without `dlog`, about three significant digits are lost: relative accelerations have errors of about 1e-12. The
+    errors are larger for points closer than a hundredth of the injectivity radius, unless that radius is given.
+
+    References
+    ----------
+    .. [1] T. Popiel, L. Noakes, "Bézier curves and C² interpolation in Riemannian manifolds", J. Approx. Theory 148
+           (2007).
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> def exp(p, v):
     ...     angle = np.linalg.norm(v, axis=-1, keepdims=True)
@@ -99,45 +133,119 @@ class Manifold(Space):
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
         self.operations = Operations(self)
-        # What the compiled core's operations are to other spaces.
+        # The counterpart of the operations of the compiled core.
         self._handle: Any = self.operations
 
     def dlog(self, p: ArrayLike, q: ArrayLike, w: ArrayLike) -> Array:
-        """The derivative of log(p, ·) at the point q in the direction w, a tangent vector at q.
+        """Compute the derivative of ``log(p, ·)`` at the point q in a direction.
 
-        Args:
-            p, q, w: shape (..., *point_shape); leading axes broadcast.
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points. Leading axes broadcast.
+        w : array_like, shape (..., *point_shape)
+            Tangent vectors at q.
 
-        Returns:
-            A tangent vector at p, shape (..., *point_shape).
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            Tangent vectors at p.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> space = ss.Stiefel(1, 3)
+        >>> p, q, w = np.eye(3)[:, :1], np.eye(3)[:, 1:2], np.eye(3)[:, 2:]
+        >>> space.dlog(p, q, w).round(8).ravel().tolist()
+        [0.0, 0.0, 1.57079633]
         """
         inputs = [self._numbers(self._doubles(x, name)) for x, name in ((p, "p"), (q, "q"), (w, "w"))]
         a, b, c = np.broadcast_arrays(*inputs)
         return self.operations.dlog(a, self.log(a, b), b, c)
 
     def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
-        """The same at q = exp(p, v), of rows."""
+        """Return `dlog` of rows at q = exp(p, v)."""
         if self.functions.dlog is not None:
             result: Array = self.functions.dlog(p, q, w)
             return result
         return dlog_by_differences(self.operations, p, v, q, w, self._radius)
 
     def frame(self, p: ArrayLike) -> Array:
-        """Orthonormal tangent vectors at the points p, shape (..., dim, *point_shape)."""
+        """Return orthonormal tangent vectors.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (..., dim, *point_shape)
+            An orthonormal basis of each tangent space.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> ss.Stiefel(2, 3).frame(np.eye(3)[:, :2]).shape
+        (3, 3, 2)
+        """
         points = self._numbers(self._doubles(p, "p"))
         frames = basis_at(self.operations, points)
         return frames.reshape(*frames.shape[:-1], *self.point_shape)
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
-        """Random points, shape ``shape + point_shape``: normal numbers, projected by ``project``.
+        """Return random points: standard normal numbers, projected by ``project``.
 
-        Raises:
-            ValidationError: there is no ``project``.
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of randomness.
+        shape : int or tuple of int, default ()
+            Leading axes of the result.
+
+        Returns
+        -------
+        ndarray, shape ``(*shape, *point_shape)``
+            Points.
+
+        Raises
+        ------
+        ValidationError
+            If the manifold was made without ``project``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> ss.Stiefel(2, 3).random_point(np.random.default_rng(0), 5).shape
+        (5, 3, 2)
         """
         return super().random_point(rng, shape)
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
-        """Standard normal tangent vectors at the points p."""
+        """Return standard normal tangent vectors.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of randomness.
+        p : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            Tangent vectors.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> ss.Stiefel(2, 3).random_tangent(np.random.default_rng(0), np.eye(3)[:, :2]).shape
+        (3, 2)
+        """
         frames = self.frame(p)
         lead = frames.shape[: frames.ndim - len(self.point_shape)]
         numbers = rng.standard_normal(lead)
@@ -145,10 +253,30 @@ class Manifold(Space):
         return np.asarray(scaled.sum(axis=len(lead) - 1))
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
-        """Length of the geodesic between p and q that ``log`` gives; shape of the leading axes.
+        """Compute the length of the geodesic between two points.
 
-        Raises:
-            CutLocusError: ``log`` gives none.
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points. Leading axes broadcast.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Distances.
+
+        Raises
+        ------
+        CutLocusError
+            If ``log`` is not finite.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> p, q = np.eye(3)[:, :1], np.eye(3)[:, 1:2]
+        >>> round(float(ss.Stiefel(1, 3).distance(p, q)), 8)
+        1.57079633
         """
         return self.norm(p, self.log(p, q))
 
@@ -159,33 +287,23 @@ class Manifold(Space):
         return f"{type(self).__name__}({self._description()})"
 
     def __str__(self) -> str:
-        # There is no name that could be read back.
+        # `symspline.space` cannot read a name of functions.
         return repr(self)
 
     def _key(self) -> tuple[Any, ...]:
         return self.functions, self._radius, self._point_shape, self._dim, self._dtype
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is made of the same functions and numbers."""
+        """Whether both manifolds are made of the same functions and parameters."""
         return type(self) is type(other) and isinstance(other, Manifold) and self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (
-            self.functions,
-            None if np.isinf(self._radius) else self._radius,
-            self._point_shape,
-            self._dim,
-            self._dtype,
-        )
-
-
-def _remade(
-    functions: Functions, radius: float | None, shape: tuple[int, ...], dim: int | None, dtype: Any
-) -> Manifold:
-    return Manifold(**functions._asdict(), injectivity_radius=radius, point_shape=shape, dim=dim, dtype=dtype)
+        radius = None if np.isinf(self._radius) else self._radius
+        options = self.functions._asdict() | {"injectivity_radius": radius, "point_shape": self._point_shape}
+        return partial(Manifold, **options, dim=self._dim, dtype=self._dtype), ()
 
 
 def _shape(value: Any) -> tuple[int, ...]:
@@ -209,8 +327,10 @@ def _radius(value: Any) -> float:
 
 
 def refuse_functions(space: Space, what: str, named: bool = False) -> None:
-    """Raise ValidationError if the space, or a factor of it, is a manifold that is made of functions, on which there is
-    no such thing; ``named`` ones, which the library makes by their names, may be let through."""
+    """Raise ValidationError if the space or a factor of it is a manifold made of functions.
+
+    With `named`, the manifolds of the library, which have a name, are accepted.
+    """
     for factor in factors_of(space):
         if isinstance(factor, Manifold) and not (named and hasattr(factor, "_name")):
-            raise ValidationError(f"{what} on a manifold that is made of functions, {factor!r}")
+            raise ValidationError(f"{what} on a manifold made of functions, {factor!r}")

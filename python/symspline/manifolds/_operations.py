@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -30,7 +32,7 @@ class Functions(NamedTuple):
 
 
 class _Made(Protocol):
-    """What is asked of a manifold."""
+    """The attributes of a manifold that are used here."""
 
     functions: Functions
     _radius: float
@@ -48,7 +50,7 @@ class _Made(Protocol):
 
 
 class Operations:
-    """What the compiled core's `Handle` is to other spaces: operations on rows of doubles.
+    """The counterpart of the `Handle` of the compiled core: operations on rows of floating-point numbers.
 
     The methods with names of geometry take arrays of points with any equal leading axes, and call the functions with
     one.
@@ -64,12 +66,8 @@ class Operations:
 
     def log(self, p: Array, q: Array) -> Array:
         """NaN where there is no logarithm."""
-        try:
-            found = self._call("log", p, q)
-        except CutLocusError:
-            # That of a space of this library raises for all rows if there is none for one.
-            found = self._log_each(p, q)
-        # Formulas that divide by the distance have nothing to say of equal points.
+        found = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
+        # Formulas that divide by the distance are undefined at equal points.
         same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
         if same.any():
             # A copy: logarithms of other libraries may be read-only arrays.
@@ -143,18 +141,7 @@ class Operations:
             )
         return np.ascontiguousarray(found, np.float64 if name == "inner" else self.space.dtype)
 
-    def _log_each(self, p: Array, q: Array) -> Array:
-        shape = self.space.point_shape
-        result = np.full(p.shape, np.nan, self.space.dtype)
-        rows = result.reshape(-1, *shape)
-        for i, (a, b) in enumerate(zip(p.reshape(-1, *shape), q.reshape(-1, *shape), strict=True)):
-            try:
-                rows[i] = self._call("log", a[None], b[None])[0]
-            except CutLocusError:
-                continue
-        return rows.reshape(p.shape)
-
-    # ---- what the classes of spaces ask of the compiled core ----
+    # ---- the interface of a handle of the compiled core ----
 
     def dim(self) -> int:
         if self.space._dim is None:
@@ -226,12 +213,26 @@ class Operations:
         )
 
     def tangent_defects(self, points: Doubles, vectors: Doubles) -> Doubles:
-        """Which part of vectors is not tangent."""
+        """Return the relative size of the normal part of vectors."""
         shape = (len(points), *self.space._doubles_shape)
         p, v = (self.space._numbers(np.ascontiguousarray(x).reshape(shape)) for x in (points, vectors))
         size = np.abs(v).reshape(len(v), -1).max(axis=1)
         off = np.abs(v - self.project_tangent(p, v)).reshape(len(v), -1).max(axis=1)
         return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
+
+
+def rows_or_nan(
+    log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)
+) -> Array:
+    """Logarithms of rows, NaN where there are none. Functions of this library raise for all rows then."""
+    try:
+        return np.asarray(log(p, q))
+    except errors:
+        found = np.full(q.shape, np.nan, q.dtype)
+    for i in range(len(q)):
+        with suppress(*errors):
+            found[i] = log(p[i : i + 1], q[i : i + 1])[0]
+    return found
 
 
 def _times(t: Doubles | None, p: Array) -> Doubles:

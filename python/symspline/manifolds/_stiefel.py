@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,26 +10,53 @@ from .._arrays import short_repr
 from .._core import CutLocusError, ValidationError
 from .._spaces import Array, Space, SpecialOrthogonal
 from ._manifold import Manifold
+from ._operations import rows_or_nan
 
 # Of Rentmeesters, Algorithms for data fitting on some common homogeneous spaces (2013), Theorem 5.5.
 _RADIUS = np.sqrt(0.8) * np.pi
-# Below which the part of a logarithm that must vanish is rounding.
+# The block of a logarithm that must vanish is rounding below this.
 _TOL = 1e-14
 _MOST = 60
 
 
 class Stiefel(Manifold):
-    """The Stiefel manifold St(k, n), frames of k orthonormal vectors in Rⁿ: points are n × k matrices with
-    orthonormal columns, with the canonical metric ⟨u, v⟩ = tr uᵀ(1 − pp ᵀ/2)v of Edelman, Arias and Smith (1998).
+    """Define the Stiefel manifold of frames of k orthonormal vectors in Rⁿ.
 
-    It is not symmetric, but for k = 1, the sphere, and k = n: its curves are those of `Manifold`. Unlike on
-    `Grassmannian` the columns themselves are joined, not only the subspaces that they span. The logarithm is found by
-    the iteration of Zimmermann and Hüper (SIAM J. Matrix Anal. Appl. 43, 2022).
+    Points are n × k matrices with orthonormal columns. The metric is the canonical metric
+    ⟨u, v⟩ = tr uᵀ(1 − pp ᵀ/2)v of Edelman, Arias and Smith [1]_.
 
-    Args:
-        k: number of vectors, from 1 to n − 1.
-        n: dimension of the space they are in.
+    Parameters
+    ----------
+    k : int
+        Number of vectors, from 1 to n − 1.
+    n : int
+        Dimension of the space of the vectors.
 
+    Raises
+    ------
+    ValidationError
+        If k and n are not integers with 1 ≤ k < n.
+
+    See Also
+    --------
+    Grassmannian : Subspaces, without a basis.
+    SpecialOrthogonal : Frames of the whole space.
+
+    Notes
+    -----
+    The manifold is symmetric only for k = 1, the sphere, so its curves are those of `Manifold`. On `Grassmannian` a
+    curve joins subspaces; here it joins their bases, column by column. The logarithm is computed by the iteration of
+    Zimmermann and Hüper [2]_.
+
+    References
+    ----------
+    .. [1] A. Edelman, T. A. Arias, S. T. Smith, "The geometry of algorithms with orthogonality constraints", SIAM J.
+           Matrix Anal. Appl. 20 (1998).
+    .. [2] R. Zimmermann, K. Hüper, "Computing the Riemannian logarithm on the Stiefel manifold", SIAM J. Matrix Anal.
+           Appl. 43 (2022).
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> space = ss.Stiefel(2, 5)
     >>> p, q = space.random_point(np.random.default_rng(0), 2)
@@ -60,14 +86,14 @@ class Stiefel(Manifold):
             point_shape=(self._n, self._k),
             dim=k * n - k * (k + 1) // 2,
         )
-        # What a frame and its motion span.
+        # Dimension of the span of a frame and its motion.
         self._m = min(2 * self._k, self._n)
         self._rotations = SpecialOrthogonal(self._m)
 
     def _key(self) -> tuple[Any, ...]:
         return self._parameters
 
-    # It has a name, which other manifolds have not.
+    # Unlike other manifolds, it has a name.
     __str__, __repr__, __reduce__ = Space.__str__, Space.__repr__, Space.__reduce__
 
     def _exp(self, p: Array, v: Array) -> Array:
@@ -82,9 +108,9 @@ class Stiefel(Manifold):
         return np.asarray(frame @ found[..., : self._k])
 
     def _frame(self, p: Array, v: Array) -> Array:
-        """Orthonormal columns that span the columns of p and of v, p first."""
+        """Return orthonormal columns that span the columns of p and of v, p first."""
         both = np.concatenate([p, v - p @ (_transposed(p) @ v)], axis=-1)
-        # Householder's vectors are orthogonal whatever rank there is.
+        # Householder's vectors are orthogonal for any rank.
         rest = np.linalg.qr(both)[0][..., self._k :]
         return np.concatenate([p, rest], axis=-1)
 
@@ -107,7 +133,7 @@ class Stiefel(Manifold):
         unit = _units(k, m)
         z, divided = z[:, None], divided[:, None]
         moved = z @ (divided * (_adjoint(z) @ unit @ z)) @ _adjoint(z)
-        # Parts that are seen in the first k columns, of D exp[H] and of w, both carried back by exp(-Ω).
+        # The first k columns of D exp[H] and of w, both multiplied by exp(-Ω).
         columns = _lower(moved.real[..., :k], k)
         back = (z[:, 0] * np.exp(-1j * x)[..., None, :]) @ _adjoint(z[:, 0])
         inside = back.real @ (_transposed(frame) @ w)
@@ -115,7 +141,7 @@ class Stiefel(Manifold):
         generator = np.einsum("...a,aij->...ij", solved, unit)
         result = frame @ generator[..., :k]
         if m < self._n:
-            # What is orthogonal to the frame stays so, and is multiplied by the mean of exp(sΩ).
+            # The part orthogonal to the frame stays orthogonal and is multiplied by the mean of exp(sΩ).
             outside = w - frame @ (_transposed(frame) @ w)
             mean = (z[:, 0] * (np.exp(0.5j * x) * np.sinc(x / (2 * np.pi)))[..., None, :]) @ _adjoint(z[:, 0])
             result = result + _transposed(
@@ -187,12 +213,17 @@ def _generator_to(rotations: SpecialOrthogonal, first: Array, k: int) -> Array:
     rest = first.shape[-2] - k
     found = np.full(turn.shape, np.nan)
     left = np.arange(len(turn))
+
+    def log(p: Array, q: Array) -> Array:
+        return rotations._apply("log", p=p, q=q)
+
     for _ in range(_MOST):
-        logs = _log_or_nan(rotations, turn[left])
+        eye = np.broadcast_to(np.eye(k + rest), turn[left].shape)
+        logs = rows_or_nan(log, eye, turn[left], (CutLocusError, ValidationError))
         size = np.abs(logs[..., k:, k:]).reshape(len(left), -1).max(axis=1, initial=0.0)
         there = size <= _TOL
         found[left[there]] = logs[there]
-        # What has no logarithm never will have one.
+        # A rotation without a logarithm is not changed further.
         on = ~there & np.isfinite(size)
         left, logs = left[on], logs[on]
         if not left.size:
@@ -219,16 +250,3 @@ def _completed(first: Array, k: int) -> Array:
     other = columns @ _transposed(flipped @ v)
     turn[..., k:] = np.where((np.linalg.det(turn) < 0)[:, None, None], other, last)
     return turn
-
-
-def _log_or_nan(rotations: SpecialOrthogonal, turn: Array) -> Array:
-    """Logarithms of rotations, NaN of those with an eigenvalue −1."""
-    eye = np.eye(turn.shape[-1])
-    try:
-        return rotations._apply("log", p=eye, q=turn)
-    except (CutLocusError, ValidationError):
-        found = np.full(turn.shape, np.nan)
-    for i, one in enumerate(turn):
-        with suppress(CutLocusError, ValidationError):
-            found[i] = rotations._apply("log", p=eye, q=one)
-    return found

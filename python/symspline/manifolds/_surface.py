@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from .._arrays import short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array
-from ._geodesics import FINE, integrate, jacobian_by_differences
+from ._differences import directional_derivative, jacobian
+from ._geodesics import FINE, integrate
 from ._manifold import Manifold
 from ._operations import Function
 
@@ -119,29 +120,31 @@ class Surface(Manifold):
 
     def _hess(self, x: Array) -> Array:
         if self._given_hess is None:
-            return jacobian_by_differences(self._gradient, x)
+            return jacobian(self._gradient, x)
         return np.asarray(self._given_hess(x), float)
 
     def _turns(self, p: Array, v: Array) -> Array:
-        """By what angle geodesics would turn with the curvature at their start."""
+        """Return the angle by which geodesics turn, from the curvature at their start."""
         g = self._gradient(p)
         turned = (self._hess(p) @ v[..., None])[..., 0]
         return np.asarray(np.linalg.norm(turned, axis=1) / np.linalg.norm(g, axis=1))
 
     def _geodesic(self, y: Array) -> Array:
-        """x'' is normal. Rows of place and velocity."""
+        """Return the derivative of rows of position and velocity: x'' is normal."""
         x, t = y[:, 0], y[:, 1]
         g = self._gradient(x)
         rough = self._given_hess is None
-        turned = _along(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
+        turned = (
+            directional_derivative(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
+        )
         pull = np.sum(t * turned, axis=1) / np.sum(g * g, axis=1)
         return np.stack([t, -pull[:, None] * g], axis=1)
 
     def _spread(self, p: Array, v: Array, tol: float = FINE) -> tuple[Array, Array, Array]:
-        """Where the geodesic with velocity v arrives, a basis at p, and what Jacobi fields that begin with velocities
-        of the basis are there: shapes (m, n), (m, n − 1, n) twice."""
+        """Return the end of the geodesic with velocity v, a basis at p, and at the end the Jacobi fields J with
+        J(0) = 0 and J'(0) in the basis: shapes (m, n), (m, n − 1, n) twice."""
         basis = np.swapaxes(np.linalg.qr(self._gradient(p)[..., None], "complete").Q[..., 1:], 1, 2)
-        # Rows of place, velocity, fields and their covariant derivatives.
+        # Rows of position, velocity, fields and their covariant derivatives.
         y = np.concatenate([p[:, None], v[:, None], np.zeros_like(basis), basis], axis=1)
         y = integrate(self._jacobi, y, self._turns(p, v), tol)
         return y[:, 0], basis, y[:, 2 : 2 + basis.shape[1]]
@@ -161,7 +164,7 @@ class Surface(Manifold):
         result[:, 0], result[:, 1], result[:, 2 : count + 2] = moving[:, 0], 0.0, y[:, count + 2 :]
         bent = jt[..., None] * turned[:, :1] - tt[..., None] * turned[:, 1 : count + 1]
         result[:, count + 2 :] = bent / square[..., None]
-        # What turns with the surface, and what of the curvature is normal.
+        # The part that turns with the surface, and the normal part of the curvature.
         along[:, count + 1 :] += (jt * across[:, :1] - tt * across[:, 1:]) / square
         result[:, 1:] -= along[..., None] * (g / square)[:, None]
         return result
@@ -175,19 +178,38 @@ def from_surface(
     hess: Function | None = None,
     injectivity_radius: float | None = None,
 ) -> Surface:
-    """The surface F = 0 in Rⁿ, such as an ellipsoid or a torus, with lengths as in Rⁿ.
+    """Define a surface in Rⁿ by an equation, with lengths as in Rⁿ.
 
-    Geodesics are integrated to rounding by an extrapolation method of order twelve, logarithms found by shooting, and
-    their derivatives by Jacobi's equation with Gauss's equation for the curvature.
+    Parameters
+    ----------
+    F : callable
+        Function of points, shape (m, n), with values of shape (m,). The surface is F = 0. F must be defined near it.
+    grad : callable
+        Gradient of F, shape (m, n), which must not vanish on the surface.
+    n : int
+        Dimension of the space around the surface.
+    hess : callable, optional
+        Second derivatives of F, shape (m, n, n). By default they are differences of order four of the gradient, which
+        is slower; geodesics then have errors of about 1e-12.
+    injectivity_radius : float, optional
+        As for `Manifold`.
 
-    Args:
-        F: a function of points, shape (m, n), with values of shape (m,); not only on the surface, but near it.
-        grad: its gradient, shape (m, n), nowhere zero on the surface.
-        n: dimension of the space that the surface is in.
-        hess: its second derivatives, shape (m, n, n). None for differences of the gradient of order four: slower, and
-            geodesics then have errors of some 1e-12.
-        injectivity_radius: as for `Manifold`.
+    Returns
+    -------
+    Manifold
+        The surface.
 
+    See Also
+    --------
+    symspline.Manifold : Define a manifold by functions.
+
+    Notes
+    -----
+    Geodesics are integrated to rounding by an extrapolation method of order twelve. Logarithms are computed by
+    shooting, and their derivatives by Jacobi's equation, with Gauss's equation for the curvature.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> axes = np.array([1.0, 1.2, 0.8])
     >>> ellipsoid = ss.manifolds.from_surface(
@@ -207,15 +229,6 @@ def _inner(p: Array, u: Array, v: Array) -> Array:
 
 def _unit(g: Array) -> Array:
     return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
-
-
-def _along(g: Any, x: Array, t: Array) -> Array:
-    """The derivative of the gradient in a direction, by differences of order four."""
-    size = np.linalg.norm(t, axis=1, keepdims=True)
-    step = 1e-3 * np.maximum(1.0, np.abs(x).max(axis=1, keepdims=True))
-    unit = np.divide(t, size, out=np.zeros_like(t), where=size > 0)
-    near, far = (g(x + s * step * unit) - g(x - s * step * unit) for s in (1, 2))
-    return np.asarray((8 * near - far) / (12 * step) * size)
 
 
 def _combined(basis: Array, fields: Array, w: Array) -> Array:

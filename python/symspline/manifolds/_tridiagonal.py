@@ -12,12 +12,14 @@ Doubles = NDArray[np.float64]
 
 
 class Tridiagonal:
-    """The equations for velocities in flat space, rows 1/hᵢ₋₁, 2/hᵢ₋₁ + 2/hᵢ, 1/hᵢ, one matrix a curve.
+    """The equations for velocities in flat space, rows 1/hᵢ₋₁, 2/hᵢ₋₁ + 2/hᵢ, 1/hᵢ, one matrix per curve.
 
     In closed curves the first and the last unknown are neighbours, too.
 
-    Attributes:
-        weight: what defects are divided by to be residuals, shape (curves, unknowns).
+    Attributes
+    ----------
+    weight : ndarray, shape (curves, unknowns)
+        Divisors of the C² residuals, as in `symspline.Report.residual`.
     """
 
     weight: Doubles
@@ -30,7 +32,7 @@ class Tridiagonal:
         behind = inverse if closed else np.concatenate([inverse, zero], axis=1)
         self._low, self._high, self._diagonal = before, behind, 2 * (before + behind)
         self.weight = before + behind
-        # A defect is a sixth of a jump of acceleration, and a third of that of the equations.
+        # A residual is a sixth of the jump of the acceleration, and a third of the right-hand side.
         self._right = np.full_like(before, 3.0)
         for which, end in enumerate(problem.ends or []):
             self._set_end(problem, which, end.kind)
@@ -41,7 +43,7 @@ class Tridiagonal:
         self._periodic = _PeriodicCorrection(self, problem, before[:, 0]) if closed else None
 
     def _set_end(self, problem: Problem, which: int, kind: str) -> None:
-        """Rows of ends whose defect is an error of the velocity."""
+        """Set the rows of ends whose residual is an error of the velocity."""
         if kind not in ("velocity", "not-a-knot"):
             return
         node, beside = (0, self._high) if which == 0 else (-1, self._low)
@@ -54,12 +56,12 @@ class Tridiagonal:
         self.weight[:, node] = np.maximum(1.0, own)
 
     def step(self, found: Doubles) -> Doubles:
-        """By how much velocities must change for defects to vanish, if space were flat; in coordinates."""
+        """Return the change of the velocities for which the residuals vanish in flat space, in coordinates."""
         x = self.solved(self._right[:, :, None] * found)
         return x if self._periodic is None else self._periodic.corrected(x)
 
     def largest_step(self, sizes: Doubles) -> Doubles:
-        """The longest step that defects of these sizes, shape (curves, unknowns), can ask for at a knot; per curve.
+        """Return the longest step at a knot that residuals of these sizes can cause, per curve.
 
         Open curves have a matrix with positive pivots and positive entries, whose inverse therefore has alternating
         signs: it is an M-matrix but for the signs of every other row and column. Closed curves have a matrix that is
@@ -85,7 +87,7 @@ class Tridiagonal:
 class _PeriodicCorrection:
     """What the two corners of a closed curve's matrix change, by Woodbury's identity.
 
-    The last point is the first, but its frame, carried round the polygon, is another: by the holonomy.
+    The last point is the first, but the frame transported around the polygon differs by the holonomy.
     """
 
     def __init__(self, matrix: Tridiagonal, problem: Problem, corner: Doubles) -> None:

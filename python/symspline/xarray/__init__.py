@@ -160,17 +160,60 @@ def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | N
 
 
 def lift(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
-    """Evaluate the curves by continuous representatives.
+    """Evaluate the curves by continuous representatives, see `CubicSpline.lift`.
 
-    Parameters are those of `evaluate`. See `CubicSpline.lift`.
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of `fit`.
+    x : time, array_like or xarray.DataArray
+        Times, as for `evaluate`.
+    nu : {0, 1, 2}, default 0
+        Order of the derivative, as for `evaluate`.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for `evaluate`.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions as from `evaluate`.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr
+    >>> import symspline.xarray
+    >>> lines = xr.DataArray([[1, 0], [0.6, 0.8], [0.28, -0.96]], dims=("time", "q"))
+    >>> ds = symspline.xarray.fit(lines, "rp:1")
+    >>> symspline.xarray.lift(ds, 2.0).values.round(12)
+    array([-0.28,  0.96])
     """
     return along(ds, x, quantity_of(nu), extrapolate, lifted=True)
 
 
 def speed(ds: xr.Dataset, x: Any, *, extrapolate: bool | str | None = None) -> xr.DataArray:
-    """Evaluate the speed of the curves, the norm of γ'.
+    """Compute the speed of the curves, the norm of γ'.
 
-    Parameters are those of `evaluate`. The result does not have the dimensions of a point.
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of `fit`.
+    x : time, array_like or xarray.DataArray
+        Times, as for `evaluate`.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for `evaluate`.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions as from `evaluate`, without those of a point.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr
+    >>> import symspline.xarray
+    >>> ds = symspline.xarray.fit(xr.DataArray([[0.0], [3.0], [6.0]], dims=("time", "q")), "r:1")
+    >>> symspline.xarray.speed(ds, [0.5, 1.5]).values.round(12)
+    array([3., 3.])
     """
     return along(ds, x, "speed", extrapolate)
 

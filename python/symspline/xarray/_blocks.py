@@ -13,6 +13,7 @@ from .._base_curve import call_at_times, evaluated
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._functional import given
+from .._report import Report, columns_of
 from .._spaces import Array, Space
 from .._threads import one_thread
 
@@ -20,15 +21,7 @@ from .._threads import one_thread
 Inputs = list[tuple[xr.DataArray, Sequence[Hashable]]]
 
 # The columns of the report, one value per curve.
-COLUMNS = {
-    "converged": np.bool_,
-    "iterations": np.int64,
-    "residual": np.float64,
-    "max_step": np.float64,
-    "max_gap": np.float64,
-    "invariant_radius": np.float64,
-    "rate": np.float64,
-}
+COLUMNS = columns_of(Report)
 
 
 def apply(

@@ -1,4 +1,4 @@
-"""Fits on manifolds made of functions: where the C² curves are, and what is wrong with those not found."""
+"""Fits on manifolds made of functions: the C² curves, and the faults of those not found."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from .._curves.curve import Doubles
+from .._curves.solve import Options, Progress, Solved, Task
 from .._faults import CUT_LOCUS, Fault, unconverged
 from .._report import SOLVERS, Columns
 from .._spaces import Array
-from ..manifolds import Manifold
-from ..manifolds._certificate import velocity_errors
-from ..manifolds._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
-from ..manifolds._frames import frames_along
-from ..manifolds._iteration import FLOOR, iterate
-from .curve import Doubles
-from .solve import Options, Progress, Solved, Task
+from ._certificate import velocity_errors
+from ._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
+from ._frames import frames_along
+from ._iteration import FLOOR, iterate
+from ._manifold import Manifold
 
 # Rounding of points in residuals of speed, for points that are so near to each other that it is more than `FLOOR`.
 _ROUNDING = 1e3 * np.finfo(float).eps
 
 
 def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -> Solved:
-    """The curves of a task in which all have one length, and which was checked."""
+    """Fit the curves of a validated task, which all have the same length."""
     space, shape = task.space, task.space.point_shape
     assert isinstance(space, Manifold)
     operations = space.operations
@@ -61,8 +61,8 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
         unknowns = slice(0, start.shape[1])
         coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
         columns.row("velocity_error")[good] = velocity_errors(problem, coordinates, pace)
-        legs = control_polygons(operations, problem.h, problem.p, found.velocities)
-        faults |= _unfit(space, legs, good, found.converged, columns, options)
+        polygon = control_polygons(operations, problem.h, problem.p, found.velocities)
+        faults |= _unfit(space, polygon, good, found.converged, columns, options)
         for i in faults:
             if faults[i].kind == CUT_LOCUS:
                 velocities[i] = np.nan
@@ -81,7 +81,7 @@ def _report(progress: Progress, nodes: int, count: int, finished: int) -> object
 
 
 def _ends(task: Task, h: Doubles, p: Array) -> list[End] | None:
-    """End conditions with numbers in place of doubles; with two points not-a-knot is the chord's velocity."""
+    """Return end conditions with the numbers of points; with two points not-a-knot is the velocity of the chord."""
     if task.ends is None:
         return None
     space = task.space
@@ -93,14 +93,14 @@ def _ends(task: Task, h: Doubles, p: Array) -> list[End] | None:
         elif p.shape[1] > 2:
             found.append(not_a_knot(space.operations, p, which))
         else:
-            leg = space.operations.log(p[:, -which], p[:, 1 - which])
+            chord = space.operations.log(p[:, -which], p[:, 1 - which])
             width = h.reshape(-1, *[1] * len(space.point_shape))
-            found.append(End("velocity", (leg if which == 0 else -leg) / width))
+            found.append(End("velocity", (chord if which == 0 else -chord) / width))
     return found
 
 
 def _far(space: Manifold, lengths: Doubles, what: str) -> dict[int, Fault]:
-    """Curves of which two points have no geodesic between them that is known to be the only one."""
+    """Return the faults of curves with two points that are not joined by a unique geodesic."""
     faults: dict[int, Fault] = {}
     limit = space.injectivity_radius
     for curve, i in np.argwhere(~(lengths < limit)).tolist():
@@ -118,17 +118,17 @@ def _far(space: Manifold, lengths: Doubles, what: str) -> dict[int, Fault]:
 
 def _unfit(
     space: Manifold,
-    legs: ControlPolygon,
+    polygon: ControlPolygon,
     good: NDArray[np.int64],
     converged: NDArray[np.bool_],
     columns: Columns,
     options: Options,
 ) -> dict[int, Fault]:
-    """What is wrong with curves that were solved."""
+    """Return the faults of curves that were solved."""
     faults: dict[int, Fault] = {}
     norm = space.operations.norm
-    outer = np.maximum(*norm(legs.p, legs.v))
-    inner = norm(legs.q[0], legs.w[0])
+    outer = np.maximum(*norm(polygon.p, polygon.v))
+    inner = norm(polygon.q[0], polygon.w[0])
     far = _far(space, np.maximum(outer, inner), "the control points between points[{0}] and points[{1}]")
     for number, own in enumerate(good.tolist()):
         if converged[number] and number in far:

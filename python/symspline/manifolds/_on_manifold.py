@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._core import ValidationError
+from .._curves.core_curve import CoreCurve
+from .._curves.curve import NORMS, REAL, Doubles
+from .._curves.gradient import Places
+from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_some
 from .._faults import Fault
 from .._spaces import Array, Euclidean, Space
-from ..manifolds import Manifold
-from ..manifolds._condition import ControlPolygon, control_polygons
-from ..manifolds._evaluation import Rows, derivative, points
-from .core_curve import CoreCurve
-from .curve import NORMS, REAL, Doubles
-from .gradient import Places
-from .manifold_checks import validate_on_manifold
-from .manifold_fit import fit_of_one_length
-from .solve import Options, Progress, Solved, Task, one_by_one, solve_some
+from ._checks import validate_on_manifold
+from ._condition import ControlPolygon, control_polygons
+from ._evaluation import Rows, derivative, points
+from ._fit import fit_of_one_length
+from ._manifold import Manifold
 
 # Samples that are computed at a time.
 _AT_ONCE = 1 << 12
@@ -101,7 +101,7 @@ class OnManifold(CoreCurve):
         h = t[number, i + 1] - t[number, i]
         tau = (x - t[number, i]) / h
         straight = np.full(len(x), outside == "geodesic") & ((x < first) | (x > last))
-        return Rows(tau, h, ControlPolygon(*(part[:, curve, i] for part in self._legs)), straight)
+        return Rows(tau, h, self._polygon.at((curve, i)), straight)
 
     @cached_property
     def _knots(self) -> Doubles:
@@ -110,7 +110,7 @@ class OnManifold(CoreCurve):
         return np.broadcast_to(self.times, (*self.batch, nodes)).reshape(-1, nodes)
 
     @cached_property
-    def _legs(self) -> ControlPolygon:
+    def _polygon(self) -> ControlPolygon:
         """Control polygons of all segments; kept from the first use on."""
         nodes, shape = self.times.shape[-1], self.space.point_shape
         rows = [a.reshape(-1, nodes, *shape) for a in (self.points, self.velocities)]

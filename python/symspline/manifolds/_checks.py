@@ -1,4 +1,4 @@
-"""What a curve on a manifold made of functions is given: points on it, tangent vectors, times."""
+"""Validation of the points, tangent vectors and times of curves on manifolds made of functions."""
 
 from __future__ import annotations
 
@@ -9,27 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import CutLocusError, ValidationError
+from .._curves.solve import Options, Task, validate, without
 from .._faults import INVALID, Fault, of_curve
 from .._spaces import Array, Euclidean
-from ..manifolds import Manifold
-from .solve import Options, Task, validate, without
+from ._condition import control_polygons
+from ._manifold import Manifold
 
 _METHODS = ("auto", "quasi-newton")
 
 
 def validate_on_manifold(task: Task, options: Options) -> tuple[Task, list[Fault]]:
-    """Validate a task and project its points onto the space. Return the task and the faults of skipped curves.
-
-    Raises:
-        ValidationError: something is wrong with it.
-    """
+    """Validate a task and project its points onto the space. Return the task and the faults of skipped curves."""
     space = task.space
     assert isinstance(space, Manifold)
     shape = space._doubles_shape
     width = math.prod(shape)
     if options.method not in _METHODS:
         raise ValidationError(
-            f"method {options.method!r} is not made on a manifold that is made of functions, {space!r}; "
+            f"method {options.method!r} is not available on a manifold made of functions, {space!r}; "
             f"use {' or '.join(map(repr, _METHODS))}"
         )
     if task.tol is None:
@@ -75,7 +72,7 @@ def validate_on_manifold(task: Task, options: Options) -> tuple[Task, list[Fault
 
 
 def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]) -> None:
-    """Vectors at the ends of some curves are tangent, and no velocity carries its control handle past the cut locus."""
+    """Raise unless the end vectors are tangent and the control handles of velocities end inside the cut locus."""
     space, axes = task.space, len(task.space.point_shape)
     assert isinstance(space, Manifold)
     if task.offsets is None:
@@ -111,11 +108,14 @@ def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]
 
 
 def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
-    """Points on the space and tangent velocities there, of curves whose control points are within reach.
+    """Return points on the space and tangent velocities of a Hermite spline.
 
-    Raises:
-        ValidationError: points or times are invalid, or a velocity is not tangent.
-        CutLocusError: inner control points of a segment lie at or past each other's cut locus.
+    Raises
+    ------
+    ValidationError
+        If points or times are invalid, or a velocity is not tangent.
+    CutLocusError
+        If the inner control points of a segment are at or past each other's cut locus.
     """
     space = task.space
     assert isinstance(space, Manifold)
@@ -123,22 +123,15 @@ def hermite_on_manifold(task: Task, velocities: Array) -> tuple[Array, Array]:
     p = space._numbers(task.points)
     space.check_tangent(p, velocities)
     vectors = np.ascontiguousarray(space.project_tangent(p, velocities))
-    axis = len(task.batch)
-    before, after = (
-        np.take(p, range(*part), axis=axis) for part in ((0, p.shape[axis] - 1), (1, p.shape[axis]))
-    )
-    h = np.diff(task.times)
-    third = h.reshape(h.shape + (1,) * len(space.point_shape)) / 3
-    u, w = (
-        np.take(vectors, range(*part), axis=axis) for part in ((0, p.shape[axis] - 1), (1, p.shape[axis]))
-    )
-    try:
-        space._apply(
-            "log", p=space._apply("exp", p=before, v=third * u), q=space._apply("exp", p=after, v=-third * w)
-        )
-    except CutLocusError as error:
+    nodes = p.shape[len(task.batch)]
+    rows = (x.reshape(-1, nodes, *space.point_shape) for x in (p, vectors))
+    h = np.broadcast_to(np.diff(task.times), (*task.batch, nodes - 1)).reshape(-1, nodes - 1)
+    inner = control_polygons(space.operations, h, *rows).w[0]
+    bad = np.argwhere(~np.isfinite(inner.reshape(*h.shape, -1)).all(axis=2)).tolist()
+    if bad:
+        curve, i = bad[0]
         raise CutLocusError(
-            f"the inner control points of a segment have no unique geodesic between them: {error}; velocities are too "
-            "large for its time"
-        ) from None
+            f"the inner control points between points[{i}] and points[{i + 1}]{of_curve(curve, task.batch)} have no "
+            "unique geodesic between them: the velocities are too large for the time of the segment"
+        )
     return p, vectors
