@@ -33,6 +33,7 @@ space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
 import signal
 import sys
 
+import numpy as np
 import pytest
 
 import symspline as ss
@@ -40,6 +41,12 @@ import symspline as ss
 # What a shell starts in the background ignores Ctrl-C, and so would all that tests start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def rng(request):
+    """Random numbers, the same in every run. A module chooses others by ``SEED``."""
+    return np.random.default_rng(getattr(request.module, "SEED", 1815))
 
 
 @pytest.fixture

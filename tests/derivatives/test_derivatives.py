@@ -218,11 +218,6 @@ def test_derivatives_of_curves_of_few_points(name, end, n):
 # ---- loops ----
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
-
-
 @pytest.mark.parametrize("name", LOOPS)
 def test_derivatives_of_a_loop(name, rng):
     space = ss.space(name)

@@ -12,6 +12,8 @@ from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
 
+SEED = 1
+
 # What an iteration counts: 120 sweeps, steps of Newton's method and the homotopy, whose steps of λ have twelve at most;
 # of points far apart 2000 sweeps of Algorithm 1 more, and 120 steps of a trust region from three starts.
 MOST = 4000
@@ -19,11 +21,6 @@ MOST = 4000
 
 # Times that suit no curve with equal steps.
 UNEVEN = np.cumsum([0.0, 20, 1, 20, 1, 20, 1, 20])
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1)
 
 
 def fit(p, space, t=None, **options):

@@ -13,12 +13,9 @@ from refused import CLAMPED, INF, NAN, REFLECTION, P
 
 import symspline as ss
 
+SEED = 2007
+
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(2007)
 
 
 @every

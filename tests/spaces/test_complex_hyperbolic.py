@@ -6,13 +6,10 @@ from cases import walk
 
 import symspline as ss
 
+SEED = 20
+
 LINE, PLANE = ss.ComplexHyperbolic(1), ss.Hyperbolic(2)
 T = np.array([0, 1, 1.7, 3, 3.4, 4.4, 5.4, 6])
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20)
 
 
 def to_plane(z, dz=None):

@@ -7,11 +7,6 @@ from cases import EPS, condition, loop_over, unit_tangent, walk
 import symspline as ss
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
-
-
 @pytest.mark.parametrize("name", ["so:2", "so:3", "so:5", "o:4", "u:3", "su:3", "gr:2,5", "cgr:2,4", "rp:3", "cp:2"])
 def test_projection_is_the_nearest_point(name, rng):
     space = ss.space(name)

@@ -9,16 +9,13 @@ from scipy.linalg import expm
 
 import symspline as ss
 
+SEED = 8
+
 QUADRICS = ["ds:2", "ds:3", "ads:2", "ads:3"]
 NAMES = [*QUADRICS, "igr:0,1,1,2", "igr:1,0,2,1", "igr:1,1,2,2"]
 quadrics = pytest.mark.parametrize("name", QUADRICS)
 every = pytest.mark.parametrize("name", NAMES)
 KNOTS = np.array([0.0, 0.7, 2.0, 2.4, 3.9, 5.0])
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(8)
 
 
 def signs(name):

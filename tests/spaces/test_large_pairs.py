@@ -6,12 +6,9 @@ from cases import loop_over
 
 import symspline as ss
 
+SEED = 1000
+
 N = 300
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1000)
 
 
 def isometry(space, m, rng):

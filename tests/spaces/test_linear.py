@@ -9,14 +9,11 @@ from scipy.linalg import expm, logm
 
 import symspline as ss
 
+SEED = 8
+
 NAMES = ["gl:2", "gl:3", "cgl:2", "aff:2", "sim:3", "sl:3", "sp:4", "so:1,3"]
 every = pytest.mark.parametrize("name", NAMES)
 KNOTS = np.array([0.0, 0.7, 2.0, 2.4, 3.9, 5.0])
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(8)
 
 
 def defect(name, p):

@@ -112,11 +112,6 @@ def test_end_vectors_broadcast_to_the_batch(shape, order):
         assert same(spline.velocities[i], alone.velocities)
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
-
-
 @pytest.mark.parametrize("part", [0.5, 0.93, 0.97, 0.995])
 @pytest.mark.parametrize("method", ["auto", "fixed-point", "quasi-newton", "newton", "homotopy"])
 def test_given_velocities_stay_near_the_cut_locus(method, part, rng):

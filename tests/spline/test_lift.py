@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 import symspline as ss
 
+SEED = 11
+
 NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "hp:2", "ch:2"]
 ORTHONORMAL = NAMES[:-1]
 KNOTS = np.array([0.0, 0.4, 1.9, 2.3, 3.6, 4.0, 5.1])
@@ -45,11 +47,6 @@ def inner(space, x, y):
     if isinstance(space, ss.ComplexHyperbolic):
         x = x * np.array([[-1.0], *[[1.0]] * (x.shape[-2] - 1)])
     return np.swapaxes(x.conj(), -1, -2) @ y
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(11)
 
 
 @pytest.mark.parametrize("name", NAMES)

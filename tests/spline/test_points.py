@@ -301,11 +301,6 @@ def test_a_curve_that_pauses(space, order):
     assert 4 * 0.69 < spline.length() < np.inf or len(order) == 9
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
-
-
 @loop_over("ends", ["periodic", "clamped"])
 @pytest.mark.parametrize("name", ["r:2", "sphere:2", "so:3", "su:2", "spd:2", "gr:2,5", "hyperbolic:2"])
 def test_there_and_back_stands_still_at_every_knot(name, ends, rng):

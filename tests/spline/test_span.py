@@ -10,6 +10,8 @@ from curves import run_python
 
 import symspline as ss
 
+SEED = 1000000
+
 # Spaces of high dimension, and small ones in them that hold the data.
 SMALL = {
     "sphere:299": "sphere:9",
@@ -21,11 +23,6 @@ SMALL = {
 }
 every_space = pytest.mark.parametrize("name", SMALL)
 N = 7
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1_000_000)
 
 
 class Embedded:
