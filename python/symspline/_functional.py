@@ -1,4 +1,4 @@
-"""Splines as functions of plain arrays, and many of different lengths at once."""
+"""Splines as functions of plain arrays, and fits of many curves of different lengths."""
 
 from __future__ import annotations
 
@@ -25,16 +25,44 @@ from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
+# With fewer knots, all of them are read.
+_MANY = 64
+
 
 def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
-    """The velocities of the C² spline through points, as plain arrays.
+    """Compute the velocities of a C² cubic spline as plain arrays.
 
-    Takes the arguments of `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots. None means 0, 1, ..., n - 1.
+    points : array_like, shape (..., n, *space.point_shape)
+        Points to interpolate. For a `Product`, a tuple with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    **options
+        Keyword arguments of `CubicSpline`.
 
-    Returns:
-        The velocities, of the shape of the points, and the report. Where the points are arrays of another library that
-        follows the array API standard, and on the CPU, velocities are of it, too.
+    Returns
+    -------
+    velocities : ndarray or tuple of ndarray
+        Velocities at the knots, with the shape of the points. If the points are arrays of another library that
+        follows the array API standard, on the CPU, so are the velocities.
+    report : Report
+        Report of the fit.
 
+    Raises
+    ------
+    ValidationError, CutLocusError, ConvergenceError
+        As for `CubicSpline`.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points by a C² curve.
+    evaluate : Evaluate a curve given by plain arrays.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
     >>> u.shape, report.converged
@@ -57,18 +85,50 @@ def evaluate(
     progress: Progress | None = None,
     out: Any = None,
 ) -> Any:
-    """The curve with given knots, points and velocities at times x, as plain arrays.
+    """Evaluate a curve that is given by knots, points and velocities.
 
-    Args:
-        t: knots, as for `CubicSpline`.
-        points, velocities: arrays of shape (..., N+1, *point_shape).
-        space: the space or its name.
-        x: times, any shape and order.
-        nu, extrapolate, per_curve, progress, out: as for calling a `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots. None means 0, 1, ..., n - 1.
+    points, velocities : array_like, shape (..., n, *space.point_shape)
+        Points and velocities at the knots. For a `Product`, tuples with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    x : array_like of float or datetime64
+        Times, of any shape and in any order. Only the nodes of the segments between the first and the last of these
+        times are read and checked, so that few times cost little.
+    nu : {0, 1, 2}, default 0
+        Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True continues
+        the first and last segments. False gives NaN. ``"geodesic"`` continues with constant velocity. ``"periodic"``
+        repeats the curve.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
+    out : ndarray or tuple of ndarray, optional
+        Array into which the result is written, and which is returned.
 
-    Returns:
-        Values as of calling a `CubicSpline`, as arrays of the library that points, velocities or x come from.
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        Points or tangent vectors, shape ``(*batch axes, *x.shape, *point_shape)``. If `points`, `velocities` or `x`
+        are arrays of another library that follows the array API standard, on the CPU, so is the result.
 
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+
+    See Also
+    --------
+    fit : Compute the velocities of a C² cubic spline as plain arrays.
+    HermiteSpline : Interpolate points and given velocities.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> u, _ = ss.fit(None, p, "sphere:2")
@@ -77,14 +137,52 @@ def evaluate(
     """
     space = space_named(space)
     check_progress(progress)
+    libraries = points, velocities, x
+    if not per_curve:
+        t, points, velocities = _nodes_around(t, points, velocities, space, x)
     clock, curve = given(t, points, velocities, space)
     where = outside(checked_extrapolate(extrapolate), "natural")
     values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress, out)
-    return values if out is not None else in_library(library_of(points, velocities, x), values)
+    return values if out is not None else in_library(library_of(*libraries), values)
+
+
+def _nodes_around(
+    t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
+) -> tuple[Any, Any, Any]:
+    """Return the knots, points and velocities of the segments in which times lie.
+
+    All nodes are returned if they are not plain arrays or too few for a gain. Each segment is determined by its two
+    ends, so the values are bit-identical.
+    """
+    everything = t, points, velocities
+    if type(t) is not np.ndarray or t.dtype != np.float64 or t.ndim != 1 or len(t) < _MANY:
+        return everything
+    times = np.asarray(x) if isinstance(x, (int, float, np.ndarray)) else None
+    if times is None or times.dtype.kind not in "iuf" or not 0 < times.size <= len(t):
+        return everything
+    first, last = times.min(), times.max()
+    # Invalid input raises further on. Comparisons are false for NaN.
+    if not (t[0] <= first and last <= t[-1] < np.inf and (t[1:] > t[:-1]).all()):
+        return everything
+    start, stop = int(t.searchsorted(first, "right")) - 1, int(t.searchsorted(last, "right")) + 1
+    start = min(start, len(t) - 2)
+    factors, arrays = factors_of(space), []
+    for value in (points, velocities):
+        each = value if isinstance(value, tuple) else (value,)
+        if len(each) != len(factors):
+            return everything
+        sliced = []
+        for factor, array in zip(factors, each, strict=True):
+            axis = array.ndim - len(factor.point_shape) - 1 if type(array) is np.ndarray else -1
+            if axis < 0 or array.shape[axis] != len(t):
+                return everything
+            sliced.append(array[(slice(None),) * axis + (slice(start, stop),)])
+        arrays.append(tuple(sliced) if isinstance(value, tuple) else sliced[0])
+    return t[start:stop], arrays[0], arrays[1]
 
 
 def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tuple[TimeAxis, CurveArrays]:
-    """The curve with given knots, points and velocities, and how it counts times."""
+    """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
     read = [
@@ -102,7 +200,7 @@ def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tu
 
 
 def velocities_of(space: Space, points: Array, velocities: Any) -> Array:
-    """Velocities for points in doubles, not in a product, as an array that has flags of its own."""
+    """Return velocities in one factor as a read-only array, after checks of their shape and numbers."""
     doubles = space._doubles(velocities, "velocities")
     array = read_only(space._numbers(doubles))
     if doubles.shape != points.shape:
@@ -132,17 +230,38 @@ def fit_many(
 ) -> list[CubicSpline]:
     """Fit curves of different lengths in one parallel call.
 
-    Args:
-        curves: pairs (t, points), one a curve; see `CubicSpline`.
-        space: the space of all curves, or its name.
-        bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol, progress: as for `CubicSpline`, for all
-            curves alike.
-        where: True for the curves that are wanted, one a curve: the others are NaN, whatever their points are.
+    Parameters
+    ----------
+    curves : iterable of pair
+        Pairs ``(t, points)``, one per curve, as for `CubicSpline`. Each pair is a single curve, not a batch.
+    space : Space or str
+        Space of all curves, or its name.
+    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol : optional
+        As for `CubicSpline`. They apply to all curves.
+    where : array_like of bool, optional
+        Mask over the curves. Curves where it is False are not fitted and evaluate to NaN.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
 
-    Returns:
-        One `CubicSpline` a curve. If curves fail and ``on_failure="raise"``, the exception's ``.spline``
-        is this list.
+    Returns
+    -------
+    list of CubicSpline
+        One spline per curve.
 
+    Raises
+    ------
+    ValidationError, CutLocusError, ConvergenceError
+        As for `CubicSpline`. The message names the curve. The attribute ``spline`` of a `CutLocusError` or
+        `ConvergenceError` is the list of all splines.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points, or a batch of curves of equal length.
+    fit_segments : Fit a recording with gaps.
+    save_many : Write several curves to one file.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, 1]]
     >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
@@ -155,7 +274,7 @@ def fit_many(
     pairs = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
-            raise ValidationError(f"curve {number} must be a pair (t, points)")
+            raise ValidationError(f"curves[{number}] must be a pair (t, points), not {short_repr(curve)}")
     if not pairs:
         return []
     mask = fitting.mask_of(where, (len(pairs),))
@@ -164,7 +283,7 @@ def fit_many(
         try:
             data = with_atol(fitting.read(p, space), atol)
             if data[0].batch:
-                raise ValidationError(f"points has shape {np.shape(p)}; each curve here is a single one")
+                raise ValidationError(f"points has shape {np.shape(p)}, but each pair must be a single curve")
             points.append(data)
             knots.append(knots_of(t, (), data[0].nodes))
         except (ValidationError, TypeError, ValueError) as error:

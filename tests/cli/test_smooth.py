@@ -65,7 +65,7 @@ def test_times_may_repeat(run, fails):
     write_table("a.csv", {"t": -(T // 2), "lon": LON, "lat": LAT})
     assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith("must not decrease; --sort puts rows in order")
     write_table("a.csv", {"t": T - T, "lon": LON, "lat": LAT})
-    assert "The data lie at one time" in fails("fit a.csv --lonlat --smooth -o b.npz")
+    assert "The data have one time only" in fails("fit a.csv --lonlat --smooth -o b.npz")
 
 
 def test_segments_and_several_curves(run):

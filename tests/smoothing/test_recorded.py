@@ -333,7 +333,7 @@ def test_the_advice_of_messages_helps():
     assert ss.make_smoothing_spline(t, noisy, space, 1e-3, knots=times).report.converged
 
     space, t, _, noisy, _ = recorded("sphere:2", "uniform", 40, 0, False)
-    with pytest.raises(ss.ConvergenceError, match="every knot needs data beside it: give fewer knots"):
+    with pytest.raises(ss.ConvergenceError, match="there must be data near every knot: pass fewer knots"):
         ss.make_lsq_spline(t, noisy, np.linspace(0, 1, 60), space)
     assert ss.make_lsq_spline(t, noisy, 8, space).report.converged
     with pytest.raises(ss.ConvergenceError, match="Raise max_iter or pass method='newton'"):

@@ -153,7 +153,7 @@ def test_a_closed_curve_of_numbers_is_a_filter():
 
 def test_other_ends_are_refused():
     space, t, noisy, _ = example("sphere:2", 0.05, n=10)
-    with pytest.raises(ss.ValidationError, match="not an end condition of a smooth curve"):
+    with pytest.raises(ss.ValidationError, match="is not available for smoothing splines"):
         ss.make_smoothing_spline(t, noisy, space, bc_type="not-a-knot")
     with pytest.raises(ss.ValidationError, match="tangent"):
         ss.make_smoothing_spline(t, noisy, space, bc_type=((1, noisy[0]), "natural"))

@@ -192,5 +192,5 @@ def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
 def test_knots_of_curves_that_count_from_their_own_time():
     both = SAVED["own dates"]
     assert both.t.shape == (2, 11) and both[0].t.shape == (11,)
-    with pytest.raises(ss.ValidationError, match=r"those of all curves, shape \(K,\)"):
+    with pytest.raises(ss.ValidationError, match=r"must have shape \(K,\)"):
         ss.make_smoothing_spline(T, beside(S2, NOISY, 0.01), S2, knots=np.eye(3))

@@ -150,7 +150,7 @@ def test_properties_of_spaces(space):
 @pytest.mark.parametrize(
     "space, match",
     [
-        ("spere:2", r"unknown space 'spere:2'; did you mean 'sphere:2'\? known are .*sphere.*, e\.g\. 'sphere:2'"),
+        ("spere:2", r"unknown space 'spere:2'; did you mean 'sphere:2'\? known names are .*sphere.*, as in 'sphere:2'"),
         ("", r"unknown space ''"),
         ("sphere:2 x klein:2", r"unknown space 'klein:2'"),
         *((family, r"is a family of spaces; give its dimension, such as Sphere\(2\) or 'sphere:2'")
@@ -159,11 +159,11 @@ def test_properties_of_spaces(space):
         (ss.Product, "Product is a family of spaces"),
         (None, r"a space or its name is needed, not None"),
         (2, r"a space or its name is needed, not 2"),
-        *((name, r"behind the colon come whole numbers")
+        *((name, r"the parameters after the colon must be integers")
           for name in ("sphere:-1", "sphere:2.0", "gr:2.0,5", "gr:2;5", "cp:1xso:3", "sphere:٢")),
-        ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 numbers"),
-        ("gr:2", r"'gr:2': Grassmannian does not take 1 numbers"),
-        ("so:2,3", r"'so:2,3': SpecialOrthogonal does not take 2 numbers"),
+        ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 parameters"),
+        ("gr:2", r"'gr:2': Grassmannian does not take 1 parameters"),
+        ("so:2,3", r"'so:2,3': SpecialOrthogonal does not take 2 parameters"),
         ("gr:5,2", r"asks for subspaces larger than the space; did you mean Grassmannian\(2, 5\)\?"),
         ("cgr:5,2", r"did you mean ComplexGrassmannian\(2, 5\)\?"),
         ("gr:3,3", r"Grassmannian\(k, n\) needs 1 <= k < n; Grassmannian\(3, 3\) is a single point"),
@@ -196,7 +196,7 @@ def test_invalid_spaces_raise(space, match):
     "ComplexProjective"])  # fmt: skip
 def test_invalid_sizes_raise(kind, value):
     cls = getattr(ss, kind)
-    with pytest.raises(ss.ValidationError, match=rf"{kind} takes whole numbers, not {value!r}"):
+    with pytest.raises(ss.ValidationError, match=rf"the parameters of {kind} must be integers >= 0, not {value!r}"):
         cls(value, 5) if kind == "Grassmannian" else cls(value)
 
 

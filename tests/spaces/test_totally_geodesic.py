@@ -280,7 +280,7 @@ def test_special_tensors_have_determinant_one():
             convert.siegel_to_positive_definite(np.array([[[1e7 + 1j]], [[1e7 + 2j]]])),
             "smallest eigenvalue is .* which is rounding beside the others",
         ),
-        ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite makes them"),
+        ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite converts"),
         ("hp:1", [np.eye(4)[:, :2], np.eye(4)[:, ::2]], r"points\[1\] is off .* no quaternionic line"),
         ("hp:1", np.eye(4)[:2] * np.ones((3, 1, 1)), "looks like vectors of quaternions"),
     ],

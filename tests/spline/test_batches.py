@@ -57,7 +57,7 @@ def test_single_curve_is_not_a_sequence():
             use(spline)
     batch = ss.CubicSpline(None, [THREE] * 2, S2)
     for index in ("0", 0.0, (0, 1), None):
-        with pytest.raises(TypeError, match="whole number or a slice"):
+        with pytest.raises(TypeError, match="integer or a slice"):
             batch[index]
 
 

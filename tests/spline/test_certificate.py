@@ -299,7 +299,7 @@ def test_radius_survives_pickles_and_files(batch, tmp_path):
 
 def test_report_states_the_radius(batch):
     for some in (batch[1], batch[:2]):
-        assert str(some.report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
+        assert str(some.report).endswith(", control handles stay below 0.234 (Theorem 3.1)")
     for some in (batch[2], batch):
         assert "Theorem" not in str(some.report)
 

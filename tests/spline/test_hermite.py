@@ -204,7 +204,7 @@ def test_only_batches_are_sequences():
     for use in (len, lambda s: s[0]):
         with pytest.raises(TypeError, match="one curve"):
             use(found)
-    with pytest.raises(TypeError, match="whole number or a slice"):
+    with pytest.raises(TypeError, match="integer or a slice"):
         curve(S2, (2,))["a"]
     assert found
 

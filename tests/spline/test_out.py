@@ -111,5 +111,5 @@ def test_products_want_a_tuple():
 
 
 def test_out_or_dtype():
-    with pytest.raises(ss.ValidationError, match="dtype or out"):
+    with pytest.raises(ss.ValidationError, match="dtype and out are both given"):
         spline_of("sphere:2")(0.0, out=np.empty(3), dtype="float32")

@@ -112,7 +112,7 @@ def test_batches_products_and_large_spaces(rng):
     "x0, x1, v, match",
     [
         (0, 2.5, [0, 1.0, 0], r"x\[1\] = 2.5 is outside the knots"),
-        (-1, 1, [0, 1.0, 0], "vectors are carried between the knots"),
+        (-1, 1, [0, 1.0, 0], "vectors are transported between the first"),
         (0, [1, 2], [0, 1.0, 0], "x0 and x1 must be single times"),
         (0, 1, ["a", "b", "c"], "v must be an array of real numbers"),
         (0, 1, [1.0, 1.0, 0], "not tangent"),

@@ -1,4 +1,4 @@
-"""The spaces: where points live, and their geometry."""
+"""The spaces: points, tangent vectors and their geometry."""
 
 from .base import Array, Space
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary

@@ -44,6 +44,14 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> Any:
     -----
     Solvers evaluate the Hamiltonian beyond the last knot. If the curve raises an error there, the final Hamiltonian is
     used instead. For SciPy's solvers, do the same with ``hamiltonian(spline, t, extrapolate="geodesic")``.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> from symspline import quantum
+    >>> flip = ss.CubicSpline([0, 10], [[1, 0], [0.6, 0.8]], "cp:1")
+    >>> quantum.qobjevo(flip)(5.0).shape
+    (2, 2)
     """
     quantum_space(spline)
     if spline._batch:
@@ -56,7 +64,7 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> Any:
         import qutip
     except ImportError:
         raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
-    beyond = "geodesic" if spline._outside == "raise" else None
+    beyond = "geodesic" if spline._outside in ("raise", "nan") else None
     first, levels = float(spline.t[0]), spline.space.point_shape[0]
     if dims is not None and not (
         isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)
