@@ -16,12 +16,6 @@ PLAIN = ["r:2", "sphere:2", "h:2", "so:3", "u:2", "spd:2", "hpd:2", "siegel:1", 
 QUOTIENTS = ["rp:2", "cp:2", "gr:2,5", "cgr:2,4", "hp:1", "ch:2"]
 
 
-@pytest.fixture(autouse=True)
-def double_precision():
-    with jax.enable_x64(True):
-        yield
-
-
 def data(name):
     space, rng = ss.space(name), np.random.default_rng(1)
     points = walk(space, 0.5, 5, np.random.default_rng(0))

@@ -7,15 +7,16 @@ import jax.numpy as jnp
 import mpmath as mp
 import numpy as np
 import pytest
-from double import double_and_quickly_compiled
 
 from symspline.jax import _series as series
 from symspline.jax import _spectral as spectral
 
+QUICK = True
+
 
 @pytest.fixture(autouse=True)
-def double_precision():
-    with double_and_quickly_compiled(), mp.workdps(40):
+def forty_digits():
+    with mp.workdps(40):
         yield
 
 
