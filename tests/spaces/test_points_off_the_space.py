@@ -282,6 +282,7 @@ def test_the_nearest_rotation_is_the_factor_of_the_polar_decomposition():
         ([np.diag([0.5, 0.6])] * 3, False),
         # The purity of a state is 1 at most.
         ([np.diag([1.5, -0.5])] * 3, False),
+        ([np.diag([0.9, 0.5, -0.4])] * 3, False),
         ([np.diag([0.5, 0.5]), np.diag([0.5, 0.6])], False),
     ],
 )
