@@ -113,7 +113,7 @@ def test_bad_times_of_evaluation(x, match):
             call(x)
 
 
-@pytest.mark.parametrize("policy", [None, True, "geodesic", "periodic"])
+@pytest.mark.parametrize("policy", [None, False, True, "geodesic", "periodic"])
 @loop_over("x", [NAN, INF, -INF])
 def test_nan_times_raise_under_every_policy(policy, x):
     spline = ss.CubicSpline(None, P, S2, extrapolate=policy)
