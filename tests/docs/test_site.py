@@ -64,7 +64,7 @@ def test_every_public_name_has_a_description():
             assert all(getattr(thing, member).__doc__ for member in members)
 
 
-def test_notation_names_what_exists():
+def test_notation_page_names_existing_attributes():
     spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2")
     things = {"spline": spline, "space": spline.space, "report": spline.report, "ss": ss}
     text = (DOCS / "notation.md").read_text(encoding="utf-8")

@@ -198,7 +198,7 @@ def test_algorithm_1_gets_more_sweeps_if_no_other_solver_can_be_afforded():
     assert report.iterations > 2000 and "newton" in report.skipped
 
 
-def test_nothing_is_left_out_in_few_dimensions():
+def test_no_solver_is_skipped_in_few_dimensions():
     assert fit(zigzag(2.5), S2).report.skipped == ()
     assert fit(zigzag(0.5), S2).report.skipped == ()
 

@@ -53,7 +53,7 @@ def test_arc_on_both_sides_of_the_switch(sign):
     assert float(jax.grad(lambda y: series.arc(y, 1 - y))(0.0)) == pytest.approx(2 / 3, rel=1e-15)
 
 
-def test_unbent_is_what_inverts_the_integral():
+def test_unbent_inverts_the_integral():
     def exact(z):
         half = mp.sqrt(z) / 2
         return (1 - half * mp.cot(half)) / z

@@ -219,7 +219,7 @@ def test_unconverged_curves_say_so():
     assert any("not converged" in text for text in texts_of(rendered(failed.plot())))
 
 
-def test_it_is_what_notebooks_show():
+def test_notebooks_show_smoothing_splines():
     assert smooth("sphere:2")._repr_html_().startswith("<pre>&lt;SmoothingSpline")
 
 

@@ -178,7 +178,7 @@ def test_points_beside_the_group_are_brought_back(name, rng):
 
 
 @pytest.mark.parametrize("name", ["Symplectic(3)", "Similarity(1)", "SpecialLinear(1)", "Lorentz(0)", "Affine(0)"])
-def test_sizes_that_are_none(name):
+def test_invalid_sizes_raise(name):
     with pytest.raises(ss.ValidationError, match="needs"):
         eval(f"ss.{name}")
 

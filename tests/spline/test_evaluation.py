@@ -106,7 +106,7 @@ def test_velocity_and_speed(space):
     ],
     ids=str,
 )
-def test_bad_times_of_evaluation(x, match):
+def test_invalid_times_raise(x, match):
     spline = ss.CubicSpline(None, P, S2)
     for call in (spline, spline.speed, lambda x: ss.evaluate(None, P, spline.velocities, S2, x)):
         with pytest.raises(ss.ValidationError, match=match):
@@ -174,7 +174,7 @@ def test_messages_are_short():
     assert len(str(caught.value)) < 250
 
 
-def test_bad_policies_of_a_call():
+def test_invalid_policies_of_a_call_raise():
     with pytest.raises(ss.ValidationError, match=r"extrapolate must be .*not 'foo'"):
         ss.CubicSpline(None, P, S2)(0.5, extrapolate="foo")
 
