@@ -9,7 +9,6 @@ import symspline as ss
 
 SEED = 1703
 
-every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 one_per_family = pytest.mark.parametrize("case", [c for c in CASES if c.interface], ids=lambda case: case.name)
 
 

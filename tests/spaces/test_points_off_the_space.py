@@ -155,9 +155,6 @@ def test_the_rotation_of_a_pose(name):
 # ---- spheres and hyperbolic space ----
 
 
-OFF = r" is off the space"
-
-
 @pytest.mark.parametrize(
     "space, points, match",
     [
