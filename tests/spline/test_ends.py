@@ -85,6 +85,8 @@ def test_end_vectors_are_kept(space):
         for (order, vector), e in zip(ends, (0, -1), strict=True):
             here, found = at_node(space, spline.points, e), spline(KNOTS[e], nu=order)
             assert vectors_off(space, spline(KNOTS[e]), found, here, vector) < (1e-13 if order == 1 else 1e-11)
+            if order == 1 and space == S2:
+                assert largest_difference(spline.velocities[e], vector) < 4 * EPS
 
 
 @every_kind
