@@ -44,7 +44,7 @@ def ends_on(space, p):
 @pytest.mark.parametrize("method", ["newton", "quasi-newton"])
 @pytest.mark.parametrize("n", [3, 4, 5, 17])
 @pytest.mark.parametrize("dim", [1, 3])
-def test_one_step_of_newton_suffices_in_flat_space(dim, n, method, rng):
+def test_newton_takes_one_step_in_flat_space(dim, n, method, rng):
     space, t = ss.Euclidean(dim), np.cumsum(rng.uniform(0.2, 2, n))
     p = rng.standard_normal((n, dim))
     closed = np.concatenate([p[:-1], p[:1]])
