@@ -61,10 +61,3 @@ def test_real_points_are_hyperbolic_space(n, rng):
     x = np.linspace(0, 6, 50)
     for nu, allowed in zip(range(3), (1e-12, 1e-11, 1e-10), strict=True):
         np.testing.assert_allclose(spline(x, nu), expected(x, nu), atol=allowed * np.abs(p).max())
-
-
-def test_complaints():
-    with pytest.raises(ss.ValidationError, match=r"its square -\|x0\|\^2 .* is 4, not -1"):
-        LINE.check_point([0, 2j])
-    with pytest.raises(ss.ValidationError, match="needs n >= 1"):
-        ss.ComplexHyperbolic(0)

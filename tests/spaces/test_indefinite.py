@@ -338,21 +338,6 @@ def test_reflections_of_another_space_raise(rng):
         ss.space("igr:0,1,1,2").check_point(group_element(np.array([-1.0, 1, 1]), rng))
 
 
-@pytest.mark.parametrize(
-    ("space", "match"),
-    [
-        ("ds:1", r"DeSitter\(n\) needs n >= 2, not 1"),
-        ("ads:1", r"AntiDeSitter\(n\) needs n >= 2, not 1"),
-        ("igr:2,0,1,2", r"needs a <= p, b <= q and 0 < a \+ b < p \+ q, not \(2, 0, 1, 2\)"),
-        ("igr:1,2,1,2", "0 < a"),
-        ("igr:0,0,1,2", "0 < a"),
-    ],
-)
-def test_invalid_dimensions_raise(space, match):
-    with pytest.raises(ss.ValidationError, match=match):
-        ss.space(space)
-
-
 def test_invalid_points_raise():
     with pytest.raises(ss.ValidationError, match=r"-x0² \+ x1² \+ … is 2, not 1"):
         ss.DeSitter(2).check_point([0.0, 1.0, 1.0])

@@ -144,6 +144,12 @@ def test_properties_of_spaces(space):
         *((f"{name}:1", r"\(n\) needs n >= 2") for name in ("o", "so", "su")),
         *((f"{name}:0", r"\(n\) needs n >= ")
           for name in ("sphere", "rp", "cp", "o", "so", "u", "su", "spd", "hpd", "r", "h")),
+        ("sp:3", r"Symplectic\(n\) needs an even n, not 3"),
+        *((name, r"needs n") for name in ("sim:1", "sl:1", "lorentz:0", "aff:0", "ch:0")),
+        ("ds:1", r"DeSitter\(n\) needs n >= 2, not 1"),
+        ("ads:1", r"AntiDeSitter\(n\) needs n >= 2, not 1"),
+        ("igr:2,0,1,2", r"needs a <= p, b <= q and 0 < a \+ b < p \+ q, not \(2, 0, 1, 2\)"),
+        *((name, "0 < a") for name in ("igr:1,2,1,2", "igr:0,0,1,2")),
         ("cp:1 x ", r"unknown space"),
         *((name, r"too large") for name in ("so:99999999999", "gr:3,99999999999999999999", f"sphere:{2**64 - 1}")),
         ("sphere:" + "9" * 30, "too large"),

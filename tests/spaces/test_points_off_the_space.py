@@ -161,6 +161,7 @@ def test_the_rotation_of_a_pose(name):
         ("sphere:2", changed(2, [0, 0, 1.1]), r"\[2\] is off the space by 1\.000e-1: its norm is 1\.1, not 1"),
         ("sphere:2", changed(1, 0), r"\[1\] is off the space by 1\.000e0: it is the zero vector"),
         ("h:2", [[1, 0, 0], [1.1, 0, 0]], r"\[1\] is off .* by 1\.000e-1: its Minkowski square is -1\.21"),
+        ("ch:1", [[1, 0], [0, 2j]], r"\[1\] is off .*its square -\|x0\|\^2 .* is 4, not -1"),
         ("h:2", [[-1, 0, 0], [1, 0, 0]], r"\[0\] is off .*the first, is -1, not positive"),
         ("h:2", [[1, 0, 0], [0, 0, 0]], r"\[1\] is off .*the first, is 0, not positive"),
     ],
