@@ -1,4 +1,4 @@
-"""Commands of the command line, and their errors of usage."""
+"""The commands of the command line and their usage errors."""
 
 import re
 import shlex

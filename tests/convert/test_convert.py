@@ -1,4 +1,4 @@
-"""Other coordinates of points: there and back, distances in them, and what is no point."""
+"""Conversions between coordinates: round trips, distances, and invalid input."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What docs/adding-a-space.md quotes is what is there."""
+"""The code quoted in docs/adding-a-space.md exists."""
 
 import re
 from pathlib import Path

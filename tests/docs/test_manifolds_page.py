@@ -1,4 +1,4 @@
-"""The example and the tables of ``docs/manifolds.md`` can be made, and say what mathematics says they must."""
+"""The example and the tables of ``docs/manifolds.md`` can be made and agree with theory."""
 
 import manifolds
 import numpy as np

@@ -1,4 +1,4 @@
-"""What is cheap to check of the site that `make docs` builds: nothing is left out, and what pages say runs."""
+"""Inexpensive checks of the site that `make docs` builds: it is complete, and the code of its pages runs."""
 
 import doctest
 import importlib

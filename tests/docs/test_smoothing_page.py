@@ -1,4 +1,4 @@
-"""The example and the tables of ``docs/smoothing.md`` can be made, and say what mathematics says they must."""
+"""The example and the tables of ``docs/smoothing.md`` can be made and agree with theory."""
 
 import numpy as np
 import pytest

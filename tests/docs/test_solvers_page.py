@@ -1,4 +1,4 @@
-"""The tables and figures of ``docs/solvers.md`` can be made, and say what mathematics says they must."""
+"""The tables and figures of ``docs/solvers.md`` can be made and agree with theory."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The example and the tables of ``docs/xarray.md`` can be made, and say what they must."""
+"""The example and the tables of ``docs/xarray.md`` can be made."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What a report says is true of the curve that is returned, and what cannot be true is an error."""
+"""The values in a report are true of the returned curve, and impossible input raises an error."""
 
 import itertools
 import zlib

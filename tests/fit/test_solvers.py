@@ -1,4 +1,4 @@
-"""The solvers: one step in flat space, quadratic convergence, points far apart, and never silent failure."""
+"""The solvers: one step in flat space, quadratic convergence, points far apart, and no silent failure."""
 
 import warnings
 from itertools import islice

@@ -1,4 +1,4 @@
-"""Curves with control points as arrays and values, and bad input."""
+"""`BSpline` and `BezierCurve` as values: arrays, copies, and invalid input."""
 
 import copy
 import math

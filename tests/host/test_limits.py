@@ -1,4 +1,4 @@
-"""No input aborts the process: sizes that no memory holds are errors, and long calls end soon after Ctrl-C."""
+"""No input aborts the process: huge sizes raise an error, and long calls end soon after Ctrl-C."""
 
 import sys
 import textwrap

@@ -1,4 +1,4 @@
-"""Progress, exceptions in it, and Ctrl-C."""
+"""Progress callbacks, exceptions in them, and Ctrl-C."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""Threads: how many there are, and that they change no bit."""
+"""The number of threads, and bit-identical results for every number of them."""
 
 import multiprocessing
 import os

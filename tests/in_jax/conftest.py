@@ -1,4 +1,4 @@
-"""What the tests in JAX run with."""
+"""Precision and compiler options of the tests in JAX."""
 
 import os
 

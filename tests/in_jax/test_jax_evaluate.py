@@ -1,4 +1,4 @@
-"""De Casteljau's algorithm in JAX itself beside the compiled core, and derivatives where formulas like to break."""
+"""De Casteljau's algorithm in JAX against the compiled core, and derivatives near singular formulas."""
 
 import jax
 import jax.numpy as jnp

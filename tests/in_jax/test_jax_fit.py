@@ -1,4 +1,4 @@
-"""Fits in JAX itself beside the compiled core."""
+"""Fits in JAX against the compiled core."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Velocities and covariant accelerations of the compiled spline in JAX, and how they follow their data."""
+"""Velocities and covariant accelerations of the compiled spline in JAX, and their sensitivity to the data."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""The functions that geodesics in JAX are made of, and their derivatives, beside mpmath."""
+"""The series and matrix functions of geodesics in JAX, and their derivatives, against mpmath."""
 
 from itertools import combinations
 

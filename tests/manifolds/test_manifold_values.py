@@ -1,4 +1,4 @@
-"""What curves on manifolds can do beside being smooth, and what they refuse."""
+"""The interface of curves on manifolds made of functions, and its errors."""
 
 import io
 import pickle

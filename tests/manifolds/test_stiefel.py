@@ -1,4 +1,4 @@
-"""Stiefel manifolds by other formulas."""
+"""Stiefel manifolds against independent formulas."""
 
 import numpy as np
 import pytest

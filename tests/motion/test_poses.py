@@ -1,4 +1,4 @@
-"""Velocities and accelerations of poses beside closed forms and finite differences; files of poses."""
+"""Velocities and accelerations of poses against closed forms and finite differences; files of poses."""
 
 import gzip
 import io

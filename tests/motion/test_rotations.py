@@ -1,4 +1,4 @@
-"""Rotations in the words of those who turn things, beside SciPy and finite differences."""
+"""Curves of rotations: rates, quaternions and other forms, against SciPy and finite differences."""
 
 import gc
 import weakref

@@ -1,4 +1,4 @@
-"""Figures: what is in them, batches, times, files, and what they leave alone."""
+"""Figures: their content, batches, times and files, and no changes of global state."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""How good the choice of λ, the bands and the robust losses are, on fixed random data."""
+"""The quality of the chosen λ, of the bands and of robust losses, on fixed random data."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Weights that are matrices: data of which some directions are better known than others."""
+"""Information matrices as weights: some directions of the data are better known than others."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Smoothing data as people bring them: irregular, long, with gaps and copies, rounded, with a bad curve in a batch."""
+"""Smoothing of realistic data: irregular, long, with gaps, copies and rounding, and with failing curves."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""Smooth curves with given velocities at their ends, and closed ones."""
+"""Smoothing splines with given end velocities, and closed ones."""
 
 import numpy as np
 import pytest

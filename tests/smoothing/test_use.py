@@ -1,4 +1,4 @@
-"""What people hand over, and what they get back."""
+"""The interface of smoothing splines: input, output, warnings and errors."""
 
 import numpy as np
 import pytest

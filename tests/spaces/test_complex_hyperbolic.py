@@ -1,4 +1,4 @@
-"""CH¹ is the hyperbolic plane with half its distances, and CHⁿ holds Hⁿ as it is."""
+"""CH¹ is the hyperbolic plane with half its distances, and CHⁿ contains Hⁿ."""
 
 import numpy as np
 import pytest

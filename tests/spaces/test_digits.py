@@ -1,4 +1,4 @@
-"""What rounding leaves of projections, of random points, and of large matrices."""
+"""Rounding errors of projections, of random points, and of large matrices."""
 
 import numpy as np
 import pytest

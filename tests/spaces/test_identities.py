@@ -1,4 +1,4 @@
-"""Spaces that are each other under another name: distances, exp and log, and whole splines must agree."""
+"""Isometric spaces agree in distances, exp, log and whole splines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""exp, log, geodesic and distance of subspaces of large spaces, which are computed in the span of two."""
+"""exp, log, geodesic and distance of subspaces of large spaces, computed in the span of two points."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Groups of invertible matrices: against other ways to the same numbers, and their subgroups."""
+"""Groups of invertible matrices and their subgroups, against independent computations."""
 
 import mpmath
 import numpy as np

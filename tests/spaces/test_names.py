@@ -1,4 +1,4 @@
-"""Spaces as values: their names, what they say of themselves, and spaces that there are not."""
+"""Spaces as values: names, properties, and invalid spaces."""
 
 import copy
 import inspect

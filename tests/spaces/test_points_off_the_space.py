@@ -1,4 +1,4 @@
-"""Points that are off a space: what is wrong, where, by how much, and what to do."""
+"""Points off a space: errors state the problem, the point, the distance and the remedy."""
 
 import numpy as np
 import pytest

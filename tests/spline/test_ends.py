@@ -1,4 +1,4 @@
-"""End conditions: words, vectors, closed curves, and bad ones."""
+"""End conditions: words, vectors, closed curves, and invalid ones."""
 
 import numpy as np
 import pytest

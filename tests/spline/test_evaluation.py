@@ -1,4 +1,4 @@
-"""Evaluation: shapes, times in any order, derivatives, speed, and bad times."""
+"""Evaluation: shapes, unsorted times, derivatives, speed, and invalid times."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""What a curve is before its first knot and after its last one."""
+"""Extrapolation before the first knot and after the last one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Curves that fail: errors, warnings, and what becomes of the others."""
+"""Failing curves: errors, warnings, and the other curves of a batch."""
 
 import pickle
 import re

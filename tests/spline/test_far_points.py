@@ -1,4 +1,4 @@
-"""Data in representations that do not fit each other: most steps are long, and a warning says so."""
+"""Inconsistent representations of the data: a warning if most steps are long. Huge and tiny numbers."""
 
 import itertools
 import warnings

@@ -1,4 +1,4 @@
-"""`fit`, `evaluate` and `fit_many` do what the class does."""
+"""`fit`, `evaluate` and `fit_many` agree with `CubicSpline`."""
 
 import numpy as np
 import pytest

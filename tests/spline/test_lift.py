@@ -1,4 +1,4 @@
-"""Horizontal lifts: representatives that are continuous, and turn no more than their subspaces do."""
+"""Horizontal lifts: representatives that are continuous and turn no more than their subspaces."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Curves of high ambient dimension, which are made in the span of their points."""
+"""Curves of high ambient dimension, which are computed in the span of their points."""
 
 import pickle
 import sys

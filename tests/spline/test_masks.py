@@ -1,4 +1,4 @@
-"""Some curves of a batch: those that are wanted, and those whose points are valid."""
+"""Masks: curves of a batch that are not fitted, and curves with invalid points."""
 
 import tracemalloc
 import warnings

@@ -1,4 +1,4 @@
-"""Options of a fit: methods and limits, and what is none."""
+"""Options of a fit: methods, limits, and invalid values."""
 
 import inspect
 

@@ -1,4 +1,4 @@
-"""Points of a curve: arrays of any type and layout, batches, and what is no array of points."""
+"""Points of a curve: arrays of any type and layout, batches, and invalid points."""
 
 import pickle
 

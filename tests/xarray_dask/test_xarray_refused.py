@@ -1,4 +1,4 @@
-"""What is wrong is said when it is asked for, before any block is worked on."""
+"""Invalid input raises an error at once, before any block is computed."""
 
 import re
 
