@@ -31,7 +31,7 @@ Doubles = NDArray[np.float64]
 
 # Lengths of steps as parts of the longest.
 _PARTS = (1e-8, 1e-4, 1e-2, 0.3, 1.0)
-# Differences of order four: places, weights, and how far they and their errors are, relative to what is compared.
+# Central differences of order four: positions, weights, step, and error relative to the compared quantity.
 _PLACES = np.array([-2.0, -1.0, 1.0, 2.0])
 _WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12
 _STEP = 3e-3
