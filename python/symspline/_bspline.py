@@ -189,7 +189,7 @@ class BSpline:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        # Unpickled arrays can be written to.
+        # Unpickled arrays are writable.
         self._control_points.flags.writeable = self._knots.flags.writeable = False
 
     def __repr__(self) -> str:
