@@ -82,17 +82,11 @@ RETIRED = [
     Retired("calm", "minimum-energy", r"\bcalm(er|est)?\b", "the calmest curve"),
     Retired("flat way", "linearised solver", r"\bflat way\b", "the flat way is slow"),
     Retired("exact way", "full Gauss–Newton solver", r"\bexact way\b", "the exact way is slow"),
-    Retired(
-        "bends least", "lowest bending energy", r"\bbends? (least|less|more)\b", "a curve that bends less"
-    ),
+    Retired("bends least", "lowest bending energy", r"\bbends? (least|less|more)\b", "a curve that bends less"),
     Retired("same bits", "bit-identical", r"\bsame bits\b", "each gets the same bits as alone"),
     Retired("doubles", "double precision", r"\bdoubles\b", "computed in doubles"),
-    Retired(
-        "digits", "significant digits, accuracy", r"(?<!significant )\bdigits\b", "derivatives lose digits"
-    ),
-    Retired(
-        "carry", "parallel transport, contain", r"\bcarr(y|ies|ied)\b", "a vector carried along the curve"
-    ),
+    Retired("digits", "significant digits, accuracy", r"(?<!significant )\bdigits\b", "derivatives lose digits"),
+    Retired("carry", "parallel transport, contain", r"\bcarr(y|ies|ied)\b", "a vector carried along the curve"),
     Retired("piece", "segment", r"\bpieces?\b", "the pieces of a recording"),
     Retired("stretch", "segment", r"\bstretch(es)?\b", "a curve of each stretch"),
     Retired("handed", "passed, converted", r"(?<!-)\bhanded\b", "matrices handed to a space"),
@@ -129,9 +123,7 @@ RETIRED = [
     Retired("weighing", "precision matrix", r"\bweighing\b", "the weighing of the data"),
     Retired("what noise leaves", "residual sum of squares", r"\bwhat noise leaves\b", "what noise leaves"),
     Retired("seam", "periodic ends", r"\bseams?\b", "the seam of closed curves"),
-    Retired(
-        "side by side", "SIMD lanes", r"\b(eight|several) \w+ side by side\b", "eight curves side by side"
-    ),
+    Retired("side by side", "SIMD lanes", r"\b(eight|several) \w+ side by side\b", "eight curves side by side"),
     Retired("beside the diagonal", "bandwidth", r"\bbeside the diagonal\b", "places beside the diagonal"),
     Retired(
         "one a",
@@ -181,8 +173,7 @@ def texts():
     found |= {path: strings(path) + comments(path) for path in EXAMPLES}
     found |= {path: strings(path) + comments(path) for path in MODULES}
     return {
-        str(path.relative_to(ROOT)): " ".join(prose("\n".join(parts)).split()).lower()
-        for path, parts in found.items()
+        str(path.relative_to(ROOT)): " ".join(prose("\n".join(parts)).split()).lower() for path, parts in found.items()
     }
 
 

@@ -1,7 +1,5 @@
 """What people hand over, and what they get back."""
 
-import pickle
-
 import numpy as np
 import pytest
 from noisy import example, rms
@@ -34,16 +32,6 @@ def test_is_a_cubic_spline():
     t, points = spline.data
     assert np.array_equal(t, T) and np.allclose(points, NOISY)
     assert "40 data" in repr(spline) and "degrees of freedom" in str(spline.report)
-
-
-def test_comes_back_from_a_pickle():
-    for spline in (
-        ss.make_smoothing_spline(T, NOISY, S2),
-        ss.make_smoothing_spline(T, (NOISY, NOISY), ss.Product(S2, S2)),
-        ss.make_smoothing_spline(T, np.stack([NOISY, NOISY]), S2),
-    ):
-        back = pickle.loads(pickle.dumps(spline))
-        assert back == spline and np.array_equal(back.std(T), spline.std(T))
 
 
 def test_progress_is_shown():
@@ -156,9 +144,7 @@ def test_band_and_deviation_check_their_arguments():
         ss.SmoothingSpline()
 
 
-@pytest.mark.parametrize(
-    "options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}]
-)
+@pytest.mark.parametrize("options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}])
 def test_between_two_knots_there_is_the_nearest_geodesic(options):
     two = ss.make_smoothing_spline([3.0, 5e6], NOISY[:2], S2, **options)
     assert np.abs(two.points - NOISY[:2]).max() < 1e-12 and two.df == pytest.approx(2)
@@ -184,9 +170,7 @@ def test_squares_beyond_doubles_are_no_result(size):
 def test_data_all_over_a_space_are_told(name, seed):
     space, rng = ss.space(name), np.random.default_rng(seed)
     points = space.random_point(rng, 200)
-    with pytest.warns(
-        UserWarning, match=r"half of the data are \d.* For random points of .* this distance is \d"
-    ):
+    with pytest.warns(UserWarning, match=r"half of the data are \d.* For random points of .* this distance is \d"):
         spline = ss.make_smoothing_spline(None, points, space, lam=1e6)
     # Of a batch the curve is named; weights of zero do not count.
     if name == "sphere:2":
