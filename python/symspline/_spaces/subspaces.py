@@ -105,7 +105,7 @@ class ComplexProjective(_Projective):
     See Also
     --------
     ComplexGrassmannian : Complex subspaces of any dimension.
-    symspline.quantum : States, gates and pulses.
+    symspline.quantum : Hamiltonians, pulses and propagators of curves.
 
     Notes
     -----
@@ -200,7 +200,7 @@ class Grassmannian(_Subspaces):
     See Also
     --------
     ComplexGrassmannian : Complex subspaces.
-    symspline.subspaces : Subspaces of data.
+    symspline.subspaces : Reduced bases over a parameter.
 
     Notes
     -----
