@@ -264,8 +264,9 @@ class QuaternionicProjective(Preserving):
     ComplexGrassmannian : The space that contains it.
 
     Notes
-    ----- The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are √2 times
-    the angles :math:`\arccos |\langle p, q \rangle|` between lines. HP¹ is the sphere S⁴ of radius 1/√2.
+    -----
+    The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are √2 times the
+    angles :math:`\arccos |\langle p, q \rangle|` between lines. HP¹ is the sphere S⁴ of radius 1/√2.
 
     Examples
     --------
