@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
 from ._curves.band import UncertaintyBand
-from ._curves.curve import CurveArrays, Doubles, quantity_of
+from ._curves.curve import CurveArrays, Doubles
 from ._curves.energy import bending_energy
 from ._curves.integrals import integrate
 from ._curves.solve import Progress
 from ._input import times_of
-from ._options import check_progress, checked_extrapolate, outside
+from ._options import check_progress, checked_extrapolate, outside, quantity_of
 from ._spaces import Array, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
 
@@ -117,8 +117,8 @@ class Curve(ABC):
         self,
         x: ArrayLike,
         start: Any = None,
-        nu: int = 0,
         *,
+        nu: int = 0,
         extrapolate: bool | str | None = None,
         per_curve: bool = False,
         progress: Progress | None = None,

@@ -11,8 +11,8 @@ from . import _core
 from ._arrays import as_array, cast, whole_number
 from ._core import ValidationError
 from ._curves.control import checked_knots, checked_points, control_array
-from ._curves.curve import quantity_of
 from ._curves.reduced import reduced
+from ._options import quantity_of
 from ._spaces import Array, Product, Space
 from ._spaces import space as space_named
 from ._time import onto_ends

@@ -21,7 +21,7 @@ from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._far import warn_of_far_points
-from ._options import check_fit_options, options_of, outside, with_atol
+from ._options import check_fit_options, options_of, order_of, outside, with_atol
 from ._report import Report, combined
 from ._signs import warn_of_signs
 from ._spaces import Array, Space
@@ -159,6 +159,7 @@ class CubicSpline(Curve):
         points: Any = None,
         t: ArrayLike | None = None,
         ends: tuple[Any, Any] | None = None,
+        *,
         nu: int = 0,
     ) -> Any:
         """How the curve at times x moves when its data move: the derivative in one direction.
@@ -191,7 +192,7 @@ class CubicSpline(Curve):
         """
         return self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
 
-    def vjp(self, x: ArrayLike, cotangent: Any, nu: int = 0) -> Gradient:
+    def vjp(self, x: ArrayLike, cotangent: Any, *, nu: int = 0) -> Gradient:
         """The gradient of ``sum(cotangent * curve)`` with respect to the data: `jvp`, transposed.
 
         Args:
@@ -201,7 +202,7 @@ class CubicSpline(Curve):
             nu: as for `jvp`.
 
         Returns:
-            A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu))`` is
+            A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu=nu))`` is
             ``sum(g.points * points) + sum(g.t * t)`` and the same for the vectors at the ends: plain sums of products.
             Vectors in it are tangent. Of a closed curve the last point has no gradient of its own. NaN for curves that
             have not converged.
@@ -229,7 +230,7 @@ class CubicSpline(Curve):
         return curve_of(self.space, self._times, found)
 
     def _places(self, x: ArrayLike, nu: int) -> Places:
-        curve = self._curve
+        nu, curve = order_of(nu), self._curve
         times, per_curve = self._clock.at(x, curve.batch, False, curve.times)
         try:
             return places(curve.times, curve.batch, times, per_curve, nu)

@@ -13,13 +13,21 @@ from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves import fit as fitting
-from ._curves.curve import CurveArrays, quantity_of
+from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, picked
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._far import warn_of_far_points
 from ._input import in_library, library_of
-from ._options import check_on_failure, check_progress, checked_extrapolate, options_of, outside, with_atol
+from ._options import (
+    check_on_failure,
+    check_progress,
+    checked_extrapolate,
+    options_of,
+    outside,
+    quantity_of,
+    with_atol,
+)
 from ._report import Report
 from ._signs import warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of
@@ -51,8 +59,8 @@ def evaluate(
     velocities: Any,
     space: Space | str,
     x: ArrayLike,
-    nu: int = 0,
     *,
+    nu: int = 0,
     extrapolate: bool | str | None = None,
     per_curve: bool = False,
     progress: Progress | None = None,

@@ -288,7 +288,7 @@ def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
     points, velocities = (np.stack([x[:-1], x[1:]], axis=1) for x in (p, u))
 
     def sides(nu: int) -> tuple[Array, Array]:
-        values = evaluate(knots, points, velocities, space, knots, nu, per_curve=True)
+        values = evaluate(knots, points, velocities, space, knots, nu=nu, per_curve=True)
         return values[:-1, 1], values[1:, 0]
 
     def jump(nu: int) -> float:

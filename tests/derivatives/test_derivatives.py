@@ -45,7 +45,7 @@ def test_derivatives_match_finite_differences(case, end):
     x = inside(t, rng)
     spline = moved(space, t, points, bc, change, 0.0)
     for nu, expected in enumerate(by_differences(space, t, points, bc, change, x)):
-        found = spline.jvp(x, *change, nu)
+        found = spline.jvp(x, *change, nu=nu)
         # Of the differences: the fourth power of the step, and residuals of 1e-14 divided by it.
         assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
 
@@ -61,8 +61,8 @@ def test_the_gradient_is_the_transpose(case, end):
         cotangent = rng.normal(size=spline(x).shape)
         if space.dtype.kind == "c":
             cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
-        forward = spline.jvp(x, vectors, knots, ends, nu)
-        gradient = spline.vjp(x, cotangent, nu)
+        forward = spline.jvp(x, vectors, knots, ends, nu=nu)
+        gradient = spline.vjp(x, cotangent, nu=nu)
         pairs = [(cotangent, forward), (gradient.points, vectors), (gradient.t, knots)]
         pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
         left, *right = [np.vdot(a, b).real for a, b in pairs]
@@ -111,7 +111,7 @@ def test_derivatives_are_finite_at_coinciding_points(case, end):
     still = np.repeat(points[:1], len(t), axis=0)
     spline = ss.CubicSpline(t, still, space, bc_type="periodic" if end == "periodic" else "natural")
     for nu in (0, 1, 2):
-        assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu).points).all()
+        assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu=nu).points).all()
 
 
 def test_batch_derivatives_match_single_curves():
@@ -227,7 +227,7 @@ def test_derivatives_of_curves_of_few_points(name, end, n):
     x = inside(t, rng)
     spline = moved(space, t, p, bc, change, 0.0)
     for nu, expected in enumerate(by_differences(space, t, p, bc, change, x, (0, 1))):
-        found = spline.jvp(x, *change, nu)
+        found = spline.jvp(x, *change, nu=nu)
         assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
 
 
@@ -247,12 +247,12 @@ def test_derivatives_of_a_loop(name, rng):
     x = inside(t, rng)
     spline = ss.CubicSpline(t, p, space, bc_type="periodic")
     for nu, expected in enumerate(by_differences(space, t, p, "periodic", change, x, (0, 1))):
-        found = spline.jvp(x, *change, nu)
+        found = spline.jvp(x, *change, nu=nu)
         assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
         cotangent = rng.normal(size=found.shape) + (
             1j * rng.normal(size=found.shape) if found.dtype == complex else 0
         )
-        gradient = spline.vjp(x, cotangent, nu)
+        gradient = spline.vjp(x, cotangent, nu=nu)
         left, *right = (
             np.vdot(a, b).real
             for a, b in ((cotangent, found), (gradient.points, change[0]), (gradient.t, change[1]))

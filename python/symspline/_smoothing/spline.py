@@ -12,8 +12,9 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.band import UncertaintyBand
-from .._curves.curve import CurveArrays, order_of
+from .._curves.curve import CurveArrays
 from .._curves.ends import fixed_velocities
+from .._options import order_of
 from .._report import Report
 from .._spaces import Array, Product, Space, factors_of
 from .._time import TimeAxis
@@ -104,7 +105,7 @@ class SmoothingSpline(CubicSpline):
             found.append(vectors)
         return self._in_factors(found)
 
-    def std(self, x: ArrayLike, nu: int = 0) -> Any:
+    def std(self, x: ArrayLike, *, nu: int = 0) -> Any:
         """Standard deviation of the curve at times x, for one coordinate of an orthonormal frame.
 
         It is the root of σ² b(t)ᵀA⁻¹b(t), in frames along the curve: the posterior of a spline (Wahba 1983). If the

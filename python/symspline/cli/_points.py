@@ -241,7 +241,7 @@ def std_numbers(spline: Any, x: Any, nu: int, columns: Columns) -> Doubles:
     """
     found: list[Doubles] = []
     half = 2 if columns.quaternion is not None else 1
-    stds: Sequence[Any] = parts_of(spline.std(x, nu), spline.space, "std") if nu < 2 else ()
+    stds: Sequence[Any] = parts_of(spline.std(x, nu=nu), spline.space, "std") if nu < 2 else ()
     for factor, std in zip(factors_of(spline.space), stds, strict=False):
         if factor._name == "se":
             found += [std[1], std[0] / half]

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
 from .._adapters import split
-from .._curves.curve import order_of
 from .._curves.ends import ends_in_factors
+from .._options import order_of
 from .._spaces import Product, Space, parts_of
 from .._spaces import space as space_named
 from ..manifolds._manifold import refuse_functions
@@ -90,7 +90,7 @@ def curve(
     real = points.real.dtype
     x, t = jnp.asarray(x, real), jnp.asarray(t, real)
     vectors = tuple(jnp.asarray(v, points.dtype) for v in given if v is not None)
-    return _curve(Fixed(space, kinds, tuple(sorted(options.items()))), int(nu), x, t, points, *vectors)
+    return _curve(Fixed(space, kinds, tuple(sorted(options.items()))), nu, x, t, points, *vectors)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))

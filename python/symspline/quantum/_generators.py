@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from .._base_curve import check_curve
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.curve import order_of
+from .._options import order_of
 from .._spaces import ComplexGrassmannian, ComplexProjective, Space, SpecialUnitary, Unitary
 from ..convert._reading import Array, adjoint
 

@@ -13,8 +13,7 @@ from typing import Any
 
 import xarray as xr
 
-from .._curves.curve import quantity_of
-from .._options import checked_extrapolate, outside
+from .._options import checked_extrapolate, outside, quantity_of
 from .._spaces import Space
 from .._version import VERSION
 from ._blocks import COLUMNS, Inputs, apply, fitted, resampled
@@ -122,7 +121,7 @@ def fit(
     return ds
 
 
-def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
+def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: bool | str | None = None) -> xr.DataArray:
     """Evaluate the curves of `fit`.
 
     Parameters
@@ -159,7 +158,7 @@ def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | N
     return along(ds, x, quantity_of(nu), extrapolate)
 
 
-def lift(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
+def lift(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: bool | str | None = None) -> xr.DataArray:
     """Evaluate the curves by continuous representatives.
 
     Parameters are those of `evaluate`. See `CubicSpline.lift`.
