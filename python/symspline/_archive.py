@@ -37,7 +37,7 @@ _KNOWN = re.compile(
 _RATIO, _SMALL = 100, 2**24
 
 
-def fitted_arrays(spline: Curve, reports: list[Report]) -> dict[str, Any]:
+def fitted_arrays(spline: Curve[Any], reports: list[Report]) -> dict[str, Any]:
     """The arrays of one fitted curve, or of a batch, and how the fit went in every factor."""
     return arrays_of(spline, FORMAT) | {
         "bc_type": json.dumps(plain(spline._bc_type)),
@@ -45,7 +45,7 @@ def fitted_arrays(spline: Curve, reports: list[Report]) -> dict[str, Any]:
     }
 
 
-def arrays_of(spline: Curve, format: str) -> dict[str, Any]:
+def arrays_of(spline: Curve[Any], format: str) -> dict[str, Any]:
     """The arrays of one curve, or of a batch; the format says which kind of curve it is."""
     refuse_functions(
         spline.space,

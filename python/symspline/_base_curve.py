@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
@@ -24,6 +24,7 @@ from ._input import times_of
 from ._options import check_progress, checked_extrapolate, outside, quantity_of
 from ._spaces import Array, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
+from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Number, Out, P
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 _DOTS = 60
 
 
-class Curve(ABC):
+class Curve(ABC, Generic[P]):
     """A curve, or a batch of them, by knots, points and velocities there."""
 
     # What a plot says of it.
@@ -61,11 +62,11 @@ class Curve(ABC):
     _clock: TimeAxis
     _t: Array
     _curve: CurveArrays
-    _extrapolate: Any
+    _extrapolate: Extrapolate
     # What happens outside the knots, as the core calls it.
     _outside: str
     # Conditions at the ends, which say whether curves are closed.
-    _bc_type: Any
+    _bc_type: BCType
 
     @abstractmethod
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
@@ -73,16 +74,65 @@ class Curve(ABC):
 
     # ---- the curve ----
 
+    @overload
     def __call__(
         self,
         x: ArrayLike,
         nu: int = 0,
         *,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         per_curve: bool = False,
-        dtype: Any = None,
+        dtype: None = None,
         progress: Progress | None = None,
-        out: Any = None,
+        out: None = None,
+    ) -> P: ...
+
+    @overload
+    def __call__(
+        self,
+        x: ArrayLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        progress: Progress | None = None,
+        out: Out,
+    ) -> Out: ...
+
+    @overload
+    def __call__(
+        self: Curve[AnyArrays],
+        x: ArrayLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        dtype: DTypeLike,
+        progress: Progress | None = None,
+    ) -> AnyArrays: ...
+
+    @overload
+    def __call__(
+        self: Curve[AnyArray],
+        x: ArrayLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        dtype: DTypeLike,
+        progress: Progress | None = None,
+    ) -> AnyArray: ...
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        dtype: DTypeLike | None = None,
+        progress: Progress | None = None,
+        out: AnyArray | AnyArrays | None = None,
     ) -> Any:
         """The curve at times x.
 
@@ -116,13 +166,13 @@ class Curve(ABC):
     def lift(
         self,
         x: ArrayLike,
-        start: Any = None,
+        start: ArrayLike | tuple[ArrayLike | None, ...] | None = None,
         *,
         nu: int = 0,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         per_curve: bool = False,
         progress: Progress | None = None,
-    ) -> Any:
+    ) -> P:
         """The curve at times x by arrays that move continuously: the horizontal lift.
 
         A point of a projective space or a Grassmannian is an array up to a unitary factor on its right, a phase, a
@@ -156,15 +206,16 @@ class Curve(ABC):
         if progress is not None:
             check_progress(progress)
         quantity, where = quantity_of(nu), self._where(extrapolate)
-        return call_at_times(
+        values: P = call_at_times(
             self._curve,
             self._clock,
             x,
             per_curve,
             lambda curve, x, per_curve: curve.lift(x, quantity, where, per_curve, start, progress),
         )
+        return values
 
-    def transport(self, x0: Any, x1: Any, v: Any) -> Any:
+    def transport(self, x0: ArrayLike, x1: ArrayLike, v: ArrayLike) -> P:
         """Parallel transport of tangent vectors along the curve, (26a) of the paper.
 
         Args:
@@ -218,26 +269,30 @@ class Curve(ABC):
         if own:
             # Curves that count time from first knots of their own are carried along one by one.
             product = isinstance(self.space, Product)
-            each = [
+            each: list[Any] = [
                 self[i].transport(x0, x1, tuple(v[i] for v in vectors) if product else vectors[0][i])
                 for i in range(len(self))
             ]
-            return tuple(map(np.stack, zip(*each, strict=True))) if product else np.stack(each)
+            stacked: Any = tuple(map(np.stack, zip(*each, strict=True))) if product else np.stack(each)
+            result: P = stacked
+            return result
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
-        return self._curve.transport((float(times[0]), float(times[1])), where, moved)
+        result = self._curve.transport((float(times[0]), float(times[1])), where, moved)
+        return result
 
     def speed(
         self,
         x: ArrayLike,
         *,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         per_curve: bool = False,
-        dtype: Any = None,
-    ) -> Any:
+        dtype: DTypeLike | None = None,
+    ) -> FloatArray:
         """|γ'| at times x, shape batch axes + x.shape; options are those of a call."""
         single = dtype is not None and is_single(dtype)
         values = self._at(x, "speed", extrapolate, per_curve)
-        return (in_single(values) if single else values)[()]
+        speeds: FloatArray = (in_single(values) if single else values)[()]
+        return speeds
 
     def _at(
         self,
@@ -258,14 +313,14 @@ class Curve(ABC):
             self._outside if extrapolate is None else outside(checked_extrapolate(extrapolate), self._bc_type)
         )
 
-    def length(self) -> Any:
+    def length(self) -> Number:
         """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
         curve = self._curve
         return integrate(
             curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
         )
 
-    def bending_energy(self) -> Any:
+    def bending_energy(self) -> Number:
         """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
         return bending_energy(self._curve, self._outside)
 
@@ -278,28 +333,31 @@ class Curve(ABC):
         return read_only(self._t)
 
     @property
-    def points(self) -> Any:
+    def points(self) -> P:
         """The points, shape (..., N+1, *point_shape)."""
-        return self._curve.points
+        points: P = self._curve.points
+        return points
 
     @property
-    def velocities(self) -> Any:
+    def velocities(self) -> P:
         """Velocities γ' at the knots, the shape of the points. Together with knots and points they are
         the whole curve."""
-        return self._curve.velocities
+        velocities: P = self._curve.velocities
+        return velocities
 
     @property
-    def control_points(self) -> Any:
+    def control_points(self) -> P:
         """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
-        return self._curve.control_points()
+        control_points: P = self._curve.control_points()
+        return control_points
 
     @property
-    def space(self) -> Space:
+    def space(self) -> Space[P]:
         """The space."""
         return self._curve.space
 
     @property
-    def extrapolate(self) -> Any:
+    def extrapolate(self) -> Extrapolate:
         """What happens outside the knots, as it was given."""
         return self._extrapolate
 
@@ -319,7 +377,7 @@ class Curve(ABC):
             raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
         return self._batch[0]
 
-    def __getitem__(self, index: Any) -> Self:
+    def __getitem__(self, index: int | np.integer[Any] | slice[Any, Any, Any]) -> Self:
         """A curve, or a slice of curves, of a batch."""
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
@@ -371,7 +429,7 @@ class Curve(ABC):
         data = b64encode(picture.getvalue()).decode()
         return f'{text}<img src="data:image/png;base64,{data}" alt="{escape(repr(self))}">'
 
-    def plot(self, file: Any = None) -> Figure:
+    def plot(self, file: File | None = None) -> Figure:
         """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.
 
         The picture depends on the space:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,13 +13,14 @@ from ._core import ValidationError
 from ._curves.control import checked_knots, checked_points, control_array
 from ._curves.reduced import reduced
 from ._options import quantity_of
-from ._spaces import Array, Product, Space
+from ._spaces import Product, Space
 from ._spaces import space as space_named
 from ._time import onto_ends
+from ._typing import FloatArray, P
 from .manifolds._manifold import refuse_functions
 
 
-class BSpline:
+class BSpline(Generic[P]):
     """A B-spline curve on a space: de Boor's algorithm with geodesics in place of straight lines.
 
     In flat space it is SciPy's ``BSpline``. On a curved space it keeps the ends and the smoothness at
@@ -44,15 +45,17 @@ class BSpline:
     array([0.40824829, 0.81649658, 0.40824829])
     """
 
-    def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space | str) -> None:
+    def __init__(
+        self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str
+    ) -> None:
         self._space = space = _factor(space)
         self._degree = whole_number(degree, "degree", 1)
         doubles, tol = control_array(control_points, space, 2)
         self._knots = checked_knots(knots, space._lead(doubles)[-1], self._degree)
-        self._control_points = checked_points(space, doubles, tol)
+        self._control_points: Any = checked_points(space, doubles, tol)
         self._control_points.flags.writeable = self._knots.flags.writeable = False
 
-    def __call__(self, x: ArrayLike, nu: int = 0) -> Array:
+    def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """The curve at times x.
 
         Args:
@@ -65,13 +68,15 @@ class BSpline:
         Raises:
             ValidationError: a time is not finite or outside.
         """
-        return self._evaluate(x, quantity_of(nu))
+        values: P = self._evaluate(x, quantity_of(nu))
+        return values
 
-    def speed(self, x: ArrayLike) -> Array:
+    def speed(self, x: ArrayLike) -> FloatArray:
         """|γ'| at times x, shape batch axes + x.shape."""
-        return self._evaluate(x, "speed")[()]
+        speeds: FloatArray = self._evaluate(x, "speed")[()]
+        return speeds
 
-    def _evaluate(self, x: ArrayLike, quantity: str) -> Array:
+    def _evaluate(self, x: ArrayLike, quantity: str) -> Any:
         times = self._times(x)
         space, control, span = reduced(self._space, self._control_points)
         values = _core.evaluate_bspline(
@@ -108,9 +113,10 @@ class BSpline:
         return self._knots
 
     @property
-    def control_points(self) -> Array:
+    def control_points(self) -> P:
         """The control points, shape (..., n, *point_shape)."""
-        return self._control_points
+        points: P = self._control_points
+        return points
 
     @property
     def degree(self) -> int:
@@ -118,7 +124,7 @@ class BSpline:
         return self._degree
 
     @property
-    def space(self) -> Space:
+    def space(self) -> Space[P]:
         """The space."""
         return self._space
 
@@ -144,7 +150,7 @@ class BSpline:
         return f"<{type(self).__name__} on {self._space!r}: {count} control points, degree {self._degree}>"
 
 
-class BezierCurve(BSpline):
+class BezierCurve(BSpline[P]):
     """A Bézier curve of any degree on a space, for times from 0 to 1: de Casteljau's algorithm, (8).
 
     Args:
@@ -159,13 +165,13 @@ class BezierCurve(BSpline):
     array([0.        , 3.14159265, 0.        ])
     """
 
-    def __init__(self, control_points: ArrayLike, space: Space | str) -> None:
+    def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
         space = _factor(space)
         count = space._lead(control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
 
 
-def _factor(space: Space | str) -> Space:
+def _factor(space: Space[P] | str) -> Space[P]:
     """The space, which is no product."""
     space = space_named(space)
     if isinstance(space, Product):

@@ -27,9 +27,10 @@ from ._signs import warn_of_signs
 from ._spaces import Array, Space
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+from ._typing import BCType, Extrapolate, File, Method, OnFailure, P, PointsLike
 
 
-class CubicSpline(Curve):
+class CubicSpline(Curve[P]):
     """The C² cubic spline through points of a space.
 
     Between two points the curve is a cubic Bézier curve made of geodesics (de Casteljau's algorithm,
@@ -94,15 +95,15 @@ class CubicSpline(Curve):
     def __init__(
         self,
         t: ArrayLike | None,
-        points: Any,
-        space: Space | str,
+        points: PointsLike,
+        space: Space[P] | str,
         *,
-        bc_type: Any = "natural",
-        method: str = "auto",
+        bc_type: BCType = "natural",
+        method: Method = "auto",
         tol: float = 1e-12,
         max_iter: int | None = None,
-        extrapolate: bool | str | None = None,
-        on_failure: str = "raise",
+        extrapolate: Extrapolate = None,
+        on_failure: OnFailure = "raise",
         check: bool = True,
         atol: float | None = None,
         where: ArrayLike | None = None,
@@ -136,8 +137,8 @@ class CubicSpline(Curve):
         clock: TimeAxis,
         t: Array,
         curve: CurveArrays,
-        bc_type: Any,
-        extrapolate: Any,
+        bc_type: BCType,
+        extrapolate: Extrapolate,
         reports: list[Report],
     ) -> None:
         self._clock, self._t, self._curve = clock, t, curve
@@ -156,12 +157,12 @@ class CubicSpline(Curve):
     def jvp(
         self,
         x: ArrayLike,
-        points: Any = None,
+        points: ArrayLike | tuple[ArrayLike | None, ...] | None = None,
         t: ArrayLike | None = None,
-        ends: tuple[Any, Any] | None = None,
+        ends: tuple[ArrayLike | None, ArrayLike | None] | None = None,
         *,
         nu: int = 0,
-    ) -> Any:
+    ) -> P:
         """How the curve at times x moves when its data move: the derivative in one direction.
 
         The data move by small multiples of what is given here; what is not given stays. It is computed by
@@ -190,9 +191,10 @@ class CubicSpline(Curve):
         >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
         array([0.6875])
         """
-        return self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
+        moved: P = self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
+        return moved
 
-    def vjp(self, x: ArrayLike, cotangent: Any, *, nu: int = 0) -> Gradient:
+    def vjp(self, x: ArrayLike, cotangent: ArrayLike, *, nu: int = 0) -> Gradient[P]:
         """The gradient of ``sum(cotangent * curve)`` with respect to the data: `jvp`, transposed.
 
         Args:
@@ -215,7 +217,8 @@ class CubicSpline(Curve):
         >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
         [[0.40625], [0.6875], [-0.09375]]
         """
-        return self._solved().pull(self._places(x, nu), self._bc_type, cotangent)
+        gradient: Gradient[P] = self._solved().pull(self._places(x, nu), self._bc_type, cotangent)
+        return gradient
 
     def _solved(self) -> CurveArrays:
         """The curve from which derivatives are made: NaN where it did not converge. They follow from the C² condition,
@@ -240,7 +243,7 @@ class CubicSpline(Curve):
     # ---- what it is made of ----
 
     @property
-    def bc_type(self) -> Any:
+    def bc_type(self) -> BCType:
         """The end conditions, as they were given."""
         return self._bc_type
 
@@ -259,7 +262,7 @@ class CubicSpline(Curve):
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
-    def _parts(self) -> tuple[CubicSpline, ...]:
+    def _parts(self) -> tuple[CubicSpline[Any], ...]:
         """The splines in the factors of a product; in another space the spline is its only part."""
         if len(self._reports) == 1:
             return (self,)
@@ -271,7 +274,7 @@ class CubicSpline(Curve):
 
     # ---- a batch as a sequence ----
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> CubicSpline:
+    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return CubicSpline._of(
             clock,
             t,
@@ -299,7 +302,7 @@ class CubicSpline(Curve):
         bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
         return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
 
-    def save(self, file: Any) -> None:
+    def save(self, file: File) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
         _archive.write(file, self._arrays())
 

@@ -41,11 +41,12 @@ from ._smoothing.stored import read_stored
 from ._spaces import Array, Product, Space, factors_of
 from ._spaces import space as space_named
 from ._time import Moments, TimeAxis, time_axis_of
+from ._typing import File
 
 _T = TypeVar("_T")
 
 
-def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
+def save_many(curves: Mapping[str, CubicSpline[Any]], file: File) -> None:
     """Write curves of one space, of any lengths, to one NPZ file, which `load_many` reads back.
 
     Knots, points and velocities of all curves follow each other in one array each; ``knots`` holds how
@@ -99,7 +100,7 @@ def save_many(curves: Mapping[str, CubicSpline], file: Any) -> None:
     write(file, arrays)
 
 
-def load(file: Any) -> CubicSpline | HermiteSpline:
+def load(file: File) -> CubicSpline | HermiteSpline:
     """Read a curve that `CubicSpline.save`, `SmoothingSpline.save` or `HermiteSpline.save` wrote, as the kind of curve
     that it was.
 
@@ -118,7 +119,7 @@ def load(file: Any) -> CubicSpline | HermiteSpline:
     return _opened(file, _read)
 
 
-def load_many(file: Any) -> dict[str, CubicSpline]:
+def load_many(file: File) -> dict[str, CubicSpline]:
     """Read the curves that `save_many`, or ``symspline fit --curve`` on the command line, wrote.
 
     Returns:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,9 +33,23 @@ from ._signs import warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+from ._typing import (
+    AnyArray,
+    AnyArrays,
+    BCType,
+    Extrapolate,
+    FitOptions,
+    Method,
+    OnFailure,
+    Out,
+    P,
+    PointsLike,
+)
 
 
-def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
+def fit(
+    t: ArrayLike | None, points: PointsLike, space: Space[P] | str, **options: Unpack[FitOptions]
+) -> tuple[P, Report]:
     """The velocities of the C² spline through points, as plain arrays.
 
     Takes the arguments of `CubicSpline`.
@@ -50,21 +64,54 @@ def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) ->
     ((3, 3), True)
     """
     spline = CubicSpline(t, points, space, **options)
-    return in_library(library_of(points), spline.velocities), spline.report
+    velocities: P = in_library(library_of(points), spline.velocities)
+    return velocities, spline.report
+
+
+@overload
+def evaluate(
+    t: ArrayLike | None,
+    points: PointsLike,
+    velocities: ArrayLike,
+    space: Space[P] | str,
+    x: ArrayLike,
+    *,
+    nu: int = 0,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    progress: Progress | None = None,
+    out: None = None,
+) -> P: ...
+
+
+@overload
+def evaluate(
+    t: ArrayLike | None,
+    points: PointsLike,
+    velocities: ArrayLike,
+    space: Space[Any] | str,
+    x: ArrayLike,
+    *,
+    nu: int = 0,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    progress: Progress | None = None,
+    out: Out,
+) -> Out: ...
 
 
 def evaluate(
     t: ArrayLike | None,
-    points: Any,
-    velocities: Any,
-    space: Space | str,
+    points: PointsLike,
+    velocities: ArrayLike,
+    space: Space[Any] | str,
     x: ArrayLike,
     *,
     nu: int = 0,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
     progress: Progress | None = None,
-    out: Any = None,
+    out: AnyArray | AnyArrays | None = None,
 ) -> Any:
     """The curve with given knots, points and velocities at times x, as plain arrays.
 
@@ -92,7 +139,9 @@ def evaluate(
     return values if out is not None else in_library(library_of(points, velocities, x), values)
 
 
-def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tuple[TimeAxis, CurveArrays]:
+def given(
+    t: ArrayLike | None, points: Any, velocities: Any, space: Space[Any]
+) -> tuple[TimeAxis, CurveArrays]:
     """The curve with given knots, points and velocities, and how it counts times."""
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
@@ -125,20 +174,20 @@ def velocities_of(space: Space, points: Array, velocities: Any) -> Array:
 
 
 def fit_many(
-    curves: Iterable[tuple[ArrayLike | None, Any]],
-    space: Space | str,
+    curves: Iterable[tuple[ArrayLike | None, PointsLike]],
+    space: Space[P] | str,
     *,
-    bc_type: Any = "natural",
-    method: str = "auto",
+    bc_type: BCType = "natural",
+    method: Method = "auto",
     tol: float = 1e-12,
     max_iter: int | None = None,
-    extrapolate: bool | str | None = None,
-    on_failure: str = "raise",
+    extrapolate: Extrapolate = None,
+    on_failure: OnFailure = "raise",
     check: bool = True,
     atol: float | None = None,
     where: ArrayLike | None = None,
     progress: Progress | None = None,
-) -> list[CubicSpline]:
+) -> list[CubicSpline[P]]:
     """Fit curves of different lengths in one parallel call.
 
     Args:
@@ -160,7 +209,7 @@ def fit_many(
     space, check = space_named(space), checked_flag(check, "check")
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
-    pairs = list(curves)
+    pairs: list[tuple[ArrayLike | None, Any]] = list(curves)
     policy = checked_extrapolate(extrapolate)
     check_on_failure(on_failure)
     check_progress(progress)
@@ -188,7 +237,7 @@ def fit_many(
     )
     fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
-    fitted = [
+    fitted: list[CubicSpline[P]] = [
         CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)
         for i, ((clock, t, _), found) in enumerate(zip(knots, fits, strict=True))
     ]

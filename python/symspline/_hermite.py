@@ -18,9 +18,10 @@ from ._signs import warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+from ._typing import BCType, Extrapolate, File, P, PointsLike
 
 
-class HermiteSpline(Curve):
+class HermiteSpline(Curve[P]):
     """The cubic curve through points with given velocities there, such as measured ones.
 
     Between two points it is the same Bézier curve as that of a `CubicSpline`, whose control points follow from the
@@ -51,16 +52,16 @@ class HermiteSpline(Curve):
     _kind = "C¹ Hermite spline"
     _ends = "given velocities"
     _unconverged = 0
-    _bc_type = "natural"  # such curves are not closed
+    _bc_type: BCType = "natural"  # such curves are not closed
 
     def __init__(
         self,
         t: ArrayLike | None,
-        points: Any,
-        velocities: Any,
-        space: Space | str,
+        points: PointsLike,
+        velocities: ArrayLike,
+        space: Space[P] | str,
         *,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         atol: float | None = None,
     ) -> None:
         space = space_named(space)
@@ -101,9 +102,9 @@ class HermiteSpline(Curve):
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
 
-    def save(self, file: Any) -> None:
+    def save(self, file: File) -> None:
         """Write the curve to an NPZ file, which `symspline.load` reads back."""
         _archive.write(file, _archive.arrays_of(self, _archive.HERMITE))
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> HermiteSpline:
+    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return HermiteSpline._of(clock, t, curve, self._extrapolate)

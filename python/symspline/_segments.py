@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from ._smoothing.precision import read_precision
 from ._spaces import Array, Product, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import Moments, time_axis_of
+from ._typing import Duplicates, FitOptions, P, PointsLike, SmoothingOptions
 
 _DUPLICATES = ("raise", "first", "mean")
 # The mean of points near each other is found by a few steps, each of which leaves the third power of their distance.
@@ -28,27 +29,43 @@ _STEPS = 50
 
 @overload
 def fit_segments(
-    t: ArrayLike, points: Any, space: Space | str, *, max_gap: Any, smooth: Literal[True], **options: Any
-) -> list[SmoothingSpline]: ...
+    t: ArrayLike,
+    points: PointsLike,
+    space: Space[P] | str,
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[True],
+    **options: Unpack[SmoothingOptions],
+) -> list[SmoothingSpline[P, Any]]: ...
 
 
 @overload
 def fit_segments(
-    t: ArrayLike, points: Any, space: Space | str, *, max_gap: Any, smooth: bool = False, **options: Any
-) -> list[CubicSpline]: ...
+    t: ArrayLike,
+    points: PointsLike,
+    space: Space[P] | str,
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[False] = False,
+    **options: Unpack[FitOptions],
+) -> list[CubicSpline[P]]: ...
 
 
 def fit_segments(
     t: ArrayLike,
-    points: Any,
-    space: Space | str,
+    points: PointsLike,
+    space: Space[Any] | str,
     *,
-    max_gap: Any,
+    max_gap: float | timedelta | np.timedelta64,
     min_points: int = 2,
-    duplicates: str = "raise",
+    duplicates: Duplicates = "raise",
     smooth: bool = False,
     **options: Any,
-) -> list[CubicSpline] | list[SmoothingSpline]:
+) -> list[Any]:
     """Fit a recording that pauses: cut where neighbouring times are more than ``max_gap`` apart, one curve a piece.
 
     A curve drawn across a pause swings out far and looks plausible. What lies between the curves is not known.
@@ -159,7 +176,7 @@ class Cut(NamedTuple):
 def cut(
     t: ArrayLike,
     points: Any,
-    space: Space | str,
+    space: Space[Any] | str,
     max_gap: Any,
     min_points: int,
     duplicates: str,

@@ -24,7 +24,7 @@ IN_PYTHON = (
 
 
 def warn_of_signs(
-    space: Space, curves: Sequence[list[Points] | None], steps: Sequence[Any] | None = None
+    space: Space[Any], curves: Sequence[list[Points] | None], steps: Sequence[Any] | None = None
 ) -> None:
     """Warn once if neighbours on S³ are more than a quarter turn apart: as quaternions they are closer with the other
     sign, and the curve between them turns the long way round.

@@ -40,6 +40,7 @@ from ._pose_files import (
     write_tum,
 )
 from ._spaces import Array, Euclidean, SpecialEuclidean
+from ._typing import Extrapolate, Frame
 from .rotations import Spline, attitude, check_frame, turned
 
 __all__ = [
@@ -81,7 +82,7 @@ def imu(
     x: ArrayLike,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Imu:
     """Compute the signals of a gyroscope and an accelerometer at the origin of the body.
@@ -138,9 +139,9 @@ def imu(
 def twist(
     spline: Spline,
     x: ArrayLike,
-    frame: str = "body",
+    frame: Frame = "body",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the twist (ω, v), angular part first.
@@ -179,9 +180,9 @@ def twist(
 def linear_velocity(
     spline: Spline,
     x: ArrayLike,
-    frame: str = "world",
+    frame: Frame = "world",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the velocity ẋ of the position.
@@ -212,9 +213,9 @@ def linear_velocity(
 def linear_acceleration(
     spline: Spline,
     x: ArrayLike,
-    frame: str = "world",
+    frame: Frame = "world",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the acceleration ẍ of the position, without gravity.

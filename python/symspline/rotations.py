@@ -30,6 +30,7 @@ from ._curves.curve import CurveArrays, Doubles
 from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
 from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
+from ._typing import Extrapolate, Frame, RotationOrder
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
 from .convert._reading import length, real_numbers, refuse
@@ -68,7 +69,7 @@ _LIFTS: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
 
 
 def rotation(
-    spline: Spline, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
+    spline: Spline, x: ArrayLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Rotation:
     """Evaluate a curve as a SciPy ``Rotation``.
 
@@ -106,9 +107,9 @@ def rotation(
 def angular_velocity(
     spline: Spline,
     x: ArrayLike,
-    frame: str = "body",
+    frame: Frame = "body",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the angular velocity of a curve.
@@ -147,9 +148,9 @@ def angular_velocity(
 def angular_acceleration(
     spline: Spline,
     x: ArrayLike,
-    frame: str = "body",
+    frame: Frame = "body",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the angular acceleration of a curve, which is continuous.
@@ -185,7 +186,7 @@ def quaternion(
     x: ArrayLike,
     *,
     scalar_first: bool | None = None,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Evaluate a curve as unit quaternions without jumps of sign.
@@ -235,7 +236,7 @@ def quaternion(
     return q if first else np.roll(q, -1, axis=-1)
 
 
-def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: str = "body") -> Array:
+def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: Frame = "body") -> Array:
     """Convert angular velocities to tangent vectors at rotations.
 
     This is the inverse of `angular_velocity`. Use the result as velocities of a `symspline.HermiteSpline` or as end
@@ -484,7 +485,7 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
     return _SO3.exp(np.eye(3), _hat(real_numbers(vectors, "vectors", (3,))[0]))
 
 
-def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None) -> Array:
+def as_six_numbers(rotations: ArrayLike | Rotation, *, order: RotationOrder | None = None) -> Array:
     """Convert rotations to the six-number representation of machine learning.
 
     The representation consists of two columns, or rows, of the matrix. It is continuous over all rotations [1]_.
@@ -519,7 +520,7 @@ def as_six_numbers(rotations: ArrayLike | Rotation, *, order: str | None = None)
     return six.reshape(*r.shape[:-2], 6)
 
 
-def from_six_numbers(numbers: ArrayLike, *, order: str | None = None) -> Array:
+def from_six_numbers(numbers: ArrayLike, *, order: RotationOrder | None = None) -> Array:
     """Convert the six-number output of a neural network to rotations.
 
     The two vectors are orthonormalised by the Gram–Schmidt process ([1]_, equation 15).

@@ -82,7 +82,7 @@ def _check_number(name: str, value: Any) -> None:
 
 
 def check(
-    space: Space | str,
+    space: Space[Any] | str,
     *,
     point: ArrayLike | None = None,
     length: float | None = None,

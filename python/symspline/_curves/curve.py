@@ -31,7 +31,7 @@ class CurveArrays(ABC):
     """
 
     exact: float = EXACT
-    space: Space
+    space: Space[Any]
     times: Doubles
     points: Any
     velocities: Any
@@ -86,7 +86,7 @@ class CurveArrays(ABC):
         """How the curve moves with its data, see `symspline.CubicSpline.jvp`."""
 
     @abstractmethod
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         """The transpose, see `symspline.CubicSpline.vjp`."""
 
     @abstractmethod

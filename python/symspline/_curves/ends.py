@@ -86,7 +86,7 @@ def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
     return fixed[0], fixed[1]
 
 
-def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
+def picked(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:
     """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
     if isinstance(bc_type, str):
         return bc_type
@@ -111,7 +111,7 @@ def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
 # ---- in a product, where prescribed vectors are tuples ----
 
 
-def ends_in_factors(bc_type: Any, space: Space) -> list[Any]:
+def ends_in_factors(bc_type: Any, space: Space[Any]) -> list[Any]:
     """End conditions for each factor; those of a space that is no product are the only ones."""
     factors = factors_of(space)
     if isinstance(bc_type, str) or len(factors) == 1:

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from .._report import Report
+from .._typing import Number
 from .curve import CurveArrays, Doubles
 from .integrals import integrate
 
 
-def bending_energy(curve: CurveArrays, outside: str) -> Any:
+def bending_energy(curve: CurveArrays, outside: str) -> Number:
     """∫ |∇γ'|² dt, (1); shape of the batch axes."""
     # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
     times = curve.times
@@ -30,7 +31,7 @@ def alternative_energy(curve: CurveArrays, reports: list[Report], outside: str) 
     of one factor, if any has one."""
     if all(report.alternative_energy is None for report in reports):
         return None
-    energies = [bending_energy(part, outside) for part in curve.parts]
+    energies: list[Any] = [bending_energy(part, outside) for part in curve.parts]
     others = [
         sum(energies) - energy + report.alternative_energy
         for energy, report in zip(energies, reports, strict=True)

@@ -60,7 +60,7 @@ class FitProblem(NamedTuple):
         skip_invalid: whether curves with points off the space are masked instead of an error.
     """
 
-    space: Space
+    space: Space[Any]
     times: NDArray[np.float64]
     points: list[Points]
     ends: list[list[End] | None]
@@ -74,7 +74,7 @@ class ManyProblem(NamedTuple):
     """Single curves of different lengths to fit, with one entry per curve in ``times`` and ``points``, and otherwise as
     `FitProblem`."""
 
-    space: Space
+    space: Space[Any]
     times: list[NDArray[np.float64]]
     points: list[list[Points]]
     ends: list[list[End] | None]
@@ -101,7 +101,7 @@ def kind_of(space: Space) -> type[CoreCurve]:
     return known
 
 
-def read(points: Any, space: Space) -> list[Points]:
+def read(points: Any, space: Space[Any]) -> list[Points]:
     """Points as a user gives them, in every factor."""
     if not isinstance(space, Product):
         return [_read(space, points)]
@@ -129,7 +129,7 @@ def _read(space: Space, points: Any) -> Points:
     return Points(doubles, point_tol(array.dtype), lead[:-1], lead[-1])
 
 
-def read_ends(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[list[End] | None]:
+def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[list[End] | None]:
     """End conditions in every factor."""
     if not isinstance(space, Product):
         return [ends_of(bc_type, space, batch)]
@@ -138,7 +138,7 @@ def read_ends(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[list[E
 
 
 def curve_of(
-    space: Space, times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
+    space: Space[Any], times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
     """The curve with points and velocities, which are there for every factor.
 
@@ -237,7 +237,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
 
 
 def validated(
-    space: Space,
+    space: Space[Any],
     times: NDArray[np.float64],
     points: list[Points],
     ends: list[list[End] | None],
@@ -254,7 +254,7 @@ def validated(
 
 
 def hermite_data(
-    space: Space, times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
+    space: Space[Any], times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
 ) -> list[tuple[Array, Array]]:
     """Points on the space and tangent velocities in every factor, of curves whose control points are within reach.
 
@@ -313,7 +313,7 @@ def _sorted(faults: list[Fault]) -> list[Fault]:
     return sorted(faults, key=lambda fault: fault.curve)
 
 
-def _in_factors(space: Space, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
+def _in_factors(space: Space[Any], work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
     """What work gives in every factor for its value; errors say in which."""
     if not isinstance(space, Product):
         return [work(space, values[0])]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._spaces import Array
+from .._typing import FloatArray, P
 
 
 @dataclass(frozen=True)
-class Gradient:
+class Gradient(Generic[P]):
     """The gradient of a number with respect to what a spline is made of, see `symspline.CubicSpline.vjp`.
 
     Attributes:
@@ -22,9 +22,9 @@ class Gradient:
             where none was given.
     """
 
-    points: Any
-    t: Array
-    ends: tuple[Any, Any]
+    points: P
+    t: FloatArray
+    ends: tuple[P | None, P | None]
 
 
 class Places(NamedTuple):

@@ -27,18 +27,18 @@ def parts_of_factor(space: Space) -> tuple[Space, ...]:
     return (space,)
 
 
-def smoothed_spaces(space: Space) -> tuple[Space, ...]:
+def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
     """The spaces in which points are smoothed, each with its own λ: the factors, and for poses rotations and
     positions."""
     return tuple(part for factor in factors_of(space) for part in parts_of_factor(factor))
 
 
-def is_several(space: Space) -> bool:
+def is_several(space: Space[Any]) -> bool:
     """Whether numbers that belong to the noise are tuples."""
     return isinstance(space, Product) or len(smoothed_spaces(space)) > 1
 
 
-def grouped(space: Space, values: Iterable[_T]) -> list[list[_T]]:
+def grouped(space: Space[Any], values: Iterable[_T]) -> list[list[_T]]:
     """What belongs to the smoothed spaces, in lists for each factor."""
     rest = iter(values)
     return [list(islice(rest, len(parts_of_factor(factor)))) for factor in factors_of(space)]

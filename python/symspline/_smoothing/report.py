@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Number
 
 
 @dataclass(frozen=True)
@@ -27,15 +31,15 @@ class SmoothingReport:
         sigma: estimated standard deviation of the noise in a coordinate, for weight one.
     """
 
-    method: str
-    converged: Any
-    iterations: Any
-    step: Any
-    rate: Any
-    lam: Any
-    at_bound: Any
-    df: Any
-    sigma: Any
+    method: Literal["linearized", "newton"]
+    converged: bool | NDArray[np.bool_]
+    iterations: int | NDArray[np.int64]
+    step: Number
+    rate: Number
+    lam: Number
+    at_bound: bool | NDArray[np.bool_]
+    df: Number
+    sigma: Number
 
     def __str__(self) -> str:
         good = np.asarray(self.converged)
@@ -62,7 +66,7 @@ class SmoothingReport:
             np.array_equal(a, b, equal_nan=True) for a, b in zip(columns, others, strict=True)
         )
 
-    def map(self, function: Any) -> SmoothingReport:
+    def map(self, function: Callable[[Any], Any]) -> SmoothingReport:
         """The report with a function applied to the fields that are per curve."""
         method, *columns = vars(self).values()
         return SmoothingReport(method, *map(function, columns))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,13 +19,44 @@ from .._options import order_of
 from .._report import Report
 from .._spaces import Array, Product, Space, factors_of
 from .._time import TimeAxis
+from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P
 from .data import Doubles, SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
+from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noisy_arrays
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
 
-class SmoothingSpline(CubicSpline):
+    # The report: one, or on products and for poses one for each part.
+    R = TypeVar(
+        "R", bound=SmoothingReport | tuple[SmoothingReport, ...], covariant=True, default=SmoothingReport
+    )
+
+    class noise_property:
+        """A property with the type of a number for one report, and of a tuple of them for several."""
+
+        def __init__(self, get: Callable[[Any], Number | tuple[Number, ...]]) -> None: ...
+
+        @overload
+        def __get__(self, spline: SmoothingSpline[Any, SmoothingReport], owner: Any = None) -> Number: ...
+
+        @overload
+        def __get__(
+            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: Any = None
+        ) -> tuple[Number, ...]: ...
+
+        def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Any: ...
+
+else:
+    from typing import TypeVar
+
+    R = TypeVar("R", covariant=True)
+    noise_property = property
+
+
+class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     """A C² cubic spline near noisy data, made by `make_smoothing_spline` or `make_lsq_spline`.
 
     It has all that a `CubicSpline` has; its points are those of the smooth curve at its knots, and derivatives by
@@ -43,8 +75,8 @@ class SmoothingSpline(CubicSpline):
         clock: TimeAxis,
         t: Array,
         curve: CurveArrays,
-        bc_type: Any,
-        extrapolate: Any,
+        bc_type: BCType,
+        extrapolate: Extrapolate,
         reports: list[Report],
         noisy: SmoothingData,
         smoothed: list[Smoothed],
@@ -61,33 +93,37 @@ class SmoothingSpline(CubicSpline):
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
-    def report(self) -> Any:
+    def report(self) -> R:  # type: ignore[override]
         """How the smoothing went: a `SmoothingReport`, in a product one of every factor."""
-        return self._each([found.report for found in self._smoothed])
+        reports: R = self._each([found.report for found in self._smoothed])
+        return reports
 
-    @property
-    def lam(self) -> Any:
+    @noise_property
+    def lam(self) -> Number | tuple[Number, ...]:
         """λ."""
-        return self._each([found.report.lam for found in self._smoothed])
+        lam: Number | tuple[Number, ...] = self._each([found.report.lam for found in self._smoothed])
+        return lam
 
-    @property
-    def df(self) -> Any:
+    @noise_property
+    def df(self) -> Number | tuple[Number, ...]:
         """Degrees of freedom for each coordinate: 2 for a geodesic, the number of data for interpolation."""
-        return self._each([found.report.df for found in self._smoothed])
+        df: Number | tuple[Number, ...] = self._each([found.report.df for found in self._smoothed])
+        return df
 
-    @property
-    def sigma(self) -> Any:
+    @noise_property
+    def sigma(self) -> Number | tuple[Number, ...]:
         """Standard deviation of the noise in a coordinate of an orthonormal frame, for weight one: the one that was
         given, or estimated as the root of ``sum(weights * distance**2)/(dim * (N - df))``."""
-        return self._each([found.sigma for found in self._smoothed])
+        sigma: Number | tuple[Number, ...] = self._each([found.sigma for found in self._smoothed])
+        return sigma
 
     @property
-    def data(self) -> tuple[Array, Any]:
+    def data(self) -> tuple[AnyArray, P]:
         """The times and the points that were smoothed."""
         return self._noisy.t, self._in_factors(self._noisy.points)
 
     @property
-    def residuals(self) -> Any:
+    def residuals(self) -> P:
         """Vectors from the curve to the data, shape (..., N, *point_shape): the logarithm of a point at the curve,
         whose length is the distance. Data of weight zero have no residual, NaN."""
         noisy = self._noisy
@@ -103,7 +139,16 @@ class SmoothingSpline(CubicSpline):
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
             found.append(vectors)
-        return self._in_factors(found)
+        residuals: P = self._in_factors(found)
+        return residuals
+
+    @overload
+    def std(self: SmoothingSpline[Any, SmoothingReport], x: ArrayLike, *, nu: int = 0) -> FloatArray: ...
+
+    @overload
+    def std(
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: ArrayLike, *, nu: int = 0
+    ) -> tuple[FloatArray, ...]: ...
 
     def std(self, x: ArrayLike, *, nu: int = 0) -> Any:
         """Standard deviation of the curve at times x, for one coordinate of an orthonormal frame.
@@ -160,6 +205,16 @@ class SmoothingSpline(CubicSpline):
         spread: Doubles = sigma * np.sqrt(variance)
         return spread
 
+    @overload
+    def band(
+        self: SmoothingSpline[Any, SmoothingReport], x: ArrayLike, level: float = 0.95
+    ) -> FloatArray: ...
+
+    @overload
+    def band(
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: ArrayLike, level: float = 0.95
+    ) -> tuple[FloatArray, ...]: ...
+
     def band(self, x: ArrayLike, level: float = 0.95) -> Any:
         """Radius of the ball about the curve at times x that holds the true point with probability ``level``.
 
@@ -177,7 +232,8 @@ class SmoothingSpline(CubicSpline):
         number = isinstance(level, (int, float, np.integer, np.floating)) and not isinstance(level, bool)
         if not number or not 0 < level < 1:
             raise ValidationError(f"level must lie between 0 and 1, not {short_repr(level)}")
-        spreads = self.std(x)
+        whole: SmoothingSpline[Any, Any] = self
+        spreads = whole.std(x)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
             [
@@ -214,7 +270,7 @@ class SmoothingSpline(CubicSpline):
         good = np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)
         return int(np.size(good) - np.sum(good))
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> SmoothingSpline:
+    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(clock, t, curve, index)
         noisy = self._noisy
         own = noisy._replace(
@@ -228,7 +284,7 @@ class SmoothingSpline(CubicSpline):
         return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
 
     @property
-    def _parts(self) -> tuple[SmoothingSpline, ...]:
+    def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
         """The splines in the factors of a product."""
         noisy = self._noisy
         weighing = grouped(self.space, noisy.weighing)
@@ -239,7 +295,7 @@ class SmoothingSpline(CubicSpline):
         )
 
     @classmethod
-    def _like(cls, spline: CubicSpline, noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
+    def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """A spline through smooth points with what is known of the noise."""
         parts = (
             spline._clock,

@@ -25,7 +25,7 @@ _KINDS = {"converged": "b", "iterations": "i", "at_bound": "b"}
 _NUMBERS = ("step", "rate", "lam", "df", "sigma", "band_lam", "scale")
 
 
-def noisy_arrays(space: Space, noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
+def noisy_arrays(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
     """The arrays that a smoothing spline has more than another one."""
     arrays: dict[str, Any] = {
         "format": SMOOTHING,

@@ -7,16 +7,17 @@ import re
 from collections.abc import Callable, Mapping
 from functools import cached_property, wraps
 from inspect import signature
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import as_array, cast, short_repr, whole_number
 from .._core import Handle, ValidationError
+from .._typing import AnyArray, FloatArray, P
 from .tolerance import point_tol
 
-Array = NDArray[Any]
+Array = AnyArray
 
 # From this ambient dimension on nothing is made that needs a frame of all tangent vectors.
 LARGE = 256
@@ -27,7 +28,7 @@ _MOST = 2**40
 
 
 # The classes of all spaces by their names, products apart.
-CLASSES: dict[str, type[Space]] = {}
+CLASSES: dict[str, type[Space[Any]]] = {}
 # What a complex array may have been meant for.
 COMPLEX_TWINS = {
     "rp": "ComplexProjective",
@@ -39,7 +40,7 @@ COMPLEX_TWINS = {
 }
 
 
-class Space:
+class Space(Generic[P]):
     """A symmetric space. Every method works on arrays of points: leading axes broadcast.
 
     Tangent vectors are arrays of the point's shape. ``str(space)`` is the name that
@@ -54,6 +55,7 @@ class Space:
     _handle: Handle
     _parameters: tuple[int, ...]
     _complex: bool
+    _dtype: np.dtype[np.float64] | np.dtype[np.complex128]
     # Shape of one point's doubles, where a complex number is two.
     _doubles_shape: tuple[int, ...]
 
@@ -74,7 +76,7 @@ class Space:
         if max(self._parameters, default=0) >= _MOST or math.prod(self._point_shape) >= _MOST:
             raise ValidationError(f"{self!r} is too large: no memory holds a point of it")
         self._complex = self._handle.is_complex()
-        self._dtype = np.dtype(np.complex128 if self._complex else np.float64)
+        self._dtype = np.dtype(np.complex128) if self._complex else np.dtype(np.float64)
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
 
@@ -102,7 +104,7 @@ class Space:
         return self._handle.curvature()
 
     @property
-    def dtype(self) -> Any:
+    def dtype(self) -> np.dtype[np.float64] | np.dtype[np.complex128]:
         """Type of the numbers of a point: float64, or complex128."""
         return self._dtype
 
@@ -128,7 +130,7 @@ class Space:
 
     # ---- geometry ----
 
-    def exp(self, p: ArrayLike, v: ArrayLike) -> Array:
+    def exp(self, p: ArrayLike, v: ArrayLike) -> P:
         """The point reached from p in unit time on the geodesic with velocity v.
 
         Args:
@@ -141,7 +143,7 @@ class Space:
         """
         return self._finite("exp", p=p, v=v)
 
-    def log(self, p: ArrayLike, q: ArrayLike) -> Array:
+    def log(self, p: ArrayLike, q: ArrayLike) -> P:
         """The velocity at p of the geodesic that reaches q in unit time; inverse of `exp`.
 
         Raises:
@@ -149,7 +151,7 @@ class Space:
         """
         return self._finite("log", p=p, q=q)
 
-    def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> Array:
+    def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> P:
         """The geodesic from p (t = 0) to q (t = 1), the paper's [p, q]_t.
 
         ``t`` broadcasts against the leading axes of p and q.
@@ -162,15 +164,15 @@ class Space:
             raise ValidationError(f"t must be real numbers, not {times.dtype}")
         return self._finite("geodesic", t=cast(times), p=p, q=q)
 
-    def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
+    def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
         """Length of the shortest geodesic between p and q; shape of the leading axes."""
         return self._finite("distance", p=p, q=q)
 
-    def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> Array:
+    def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> P:
         """The transvection E_p(v) of (10), applied to the point x: it moves p to exp_p(v)."""
         return self._finite("transvection", p=p, v=v, x=x)
 
-    def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> Array:
+    def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> P:
         """Parallel transport of the tangent vector v from p to q along the geodesic between them.
 
         Raises:
@@ -178,7 +180,7 @@ class Space:
         """
         return self._finite("transport", p=p, q=q, v=v)
 
-    def symmetry(self, p: ArrayLike, x: ArrayLike) -> Array:
+    def symmetry(self, p: ArrayLike, x: ArrayLike) -> P:
         """Apply the geodesic symmetry at p to points x.
 
         The symmetry reverses every geodesic through p. It is computed without a logarithm, so that it is also
@@ -225,7 +227,7 @@ class Space:
         """
         return self._isometric("symmetry", self._reflected, p=p, x=x)
 
-    def act(self, g: Any, x: ArrayLike) -> Array:
+    def act(self, g: ArrayLike | tuple[Any, ...], x: ArrayLike) -> P:
         """Apply an element g of the group of the space to points x.
 
         Every element is an isometry, or on groups without a metric an automorphism of the connection: the spline
@@ -296,7 +298,7 @@ class Space:
             element = self._element(g)
         return self._isometric("act", lambda x: self._moved(element, x), x=x)
 
-    def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> Array:
+    def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> P:
         """Points that a formula makes of arrays of points, on the space to rounding."""
         arrays = {key: self._numbers(self._doubles(value, key)) for key, value in inputs.items()}
         self._leads({key: array.shape for key, array in arrays.items()})
@@ -311,7 +313,8 @@ class Space:
             raise ValidationError(
                 f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast"
             ) from None
-        return self._require_finite(name, result)
+        points: P = self._require_finite(name, result)
+        return points
 
     # What every kind of symmetric space has to define for `symmetry` and `act`: see `actions`.
 
@@ -328,24 +331,24 @@ class Space:
     def _not_symmetric(self, what: str) -> ValidationError:
         return ValidationError(f"{self!r} is not known to be symmetric: it has no {what}")
 
-    def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
+    def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> FloatArray:
         """Inner product of two tangent vectors at p; shape of the leading axes."""
         return self._finite("inner", p=p, u=u, v=v)
 
-    def norm(self, p: ArrayLike, v: ArrayLike) -> Array:
+    def norm(self, p: ArrayLike, v: ArrayLike) -> FloatArray:
         """Length of the tangent vector v at p; shape of the leading axes."""
-        result: Array = np.sqrt(np.maximum(self._finite("inner", p=p, v=v, again=v), 0.0))
+        result: FloatArray = np.sqrt(np.maximum(self._finite("inner", p=p, v=v, again=v), 0.0))
         return result
 
     # ---- membership ----
 
-    def project(self, x: ArrayLike) -> Array:
+    def project(self, x: ArrayLike) -> P:
         """A point of the space close to x, for x near the space.
 
         Raises:
             ValidationError: no point is close to x (a zero vector, or not finite).
         """
-        result = self._apply("project", x=x)
+        result: Any = self._apply("project", x=x)
         good = np.isfinite(result) & np.isfinite(cast(self._array(x, "x"), self.dtype))
         if not good.all():
             bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
@@ -356,13 +359,14 @@ class Space:
             self.check_point(result)
         except ValidationError as error:
             raise ValidationError(f"x cannot be projected; of what comes nearest, {error}") from None
-        return result
+        points: P = result
+        return points
 
-    def project_tangent(self, p: ArrayLike, v: ArrayLike) -> Array:
+    def project_tangent(self, p: ArrayLike, v: ArrayLike) -> P:
         """The tangential part of v at p."""
         return self._finite("project_tangent", p=p, v=v)
 
-    def rounding(self, p: ArrayLike) -> Any:
+    def rounding(self, p: ArrayLike) -> FloatArray:
         """By how much rounding counts at points p: how far apart neighbouring floating-point points are, in units of
         2.2e-16, shape of the leading axes. |p|² in hyperbolic space, tr p · tr p⁻¹ (about the condition) of positive
         definite matrices, the length of vectors and translations; 1 or more.
@@ -397,7 +401,7 @@ class Space:
                 f"off the space (allowed: {tol:.0e}); use space.project_tangent(p, v)"
             )
 
-    def frame(self, p: ArrayLike) -> Array:
+    def frame(self, p: ArrayLike) -> P:
         """Tangent vectors that span the tangent space at every one of the points p, shape (..., dim, *point_shape):
         orthonormal, where the space has a metric. There are many such frames; this one is no continuous function of p.
 
@@ -416,27 +420,29 @@ class Space:
 
     # ---- chance ----
 
-    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
+    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> P:
         """Random points, shape ``shape + point_shape``: uniform on a compact space."""
         if not isinstance(shape, (int, np.integer, tuple, list)):
             raise ValidationError(f"shape must be a whole number or a tuple of them, not {short_repr(shape)}")
         sizes = (shape,) if isinstance(shape, (int, np.integer)) else tuple(shape)
         noise = self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes))
-        return self._apply("scatter", x=self._scatter_scale * noise)
+        points: Any = self._apply("scatter", x=self._scatter_scale * noise)
+        result: P = points
+        return result
 
     @property
     def _scatter_scale(self) -> float:
         """What random points multiply standard normal numbers by."""
         return 1.0
 
-    def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
+    def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> P:
         """Standard normal tangent vectors at the points p."""
         noise = self._noise(rng, self._lead(self._doubles(p, "p")))
         if self._linear and self.point_shape[0] >= LARGE:
             return self._normal_tangent(p, noise)
         return self._finite("random_tangent", p=p, noise=noise)
 
-    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> P:
         """Standard normal tangent vectors, made of standard normal numbers without a frame at p."""
         return self.project_tangent(p, noise)
 
@@ -511,11 +517,22 @@ class Space:
             return result.reshape(lead)[()]
         return self._numbers(result.reshape(lead + self._doubles_shape))
 
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+    @overload
+    def _finite(
+        self,
+        operation: Literal["distance", "inner"],
+        t: NDArray[np.float64] | None = None,
+        **inputs: ArrayLike,
+    ) -> FloatArray: ...
+
+    @overload
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> P: ...
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         """The same, but with an error where it is not finite."""
         return self._require_finite(operation, self._apply(operation, t, **inputs))
 
-    def _require_finite(self, operation: str, result: Array) -> Array:
+    def _require_finite(self, operation: str, result: Array) -> Any:
         if not np.isfinite(result).all():
             axes = () if operation in _NUMBERS else self._point_axes(result)
             bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()
@@ -526,23 +543,24 @@ class Space:
         return result
 
     def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
         if hasattr(cls, "_name"):
             CLASSES[cls._name] = cls
             cls.__init__ = _taking_numbers(cls, cls.__init__)  # type: ignore[method-assign]
 
 
-def example_of(cls: type[Space]) -> str:
+def example_of(cls: type[Space[Any]]) -> str:
     """How one of a family of spaces is written."""
     numbers = {"gr": "2, 4", "cgr": "2, 4", "stiefel": "2, 4", "igr": "0, 1, 1, 2"}.get(cls._name, "2")
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 
-def _taking_numbers(cls: type[Space], init: Callable[..., None]) -> Callable[..., None]:
+def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callable[..., None]:
     """The constructor, whose error says which numbers are wanted where they are not given."""
     names = [*signature(init).parameters][1:]
 
     @wraps(init)
-    def checked(self: Space, *numbers: Any, **named: Any) -> None:
+    def checked(self: Space[Any], *numbers: Any, **named: Any) -> None:
         # Not asked beforehand, which would take longer than to make the space.
         try:
             init(self, *numbers, **named)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from .._typing import ComplexArray, FloatArray
 from .actions import Group
 from .base import Array
 from .disconnected import DisconnectedGroup
 
 
-class SpecialOrthogonal(Group):
+class SpecialOrthogonal(Group[FloatArray]):
     """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
     In SO(3) distance is the angle of the rotation from one to the other, and a SciPy ``Rotation`` of any shape,
     or a list of them, is taken wherever points are.
@@ -40,7 +41,7 @@ def _matrices(value: Any) -> Any:
     return value
 
 
-class Orthogonal(DisconnectedGroup, Group):
+class Orthogonal(DisconnectedGroup[FloatArray], Group[FloatArray]):
     """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
     of the two parts.
 
@@ -56,7 +57,7 @@ class Orthogonal(DisconnectedGroup, Group):
         super().__init__(n)
 
 
-class SpecialUnitary(Group):
+class SpecialUnitary(Group[ComplexArray]):
     """Unitary n × n matrices of determinant 1, with ⟨u, v⟩ = Re tr u*v.
 
     >>> import symspline as ss
@@ -71,7 +72,7 @@ class SpecialUnitary(Group):
         super().__init__(n)
 
 
-class Unitary(Group):
+class Unitary(Group[ComplexArray]):
     """Unitary n × n matrices, with ⟨u, v⟩ = Re tr u*v.
 
     >>> import symspline as ss
@@ -86,7 +87,7 @@ class Unitary(Group):
         super().__init__(n)
 
 
-class SpecialEuclidean(Group):
+class SpecialEuclidean(Group[FloatArray]):
     """Rigid motions of n = 2 or 3 dimensions, poses: homogeneous (n+1) × (n+1) matrices [[R, t], [0, 1]].
 
     Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._typing import FloatArray, P
 from .actions import Preserving, adjoint, matrices, preserves
 from .base import Array, Space
 
 
-class Indefinite(Space):
+class Indefinite(Space[P]):
     """A space with an invariant metric that is indefinite.
 
     Such a metric gives no lengths, so ``inner``, ``norm`` and ``distance`` do not use it. They are the Euclidean ones
@@ -20,7 +21,7 @@ class Indefinite(Space):
     Splines do not depend on them: they commute with every isometry of the indefinite metric.
     """
 
-    def invariant_form(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
+    def invariant_form(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> FloatArray:
         """Evaluate the invariant indefinite metric.
 
         Parameters
@@ -50,7 +51,7 @@ class Indefinite(Space):
         result = self._form(arrays["u"], arrays["v"])
         return np.broadcast_to(result, lead)[()].copy()
 
-    def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
+    def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
         """Return the size of ``log(p, q)``, by ``norm``; shape of the leading axes.
 
         Raises
@@ -64,7 +65,7 @@ class Indefinite(Space):
         raise NotImplementedError
 
 
-class DeSitter(Indefinite, Preserving):
+class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
     """De Sitter space dSⁿ, n ≥ 2: arrays (x₀, x₁, …, xₙ) with −x₀² + x₁² + … + xₙ² = 1, the time-like coordinate first.
 
     The metric ⟨u, v⟩ = −u₀v₀ + u₁v₁ + … + uₙvₙ has one negative square, the group of isometries is O(1, n), and the
@@ -93,7 +94,7 @@ class DeSitter(Indefinite, Preserving):
         return np.asarray((u[..., 1:] * v[..., 1:]).sum(axis=-1) - u[..., 0] * v[..., 0])
 
 
-class AntiDeSitter(Indefinite, Preserving):
+class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
     """Anti-de Sitter space AdSⁿ, n ≥ 2: arrays (x₀, x₁, …, xₙ) with −x₀² − x₁² + x₂² + … + xₙ² = −1, the two
     time-like coordinates first.
 
@@ -121,7 +122,7 @@ class AntiDeSitter(Indefinite, Preserving):
         return np.asarray((u[..., 2:] * v[..., 2:]).sum(axis=-1) - (u[..., :2] * v[..., :2]).sum(axis=-1))
 
 
-class IndefiniteGrassmannian(Indefinite):
+class IndefiniteGrassmannian(Indefinite[FloatArray]):
     """Subspaces of R^{p,q} on which the form has signature (a, b): O(p, q) / (O(a, b) × O(p − a, q − b)).
 
     Of both signatures the number of negative squares comes first: the form is −x₁² − … − x_p² + x_{p+1}² + …, and on a

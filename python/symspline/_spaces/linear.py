@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from .._typing import ComplexArray, FloatArray
 from .actions import Group
 from .disconnected import DisconnectedGroup
 
 
-class GeneralLinear(DisconnectedGroup, Group):
+class GeneralLinear(DisconnectedGroup[FloatArray], Group[FloatArray]):
     """GL(n), invertible real matrices, with the symmetries x ↦ p x⁻¹ p.
 
     Geodesics are p exp(tΩ), and ``log(p, q) = p log(p⁻¹q)`` with the principal logarithm, which exists while no
@@ -26,7 +27,7 @@ class GeneralLinear(DisconnectedGroup, Group):
         super().__init__(n)
 
 
-class ComplexGeneralLinear(Group):
+class ComplexGeneralLinear(Group[ComplexArray]):
     """GL(n, C), invertible complex matrices; see `GeneralLinear`.
 
     >>> import symspline as ss
@@ -40,7 +41,7 @@ class ComplexGeneralLinear(Group):
         super().__init__(n)
 
 
-class Affine(DisconnectedGroup, Group):
+class Affine(DisconnectedGroup[FloatArray], Group[FloatArray]):
     """Affine maps x ↦ Ax + b of n dimensions as matrices (A, b; 0, 1); see `GeneralLinear`.
 
     >>> import symspline as ss
@@ -54,7 +55,7 @@ class Affine(DisconnectedGroup, Group):
         super().__init__(n)
 
 
-class Similarity(Group):
+class Similarity(Group[FloatArray]):
     """Similarities x ↦ sRx + b, with a rotation R and s > 0, as matrices (sR, b; 0, 1): poses whose scale
     drifts. See `GeneralLinear`.
 
@@ -69,7 +70,7 @@ class Similarity(Group):
         super().__init__(n)
 
 
-class SpecialLinear(Group):
+class SpecialLinear(Group[FloatArray]):
     """SL(n), real matrices of determinant one: homographies of the plane for n = 3. See `GeneralLinear`.
 
     >>> import symspline as ss
@@ -83,7 +84,7 @@ class SpecialLinear(Group):
         super().__init__(n)
 
 
-class Symplectic(Group):
+class Symplectic(Group[FloatArray]):
     """Sp(n, R), real n × n matrices with XᵀJX = J for J = (0, 1; -1, 0), n even: linear canonical transformations of
     n/2 positions and n/2 momenta. See `GeneralLinear`.
 
@@ -98,7 +99,7 @@ class Symplectic(Group):
         super().__init__(n)
 
 
-class Lorentz(Group):
+class Lorentz(Group[FloatArray]):
     """The Lorentz group of n dimensions of space, SO⁺(1, n): (1 + n) × (1 + n) matrices that preserve -t² + x², the
     orientation and the direction of time, which is the first coordinate. See `GeneralLinear`.
 

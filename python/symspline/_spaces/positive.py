@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._core import ValidationError
+from .._typing import ComplexArray, FloatArray, P
 from .actions import Congruent, preserves, require
 from .base import Array
 
@@ -16,7 +17,7 @@ from .base import Array
 _FREE_SIZE = 20
 
 
-class _PositiveDefinite(Congruent):
+class _PositiveDefinite(Congruent[P]):
     """Matrices whose random points are exponentials."""
 
     @property
@@ -24,7 +25,7 @@ class _PositiveDefinite(Congruent):
         return min(1.0, math.sqrt(_FREE_SIZE / self.point_shape[0]))
 
 
-class SymmetricPositiveDefinite(_PositiveDefinite):
+class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
     """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
     covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
 
@@ -40,7 +41,7 @@ class SymmetricPositiveDefinite(_PositiveDefinite):
         super().__init__(n)
 
 
-class SpecialPositiveDefinite(_PositiveDefinite):
+class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):
     """Symmetric positive definite n × n matrices of determinant 1, SL(n)/SO(n): the shape of a tensor without its
     size. A totally geodesic part of `SymmetricPositiveDefinite`, with its metric.
 
@@ -60,7 +61,7 @@ class SpecialPositiveDefinite(_PositiveDefinite):
         require(self, defects, tol, "|det g| − 1", "Divide g by abs(numpy.linalg.det(g)) ** (1 / n).")
 
 
-class HermitianPositiveDefinite(_PositiveDefinite):
+class HermitianPositiveDefinite(_PositiveDefinite[ComplexArray]):
     """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
 
     >>> import symspline as ss
@@ -74,7 +75,7 @@ class HermitianPositiveDefinite(_PositiveDefinite):
         super().__init__(n)
 
 
-class Siegel(_PositiveDefinite):
+class Siegel(_PositiveDefinite[FloatArray]):
     """Siegel's upper half space Sp(2n, R)/U(n) of complex symmetric n × n matrices X + iY with positive definite Y:
     points are the symplectic positive definite matrices (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) of 2n rows, which
     `symspline.convert.siegel_to_positive_definite` makes. A totally geodesic part of `SymmetricPositiveDefinite`,

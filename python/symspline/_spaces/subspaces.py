@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
+from .._typing import ComplexArray, FloatArray, P
 from .actions import Preserving, largest, require
 from .base import LARGE, Array
 from .tolerance import point_tol
@@ -17,7 +18,7 @@ from .tolerance import point_tol
 _NEAR = 1e-4
 
 
-class _Projective(Preserving):
+class _Projective(Preserving[P]):
     """Lines, of which people also hold the projectors."""
 
     # The space of positive definite matrices of the same numbers.
@@ -60,7 +61,7 @@ def _is_density(x: Array) -> bool:
         )
 
 
-class RealProjective(_Projective):
+class RealProjective(_Projective[FloatArray]):
     """Real projective space RPⁿ, lines through the origin of Rⁿ⁺¹: points are unit vectors of n + 1
     numbers, of which x and −x are the same point. Distance is the angle between lines, at most π/2.
 
@@ -77,7 +78,7 @@ class RealProjective(_Projective):
         super().__init__(n)
 
 
-class ComplexProjective(_Projective):
+class ComplexProjective(_Projective[ComplexArray]):
     """Complex projective space CPⁿ, pure quantum states of n + 1 levels: points are complex unit vectors
     of n + 1 numbers up to a phase, with the Fubini–Study metric: distance is arccos |⟨p, q⟩|.
 
@@ -97,7 +98,7 @@ class ComplexProjective(_Projective):
         super().__init__(n)
 
 
-class ComplexHyperbolic(Preserving):
+class ComplexHyperbolic(Preserving[ComplexArray]):
     """Complex hyperbolic space CHⁿ: points are complex arrays (z₀, z₁, …, zₙ) with
     −|z₀|² + |z₁|² + … + |zₙ|² = −1 up to a phase, with the metric of curvature −4 along complex lines:
     distance is arcosh |⟨p, q⟩|.
@@ -116,12 +117,12 @@ class ComplexHyperbolic(Preserving):
         super().__init__(n)
 
 
-class _Subspaces(Preserving):
+class _Subspaces(Preserving[P]):
     """Subspaces. What joins two of them lies in their span, where large ones cost less."""
 
     _linear = True
 
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         k, n = self._parameters
         if operation not in ("exp", "log", "geodesic", "distance") or n < LARGE or n <= 2 * k:
             return super()._finite(operation, t, **inputs)
@@ -142,7 +143,7 @@ class _Subspaces(Preserving):
         return result if operation == "distance" else p @ result[..., :k, :] + basis @ result[..., k:, :]
 
 
-class Grassmannian(_Subspaces):
+class Grassmannian(_Subspaces[FloatArray]):
     """The Grassmannian Gr(k, n), k-dimensional subspaces of Rⁿ: points are n × k matrices with
     orthonormal columns, any basis of the subspace. Distance is √(Σ θᵢ²) of the principal angles.
 
@@ -157,7 +158,7 @@ class Grassmannian(_Subspaces):
         super().__init__(k, n)
 
 
-class ComplexGrassmannian(_Subspaces):
+class ComplexGrassmannian(_Subspaces[ComplexArray]):
     """The complex Grassmannian, k-dimensional subspaces of Cⁿ: points are complex n × k matrices with
     orthonormal columns, any basis of the subspace.
 
@@ -172,7 +173,7 @@ class ComplexGrassmannian(_Subspaces):
         super().__init__(k, n)
 
 
-class QuaternionicProjective(Preserving):
+class QuaternionicProjective(Preserving[ComplexArray]):
     """Quaternionic projective space HPⁿ, lines of n + 1 quaternions: points are the planes of C²ⁿ⁺² that such lines
     become, any basis of one, a complex (2n + 2) × 2 matrix with orthonormal columns, which
     `symspline.convert.quaternions_to_subspace` makes. A totally geodesic part of `ComplexGrassmannian`, with its

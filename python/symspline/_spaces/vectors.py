@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._typing import FloatArray
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
 
 
-class Euclidean(Space):
+class Euclidean(Space[FloatArray]):
     """Flat space Rⁿ: points are arrays of n numbers, splines the classical ones.
 
     >>> import symspline as ss
@@ -34,7 +35,7 @@ class Euclidean(Space):
         return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
 
 
-class Sphere(Preserving):
+class Sphere(Preserving[FloatArray]):
     """The unit sphere Sⁿ: points are unit vectors of n + 1 numbers.
 
     S² are directions or places on a globe, S³ unit quaternions: q and −q are two points here, and for curves of
@@ -52,7 +53,7 @@ class Sphere(Preserving):
         super().__init__(n)
 
 
-class Hyperbolic(Preserving):
+class Hyperbolic(Preserving[FloatArray]):
     """Hyperbolic space Hⁿ: points are arrays (x₀, x₁, …, xₙ) on the hyperboloid
     −x₀² + x₁² + … + xₙ² = −1 with x₀ > 0, the time-like coordinate first. Rounding errors of a point p are ε|p|²;
     curves are made as far as distance 15 from (1, 0, …), where they are 10⁻³.
@@ -75,7 +76,7 @@ class Hyperbolic(Preserving):
         require(self, -g[..., 0, 0], 0.0, "−g[0, 0]", "Pass −g, which keeps the sheet x₀ > 0.")
         return g
 
-    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> FloatArray:
         # Only at the middle is the metric that of the ambient numbers.
         middle = np.eye(1, self.point_shape[0])[0]
         noise[..., 0] = 0.0

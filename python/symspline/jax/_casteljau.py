@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +17,19 @@ from ._registry import QUOTIENTS, model_of
 from ._spectral import adjoint
 
 
-def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0) -> Any:
+@overload
+def evaluate(
+    t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0
+) -> jax.Array: ...
+
+
+@overload
+def evaluate(
+    t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0
+) -> tuple[jax.Array, ...]: ...
+
+
+def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
     """Evaluate curves with given knots, points and velocities, in JAX alone.
 
     This is `symspline.evaluate` written in JAX. It runs on the device of JAX and has derivatives of any order, in

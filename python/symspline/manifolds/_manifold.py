@@ -208,7 +208,7 @@ def _radius(value: Any) -> float:
     return float(value)
 
 
-def refuse_functions(space: Space, what: str, named: bool = False) -> None:
+def refuse_functions(space: Space[Any], what: str, named: bool = False) -> None:
     """Raise ValidationError if the space, or a factor of it, is a manifold that is made of functions, on which there is
     no such thing; ``named`` ones, which the library makes by their names, may be let through."""
     for factor in factors_of(space):

@@ -11,12 +11,11 @@ from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._options import order_of
 from .._spaces import ComplexGrassmannian, ComplexProjective, Space, SpecialUnitary, Unitary
+from .._typing import Extrapolate
 from ..convert._reading import Array, adjoint
 
 
-def hamiltonian(
-    spline: CubicSpline, x: ArrayLike, *, nu: int = 0, extrapolate: bool | str | None = None
-) -> Array:
+def hamiltonian(spline: CubicSpline, x: ArrayLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
     """Compute the Hamiltonian that drives states along a curve, or its derivative.
 
     Parameters

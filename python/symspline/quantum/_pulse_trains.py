@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,11 @@ from ._generators import generator, hamiltonian, quantum_space
 
 
 def pulses(
-    spline: CubicSpline, edges: ArrayLike, *, kind: str = "exact", operators: ArrayLike | None = None
+    spline: CubicSpline,
+    edges: ArrayLike,
+    *,
+    kind: Literal["exact", "midpoint"] = "exact",
+    operators: ArrayLike | None = None,
 ) -> Array:
     """Compute piecewise constant Hamiltonians that steer along a curve.
 
