@@ -222,7 +222,7 @@ def _families():
     try:
         ss.space("unknown:1")
     except ss.ValidationError as error:
-        listed = re.search(r"known are (.*), e\.g\.", str(error))[1]
+        listed = re.search(r"known names are (.*), as in", str(error))[1]
     return [row.split(" or ") for row in listed.split(", ") if not row.startswith("stiefel")]
 
 

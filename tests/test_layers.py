@@ -28,7 +28,7 @@ LAYERS = [
     ["_spaces"],
     ["manifolds"],
     ["_curves"],
-    ["_errors", "_far", "_options", "_plotting", "_signs"],
+    ["_errors", "_options", "_plotting", "_representatives"],
     ["_base_curve", "_bspline"],
     ["_archive"],
     ["_cubic"],

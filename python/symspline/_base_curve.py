@@ -1,4 +1,4 @@
-"""Curves made of Bézier segments between knots: what they have whatever their velocities come from."""
+"""The base class of curves made of Bézier segments between knots."""
 
 from __future__ import annotations
 
@@ -29,48 +29,66 @@ from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Per inch, in notebooks.
+# Resolution of pictures in notebooks, in dots per inch.
 _DOTS = 60
 
 
 class Curve(ABC, Generic[P]):
-    """A curve, or a batch of them, by knots, points and velocities there."""
+    """Base class of curves that are given by knots, points and velocities.
 
-    # What a plot says of it.
+    A curve object holds a single curve or a batch. The classes of curves differ in the origin of the velocities.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points by a C² curve.
+    HermiteSpline : Interpolate points and given velocities.
+    SmoothingSpline : Result of a smoothing fit.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
+    >>> isinstance(quarter, ss.Curve), quarter.space
+    (True, Sphere(2))
+    """
+
+    # Title of plots.
     _kind: ClassVar[str]
 
     @property
     @abstractmethod
     def _ends(self) -> str:
-        """Conditions at the ends, in words."""
+        """End conditions, as the title of a plot names them."""
 
     @property
     def _made_of(self) -> str:
-        """What a plot says of the data."""
+        """Description of the data, for the title of a plot."""
         return f"{self._t.shape[-1]} points{' each' if self._batch else ''}, {self._ends}"
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand | None:
-        """Noisy data near one curve of a batch, with bands at times x of the core; None where the given points are
-        on the curve."""
+        """Return the noisy data of one curve of a batch, with uncertainty bands at times x of the core.
+
+        Curves that pass through their points have none and return None.
+        """
         return None
 
     @property
     @abstractmethod
     def _unconverged(self) -> int:
-        """How many curves are none."""
+        """Number of curves that failed."""
 
     _clock: TimeAxis
     _t: Array
     _curve: CurveArrays
     _extrapolate: Extrapolate
-    # What happens outside the knots, as the core calls it.
+    # Extrapolation policy, by its name in the core.
     _outside: str
-    # Conditions at the ends, which say whether curves are closed.
+    # End conditions, which determine whether curves are closed.
     _bc_type: BCType
 
     @abstractmethod
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
-        """Some of the curves of a batch."""
+        """Return the curves that an index selects from the batch."""
 
     # ---- the curve ----
 
@@ -134,32 +152,47 @@ class Curve(ABC, Generic[P]):
         progress: Progress | None = None,
         out: AnyArray | AnyArrays | None = None,
     ) -> Any:
-        """The curve at times x.
+        """Evaluate the curve or its derivatives.
 
-        Args:
-            x: times, any shape and order; dates if the knots are. If those had a time zone, dates here have one, any,
-                or are ``datetime64`` in UTC; if they had none, neither have these.
-            nu: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
-            extrapolate: as for the constructor, whose choice holds if None.
-            per_curve: whether the leading axes of x are the batch axes: every curve has its own times.
-            dtype: ``"float32"`` for results in single precision, of complex points in complex64; they are computed in
-                double precision.
-            progress: called from time to time with the finished and the total number of points to compute.
-            out: an array of the result's shape, for a product a tuple of them, that takes the result and is
-                returned. One of another type than the space's, or with gaps in memory, costs a copy.
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape and in any order. If the knots are dates, times must be dates as well. If the knots had
+            a time zone, pass times with any time zone, or ``datetime64`` in UTC; otherwise pass times without one.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+        extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+            Extrapolation policy for this call. None means the policy of the curve.
+        per_curve : bool, default False
+            True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
+        dtype : {"float32", "float64"}, optional
+            Precision of the result; ``"float32"`` gives complex64 on complex spaces. The computation is always in
+            double precision.
+        progress : callable, optional
+            Function that is called from time to time with the finished and the total number of points.
+        out : ndarray or tuple of ndarray, optional
+            Array into which the result is written, and which is returned. For a `Product`, a tuple with one array per
+            factor. An array that is not contiguous, or not of the type of the space, requires an additional copy.
 
-        Returns:
-            Shape batch axes + x.shape + point_shape (x.shape without its batch axes if ``per_curve``).
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            Points or tangent vectors, shape ``(*batch axes, *x.shape, *point_shape)``. With `per_curve`, the batch
+            axes appear only once. For a `Product`, a tuple with one array per factor.
 
-        Raises:
-            ValidationError: a time is not finite, or outside the knots and ``extrapolate`` is None; ``out`` is no
-                array that can take the result, or ``dtype`` is given beside it.
+        Raises
+        ------
+        ValidationError
+            If a time is not finite, if a time lies outside the knots and the policy does not allow it, if `out` cannot
+            hold the result, or if both `out` and `dtype` are given.
         """
         if progress is not None:
             check_progress(progress)
         single = dtype is not None and is_single(dtype)
         if out is not None and dtype is not None:
-            raise ValidationError("give dtype or out, not both: results have the type of out")
+            raise ValidationError(
+                "dtype and out are both given. Pass one of them; the result has the type of out."
+            )
         values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress, out)
         return in_single(values) if single else values
 
@@ -173,31 +206,51 @@ class Curve(ABC, Generic[P]):
         per_curve: bool = False,
         progress: Progress | None = None,
     ) -> P:
-        """The curve at times x by arrays that move continuously: the horizontal lift.
+        """Evaluate the horizontal lift of the curve, a continuous choice of representatives.
 
-        A point of a projective space or a Grassmannian is an array up to a unitary factor on its right, a phase, a
-        sign or a change of the basis. A call picks one by itself, which jumps at knots. The horizontal lift X is
-        continuous, and turns no more than its subspace does: X*X' = 0. It depends neither on the representatives of
-        the data nor on the other times that are asked for. Where points have one array only it is the curve itself.
+        On projective spaces and Grassmannians, several arrays represent one point: they differ by a sign, a phase or a
+        change of basis. Calling the curve returns representatives that may jump at knots. The lift returns
+        representatives that move continuously. On all other spaces the lift is the curve itself.
 
-        Args:
-            x: times, any shape and order, as in a call.
-            start: a representative of the first point, at which the lift starts, shape point_shape or batch axes +
-                point_shape; None for the first point as it was given. For a product a tuple with one or None for
-                every factor.
-            nu: 0 for representatives, 1 for the velocity γ', 2 for the covariant acceleration ∇γ' there. With ``nu=1``
-                these are the derivatives of the arrays.
-            extrapolate, per_curve, progress: as in a call. A closed curve may come back as another representative,
-                by its *holonomy* (on CP¹ the phase of half the enclosed area, Berry's phase); beyond the knots the
-                lift goes on with that.
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape and in any order, as in a call of the curve.
+        start : array_like, optional
+            Representative of the first point at which the lift starts, with the shape of a point or with batch axes in
+            front. By default, the first point as it was given. For a `Product`, a tuple with one array or None per
+            factor.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative: 0 for representatives, 1 for the velocity γ', 2 for the covariant acceleration
+            ∇γ'. Velocities are the derivatives of the representatives.
+        extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+            Extrapolation policy for this call. None means the policy of the curve.
+        per_curve : bool, default False
+            True if every curve of a batch has its own times.
+        progress : callable, optional
+            Function that is called from time to time with the finished and the total number of points.
 
-        Returns:
-            Shape batch axes + x.shape + point_shape.
+        Returns
+        -------
+        ndarray or tuple of ndarray
+            Representatives or tangent vectors, shape ``(*batch axes, *x.shape, *point_shape)``.
 
-        Raises:
-            ValidationError: as in a call, and where ``start`` does not represent the first point.
+        Raises
+        ------
+        ValidationError
+            If `x` is invalid, as in a call of the curve, or if `start` does not represent the first point.
 
-        >>> import numpy as np
+        Notes
+        -----
+        The lift X of a curve of subspaces satisfies :math:`X^* X' = 0`: the basis turns no more than its subspace. It
+        depends neither on the representatives of the data nor on the other times in `x`.
+
+        A closed curve may return to its first point with another representative. The difference is its holonomy; on
+        CP¹ it is the phase of half the enclosed area (Berry's phase). With ``extrapolate="periodic"`` the lift
+        continues from that representative.
+
+        Examples
+        --------
         >>> import symspline as ss
         >>> spline = ss.CubicSpline(None, [[1, 0], [0.6, 0.8], [-0.28, -0.96]], "rp:1")
         >>> spline.lift(2.0).round(12)  # the data have the other sign
@@ -211,34 +264,58 @@ class Curve(ABC, Generic[P]):
             self._clock,
             x,
             per_curve,
-            lambda curve, x, per_curve: curve.lift(x, quantity, where, per_curve, start, progress),
+            where,
+            lambda curve, x, per_curve, where: curve.lift(x, quantity, where, per_curve, start, progress),
         )
         return values
 
     def transport(self, x0: ArrayLike, x1: ArrayLike, v: ArrayLike) -> P:
-        """Parallel transport of tangent vectors along the curve, (26a) of the paper.
+        r"""Transport tangent vectors in parallel along the curve.
 
-        Args:
-            x0, x1: from when to when, two times between the first and the last knot, in any order. A closed curve is
-                gone round as often as times beyond its knots say.
-            v: a tangent vector at ``spline(x0)``, shape point_shape, or one for every curve, batch axes + point_shape;
-                for a product a tuple.
+        Parameters
+        ----------
+        x0, x1 : float or datetime64
+            Start and end of the transport, in any order. Both must lie between the first and the last knot, unless the
+            curve is periodic; the transport then follows the curve around as often as the times require.
+        v : array_like, shape point_shape or ``(*batch axes, *point_shape)``
+            Tangent vectors at ``spline(x0)``. For a `Product`, a tuple with one array per factor.
 
-        Returns:
-            Tangent vectors at ``spline(x1)``, shape batch axes + point_shape. On quotient spaces vectors belong to the
-            representatives that the two calls give.
+        Returns
+        -------
+        ndarray or tuple of ndarray, shape ``(*batch axes, *point_shape)``
+            Tangent vectors at ``spline(x1)``. On quotient spaces, vectors refer to the representatives that
+            ``spline(x0)`` and ``spline(x1)`` return.
 
-        Raises:
-            ValidationError: a time is outside the knots, or v is not tangent at ``spline(x0)``.
+        Raises
+        ------
+        ValidationError
+            If a time lies outside the knots, or if v is not tangent at ``spline(x0)``.
+
+        See Also
+        --------
+        Space.transport : Transport a tangent vector along a geodesic.
+
+        Notes
+        -----
+        The transported vector V satisfies :math:`\nabla_{\gamma'} V = 0` for the invariant connection (26a).
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (26a).
+
+        Examples
+        --------
+        A vector with a component along the curve and one across it:
 
         >>> import symspline as ss
         >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
-        >>> quarter.transport(0, 1, [0.0, 1.0, 2.0]).round(12) + 0.0  # a vector ahead, and one across
+        >>> quarter.transport(0, 1, [0.0, 1.0, 2.0]).round(12) + 0.0
         array([-1.,  0.,  2.])
         """
         ends = [as_array(times_of(x, name)[0], name) for name, x in (("x0", x0), ("x1", x1))]
         if any(end.ndim for end in ends):
-            raise ValidationError("x0 and x1 must be single times, from when to when")
+            raise ValidationError("x0 and x1 must be single times, the start and the end of the transport")
         pair = (
             times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
         )
@@ -248,13 +325,15 @@ class Curve(ABC, Generic[P]):
             at = evaluated(self._curve, self._clock, pair, "point", where, False, None)
         except ValidationError as error:
             what = str(error).partition("; pass extrapolate")[0]
-            raise ValidationError(f"{what}; vectors are carried between the knots, x is (x0, x1)") from None
+            raise ValidationError(
+                f"{what}; vectors are transported between the first and the last knot only, and x is (x0, x1)"
+            ) from None
         vectors = []
         for points, part, one in zip(
             parts_of(at, self.space, "points"), self._curve.parts, parts_of(v, self.space, "v"), strict=True
         ):
             first = np.take(points, 0, axis=len(self._batch))
-            # Of curves that were not found there is nothing to check.
+            # Curves that failed are NaN, and their vectors are not checked.
             good = np.isfinite(first).all(axis=tuple(range(-len(part.space.point_shape), 0)))
             given = part.space._array(one, "v")
             part.space._doubles(given, "v")
@@ -267,7 +346,7 @@ class Curve(ABC, Generic[P]):
             part.space.check_tangent(first[good], given[good])
             vectors.append(given)
         if own:
-            # Curves that count time from first knots of their own are carried along one by one.
+            # Curves that count time from their own first knots are processed one by one.
             product = isinstance(self.space, Product)
             each: list[Any] = [
                 self[i].transport(x0, x1, tuple(v[i] for v in vectors) if product else vectors[0][i])
@@ -288,7 +367,36 @@ class Curve(ABC, Generic[P]):
         per_curve: bool = False,
         dtype: DTypeLike | None = None,
     ) -> FloatArray:
-        """|γ'| at times x, shape batch axes + x.shape; options are those of a call."""
+        """Compute the speed of the curve.
+
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape and in any order, as in a call of the curve.
+        extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+            Extrapolation policy for this call. None means the policy of the curve.
+        per_curve : bool, default False
+            True if every curve of a batch has its own times.
+        dtype : {"float32", "float64"}, optional
+            Precision of the result.
+
+        Returns
+        -------
+        ndarray or float, shape ``(*batch axes, *x.shape)``
+            The norm of the velocity γ'.
+
+        Raises
+        ------
+        ValidationError
+            If `x` is invalid, as in a call of the curve.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> line = ss.CubicSpline([0, 2], [[0.0], [3.0]], "r:1")
+        >>> line.speed([0.5, 1.0])
+        array([1.5, 1.5])
+        """
         single = dtype is not None and is_single(dtype)
         values = self._at(x, "speed", extrapolate, per_curve)
         speeds: FloatArray = (in_single(values) if single else values)[()]
@@ -308,57 +416,94 @@ class Curve(ABC, Generic[P]):
         )
 
     def _where(self, extrapolate: Any) -> str:
-        """What happens outside the knots, as the core calls it."""
+        """Return the core's name of the extrapolation policy."""
         return (
             self._outside if extrapolate is None else outside(checked_extrapolate(extrapolate), self._bc_type)
         )
 
     def length(self) -> Number:
-        """Length of the curve from first to last knot, ∫ |γ'| dt; shape of the batch axes."""
+        r"""Compute the length of the curve from the first to the last knot.
+
+        Returns
+        -------
+        ndarray or float, shape ``batch axes``
+            The integral of the speed, :math:`\int \lVert\gamma'\rVert \, dt`.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
+        >>> round(float(quarter.length()), 8)
+        1.57079633
+        """
         curve = self._curve
         return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", self._outside, True), curve.batch, curve.exact
+            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
         )
 
     def bending_energy(self) -> Number:
-        """∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise; shape of the batch axes."""
-        return bending_energy(self._curve, self._outside)
+        r"""Compute the bending energy of the curve.
 
-    # ---- what it is made of ----
+        Returns
+        -------
+        ndarray or float, shape ``batch axes``
+            The integral of the squared covariant acceleration.
+
+        Notes
+        -----
+        The bending energy is :math:`\int \lVert\nabla_{\gamma'}\gamma'\rVert^2 \, dt`, equation (1) of the paper.
+        Riemannian cubics minimise it.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (1).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> wave = ss.CubicSpline(None, [[0.0], [1.0], [0.0]], "r:1")
+        >>> round(float(wave.bending_energy()), 8)
+        6.0
+        """
+        return bending_energy(self._curve)
+
+    # ---- data ----
 
     @property
     def t(self) -> Array:
-        """The knots, shape (N+1,) or (..., N+1); numbers or ``datetime64`` as they were given. Times with a time zone
-        are in UTC here, as ``datetime64`` has no zone."""
+        """Knots as numbers or ``datetime64``, shape (n,) or (..., n); dates with a time zone are in UTC."""
         return read_only(self._t)
 
     @property
     def points(self) -> P:
-        """The points, shape (..., N+1, *point_shape)."""
+        """Points at the knots, shape (..., n, *point_shape)."""
         points: P = self._curve.points
         return points
 
     @property
     def velocities(self) -> P:
-        """Velocities γ' at the knots, the shape of the points. Together with knots and points they are
-        the whole curve."""
+        """Velocities γ' at the knots, with the shape of the points.
+
+        Knots, points and velocities determine the curve.
+        """
         velocities: P = self._curve.velocities
         return velocities
 
     @property
     def control_points(self) -> P:
-        """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
+        """Control points of the Bézier segments, shape (..., n - 1, 4, *point_shape)."""
         control_points: P = self._curve.control_points()
         return control_points
 
     @property
     def space(self) -> Space[P]:
-        """The space."""
+        """Space of the curve."""
         return self._curve.space
 
     @property
     def extrapolate(self) -> Extrapolate:
-        """What happens outside the knots, as it was given."""
+        """Extrapolation policy, as passed to the constructor."""
         return self._extrapolate
 
     @property
@@ -367,10 +512,10 @@ class Curve(ABC, Generic[P]):
 
     @property
     def _times(self) -> NDArray[np.float64]:
-        """The knots as the core counts them."""
+        """Knots as the core counts them."""
         return self._curve.times
 
-    # ---- a batch as a sequence ----
+    # ---- batches ----
 
     def __len__(self) -> int:
         if not self._batch:
@@ -378,13 +523,11 @@ class Curve(ABC, Generic[P]):
         return self._batch[0]
 
     def __getitem__(self, index: int | np.integer[Any] | slice[Any, Any, Any]) -> Self:
-        """A curve, or a slice of curves, of a batch."""
+        """Return one curve of a batch, or a slice of the batch."""
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
         if not isinstance(index, (int, np.integer, slice)):
-            raise TypeError(
-                f"a curve is picked by a whole number or a slice as index, not {short_repr(index)}"
-            )
+            raise TypeError(f"the index of a curve must be an integer or a slice, not {short_repr(index)}")
         if not isinstance(index, slice) and not -len(self) <= index < len(self):
             raise IndexError(f"index {short_repr(index)} is out of range: there are {len(self)} curves")
         t = self._t[index] if self._times.ndim > 1 else self._t
@@ -396,10 +539,10 @@ class Curve(ABC, Generic[P]):
     def __iter__(self) -> Iterator[Self]:
         return (self[i] for i in range(len(self)))
 
-    # ---- as a value ----
+    # ---- comparison, text and plots ----
 
     def __eq__(self, other: object) -> bool:
-        """Equal space, knots, points and velocities, to the last bit."""
+        """Whether spaces, knots, points and velocities are equal, bit by bit."""
         if type(self) is not type(other) or not isinstance(other, Curve):
             return NotImplemented
         return (
@@ -413,10 +556,10 @@ class Curve(ABC, Generic[P]):
             )
         )
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__: ClassVar[None] = None  # type: ignore[assignment]
 
     def _repr_html_(self) -> str:
-        """What notebooks show: a small picture, where matplotlib is there to draw it."""
+        """Return the representation for notebooks, with a small plot if Matplotlib is installed."""
         text = f"<pre>{escape(repr(self))}</pre>"
         if find_spec("matplotlib") is None:
             return text
@@ -424,41 +567,54 @@ class Curve(ABC, Generic[P]):
         try:
             self.plot().savefig(picture, format="png", dpi=_DOTS)
         except ValidationError:
-            # There is nothing to plot of curves that failed.
+            # Curves that failed cannot be plotted.
             return text
         data = b64encode(picture.getvalue()).decode()
         return f'{text}<img src="data:image/png;base64,{data}" alt="{escape(repr(self))}">'
 
     def plot(self, file: File | None = None) -> Figure:
-        """A figure with a picture of the curve, and speed |γ'| and |∇γ'| against time.
+        """Plot the curve, its speed and the size of its covariant acceleration.
 
-        The picture depends on the space:
+        The first panel depends on the space:
 
         - S²: a globe and a map; H²: the Poincaré disk; R¹, R² and R³: the graph or the curve.
         - SO(3), O(3), SU(2) and S³ (unit quaternions, scalar first): rotated frames along the time axis.
-        - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the angle against time, without jumps.
-        - SE(3): frames on the path of the positions; SE(2): arrow heads on it.
+        - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the continuous angle against time.
+        - SE(3): frames along the path of the positions; SE(2): arrow heads on it.
         - CP¹ and the complex Gr(1, 2): the Bloch sphere.
-        - RP², Gr(1, 3) and Gr(2, 3): a half sphere, with the normals of planes; a curve that leaves it
-          through the rim comes back on the opposite side.
+        - RP², Gr(1, 3) and Gr(2, 3): a hemisphere, with the normals of planes. A curve that leaves it through the rim
+          re-enters on the opposite side.
         - Other projective spaces and Grassmannians: the principal angles to the first point.
         - SPD(2) and SPD(3): ellipses and ellipsoids along the time axis.
-        - Otherwise the components against time, imaginary parts dashed.
+        - All other spaces: the components against time, with dashed imaginary parts.
 
-        A smoothing spline has its data as light dots, and a light band that holds the true curve with probability 95 %
-        where the space has room for one; so has its speed, but in a product. Of a batch a few curves have them.
+        A product has one such panel per factor. At most 50 curves of a batch are drawn.
 
-        For a product the pictures of its factors. Of a batch at most 50 curves are drawn. Neither pyplot nor
-        any setting of matplotlib is touched.
+        Parameters
+        ----------
+        file : str, path or file object, optional
+            File to which the figure is saved, such as ``"curve.pdf"``.
 
-        Args:
-            file: where to save the figure, if anywhere: a name such as ``"curve.pdf"``, or an open file.
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which you can modify or save.
 
-        Returns:
-            The figure, to change or to save.
+        Raises
+        ------
+        ImportError
+            If Matplotlib is not installed.
 
-        Raises:
-            ImportError: matplotlib is not installed.
+        Notes
+        ----- A smoothing spline is drawn with its data and, where possible, with 95 % bands of the curve and the
+        speed; bands of a batch are drawn for a few curves only. The function uses neither pyplot nor any global
+        setting of Matplotlib.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> quarter = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], ss.Sphere(2))
+        >>> figure = quarter.plot()
         """
         if find_spec("matplotlib") is None:
             raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")
@@ -468,7 +624,7 @@ class Curve(ABC, Generic[P]):
 
 
 def check_curve(spline: Any, name: str = "spline") -> None:
-    """Raise TypeError unless an argument is a curve that was fitted."""
+    """Raise TypeError unless an argument is a curve."""
     if not isinstance(spline, Curve):
         raise TypeError(f"{name} must be a curve, such as a symspline.CubicSpline, not {short_repr(spline)}")
 
@@ -483,14 +639,14 @@ def evaluated(
     progress: Progress | None,
     out: Any = None,
 ) -> Any:
-    """A quantity at times as the user gives them."""
+    """Evaluate a quantity at times as a user passes them."""
 
-    def call(curve: CurveArrays, x: Doubles, per_curve: bool) -> Any:
+    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
         if out is None:
             return curve.evaluate(x, quantity, outside, per_curve, progress)
         return curve.write(out, x, quantity, outside, per_curve, progress)
 
-    return call_at_times(curve, clock, x, per_curve, call)
+    return call_at_times(curve, clock, x, per_curve, outside, call)
 
 
 def call_at_times(
@@ -498,18 +654,51 @@ def call_at_times(
     clock: TimeAxis,
     x: ArrayLike,
     per_curve: bool,
-    call: Callable[[CurveArrays, Doubles, bool], Any],
+    outside: str,
+    call: Callable[[CurveArrays, Doubles, bool, str], Any],
 ) -> Any:
-    """What a curve has at times as the user gives them."""
+    """Call a function of a curve with times as a user passes them.
+
+    Parameters
+    ----------
+    outside : str
+        The extrapolation policy in the words of the core, or ``"nan"``, which this function implements.
+    call : callable
+        Takes the curve, times as the core counts them, `per_curve`, and a policy of the core.
+    """
     per_curve = checked_flag(per_curve, "per_curve")
     if clock.plain and type(x) is float:
-        # A single time is worth a short way.
+        # Single times are frequent, and the general conversion would cost more than the evaluation.
         times, knots = np.array(x), curve.times
         if knots.ndim > 1 or not knots[0] <= x <= knots[-1]:
             times, per_curve = onto_ends(times, knots, curve.batch, per_curve)
     else:
         times, per_curve = clock.at(x, curve.batch, per_curve, curve.times)
+    beyond = None
+    if outside == "nan":
+        times, per_curve, beyond = _inside(curve, times, per_curve)
+        outside = "raise"
     try:
-        return call(curve, times, per_curve)
+        values = call(curve, times, per_curve, outside)
     except ValidationError as error:
         raise clock.explain(error) from None
+    if beyond is not None:
+        index = beyond if per_curve else (slice(None),) * len(curve.batch) + (beyond,)
+        for own in values if isinstance(values, tuple) else (values,):
+            own[index] = np.nan
+    return values
+
+
+def _inside(
+    curve: CurveArrays, times: Doubles, per_curve: bool
+) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
+    """Times of which those outside the knots are replaced by the first knot, and which these are, if any."""
+    first, last = curve.times[..., 0], curve.times[..., -1]
+    if curve.times.ndim > 1:
+        own = times.shape[len(curve.batch) :] if per_curve else times.shape
+        first, last = (end.reshape(curve.batch + (1,) * len(own)) for end in (first, last))
+    # Infinite times and NaN remain, and raise.
+    beyond = np.asarray(np.isfinite(times) & ((times < first) | (times > last)))
+    if not beyond.any():
+        return times, per_curve, None
+    return np.where(beyond, first, times), per_curve or beyond.ndim > times.ndim, beyond

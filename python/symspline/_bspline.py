@@ -1,8 +1,8 @@
-"""Bézier and B-spline curves: control points that the curve is drawn towards, without interpolation."""
+"""Bézier and B-spline curves, which approximate their control points without interpolating them."""
 
 from __future__ import annotations
 
-from typing import Any, Generic
+from typing import Any, ClassVar, Generic
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,24 +21,47 @@ from .manifolds._manifold import refuse_functions
 
 
 class BSpline(Generic[P]):
-    """A B-spline curve on a space: de Boor's algorithm with geodesics in place of straight lines.
+    """Construct a B-spline curve from control points.
 
-    In flat space it is SciPy's ``BSpline``. On a curved space it keeps the ends and the smoothness at
-    simple knots up to C¹ (Popiel & Noakes 2007); at interior knots higher derivatives may jump. Where they
-    jump the curve has those from the right, at its end those from the left.
+    The curve is evaluated by de Boor's algorithm with geodesics in place of straight lines. On a Euclidean space the
+    result equals SciPy's ``BSpline``. Leading axes of the control points are batch axes.
 
-    Args:
-        knots: shape (n + degree + 1,) for n control points, not falling; a knot may repeat up to
-            ``degree + 1`` times, at which the curve is less smooth.
-        control_points: shape (..., n, *space.point_shape); leading axes are independent curves. Points
-            within 1e-8 of the space (1e-4 for single precision) are projected.
-        degree: 1 or more.
-        space: a space or its name.
+    Parameters
+    ----------
+    knots : array_like, shape (n + degree + 1,)
+        Non-decreasing knots for n control points. A knot may repeat up to ``degree + 1`` times; the curve is less
+        smooth there.
+    control_points : array_like, shape (..., n, *space.point_shape)
+        Control points. Points within 1e-8 of the manifold (1e-4 for single precision) are projected onto it.
+    degree : int
+        Degree, at least 1.
+    space : Space or str
+        A space or its name. Products and manifolds made of functions are not supported.
 
-    Raises:
-        ValidationError: the input is not what is described above.
-        CutLocusError: the geodesic between two neighbouring control points is not unique.
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
 
+    See Also
+    --------
+    BezierCurve : Construct a Bézier curve of any degree.
+    CubicSpline : Interpolate points by a C² curve.
+
+    Notes
+    -----
+    On a curved space the curve is C¹ at simple knots, as long as the degree is at least two. Higher derivatives may
+    jump at interior knots. There, the derivatives from the right are returned, and at the end of the curve those from
+    the left.
+
+    References
+    ----------
+    T. Popiel, L. Noakes, Bézier curves and C² interpolation in Riemannian manifolds, J. Approx. Theory 148 (2007).
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> corner = ss.BSpline([0, 0, 0, 1, 1, 1], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], 2, ss.Sphere(2))
     >>> corner(0.5).round(8)
@@ -56,23 +79,53 @@ class BSpline(Generic[P]):
         self._control_points.flags.writeable = self._knots.flags.writeable = False
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> P:
-        """The curve at times x.
+        """Evaluate the curve or its derivatives.
 
-        Args:
-            x: times between ``knots[degree]`` and ``knots[-degree - 1]``, any shape and order.
-            nu: 0 for points, 1 for the velocity, 2 for the covariant acceleration.
+        Parameters
+        ----------
+        x : array_like
+            Times between ``knots[degree]`` and ``knots[-degree - 1]``, of any shape and in any order.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative: 0 for points, 1 for the velocity, 2 for the covariant acceleration.
 
-        Returns:
-            Shape batch axes + x.shape + point_shape.
+        Returns
+        -------
+        ndarray, shape ``(*batch axes, *x.shape, *point_shape)``
+            Points or tangent vectors.
 
-        Raises:
-            ValidationError: a time is not finite or outside.
+        Raises
+        ------
+        ValidationError
+            If a time is not finite or lies outside the domain of the curve.
         """
         values: P = self._evaluate(x, quantity_of(nu))
         return values
 
     def speed(self, x: ArrayLike) -> FloatArray:
-        """|γ'| at times x, shape batch axes + x.shape."""
+        """Compute the speed of the curve.
+
+        Parameters
+        ----------
+        x : array_like
+            Times in the domain of the curve, of any shape and in any order.
+
+        Returns
+        -------
+        ndarray, shape ``(*batch axes, *x.shape)``
+            The norm of the velocity.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite or lies outside the domain of the curve.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> line = ss.BSpline([0, 0, 2, 2], [[0.0], [3.0]], 1, "r:1")
+        >>> line.speed([0.5, 1.0])
+        array([1.5, 1.5])
+        """
         speeds: FloatArray = self._evaluate(x, "speed")[()]
         return speeds
 
@@ -88,7 +141,7 @@ class BSpline(Generic[P]):
         return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), batch)
 
     def _times(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Times of the curve as doubles."""
+        """Return times in the domain of the curve as float64."""
         times = as_array(x, "x")
         if times.dtype.kind not in "biuf":
             raise ValidationError(f"x must be real numbers, not {times.dtype}")
@@ -98,7 +151,7 @@ class BSpline(Generic[P]):
         if outside.any():
             index = np.argwhere(outside)[0].tolist()
             time = times[tuple(index)]
-            where = f"outside the curve's times [{start}, {end}]" if np.isfinite(time) else "not finite"
+            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(time) else "not finite"
             raise ValidationError(f"x{index or ''} = {time} is {where}")
         return times
 
@@ -109,23 +162,23 @@ class BSpline(Generic[P]):
 
     @property
     def knots(self) -> NDArray[np.float64]:
-        """The knots."""
+        """Knots, shape (n + degree + 1,)."""
         return self._knots
 
     @property
     def control_points(self) -> P:
-        """The control points, shape (..., n, *point_shape)."""
+        """Control points, shape (..., n, *point_shape)."""
         points: P = self._control_points
         return points
 
     @property
     def degree(self) -> int:
-        """The degree."""
+        """Degree of the curve."""
         return self._degree
 
     @property
     def space(self) -> Space[P]:
-        """The space."""
+        """Space of the curve."""
         return self._space
 
     def __eq__(self, other: object) -> bool:
@@ -138,7 +191,7 @@ class BSpline(Generic[P]):
             and np.array_equal(self._control_points, other._control_points)
         )
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__: ClassVar[None] = None  # type: ignore[assignment]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -151,12 +204,44 @@ class BSpline(Generic[P]):
 
 
 class BezierCurve(BSpline[P]):
-    """A Bézier curve of any degree on a space, for times from 0 to 1: de Casteljau's algorithm, (8).
+    r"""Construct a Bézier curve of any degree, for times from 0 to 1.
 
-    Args:
-        control_points: shape (..., degree + 1, *space.point_shape), at least two.
-        space: a space or its name.
+    The curve is evaluated by de Casteljau's algorithm with geodesics in place of straight lines. The degree is the
+    number of control points minus one.
 
+    Parameters
+    ----------
+    control_points : array_like, shape (..., degree + 1, *space.point_shape)
+        Control points, at least two per curve. Leading axes are batch axes.
+    space : Space or str
+        A space or its name. Products and manifolds made of functions are not supported.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+
+    See Also
+    --------
+    BSpline : Construct a B-spline curve from control points.
+
+    Notes
+    -----
+    A segment of a `CubicSpline` is a Bézier curve of degree three, equation (8) of the paper:
+
+    .. math:: \gamma(t) = [\,[\,[p_0, q_0]_t, [q_0, q_1]_t\,]_t, [\,[q_0, q_1]_t, [q_1, p_1]_t\,]_t\,]_t,
+
+    where :math:`[p, q]_t` is the geodesic from p to q.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), equation (8).
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> curve = ss.BezierCurve([[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
     >>> curve(0.5).round(8)
@@ -172,9 +257,11 @@ class BezierCurve(BSpline[P]):
 
 
 def _factor(space: Space[P] | str) -> Space[P]:
-    """The space, which is no product."""
+    """Return the space, which must not be a product."""
     space = space_named(space)
     if isinstance(space, Product):
-        raise ValidationError("a curve in a product is one curve in every factor: make one for each")
+        raise ValidationError(
+            "B-spline and Bézier curves are not defined on a Product. Make one curve for each factor."
+        )
     refuse_functions(space, "B-spline and Bézier curves are not made")
     return space

@@ -1,4 +1,4 @@
-"""C² cubic splines."""
+"""C² cubic splines through points."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from ._curves.curve import CurveArrays
 from ._curves.derivatives import places
 from ._curves.ends import ends_in_factors, freeze_bc_type, picked
 from ._curves.energy import alternative_energy
-from ._curves.fit import FitProblem, curve_of, fit, mask_of, read, read_ends
+from ._curves.fit import Fit, FitProblem, curve_of, fit, mask_of, read, read_ends
 from ._curves.gradient import Gradient, Places
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._far import warn_of_far_points
-from ._options import check_fit_options, options_of, order_of, outside, with_atol
+from ._options import fit_options, order_of, outside, with_atol
 from ._report import Report, combined
-from ._signs import warn_of_signs
+from ._representatives import warn_of_representatives
 from ._spaces import Array, Space
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -31,59 +30,111 @@ from ._typing import BCType, Extrapolate, File, Method, OnFailure, P, PointsLike
 
 
 class CubicSpline(Curve[P]):
-    """The C² cubic spline through points of a space.
+    r"""Interpolate points on a space by a C² cubic spline.
 
-    Between two points the curve is a cubic Bézier curve made of geodesics (de Casteljau's algorithm,
-    (8) of the paper); at the points value, velocity and covariant acceleration agree from both sides,
-    (13). In flat space it is SciPy's ``CubicSpline``.
+    Each segment is a cubic Bézier curve built from geodesics. At every knot the values, velocities and covariant
+    accelerations of adjacent segments agree. On a Euclidean space the result equals SciPy's ``CubicSpline``.
 
-    Args:
-        t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one
-            row per curve. Numbers, ``datetime64`` or other dates; for dates rates are per second. Those with a
-            time zone become UTC.
-        points: shape (..., N+1, *space.point_shape), N >= 1, real, or complex on complex spaces; leading axes
-            are independent curves. Points within 1e-8 of the space (1e-4 for single precision) are projected.
-            For a `Product` a tuple of arrays.
-        space: a space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
-        bc_type: conditions at the ends: ``"natural"`` (zero covariant acceleration, the paper's default),
-            ``"not-a-knot"`` (the better choice for a smooth curve: order 4 instead of 2 near the ends),
-            ``"clamped"`` (zero velocity, as in SciPy), ``"periodic"`` (the last point is the first), or a
-            pair with one of ``"natural"``, ``"clamped"``, ``"not-a-knot"``, ``(1, velocity)``,
-            ``(2, acceleration)`` for either end. The paper's clamped spline is ``((1, v0), (1, vN))``.
-            Vectors are derivatives in t, shape (*point_shape) or with the batch axes.
-        method: ``"quasi-newton"``, ``"newton"``, ``"fixed-point"`` (the paper's Algorithm 1, literally), ``"homotopy"``
-            (the curve that is continued from near points), or ``"auto"``: quasi-Newton, then Newton's method and the
-            homotopy for curves that did not converge. Points far apart (steps beyond 0.55 of the way to the cut locus,
-            or beyond 0.4 where quasi-Newton is slow) may have several C² curves. Then ``"auto"`` also runs Algorithm 1,
-            all other solvers and a trust region within a budget, and keeps the solution with the lowest bending energy.
-            `Report.method` names the solver that found it.
-        tol: largest relative C² defect that counts as converged, see `Report.residual`.
-        max_iter: largest number of iterations; None for the method's own.
-        extrapolate: what happens outside the knots: None raises (and wraps for periodic curves), True
-            continues the last segment, ``"geodesic"`` goes on with constant velocity, ``"periodic"`` wraps.
-        on_failure: what happens when a curve does not converge or meets a cut locus: ``"raise"``,
-            ``"warn"`` or ``"ignore"``. The exception's ``.spline`` holds all good curves; an unconverged
-            curve keeps its best iterate (with ``method="fixed-point"`` its last one), a curve with a cut-locus fault
-            is NaN. With ``"warn"`` and ``"ignore"``, a curve of a batch with an invalid point (NaN, not positive
-            definite, off the space) is NaN, too, and the others are fitted.
-        where: True for the curves of a batch that are wanted, shape of the batch axes: the others are NaN, whatever
-            their points are, and no work is done for them.
-        check: whether to validate the input.
-        atol: how far off the space points may be, for numbers that were rounded in a file, such as 1e-5 for unit
-            quaternions of six decimals; None for what ``points`` says.
-        progress: called from time to time with the finished and the total number of points.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots, shared by all curves or one row per curve. None means 0, 1, ..., n - 1. Rates for
+        dates are per second. Dates with a time zone are converted to UTC.
+    points : array_like, shape (..., n, *space.point_shape)
+        Points to interpolate, at least two per curve. Leading axes are batch axes. Points within `atol` of the
+        manifold are projected onto it. On complex spaces the numbers may be complex. For a `Product`, pass a tuple
+        with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    bc_type : {"natural", "not-a-knot", "clamped", "periodic"} or pair, default "natural"
+        End conditions. Use ``"not-a-knot"`` for samples of a smooth motion; its error is of fourth order up to the
+        ends, while natural ends are of second order there.
 
-    Raises:
-        ValidationError: the input is not what is described above.
-        CutLocusError: the geodesic between two neighbours, or to a control point, is not unique.
-        ConvergenceError: the solver did not reach ``tol``.
+        - ``"natural"``: the covariant acceleration at both ends is zero.
+        - ``"not-a-knot"``: the outer two segments at each end form one cubic, in the sense of flat space.
+        - ``"clamped"``: the velocity at both ends is zero, as in SciPy.
+        - ``"periodic"``: the curve is closed. The last point must equal the first.
+        - A pair sets each end separately. Its entries are ``"natural"``, ``"not-a-knot"``, ``"clamped"``,
+          ``(1, velocity)`` or ``(2, acceleration)``. Vectors are derivatives with respect to t, tangent at the
+          corresponding end point, with the shape of a point or with batch axes in front.
+    method : {"auto", "quasi-newton", "newton", "fixed-point", "homotopy"}, default "auto"
+        Solver. ``"fixed-point"`` is Algorithm 1 of the paper. ``"homotopy"`` follows the solution from flat space to
+        the given points. ``"auto"`` starts with quasi-Newton and uses Newton's method and the homotopy for curves that
+        do not converge. If points are far apart, it also searches for solutions of lower energy; see Notes.
+    tol : float, default 1e-12
+        Largest relative C² residual of a converged curve, see `Report.residual`.
+    max_iter : int, optional
+        Largest number of iterations. By default each solver has its own limit.
+    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None raises `ValidationError`, except for closed curves,
+        which are evaluated periodically. ``"raise"`` raises for closed curves, too. False gives NaN, as in SciPy. True
+        continues the first and last segments. ``"geodesic"`` continues with constant velocity. ``"periodic"`` repeats
+        the curve.
+    on_failure : {"raise", "warn", "ignore"}, default "raise"
+        Action if a curve does not converge or meets a cut locus. ``"warn"`` issues a `ConvergenceWarning`. An
+        unconverged curve keeps its best iterate (the last one with ``method="fixed-point"``). A curve that meets a
+        cut locus is NaN. With ``"warn"`` and ``"ignore"``, curves of a batch with invalid points are NaN as well,
+        and the others are fitted.
+    check : bool, default True
+        Whether to validate the points and end vectors. If False, the points are not projected either.
+    atol : float, optional
+        Largest distance of a point from the manifold, such as 1e-5 for unit quaternions with six decimals. By
+        default 1e-8, or 1e-4 for points in single precision.
+    where : array_like of bool, optional
+        Mask over the batch. Curves where it is False are not fitted and evaluate to NaN.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
 
-    Warns:
-        UserWarning: neighbours are within 1e-5 of each other's cut locus: a little more, and the curve would go the
-            other way round. Or points of ``sphere:3`` look like quaternions of which some have the wrong sign.
-        FarPointsWarning: more than half of the steps of a curve with four or more are beyond 0.6 of the way to the cut
-            locus.
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring points or control points are not joined by a unique shortest geodesic.
+    ConvergenceError
+        If the solver does not reach `tol`. Its attribute ``spline`` holds the converged curves and the best iterates
+        of the others.
 
+    Warns
+    -----
+    FarPointsWarning
+        If a curve has at least four segments and more than half of its steps exceed 0.6 of the distance to the cut
+        locus.
+    ConvergenceWarning
+        If a curve fails and `on_failure` is ``"warn"``.
+    UserWarning
+        If two neighbouring points are within 1e-5 of each other's cut locus, or if points on ``Sphere(3)`` look like
+        unit quaternions with inconsistent signs.
+
+    See Also
+    --------
+    HermiteSpline : Interpolate points and given velocities.
+    make_smoothing_spline : Fit a curve close to noisy points.
+    fit_many : Fit curves of different lengths in one call.
+    fit_segments : Fit a recording with gaps.
+
+    Notes
+    -----
+    Let :math:`p_i` be the points, :math:`h_i = t_{i+1} - t_i` the lengths of the intervals and :math:`u_i` the
+    velocities at the knots. Segment i is the Bézier curve (8) with the control points
+
+    .. math:: p_i, \quad q_i^+ = \exp_{p_i}(h_i u_i / 3), \quad q_{i+1}^- = \exp_{p_{i+1}}(-h_i u_{i+1} / 3),
+              \quad p_{i+1}.
+
+    The solver determines the velocities from the C² condition (13), extended from unit intervals to arbitrary ones.
+    The clamped spline of the paper is ``bc_type=((1, v0), (1, vN))``.
+
+    If steps exceed 0.55 of the distance to the cut locus, or 0.4 of it where quasi-Newton is slow, several C² curves
+    may pass through the points. ``"auto"`` then runs all solvers and a trust-region method within a budget, and keeps
+    the solution with the lowest bending energy. `Report.method` names the solver that found it.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), equations (8) and (13), Algorithm 1.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> spline = ss.CubicSpline([0, 1, 3], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
     >>> spline(1).round(12) + 0.0
@@ -110,8 +161,7 @@ class CubicSpline(Curve[P]):
         progress: Progress | None = None,
     ) -> None:
         space = space_named(space)
-        check_fit_options(extrapolate, on_failure, check, progress)
-        options = options_of(method, tol, max_iter)
+        options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
         data = read(points, space)
         if atol is not None:
             data = with_atol(data, atol)
@@ -120,17 +170,23 @@ class CubicSpline(Curve[P]):
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         problem = FitProblem(
-            space, times, data, ends, options, bool(check), mask_of(where, batch), skip_invalid
+            space,
+            times,
+            data,
+            ends,
+            options,
+            bool(check),
+            None if where is None else mask_of(where, batch),
+            skip_invalid,
         )
         try:
-            curve, reports, faults = fit(problem, progress)
+            found = fit(problem, progress)
         except ValidationError as error:
             raise clock.explain(error) from None
-        self._fill(clock, shown_times, curve, freeze_bc_type(bc_type), extrapolate, reports)
-        if faults:
-            raise_or_warn(faults, on_failure, self)
-        warn_of_signs(space, [data], [report.max_step for report in reports])
-        warn_of_far_points([curve], [reports])
+        self._fill(clock, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
+        if found.faults:
+            raise_or_warn(found.faults, on_failure, self)
+        warn_of_representatives(space, [data], [found.curve], [found.columns])
 
     def _fill(
         self,
@@ -139,20 +195,24 @@ class CubicSpline(Curve[P]):
         curve: CurveArrays,
         bc_type: BCType,
         extrapolate: Extrapolate,
-        reports: list[Report],
+        reports: list[Report] | Fit,
     ) -> None:
         self._clock, self._t, self._curve = clock, t, curve
-        self._bc_type, self._extrapolate, self._reports = bc_type, extrapolate, reports
+        self._bc_type, self._extrapolate = bc_type, extrapolate
+        if isinstance(reports, Fit):
+            self._fit = reports
+        else:
+            self._reports = reports
         self._outside = outside(extrapolate, bc_type)
 
     @classmethod
     def _of(cls, *parts: Any) -> Self:
-        """A spline that was fitted before, from all that it keeps."""
+        """Return a spline with the given state, without a fit."""
         self = cls.__new__(cls)
         self._fill(*parts)
         return self
 
-    # ---- how it follows its data ----
+    # ---- sensitivity to the data ----
 
     def jvp(
         self,
@@ -163,29 +223,54 @@ class CubicSpline(Curve[P]):
         *,
         nu: int = 0,
     ) -> P:
-        """How the curve at times x moves when its data move: the derivative in one direction.
+        """Compute the change of the curve for a change of its data (forward mode).
 
-        The data move by small multiples of what is given here; what is not given stays. It is computed by
-        implicit differentiation of the C² condition, whose Jacobian Newton's method uses, too.
+        This is the directional derivative of the curve in the direction given by `points`, `t` and `ends`. Omitted
+        arguments are held fixed.
 
-        Args:
-            x: times between the first and the last knot, any shape.
-            points: tangent vectors at the points, of their shape. Of a closed curve the last point goes with the
-                first, and its row is not read.
-            t: changes of the knots, of their shape; in seconds for dates.
-            ends: changes of the vectors that were given at the two ends; None for no change. What is not changed
-                goes with its point in parallel.
-            nu: 0 for the point γ, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+        Parameters
+        ----------
+        x : array_like
+            Times between the first and the last knot, of any shape.
+        points : array_like, optional
+            Tangent vectors at the points, with their shape. The last row of a closed curve is ignored, because its
+            last point is its first.
+        t : array_like, optional
+            Changes of the knots, with their shape; in seconds for dates.
+        ends : tuple of array_like or None, optional
+            Changes of the vectors prescribed by `bc_type` at the two ends. A vector whose change is None is
+            transported parallel with its point.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative in time: 0 for the point γ, 1 for the velocity γ', 2 for the covariant acceleration
+            ∇γ'.
 
-        Returns:
-            Tangent vectors at the points of the curve, shape batch axes + x.shape + point_shape. With ``nu`` 1 or 2
-            covariant derivatives: how γ' or ∇γ' change seen from the moving point. NaN for curves that have not
-            converged.
+        Returns
+        -------
+        ndarray, shape ``(*batch axes, *x.shape, *point_shape)``
+            Tangent vectors at the points of the curve. For `nu` 1 and 2 they are covariant derivatives of γ' and ∇γ'.
+            Curves that did not converge give NaN.
 
-        Raises:
-            ValidationError: the input is not what is described above, or the space has very many dimensions.
+        Raises
+        ------
+        ValidationError
+            If the input does not meet the requirements above, or the dimension of the space is too large.
 
-        >>> import numpy as np
+        See Also
+        --------
+        CubicSpline.vjp : Compute the gradient of a function of the curve (reverse mode).
+
+        Notes
+        -----
+        The derivative follows from implicit differentiation of the C² condition (13). Newton's method uses the same
+        Jacobian.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (13).
+
+        Examples
+        --------
         >>> import symspline as ss
         >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
         >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
@@ -195,23 +280,38 @@ class CubicSpline(Curve[P]):
         return moved
 
     def vjp(self, x: ArrayLike, cotangent: ArrayLike, *, nu: int = 0) -> Gradient[P]:
-        """The gradient of ``sum(cotangent * curve)`` with respect to the data: `jvp`, transposed.
+        """Compute the gradient of a function of the curve with respect to its data.
 
-        Args:
-            x: times between the first and the last knot, any shape.
-            cotangent: any array of the shape of ``spline(x)``. Of complex numbers the sum is of the products of real
-                and of imaginary parts.
-            nu: as for `jvp`.
+        The function is ``sum(cotangent * spline(x, nu))``. This is reverse mode, the transpose of `jvp`.
 
-        Returns:
-            A `Gradient` g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu=nu))`` is
-            ``sum(g.points * points) + sum(g.t * t)`` and the same for the vectors at the ends: plain sums of products.
-            Vectors in it are tangent. Of a closed curve the last point has no gradient of its own. NaN for curves that
-            have not converged.
+        Parameters
+        ----------
+        x : array_like
+            Times between the first and the last knot, of any shape.
+        cotangent : array_like, shape ``(*batch axes, *x.shape, *point_shape)``
+            Weights of the numbers of ``spline(x, nu)``. For complex numbers, real and imaginary parts are multiplied
+            separately.
+        nu : {0, 1, 2}, default 0
+            Order of the derivative in time, as for `jvp`.
 
-        Raises:
-            ValidationError: the input is not what is described above, or the space has very many dimensions.
+        Returns
+        -------
+        Gradient
+            A gradient g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu=nu))`` equals ``sum(g.points *
+            points) + sum(g.t * t)`` plus the same sums for the end vectors. Its vectors are tangent. The last point of
+            a closed curve has no separate gradient. Curves that did not converge give NaN.
 
+        Raises
+        ------
+        ValidationError
+            If the input does not meet the requirements above, or the dimension of the space is too large.
+
+        See Also
+        --------
+        CubicSpline.jvp : Compute the change of the curve for a change of its data (forward mode).
+
+        Examples
+        --------
         >>> import symspline as ss
         >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
         >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
@@ -221,8 +321,11 @@ class CubicSpline(Curve[P]):
         return gradient
 
     def _solved(self) -> CurveArrays:
-        """The curve from which derivatives are made: NaN where it did not converge. They follow from the C² condition,
-        which only curves that converged fulfil; without it they would be wrong in silence."""
+        """Return the curve with NaN for all curves that did not converge.
+
+        Derivatives follow from the C² condition, which only converged curves satisfy. For the others they would be
+        wrong without notice.
+        """
         if all(np.all(report.converged) for report in self._reports):
             return self._curve
         found = []
@@ -240,30 +343,35 @@ class CubicSpline(Curve[P]):
         except ValidationError as error:
             raise self._clock.explain(error) from None
 
-    # ---- what it is made of ----
+    # ---- data and report ----
 
     @property
     def bc_type(self) -> BCType:
-        """The end conditions, as they were given."""
+        """End conditions, as passed to the constructor."""
         return self._bc_type
+
+    @cached_property
+    def _reports(self) -> list[Report]:
+        """The reports in every factor, made on demand: they cost as much as a third of a fit of few points."""
+        return self._fit.reports()
 
     @property
     def report(self) -> Report:
-        """How the fit went."""
+        """Report of the fit: convergence, solver, residual and step lengths."""
         if len(self._reports) == 1:
             return self._reports[0]
         return self._product_report
 
     @cached_property
     def _product_report(self) -> Report:
-        """The report of all factors, made when it is asked for: it costs more than a fit of few points."""
+        """Report of all factors, computed on first access because it costs more than a fit of few points."""
         curve, reports = self._curve, self._reports
-        other = alternative_energy(curve, reports, self._outside)
+        other = alternative_energy(curve, reports)
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
     def _parts(self) -> tuple[CubicSpline[Any], ...]:
-        """The splines in the factors of a product; in another space the spline is its only part."""
+        """Splines in the factors of a product; in any other space, the spline itself."""
         if len(self._reports) == 1:
             return (self,)
         each = zip(self._curve.parts, ends_in_factors(self._bc_type, self.space), self._reports, strict=True)
@@ -272,7 +380,7 @@ class CubicSpline(Curve[P]):
             for curve, ends, report in each
         )
 
-    # ---- a batch as a sequence ----
+    # ---- batches ----
 
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return CubicSpline._of(
@@ -284,7 +392,7 @@ class CubicSpline(Curve[P]):
             [report.map(lambda column: column[index]) for report in self._reports],
         )
 
-    # ---- as a value ----
+    # ---- pickling, text and files ----
 
     def __reduce__(self) -> tuple[Any, ...]:
         return CubicSpline._of, (
@@ -299,23 +407,53 @@ class CubicSpline(Curve[P]):
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
-        bc = self._bc_type if isinstance(self._bc_type, str) else "own end conditions"
+        bc = self._bc_type if isinstance(self._bc_type, str) else "custom end conditions"
         return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
 
     def save(self, file: File) -> None:
-        """Write the curve to an NPZ file, which `symspline.load` reads back without a new fit."""
+        """Write the curve to an NPZ file.
+
+        `load` reads it back without a new fit.
+
+        Parameters
+        ----------
+        file : str, path or file object
+            Name of the file, or a binary file that is open for writing. An existing file of this name is replaced only
+            when the new one is complete.
+
+        Raises
+        ------
+        ValidationError
+            If the space is a `Manifold` made of functions, which cannot be stored.
+        OSError
+            If the file cannot be written.
+
+        See Also
+        --------
+        load : Read a curve.
+        save_many : Write several curves to one file.
+
+        Examples
+        --------
+        >>> import io, symspline as ss
+        >>> file = io.BytesIO()
+        >>> ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2").save(file)
+        >>> _ = file.seek(0)
+        >>> ss.load(file)
+        <CubicSpline on Sphere(2): 2 points, natural>
+        """
         _archive.write(file, self._arrays())
 
     def _arrays(self) -> dict[str, Any]:
-        """What stands in a file."""
+        """Return the entries of the NPZ file."""
         return _archive.fitted_arrays(self, self._reports)
 
-    # What a plot says of it.
+    # Title of plots.
     _kind = "C² spline"
 
     @property
     def _ends(self) -> str:
-        return f"{self._bc_type} ends" if isinstance(self._bc_type, str) else "own end conditions"
+        return f"{self._bc_type} ends" if isinstance(self._bc_type, str) else "custom end conditions"
 
     @property
     def _unconverged(self) -> int:

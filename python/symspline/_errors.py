@@ -1,4 +1,4 @@
-"""What is done about curves that failed, or that may go the wrong way round."""
+"""Errors and warnings about curves that failed, or that are close to a cut locus."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from ._faults import CUT_LOCUS, Fault
 from ._report import ConvergenceWarning
 
 _PACKAGE = os.path.dirname(__file__)
-# So many times shorter than its neighbours an interval is for the times to be the reason, and so many times faster.
+# The times are considered the reason if an interval is shorter than its neighbours by this factor, and if its speed
+# exceeds the median by the same factor.
 _CLOSE = 10
 _ERRORS: dict[str, type[Exception]] = {CUT_LOCUS: CutLocusError}
 
 
 def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
-    """Raise or warn, with the good curves attached.
+    """Raise an error or warn about failed curves, with the fitted curves attached.
 
     Parameters
     ----------
     faults : list of Fault
-        In the order of curves.
+        Faults in the order of curves.
     on_failure : {"raise", "warn", "ignore"}
+        Policy of the user.
     spline : curve, batch of curves, or list of curves
-        What was fitted.
+        The fitted curves, which become the attribute ``spline`` of the error.
     """
     batch = (len(spline),) if isinstance(spline, (list, tuple)) else spline._batch
     failed = [fault for fault in faults if fault.failed]
@@ -50,12 +52,12 @@ def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
 
 
 def _remedy_for_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> str | None:
-    """The remedy of a failure whose reason is that two times lie too close together for their points; it names them.
+    """Return a remedy that names two times too close together for their points, or None.
 
     Notes
     -----
-    An interval of length h between points at a distance d asks for the speed d/h at both of its ends. Where h is far
-    shorter than its neighbours, this speed carries the curve in them much farther than their points are apart.
+    An interval of length h between points at a distance d requires the speed d/h at both of its ends. Where h is far
+    shorter than its neighbours, this speed moves the curve in them much farther than their points are apart.
     """
     if not fault.about_times:
         return None
@@ -84,7 +86,7 @@ def _remedy_for_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -
     t = curve._t[index] if curve._t.ndim > 1 else curve._t
     return (
         f"t[{i}] = {t[i]} and t[{i + 1}] = {t[i + 1]} are too close for the distance {step[i]:.3g} between "
-        "their points: merge the two samples, smooth the data with make_smoothing_spline, or correct the clock"
+        "their points: merge the two samples, smooth the data with make_smoothing_spline, or correct the times"
     )
 
 
@@ -93,7 +95,7 @@ def _more(faults: list[Fault], what: str) -> str:
 
 
 def callers_level() -> int:
-    """How many frames up the code is that called this package."""
+    """Return the number of frames between this function and the code that called the package."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         frame, level = frame.f_back, level + 1

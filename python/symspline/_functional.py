@@ -1,4 +1,4 @@
-"""Splines as functions of plain arrays, and many of different lengths at once."""
+"""Splines as functions of plain arrays, and fits of many curves of different lengths."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import checked_flag, read_only, short_repr
+from ._arrays import read_only, short_repr
 from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -17,19 +17,10 @@ from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, picked
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._far import warn_of_far_points
 from ._input import in_library, library_of
-from ._options import (
-    check_on_failure,
-    check_progress,
-    checked_extrapolate,
-    options_of,
-    outside,
-    quantity_of,
-    with_atol,
-)
+from ._options import check_progress, checked_extrapolate, fit_options, outside, quantity_of, with_atol
 from ._report import Report
-from ._signs import warn_of_signs
+from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -46,18 +37,46 @@ from ._typing import (
     PointsLike,
 )
 
+# With fewer knots, all of them are read.
+_MANY = 64
+
 
 def fit(
     t: ArrayLike | None, points: PointsLike, space: Space[P] | str, **options: Unpack[FitOptions]
 ) -> tuple[P, Report]:
-    """The velocities of the C² spline through points, as plain arrays.
+    """Compute the velocities of a C² cubic spline as plain arrays.
 
-    Takes the arguments of `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots. None means 0, 1, ..., n - 1.
+    points : array_like, shape (..., n, *space.point_shape)
+        Points to interpolate. For a `Product`, a tuple with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    **options
+        Keyword arguments of `CubicSpline`.
 
-    Returns:
-        The velocities, of the shape of the points, and the report. Where the points are arrays of another library that
-        follows the array API standard, and on the CPU, velocities are of it, too.
+    Returns
+    -------
+    velocities : ndarray or tuple of ndarray
+        Velocities at the knots, with the shape of the points. If the points are arrays of another library that
+        follows the array API standard, on the CPU, so are the velocities.
+    report : Report
+        Report of the fit.
 
+    Raises
+    ------
+    ValidationError, CutLocusError, ConvergenceError
+        As for `CubicSpline`.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points by a C² curve.
+    evaluate : Evaluate a curve given by plain arrays.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> u, report = ss.fit(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "sphere:2")
     >>> u.shape, report.converged
@@ -113,18 +132,50 @@ def evaluate(
     progress: Progress | None = None,
     out: AnyArray | AnyArrays | None = None,
 ) -> Any:
-    """The curve with given knots, points and velocities at times x, as plain arrays.
+    """Evaluate a curve that is given by knots, points and velocities.
 
-    Args:
-        t: knots, as for `CubicSpline`.
-        points, velocities: arrays of shape (..., N+1, *point_shape).
-        space: the space or its name.
-        x: times, any shape and order.
-        nu, extrapolate, per_curve, progress, out: as for calling a `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots. None means 0, 1, ..., n - 1.
+    points, velocities : array_like, shape (..., n, *space.point_shape)
+        Points and velocities at the knots. For a `Product`, tuples with one array per factor.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    x : array_like of float or datetime64
+        Times, of any shape and in any order. Only the nodes from the first to the last segment that contain times are
+        read and checked, so that few times cost little.
+    nu : {0, 1, 2}, default 0
+        Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
+    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. False gives NaN,
+        as in SciPy. True continues the first and last segments. ``"geodesic"`` continues with constant velocity.
+        ``"periodic"`` repeats the curve.
+    per_curve : bool, default False
+        True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
+    out : ndarray or tuple of ndarray, optional
+        Array into which the result is written, and which is returned.
 
-    Returns:
-        Values as of calling a `CubicSpline`, as arrays of the library that points, velocities or x come from.
+    Returns
+    -------
+    ndarray or tuple of ndarray
+        Points or tangent vectors, shape ``(*batch axes, *x.shape, *point_shape)``. If `points`, `velocities` or `x`
+        are arrays of another library that follows the array API standard, on the CPU, so is the result.
 
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+
+    See Also
+    --------
+    fit : Compute the velocities of a C² cubic spline as plain arrays.
+    HermiteSpline : Interpolate points and given velocities.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> p = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> u, _ = ss.fit(None, p, "sphere:2")
@@ -133,16 +184,54 @@ def evaluate(
     """
     space = space_named(space)
     check_progress(progress)
+    libraries = points, velocities, x
+    if not per_curve:
+        t, points, velocities = _nodes_around(t, points, velocities, space, x)
     clock, curve = given(t, points, velocities, space)
     where = outside(checked_extrapolate(extrapolate), "natural")
     values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress, out)
-    return values if out is not None else in_library(library_of(points, velocities, x), values)
+    return values if out is not None else in_library(library_of(*libraries), values)
+
+
+def _nodes_around(
+    t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
+) -> tuple[Any, Any, Any]:
+    """The knots, points and velocities of the segments that times lie in, or all of them where they are not plain
+    arrays, or where it would not pay.
+
+    Every segment is determined by its two ends, so that values are bit-identical.
+    """
+    everything = t, points, velocities
+    if type(t) is not np.ndarray or t.dtype != np.float64 or t.ndim != 1 or len(t) < _MANY:
+        return everything
+    times = np.asarray(x) if isinstance(x, (int, float, np.ndarray)) else None
+    if times is None or times.dtype.kind not in "iuf" or not 0 < times.size <= len(t):
+        return everything
+    first, last = times.min(), times.max()
+    # Invalid input raises further on. Comparisons are false for NaN.
+    if not (t[0] <= first and last <= t[-1] < np.inf and (t[1:] > t[:-1]).all()):
+        return everything
+    start, stop = int(t.searchsorted(first, "right")) - 1, int(t.searchsorted(last, "right")) + 1
+    start = min(start, len(t) - 2)
+    factors, arrays = factors_of(space), []
+    for value in (points, velocities):
+        each = value if isinstance(value, tuple) else (value,)
+        if len(each) != len(factors):
+            return everything
+        sliced = []
+        for factor, array in zip(factors, each, strict=True):
+            axis = array.ndim - len(factor.point_shape) - 1 if type(array) is np.ndarray else -1
+            if axis < 0 or array.shape[axis] != len(t):
+                return everything
+            sliced.append(array[(slice(None),) * axis + (slice(start, stop),)])
+        arrays.append(tuple(sliced) if isinstance(value, tuple) else sliced[0])
+    return t[start:stop], arrays[0], arrays[1]
 
 
 def given(
     t: ArrayLike | None, points: Any, velocities: Any, space: Space[Any]
 ) -> tuple[TimeAxis, CurveArrays]:
-    """The curve with given knots, points and velocities, and how it counts times."""
+    """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
     read = [
@@ -160,7 +249,7 @@ def given(
 
 
 def velocities_of(space: Space, points: Array, velocities: Any) -> Array:
-    """Velocities for points in doubles, not in a product, as an array that has flags of its own."""
+    """Return velocities in one factor as a read-only array, after checks of their shape and numbers."""
     doubles = space._doubles(velocities, "velocities")
     array = read_only(space._numbers(doubles))
     if doubles.shape != points.shape:
@@ -190,33 +279,51 @@ def fit_many(
 ) -> list[CubicSpline[P]]:
     """Fit curves of different lengths in one parallel call.
 
-    Args:
-        curves: pairs (t, points), one a curve; see `CubicSpline`.
-        space: the space of all curves, or its name.
-        bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol, progress: as for `CubicSpline`, for all
-            curves alike.
-        where: True for the curves that are wanted, one a curve: the others are NaN, whatever their points are.
+    Parameters
+    ----------
+    curves : iterable of pair
+        Pairs ``(t, points)``, one per curve, as for `CubicSpline`. Each pair is a single curve, not a batch.
+    space : Space or str
+        Space of all curves, or its name.
+    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol
+        As for `CubicSpline`. They apply to all curves.
+    where : array_like of bool, optional
+        Mask over the curves. Curves where it is False are not fitted and evaluate to NaN.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
 
-    Returns:
-        One `CubicSpline` a curve. If curves fail and ``on_failure="raise"``, the exception's ``.spline``
-        is this list.
+    Returns
+    -------
+    list of CubicSpline
+        One spline per curve.
 
+    Raises
+    ------
+    ValidationError, CutLocusError, ConvergenceError
+        As for `CubicSpline`. The message names the curve. The attribute ``spline`` of a `CutLocusError` or
+        `ConvergenceError` is the list of all splines.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points, or a batch of curves of equal length.
+    fit_segments : Fit a recording with gaps.
+    save_many : Write several curves to one file.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, 0, 1]]
     >>> [len(s.t) for s in ss.fit_many([(None, square), ([0, 2], square[:2])], "sphere:2")]
     [4, 2]
     """
-    space, check = space_named(space), checked_flag(check, "check")
+    space = space_named(space)
+    options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
     pairs: list[tuple[ArrayLike | None, Any]] = list(curves)
-    policy = checked_extrapolate(extrapolate)
-    check_on_failure(on_failure)
-    check_progress(progress)
-    options = options_of(method, tol, max_iter)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
-            raise ValidationError(f"curve {number} must be a pair (t, points)")
+            raise ValidationError(f"curve {number} must be a pair (t, points), not {short_repr(curve)}")
     if not pairs:
         return []
     mask = fitting.mask_of(where, (len(pairs),))
@@ -225,7 +332,7 @@ def fit_many(
         try:
             data = with_atol(fitting.read(p, space), atol)
             if data[0].batch:
-                raise ValidationError(f"points has shape {np.shape(p)}; each curve here is a single one")
+                raise ValidationError(f"points has shape {np.shape(p)}, but each pair must be a single curve")
             points.append(data)
             knots.append(knots_of(t, (), data[0].nodes))
         except (ValidationError, TypeError, ValueError) as error:
@@ -233,16 +340,16 @@ def fit_many(
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
     problem = fitting.ManyProblem(
-        space, times, points, ends, options, check, mask, skip_invalid=on_failure != "raise"
+        space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
     fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
     fitted: list[CubicSpline[P]] = [
-        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), policy, found.reports)
+        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), extrapolate, found)
         for i, ((clock, t, _), found) in enumerate(zip(knots, fits, strict=True))
     ]
     if faults:
         raise_or_warn(faults, on_failure, fitted)
-    warn_of_signs(space, [own if mask is None or mask[i] else None for i, own in enumerate(points)])
-    warn_of_far_points([found.curve for found in fits], [found.reports for found in fits])
+    wanted = [own if mask is None or mask[i] else None for i, own in enumerate(points)]
+    warn_of_representatives(space, wanted, [found.curve for found in fits], [found.columns for found in fits])
     return fitted

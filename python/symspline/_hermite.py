@@ -1,4 +1,4 @@
-"""Curves through points with given velocities."""
+"""Cubic Hermite splines: curves through points with given velocities."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from ._base_curve import Curve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
-from ._far import warn_of_far_points
 from ._functional import velocities_of
 from ._options import checked_extrapolate, outside, with_atol
-from ._signs import warn_of_signs
+from ._representatives import warn_of_far_points, warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
@@ -22,27 +21,66 @@ from ._typing import BCType, Extrapolate, File, P, PointsLike
 
 
 class HermiteSpline(Curve[P]):
-    """The cubic curve through points with given velocities there, such as measured ones.
+    r"""Interpolate points and velocities by a C¹ cubic Hermite spline.
 
-    Between two points it is the same Bézier curve as that of a `CubicSpline`, whose control points follow from the
-    velocities. At the points it is C¹: the acceleration jumps. In flat space it is SciPy's ``CubicHermiteSpline``.
+    Each segment is the cubic Bézier curve of a `CubicSpline`, with control points that follow from the given
+    velocities instead of a C² condition. The covariant acceleration may jump at the knots. On a Euclidean space the
+    result equals SciPy's ``CubicHermiteSpline``.
 
-    Args:
-        t: times of the points, increasing: None for 0, 1, …, N, shape (N+1,), or (..., N+1) with one row per curve.
-            Numbers or dates; for dates velocities are per second. Those with a time zone become UTC.
-        points: shape (..., N+1, *space.point_shape), N >= 1; leading axes are independent curves. For a `Product` a
-            tuple of arrays.
-        velocities: γ' at the points, tangent vectors of the shape of the points. Those of rotations are made of
-            angular velocities by `symspline.rotations.velocities`.
-        space: a space or its name.
-        extrapolate: what happens outside the knots: None raises, True continues the last segment, ``"geodesic"`` goes
-            on with constant velocity, ``"periodic"`` wraps.
-        atol: how far off the space points may be, as for `CubicSpline`.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,) or (..., n), or None
+        Strictly increasing knots, shared by all curves or one row per curve. None means 0, 1, ..., n - 1. Velocities
+        for dates are per second. Dates with a time zone are converted to UTC.
+    points : array_like, shape (..., n, *space.point_shape)
+        Points to interpolate, at least two per curve. Leading axes are batch axes. Points within `atol` of the
+        manifold are projected onto it. For a `Product`, pass a tuple with one array per factor.
+    velocities : array_like, shape (..., n, *space.point_shape)
+        Velocities γ' at the points, which must be tangent vectors there. `symspline.rotations.velocities` computes
+        those of rotations from angular velocities.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. False gives NaN,
+        as in SciPy. True continues the first and last segments. ``"geodesic"`` continues with constant velocity.
+        ``"periodic"`` repeats the curve.
+    atol : float, optional
+        Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
 
-    Raises:
-        ValidationError: the input is not what is described above.
-        CutLocusError: the geodesic between two neighbours, or between their control points, is not unique.
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    CutLocusError
+        If two neighbouring points or control points are not joined by a unique shortest geodesic.
 
+    Warns
+    -----
+    FarPointsWarning
+        If a curve has at least four segments and more than half of its steps exceed 0.6 of the distance to the cut
+        locus.
+    UserWarning
+        If points on ``Sphere(3)`` look like unit quaternions with inconsistent signs.
+
+    See Also
+    --------
+    CubicSpline : Interpolate points by a C² curve.
+    evaluate : Evaluate a curve given by plain arrays.
+
+    Notes
+    -----
+    The control points of the segment between the points :math:`p_i` and :math:`p_{i+1}` with the velocities
+    :math:`u_i` and :math:`u_{i+1}` are, for an interval of length h,
+
+    .. math:: p_i, \quad \exp_{p_i}(h u_i / 3), \quad \exp_{p_{i+1}}(-h u_{i+1} / 3), \quad p_{i+1}.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), equations (8) and (12).
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> curve = ss.HermiteSpline([0, 1], [[1, 0, 0], [0, 1, 0]], [[0, 0, 0], [-1, 0, 0]], "sphere:2")
     >>> curve(1, nu=1).round(12) + 0.0
@@ -52,7 +90,7 @@ class HermiteSpline(Curve[P]):
     _kind = "C¹ Hermite spline"
     _ends = "given velocities"
     _unconverged = 0
-    _bc_type: BCType = "natural"  # such curves are not closed
+    _bc_type: BCType = "natural"  # Hermite splines are never closed.
 
     def __init__(
         self,
@@ -81,7 +119,7 @@ class HermiteSpline(Curve[P]):
         curve = curve_of(space, times, arrays, fitted=False)
         self._fill(clock, shown_times, curve, policy)
         warn_of_signs(space, [data])
-        warn_of_far_points([curve], [None])
+        warn_of_far_points([curve])
 
     def _fill(self, clock: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate
@@ -89,7 +127,7 @@ class HermiteSpline(Curve[P]):
 
     @classmethod
     def _of(cls, *parts: Any) -> Self:
-        """A curve that was checked before, from all that it keeps."""
+        """Return a curve with the given state, without checks."""
         self = cls.__new__(cls)
         self._fill(*parts)
         return self
@@ -103,7 +141,36 @@ class HermiteSpline(Curve[P]):
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
 
     def save(self, file: File) -> None:
-        """Write the curve to an NPZ file, which `symspline.load` reads back."""
+        """Write the curve to an NPZ file.
+
+        `load` reads it back.
+
+        Parameters
+        ----------
+        file : str, path or file object
+            Name of the file, or a binary file that is open for writing. An existing file of this name is replaced only
+            when the new one is complete.
+
+        Raises
+        ------
+        ValidationError
+            If the space is a `Manifold` made of functions, which cannot be stored.
+        OSError
+            If the file cannot be written.
+
+        See Also
+        --------
+        load : Read a curve.
+
+        Examples
+        --------
+        >>> import io, symspline as ss
+        >>> file = io.BytesIO()
+        >>> ss.HermiteSpline(None, [[0.0], [1.0]], [[0.0], [0.0]], "r:1").save(file)
+        >>> _ = file.seek(0)
+        >>> ss.load(file)
+        <HermiteSpline on Euclidean(1): 2 points>
+        """
         _archive.write(file, _archive.arrays_of(self, _archive.HERMITE))
 
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Places on a globe: longitude and latitude in degrees, and unit vectors of S²."""
+"""Positions on a globe: longitude and latitude in degrees, and unit vectors of S²."""
 
 from __future__ import annotations
 
@@ -12,19 +12,32 @@ Array = NDArray[np.float64]
 
 
 def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
-    """The unit vectors of places on a globe.
+    """Convert longitude and latitude to unit vectors.
 
-    Args:
-        lon, lat: degrees east and north, shape (...).
+    Parameters
+    ----------
+    lon, lat : array_like, shape (...)
+        Degrees east and north.
 
-    Returns:
-        Shape (..., 3): x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Unit vectors: x points to 0° E 0° N, y to 90° E 0° N, z to the north pole.
 
-    Raises:
-        ValidationError: a latitude is beyond a pole, or a longitude ten turns away, as where the two are swapped or a
-            value stands for a missing one.
+    Raises
+    ------
+    ValidationError
+        If a latitude is beyond a pole or a longitude exceeds ten turns. The two may then be swapped, or a value may
+        represent a missing one.
 
-    >>> from_lonlat(90, 0).round(15)
+    See Also
+    --------
+    to_lonlat : Convert unit vectors to longitude and latitude.
+
+    Examples
+    --------
+    >>> from symspline import geo
+    >>> geo.from_lonlat(90, 0).round(15)
     array([0., 1., 0.])
     """
     east, north = _degrees(lon, "lon", 3600), _degrees(lat, "lat", 90)
@@ -32,16 +45,33 @@ def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
         east, north = np.broadcast_arrays(east, north)
     except ValueError:
         raise ValidationError(
-            f"lon of shape {east.shape} and lat of shape {north.shape} do not go together; give one of each per place"
+            f"lon of shape {east.shape} and lat of shape {north.shape} do not broadcast. Pass one of each per position."
         ) from None
     x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
     return np.stack([x, y, z], axis=-1)
 
 
 def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
-    """Longitude in (-180, 180] and latitude, in degrees, of unit vectors of shape (..., 3).
+    """Convert unit vectors to longitude and latitude.
 
-    >>> lon, lat = to_lonlat([0, 1, 0])
+    Parameters
+    ----------
+    points : array_like, shape (..., 3)
+        Unit vectors.
+
+    Returns
+    -------
+    lon, lat : ndarray, shape (...)
+        Degrees east in (-180, 180], and degrees north.
+
+    See Also
+    --------
+    from_lonlat : Convert longitude and latitude to unit vectors.
+
+    Examples
+    --------
+    >>> from symspline import geo
+    >>> lon, lat = geo.to_lonlat([0, 1, 0])
     >>> float(lon), float(lat)
     (90.0, 0.0)
     """
@@ -50,10 +80,22 @@ def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
 
 
 def compass(points: ArrayLike) -> tuple[Array, Array]:
-    """Unit vectors to the east and to the north at unit vectors of shape (..., 3); at a pole, those of
-    0° E.
+    """Compute the directions east and north at unit vectors.
 
-    >>> east, north = compass([1, 0, 0])
+    Parameters
+    ----------
+    points : array_like, shape (..., 3)
+        Unit vectors.
+
+    Returns
+    -------
+    east, north : ndarray, shape (..., 3)
+        Unit tangent vectors. At a pole they are those of the meridian of 0° E.
+
+    Examples
+    --------
+    >>> from symspline import geo
+    >>> east, north = geo.compass([1, 0, 0])
     >>> east + 0.0, north + 0.0
     (array([0., 1., 0.]), array([0., 0., 1.]))
     """
@@ -66,16 +108,16 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
 
 
 def _degrees(value: ArrayLike, name: str, most: float) -> Array:
-    """An angle in radians, of one in degrees."""
+    """Convert an angle from degrees to radians."""
     angles = _floats(value, name)
-    # Single precision may round up.
+    # The limit itself may be rounded up in single precision.
     beyond = np.argwhere(np.abs(angles) > most * (1 + 1e-7))
     if len(beyond):
         place = tuple(map(int, beyond[0]))
         where = name + "".join(f"[{i}]" for i in place)
         raise ValidationError(
-            f"{where} is {angles[place]}: {name} must be from -{most} to {most} degrees; are lon and lat swapped, or "
-            "does it stand for a missing value?"
+            f"{where} is {angles[place]}, but {name} must be from -{most} to {most} degrees. Check whether lon and lat "
+            "are swapped, or whether the value represents a missing one."
         )
     return np.radians(angles)
 

@@ -1,4 +1,4 @@
-"""Options of a spline: what a user may write, checked."""
+"""Validation of the options of splines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,14 @@ from ._curves.solve import Options
 
 _QUANTITIES = ("point", "velocity", "acceleration")
 _RAISE = "raise"
-_OUTSIDE = {None: "raise", True: "continue", "geodesic": "geodesic", "periodic": "periodic"}
+_OUTSIDE = {
+    None: "raise",
+    "raise": "raise",
+    True: "continue",
+    False: "nan",
+    "geodesic": "geodesic",
+    "periodic": "periodic",
+}
 
 
 def quantity_of(nu: Any) -> str:
@@ -36,13 +43,8 @@ def order_of(nu: Any, most: int = 2) -> int:
     return int(nu)
 
 
-def options_of(method: str, tol: float, max_iter: int | None) -> Options:
-    """How to solve; the core checks method and tol."""
-    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
-
-
 def with_atol(data: list[Points], atol: float | None) -> list[Points]:
-    """Points that may be off the space by ``atol``; None leaves what their type allows."""
+    """Return points with the tolerance `atol`; None keeps the tolerance of their type."""
     if atol is None:
         return data
     tol = checked_atol(atol)
@@ -50,40 +52,53 @@ def with_atol(data: list[Points], atol: float | None) -> list[Points]:
 
 
 def checked_extrapolate(extrapolate: Any) -> Any:
-    """What happens outside the knots, if it is one of the words for it."""
+    """Return the extrapolation policy, or raise ValidationError if it is invalid."""
     known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
-    if extrapolate is not None and extrapolate is not True and not known:
+    if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
-            f"extrapolate must be None, True, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
+            "extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not "
+            f"{short_repr(extrapolate)}"
         )
     return extrapolate
 
 
 def outside(policy: Any, bc_type: Any) -> str:
-    """The same as the core calls it; closed curves go on as they began."""
+    """Return the core's name of an extrapolation policy. Closed curves repeat unless another policy is given."""
     return "periodic" if policy is None and is_closed(bc_type) else _OUTSIDE[policy]
 
 
 def check_progress(progress: Any) -> None:
-    """Raise ValidationError unless it can be called, or is None."""
+    """Raise ValidationError unless the argument is callable or None."""
     if progress is not None and not callable(progress):
         raise ValidationError(f"progress must be a function of two numbers, not {short_repr(progress)}")
 
 
-def check_fit_options(extrapolate: Any, on_failure: Any, check: Any, progress: Any) -> None:
-    """Raise ValidationError unless all of these are valid. The defaults, which are usual, cost one call."""
+def fit_options(
+    method: str,
+    tol: float,
+    max_iter: int | None,
+    extrapolate: Any,
+    on_failure: Any,
+    check: Any,
+    progress: Any,
+) -> Options:
+    """The options of the solver, after validation of all options of a fit.
+
+    The compiled core validates ``method`` and ``tol``. The usual defaults take no further function call.
+    """
     if extrapolate is not None:
         checked_extrapolate(extrapolate)
-    # Not ==, which would compare every number of an array.
+    # == would compare every element of an array.
     if on_failure is not _RAISE:
         check_on_failure(on_failure)
     if check is not True:
         checked_flag(check, "check")
     if progress is not None:
         check_progress(progress)
+    return Options(method, tol, None if max_iter is None else whole_number(max_iter, "max_iter", 1))
 
 
 def check_on_failure(on_failure: Any) -> None:
-    """Raise ValidationError unless it is one of the three words."""
+    """Raise ValidationError unless the argument is one of the three policies."""
     if not isinstance(on_failure, str) or on_failure not in ("raise", "warn", "ignore"):
         raise ValidationError(f"on_failure must be 'raise', 'warn' or 'ignore', not {short_repr(on_failure)}")

@@ -1,4 +1,4 @@
-"""The segments of a curve one by one, and what they do where they meet."""
+"""Segments of a curve as separate curves, and their jumps at the knots."""
 
 from __future__ import annotations
 
@@ -21,9 +21,12 @@ Doubles = NDArray[np.float64]
 class Jumps:
     """Jumps of γ, γ' or ∇γ' at the knots where two segments meet.
 
-    Attributes:
-        size: shape (knots,).
-        largest: the largest value at an end of a segment.
+    Attributes
+    ----------
+    size : ndarray, shape (knots,)
+        Size of each jump.
+    largest : float
+        Largest value at an end of a segment.
     """
 
     size: Doubles
@@ -31,19 +34,23 @@ class Jumps:
 
     @property
     def relative(self) -> float:
-        """The largest jump, relative to the largest value."""
+        """Largest jump, relative to the largest value."""
         most = float(self.size.max(initial=0.0))
         return most / self.largest if most else 0.0
 
 
 @dataclass(frozen=True)
 class Segments:
-    """Segments as curves of their own, each with two knots: they know nothing of their neighbours.
+    """Segments as separate curves with two knots each, evaluated without their neighbours.
 
-    Attributes:
-        space: their space, not a product.
-        t: shape (S, 2).
-        points, velocities: shape (S, 2, *point_shape).
+    Attributes
+    ----------
+    space : Space
+        Their space, not a product.
+    t : ndarray, shape (S, 2)
+        Knots.
+    points, velocities : ndarray, shape (S, 2, *point_shape)
+        Points and velocities at the knots.
     """
 
     space: Space
@@ -52,17 +59,25 @@ class Segments:
     velocities: Array
 
     def at(self, x: Array, nu: int = 0) -> Array:
-        """Every segment at its own times, the rows of x: shape (S, m, *point_shape)."""
+        """Evaluate every segment at its own times, the rows of x; shape (S, m, *point_shape)."""
         values: Array = evaluate(self.t, self.points, self.velocities, self.space, x, nu=nu, per_curve=True)
         return values
 
     def jumps(self, nu: int, closed: bool = False) -> Jumps:
-        """How the ends of segments differ from the starts of the next ones, with ``closed`` also of the
-        last from that of the first.
+        """Return the differences between the ends of segments and the starts of the next ones.
 
-        Each value is that of its segment alone. Vectors are carried from end to start before they are
-        compared, as one point may have two arrays, and their lengths are those of the space: rounding
-        far out in hyperbolic space is the same as near its middle then, but for the condition |p|².
+        Parameters
+        ----------
+        nu : {0, 1, 2}
+            Order of the derivative.
+        closed : bool
+            Whether the last segment is compared with the first one as well.
+
+        Notes
+        ----- Each value is computed from its segment alone. One point may have several representatives, so vectors are
+        transported in parallel from end to start before they are compared. Their lengths are those of the space.
+        Rounding errors far out in hyperbolic space are then comparable to those near its origin, up to the condition
+        number |p|².
         """
         last = None if closed else -1
         places = self.at(self.t)
@@ -72,7 +87,7 @@ class Segments:
             return Jumps(self.space.distance(end, start), float(np.linalg.norm(flat, axis=-1).max()))
         vectors = self.at(self.t, nu)
         carried = vectors[:last, 1]
-        # Points of a manifold that was made without it have one array each.
+        # A manifold made of functions without `transport` has one representative per point.
         if not isinstance(self.space, Manifold) or self.space.functions.transport is not None:
             carried = self.space.transport(end, start, carried)
         size = self.space.norm(start, carried - _next(vectors)[:last])
@@ -80,15 +95,15 @@ class Segments:
 
 
 def segments_of(spline: CubicSpline) -> Segments:
-    """The segments of one curve, not in a product."""
+    """Return the segments of a single curve, not in a product."""
     return Segments(spline.space, pairs(spline.t), pairs(spline.points), pairs(spline.velocities))
 
 
 def pairs(values: Array) -> Array:
-    """Neighbours, shape (N, 2, ...)."""
+    """Return pairs of neighbours, shape (N, 2, ...)."""
     return np.stack([values[:-1], values[1:]], axis=1)
 
 
 def _next(values: Array) -> Array:
-    """What comes at the start of the segment after each, after the last that of the first."""
+    """Return the values at the start of the segment after each; after the last one comes the first."""
     return np.roll(values[:, 0], -1, axis=0)

@@ -1,4 +1,4 @@
-"""Rotation matrices and unit quaternions: formulas for numbers, and for arrays of NumPy or JAX."""
+"""Conversions between rotation matrices and unit quaternions, as formulas for numbers and for NumPy or JAX arrays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ Rows = tuple[tuple[Any, ...], ...]
 
 
 def rotation_rows(w: Any, x: Any, y: Any, z: Any) -> Rows:
-    """The rows of the rotation matrix of a unit quaternion."""
+    """Return the rows of the rotation matrix of a unit quaternion."""
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
@@ -17,9 +17,13 @@ def rotation_rows(w: Any, x: Any, y: Any, z: Any) -> Rows:
 
 
 def quaternion_rows(matrix: Any) -> Rows:
-    """The rows of 4qqᵀ for the unit quaternion q of a rotation matrix, shape (..., 3, 3).
+    """Return the rows of 4qqᵀ for the unit quaternion q of a rotation matrix, shape (..., 3, 3).
 
-    All rows are multiples of q. In the one with the largest diagonal entry nothing cancels (Shepperd 1978).
+    All rows are multiples of q. The row with the largest diagonal entry has no cancellation.
+
+    References
+    ----------
+    S. W. Shepperd, Quaternion from rotation matrix, J. Guidance and Control 1 (1978).
     """
     (a, b, c), (d, e, f), (g, h, i) = ([matrix[..., row, column] for column in range(3)] for row in range(3))
     return (

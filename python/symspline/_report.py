@@ -1,4 +1,4 @@
-"""What a fit says about itself."""
+"""Reports of fits."""
 
 from __future__ import annotations
 
@@ -10,60 +10,99 @@ import numpy as np
 from numpy.typing import NDArray
 
 Number = float | NDArray[np.float64]
-# So many times the median is a long gap between points.
+# A gap between points is long if it exceeds the median by this factor.
 _LONG = 10
 
 
 class ConvergenceWarning(UserWarning):
-    """A curve did not converge, or passes a cut locus, and ``on_failure="warn"``."""
+    """Warning that a curve did not converge or meets a cut locus, if ``on_failure="warn"``."""
 
 
 class FarPointsWarning(UserWarning):
-    """Most neighbours are so far apart that several C² curves may exist: the points may be in representations that do
-    not fit each other."""
+    """Warning that most neighbouring points of a curve are far apart.
+
+    Several C² curves may then pass through the points. Often the representation of such data does not suit the space.
+    """
 
 
 @dataclass(frozen=True)
 class Report:
-    """How a fit went. For a batch of curves every field but ``method`` and ``curvature`` is an array
-    with the batch axes.
+    r"""Report of a fit.
 
-    Attributes:
-        method: the solver that was used: ``"auto"`` tries quasi-newton, then newton, then the homotopy; of
-            a batch the last that any curve needed. Where these fail, or points are far apart, ``"trust-region"``.
-        converged: whether the residual is below the tolerance, or at the rounding floor (256 ε times
-            the condition of the data), and all control legs are inside the cut locus. It is true of the curve:
-            across the seam of a closed curve, too.
-        iterations: how often the C² residual was evaluated.
-        residual: the C² defect of a knot divided by 1/hᵢ₋₁ + 1/hᵢ, relative to the largest speed |u| (or to
-            a thousandth of the largest distance over time between neighbours, if all speeds are smaller);
-            the largest of all knots. At an end with not-a-knot it is the error of the velocity there, divided by
-            1 + h₀/h₁.
-        max_step: D of (21), the longest distance between neighbouring points.
-        max_gap: the longest time between neighbouring points, in seconds for dates.
-        curvature: K of (22).
-        invariant_radius: the smallest V of (38): with all ‖h u/3‖ ≤ V, Algorithm 1 keeps them so
-            (Theorem 3.1). None where the theorem does not apply, which is normal for points far apart, for
-            unequal knots and other ends than natural ones and given velocities; NaN for such a curve of a
-            batch. In a product the legs in every factor stay below the radius there, and together below the root
-            of the sum of their squares, which is this.
-        contraction_bound: a bound α < 1 on the contraction of Algorithm 1 per sweep in that region, in the largest
-            length of a velocity. With it the region holds exactly one C² curve, and Algorithm 1 converges to it from
-            zero velocities. None (NaN in a batch) where the theorem does not apply, or K D > 0.26058. Of a product, the
-            largest of its factors.
-        guaranteed_sweeps: the number of sweeps of Algorithm 1 after which all ‖h u/3‖ are, by this bound, within
-            ``tol`` times ``invariant_radius`` of those of the curve. None (NaN in a batch) where there is no bound.
-        rate: mean contraction of the residual per iteration.
-        alternative_energy: the least bending energy ∫ |∇γ'|² dt of other C² curves through the points that ``"auto"``
-            found on its way: points far apart may have several. None where there was none; NaN for such a curve of a
-            batch. Through the points of a product another curve has the alternative of one factor.
-        skipped: solvers that ``"auto"`` left out, or stopped early, because they would have cost too much; of a batch
-            those of any curve. The search for other curves costs at most a few times what the first curve cost, or a
-            fixed budget that is generous up to ten dimensions. With ``method=`` any solver runs to its end.
-        velocity_error: on a `Manifold` a bound for the distance of the velocities at the knots from those of the exact
-            C² curve, the largest norm of all knots, in units of velocity (per second for dates): see
-            :doc:`/manifolds`. inf where there is no bound. None on symmetric spaces. In a product of manifolds the
-            root of the sum of squares.
+    For a batch of curves, every field except ``method``, ``curvature`` and ``skipped`` is an array with the batch
+    axes.
+
+    Attributes
+    ----------
+    method : str
+        Solver that computed the curve: ``"fixed-point"``, ``"quasi-newton"``, ``"newton"``, ``"homotopy"`` or
+        ``"trust-region"``. For a batch, the last one in this order that any curve needed.
+    converged : bool or ndarray of bool
+        Whether the residual is below the tolerance, or at the rounding floor (256 ε times the condition number of the
+        data), and all control handles are inside the cut locus. For a closed curve this includes the point where its
+        ends meet.
+    iterations : int or ndarray of int
+        Number of evaluations of the C² residual.
+    residual : float or ndarray
+        Relative C² residual, the largest over all knots; see Notes.
+    max_step : float or ndarray
+        D of (21), the longest distance between neighbouring points.
+    max_gap : float or ndarray
+        Longest time between neighbouring points; in seconds for dates.
+    curvature : float
+        K of (22), the bound of the curvature of the space.
+    invariant_radius : float, ndarray or None
+        Smallest V of (38), see Notes. None where the theorem does not apply, which is normal for points far apart,
+        for unequal knots, and for end conditions other than natural ends and given velocities; NaN for such curves of
+        a batch. For a product, the root of the sum of the squares of its factors.
+    rate : float or ndarray
+        Mean contraction factor of the residual per iteration.
+    alternative_energy : float, ndarray or None
+        Lowest bending energy of other C² curves through the points that ``method="auto"`` computed. None if there
+        were none, NaN for such curves of a batch. For a product, the alternative differs in one factor.
+    contraction_bound : float, ndarray or None
+        Bound α < 1 of the contraction factor of Algorithm 1, see Notes. None, or NaN in a batch, where the theorem
+        does not apply or K D > 0.26058. For a product, the largest bound of its factors.
+    guaranteed_sweeps : int, ndarray or None
+        Number of sweeps of Algorithm 1 after which, by this bound, all h u/3 are within ``tol`` times
+        `invariant_radius` of those of the curve. None, or NaN in a batch, if there is no bound.
+    skipped : tuple of str
+        Solvers that ``method="auto"`` omitted or stopped early because they would have exceeded its budget. For a
+        batch, those of any curve.
+    velocity_error : float, ndarray or None
+        Bound of the distance between the velocities at the knots and those of the exact C² curve on a `Manifold`, in
+        units of velocity; see :doc:`/manifolds`. inf if there is no bound, None on symmetric spaces. For a product,
+        the root of the sum of squares.
+
+    See Also
+    --------
+    CubicSpline.report : Report of a spline.
+    SmoothingReport : Report of a smoothing fit.
+
+    Notes
+    -----
+    The residual at a knot is the violation of the C² condition (13) divided by :math:`1/h_{i-1} + 1/h_i`, relative to
+    the largest speed, or to a thousandth of the largest distance over time between neighbours if all speeds are
+    smaller. At an end with the condition ``"not-a-knot"`` it is the error of the velocity there, divided by
+    :math:`1 + h_0/h_1`.
+
+    Let u be the velocities and h the length of an interval. If all :math:`\lVert h u/3 \rVert \le V`, Algorithm 1
+    keeps them so (Theorem 3.1). `contraction_bound` bounds its contraction per sweep in this region, in the norm of
+    the largest velocity. With such a bound the region contains exactly one C² curve, and Algorithm 1 converges to it
+    from zero velocities.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), equations (13), (21), (22) and (38), Theorem 3.1.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ss.Sphere(2))
+    >>> report = spline.report
+    >>> report.method, report.converged, round(report.max_step, 4)
+    ('quasi-newton', True, 1.5708)
     """
 
     method: str
@@ -102,7 +141,7 @@ class Report:
         radius = self.invariant_radius
         if radius is None or np.isnan(radius).any():
             return ""
-        return f", control legs stay below {np.max(radius):.3g} (Theorem 3.1)"
+        return f", control handles stay below {np.max(radius):.3g} (Theorem 3.1)"
 
     def _accuracy(self) -> str:
         return "" if self.velocity_error is None else f", velocities within {_worst(self.velocity_error):.1e}"
@@ -114,7 +153,26 @@ class Report:
         return all(_same(getattr(self, name), getattr(other, name)) for name in names)
 
     def map(self, function: Any) -> Report:
-        """The report with a function applied to the fields that are per curve."""
+        """Apply a function to all fields that have one value per curve.
+
+        Parameters
+        ----------
+        function : callable
+            Function of one field, such as the selection of some curves.
+
+        Returns
+        -------
+        Report
+            Report with the results.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> curves = ss.CubicSpline(None, np.zeros((3, 4, 1)), "r:1")
+        >>> bool(curves.report.map(lambda field: field[0]).iterations == curves[0].report.iterations)
+        True
+        """
 
         def known(value: Any) -> Any:
             part = None if value is None else function(value)
@@ -139,7 +197,7 @@ class Report:
 
 
 def _worst(values: Any) -> Any:
-    """The largest of those of curves whose points are good, which may be none."""
+    """Return the largest value, without those of failed curves, which are NaN."""
     return np.fmax.reduce(np.ravel(values))
 
 
@@ -149,11 +207,11 @@ def _same(a: Any, b: Any) -> bool:
     return np.array_equal(a, b, equal_nan=True)
 
 
-# As the compiled core numbers them, in the order in which they are tried.
+# In the order of their numbers in the compiled core.
 SOLVERS = ("fixed-point", "quasi-newton", "newton", "homotopy", "trust-region")
 
 INTEGERS = ("converged", "iterations", "solver", "skipped")
-# NaN where they are not known.
+# Fields that are NaN where they are unknown.
 OPTIONAL = (
     "invariant_radius",
     "contraction_bound",
@@ -162,22 +220,25 @@ OPTIONAL = (
     "velocity_error",
 )
 NUMBERS = ("residual", "max_step", "rate", *OPTIONAL)
+MAX_STEP = NUMBERS.index("max_step")
 
 
 class Columns(NamedTuple):
-    """The fields of reports as two tables with a row for each field and a column for each curve: ``"solver"`` is a
-    number in `SOLVERS`, ``"skipped"`` a set of bits.
+    """Fields of reports as two tables with one row per field and one column per curve.
 
-    Attributes:
-        integers: rows in the order of `INTEGERS`.
-        numbers: rows in the order of `NUMBERS`.
+    Attributes
+    ----------
+    integers : ndarray, shape (len(INTEGERS), curves)
+        Rows in the order of `INTEGERS`. ``"solver"`` is an index into `SOLVERS`, ``"skipped"`` a set of bits.
+    numbers : ndarray, shape (len(NUMBERS), curves)
+        Rows in the order of `NUMBERS`.
     """
 
     integers: NDArray[np.int64]
     numbers: NDArray[np.float64]
 
     def row(self, name: str) -> NDArray[Any]:
-        """The values of a field, one for each curve; a view that can be written to."""
+        """Return the values of a field, one per curve, as a writable view."""
         integer = name in INTEGERS
         values: NDArray[Any] = (
             self.integers[INTEGERS.index(name)] if integer else self.numbers[NUMBERS.index(name)]
@@ -185,36 +246,38 @@ class Columns(NamedTuple):
         return values
 
     def part(self, curves: Any) -> Columns:
-        """Those of some curves."""
+        """Return the columns of some curves."""
         return Columns(self.integers[:, curves], self.numbers[:, curves])
 
     def put(self, curves: Any, other: Columns) -> None:
-        """Replace those of some curves."""
+        """Replace the columns of some curves."""
         self.integers[:, curves], self.numbers[:, curves] = other
 
     @staticmethod
     def empty(count: int) -> Columns:
-        """Those of so many curves that were not fitted."""
+        """Return columns for curves that were not fitted."""
         return Columns(np.zeros((len(INTEGERS), count), np.int64), np.full((len(NUMBERS), count), np.nan))
 
     @staticmethod
     def joined(each: Sequence[Columns]) -> Columns:
-        """Those of the curves of all."""
+        """Concatenate columns."""
         return Columns(*(np.concatenate(tables, axis=1) for tables in zip(*each, strict=True)))
 
 
 def combined(
     reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None
 ) -> Report:
-    """The report of curves in a product, from those in its factors: the worst of each field, and what is of the
-    whole."""
+    """Combine the reports of the factors into the report of a product.
+
+    Most fields are the worst of the factors; the arguments are fields of the whole product.
+    """
 
     def largest(name: str) -> Any:
         result: NDArray[Any] = np.max(np.stack([getattr(report, name) for report in reports]), axis=0)
         return result.item() if result.ndim == 0 else result
 
     def of_all(name: str, whole: Any) -> Any:
-        # The theorem is about each factor by itself.
+        # Theorem 3.1 applies to each factor separately, and to the product only if it applies to all of them.
         each = [getattr(report, name) for report in reports]
         return None if any(one is None for one in each) else whole(np.stack(each))[()]
 
@@ -242,13 +305,13 @@ def combined(
 
 
 def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which steps between the knots of one curve are far longer than most."""
+    """Return which steps between the knots of one curve are far longer than most."""
     steps = np.diff(times)
     return np.asarray(steps > _LONG * np.median(steps))
 
 
 def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
-    """The longest time between neighbouring knots, shape of the batch axes."""
+    """Return the longest time between neighbouring knots, shape of the batch axes."""
     longest = np.maximum.reduce(times[..., 1:] - times[..., :-1], axis=-1)
     return np.broadcast_to(longest, batch).copy() if batch else float(longest)
 
@@ -256,7 +319,7 @@ def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
 def shaped(
     columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], curvature: float, method: str
 ) -> Report:
-    """A report from the columns of curves with these knots; ``method`` is what was asked for."""
+    """Return the report of curves with these knots from its columns; `method` is the requested one."""
     gap = longest_gap(times, batch)
     if batch == ():
         converged, iterations, solver, bits = columns.integers[:, 0].tolist()
@@ -278,7 +341,7 @@ def shaped(
             _skipped(bits),
             error,
         )
-    # Each row by itself: a batch may have no curves.
+    # Rows are reshaped one by one, because a batch may be empty.
     integers = {name: columns.row(name).reshape(batch) for name in INTEGERS}
     numbers: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in NUMBERS}
     solvers = integers["solver"]
@@ -297,7 +360,7 @@ def shaped(
 
 
 def _count(value: Any) -> Any:
-    """A whole number of one curve; arrays, which may hold NaN, stay floats."""
+    """Return an integer for one curve. Arrays may hold NaN and stay floats."""
     return value if value is None or np.ndim(value) else int(value)
 
 

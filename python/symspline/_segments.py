@@ -1,4 +1,4 @@
-"""Recordings with pauses: one curve for each stretch between them."""
+"""Fits of recordings with gaps: one curve for each segment between them."""
 
 from __future__ import annotations
 
@@ -14,17 +14,46 @@ from ._cubic import CubicSpline
 from ._curves.fit import read
 from ._functional import fit_many
 from ._input import times_of
-from ._smoothing import SmoothingSpline
+from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
-from ._spaces import Array, Product, Space, factors_of, parts_of
+from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import Moments, time_axis_of
-from ._typing import Duplicates, FitOptions, P, PointsLike, SmoothingOptions
+from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions
 
 _DUPLICATES = ("raise", "first", "mean")
-# The mean of points near each other is found by a few steps, each of which leaves the third power of their distance.
+# Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
+# the points, so a few steps are enough for points close together.
 _STEPS = 50
+
+
+@overload
+def fit_segments(  # type: ignore[overload-overlap]
+    t: ArrayLike,
+    points: PointsLike,
+    space: Product[PProduct],
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[True],
+    **options: Unpack[SmoothingOptions],
+) -> list[SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
+
+
+@overload
+def fit_segments(
+    t: ArrayLike,
+    points: PointsLike,
+    space: SpecialEuclidean,
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[True],
+    **options: Unpack[SmoothingOptions],
+) -> list[SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
@@ -38,7 +67,7 @@ def fit_segments(
     duplicates: Duplicates = "raise",
     smooth: Literal[True],
     **options: Unpack[SmoothingOptions],
-) -> list[SmoothingSpline[P, Any]]: ...
+) -> list[SmoothingSpline[P]]: ...
 
 
 @overload
@@ -66,45 +95,67 @@ def fit_segments(
     smooth: bool = False,
     **options: Any,
 ) -> list[Any]:
-    """Fit a recording that pauses: cut where neighbouring times are more than ``max_gap`` apart, one curve a piece.
+    """Fit a recording with gaps, one curve per segment.
 
-    A curve drawn across a pause swings out far and looks plausible. What lies between the curves is not known.
+    The recording is cut wherever neighbouring times are more than `max_gap` apart. A single curve across a long gap
+    would swing far out and still look plausible.
 
-    Args:
-        t: times of the points, not falling, shape (n,): numbers or ``datetime64``.
-        points: shape (n, *space.point_shape), for a `Product` a tuple of arrays; a SciPy ``Rotation`` on ``so:3``.
-        space: a space or its name.
-        max_gap: the longest time between neighbours of one curve, in the unit of t, seconds for dates; or a
-            ``timedelta64``.
-        min_points: pieces of fewer points are left out; 2 or more.
-        duplicates: what happens where a time comes several times: ``"raise"`` an error, keep the ``"first"`` point, or
-            take their ``"mean"``, the point from which the directions to them add up to zero.
-        smooth: whether the points are noisy: every piece is a `SmoothingSpline` then, with a smoothness and a noise of
-            its own. Of points with one time all count, unless the ``"first"`` are to be kept; copies of a
-            point are one.
-        options: those of `CubicSpline`, or with ``smooth`` those of `make_smoothing_spline`, for all pieces alike;
-            ``weights`` and ``frames`` are those of all points, ``knots`` is a number in each piece. Points of weight
-            zero are left out before the recording is cut, so that many of them are a pause.
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (n,)
+        Times of the points, in non-decreasing order.
+    points : array_like, shape (n, *space.point_shape)
+        Points. For a `Product`, a tuple with one array per factor. On ``so:3``, also a SciPy ``Rotation``.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    max_gap : float or timedelta64
+        Longest time between neighbours of one curve, in the unit of t (seconds for dates).
+    min_points : int, default 2
+        Segments with fewer points are dropped. At least 2.
+    duplicates : {"raise", "first", "mean"}, default "raise"
+        Treatment of points with equal times. ``"raise"`` raises `ValidationError`, ``"first"`` keeps the first point
+        of each time, and ``"mean"`` replaces them by their Karcher mean.
+    smooth : bool, default False
+        Whether the points are noisy. If True, each segment is fitted by `make_smoothing_spline`, with its own λ and
+        noise level. All points with equal times then count, unless `duplicates` is ``"first"``; consecutive copies of
+        a point count as one point.
+    **options
+        Keyword arguments of `CubicSpline` or, with `smooth`, of `make_smoothing_spline`. They apply to all segments.
+        ``weights`` and ``frames`` refer to all points of the recording, and ``knots`` is the number of knots of each
+        segment. Points of weight zero are removed before the recording is cut.
 
-    Returns:
-        The curves in the order of time, each a `CubicSpline` or a `SmoothingSpline`: ``curve.t[0]`` and
-        ``curve.t[-1]`` are where it begins and ends.
+    Returns
+    -------
+    list of CubicSpline or list of SmoothingSpline
+        Curves in the order of time. A segment begins at ``curve.t[0]`` and ends at ``curve.t[-1]``.
 
-    Raises:
-        ValidationError: the input is not what is described above, times fall or repeat, or no piece has ``min_points``.
-        CutLocusError, ConvergenceError: as for `fit_many`; the exception's ``.spline`` is the list of all curves.
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above, or no segment has `min_points` points.
+    CutLocusError, ConvergenceError
+        As for `fit_many`. The attribute ``spline`` is the list of all curves.
 
+    See Also
+    --------
+    fit_many : Fit curves of different lengths in one call.
+    make_smoothing_spline : Fit a curve close to noisy points.
+
+    Examples
+    --------
+    >>> import numpy as np
     >>> import symspline as ss
     >>> t = [0, 1, 1, 2, 14, 15]
-    >>> here, there = ss.fit_segments(t, [[0], [1], [2], [4], [0], [3]], "r:1", max_gap=5, duplicates="mean")
-    >>> here.t, here.points[:, 0], there.t
+    >>> morning, noon = ss.fit_segments(t, [[0], [1], [2], [4], [0], [3]], "r:1", max_gap=5, duplicates="mean")
+    >>> morning.t, morning.points[:, 0], noon.t
     (array([0., 1., 2.]), array([0. , 1.5, 4. ]), array([14., 15.]))
 
-    >>> import numpy as np
+    Noisy data:
+
     >>> t = np.r_[0:10:0.1, 30:40:0.1]
     >>> y = np.sin(t) + 0.1 * np.random.default_rng(0).standard_normal(200)
-    >>> pieces = ss.fit_segments(t, y[:, None], "r:1", max_gap=1, smooth=True)
-    >>> [round(piece.sigma, 1) for piece in pieces]
+    >>> curves = ss.fit_segments(t, y[:, None], "r:1", max_gap=1, smooth=True)
+    >>> [round(curve.sigma, 1) for curve in curves]
     [0.1, 0.1]
     """
     space = space_named(space)
@@ -114,8 +165,8 @@ def fit_segments(
     curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
     if not curves:
         raise ValidationError(
-            f"no piece has {min_points} points: {np.sum(steps > gap)} of {len(steps)} steps are longer than "
-            f"max_gap={max_gap}, the median step is {np.median(steps) if len(steps) else 0:.3g}"
+            f"no segment has {min_points} points: {np.sum(steps > gap)} of {len(steps)} time steps are longer than "
+            f"max_gap={max_gap}, and the median step is {np.median(steps) if len(steps) else 0:.3g}"
         )
     if not smooth:
         return fit_many(curves, space, **options)
@@ -127,44 +178,49 @@ def fit_segments(
 
 
 def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
-    """Raise unless pieces can be smoothed like that, if they are to be."""
+    """Raise ValidationError if `smooth` is invalid, or does not agree with the other options."""
     if not isinstance(smooth, (bool, np.bool_)):
         raise ValidationError(
-            f"smooth must be True or False, not {short_repr(smooth)}; lam, criterion and the like are "
-            "separate keywords"
+            f"smooth must be True or False, not {short_repr(smooth)}. Pass lam, criterion and similar options as "
+            "separate keywords."
         )
     if not smooth:
         return
     if duplicates == "mean":
-        raise ValidationError("with smooth all points of one time count; leave duplicates='mean' out")
+        raise ValidationError("with smooth=True, all points with equal times count. Omit duplicates='mean'.")
     if np.ndim(options.get("knots", 0)) > 0:
         raise ValidationError(
-            "knots: give a number of knots for each piece, or none; pieces have their own times"
+            "knots must be the number of knots of each segment, because segments have different times"
         )
 
 
 def _used(weighing: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
-    """Which noisy points have a weight."""
+    """Return which points have a nonzero weight."""
     found = read_precision(**weighing, space=space, data=read(points, space))
     used: NDArray[np.bool_] = np.any([own.weights > 0 for own in found], axis=0)
     return used
 
 
 def _of_rows(value: Any, rows: NDArray[np.intp]) -> Any:
-    """What belongs to some of the points; of a product in every factor."""
+    """Select the rows of an array that belong to some points; for a product, in every factor."""
     if isinstance(value, tuple):
         return tuple(_of_rows(one, rows) for one in value)
     return None if value is None else np.asarray(value)[rows]
 
 
 class Cut(NamedTuple):
-    """A recording in pieces.
+    """A recording cut into segments.
 
-    Attributes:
-        curves: times and points of each; none where all are too short.
-        rows: which points these are.
-        steps: all between neighbouring times, as the core counts them.
-        gap: the longest of a piece.
+    Attributes
+    ----------
+    curves : list of pair
+        Times and points of each segment; empty if all segments are too short.
+    rows : list of ndarray
+        Indices of these points in the recording.
+    steps : ndarray
+        Differences of neighbouring times, as the core counts them.
+    gap : float
+        Longest difference within a segment.
     """
 
     curves: list[tuple[Any, Any]]
@@ -182,14 +238,19 @@ def cut(
     duplicates: str,
     used: NDArray[np.bool_] | None = None,
 ) -> Cut:
-    """The pieces as `fit_segments` says; of noisy points those that are used, whose times may repeat."""
+    """Cut a recording into the segments that `fit_segments` fits.
+
+    With `used`, only these points count, and their times may repeat.
+    """
     space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
     if not isinstance(duplicates, str) or duplicates not in _DUPLICATES:
         raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {short_repr(duplicates)}")
     data = read(points, space)
     if data[0].batch:
-        raise ValidationError(f"points has batch axes {data[0].batch}; a recording is a single curve")
+        raise ValidationError(
+            f"points has batch axes {data[0].batch}, but a recording must be a single curve"
+        )
     given, zone = times_of(t, "t")
     clock, times = time_axis_of(Moments(given, zone))
     if times.shape != (data[0].nodes,):
@@ -201,7 +262,7 @@ def cut(
         factor._array(part, "points")
         for factor, part in zip(factors_of(space), parts_of(points, space, "points"), strict=True)
     ]
-    # As they were given, so that curves know of a zone, and of durations.
+    # Times stay in the form in which they were given, so that the curves keep time zones and durations.
     moments = as_array(given, "t")
     rows = np.arange(len(seconds))
     if used is not None:
@@ -230,7 +291,7 @@ def cut(
 
 
 def _seconds(max_gap: Any, dates: bool) -> float:
-    """The longest gap as the core counts times."""
+    """Return the longest gap as the core counts times."""
     if dates and isinstance(max_gap, (np.timedelta64, timedelta)):
         max_gap = np.timedelta64(max_gap) / np.timedelta64(1, "s")
     if isinstance(max_gap, (bool, np.timedelta64)) or not isinstance(
@@ -252,21 +313,27 @@ def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: 
     if len(falls):
         i = falls[0]
         raise ValidationError(
-            f"t[{i + 1}] = {times[i + 1]} is before t[{i}] = {times[i]}; sort times and points, for instance by "
-            "numpy.argsort(t, kind='stable')"
+            f"t[{i + 1}] = {times[i + 1]} is before t[{i}] = {times[i]}. Sort times and points, for instance with "
+            "numpy.argsort(t, kind='stable')."
         )
     same = np.flatnonzero(steps == 0)
     if len(same) and duplicates == "raise":
         i = same[0]
         more = f" (and {len(same) - 1} more such pairs)" if len(same) > 1 else ""
         raise ValidationError(
-            f"t[{i}] and t[{i + 1}] are both {times[i]}{more}; duplicates='first' keeps the first point of each time, "
-            "duplicates='mean' takes their mean"
+            f"t[{i}] and t[{i + 1}] are both {times[i]}{more}. Pass duplicates='first' to keep the first point of "
+            "each time, or duplicates='mean' to average them."
         )
 
 
 def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: str) -> Array:
-    """One point for every time, of those from its start to the next; single points stay as they are."""
+    """Return one point per distinct time. Points whose time is unique are not changed.
+
+    Parameters
+    ----------
+    starts : ndarray of int
+        Index of the first point of every time.
+    """
     kept = points[starts]
     if duplicates == "first":
         return kept
@@ -280,9 +347,11 @@ def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: 
 
 
 def _means(space: Space, points: Array, group: NDArray[np.intp]) -> Array:
-    """The mean of every group of points that follow each other: where the logarithms add up to zero.
+    """Return the Karcher mean of every group of consecutive points.
 
-    Source: Karcher, Riemannian center of mass and mollifier smoothing (1977).
+    References
+    ----------
+    H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
     """
     starts = np.flatnonzero(np.diff(group, prepend=-1))
     counts = np.diff(np.append(starts, len(points))).reshape(-1, *[1] * len(space.point_shape))

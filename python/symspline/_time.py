@@ -123,6 +123,10 @@ class TimeAxis:
         return error._with_message(f"{error}; times are {what} since {since}{more}")
 
 
+# The axis of times that are taken as they are.
+_NUMBERS = TimeAxis()
+
+
 def time_axis_of(knots: ArrayLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
     """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
     given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
@@ -154,7 +158,7 @@ def knots_of(
     if type(t) is np.ndarray and t.dtype == np.float64 and t.shape == (nodes,):
         # What most programs pass.
         knots = t.copy()
-        return TimeAxis(), knots, knots
+        return _NUMBERS, knots, knots
     clock, shown = time_axis_of(t)
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""

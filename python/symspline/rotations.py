@@ -100,7 +100,14 @@ def rotation(
         raise ImportError(
             "rotation returns a SciPy Rotation; install SciPy with: pip install scipy"
         ) from None
-    found: Rotation = Rotation.from_matrix(_at(spline, x, "point", extrapolate, per_curve))
+    matrices = _at(spline, x, "point", extrapolate, per_curve)
+    missing = np.argwhere(np.isnan(matrices[..., 0, 0]))
+    if len(missing):
+        raise ValidationError(
+            f"the value at index {missing[0].tolist()} is NaN, which SciPy's Rotation cannot hold: its curve was not "
+            "fitted, or its time is outside the knots. Use spline(x), or remove these values"
+        )
+    found: Rotation = Rotation.from_matrix(matrices)
     return found
 
 

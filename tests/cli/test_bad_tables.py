@@ -24,7 +24,7 @@ def test_invalid_tables(fails):
         (AXES, "--space r:2 --columns x,x", "column 'x' of a.csv cannot have two meanings"),
         (AXES, "--space r:2 --columns t,x --time t", "column 't' of a.csv cannot have two meanings"),
         (AXES, "", "say which space the points are on with --space, such as --space sphere:2"),
-        (AXES, "--space foo:2", "unknown space 'foo:2'; known are"),
+        (AXES, "--space foo:2", "unknown space 'foo:2'; known names are"),
         (AXES + "4,1,0,n/a\n", "--space s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
         (AXES + "\n\n4,1,0,\n", "--space s:2", "a.csv, line 7: column 'z' is empty"),
         (

@@ -326,7 +326,7 @@ def test_arrays_that_are_smaller_than_their_header_says():
         ({"space": 5.0}, "entry 'space': entry 'space' is not a text|entry 'space' is not a text"),
         (
             {"extrapolate": '"wrap"'},
-            "entry 'extrapolate': extrapolate must be None, True, 'geodesic' or 'periodic'",
+            "entry 'extrapolate': extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic'",
         ),
         ({"extrapolate": "{"}, "entry 'extrapolate' is not JSON"),
         ({"bc_type": '"foo"'}, "entry 'bc_type': bc_type is 'natural'"),

@@ -190,14 +190,14 @@ def test_control_points_of_two_parts():
 
 def test_control_points_in_a_product():
     for make in (lambda s: ss.BezierCurve((P, P), s), lambda s: ss.BSpline(CLAMPED, (P, P), 2, s)):
-        with pytest.raises(ss.ValidationError, match="one curve in every factor: make one for each"):
+        with pytest.raises(ss.ValidationError, match="Make one curve for each factor"):
             make("sphere:2 x r:3")
 
 
 @pytest.mark.parametrize(
     "x, match",
     [
-        (-0.1, r"x = -0\.1 is outside the curve's times \[0\.0, 1\.0\]"),
+        (-0.1, r"x = -0\.1 is outside the domain \[0\.0, 1\.0\] of the curve"),
         ([0.5, 2], r"x\[1\] = 2\.0 is outside"),
         (1 + 2**-48, r"x = 1\.0000000000000036 is outside"),
         (NAN, r"x = nan is not finite"),

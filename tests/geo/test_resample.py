@@ -86,7 +86,7 @@ def test_noisy_tracks_are_smoothed():
         ),
         (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
         (lambda t: {"smooth": 0.5}, "smooth must be True or False, not 0.5"),
-        (lambda t: {"smooth": True, "duplicates": "mean"}, "leave duplicates='mean' out"),
+        (lambda t: {"smooth": True, "duplicates": "mean"}, "Omit duplicates='mean'"),
         (lambda t: {"smooth": True, "weights": [1]}, "resample does not support weights"),
         (
             lambda t: {"max_gap": 6},
@@ -97,7 +97,10 @@ def test_noisy_tracks_are_smoothed():
             r"1 rows have no 'mmsi', the first of them row 8; drop them by frame.dropna\(subset=\['mmsi'\]\)",
         ),
         (lambda t: {"frame": t.assign(lat=np.nan)}, "rows have no 'lat', the first of them row 0"),
-        (lambda t: {"frame": t.assign(lat=100.0)}, r"lat\[0\] is 100.0: lat must be from -90 to 90 degrees"),
+        (
+            lambda t: {"frame": t.assign(lat=100.0)},
+            r"lat\[0\] is 100.0, but lat must be from -90 to 90 degrees",
+        ),
         (lambda t: {"frame": t.to_numpy()}, "frame must be a pandas DataFrame"),
     ],
 )

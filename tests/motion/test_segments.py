@@ -86,14 +86,14 @@ def test_what_scipy_and_lists_hold():
     ("match", "changes"),
     [
         (
-            r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\); duplicates='first'",
+            r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'",
             {"t": [0, 1, 1, 1, 2]},
         ),
-        (r"t\[2\] = 0.5 is before t\[1\] = 1.0; sort", {"t": [0, 1, 0.5, 2, 3]}),
+        (r"t\[2\] = 0.5 is before t\[1\] = 1.0. Sort", {"t": [0, 1, 0.5, 2, 3]}),
         (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
         (r"t has shape \(4,\), but there are 5 points", {"t": range(4)}),
         (
-            "no piece has 3 points: 4 of 4 steps are longer than max_gap=0.5, the median step is 1",
+            "no segment has 3 points: 4 of 4 time steps are longer than max_gap=0.5, and the median step is 1",
             {"max_gap": 0.5, "min_points": 3},
         ),
         ("max_gap must be more than 0, not 0", {"max_gap": 0}),
@@ -211,11 +211,11 @@ def test_failed_noisy_segments_are_all_kept():
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"smooth": "gcv"}, "smooth must be True or False, not 'gcv'; lam, criterion"),
-        ({"duplicates": "mean"}, "all points of one time count"),
-        ({"knots": [0.0, 1.0]}, "give a number of knots"),
+        ({"smooth": "gcv"}, "smooth must be True or False, not 'gcv'. Pass lam, criterion"),
+        ({"duplicates": "mean"}, "all points with equal times count"),
+        ({"knots": [0.0, 1.0]}, "must be the number of knots of each segment"),
         ({"weights": [1.0]}, r"weights has shape \(1,\), but 60 points need \(60,\)"),
-        ({"weights": np.zeros(60)}, "no piece has 2 points"),
+        ({"weights": np.zeros(60)}, "no segment has 2 points"),
         ({"criterion": "aic"}, "curve 0: "),
         ({"bc_type": "not-a-knot"}, "bc_type"),
     ],

@@ -168,15 +168,15 @@ def test_poses_have_no_curvature_in_products():
     [
         (
             "spere:2",
-            r"unknown space 'spere:2'; did you mean 'sphere:2'\? known are .*sphere.*, e\.g\. 'sphere:2'",
+            r"unknown space 'spere:2'; did you mean 'sphere:2'\? known names are .*sphere.*, as in 'sphere:2'",
         ),
         ("", r"unknown space ''"),
         ("sphere:2 x klein:2", r"unknown space 'klein:2'"),
         ("sphere", r"'sphere' is a family of spaces; give its dimension, such as Sphere\(2\) or 'sphere:2'"),
         ("sphere:", r"'sphere:' is a family of spaces; give its dimension"),
-        ("sphere:-1", r"'sphere:-1': behind the colon come whole numbers"),
-        ("sphere:2.0", r"behind the colon come whole numbers"),
-        ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 numbers"),
+        ("sphere:-1", r"'sphere:-1': the parameters after the colon must be integers"),
+        ("sphere:2.0", r"the parameters after the colon must be integers"),
+        ("sphere:2,3", r"'sphere:2,3': Sphere does not take 2 parameters"),
         ("sphere:0", r"Sphere\(n\) needs n >= 1"),
         (None, r"a space or its name is needed, not None"),
         (ss.Sphere, r"Sphere is a family of spaces; give its dimension"),
@@ -193,7 +193,9 @@ def test_unknown_spaces_raise(space, match):
 @loop_over("n", [-1, 2.0, "2", None, True, 0])
 @pytest.mark.parametrize("kind", [ss.Sphere, ss.Hyperbolic, ss.Euclidean])
 def test_invalid_dimensions_raise(kind, n):
-    with pytest.raises(ss.ValidationError, match=rf"{kind.__name__} takes whole numbers, not|needs n >= 1"):
+    with pytest.raises(
+        ss.ValidationError, match=rf"the parameters of {kind.__name__} must be integers >= 0|needs n >= 1"
+    ):
         kind(n)
 
 
@@ -209,17 +211,17 @@ def test_huge_dimensions_raise(make):
         ("gr:3,3", r"Grassmannian\(k, n\) needs 1 <= k < n; Grassmannian\(3, 3\) is a single point"),
         ("cgr:1,1", r"needs 1 <= k < n; ComplexGrassmannian\(1, 1\) is a single point"),
         ("gr:0,3", r"needs 1 <= k < n"),
-        ("gr:2", r"'gr:2': Grassmannian does not take 1 numbers"),
-        ("so:2,3", r"'so:2,3': SpecialOrthogonal does not take 2 numbers"),
+        ("gr:2", r"'gr:2': Grassmannian does not take 1 parameters"),
+        ("so:2,3", r"'so:2,3': SpecialOrthogonal does not take 2 parameters"),
         ("se:4", r"SpecialEuclidean\(n\) needs n = 2 or 3, not 4"),
         ("se:1", r"needs n = 2 or 3, not 1"),
         ("o:1", r"Orthogonal\(n\) needs n >= 2"),
         ("so:1", r"SpecialOrthogonal\(n\) needs n >= 2"),
         ("su:1", r"SpecialUnitary\(n\) needs n >= 2"),
         *((f"{name}:0", r"\(n\) needs n >= ") for name in ("rp", "cp", "o", "so", "u", "su", "spd", "hpd", "r", "h")),
-        ("gr:2.0,5", r"behind the colon come whole numbers"),
-        ("gr:2;5", r"behind the colon come whole numbers"),
-        ("cp:1xso:3", r"behind the colon come whole numbers"),
+        ("gr:2.0,5", r"the parameters after the colon must be integers"),
+        ("gr:2;5", r"the parameters after the colon must be integers"),
+        ("cp:1xso:3", r"the parameters after the colon must be integers"),
         ("cp:1 x ", r"unknown space"),
         ("so:99999999999", r"too large"),
         ("gr:3,99999999999999999999", r"too large"),
@@ -236,7 +238,9 @@ def test_invalid_space_names_raise(name, match):
 )
 def test_invalid_sizes_raise(kind, value):
     cls = getattr(ss, kind)
-    with pytest.raises(ss.ValidationError, match=rf"{kind} takes whole numbers, not {value!r}"):
+    with pytest.raises(
+        ss.ValidationError, match=rf"the parameters of {kind} must be integers >= 0, not {value!r}"
+    ):
         cls(value, 5) if kind == "Grassmannian" else cls(value)
 
 
@@ -261,7 +265,7 @@ def test_a_product_has_types():
 
 
 def test_digits_of_other_scripts_raise():
-    with pytest.raises(ss.ValidationError, match="behind the colon come whole numbers"):
+    with pytest.raises(ss.ValidationError, match="the parameters after the colon must be integers"):
         ss.space("sphere:٢")
 
 

@@ -322,13 +322,13 @@ def test_a_loaded_batch_has_an_array(batch, tmp_path):
 
 
 def test_report_states_the_radius(batch):
-    assert str(batch[1].report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
+    assert str(batch[1].report).endswith(", control handles stay below 0.234 (Theorem 3.1)")
     assert "Theorem" not in str(batch[2].report)
-    assert str(batch[:2].report).endswith(", control legs stay below 0.234 (Theorem 3.1)")
+    assert str(batch[:2].report).endswith(", control handles stay below 0.234 (Theorem 3.1)")
 
 
 def test_report_omits_missing_radii(batch):
-    assert ", control legs stay below" not in str(batch.report)
+    assert ", control handles stay below" not in str(batch.report)
 
 
 # ---- elsewhere ----

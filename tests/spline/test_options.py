@@ -52,8 +52,10 @@ def test_tol_and_max_iter_bound_the_work():
         ({"tol": NAN}, r"tol must be a number >= 0, not NaN"),
         ({"tol": INF}, r"tol must be a number >= 0, not inf"),
         ({"max_iter": 0}, r"max_iter must be at least 1"),
-        ({"extrapolate": "foo"}, r"extrapolate must be None, True, 'geodesic' or 'periodic', not 'foo'"),
-        ({"extrapolate": False}, r"extrapolate must be .*, not False"),
+        (
+            {"extrapolate": "foo"},
+            r"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not 'foo'",
+        ),
         ({"on_failure": "foo"}, r"on_failure must be 'raise', 'warn' or 'ignore', not 'foo'"),
         ({"on_failure": None}, r"on_failure must be .*, not None"),
     ],

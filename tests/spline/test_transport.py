@@ -135,7 +135,7 @@ def test_invalid_vectors_to_transport_raise():
     spline = ss.CubicSpline(None, np.eye(3), "sphere:2", extrapolate="geodesic")
     with pytest.raises(ss.ValidationError, match=r"x\[1\] = 2.5 is outside the knots"):
         spline.transport(0, 2.5, [0, 1.0, 0])
-    with pytest.raises(ss.ValidationError, match="vectors are carried between the knots"):
+    with pytest.raises(ss.ValidationError, match="vectors are transported between the first"):
         spline.transport(-1, 1, [0, 1.0, 0])
     with pytest.raises(ss.ValidationError, match="x0 and x1 must be single times"):
         spline.transport(0, [1, 2], [0, 1.0, 0])

@@ -21,6 +21,8 @@ pub enum Operation {
     Geodesic,
     /// distance: p, q
     Distance,
+    /// the deciding angle divided by the cut angle: p, q
+    CutFraction,
     /// E_p(v)·x: p, v, x
     Transvection,
     /// parallel transport of v from p to q: p, q, v
@@ -42,7 +44,10 @@ pub enum Operation {
 impl Operation {
     /// Numbers in a row of the result, for points of `len` numbers.
     pub fn row_len(self, len: usize) -> usize {
-        if matches!(self, Operation::Distance | Operation::Inner | Operation::Rounding) { 1 } else { len }
+        match self {
+            Operation::Distance | Operation::CutFraction | Operation::Inner | Operation::Rounding => 1,
+            _ => len,
+        }
     }
 
     /// Whether points at or past each other's cut locus are an error.
@@ -81,7 +86,8 @@ pub fn apply(
                 gather(at.map(|i| &input[i * len..(i + 1) * len]), x);
             }
             let [a, b, c] = &mut x;
-            let angle = if operation.needs_log() || operation == Operation::Distance {
+            let measures = matches!(operation, Operation::Distance | Operation::CutFraction);
+            let angle = if operation.needs_log() || measures {
                 space.log(a, b, &mut log)
             } else {
                 Lane::ZERO
@@ -100,6 +106,11 @@ pub fn apply(
                     }
                 }
                 Operation::Distance => result[0] = space.distance(a, b, &log, angle),
+                Operation::CutFraction => {
+                    // The angle that comes with a logarithm is exact near the cut locus only.
+                    let exact = angle.simd_lt(limit).select(space.angle_at(a, &log), angle);
+                    result[0] = exact / lane(space.cut_angle());
+                }
                 Operation::Transvection => space.transvect(a, b, c, &mut result),
                 Operation::Transport => space.parallel_transport(a, b, &log, c, &mut result),
                 Operation::Inner => result[0] = space.inner(a, b, c),

@@ -275,7 +275,7 @@ fn check_times(
         let of = if own_times || shared { String::new() } else { of_curve(c, batch) };
         return Err(invalid(format!(
             "{name} = {found} is outside the knots [{}, {}]{of}; pass extrapolate=True, 'geodesic' or \
-             'periodic' to say what is meant there",
+             'periodic' to continue the curve there, or False for NaN",
             number(start),
             number(end),
         )));

@@ -81,6 +81,7 @@ impl Handle {
             "log" => Operation::Log,
             "geodesic" => Operation::Geodesic,
             "distance" => Operation::Distance,
+            "cut_fraction" => Operation::CutFraction,
             "transvection" => Operation::Transvection,
             "transport" => Operation::Transport,
             "inner" => Operation::Inner,

@@ -16,7 +16,7 @@ from .curve import REAL, CurveArrays, Doubles
 from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
 from .out import check_out, is_room
-from .solve import Options, Progress, Solved, Task, solve, validate
+from .solve import Options, Progress, Task, solve, validate
 
 # Their matrices have the same last row everywhere, which the core writes of curves that were not found, too.
 _CONSTANT_ROW = (SpecialEuclidean, Similarity, Affine)
@@ -48,10 +48,8 @@ class CoreCurve(CurveArrays):
         """Whether curves in a space are of this kind, if they are of no other one."""
         return True
 
-    @staticmethod
-    def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
-        """The velocities that make the curve C²; only plain curves are checked on the way."""
-        return solve(task, options, progress)
+    # The velocities that make the curve C². The core validates such curves on the way.
+    solve = staticmethod(solve)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:

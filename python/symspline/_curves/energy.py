@@ -12,26 +12,26 @@ from .curve import CurveArrays, Doubles
 from .integrals import integrate
 
 
-def bending_energy(curve: CurveArrays, outside: str) -> Number:
+def bending_energy(curve: CurveArrays) -> Number:
     """∫ |∇γ'|² dt, (1); shape of the batch axes."""
     # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
     times = curve.times
     unit = np.broadcast_to(times[..., -1:] - times[..., :1], (*curve.batch, 1))
 
     def power(x: Doubles) -> Doubles:
-        bend: Doubles = curve.evaluate(x, "bend", outside, True) * unit * unit
+        bend: Doubles = curve.evaluate(x, "bend", "continue", True) * unit * unit
         return bend * bend / unit
 
     with np.errstate(all="ignore"):
         return integrate(times, power, curve.batch, curve.exact) / unit[..., 0] / unit[..., 0] / unit[..., 0]
 
 
-def alternative_energy(curve: CurveArrays, reports: list[Report], outside: str) -> Any:
+def alternative_energy(curve: CurveArrays, reports: list[Report]) -> Any:
     """The least energy of other curves that were found through the points of a product: those with the alternative
     of one factor, if any has one."""
     if all(report.alternative_energy is None for report in reports):
         return None
-    energies: list[Any] = [bending_energy(part, outside) for part in curve.parts]
+    energies: list[Any] = [bending_energy(part) for part in curve.parts]
     others = [
         sum(energies) - energy + report.alternative_energy
         for energy, report in zip(energies, reports, strict=True)

@@ -17,8 +17,8 @@ from .. import _core
 from .._arrays import as_array
 from .._core import ValidationError
 from .._faults import INVALID, Fault
-from .._report import Report, shaped
-from .._spaces import Array, Product, Space, factors_of, parts_of, point_tol
+from .._report import Columns, Report, shaped
+from .._spaces import POINT_TOL, Array, Product, Space, factors_of, parts_of, point_tol
 from ..manifolds import Manifold
 from .core_curve import CoreCurve
 from .curve import CurveArrays
@@ -85,11 +85,30 @@ class ManyProblem(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """What came of a fit: the curves, a report a factor, and what failed."""
+    """The result of a fit.
+
+    Attributes
+    ----------
+    curve : CurveArrays
+    columns : list of Columns
+        The reports in every factor.
+    method : str
+        The method that was requested.
+    faults : list of Fault
+    """
 
     curve: CurveArrays
-    reports: list[Report]
+    columns: list[Columns]
+    method: str
     faults: list[Fault]
+
+    def reports(self) -> list[Report]:
+        """The reports in every factor."""
+        times, batch = self.curve.times, self.curve.batch
+        return [
+            shaped(own, times, batch, part.space.curvature, self.method)
+            for part, own in zip(self.curve.parts, self.columns, strict=True)
+        ]
 
 
 def kind_of(space: Space) -> type[CoreCurve]:
@@ -113,6 +132,12 @@ def read(points: Any, space: Space[Any]) -> list[Points]:
 
 
 def _read(space: Space, points: Any) -> Points:
+    if type(points) is np.ndarray and points.dtype == np.float64 and not space._complex:
+        # The usual case is checked without further function calls.
+        flags, shape, axis = points.flags, points.shape, points.ndim - len(space._point_shape) - 1
+        suits = axis >= 0 and points.size and shape[axis] >= 2 and shape[axis + 1 :] == space._point_shape
+        if suits and flags.c_contiguous and flags.aligned:
+            return Points(points, POINT_TOL, shape[:axis], shape[axis])
     array = points if type(points) is np.ndarray else space._array(points, "points")
     # A batch may be empty, as blocks of a selection are.
     axis = array.ndim - len(space._point_shape) - 1
@@ -175,7 +200,6 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
 def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
     """Fit curves of equal length."""
     space, times, points, ends, options, check, mask, skip = problem
-    batch = points[0].batch
     if len(points) == 1 and kind_of(space) is CoreCurve:
         # The core checks before it solves.
         data = points[0]
@@ -183,8 +207,8 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
             space, times, data.doubles, ends[0], data.tol if check else None, None, mask, check and skip
         )
         found = CoreCurve.solve(task, options, progress)
-        report = shaped(found.columns, times, batch, space.curvature, options.method)
-        return Fit(CoreCurve(space, times, found.points, found.velocities), [report], found.faults)
+        single = CoreCurve(space, times, found.points, found.velocities)
+        return Fit(single, [found.columns], options.method, found.faults)
     tasks = [
         Task(
             factor,
@@ -198,12 +222,9 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     solved, invalid = _solve(space, tasks, options, progress)
-    reports = [
-        shaped(found.columns, times, batch, factor.curvature, options.method)
-        for factor, found in zip(factors_of(space), solved, strict=True)
-    ]
     curve = curve_of(space, times, [found[:2] for found in solved])
-    return Fit(curve, reports, _sorted(invalid + _first_faults(solved)))
+    columns = [found.columns for found in solved]
+    return Fit(curve, columns, options.method, _sorted(invalid + _first_faults(solved)))
 
 
 def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit], list[Fault]]:
@@ -225,12 +246,9 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
 
     def one(i: int, start: int, stop: int) -> Fit:
         own = slice(start, stop)
-        reports = [
-            shaped(found.columns.part(slice(i, i + 1)), times[i], (), task.space.curvature, options.method)
-            for task, found in zip(tasks, solved, strict=True)
-        ]
+        columns = [found.columns.part(slice(i, i + 1)) for found in solved]
         arrays = [(found.points[own], found.velocities[own]) for found in solved]
-        return Fit(curve_of(space, times[i], arrays), reports, [])
+        return Fit(curve_of(space, times[i], arrays), columns, options.method, [])
 
     fits = [one(i, *pair) for i, pair in enumerate(pairwise(offsets))]
     return fits, _sorted(invalid + more + _first_faults(solved))

@@ -40,7 +40,7 @@ class OnManifold(CoreCurve):
         return isinstance(space, Manifold)
 
     @staticmethod
-    def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+    def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
         if task.offsets is not None:
             return one_by_one(task, options, progress, fit_of_one_length)
         return solve_some(task, options, progress, fit_of_one_length)

@@ -45,7 +45,7 @@ class ProductCurve(CurveArrays):
             part.evaluate(x, quantity, outside, per_curve, share(progress, i, count))
             for i, part in enumerate(self._parts)
         )
-        return together(values) if quantity in NORMS else values
+        return np.asarray(together(values)) if quantity in NORMS else values
 
     def write(
         self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None

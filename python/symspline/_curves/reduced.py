@@ -51,7 +51,7 @@ class ReducedCurve(CoreCurve):
         return space._linear and space.point_shape[0] >= _LARGE
 
     @staticmethod
-    def solve(task: Task, options: Options, progress: Progress | None) -> Solved:
+    def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
         if task.offsets is None:
             return solve_some(task, options, progress, _solve)
         return one_by_one(task, options, progress, _solve)

@@ -1,4 +1,4 @@
-"""Making smoothing splines."""
+"""Fits of smoothing splines."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from .._curves.ends import End, freeze_bc_type, is_closed
 from .._curves.fit import FitProblem, Points, fit, mask_of
 from .._curves.solve import Options, Progress
 from .._errors import raise_or_warn
-from .._far import warn_of_far_points
 from .._options import check_on_failure, check_progress, checked_extrapolate
-from .._signs import warn_of_signs
+from .._representatives import warn_of_far_points, warn_of_signs
 from .._spaces import Product, Space, SpecialEuclidean, factors_of
 from .._spaces import space as space_named
 from .._typing import (
@@ -55,9 +54,9 @@ from .spread import warn_of_spread
 from .warned import warn_of_bounds
 
 _FIT = Options("auto", 1e-12, None)
-# Knots from which fewer are tried first, and how many.
+# If there are more knots than the first number, the fit begins with the second number of knots.
 _MANY, _FIRST = 4000, 2000
-# How often λ may ask for other knots.
+# Largest number of times that the knots are adapted to λ.
 _TRIES = 4
 
 
@@ -114,67 +113,65 @@ def make_smoothing_spline(
     where: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> SmoothingSpline[Any, Any]:
-    """Fit a C² curve close to noisy points.
+    r"""Fit a C² curve close to noisy points.
 
     The curve minimises a weighted sum of squared distances to the data and the integrated squared acceleration. The
-    data determine the weight λ between the two, unless `lam` is given. In flat space the result is SciPy's
-    ``make_smoothing_spline``.
+    data determine the weight λ between the two, unless `lam` is given. On a Euclidean space the result equals SciPy's
+    ``make_smoothing_spline`` with the same λ.
 
     Parameters
     ----------
     t : array_like of float or datetime64, shape (N,) or (..., N), or None
-        Times of the data, not decreasing. Several data may have one time; consecutive copies of a datum count as one
-        datum with the sum of their weights. None means 0, 1, ..., N - 1.
+        Times of the data, in non-decreasing order. Several data may have the same time; consecutive copies of a datum
+        count as one datum with the sum of their weights. None means 0, 1, ..., N - 1.
     points : array_like, shape (..., N, *space.point_shape)
-        Noisy points. Leading axes are batch axes; each curve has its own λ. For a `Product` a tuple of arrays.
+        Noisy points. Leading axes are batch axes; each curve has its own λ. For a `Product`, a tuple of arrays.
     space : Space or str
-        A space or its name. Points of `SpecialEuclidean` are smoothed as rotations and positions, which have a λ and a
-        noise level each: a rigid motion has no invariant metric. The curve is a curve of the space through the poses
-        that result.
+        A space or its name. Points of `SpecialEuclidean` are smoothed as rotations and positions, each with its own λ
+        and noise level, because rigid motions have no invariant metric. The curve is the spline of the space through
+        the smoothed poses.
     lam : float, array_like or tuple, optional
-        λ ≥ 0 in units of weight · time³. With 0 the curve comes as near to the data as its knots allow; large values
-        give a geodesic. For a batch also one for each curve; for products and poses also a tuple with one for each
-        part. Chosen by `criterion` if omitted.
+        λ ≥ 0 in units of weight · time³. With 0 the curve is as close to the data as its knots allow; large values
+        give a geodesic. For a batch also an array with one value per curve; for products and poses also a tuple with
+        one entry per part. By default `criterion` chooses λ.
     weights : array_like or tuple, optional
         Weights ≥ 0 of the data, shape (N,) or (..., N): the inverse variances of their noise up to a common factor.
-        Points of weight 0 are left out, and may be NaN. Or information matrices W, shape (N, m, m) or (..., N, m, m)
-        with m = ``space.dim``: inverse covariances of the noise, possibly rank-deficient. Then eᵀWe takes the place of
-        w d², where e are the coordinates of ``space.log(y, γ(t))``. For a product a tuple with one of these for each
-        factor. For poses also a pair, for rotations and positions; of matrices for whole poses the correlation of the
-        two is not used.
+        Points of weight 0 are ignored and may be NaN. Alternatively information matrices W, shape (N, m, m) or (...,
+        N, m, m) with m = ``space.dim``: inverse covariances of the noise, possibly rank-deficient; see Notes. For a
+        product, a tuple with one of these per factor. For poses also a pair, for rotations and positions; matrices for
+        whole poses are used without the correlation between the two.
     frames : array_like or tuple, optional
-        Tangent vectors that the information matrices refer to, m at every point and not necessarily orthonormal, shape
-        (..., N, m, *space.point_shape). Default ``space.frame(points)``. For rotations,
+        Tangent vectors to which the information matrices refer, m at every point and not necessarily orthonormal,
+        shape (..., N, m, *space.point_shape). Default ``space.frame(points)``. For rotations,
         ``symspline.rotations.velocities(points[:, None], np.eye(3))`` are the axes of the body, in radians.
     knots : int or array_like, optional
-        Knots of the curve: how many, or an increasing array that reaches from the first to the last time. About four
-        times the degrees of freedom are enough. By default all times of the data are knots; of more than 4000 times,
-        as many as the degrees of freedom need.
+        Knots of the curve: their number, or an increasing array that reaches from the first to the last time. About
+        four times the degrees of freedom are enough. By default all times of the data are knots; if there are more
+        than 4000 times, as many as the degrees of freedom require.
     criterion : {"gcv", "reml", "cp"}, default "gcv"
-        How λ is chosen: by generalised cross-validation, by restricted maximum likelihood, or by Mallows' C_p, which
-        needs `sigma`.
+        Criterion for λ: generalised cross-validation, restricted maximum likelihood, or Mallows' C_p, which requires
+        `sigma`.
     gamma : float, default 1.4
-        How much a degree of freedom counts in ``"gcv"``. With 1, cross-validation as Craven and Wahba define it, a
-        curve through all data is chosen now and then.
+        Weight of a degree of freedom in ``"gcv"``, at least 1. With 1, which is cross-validation as Craven and Wahba
+        define it, the chosen curve occasionally passes through all data.
     sigma : float, array_like or tuple, optional
-        Standard deviation of the noise in a coordinate for weight one, as a length in the space: radians on the unit
-        sphere. Also one for each curve, or a tuple for products and poses.
+        Standard deviation of the noise in one coordinate for weight one, as a length in the space: radians on the unit
+        sphere. Also an array with one value per curve, or a tuple for products and poses.
     bc_type : {"natural", "clamped", "periodic"} or pair, default "natural"
-        Conditions at the ends, or ``(1, velocity)`` at either end, as for `CubicSpline`. Velocities are tangent at the
-        first and the last point, from where they are transported to the curve. A closed curve has the period of its
-        knots.
+        End conditions, or ``(1, velocity)`` at either end, as for `CubicSpline`. Velocities must be tangent at the
+        first and the last datum; they are transported to the curve. The period of a closed curve is that of its knots.
     loss : {"linear", "huber", "cauchy"}, default "linear"
-        Least squares, or a loss that limits the influence of outliers. Cauchy's is the better one for many or distant
-        outliers.
+        Least squares, or a loss that limits the influence of outliers. Use ``"cauchy"`` for many or distant outliers.
     method : {"auto", "linearized", "newton"}, default "auto"
-        ``"linearized"`` solves the linearised problem in frames along the curve repeatedly. Its result differs from the
-        minimum by about 1e-4 of the error, and by more where segments are long. ``"newton"`` is the full Gauss-Newton
-        method, which is much slower. ``"auto"`` uses the first, and the second where the first converges slowly.
+        ``"linearized"`` solves the linearised problem in frames along the curve repeatedly. Its result differs from
+        the minimum by about 1e-4 of the error, and by more where segments are long. ``"newton"`` is the full
+        Gauss–Newton solver, which is much slower. ``"auto"`` uses the first, and the second where the first converges
+        slowly.
     tol : float, default 1e-3
-        The search ends when no point moves by more than this fraction of its standard deviation.
+        The iteration ends when no point moves by more than this fraction of its standard deviation.
     max_iter : int, default 50
-        The largest number of iterations, each of which fits a spline. Robust losses have
-        three stages with a limit each; the last of them may take 20 times as many.
+        Largest number of iterations, each of which fits a spline. Robust losses have three stages with a limit each;
+        the last of them may take 20 times as many.
     extrapolate, on_failure, atol, progress
         As for `CubicSpline`.
     where : array_like of bool, optional
@@ -184,22 +181,46 @@ def make_smoothing_spline(
     Returns
     -------
     SmoothingSpline
-        A `CubicSpline` that knows λ, the degrees of freedom, the noise level and standard deviations.
+        A `CubicSpline` with λ, the degrees of freedom, the noise level and standard deviations.
 
     Raises
     ------
     ValidationError
         If the input does not meet the requirements above.
     ConvergenceError
-        If the search did not end, or no spline joins the points that it led to.
+        If the iteration does not converge, or no spline joins the smoothed points. Its attribute ``spline`` holds the
+        curves.
 
     Warns
     -----
     SmoothingWarning
-        If the chosen λ lies at a bound: the curve goes through all data, does not bend at all, or is the roughest one
+        If the chosen λ is at a bound: the curve follows nearly all data, has no bending energy, or is the roughest one
         that was found.
+    ConvergenceWarning
+        If a curve fails and `on_failure` is ``"warn"``.
     UserWarning
         If the data are about as far from their curve as random points of a compact space would be.
+
+    See Also
+    --------
+    make_lsq_spline : Fit a curve with given knots by least squares.
+    CubicSpline : Interpolate points by a C² curve.
+    fit_segments : Fit a recording with gaps.
+
+    Notes
+    -----
+    Let :math:`y_j` be the data at the times :math:`t_j` with the weights :math:`w_j`. The curve minimises
+
+    .. math:: \sum_j w_j\, d(y_j, \gamma(t_j))^2 + \lambda \int \lVert\nabla_{\gamma'}\gamma'\rVert^2 \, dt
+
+    among the C² splines with the given knots. For information matrices, :math:`e_j^T W_j e_j` replaces
+    :math:`w_j d^2`, where :math:`e_j` are the coordinates of ``space.log(y, γ(t))``.
+
+    References
+    ----------
+    P. Craven, G. Wahba, Smoothing noisy data with spline functions, Numer. Math. 31 (1979).
+
+    C. Gu, Smoothing Spline ANOVA Models, 2nd ed., Springer (2013), Section 3.2.
 
     Examples
     --------
@@ -239,7 +260,7 @@ def make_smoothing_spline(
             "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
     if given.times.shape[-1] == 2:
-        # Two points have no outlier, and do not determine the size of the noise.
+        # Two points have no outliers and do not determine the noise level.
         asked = asked._replace(loss="linear")
     mask = mask_of(where, given.batch)
     some_given, faults = given.sound(space, mask, on_failure == "raise")
@@ -278,12 +299,12 @@ def make_smoothing_spline(
 
     if is_closed(bc_type) and every.times.shape[-1] < 4:
         raise ValidationError(
-            f"A closed curve needs at least 4 knots, and there are {every.times.shape[-1]}. Give more data, or knots."
+            f"A closed curve needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data or knots."
         )
     if knots is None:
         found, at = _with_enough(every, noisy, lams, run)
         finer = in_gaps(at, given)
-        # The knots in gaps come first: a larger λ than the criterion asks for harms the whole curve.
+        # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):
             found, at = run(finer, raise_lam=True), finer
     else:
@@ -306,10 +327,17 @@ def make_smoothing_spline(
         for factor, own in zip(factors_of(space), at_knots, strict=True)
     ]
     good = None if chosen is None else _flags(given.batch, chosen)
-    curve, reports, _ = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
+    fitted = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
     noise = [part.map(lambda column: _at_places(column, given.batch, chosen)) for _, part, _ in found]
     spline = SmoothingSpline._of(
-        given.clock, at.t, curve, _conditions(bc_type, conditions, space), policy, reports, whole, noise
+        given.clock,
+        at.t,
+        fitted.curve,
+        _conditions(bc_type, conditions, space),
+        policy,
+        fitted.reports(),
+        whole,
+        noise,
     )
     faults += next((own for _, _, own in found if own), [])
     if faults:
@@ -320,18 +348,13 @@ def make_smoothing_spline(
         [_at_places(np.isnan(own), given.batch, chosen) for own in lams],
         [np.sum(own.weights > 0, axis=-1) for own in given.weighing],
     )
-    warn_of_spread(space, curve, whole, [part.report.df for part in noise])
-    nodes = given.times.shape[-1]
-    warn_of_signs(
-        space,
-        [
-            [
-                Points(one._as_doubles(own), 0.0, given.batch, nodes)
-                for one, own in zip(factors_of(space), whole.points, strict=True)
-            ]
-        ],
-    )
-    warn_of_far_points([curve], [reports])
+    warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
+    data = [
+        Points(one._as_doubles(own), 0.0, given.batch, given.times.shape[-1])
+        for one, own in zip(factors_of(space), whole.points, strict=True)
+    ]
+    warn_of_signs(space, [data])
+    warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
 
 
@@ -384,13 +407,47 @@ def make_lsq_spline(
     loss: Loss = "linear",
     **options: Unpack[LsqOptions],
 ) -> SmoothingSpline[Any, Any]:
-    """The C² curve with natural ends and given knots that comes nearest to the data: ``Σ w d(y, γ(t))²`` is least.
+    """Fit a C² curve with given knots to noisy points by least squares.
 
-    Args:
-        t, points, space, weights, loss: as for `make_smoothing_spline`.
-        knots: an array, or how many there are to be; there must be data beside every knot.
-        options: the other keywords of `make_smoothing_spline`.
+    The curve minimises the weighted sum of squared distances to the data. There is no penalty on its acceleration; the
+    number of knots determines its smoothness.
 
+    Parameters
+    ----------
+    t : array_like of float or datetime64, shape (N,) or (..., N), or None
+        Times of the data, in non-decreasing order. None means 0, 1, ..., N - 1.
+    points : array_like, shape (..., N, *space.point_shape)
+        Noisy points. For a `Product`, a tuple of arrays.
+    knots : int or array_like
+        Number of knots, or an increasing array that reaches from the first to the last time. There must be data near
+        every knot.
+    space : Space or str
+        A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
+    weights : array_like or tuple, optional
+        Weights or information matrices, as for `make_smoothing_spline`.
+    loss : {"linear", "huber", "cauchy"}, default "linear"
+        Least squares, or a loss that limits the influence of outliers.
+    **options
+        Further keyword arguments of `make_smoothing_spline`.
+
+    Returns
+    -------
+    SmoothingSpline
+        The curve. Its ends are natural unless `bc_type` is given.
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above.
+    ConvergenceError
+        If the iteration does not converge, or the data do not determine the curve.
+
+    See Also
+    --------
+    make_smoothing_spline : Fit a curve whose smoothness the data determine.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> import symspline as ss
     >>> t = np.linspace(0, 1, 40)
@@ -398,12 +455,15 @@ def make_lsq_spline(
     array([0.997])
     """
     if knots is None:
-        raise ValidationError("knots must be given: an array of times, or how many there are to be")
+        raise ValidationError("knots must not be None. Pass an array of times, or the number of knots.")
     return make_smoothing_spline(t, points, space, 0.0, weights=weights, knots=knots, loss=loss, **options)
 
 
 def _chosen(lams: list[Any], at: Knots) -> list[Any]:
-    """Between two knots there is nothing to choose: the curve is the nearest geodesic, whatever λ is."""
+    """Return λ, which is the cube of the interval if there are only two knots.
+
+    The curve is then the nearest geodesic for every λ, and there is nothing to choose.
+    """
     if at.times.shape[-1] > 2:
         return lams
     cube = np.ravel(at.times[..., 1] - at.times[..., 0]) ** 3
@@ -411,20 +471,20 @@ def _chosen(lams: list[Any], at: Knots) -> list[Any]:
 
 
 def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> list[Any]:
-    """A number a curve in every space in which data are smoothed."""
+    """Return one array with a number per curve for each space in which data are smoothed."""
     spaces = smoothed_spaces(space)
     if is_several(space) and isinstance(value, tuple):
         if len(value) != len(spaces):
             raise ValidationError(
                 f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
-                f"{', '.join(map(repr, spaces))}. Give one for each."
+                f"{', '.join(map(repr, spaces))}. Pass one entry per part."
             )
         return [one_a_curve(one, name, batch) for one in value]
     return [one_a_curve(value, name, batch)] * len(spaces)
 
 
 def _names(batch: tuple[int, ...], chosen: Any) -> Callable[[int], tuple[int, str]]:
-    """The number of a curve among those that are made to its number in the batch, and what messages call it."""
+    """Return a function from the number of a fitted curve to its number in the batch and its name in messages."""
 
     def name(number: int) -> tuple[int, str]:
         there = number if chosen is None else int(chosen[number])
@@ -440,7 +500,7 @@ def _flags(batch: tuple[int, ...], chosen: Any) -> Any:
 
 
 def _at_places(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
-    """What belongs to the curves that are made, at their places in the batch: NaN, False or zero for the others."""
+    """Return values of the fitted curves as an array over the whole batch; the others are NaN, False or zero."""
     if chosen is None:
         return column
     rows = np.asarray(column)
@@ -455,7 +515,7 @@ def _ends_at_places(ends: list[End] | None, batch: tuple[int, ...], chosen: Any)
 
 
 def _whole(given: Given, noisy: SmoothingData, chosen: Any) -> SmoothingData:
-    """The data of all curves; NaN for points of those that are left out."""
+    """Return the data of all curves; points of masked curves are NaN."""
     if chosen is None:
         return noisy
     points = [_at_places(own, given.batch, chosen) for own in noisy.points]
@@ -465,7 +525,7 @@ def _whole(given: Given, noisy: SmoothingData, chosen: Any) -> SmoothingData:
 def _with_enough(
     whole: Knots, noisy: SmoothingData, lams: list[Any], run: Callable[[Knots], list[Any]]
 ) -> tuple[list[Any], Knots]:
-    """What is found with as many of the knots as λ and the degrees of freedom ask for; and these knots."""
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
     given = all(np.isfinite(lam).all() for lam in lams)
     at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
     if at.times.shape[-1] > _MANY:
@@ -479,7 +539,7 @@ def _with_enough(
         if better.times.shape[-1] > max(_MANY, most):
             better = thin_knots(better, max(_FIRST, most))
         wanted = better.times.shape[-1]
-        # A rough curve is rougher still with more knots; one that is stiff needs fewer.
+        # More knots would make a rough curve rougher, and a stiff curve needs fewer.
         if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
             break
         at = better
@@ -487,8 +547,10 @@ def _with_enough(
 
 
 def _of_all(lams: list[Any]) -> float:
-    """The λ by which knots are thinned that all curves have: as many as the roughest needs, if they are not too many
-    for the stiffest."""
+    """Return one λ from which the knots of all curves are selected.
+
+    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
+    """
     flat = np.concatenate([np.ravel(lam) for lam in lams])
     flat = flat[np.isfinite(flat)]
     return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
@@ -497,7 +559,7 @@ def _of_all(lams: list[Any]) -> float:
 def transport_end_velocities(
     ends: list[End] | None, space: Space, data: Any, points: Any, noisy: SmoothingData
 ) -> list[End] | None:
-    """Velocities at the first and the last of the data, carried to the ends of the curve."""
+    """Transport velocities at the first and the last datum to the ends of the curve."""
     axis = len(noisy.batch)
     result: list[End] = []
     for (kind, vector), index in zip(ends or [], (0, -1), strict=ends is not None):
@@ -512,7 +574,7 @@ def transport_end_velocities(
 
 
 def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
-    """The conditions at the ends of a factor from those of its parts."""
+    """Combine the end conditions of the parts of a factor."""
     if ends[0] is None or len(ends) == 1:
         return ends[0]
     parts: tuple[Space, ...] = parts_of_factor(space)
@@ -528,7 +590,7 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
 
 
 def _conditions(bc_type: Any, carried: list[list[End] | None], space: Space) -> Any:
-    """The same as a user may write it."""
+    """Return end conditions in the form of the argument `bc_type`."""
     if isinstance(bc_type, str):
         return bc_type
 

@@ -1,4 +1,4 @@
-"""What a smoothing says about itself."""
+"""Reports of smoothing fits."""
 
 from __future__ import annotations
 
@@ -14,21 +14,45 @@ from .._typing import Number
 
 @dataclass(frozen=True)
 class SmoothingReport:
-    """How a smoothing went, in a space that is no product. For a batch of curves every field but ``method`` is an array
-    with the batch axes.
+    """Report of a smoothing fit in a space that is not a product.
 
-    Attributes:
-        method: ``"linearized"`` or ``"newton"``, the way that led to the minimum; of a batch ``"newton"`` if any curve
-            needed it.
-        converged: whether the last step was below the tolerance.
-        iterations: how many splines were fitted.
-        step: the last step of the points, in their standard deviations; the largest of all knots.
-        rate: contraction of the steps in the last iteration.
-        lam: λ.
-        at_bound: whether the chosen λ lies at a bound: the curve is a geodesic (``df`` is 2), goes through all
-            data, or is the roughest one that was found.
-        df: degrees of freedom, for each coordinate: 2 for a geodesic, and the number of data for interpolation.
-        sigma: estimated standard deviation of the noise in a coordinate, for weight one.
+    For a batch of curves, every field except ``method`` is an array with the batch axes.
+
+    Attributes
+    ----------
+    method : {"linearized", "newton"}
+        Solver that found the minimum. For a batch, ``"newton"`` if any curve needed it.
+    converged : bool or ndarray of bool
+        Whether the last step was below the tolerance.
+    iterations : int or ndarray of int
+        Number of splines that were fitted.
+    step : float or ndarray
+        Last step of the points, in their standard deviations; the largest over all knots.
+    rate : float or ndarray
+        Contraction factor of the steps in the last iteration.
+    lam : float or ndarray
+        Weight λ of the bending energy.
+    at_bound : bool or ndarray of bool
+        Whether the chosen λ is at a bound: the curve is a geodesic, passes through all data, or is the roughest one
+        that was found.
+    df : float or ndarray
+        Effective degrees of freedom per coordinate: 2 for a geodesic, and the number of data for interpolation.
+    sigma : float or ndarray
+        Estimated standard deviation of the noise in one coordinate, for weight one.
+
+    See Also
+    --------
+    SmoothingSpline.report : Report of a smoothing spline.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import symspline as ss
+    >>> t = np.linspace(0, 1, 50)
+    >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
+    >>> report = ss.make_smoothing_spline(t, y[:, None], "r:1").report
+    >>> report.method, report.converged, report.at_bound
+    ('linearized', True, False)
     """
 
     method: Literal["linearized", "newton"]
@@ -55,7 +79,25 @@ class SmoothingReport:
         return f"{np.count_nonzero(good)} of {good.size} curves converged: {self.method}"
 
     def is_stiff(self, index: tuple[int, ...] = ()) -> bool:
-        """Whether a curve has hardly more degrees of freedom than one without any bending."""
+        """Whether a curve has hardly more degrees of freedom than a geodesic.
+
+        Parameters
+        ----------
+        index : tuple of int, default ()
+            Index of the curve in the batch.
+
+        Returns
+        -------
+        bool
+            True if the curve has less than 2.5 degrees of freedom per coordinate.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> line = ss.make_smoothing_spline([0, 1, 2, 3], [[0.0], [1.1], [1.9], [3.0]], "r:1", lam=1e6)
+        >>> line.report.is_stiff()
+        True
+        """
         return bool(np.asarray(self.df)[index] < 2.5)
 
     def __eq__(self, other: object) -> bool:
@@ -67,6 +109,26 @@ class SmoothingReport:
         )
 
     def map(self, function: Callable[[Any], Any]) -> SmoothingReport:
-        """The report with a function applied to the fields that are per curve."""
+        """Apply a function to all fields that have one value per curve.
+
+        Parameters
+        ----------
+        function : callable
+            Function of one field, such as the selection of some curves.
+
+        Returns
+        -------
+        SmoothingReport
+            Report with the results.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> noisy = np.random.default_rng(0).standard_normal((3, 20, 1))
+        >>> curves = ss.make_smoothing_spline(None, noisy, "r:1", lam=1.0)
+        >>> curves.report.map(lambda field: field[0]) == curves[0].report
+        True
+        """
         method, *columns = vars(self).values()
         return SmoothingReport(method, *map(function, columns))

@@ -1,4 +1,4 @@
-"""Smoothing splines."""
+"""Smoothing splines, the results of smoothing fits."""
 
 from __future__ import annotations
 
@@ -57,18 +57,35 @@ else:
 
 
 class SmoothingSpline(CubicSpline[P], Generic[P, R]):
-    """A C² cubic spline near noisy data, made by `make_smoothing_spline` or `make_lsq_spline`.
+    """A C² cubic spline close to noisy data.
 
-    It has all that a `CubicSpline` has; its points are those of the smooth curve at its knots, and derivatives by
-    `jvp` and `vjp` are with respect to them, not to the data. Numbers that belong to the noise are tuples with one
-    entry a factor in a `Product`, and arrays with the batch axes for a batch of curves. `save` keeps all of them,
-    and the data; `plot` shows the data and 95 % bands.
+    `make_smoothing_spline` and `make_lsq_spline` return objects of this class; it has no public constructor. All
+    methods of `CubicSpline` are available. `points` are those of the smooth curve at its knots, and `jvp` and `vjp`
+    differentiate with respect to them, not to the data. Files keep the data and the bands, and plots show them.
+
+    Properties of the noise are arrays with the batch axes for a batch of curves. For a `Product`, and for poses, they
+    are tuples with one entry per factor or part.
+
+    See Also
+    --------
+    make_smoothing_spline : Fit a curve close to noisy points.
+    make_lsq_spline : Fit a curve with given knots by least squares.
+    SmoothingReport : Report of a smoothing fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import symspline as ss
+    >>> t = np.linspace(0, 1, 50)
+    >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
+    >>> ss.make_smoothing_spline(t, y[:, None], "r:1")
+    <SmoothingSpline on Euclidean(1): 50 data, 50 knots>
     """
 
     _kind = "Smoothing spline"
 
     def __init__(self) -> None:
-        raise TypeError("smoothing splines are made by symspline.make_smoothing_spline")
+        raise TypeError("SmoothingSpline has no public constructor. Use symspline.make_smoothing_spline.")
 
     def _fill(  # type: ignore[override]
         self,
@@ -85,47 +102,55 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         self._noisy, self._smoothed = noisy, smoothed
 
     def _each(self, values: list[Any]) -> Any:
-        """One value, or one for every space in which data were smoothed."""
+        """Return one value, or a tuple with one value per space in which data were smoothed."""
         return tuple(values) if is_several(self.space) else values[0]
 
     def _in_factors(self, values: list[Any]) -> Any:
-        """One value, or one for every factor."""
+        """Return one value, or a tuple with one value per factor."""
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
     def report(self) -> R:  # type: ignore[override]
-        """How the smoothing went: a `SmoothingReport`, in a product one of every factor."""
+        """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
         reports: R = self._each([found.report for found in self._smoothed])
         return reports
 
     @noise_property
     def lam(self) -> Number | tuple[Number, ...]:
-        """λ."""
+        """Weight λ of the bending energy."""
         lam: Number | tuple[Number, ...] = self._each([found.report.lam for found in self._smoothed])
         return lam
 
     @noise_property
     def df(self) -> Number | tuple[Number, ...]:
-        """Degrees of freedom for each coordinate: 2 for a geodesic, the number of data for interpolation."""
+        """Effective degrees of freedom per coordinate.
+
+        They are 2 for a geodesic, and the number of data for interpolation.
+        """
         df: Number | tuple[Number, ...] = self._each([found.report.df for found in self._smoothed])
         return df
 
     @noise_property
     def sigma(self) -> Number | tuple[Number, ...]:
-        """Standard deviation of the noise in a coordinate of an orthonormal frame, for weight one: the one that was
-        given, or estimated as the root of ``sum(weights * distance**2)/(dim * (N - df))``."""
+        """Standard deviation of the noise in one coordinate, for weight one.
+
+        This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))``.
+        Coordinates refer to an orthonormal frame.
+        """
         sigma: Number | tuple[Number, ...] = self._each([found.sigma for found in self._smoothed])
         return sigma
 
     @property
     def data(self) -> tuple[AnyArray, P]:
-        """The times and the points that were smoothed."""
+        """Times and points that were smoothed."""
         return self._noisy.t, self._in_factors(self._noisy.points)
 
     @property
     def residuals(self) -> P:
-        """Vectors from the curve to the data, shape (..., N, *point_shape): the logarithm of a point at the curve,
-        whose length is the distance. Data of weight zero have no residual, NaN."""
+        """Tangent vectors from the curve to the data, shape (..., N, *point_shape).
+
+        They are logarithms at the curve, and their lengths are the distances. Data of weight zero have NaN.
+        """
         noisy = self._noisy
         at = self._curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)
         found = []
@@ -151,19 +176,42 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     ) -> tuple[FloatArray, ...]: ...
 
     def std(self, x: ArrayLike, *, nu: int = 0) -> Any:
-        """Standard deviation of the curve at times x, for one coordinate of an orthonormal frame.
+        r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
-        It is the root of σ² b(t)ᵀA⁻¹b(t), in frames along the curve: the posterior of a spline (Wahba 1983). If the
-        knots are the times of the data, as by default, what a curve of this roughness may do between them is added; a
-        spline on knots of your own has no such freedom.
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape. Beyond the knots, the standard deviation is that of a curve that continues with
+            constant velocity, or periodically if it is closed.
+        nu : {0, 1}, default 0
+            0 for the point, 1 for the velocity.
 
-        Args:
-            x: times, any shape; beyond the knots the curve goes on straight, or round again if it is closed.
-            nu: 0 for the point, 1 for the velocity.
+        Returns
+        -------
+        ndarray, float or tuple, shape ``(*batch axes, *x.shape)``
+            Standard deviations, for products and poses a tuple with one entry per part.
 
-        Returns:
-            Shape batch axes + x.shape.
+        Raises
+        ------
+        ValidationError
+            If a time is not finite, or `nu` is invalid.
 
+        See Also
+        --------
+        SmoothingSpline.band : Compute the radius of a credible ball.
+
+        Notes
+        ----- The variance at time t is :math:`\sigma^2 b(t)^T A^{-1} b(t)`, the posterior variance of a spline in
+        frames along the curve. b(t) are the values of the B-splines, and A is the matrix of the linearised problem. If
+        the knots are the times of the data, as they are by default, the variance of the curve between the knots is
+        added, as the smoothness determines it. A spline with knots of your own has no such freedom.
+
+        References
+        ---------- G. Wahba, Bayesian "confidence intervals" for the cross-validated smoothing spline, J. R. Stat. Soc.
+        B 45 (1983).
+
+        Examples
+        --------
         >>> import numpy as np
         >>> import symspline as ss
         >>> t = np.linspace(0, 1, 50)
@@ -188,11 +236,11 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return self._each(found)
 
     def _spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
-        """The standard deviation of one curve in a factor at times x of the core."""
+        """Return the standard deviation of one curve in one part at times x of the core."""
         knots = self._times[index] if self._times.ndim > 1 else self._times
         lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
         if not part.between:
-            # As with λ = 0: nothing happens between the knots but what the spline does.
+            # With λ = 0 the curve has no variance between the knots besides that of the spline.
             lam = 0.0
         variance = _core.smoothing_variance(
             np.ascontiguousarray(knots),
@@ -216,18 +264,43 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     ) -> tuple[FloatArray, ...]: ...
 
     def band(self, x: ArrayLike, level: float = 0.95) -> Any:
-        """Radius of the ball about the curve at times x that holds the true point with probability ``level``.
+        """Compute the radius of the ball that contains the true point with a given probability.
 
-        The mean coverage over all times is what it says; at the two end points it is less where the truth bends
-        there, since natural ends do not, and so it is within long gaps. Where λ is at its bound (``report.at_bound``)
-        it means nothing.
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape.
+        level : float, default 0.95
+            Probability between 0 and 1.
 
-        Args:
-            x: times, any shape.
-            level: between 0 and 1.
+        Returns
+        -------
+        ndarray, float or tuple, shape ``(*batch axes, *x.shape)``
+            Distances in the space, for products and poses a tuple with one entry per part.
 
-        Returns:
-            Shape batch axes + x.shape: a distance in the space.
+        Raises
+        ------
+        ValidationError
+            If a time is not finite, or `level` is not between 0 and 1.
+
+        See Also
+        --------
+        SmoothingSpline.std : Compute the standard deviation of the curve.
+
+        Notes
+        ----- `level` is the coverage on average over all times. The coverage is lower in long gaps, and at end points
+        with natural conditions if the true curve has an acceleration there. The band is not valid if λ is at its bound
+        (``report.at_bound``).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 1, 50)
+        >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
+        >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1")
+        >>> (s.band(0.5) / s.std(0.5)).round(2)
+        np.float64(1.96)
         """
         number = isinstance(level, (int, float, np.integer, np.floating)) and not isinstance(level, bool)
         if not number or not 0 < level < 1:
@@ -242,7 +315,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
             ]
         )
 
-    # ---- what a plot shows ----
+    # ---- plots ----
 
     @property
     def _made_of(self) -> str:
@@ -256,7 +329,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         noisy = self._noisy
         times = noisy.times[index] if noisy.times.ndim > 1 else noisy.times
         used = noisy.used[index] if noisy.used.ndim > 1 else noisy.used
-        # Of poses, whose parts have a unit each, pictures show the position.
+        # The parts of a pose have different units; plots show the band of the position.
         radii = [
             _radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
             for own in grouped(self.space, zip(smoothed_spaces(self.space), self._smoothed, strict=True))
@@ -285,7 +358,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     @property
     def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
-        """The splines in the factors of a product."""
+        """Splines in the factors of a product."""
         noisy = self._noisy
         weighing = grouped(self.space, noisy.weighing)
         found = grouped(self.space, self._smoothed)
@@ -296,7 +369,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     @classmethod
     def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
-        """A spline through smooth points with what is known of the noise."""
+        """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
         parts = (
             spline._clock,
             spline._t,
@@ -321,12 +394,12 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
 
 def _radius(space: Space, level: float) -> float:
-    """How many standard deviations of a coordinate the ball reaches that holds a normal vector so often."""
+    """Return the radius of the ball that contains a normal vector with this probability, in standard deviations."""
     return float(np.sqrt(_core.chi_squared(space.dim, level)))
 
 
 def _ranges(factors: list[Any], digits: int) -> str:
-    """A number of every factor, of a batch the least and the largest; of many factors these, too."""
+    """Return the range of a number for every factor, or one range for all if there are more than three factors."""
     few = factors if len(factors) <= 3 else [np.concatenate([np.ravel(values) for values in factors])]
     return " and ".join(_range(np.ravel(values), digits) for values in few)
 
@@ -334,5 +407,5 @@ def _ranges(factors: list[Any], digits: int) -> str:
 def _range(values: Doubles, digits: int) -> str:
     good = values[np.isfinite(values)]
     ends = (good.min(), good.max()) if good.size else ()
-    # Once, if they look alike.
+    # dict.fromkeys drops the second of two equal texts.
     return " to ".join(dict.fromkeys(f"{value:.{digits}g}" for value in ends)) or "unknown"

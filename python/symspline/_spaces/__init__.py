@@ -1,4 +1,4 @@
-"""The spaces: where points live, and their geometry."""
+"""The spaces: points, tangent vectors and their geometry."""
 
 from .base import Array, Space
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
@@ -23,10 +23,11 @@ from .subspaces import (
     QuaternionicProjective,
     RealProjective,
 )
-from .tolerance import POINT_TOL_FLOAT32, point_tol
+from .tolerance import POINT_TOL, POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
 
 __all__ = [
+    "POINT_TOL",
     "POINT_TOL_FLOAT32",
     "Affine",
     "AntiDeSitter",

@@ -1,4 +1,4 @@
-"""Geodesic symmetries, and the actions of the groups G of the paper's Table 1, one class per kind of action."""
+"""Geodesic symmetries and group actions, one class per kind of action in Table 1 of the paper."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .tolerance import point_tol
 
 
 def adjoint(x: Array) -> Array:
-    """Conjugate transposes."""
+    """Return conjugate transposes."""
     return np.swapaxes(x.conj(), -1, -2)
 
 
 def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:
-    """The argument `g` of `Space.act` as square matrices, and the tolerance that belongs to its type."""
+    """Return the argument `g` of `Space.act` as square matrices, and the tolerance for its type."""
     array = as_array(g, "g")
     if array.dtype.kind not in ("biufc" if np.dtype(dtype).kind == "c" else "biuf"):
         numbers = "numbers" if np.dtype(dtype).kind == "c" else "real numbers"
@@ -39,7 +39,7 @@ def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Ar
 
 
 def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
-    """Raise ValidationError for the first matrix whose defect exceeds what is allowed."""
+    """Raise ValidationError for the first matrix whose deviation exceeds the limit."""
     bad = np.argwhere(~(np.isfinite(defects) & (defects <= allowed)))
     if len(bad):
         index = bad[0].tolist()
@@ -51,7 +51,7 @@ def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what:
 
 
 def largest(x: Array) -> NDArray[np.float64]:
-    """The largest entry of every matrix by absolute value."""
+    """Return the largest absolute value of the entries of every matrix."""
     sizes: NDArray[np.float64] = np.max(np.abs(x), axis=(-2, -1))
     return sizes
 
@@ -67,7 +67,7 @@ def preserves(space: Space[Any], g: Array, form: Array, tol: float, remedy: str)
 class Preserving(Space[P]):
     """Vectors and bases of subspaces of a linear space with a form J: g acts as x ↦ gx, where g*Jg = J."""
 
-    # Entries of J that are −1; the others are 1.
+    # Indices of the entries −1 of the diagonal matrix J; the other entries are 1.
     _negative: tuple[int, ...] = ()
 
     def _signs(self) -> NDArray[np.float64]:
@@ -101,7 +101,7 @@ class Congruent(Space[P]):
     """Positive definite matrices: g acts as x ↦ g x g*."""
 
     def _reflected(self, p: Array, x: Array) -> Any:
-        # p x⁻¹ p by Cholesky factors, which keeps the digits of matrices with entries of very different size.
+        # p x⁻¹ p by Cholesky factors, which remains accurate for matrices with entries of very different size.
         y = np.linalg.solve(np.linalg.cholesky(x), p)
         return adjoint(y) @ y
 
@@ -115,7 +115,7 @@ class Congruent(Space[P]):
         return g
 
     def _require_subgroup(self, g: Array, tol: float) -> None:
-        """Nothing more is required of GL(n)."""
+        """Raise ValidationError unless g is in the group. GL(n) requires no more than an invertible matrix."""
 
     def _moved(self, g: Array, x: Array) -> Any:
         return g @ x @ adjoint(g)
@@ -156,7 +156,7 @@ class Group(Space[P]):
 
 
 def homogeneous(space: Space[Any], g: Any, dim: int) -> Array:
-    """Isometries of flat space as homogeneous matrices (A, b; 0, 1)."""
+    """Return isometries of Euclidean space as homogeneous matrices (A, b; 0, 1)."""
     array, tol = matrices(space, g, dim + 1, np.float64)
     remedy = "Pass [[A, b], [0, 1]] with an orthogonal matrix A and a vector b."
     off = array[..., -1:, :] - np.eye(dim + 1)[-1]

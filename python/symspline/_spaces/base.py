@@ -1,4 +1,4 @@
-"""What all spaces share: the operations on arrays of points, and how arrays go to the compiled core."""
+"""Operations that all spaces share, and the conversion of arrays for the compiled core."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from .tolerance import point_tol
 
 Array = AnyArray
 
-# From this ambient dimension on nothing is made that needs a frame of all tangent vectors.
+# From this ambient dimension on, frames of the whole tangent space are not computed.
 LARGE = 256
-# Operations that give one number a row, not a point.
-_NUMBERS = ("distance", "inner", "rounding")
-# So many numbers are 8 TB.
+# Operations whose result is one number per point.
+_NUMBERS = ("distance", "cut_fraction", "inner", "rounding")
+# Largest number of entries of a point: 8 TB.
 _MOST = 2**40
 
 
-# The classes of all spaces by their names, products apart.
+# The classes of all spaces except products, by name.
 CLASSES: dict[str, type[Space[Any]]] = {}
-# What a complex array may have been meant for.
+# Complex counterparts of real spaces, for the message about complex points.
 COMPLEX_TWINS = {
     "rp": "ComplexProjective",
     "gr": "ComplexGrassmannian",
@@ -41,32 +41,62 @@ COMPLEX_TWINS = {
 
 
 class Space(Generic[P]):
-    """A symmetric space. Every method works on arrays of points: leading axes broadcast.
+    """Base class of symmetric spaces.
 
-    Tangent vectors are arrays of the point's shape. ``str(space)`` is the name that
-    `symspline.space` reads back, ``repr(space)`` the constructor call.
+    All methods work on arrays of points, whose leading axes broadcast. Tangent vectors are arrays with the shape of
+    points. ``str(space)`` is the name that `space` reads back, and ``repr(space)`` is the constructor call.
+
+    Parameters
+    ----------
+    *parameters : int
+        Parameters of the space, such as its dimension. Only subclasses can be instantiated.
+
+    See Also
+    --------
+    space : Return a space by its name.
+    Manifold : A manifold given by functions.
+    Product : The product of spaces.
+
+    Notes
+    -----
+    A symmetric space is a manifold on which every point p has an isometry that fixes p and reverses all geodesics
+    through p, the geodesic symmetry. The subclasses include all spaces of Table 1 of the paper.
+
+    References
+    ----------
+    G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+    Anal. 56 (2018), Section 2 and Table 1.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> sphere = ss.Sphere(2)
+    >>> sphere.point_shape, sphere.dim, str(sphere)
+    ((3,), 2, 'sphere:2')
     """
 
     _name: ClassVar[str]
-    # Further names, of spaces that the compiled core does not know.
+    # Further names of spaces that the compiled core does not implement.
     _aliases: ClassVar[tuple[str, ...]] = ()
-    # Whether points are vectors or bases of subspaces, so that curves stay in the span of their points.
+    # Whether points are vectors or bases of subspaces, so that curves stay in the linear span of their points.
     _linear: ClassVar[bool] = False
     _handle: Handle
     _parameters: tuple[int, ...]
     _complex: bool
     _dtype: np.dtype[np.float64] | np.dtype[np.complex128]
-    # Shape of one point's doubles, where a complex number is two.
+    # Shape of the floating-point numbers of one point; a complex number is two.
     _doubles_shape: tuple[int, ...]
 
     def __init__(self, *parameters: int) -> None:
         if not hasattr(type(self), "_name"):
             raise TypeError(
-                f"{type(self).__name__} takes no parameters itself; make one of its kinds, as Sphere(2)"
+                f"{type(self).__name__} cannot be instantiated. Use one of its subclasses, such as Sphere(2)."
             )
         for value in parameters:
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
-                raise ValidationError(f"{type(self).__name__} takes whole numbers, not {short_repr(value)}")
+                raise ValidationError(
+                    f"the parameters of {type(self).__name__} must be integers >= 0, not {short_repr(value)}"
+                )
         self._parameters = tuple(int(value) for value in parameters)
         try:
             self._handle = Handle(self._name, list(self._parameters))
@@ -74,13 +104,13 @@ class Space(Generic[P]):
             raise ValidationError(f"{self!r} is too large") from None
         self._point_shape = tuple(self._handle.point_shape())
         if max(self._parameters, default=0) >= _MOST or math.prod(self._point_shape) >= _MOST:
-            raise ValidationError(f"{self!r} is too large: no memory holds a point of it")
+            raise ValidationError(f"{self!r} is too large: one point would not fit into memory")
         self._complex = self._handle.is_complex()
         self._dtype = np.dtype(np.complex128) if self._complex else np.dtype(np.float64)
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
 
-    # ---- what it is ----
+    # ---- properties ----
 
     @property
     def point_shape(self) -> tuple[int, ...]:
@@ -89,28 +119,31 @@ class Space(Generic[P]):
 
     @property
     def dim(self) -> int:
-        """Dimension of the space."""
+        """Dimension of the manifold."""
         return self._handle.dim()
 
     @property
     def injectivity_radius(self) -> float:
-        """Distance below which the geodesic between two points is unique, whatever its direction."""
+        """Distance below which two points are joined by a unique shortest geodesic."""
         return self._handle.injectivity_radius()
 
     @property
     def curvature(self) -> float:
-        """K of (22) in the paper: 0 for flat space, 1/r for a sphere of radius r; NaN for poses and other
-        spaces without an invariant metric that is positive definite."""
+        """K of (22) in the paper, a bound of the curvature.
+
+        It is 0 for flat space and 1/r for a sphere of radius r. It is NaN for spaces without an invariant metric that
+        is positive definite, such as poses.
+        """
         return self._handle.curvature()
 
     @property
     def dtype(self) -> np.dtype[np.float64] | np.dtype[np.complex128]:
-        """Type of the numbers of a point: float64, or complex128."""
+        """Type of the numbers of a point, float64 or complex128."""
         return self._dtype
 
     @cached_property
     def _text(self) -> str:
-        # Spaces are compared by it, several times in a fit.
+        # Cached because spaces are compared by name several times during a fit.
         return f"{self._name}:{','.join(map(str, self._parameters))}"
 
     def __str__(self) -> str:
@@ -131,12 +164,32 @@ class Space(Generic[P]):
     # ---- geometry ----
 
     def exp(self, p: ArrayLike, v: ArrayLike) -> P:
-        """The point reached from p in unit time on the geodesic with velocity v.
+        r"""Follow the geodesic from p with velocity v for unit time.
 
-        Args:
-            p: points, shape (..., *point_shape).
-            v: tangent vectors at p, shape (..., *point_shape).
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+        v : array_like, shape (..., *point_shape)
+            Tangent vectors at p.
 
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The points :math:`\exp_p(v)`.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.log : The inverse operation.
+        Space.geodesic : Evaluate the geodesic between two points.
+
+        Examples
+        --------
         >>> import symspline as ss
         >>> ss.Sphere(2).exp([1, 0, 0], [0, ss.Sphere(2).injectivity_radius / 2, 0]).round(15)
         array([0., 1., 0.])
@@ -144,20 +197,78 @@ class Space(Generic[P]):
         return self._finite("exp", p=p, v=v)
 
     def log(self, p: ArrayLike, q: ArrayLike) -> P:
-        """The velocity at p of the geodesic that reaches q in unit time; inverse of `exp`.
+        r"""Compute the velocity at p of the geodesic that reaches q in unit time.
 
-        Raises:
-            CutLocusError: the two points lie at or past each other's cut locus.
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The tangent vectors :math:`\log_p(q)`.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+        CutLocusError
+            If two points lie at or past each other's cut locus.
+
+        See Also
+        --------
+        Space.exp : The inverse operation.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (11).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).log([1, 0, 0], [0, 1, 0]).round(8)
+        array([0.        , 1.57079633, 0.        ])
         """
         return self._finite("log", p=p, q=q)
 
     def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> P:
-        """The geodesic from p (t = 0) to q (t = 1), the paper's [p, q]_t.
+        """Evaluate the geodesic from p to q at times t.
 
-        ``t`` broadcasts against the leading axes of p and q.
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points.
+        t : array_like, shape (...)
+            Times: 0 gives p, and 1 gives q. They broadcast against the leading axes of p and q.
 
-        Raises:
-            CutLocusError: the two points lie at or past each other's cut locus.
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The points :math:`[p, q]_t` in the notation of the paper.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the required shape, or if the result is not finite.
+        CutLocusError
+            If two points lie at or past each other's cut locus.
+
+        See Also
+        --------
+        Space.log : Compute the velocity of this geodesic.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (6).
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).geodesic([1, 0, 0], [0, 1, 0], 0.5).round(8)
+        array([0.70710678, 0.70710678, 0.        ])
         """
         times = as_array(t, "t")
         if times.dtype.kind not in "biuf":
@@ -165,18 +276,106 @@ class Space(Generic[P]):
         return self._finite("geodesic", t=cast(times), p=p, q=q)
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
-        """Length of the shortest geodesic between p and q; shape of the leading axes."""
+        """Compute the length of the shortest geodesic between p and q.
+
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray or float, shape (...)
+            Distances.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.norm : Compute the length of a tangent vector.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).distance([1, 0, 0], [[0, 1, 0], [-1, 0, 0]]).round(8)
+        array([1.57079633, 3.14159265])
+        """
         return self._finite("distance", p=p, q=q)
 
     def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> P:
-        """The transvection E_p(v) of (10), applied to the point x: it moves p to exp_p(v)."""
+        r"""Move points x by the transvection along a geodesic.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points at which the geodesics start.
+        v : array_like, shape (..., *point_shape)
+            Tangent vectors at p.
+        x : array_like, shape (..., *point_shape)
+            Points to move.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            The points :math:`E_p(v) \cdot x`. The transvection moves p to :math:`\exp_p(v)`.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.symmetry : Apply the geodesic symmetry at a point.
+        Space.act : Apply an element of the group of the space.
+
+        References
+        ----------
+        G. Bogfjellmo, K. Modin, O. Verdier, A Numerical Algorithm for C²-Splines on Symmetric Spaces, SIAM J. Numer.
+        Anal. 56 (2018), equation (10).
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> ss.Sphere(2).transvection([1, 0, 0], [0, np.pi / 2, 0], [0, 1, 0]).round(15) + 0.0
+        array([-1.,  0.,  0.])
+        """
         return self._finite("transvection", p=p, v=v, x=x)
 
     def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> P:
-        """Parallel transport of the tangent vector v from p to q along the geodesic between them.
+        """Transport tangent vectors in parallel along the geodesic from p to q.
 
-        Raises:
-            CutLocusError: the two points lie at or past each other's cut locus.
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points.
+        v : array_like, shape (..., *point_shape)
+            Tangent vectors at p.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            Tangent vectors at q.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+        CutLocusError
+            If two points lie at or past each other's cut locus.
+
+        See Also
+        --------
+        Curve.transport : Transport tangent vectors along a curve.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).transport([1, 0, 0], [0, 1, 0], [0, 1, 2]).round(15) + 0.0
+        array([-1.,  0.,  2.])
         """
         return self._finite("transport", p=p, q=q, v=v)
 
@@ -293,13 +492,13 @@ class Space(Generic[P]):
         >>> ss.SpecialOrthogonal(3).act((quarter_turn, np.eye(3)), np.eye(3)).shape
         (3, 3)
         """
-        # Of matrices that are too large or singular the checks make an error of their own.
+        # The checks report matrices that are too large or singular.
         with np.errstate(all="ignore"):
             element = self._element(g)
         return self._isometric("act", lambda x: self._moved(element, x), x=x)
 
     def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> P:
-        """Points that a formula makes of arrays of points, on the space to rounding."""
+        """Apply a formula to arrays of points, and project the result onto the space to remove rounding errors."""
         arrays = {key: self._numbers(self._doubles(value, key)) for key, value in inputs.items()}
         self._leads({key: array.shape for key, array in arrays.items()})
         try:
@@ -316,13 +515,13 @@ class Space(Generic[P]):
         points: P = self._require_finite(name, result)
         return points
 
-    # What every kind of symmetric space has to define for `symmetry` and `act`: see `actions`.
+    # The classes in `actions` define these methods for `symmetry` and `act`.
 
     def _reflected(self, p: Array, x: Array) -> Any:
         raise self._not_symmetric("geodesic symmetries")
 
     def _element(self, g: Any) -> Any:
-        """The argument of `act` as checked arrays."""
+        """Return the argument of `act` as checked arrays."""
         raise self._not_symmetric("group")
 
     def _moved(self, g: Any, x: Array) -> Any:
@@ -332,45 +531,166 @@ class Space(Generic[P]):
         return ValidationError(f"{self!r} is not known to be symmetric: it has no {what}")
 
     def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> FloatArray:
-        """Inner product of two tangent vectors at p; shape of the leading axes."""
+        """Compute the inner product of two tangent vectors at p.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+        u, v : array_like, shape (..., *point_shape)
+            Tangent vectors at p.
+
+        Returns
+        -------
+        ndarray or float, shape (...)
+            Inner products.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.norm : Compute the length of a tangent vector.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).inner([1, 0, 0], [0, 1, 2], [0, 3, 4])
+        np.float64(11.0)
+        """
         return self._finite("inner", p=p, u=u, v=v)
 
     def norm(self, p: ArrayLike, v: ArrayLike) -> FloatArray:
-        """Length of the tangent vector v at p; shape of the leading axes."""
+        """Compute the length of a tangent vector at p.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+        v : array_like, shape (..., *point_shape)
+            Tangent vectors at p.
+
+        Returns
+        -------
+        ndarray or float, shape (...)
+            Lengths.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.inner : Compute the inner product of two tangent vectors.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).norm([1, 0, 0], [0, 3, 4])
+        np.float64(5.0)
+        """
         result: FloatArray = np.sqrt(np.maximum(self._finite("inner", p=p, v=v, again=v), 0.0))
         return result
 
     # ---- membership ----
 
     def project(self, x: ArrayLike) -> P:
-        """A point of the space close to x, for x near the space.
+        """Project arrays near the manifold onto it.
 
-        Raises:
-            ValidationError: no point is close to x (a zero vector, or not finite).
+        Parameters
+        ----------
+        x : array_like, shape (..., *point_shape)
+            Arrays near points of the space, such as points with rounding errors.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            Points of the space.
+
+        Raises
+        ------
+        ValidationError
+            If x is not finite or has no point close to it, such as a zero vector on a sphere.
+
+        See Also
+        --------
+        Space.check_point : Check whether arrays are points.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).project([3, 0, 4])
+        array([0.6, 0. , 0.8])
         """
         result: Any = self._apply("project", x=x)
         good = np.isfinite(result) & np.isfinite(cast(self._array(x, "x"), self.dtype))
         if not good.all():
             bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
             raise ValidationError(
-                f"x{bad or ''} cannot be projected: no point of the space is close to it, or it is not finite"
+                f"x{bad or ''} cannot be projected: it is not finite, or no point of {self!r} is close to it"
             )
         try:
             self.check_point(result)
         except ValidationError as error:
-            raise ValidationError(f"x cannot be projected; of what comes nearest, {error}") from None
+            raise ValidationError(f"x cannot be projected; for the nearest array, {error}") from None
         points: P = result
         return points
 
     def project_tangent(self, p: ArrayLike, v: ArrayLike) -> P:
-        """The tangential part of v at p."""
+        """Project arrays onto the tangent space at p.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+        v : array_like, shape (..., *point_shape)
+            Arrays with the shape of points.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            Tangent vectors at p.
+
+        Raises
+        ------
+        ValidationError
+            If an array does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.check_tangent : Check whether arrays are tangent vectors.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).project_tangent([1, 0, 0], [5, 1, 2])
+        array([0., 1., 2.])
+        """
         return self._finite("project_tangent", p=p, v=v)
 
     def rounding(self, p: ArrayLike) -> FloatArray:
-        """By how much rounding counts at points p: how far apart neighbouring floating-point points are, in units of
-        2.2e-16, shape of the leading axes. |p|² in hyperbolic space, tr p · tr p⁻¹ (about the condition) of positive
-        definite matrices, the length of vectors and translations; 1 or more.
+        """Compute the spacing of floating-point numbers at points p.
 
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray or float, shape (...)
+            Distance between neighbouring floating-point points in units of the machine epsilon, 2.2e-16; at least 1.
+
+        Notes
+        -----
+        The spacing is |p|² on hyperbolic space, tr p · tr p⁻¹ (about the condition number) for positive definite
+        matrices, and the length of vectors and translations.
+
+        Examples
+        --------
         >>> import symspline as ss
         >>> ss.Sphere(1).rounding([1.0, 0.0]), ss.Hyperbolic(1).rounding([1.25, 0.75])
         (np.float64(1.0), np.float64(2.125))
@@ -378,13 +698,57 @@ class Space(Generic[P]):
         return self._apply("rounding", p=p)
 
     def check_point(self, p: ArrayLike) -> None:
-        """Raise ValidationError unless p (or every one of an array of points) is a point."""
+        """Raise an exception unless all arrays are points of the space.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Arrays to check.
+
+        Raises
+        ------
+        ValidationError
+            If an array is farther than 1e-8 (1e-4 for single precision) from the manifold. The message names its
+            index.
+
+        See Also
+        --------
+        Space.project : Project arrays onto the manifold.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).check_point([0.6, 0, 0.8])
+        """
         array = self._doubles(p, "p")
         lead = self._lead(array)
         self._handle.check_points(self._rows(array, lead), lead, point_tol(self._array(p, "p").dtype))
 
     def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
-        """Raise ValidationError unless v is a tangent vector at the point p."""
+        """Raise an exception unless all arrays are tangent vectors.
+
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+        v : array_like, shape (..., *point_shape)
+            Arrays to check.
+
+        Raises
+        ------
+        ValidationError
+            If p is not a point, or if the normal component of v exceeds 1e-8 (1e-4 for single precision). The message
+            names the index.
+
+        See Also
+        --------
+        Space.project_tangent : Project arrays onto a tangent space.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.Sphere(2).check_tangent([1, 0, 0], [0, 2, 3])
+        """
         self.check_point(p)
         points, vectors = self._doubles(p, "p"), self._doubles(v, "v")
         try:
@@ -397,33 +761,82 @@ class Space(Generic[P]):
         if bad.size:
             index = ",".join(map(str, np.unravel_index(bad[0], lead)))
             raise ValidationError(
-                f"vector {index or 'v'} is not tangent at its point: a part of {defects[bad[0]]:.3e} of it points "
-                f"off the space (allowed: {tol:.0e}); use space.project_tangent(p, v)"
+                f"vector {index or 'v'} is not tangent at its point: its normal component is {defects[bad[0]]:.3e} "
+                f"(allowed: {tol:.0e}); use space.project_tangent(p, v)"
             )
 
     def frame(self, p: ArrayLike) -> P:
-        """Tangent vectors that span the tangent space at every one of the points p, shape (..., dim, *point_shape):
-        orthonormal, where the space has a metric. There are many such frames; this one is no continuous function of p.
+        """Compute a basis of the tangent space at every point.
 
+        Parameters
+        ----------
+        p : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (..., dim, *point_shape)
+            Tangent vectors that span the tangent space. They are orthonormal if the space has a metric. The frame is
+            not a continuous function of p.
+
+        Raises
+        ------
+        ValidationError
+            If p does not have the shape of points, or if the dimension of the space is too large for frames.
+
+        See Also
+        --------
+        Space.random_tangent : Draw random tangent vectors.
+
+        Examples
+        --------
         >>> import symspline as ss
         >>> ss.SpecialOrthogonal(3).frame([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]).shape
         (3, 3, 3)
         """
         if self._linear and self.point_shape[0] >= LARGE:
-            raise ValidationError(f"{self!r} has too many dimensions for frames")
+            raise ValidationError(f"the dimension of {self!r} is too large for frames")
         doubles = self._doubles(p, "p")
         at_each = np.expand_dims(doubles, len(self._lead(doubles)))
         size = math.prod(self._doubles_shape)
         units = np.eye(self.dim, size).reshape(-1, *self._doubles_shape)
-        # From a frame at p the core makes random vectors; these are what it makes of single ones.
+        # The core combines a frame at p with random coefficients. Unit coefficients give the frame itself.
         return self._finite("random_tangent", p=self._numbers(at_each), noise=self._numbers(units))
 
-    # ---- chance ----
+    # ---- random points ----
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> P:
-        """Random points, shape ``shape + point_shape``: uniform on a compact space."""
+        """Draw random points.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of random numbers.
+        shape : int or tuple of int, default ()
+            Shape of the array of points.
+
+        Returns
+        -------
+        ndarray, shape ``(*shape, *point_shape)``
+            Random points. On a compact space their distribution is uniform.
+
+        Raises
+        ------
+        ValidationError
+            If the shape is invalid.
+
+        See Also
+        --------
+        Space.random_tangent : Draw random tangent vectors.
+
+        Examples
+        --------
+        >>> import numpy as np, symspline as ss
+        >>> ss.Sphere(2).random_point(np.random.default_rng(0), (4, 5)).shape
+        (4, 5, 3)
+        """
         if not isinstance(shape, (int, np.integer, tuple, list)):
-            raise ValidationError(f"shape must be a whole number or a tuple of them, not {short_repr(shape)}")
+            raise ValidationError(f"shape must be an integer or a tuple of integers, not {short_repr(shape)}")
         sizes = (shape,) if isinstance(shape, (int, np.integer)) else tuple(shape)
         noise = self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes))
         points: Any = self._apply("scatter", x=self._scatter_scale * noise)
@@ -432,49 +845,85 @@ class Space(Generic[P]):
 
     @property
     def _scatter_scale(self) -> float:
-        """What random points multiply standard normal numbers by."""
+        """Factor of the standard normal numbers from which random points are computed."""
         return 1.0
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> P:
-        """Standard normal tangent vectors at the points p."""
+        """Draw random tangent vectors with the standard normal distribution.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of random numbers.
+        p : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray, shape (..., *point_shape)
+            One tangent vector at each point.
+
+        Raises
+        ------
+        ValidationError
+            If p does not have the shape of points, or if the result is not finite.
+
+        See Also
+        --------
+        Space.random_point : Draw random points.
+
+        Examples
+        --------
+        Noise of standard deviation 0.1 in each of the two tangent directions:
+
+        >>> import numpy as np, symspline as ss
+        >>> sphere, p = ss.Sphere(2), [1, 0, 0]
+        >>> noisy = sphere.exp(p, 0.1 * sphere.random_tangent(np.random.default_rng(0), p))
+        >>> sphere.distance(p, noisy).round(3)
+        np.float64(0.018)
+        """
         noise = self._noise(rng, self._lead(self._doubles(p, "p")))
         if self._linear and self.point_shape[0] >= LARGE:
             return self._normal_tangent(p, noise)
         return self._finite("random_tangent", p=p, noise=noise)
 
     def _normal_tangent(self, p: ArrayLike, noise: Array) -> P:
-        """Standard normal tangent vectors, made of standard normal numbers without a frame at p."""
+        """Return standard normal tangent vectors without a frame at p."""
         return self.project_tangent(p, noise)
 
     def _noise(self, rng: np.random.Generator, lead: tuple[int, ...]) -> Array:
-        """Standard normal numbers in the shape of points."""
+        """Return standard normal numbers in the shape of points."""
         if not hasattr(rng, "standard_normal"):
             raise TypeError(f"rng must be a numpy.random.Generator, not {short_repr(rng)}")
         try:
             return self._numbers(rng.standard_normal(lead + self._doubles_shape))
         except ValueError as error:
-            raise ValidationError(f"cannot make points of shape {lead}: {error}") from None
+            raise ValidationError(f"cannot draw points of shape {lead}: {error}") from None
 
     # ---- arrays ----
 
     def _numbers(self, doubles: NDArray[np.float64]) -> Array:
-        """The compiled core's doubles as the numbers of points: pairs are complex numbers."""
+        """Return floating-point numbers of the core as numbers of points; on complex spaces, pairs become complex
+        numbers.
+        """
         return doubles.view(np.complex128) if self._complex else doubles
 
     def _as_doubles(self, numbers: Array) -> NDArray[np.float64]:
-        """The inverse: numbers of points, in contiguous memory, as doubles."""
+        """Return numbers of points in contiguous memory as floating-point numbers of the core."""
         return numbers.view(np.float64) if self._complex else numbers
 
     def _array(self, value: Any, name: str) -> Array:
-        """Points as they are given, as an array: where objects that are no arrays are taken, too."""
+        """Return points as an array. Subclasses accept objects of other libraries as well."""
         return as_array(value, name)
 
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
 
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
-        """The value as contiguous doubles whose last axes are those of a point; of complex numbers the
-        last axis holds real and imaginary parts side by side."""
+        """Return points as contiguous floating-point numbers of the core.
+
+        The last axis of complex points holds real and imaginary parts in turn.
+        """
         array = self._array(value, name)
         if array.dtype.kind not in ("biufc" if self._complex else "biuf"):
             numbers = "numbers" if self._complex else "real numbers"
@@ -493,11 +942,11 @@ class Space(Generic[P]):
         return np.ascontiguousarray(np.broadcast_to(array, lead + shape).reshape(-1, math.prod(shape)))
 
     def _lead(self, array: NDArray[np.float64]) -> tuple[int, ...]:
-        """The axes before those of a point."""
+        """Return the axes before those of a point."""
         return array.shape[: array.ndim - len(self.point_shape)]
 
     def _leads(self, shapes: Mapping[str, tuple[int, ...]], further: tuple[int, ...] = ()) -> tuple[int, ...]:
-        """The leading axes that arrays of points of these shapes have together."""
+        """Return the broadcast leading axes of arrays of points with these shapes."""
         try:
             return np.broadcast_shapes(
                 *(shape[: len(shape) - len(self.point_shape)] for shape in shapes.values()), further
@@ -529,7 +978,7 @@ class Space(Generic[P]):
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> P: ...
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
-        """The same, but with an error where it is not finite."""
+        """Apply an operation of the core, and raise ValidationError if a result is not finite."""
         return self._require_finite(operation, self._apply(operation, t, **inputs))
 
     def _require_finite(self, operation: str, result: Array) -> Any:
@@ -537,8 +986,8 @@ class Space(Generic[P]):
             axes = () if operation in _NUMBERS else self._point_axes(result)
             bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()
             raise ValidationError(
-                f"{operation} of row {bad or 0} is not finite: its numbers are not finite, too large, or no point of "
-                "the space"
+                f"{operation} of row {bad or 0} is not finite: the input is not finite, is too large, or is not a "
+                "point of the space"
             )
         return result
 
@@ -550,18 +999,18 @@ class Space(Generic[P]):
 
 
 def example_of(cls: type[Space[Any]]) -> str:
-    """How one of a family of spaces is written."""
+    """Return an example of a space of this class, as a constructor call and as a name."""
     numbers = {"gr": "2, 4", "cgr": "2, 4", "stiefel": "2, 4", "igr": "0, 1, 1, 2"}.get(cls._name, "2")
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 
 def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callable[..., None]:
-    """The constructor, whose error says which numbers are wanted where they are not given."""
+    """Wrap a constructor so that a wrong number of arguments raises an error that names the parameters."""
     names = [*signature(init).parameters][1:]
 
     @wraps(init)
     def checked(self: Space[Any], *numbers: Any, **named: Any) -> None:
-        # Not asked beforehand, which would take longer than to make the space.
+        # A check in advance would take longer than the constructor.
         try:
             init(self, *numbers, **named)
         except TypeError:

@@ -1,4 +1,4 @@
-"""Groups of real matrices of which one part has positive determinants and the other one negative ones."""
+"""Groups of real matrices with two components, of positive and of negative determinant."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .base import Array, Space
 
 
 class DisconnectedGroup(Space[P]):
-    """A space of matrices of two parts, which no curve joins: what fails for two points in different ones says so."""
+    """Group with two components. Operations on points in different components fail with an explanation."""
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         try:
@@ -26,7 +26,7 @@ class DisconnectedGroup(Space[P]):
 
     def _check_same_part(self, p: ArrayLike, q: ArrayLike) -> None:
         pairs: Array = np.zeros((0, 0), int)
-        # Arrays of a wrong shape have an error of their own.
+        # Arrays of a wrong shape raise an error elsewhere.
         with np.errstate(all="ignore"), suppress(ValueError):
             signs = [np.sign(np.linalg.det(self._doubles(x, name))) for x, name in ((p, "p"), (q, "q"))]
             pairs = np.argwhere(signs[0] * signs[1] < 0)

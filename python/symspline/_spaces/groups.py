@@ -1,4 +1,4 @@
-"""Groups of matrices: rotations, unitary matrices and rigid motions."""
+"""Compact groups of matrices, and rigid motions."""
 
 from __future__ import annotations
 
@@ -11,10 +11,28 @@ from .disconnected import DisconnectedGroup
 
 
 class SpecialOrthogonal(Group[FloatArray]):
-    """Rotations of n dimensions: orthogonal n × n matrices of determinant 1, with ⟨u, v⟩ = ½ tr uᵀv.
-    In SO(3) distance is the angle of the rotation from one to the other, and a SciPy ``Rotation`` of any shape,
-    or a list of them, is taken wherever points are.
+    r"""The rotation group SO(n).
 
+    A point is an orthogonal n × n matrix of determinant 1. In SO(3), distance is the angle of the rotation from one
+    point to the other, and a SciPy ``Rotation`` of any shape, or a list of them, is accepted wherever points are.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 2.
+
+    See Also
+    --------
+    Orthogonal : Rotations and reflections.
+    SpecialEuclidean : Rigid motions.
+    symspline.rotations : Angular velocities, quaternions and rotation vectors.
+
+    Notes
+    -----
+    The metric is :math:`\langle u, v \rangle = \tfrac12 \operatorname{tr} u^T v`.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     >>> ss.SpecialOrthogonal(3).distance(np.eye(3), quarter).round(8)
@@ -32,8 +50,10 @@ class SpecialOrthogonal(Group[FloatArray]):
 
 
 def _matrices(value: Any) -> Any:
-    """The matrices of a `scipy.spatial.transform.Rotation` or of a list of them, known by their method ``as_matrix``,
-    so that SciPy need not be there; any other value as it is."""
+    """Return the matrices of a SciPy ``Rotation`` or of a list of them; any other value is returned unchanged.
+
+    Rotations are recognised by their method ``as_matrix``, so that SciPy need not be installed.
+    """
     if hasattr(value, "as_matrix"):
         return value.as_matrix()
     if isinstance(value, (list, tuple)) and any(hasattr(part, "as_matrix") for part in value):
@@ -42,9 +62,26 @@ def _matrices(value: Any) -> Any:
 
 
 class Orthogonal(DisconnectedGroup[FloatArray], Group[FloatArray]):
-    """Orthogonal n × n matrices, rotations and reflections, with ⟨u, v⟩ = ½ tr uᵀv. A curve stays in one
-    of the two parts.
+    r"""The orthogonal group O(n).
 
+    A point is an orthogonal n × n matrix, a rotation or a reflection. The group has two components, and a curve stays
+    in one of them.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 2.
+
+    See Also
+    --------
+    SpecialOrthogonal : Rotations only.
+
+    Notes
+    -----
+    The metric is :math:`\langle u, v \rangle = \tfrac12 \operatorname{tr} u^T v`.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Orthogonal(2).dim
     1
@@ -58,8 +95,25 @@ class Orthogonal(DisconnectedGroup[FloatArray], Group[FloatArray]):
 
 
 class SpecialUnitary(Group[ComplexArray]):
-    """Unitary n × n matrices of determinant 1, with ⟨u, v⟩ = Re tr u*v.
+    r"""The special unitary group SU(n).
 
+    A point is a unitary n × n matrix of determinant 1, such as a quantum gate without a global phase.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 2.
+
+    See Also
+    --------
+    Unitary : Unitary matrices of any determinant.
+
+    Notes
+    -----
+    The metric is :math:`\langle u, v \rangle = \operatorname{Re} \operatorname{tr} u^* v`.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.SpecialUnitary(2).dim
     3
@@ -73,8 +127,25 @@ class SpecialUnitary(Group[ComplexArray]):
 
 
 class Unitary(Group[ComplexArray]):
-    """Unitary n × n matrices, with ⟨u, v⟩ = Re tr u*v.
+    r"""The unitary group U(n).
 
+    A point is a unitary n × n matrix.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 1.
+
+    See Also
+    --------
+    SpecialUnitary : Unitary matrices of determinant 1.
+
+    Notes
+    -----
+    The metric is :math:`\langle u, v \rangle = \operatorname{Re} \operatorname{tr} u^* v`.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Unitary(1).distance([[1]], [[1j]]).round(8)
     np.float64(1.57079633)
@@ -88,16 +159,34 @@ class Unitary(Group[ComplexArray]):
 
 
 class SpecialEuclidean(Group[FloatArray]):
-    """Rigid motions of n = 2 or 3 dimensions, poses: homogeneous (n+1) × (n+1) matrices [[R, t], [0, 1]].
+    r"""The group SE(n) of rigid motions, or poses.
 
-    Geodesics are screw motions g exp(tξ). The group has no invariant metric: lengths are those of
-    (ω, v) = g⁻¹u, the rates in the body, and serve for reporting only. For positions that move
-    independently of the rotation use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
+    A point is a homogeneous (n + 1) × (n + 1) matrix [[R, t], [0, 1]]. Geodesics are screw motions. For positions that
+    move independently of the rotation, use ``Product(SpecialOrthogonal(3), Euclidean(3))``.
 
-    The covariant acceleration of a curve (``nu=2``) is that of the group's connection: its last column is ẍ − ω × ẋ
-    with the angular velocity ω in the world, and not ẍ. A body that turns with its path along a circle has 0 there.
-    `symspline.poses.linear_acceleration` gives ẍ.
+    Parameters
+    ----------
+    n : {2, 3}
+        Dimension of the space in which the body moves.
 
+    See Also
+    --------
+    SpecialOrthogonal : Rotations.
+    Similarity : Poses with a scale.
+    symspline.poses : Velocities, accelerations and files of poses.
+
+    Notes
+    -----
+    Geodesics are :math:`g \exp(t \xi)`. The group has no bi-invariant metric. Lengths are those of the body rates
+    :math:`(\omega, v) = g^{-1} u` and serve for reporting only.
+
+    The covariant acceleration of a curve (``nu=2``) belongs to the connection of the group. Its last column is
+    :math:`\ddot x - \omega \times \dot x` with the angular velocity ω in the world frame, not :math:`\ddot x`. It is
+    zero for a body that turns with its path along a circle. `symspline.poses.linear_acceleration` returns :math:`\ddot
+    x`.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.SpecialEuclidean(3).point_shape
     (4, 4)

@@ -1,5 +1,7 @@
-"""Symmetric spaces whose invariant metric is indefinite: de Sitter and anti-de Sitter space, and the subspaces of an
-indefinite form."""
+"""Symmetric spaces whose invariant metric is indefinite.
+
+De Sitter space, anti-de Sitter space, and the subspaces of an indefinite form.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,10 @@ from .base import Array, Space
 
 
 class Indefinite(Space[P]):
-    """A space with an invariant metric that is indefinite.
+    """Base class of spaces whose invariant metric is indefinite.
 
-    Such a metric gives no lengths, so ``inner``, ``norm`` and ``distance`` do not use it. They are the Euclidean ones
-    of arrays (see each class), depend on the coordinate system, and serve for reporting only; `curvature` is NaN.
+    Such a metric does not give lengths, so ``inner``, ``norm`` and ``distance`` do not use it. They are Euclidean ones
+    of arrays (see each class), depend on the coordinate system, and serve for reporting only. `curvature` is NaN.
     Splines do not depend on them: they commute with every isometry of the indefinite metric.
     """
 
@@ -52,12 +54,31 @@ class Indefinite(Space[P]):
         return np.broadcast_to(result, lead)[()].copy()
 
     def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
-        """Return the size of ``log(p, q)``, by ``norm``; shape of the leading axes.
+        """Compute the length of ``log(p, q)`` with the norm at p.
+
+        The invariant metric does not give distances. This number depends on the coordinate system, and it is not
+        symmetric in p and q.
+
+        Parameters
+        ----------
+        p, q : array_like, shape (..., *point_shape)
+            Points.
+
+        Returns
+        -------
+        ndarray or float, shape (...)
+            The number ``norm(p, log(p, q))``.
 
         Raises
         ------
         CutLocusError
             If not exactly one geodesic joins the two points.
+
+        Examples
+        --------
+        >>> import symspline as ss
+        >>> ss.DeSitter(2).distance([0, 1, 0], [3, 1, 3]).round(8)
+        np.float64(4.24264069)
         """
         return self.norm(p, self.log(p, q))
 
@@ -66,17 +87,32 @@ class Indefinite(Space[P]):
 
 
 class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
-    """De Sitter space dSⁿ, n ≥ 2: arrays (x₀, x₁, …, xₙ) with −x₀² + x₁² + … + xₙ² = 1, the time-like coordinate first.
+    r"""De Sitter space dSⁿ.
 
-    The metric ⟨u, v⟩ = −u₀v₀ + u₁v₁ + … + uₙvₙ has one negative square, the group of isometries is O(1, n), and the
-    curvature is 1. Geodesics are trigonometric, straight or hyperbolic as their velocity is space-like, null or
-    time-like. Points with ⟨p, q⟩ > −1 are joined by one geodesic of less than half a turn; no geodesic joins points
-    with ⟨p, q⟩ < −1. Space-like geodesics are closed.
+    A point is an array (x₀, x₁, …, xₙ) with −x₀² + x₁² + … + xₙ² = 1; the time-like coordinate comes first.
 
-    ``invariant_form`` is the metric. It gives no lengths, so that ``inner``, ``norm`` and ``distance`` are those of
-    the arrays of numbers: `distance(p, q)` is the size of `log(p, q)`, and not symmetric. Rounding errors of a point
-    are ε|p|².
+    Parameters
+    ----------
+    n : int
+        Dimension, at least 2.
 
+    See Also
+    --------
+    AntiDeSitter : The analogous space with two time-like coordinates.
+    Hyperbolic : The hyperboloid of the opposite sign.
+
+    Notes
+    ----- The invariant metric −u₀v₀ + u₁v₁ + … + uₙvₙ has one negative square, and its curvature is 1. The group of
+    isometries is O(1, n). Geodesics are trigonometric, straight or hyperbolic if their velocity is space-like, null or
+    time-like, respectively. Points with ⟨p, q⟩ > −1 are joined by one geodesic of less than half a turn. No geodesic
+    joins points with ⟨p, q⟩ < −1. Space-like geodesics are closed.
+
+    ``invariant_form`` evaluates the metric. It does not give lengths, so ``inner``, ``norm`` and ``distance`` are
+    Euclidean ones of the arrays. ``distance(p, q)`` is the length of ``log(p, q)`` and is not symmetric. The rounding
+    error of a point is about :math:`\varepsilon \lVert p \rVert^2`.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> ss.DeSitter(2).log([0, 1, 0], [np.sinh(2), np.cosh(2), 0]).round(8)
     array([2., 0., 0.])
@@ -95,18 +131,31 @@ class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
 
 
 class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
-    """Anti-de Sitter space AdSⁿ, n ≥ 2: arrays (x₀, x₁, …, xₙ) with −x₀² − x₁² + x₂² + … + xₙ² = −1, the two
-    time-like coordinates first.
+    r"""Anti-de Sitter space AdSⁿ.
 
-    The metric is the form −u₀v₀ − u₁v₁ + u₂v₂ + … + uₙvₙ on tangent vectors, where it has one negative square. The
-    group of isometries is O(2, n − 1), and the curvature is −1. Geodesics are trigonometric, straight or hyperbolic
-    as their velocity is time-like, null or space-like. Points with ⟨p, q⟩ < 1 are joined by one geodesic of less than
-    half a turn; no geodesic joins points with ⟨p, q⟩ > 1. Time-like geodesics are closed.
+    A point is an array (x₀, x₁, …, xₙ) with −x₀² − x₁² + x₂² + … + xₙ² = −1; the two time-like coordinates come first.
 
-    ``invariant_form`` is the metric. It gives no lengths, so that ``inner``, ``norm`` and ``distance`` are those of
-    the arrays of numbers: `distance(p, q)` is the size of `log(p, q)`, and not symmetric. Rounding errors of a point
-    are ε|p|².
+    Parameters
+    ----------
+    n : int
+        Dimension, at least 2.
 
+    See Also
+    --------
+    DeSitter : The analogous space with one time-like coordinate.
+
+    Notes
+    ----- The invariant metric is the form −u₀v₀ − u₁v₁ + u₂v₂ + … + uₙvₙ. On tangent vectors it has one negative
+    square, and its curvature is −1. The group of isometries is O(2, n − 1). Geodesics are trigonometric, straight or
+    hyperbolic if their velocity is time-like, null or space-like, respectively. Points with ⟨p, q⟩ < 1 are joined by
+    one geodesic of less than half a turn. No geodesic joins points with ⟨p, q⟩ > 1. Time-like geodesics are closed.
+
+    ``invariant_form`` evaluates the metric. It does not give lengths, so ``inner``, ``norm`` and ``distance`` are
+    Euclidean ones of the arrays. ``distance(p, q)`` is the length of ``log(p, q)`` and is not symmetric. The rounding
+    error of a point is about :math:`\varepsilon \lVert p \rVert^2`.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> ss.AntiDeSitter(2).log([1, 0, 0], [np.cos(2), np.sin(2), 0]).round(8)
     array([0., 2., 0.])
@@ -123,19 +172,35 @@ class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
 
 
 class IndefiniteGrassmannian(Indefinite[FloatArray]):
-    """Subspaces of R^{p,q} on which the form has signature (a, b): O(p, q) / (O(a, b) × O(p − a, q − b)).
+    """Subspaces on which an indefinite form of signature (p, q) has signature (a, b).
 
-    Of both signatures the number of negative squares comes first: the form is −x₁² − … − x_p² + x_{p+1}² + …, and on a
-    subspace it has a negative and b positive squares. A point is the reflection P of the subspace, which is 1 on it and
-    −1 on its orthogonal complement: a (p + q) × (p + q) matrix with P² = 1 that preserves the form.
-    `symspline.convert.basis_to_reflection` makes reflections of bases.
+    The form on ℝᵖ⁺ᑫ is −x₁² − … − x_p² + x_{p+1}² + …: in both signatures the number of negative squares comes first.
+    A point is the reflection P in a subspace, which is 1 on it and −1 on its orthogonal complement: a (p + q) × (p +
+    q) matrix with P² = 1 that preserves the form. `symspline.convert.basis_to_reflection` converts bases to
+    reflections.
 
-    Geodesics are P exp(tΩ), as in `GeneralLinear`, and ``log(P, Q) = P log(PQ)`` exists while no eigenvalue of PQ is a
-    negative number. ``invariant_form`` is the metric, ⟨u, v⟩ = tr(uv)/8: on a line spanned by x, with the velocity v
-    orthogonal to x, it is ⟨v, v⟩/⟨x, x⟩. It gives no lengths; ``inner``, ``norm`` and ``distance`` are those of Ω =
-    P⁻¹v as an array of numbers. ``igr:0,1,1,n`` is `DeSitter` with x and −x as one point, ``igr:1,0,2,n-1`` is
-    `AntiDeSitter`.
+    Parameters
+    ----------
+    a, b : int
+        Signature of the form on the subspaces.
+    p, q : int
+        Signature of the form on the ambient space.
 
+    See Also
+    --------
+    Grassmannian : Subspaces of a Euclidean space.
+
+    Notes
+    ----- The space is O(p, q) / (O(a, b) × O(p − a, q − b)). Geodesics are P exp(tΩ), as in `GeneralLinear`, and
+    ``log(P, Q) = P log(PQ)`` exists unless PQ has a negative eigenvalue. ``invariant_form`` evaluates the metric ⟨u,
+    v⟩ = tr(uv)/8. On a line spanned by x, with the velocity v orthogonal to x, it is ⟨v, v⟩/⟨x, x⟩. It does not give
+    lengths; ``inner``, ``norm`` and ``distance`` are those of Ω = P⁻¹v as an array of numbers.
+
+    ``igr:0,1,1,n`` is `DeSitter` with x and −x as one point, and ``igr:1,0,2,n-1`` is `AntiDeSitter` with the same
+    identification.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> space = ss.IndefiniteGrassmannian(0, 1, 1, 2)
     >>> space.dim, space.point_shape

@@ -1,4 +1,4 @@
-"""Groups of invertible matrices, to which no metric belongs."""
+"""Groups of invertible matrices, which have no bi-invariant metric."""
 
 from __future__ import annotations
 
@@ -8,13 +8,29 @@ from .disconnected import DisconnectedGroup
 
 
 class GeneralLinear(DisconnectedGroup[FloatArray], Group[FloatArray]):
-    """GL(n), invertible real matrices, with the symmetries x ↦ p x⁻¹ p.
+    r"""The general linear group GL(n, ℝ).
 
-    Geodesics are p exp(tΩ), and ``log(p, q) = p log(p⁻¹q)`` with the principal logarithm, which exists while no
-    eigenvalue of p⁻¹q is a negative number. The group has no invariant metric: lengths are those of Ω = p⁻¹v,
-    the root of the sum of squares, and serve for reporting only. Curves through points of a closed subgroup stay in
-    it. Digits are lost as the condition number of a point has them.
+    A point is an invertible real n × n matrix. Curves through points of a closed subgroup stay in the subgroup.
 
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 1.
+
+    See Also
+    --------
+    ComplexGeneralLinear : Invertible complex matrices.
+    Affine : Affine maps.
+    SpecialLinear : Matrices of determinant 1.
+
+    Notes
+    ----- The geodesic symmetry at p is :math:`x \mapsto p x^{-1} p`. Geodesics are :math:`p \exp(t \Omega)`, and
+    :math:`\log_p(q) = p \log(p^{-1} q)` with the principal logarithm, which exists unless :math:`p^{-1} q` has a
+    negative eigenvalue. The group has no bi-invariant metric. Lengths are Frobenius norms of :math:`\Omega = p^{-1} v`
+    and serve for reporting only. The relative rounding error is proportional to the condition number of a point.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.GeneralLinear(2).log([[1, 0], [0, 1]], [[1, 3], [0, 1]]).round(12)
     array([[0., 3.],
@@ -28,8 +44,21 @@ class GeneralLinear(DisconnectedGroup[FloatArray], Group[FloatArray]):
 
 
 class ComplexGeneralLinear(Group[ComplexArray]):
-    """GL(n, C), invertible complex matrices; see `GeneralLinear`.
+    """The complex general linear group GL(n, ℂ).
 
+    A point is an invertible complex n × n matrix. Geodesics and lengths are as in `GeneralLinear`.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 1.
+
+    See Also
+    --------
+    GeneralLinear : Invertible real matrices.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.ComplexGeneralLinear(2).dim
     8
@@ -42,8 +71,23 @@ class ComplexGeneralLinear(Group[ComplexArray]):
 
 
 class Affine(DisconnectedGroup[FloatArray], Group[FloatArray]):
-    """Affine maps x ↦ Ax + b of n dimensions as matrices (A, b; 0, 1); see `GeneralLinear`.
+    """The group of affine maps x ↦ Ax + b.
 
+    A point is a matrix [[A, b], [0, 1]] with an invertible n × n matrix A. Geodesics and lengths are as in
+    `GeneralLinear`.
+
+    Parameters
+    ----------
+    n : int
+        Dimension, at least 1.
+
+    See Also
+    --------
+    GeneralLinear : Invertible real matrices.
+    Similarity : Maps that preserve angles.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Affine(2).point_shape, ss.Affine(2).dim
     ((3, 3), 6)
@@ -56,9 +100,22 @@ class Affine(DisconnectedGroup[FloatArray], Group[FloatArray]):
 
 
 class Similarity(Group[FloatArray]):
-    """Similarities x ↦ sRx + b, with a rotation R and s > 0, as matrices (sR, b; 0, 1): poses whose scale
-    drifts. See `GeneralLinear`.
+    """The group of similarities x ↦ sRx + b.
 
+    A point is a matrix [[sR, b], [0, 1]] with a rotation R and a scale s > 0, such as a camera pose with a scale that
+    drifts. Geodesics and lengths are as in `GeneralLinear`.
+
+    Parameters
+    ----------
+    n : int
+        Dimension, at least 2.
+
+    See Also
+    --------
+    SpecialEuclidean : Rigid motions, without a scale.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Similarity(3).dim
     7
@@ -71,8 +128,22 @@ class Similarity(Group[FloatArray]):
 
 
 class SpecialLinear(Group[FloatArray]):
-    """SL(n), real matrices of determinant one: homographies of the plane for n = 3. See `GeneralLinear`.
+    """The special linear group SL(n, ℝ).
 
+    A point is a real n × n matrix of determinant 1. For n = 3 these represent homographies of the plane. Geodesics and
+    lengths are as in `GeneralLinear`.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 2.
+
+    See Also
+    --------
+    GeneralLinear : Invertible real matrices.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.SpecialLinear(3).dim
     8
@@ -85,9 +156,23 @@ class SpecialLinear(Group[FloatArray]):
 
 
 class Symplectic(Group[FloatArray]):
-    """Sp(n, R), real n × n matrices with XᵀJX = J for J = (0, 1; -1, 0), n even: linear canonical transformations of
-    n/2 positions and n/2 momenta. See `GeneralLinear`.
+    """The symplectic group Sp(n, ℝ).
 
+    A point is a real n × n matrix X with XᵀJX = J, where J = [[0, 1], [−1, 0]]: a linear canonical transformation of
+    n/2 positions and n/2 momenta. Geodesics and lengths are as in `GeneralLinear`.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, even and at least 2.
+
+    See Also
+    --------
+    GeneralLinear : Invertible real matrices.
+    Siegel : Siegel's upper half space, on which the group acts.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Symplectic(4).dim
     10
@@ -100,9 +185,23 @@ class Symplectic(Group[FloatArray]):
 
 
 class Lorentz(Group[FloatArray]):
-    """The Lorentz group of n dimensions of space, SO⁺(1, n): (1 + n) × (1 + n) matrices that preserve -t² + x², the
-    orientation and the direction of time, which is the first coordinate. See `GeneralLinear`.
+    """The Lorentz group SO⁺(1, n).
 
+    A point is a (1 + n) × (1 + n) matrix that preserves −t² + x², the orientation and the direction of time. The first
+    coordinate is the time t. Geodesics and lengths are as in `GeneralLinear`.
+
+    Parameters
+    ----------
+    n : int
+        Dimension of space, at least 1.
+
+    See Also
+    --------
+    GeneralLinear : Invertible real matrices.
+    Hyperbolic : Hyperbolic space, on which the group acts.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.space("so:1,3")
     Lorentz(3)

@@ -1,4 +1,4 @@
-"""Any space by its name."""
+"""Spaces by name, including products."""
 
 from __future__ import annotations
 
@@ -19,14 +19,31 @@ def space(name: str | Space[P]) -> Space[P]: ...
 
 
 def space(name: str | Space[Any]) -> Space[Any]:
-    """The space with a name, e.g. ``"sphere:2"``, ``"h:3"``, or ``"sphere:3 x r:3"`` for a product.
+    """Return the space with a name.
 
-    Args:
-        name: the name in long or short form, a colon, and the parameters; a space is returned as it is.
+    Parameters
+    ----------
+    name : str or Space
+        The name of a space, followed by a colon and its parameters, such as ``"sphere:2"`` or ``"h:3"``. The names of
+        the factors of a product are joined by ``" x "``, as in ``"so:3 x r:3"``. A space is returned unchanged.
 
+    Returns
+    -------
+    Space
+        The space. ``str(space)`` is its full name.
+
+    Raises
+    ------
+    ValidationError
+        If the name is unknown, or its parameters are invalid.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.space("sphere:2")
     Sphere(2)
+    >>> ss.space("so:3 x r:3")
+    Product(SpecialOrthogonal(3), Euclidean(3))
     """
     if isinstance(name, Space):
         return name

@@ -1,4 +1,4 @@
-"""Positive definite matrices: covariances and the like."""
+"""Positive definite matrices, such as covariance matrices."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from .._typing import ComplexArray, FloatArray, P
 from .actions import Congruent, preserves, require
 from .base import Array
 
-# Beyond this size random exponents are scaled so that they do not grow with the size: exp of a random symmetric matrix
-# has a condition of e^√(8n) and more, and is not positive definite in floating-point numbers from n = 200 on.
+# Beyond this size, random exponents are scaled so that they do not grow with the size. Otherwise the exponential of a
+# random symmetric matrix has a condition number above e^√(8n), and from n = 200 on it is not positive definite in
+# floating-point arithmetic.
 _FREE_SIZE = 20
 
 
 class _PositiveDefinite(Congruent[P]):
-    """Matrices whose random points are exponentials."""
+    """Positive definite matrices, whose random points are exponentials of random matrices."""
 
     @property
     def _scatter_scale(self) -> float:
@@ -26,9 +27,28 @@ class _PositiveDefinite(Congruent[P]):
 
 
 class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
-    """Symmetric positive definite n × n matrices with the affine-invariant metric tr p⁻¹u p⁻¹v:
-    covariance matrices, diffusion tensors. Errors are rounding times the condition of the matrix.
+    r"""Symmetric positive definite matrices with the affine-invariant metric.
 
+    A point is a symmetric positive definite n × n matrix, such as a covariance matrix or a diffusion tensor.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 1.
+
+    See Also
+    --------
+    SpecialPositiveDefinite : Matrices of determinant 1.
+    HermitianPositiveDefinite : Complex matrices.
+    symspline.tensors : Diffusion tensors.
+
+    Notes
+    -----
+    The metric at p is :math:`\operatorname{tr} p^{-1} u p^{-1} v`. The relative rounding error is proportional to the
+    condition number of a point.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> ss.SymmetricPositiveDefinite(2).geodesic(np.eye(2), 4 * np.eye(2), 0.5).round(12)
     array([[2., 0.],
@@ -42,9 +62,22 @@ class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
 
 
 class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):
-    """Symmetric positive definite n × n matrices of determinant 1, SL(n)/SO(n): the shape of a tensor without its
-    size. A totally geodesic part of `SymmetricPositiveDefinite`, with its metric.
+    """Symmetric positive definite matrices of determinant 1, SL(n)/SO(n).
 
+    A point describes the shape of a tensor without its size. The space is a totally geodesic subspace of
+    `SymmetricPositiveDefinite` and has its metric.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 2.
+
+    See Also
+    --------
+    SymmetricPositiveDefinite : Matrices of any determinant.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> ss.SpecialPositiveDefinite(2).geodesic(np.eye(2), np.diag([4, 0.25]), 0.5).round(12)
     array([[2. , 0. ],
@@ -62,8 +95,25 @@ class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):
 
 
 class HermitianPositiveDefinite(_PositiveDefinite[ComplexArray]):
-    """Hermitian positive definite n × n matrices with the affine-invariant metric Re tr p⁻¹u p⁻¹v.
+    r"""Hermitian positive definite matrices with the affine-invariant metric.
 
+    A point is a Hermitian positive definite n × n matrix.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrices, at least 1.
+
+    See Also
+    --------
+    SymmetricPositiveDefinite : Real matrices.
+
+    Notes
+    -----
+    The metric at p is :math:`\operatorname{Re} \operatorname{tr} p^{-1} u p^{-1} v`.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.HermitianPositiveDefinite(2).dim
     4
@@ -76,13 +126,29 @@ class HermitianPositiveDefinite(_PositiveDefinite[ComplexArray]):
 
 
 class Siegel(_PositiveDefinite[FloatArray]):
-    """Siegel's upper half space Sp(2n, R)/U(n) of complex symmetric n × n matrices X + iY with positive definite Y:
-    points are the symplectic positive definite matrices (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹) of 2n rows, which
-    `symspline.convert.siegel_to_positive_definite` makes. A totally geodesic part of `SymmetricPositiveDefinite`,
-    with its metric: distances are √2 times those of Siegel's metric tr Y⁻¹dZ Y⁻¹dZ̄.
+    r"""Siegel's upper half space Sp(2n, ℝ)/U(n).
 
-    For n = 1 it is the hyperbolic plane with √2 times its distances.
+    The elements of the half space are complex symmetric n × n matrices X + iY with positive definite Y. A point is the
+    symplectic positive definite matrix [[Y + XY⁻¹X, XY⁻¹], [Y⁻¹X, Y⁻¹]] of size 2n, which
+    `symspline.convert.siegel_to_positive_definite` computes.
 
+    Parameters
+    ----------
+    n : int
+        Size of the complex matrices, at least 1.
+
+    See Also
+    --------
+    SymmetricPositiveDefinite : The space that contains it.
+    Symplectic : The group that acts on it.
+
+    Notes
+    ----- The space is a totally geodesic subspace of `SymmetricPositiveDefinite` and has its metric. Distances are √2
+    times those of Siegel's metric :math:`\operatorname{tr} Y^{-1} dZ\, Y^{-1} d\bar Z`. For n = 1 it is the hyperbolic
+    plane with distances multiplied by √2.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> p, q = ss.convert.siegel_to_positive_definite([[[1j]], [[1 + 2j]]])
     >>> middle = ss.Siegel(1).geodesic(p, q, 0.5)
@@ -104,6 +170,6 @@ class Siegel(_PositiveDefinite[FloatArray]):
         if np.iscomplexobj(array) and name in ("points", "p", "q"):
             raise ValidationError(
                 f"{name} has complex numbers, but points of {self!r} are real matrices of shape {self.point_shape}; "
-                "symspline.convert.siegel_to_positive_definite makes them of complex symmetric ones"
+                "symspline.convert.siegel_to_positive_definite converts complex symmetric matrices to points"
             )
         return array

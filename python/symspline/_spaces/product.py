@@ -1,4 +1,4 @@
-"""Products of spaces: points that have a part in each of several spaces."""
+"""Products of spaces, whose points are tuples with one point per factor."""
 
 from __future__ import annotations
 
@@ -22,10 +22,33 @@ _D = TypeVar("_D", bound=AnyArray)
 
 
 class Product(Space[PProduct]):
-    """The product of spaces: a point is a tuple with one point of each.
+    """The product of several spaces.
 
-    Distances add as in Pythagoras' theorem; geodesics and splines run in every factor on its own.
+    A point is a tuple with one point per factor. Geodesics and splines are computed in every factor separately, and
+    distances add as in Pythagoras' theorem. All methods take and return tuples with one entry per factor.
 
+    Parameters
+    ----------
+    *factors : Space or str
+        At least two spaces or their names. The factors of a product among them become factors of this product.
+
+    Attributes
+    ----------
+    factors : tuple of Space
+        The factors, none of them a product.
+
+    Raises
+    ------
+    ValidationError
+        If there are fewer than two factors.
+
+    See Also
+    --------
+    space : Return a space by its name, such as ``"so:3 x r:3"``.
+    SpecialEuclidean : Rigid motions, whose geodesics are screw motions.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Product(ss.Sphere(3), ss.Euclidean(3))
     Product(Sphere(3), Euclidean(3))
@@ -67,17 +90,17 @@ class Product(Space[PProduct]):
 
     @property
     def dim(self) -> int:
-        """Sum of the factors' dimensions."""
+        """Sum of the dimensions of the factors."""
         return sum(f.dim for f in self.factors)
 
     @property
     def injectivity_radius(self) -> float:
-        """The smallest of the factors'."""
+        """Smallest injectivity radius of the factors."""
         return min(f.injectivity_radius for f in self.factors)
 
     @property
     def curvature(self) -> float:
-        """The largest K of the factors; NaN if one of them has none."""
+        """Largest K of the factors; NaN if it is NaN for one of them."""
         return float(np.max([f.curvature for f in self.factors]))
 
     @property
@@ -86,6 +109,8 @@ class Product(Space[PProduct]):
     ) -> tuple[np.dtype[np.float64] | np.dtype[np.complex128], ...]:
         """Types of the numbers of one point, a tuple with one entry per factor.
 
+        Examples
+        --------
         >>> import symspline as ss
         >>> ss.space("sphere:2 x cp:1").dtype
         (dtype('float64'), dtype('complex128'))
@@ -154,14 +179,14 @@ class Product(Space[PProduct]):
         return sum(each) if operation == "inner" else each
 
     def _each(self, method: str, *arguments: Any) -> PProduct:
-        """Calls a method of every factor with its parts of the arguments."""
+        """Call a method of every factor with the entries of the arguments that belong to it."""
         parts = zip(self.factors, self._split(*arguments), strict=True)
         each: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
         result: PProduct = each
         return result
 
     def _split(self, *arguments: Any) -> list[Tuple]:
-        """The arguments' parts in every factor."""
+        """Return the entries of the arguments that belong to each factor."""
         for value in arguments:
             if not isinstance(value, (tuple, list)) or len(value) != len(self.factors):
                 raise ValidationError(f"{self!r} needs tuples of {len(self.factors)} arrays, one per factor")
@@ -169,19 +194,19 @@ class Product(Space[PProduct]):
 
 
 def factors_of(space: Space[Any]) -> tuple[Space[AnyArray], ...]:
-    """The factors of a product; any other space is its own."""
+    """Return the factors of a product, or the space itself in a tuple."""
     return space.factors if isinstance(space, Product) else (space,)
 
 
 def check_tuple(points: Any, space: Space[Any], name: str) -> None:
-    """Raise ValidationError unless there is one array a factor of the product."""
+    """Raise ValidationError unless there is one array per factor of the product."""
     count = len(factors_of(space))
     if not isinstance(points, (tuple, list)) or len(points) != count:
         raise ValidationError(f"{name} must be a tuple of {count} arrays, one per factor of {space!r}")
 
 
 def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
-    """What belongs to each factor; of a space that is no product, the value is the only one."""
+    """Return the entries of a value that belong to each factor; in a space that is not a product, the value itself."""
     if not isinstance(space, Product):
         return (value,)
     check_tuple(value, space, name)
@@ -189,7 +214,7 @@ def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
 
 
 def together(lengths: Tuple) -> FloatArray:
-    """What lengths in the factors are as one, by Pythagoras' theorem."""
+    """Combine the lengths in the factors by Pythagoras' theorem."""
     with np.errstate(all="ignore"):
         length: FloatArray = reduce(np.hypot, lengths)
         return length

@@ -10,12 +10,12 @@ from .._arrays import short_repr
 from .._core import Handle, ValidationError
 from .base import CLASSES, Space, example_of
 
-# No number of a space is as long.
+# No parameter of a space has as many decimal digits.
 _DIGITS = 40
 
 
 def spaces_named(name: Any) -> list[Space]:
-    """The spaces, none of them a product, of which a text is the name: "sphere:3 x r:3" names two.
+    """Return the spaces that a name lists, none of them a product.
 
     >>> spaces_named("sphere:3 x r:3")
     [Sphere(3), Euclidean(3)]
@@ -28,14 +28,14 @@ def spaces_named(name: Any) -> list[Space]:
 
 
 def _rows() -> list[list[str]]:
-    """All names, one row a family: those of the compiled core, and of spaces that are made in Python."""
+    """Return all names, one row per class: those of the compiled core, and those of spaces implemented in Python."""
     compiled = Handle.names()
     known = {row[0] for row in compiled}
     return compiled + [[name, *cls._aliases] for name, cls in CLASSES.items() if name not in known]
 
 
 def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
-    """What a name that is none may have been, "SO3" and "SpecialOrthogonal(3)" too; or nothing."""
+    """Suggest the name that was probably meant, also for "SO3" and "SpecialOrthogonal(3)", or return an empty text."""
     glued = re.fullmatch(r"([a-z_ -]+)\(?(\d[\d, ]*)\)?", word)
     if glued is not None and not parameters:
         word, parameters = glued[1], glued[2]
@@ -46,7 +46,7 @@ def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
 
 
 def _whole(cls: Any) -> str:
-    """How to name one of a family."""
+    """Explain how to specify one space of a class."""
     if not hasattr(cls, "_name"):
         return "a space or its name is needed, such as Sphere(2) or 'sphere:2'"
     return f"give its dimension, such as {example_of(cls)}"
@@ -55,7 +55,7 @@ def _whole(cls: Any) -> str:
 def _named(name: str) -> Space:
     word, _, parameters = name.partition(":")
     word = word.strip().lower()
-    # SO(1, n), as it is written, is no rotation group.
+    # SO(1, n) is the usual notation for the Lorentz group.
     if word == "so" and parameters.count(",") == 1 and parameters.partition(",")[0].strip() == "1":
         word, parameters = "lorentz", parameters.partition(",")[2]
     rows = _rows()
@@ -63,17 +63,21 @@ def _named(name: str) -> Space:
     if word not in names:
         known = ", ".join(" or ".join(row) for row in rows)
         guess = _guess(word, parameters, names)
-        raise ValidationError(f"unknown space {short_repr(name)}; {guess}known are {known}, e.g. 'sphere:2'")
+        raise ValidationError(
+            f"unknown space {short_repr(name)}; {guess}known names are {known}, as in 'sphere:2'"
+        )
     if not parameters.strip():
         raise ValidationError(f"{short_repr(name)} is a family of spaces; {_whole(CLASSES[names[word]])}")
     values = [part.strip() for part in parameters.split(",")]
     if not all(value.isdecimal() and value.isascii() and len(value) <= _DIGITS for value in values):
-        raise ValidationError(f"{short_repr(name)}: behind the colon come whole numbers, e.g. 'sphere:2'")
+        raise ValidationError(
+            f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'"
+        )
     cls: Any = CLASSES[names[word]]
     try:
         made: Space = cls(*map(int, values))
     except TypeError:
         raise ValidationError(
-            f"{short_repr(name)}: {cls.__name__} does not take {len(values)} numbers"
+            f"{short_repr(name)}: {cls.__name__} does not take {len(values)} parameters"
         ) from None
     return made

@@ -1,5 +1,4 @@
-"""Lines and subspaces: projective and complex hyperbolic spaces and Grassmannians, where many arrays are one
-point."""
+"""Projective spaces, complex hyperbolic space and Grassmannians, where several arrays represent one point."""
 
 from __future__ import annotations
 
@@ -14,12 +13,13 @@ from .actions import Preserving, largest, require
 from .base import LARGE, Array
 from .tolerance import point_tol
 
-# No more than a hint is made of it: rows of such matrices are no unit vectors, whatever the rounding.
+# Tolerance for recognising density matrices. It only selects the text of an error message, since rows of density
+# matrices are not unit vectors.
 _NEAR = 1e-4
 
 
 class _Projective(Preserving[P]):
-    """Lines, of which people also hold the projectors."""
+    """Projective spaces, whose lines are sometimes given as projection matrices."""
 
     # The space of positive definite matrices of the same numbers.
     _definite: str
@@ -29,10 +29,10 @@ class _Projective(Preserving[P]):
         if name in ("points", "p", "q") and _are_densities(array):
             purity = np.einsum("...ij,...ji->...", array, array).real
             advice = (
-                "symspline.convert.density_to_state makes those of pure states"
+                "symspline.convert.density_to_state converts those of pure states"
                 if (purity > 1 - _NEAR).all()
-                else "states that are mixed have none. There is no space of density matrices: those of full rank are "
-                f"points of {self._definite}({array.shape[-1]}), where curves leave trace 1"
+                else "mixed states are not represented by vectors. Density matrices of full rank are points of "
+                f"{self._definite}({array.shape[-1]}), but curves there do not keep the trace 1"
             )
             raise ValidationError(
                 f"{name} has shape {array.shape} and looks like density matrices, Hermitian of trace 1, but points of "
@@ -42,7 +42,7 @@ class _Projective(Preserving[P]):
 
 
 def _are_densities(array: Array) -> bool:
-    """Whether an array is square matrices, Hermitian, of trace 1, and of no larger purity than pure states."""
+    """Whether an array consists of Hermitian matrices of trace 1 whose purity does not exceed that of pure states."""
     square = array.ndim > 1 and array.shape[-2] == array.shape[-1] > 1
     if not square or not array.size or array.dtype.kind not in "ifc":
         return False
@@ -62,9 +62,23 @@ def _is_density(x: Array) -> bool:
 
 
 class RealProjective(_Projective[FloatArray]):
-    """Real projective space RPⁿ, lines through the origin of Rⁿ⁺¹: points are unit vectors of n + 1
-    numbers, of which x and −x are the same point. Distance is the angle between lines, at most π/2.
+    """Real projective space ℝPⁿ, the lines through the origin of ℝⁿ⁺¹.
 
+    A point is a unit vector of n + 1 numbers; x and −x are the same point. Distance is the angle between lines, at
+    most π/2.
+
+    Parameters
+    ----------
+    n : int
+        Dimension, at least 1.
+
+    See Also
+    --------
+    Sphere : Unit vectors, where x and −x are different points.
+    Grassmannian : Subspaces of any dimension.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.RealProjective(2).distance([1, 0, 0], [-1, 0, 0]).round(8)
     np.float64(0.0)
@@ -79,12 +93,27 @@ class RealProjective(_Projective[FloatArray]):
 
 
 class ComplexProjective(_Projective[ComplexArray]):
-    """Complex projective space CPⁿ, pure quantum states of n + 1 levels: points are complex unit vectors
-    of n + 1 numbers up to a phase, with the Fubini–Study metric: distance is arccos |⟨p, q⟩|.
+    r"""Complex projective space ℂPⁿ, the pure quantum states of n + 1 levels.
 
-    CP¹ is the Bloch sphere, of radius ½. Density matrices of pure states become points by
-    `symspline.convert.density_to_state`.
+    A point is a complex unit vector of n + 1 numbers, up to a phase. `symspline.convert.density_to_state` converts
+    density matrices of pure states to points. CP¹ is the Bloch sphere, with radius ½.
 
+    Parameters
+    ----------
+    n : int
+        Complex dimension, at least 1.
+
+    See Also
+    --------
+    ComplexGrassmannian : Complex subspaces of any dimension.
+    symspline.quantum : States, gates and pulses.
+
+    Notes
+    -----
+    The metric is that of Fubini and Study: the distance is :math:`\arccos |\langle p, q \rangle|`.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.ComplexProjective(1).distance([1, 0], [0.6, 0.8j]).round(8)
     np.float64(0.92729522)
@@ -99,12 +128,26 @@ class ComplexProjective(_Projective[ComplexArray]):
 
 
 class ComplexHyperbolic(Preserving[ComplexArray]):
-    """Complex hyperbolic space CHⁿ: points are complex arrays (z₀, z₁, …, zₙ) with
-    −|z₀|² + |z₁|² + … + |zₙ|² = −1 up to a phase, with the metric of curvature −4 along complex lines:
-    distance is arcosh |⟨p, q⟩|.
+    r"""Complex hyperbolic space ℂHⁿ.
 
-    CH¹ is the hyperbolic plane with half its distances.
+    A point is a complex array (z₀, z₁, …, zₙ) with −|z₀|² + |z₁|² + … + |zₙ|² = −1, up to a phase.
 
+    Parameters
+    ----------
+    n : int
+        Complex dimension, at least 1.
+
+    See Also
+    --------
+    Hyperbolic : Real hyperbolic space.
+
+    Notes
+    -----
+    The metric has curvature −4 along complex lines: the distance is
+    :math:`\operatorname{arcosh} |\langle p, q \rangle|`. CH¹ is the hyperbolic plane with half its distances.
+
+    Examples
+    --------
     >>> import numpy as np, symspline as ss
     >>> ss.ComplexHyperbolic(1).distance([1, 0], [np.cosh(2), 1j * np.sinh(2)]).round(8)
     np.float64(2.0)
@@ -118,7 +161,7 @@ class ComplexHyperbolic(Preserving[ComplexArray]):
 
 
 class _Subspaces(Preserving[P]):
-    """Subspaces. What joins two of them lies in their span, where large ones cost less."""
+    """Grassmannians. In large ambient spaces, operations on two points are computed in the span of both."""
 
     _linear = True
 
@@ -129,8 +172,8 @@ class _Subspaces(Preserving[P]):
         pair = {name: self._numbers(self._doubles(value, name)) for name, value in inputs.items()}
         lead = self._leads({name: x.shape for name, x in pair.items()})
         p, rest = (np.broadcast_to(x, lead + self.point_shape) for x in pair.values())
-        # The second is p·along + basis·beyond. One projection leaves rounding errors along p, which count where
-        # little else is left.
+        # The second point is p·along + basis·beyond. A second projection removes the rounding errors along p, which
+        # matter if the remainder is small.
         along = np.zeros((*lead, k, k), self.dtype)
         with np.errstate(all="ignore"):
             for _ in range(2):
@@ -144,9 +187,28 @@ class _Subspaces(Preserving[P]):
 
 
 class Grassmannian(_Subspaces[FloatArray]):
-    """The Grassmannian Gr(k, n), k-dimensional subspaces of Rⁿ: points are n × k matrices with
-    orthonormal columns, any basis of the subspace. Distance is √(Σ θᵢ²) of the principal angles.
+    r"""The Grassmannian Gr(k, n) of k-dimensional subspaces of ℝⁿ.
 
+    A point is an n × k matrix with orthonormal columns, any basis of the subspace.
+
+    Parameters
+    ----------
+    k : int
+        Dimension of the subspaces.
+    n : int
+        Dimension of the ambient space, greater than k.
+
+    See Also
+    --------
+    ComplexGrassmannian : Complex subspaces.
+    symspline.subspaces : Subspaces of data.
+
+    Notes
+    -----
+    The distance is :math:`\sqrt{\sum_i \theta_i^2}` with the principal angles :math:`\theta_i` between two subspaces.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.Grassmannian(2, 5).dim
     6
@@ -159,9 +221,23 @@ class Grassmannian(_Subspaces[FloatArray]):
 
 
 class ComplexGrassmannian(_Subspaces[ComplexArray]):
-    """The complex Grassmannian, k-dimensional subspaces of Cⁿ: points are complex n × k matrices with
-    orthonormal columns, any basis of the subspace.
+    """The complex Grassmannian of k-dimensional subspaces of ℂⁿ.
 
+    A point is a complex n × k matrix with orthonormal columns, any basis of the subspace.
+
+    Parameters
+    ----------
+    k : int
+        Dimension of the subspaces.
+    n : int
+        Dimension of the ambient space, greater than k.
+
+    See Also
+    --------
+    Grassmannian : Real subspaces.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.ComplexGrassmannian(2, 5).dim
     12
@@ -174,13 +250,26 @@ class ComplexGrassmannian(_Subspaces[ComplexArray]):
 
 
 class QuaternionicProjective(Preserving[ComplexArray]):
-    """Quaternionic projective space HPⁿ, lines of n + 1 quaternions: points are the planes of C²ⁿ⁺² that such lines
-    become, any basis of one, a complex (2n + 2) × 2 matrix with orthonormal columns, which
-    `symspline.convert.quaternions_to_subspace` makes. A totally geodesic part of `ComplexGrassmannian`, with its
-    metric: distances are √2 times the angles between lines, arccos |⟨p, q⟩|.
+    r"""Quaternionic projective space ℍPⁿ, the lines of n + 1 quaternions.
 
-    HP¹ is the sphere S⁴ of radius 1/√2.
+    A point is a complex (2n + 2) × 2 matrix with orthonormal columns, any basis of the plane in ℂ²ⁿ⁺² that represents
+    the line. `symspline.convert.quaternions_to_subspace` converts vectors of quaternions to points.
 
+    Parameters
+    ----------
+    n : int
+        Quaternionic dimension, at least 1.
+
+    See Also
+    --------
+    ComplexGrassmannian : The space that contains it.
+
+    Notes
+    ----- The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are √2 times
+    the angles :math:`\arccos |\langle p, q \rangle|` between lines. HP¹ is the sphere S⁴ of radius 1/√2.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> p, q = ss.convert.quaternions_to_subspace([[[1, 0, 0, 0], [0, 0, 0, 0]], [[0.6, 0, 0, 0], [0, 0, 0.8, 0]]])
     >>> (ss.QuaternionicProjective(1).distance(p, q) / 2**0.5).round(8)
@@ -206,6 +295,7 @@ class QuaternionicProjective(Preserving[ComplexArray]):
         if name in ("points", "p", "q") and array.shape[-2:] == lines and not np.iscomplexobj(array):
             raise ValidationError(
                 f"{name} has shape {array.shape} and looks like vectors of quaternions, but points of {self!r} are "
-                f"complex matrices of shape {self.point_shape}, which symspline.convert.quaternions_to_subspace makes"
+                f"complex matrices of shape {self.point_shape}; convert them with "
+                "symspline.convert.quaternions_to_subspace"
             )
         return array

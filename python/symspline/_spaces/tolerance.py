@@ -1,4 +1,4 @@
-"""How far off a space points may be."""
+"""Tolerances for the distance of points from the manifold."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ POINT_TOL_FLOAT32 = 1e-4
 
 
 def point_tol(dtype: np.dtype[Any]) -> float:
-    """How far off a space points of a type may be."""
+    """Return the largest distance from the manifold of points with this type of numbers."""
     return POINT_TOL_FLOAT32 if dtype in (np.float32, np.float16, np.complex64) else POINT_TOL

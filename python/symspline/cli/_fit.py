@@ -46,7 +46,7 @@ from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._functional import fit_many
 from .._report import long_gaps
-from .._signs import IN_PYTHON
+from .._representatives import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
 from .._smoothing.many import smooth_many
 from .._spaces import Space

@@ -33,7 +33,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._curves.ends import is_closed
 from .._smoothing import SmoothingSpline
 from .._spaces import space as space_named
 from .._time import onto_ends
@@ -170,7 +169,7 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
         ((times.dtype.kind == "M") != dates, kinds),
         (mixed, f"{zones}; write both with a zone, or neither"),
     )
-    if spline.extrapolate is not None or is_closed(spline.bc_type):
+    if spline._outside != "raise":
         return
     inside = onto_ends(times, knots, (), False)[0] if times.dtype.kind == knots.dtype.kind == "f" else times
     outside = np.flatnonzero((inside < knots[0]) | (inside > knots[-1]))

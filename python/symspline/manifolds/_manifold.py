@@ -85,7 +85,7 @@ class Manifold(Space):
         dim: int | None = None,
         dtype: Any = np.float64,
     ) -> None:
-        self.functions = Functions(exp, log, project_tangent, inner, dlog, transport, project)
+        self.functions: Functions = Functions(exp, log, project_tangent, inner, dlog, transport, project)
         for name, function in self.functions._asdict().items():
             if not callable(function) and (function is not None or name in _NEEDED):
                 raise ValidationError(f"{name} must be a function, not {short_repr(function)}")
@@ -98,7 +98,7 @@ class Manifold(Space):
         self._complex = self._dtype == np.complex128
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
-        self.operations = Operations(self)
+        self.operations: Operations = Operations(self)
         # What the compiled core's operations are to other spaces.
         self._handle: Any = self.operations
 

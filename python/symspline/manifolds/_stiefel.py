@@ -67,8 +67,16 @@ class Stiefel(Manifold):
     def _key(self) -> tuple[Any, ...]:
         return self._parameters
 
-    # It has a name, which other manifolds have not.
-    __str__, __repr__, __reduce__ = Space.__str__, Space.__repr__, Space.__reduce__
+    # Other manifolds do not have a name.
+
+    def __str__(self) -> str:
+        return Space.__str__(self)
+
+    def __repr__(self) -> str:
+        return Space.__repr__(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Space.__reduce__(self)
 
     def _exp(self, p: Array, v: Array) -> Array:
         frame, a, b = self._reduced(p, v)

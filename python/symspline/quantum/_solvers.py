@@ -60,7 +60,7 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEv
         import qutip
     except ImportError:
         raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
-    beyond: Extrapolate = "geodesic" if spline._outside == "raise" else None
+    beyond: Extrapolate = "geodesic" if spline._outside in ("raise", "nan") else None
     first, levels = float(spline.t[0]), spline.space.point_shape[0]
     if dims is not None and not (
         isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)

@@ -145,7 +145,12 @@ def values_at(
     clock, curve = given(t, points, velocities, space)
     if lifted:
         found = call_at_times(
-            curve, clock, x, per_curve, lambda curve, x, each: curve.lift(x, quantity, policy, each, None)
+            curve,
+            clock,
+            x,
+            per_curve,
+            policy,
+            lambda curve, x, each, where: curve.lift(x, quantity, where, each, None),
         )
     else:
         found = evaluated(curve, clock, x, quantity, policy, per_curve, None)

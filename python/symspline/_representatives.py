@@ -1,0 +1,199 @@
+"""Warnings about points whose representatives do not fit their neighbours."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._core import CutLocusError
+from ._curves.curve import CurveArrays
+from ._curves.fit import Points
+from ._errors import callers_level
+from ._report import MAX_STEP, Columns, FarPointsWarning
+from ._spaces import Array, Space, Sphere, Unitary, factors_of
+from .manifolds import Manifold
+
+# The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
+FAR = 0.6
+# Fewer steps are too few to show a pattern.
+_LEAST = 4
+# Points closer to each other than this, slightly less than π/2, have a positive inner product.
+_NEAR = 1.57
+# Remedies for users of the Python interface.
+IN_PYTHON = (
+    "For rotations, use so:3 (symspline.rotations.from_quaternions returns its points) or rp:3, where q and -q are the "
+    "same point. For other data, silence this warning with "
+    "warnings.filterwarnings('ignore', message='neighbours of opposite sign')"
+)
+
+
+def warn_of_representatives(
+    space: Space[Any],
+    points: Sequence[list[Points] | None],
+    curves: Sequence[CurveArrays],
+    columns: Sequence[Sequence[Columns]],
+) -> None:
+    """Warn of signs and of far points, for curves through their points.
+
+    Parameters
+    ----------
+    points, curves, columns
+        As for `warn_of_signs` and `warn_of_far_points`.
+    """
+    factors = factors_of(space)
+    for each in columns:
+        for factor, own in zip(factors, each, strict=True):
+            limit = factor.__dict__.get("_longest_near_step") or _longest_near_step(factor)
+            if np.count_nonzero(own.numbers[MAX_STEP] > limit):
+                warn_of_signs(space, points)
+                warn_of_far_points(curves, columns)
+                return
+
+
+def _longest_near_step(space: Space[Any]) -> float:
+    """The longest step of which there is nothing to warn, remembered for each space."""
+    limit = FAR * space.injectivity_radius
+    if _has_quaternions(space):
+        limit = min(limit, _NEAR)
+    space.__dict__["_longest_near_step"] = limit
+    return limit
+
+
+def _has_quaternions(space: Space[Any]) -> bool:
+    return isinstance(space, Sphere) and space._parameters == (3,)
+
+
+# ---- quaternions of opposite sign ----
+
+
+def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> None:
+    """Warn if neighbours on S³ are more than a quarter turn apart.
+
+    As quaternions they are closer with the other sign, and the curve between them turns the long way round.
+
+    Parameters
+    ----------
+    curves : sequence of list of Points
+        The given points of each curve in every factor. A batch counts as one curve. None for masked curves.
+    """
+    found = [
+        (number, index, part.doubles)
+        for number, parts in enumerate(curves)
+        if parts is not None
+        for part, factor in zip(parts, factors_of(space), strict=True)
+        if _has_quaternions(factor)
+        for index in _opposite(part.doubles)
+    ]
+    if not found:
+        return
+    number, index, points = found[0]
+    *batch, i = index.tolist()
+    curve = [number] * (len(curves) > 1) + batch
+    of = f" of curve {','.join(map(str, curve))}" if curve else ""
+    more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
+    product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
+    warnings.warn(
+        f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
+        f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
+        f"round. {IN_PYTHON}",
+        UserWarning,
+        stacklevel=callers_level(),
+    )
+
+
+def _opposite(points: Array) -> NDArray[np.intp]:
+    """Indices of points with a negative product with the next one."""
+    return np.argwhere(np.einsum("...i,...i", points[..., :-1, :], points[..., 1:, :]) < 0)
+
+
+# ---- long steps ----
+
+
+def warn_of_far_points(
+    curves: Sequence[CurveArrays], columns: Sequence[Sequence[Columns]] | None = None
+) -> None:
+    """Warn if more than half of the steps of a curve are beyond 0.6 of the way to the cut locus.
+
+    Parameters
+    ----------
+    curves : sequence of CurveArrays
+        The curves of one fit.
+    columns : sequence of sequence of Columns, optional
+        The reports of each curve in every factor. Points whose longest step is short need not be examined.
+    """
+    found: list[tuple[tuple[int, ...], int, int, Space]] = []
+    for number, curve in enumerate(curves):
+        steps = curve.times.shape[-1] - 1
+        if steps < _LEAST:
+            continue
+        for k, part in enumerate(curve.parts):
+            limit = FAR * part.space.injectivity_radius
+            own = None if columns is None else columns[number][k]
+            # Deciding angles are at most as large as distances.
+            if not limit < math.inf or (own is not None and not (own.numbers[MAX_STEP] > limit).any()):
+                continue
+            far = np.count_nonzero(cut_fractions(part.space, part.points) > FAR, axis=-1)
+            if own is not None:
+                # Failures of curves that did not converge are reported elsewhere, as `on_failure` demands.
+                far = np.where(own.row("converged").reshape(curve.batch), far, 0)
+            for index in np.argwhere(far > steps / 2).tolist():
+                place = tuple([number] * (len(curves) > 1) + index)
+                found.append((place, int(far[tuple(index)]), steps, part.space))
+    if not found:
+        return
+    place, count, steps, space = found[0]
+    of = f" of curve {','.join(map(str, place))}" if place else ""
+    others = len({place for place, *_ in found}) - 1
+    more = f" (and of {others} more curves)" if others else ""
+    warnings.warn(
+        f"more than half of the steps are long: {count} of {steps} steps between neighbouring points{of}{more} are "
+        f"beyond {FAR} of the way to the cut locus of {space!r}, where several C² curves may exist. Where points have "
+        "equivalent representatives, as orientations of crystals do, take the one nearest to the previous point. Where "
+        "phases, signs or bases do not count, remove them, or use a projective space or a Grassmannian. Otherwise put "
+        "points in between.",
+        FarPointsWarning,
+        stacklevel=callers_level(),
+    )
+
+
+def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
+    """The deciding angle between neighbouring points, divided by the angle at which the cut locus is met.
+
+    Parameters
+    ----------
+    space : Space
+        A space that is not a product.
+    points : ndarray, shape (..., N+1, *point_shape)
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        NaN where a point is not finite or the fraction is unknown.
+    """
+    axes = len(space.point_shape)
+    lead = (slice(None),) * (points.ndim - axes - 1)
+    finite = np.asarray(np.isfinite(points).all(axis=tuple(range(-axes, 0))))
+    good = finite[..., :-1] & finite[..., 1:]
+    result = np.full(good.shape, np.nan)
+    p, q = points[(*lead, slice(None, -1))][good], points[(*lead, slice(1, None))][good]
+    if not len(p):
+        return result
+    if isinstance(space, Manifold):
+        # The distance may be unknown on a manifold that is made of functions.
+        with suppress(CutLocusError):
+            result[good] = space.distance(p, q) / space.injectivity_radius
+        return result
+    found = space._apply("cut_fraction", p=p, q=q)
+    if isinstance(space, Unitary):
+        # A random global phase alone is often below the limit. The root mean square of the angles, doubled, exceeds it
+        # more often.
+        rms = space.distance(p, q) / math.sqrt(space._parameters[0])
+        found = np.maximum(found, math.sqrt(2) * rms / math.pi)
+    result[good] = found
+    return result
