@@ -11,7 +11,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
 
-# Format, lints, types, and the laws of every space in Rust: what to run before a commit.
+# Format, lints, types, docstrings, and the laws of every space in Rust: what to run before a commit.
 check: .venv/tools
 	cargo fmt --all --check
 	cargo clippy --quiet --all-targets -- -D warnings
@@ -19,6 +19,7 @@ check: .venv/tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/test_docstrings.py
 
 test: check
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --doctest-modules python tests

@@ -103,35 +103,17 @@ CASES = [
 ]
 
 # Matrices so long that a law takes seconds: they obey three, of the space, of the curve and of its derivatives.
-LARGE = [
-    Case("so:8", few=True),
-    Case("u:8", few=True),
-    Case("su:8", few=True),
-    Case("spd:8", far=1.5, few=True),
-]
+LARGE = [Case("so:8", few=True), Case("u:8", few=True), Case("su:8", few=True), Case("spd:8", far=1.5, few=True)]
 
 # Every family, for operations and names; and products.
 SINGLE = [case.space for case in CASES if case.interface]
-SPACES = SINGLE + [
-    ss.space(name) for name in ("sphere:3 x r:2", "u:2 x r:3", "cp:1 x so:3", "gr:2,5 x hpd:2 x se:3")
-]
+SPACES = SINGLE + [ss.space(name) for name in ("sphere:3 x r:2", "u:2 x r:3", "cp:1 x so:3", "gr:2,5 x hpd:2 x se:3")]
 # One of each kind, for what does not depend on the formulas of a space: flat, of positive, negative and indefinite
 # curvature, real and complex, vectors and matrices, points of one array and of many, groups, products.
 REPRESENTATIVE = [
     ss.space(name)
     for name in (
-        *(
-            "euclidean:3",
-            "sphere:2",
-            "hyperbolic:2",
-            "ads:4",
-            "cp:2",
-            "gr:2,5",
-            "so:3",
-            "u:2",
-            "hpd:2",
-            "se:3",
-        ),
+        *("euclidean:3", "sphere:2", "hyperbolic:2", "ads:4", "cp:2", "gr:2,5", "so:3", "u:2", "hpd:2", "se:3"),
         *("sphere:3 x r:2", "gr:2,5 x hpd:2 x se:3"),
     )
 ]
@@ -228,12 +210,7 @@ def _families():
 
 FAMILIES = _families()
 
-POSITIVE = (
-    ss.SymmetricPositiveDefinite,
-    ss.HermitianPositiveDefinite,
-    ss.SpecialPositiveDefinite,
-    ss.Siegel,
-)
+POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite, ss.SpecialPositiveDefinite, ss.Siegel)
 HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
 LINEAR = (
     ss.GeneralLinear,
@@ -448,3 +425,14 @@ def jumps(spline):
             difference = np.abs(left - right).reshape(len(left), -1).max(axis=1, initial=0.0)
         found.append(float((difference / allowed).max(initial=0.0)))
     return found
+
+
+def by_differences(space, curve, x, h):
+    """Velocity and covariant acceleration, by Richardson's extrapolation of central differences at h and h/2."""
+    y = curve(x)
+
+    def differences(h):
+        plus, minus = (space.log(y, curve(x + s * h)) for s in (1, -1))
+        return (plus - minus) / (2 * h), (plus + minus) / h**2
+
+    return tuple((4 * half - whole) / 3 for whole, half in zip(differences(h), differences(h / 2), strict=True))

@@ -57,8 +57,6 @@ def memory():
         import resource
 
         # Children that are forked begin with all that this process has.
-        most = dict.fromkeys(
-            (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN), 4 if "jax" in sys.modules else 2
-        )
+        most = dict.fromkeys((resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN), 4 if "jax" in sys.modules else 2)
         for who, gigabytes in most.items():
             assert resource.getrusage(who).ru_maxrss < gigabytes * 2**20, "the largest resident size in kB"

@@ -13,9 +13,7 @@ import symspline as ss
 
 every_space = pytest.mark.parametrize("space", SPACES, ids=str)
 every_kind = pytest.mark.parametrize("space", REPRESENTATIVE, ids=str)
-every_single = pytest.mark.parametrize(
-    "space", [s for s in REPRESENTATIVE if not isinstance(s, ss.Product)], ids=str
-)
+every_single = pytest.mark.parametrize("space", [s for s in REPRESENTATIVE if not isinstance(s, ss.Product)], ids=str)
 every_common = pytest.mark.parametrize("space", COMMON, ids=str)
 every_batch = loop_over("batch", [(), (2, 3)])
 
@@ -106,10 +104,7 @@ def pick(value, index):
 
 def with_ends(space, p):
     """End conditions with a vector at either end, for every curve its own."""
-    return (
-        (1, tangents_at(space, at_node(space, p, 0))),
-        (2, tangents_at(space, at_node(space, p, -1), seed=6)),
-    )
+    return ((1, tangents_at(space, at_node(space, p, 0))), (2, tangents_at(space, at_node(space, p, -1), seed=6)))
 
 
 def shaped(space, lead):
@@ -123,9 +118,7 @@ def found(value):
 
 def off(space, x, y):
     """How far points are apart, whatever their arrays."""
-    return max(
-        float(np.max(apart(f, a, b))) for f, a, b in zip(factors(space), parts(x), parts(y), strict=True)
-    )
+    return max(float(np.max(apart(f, a, b))) for f, a, b in zip(factors(space), parts(x), parts(y), strict=True))
 
 
 def vectors_off(space, x, u, y, v):
@@ -165,3 +158,8 @@ def pair_of_curves(space):
     axes = np.eye(3)
     points = np.stack([axes, axes[[1, 0, 2]]])
     return ss.CubicSpline(None, (points, points) if isinstance(space, ss.Product) else points, space)
+
+
+def clamped(interior, degree, end=3.0):
+    """Knots of a B-spline from 0 to ``end`` at which it starts and ends in its control points."""
+    return np.concatenate([[0.0] * (degree + 1), interior, [end] * (degree + 1)])

@@ -33,18 +33,7 @@ LAYERS = [
     ["_archive"],
     ["_cubic"],
     ["_functional"],
-    [
-        "_adapters",
-        "_files",
-        "_hermite",
-        "_pairs",
-        "_segments",
-        "_smoothing",
-        "convert",
-        "jax",
-        "torch",
-        "xarray",
-    ],
+    ["_adapters", "_files", "_hermite", "_pairs", "_segments", "_smoothing", "convert", "jax", "torch", "xarray"],
     ["_pose_files", "geo", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
     ["cli"],
     ["__init__", "__main__"],
@@ -88,9 +77,9 @@ def layer(name):
 
 
 def test_the_graph_is_that_of_the_package():
-    assert {"_spaces.base", "_curves.curve", "_arrays"} <= GRAPH["_curves.core_curve"] | GRAPH[
-        "_spaces"
-    ] | GRAPH["_time"]
+    assert {"_spaces.base", "_curves.curve", "_arrays"} <= GRAPH["_curves.core_curve"] | GRAPH["_spaces"] | GRAPH[
+        "_time"
+    ]
     # An import inside a function.
     assert "_plotting" in GRAPH["_base_curve"]
 
@@ -109,19 +98,7 @@ def test_there_is_no_circle():
 
 # What users import. The name of any other module, or of a folder around it, starts with an underscore.
 PUBLIC = {
-    *(
-        "cli",
-        "convert",
-        "geo",
-        "jax",
-        "manifolds",
-        "poses",
-        "quantum",
-        "rotations",
-        "shapes",
-        "subspaces",
-        "tensors",
-    ),
+    *("cli", "convert", "geo", "jax", "manifolds", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors"),
     *("testing", "torch", "xarray"),
 }
 

@@ -178,9 +178,7 @@ def margin(space, p, q):
         turns = np.rint(phases.sum(axis=-1) / (2 * np.pi)).astype(int)
         n = phases.shape[-1]
         place = np.arange(n)
-        phases = (
-            phases - 2 * np.pi * (place >= n - turns[..., None]) + 2 * np.pi * (place < -turns[..., None])
-        )
+        phases = phases - 2 * np.pi * (place >= n - turns[..., None]) + 2 * np.pi * (place < -turns[..., None])
         return 2 * np.pi - (phases.max(axis=-1) - phases.min(axis=-1)), 2 * np.pi
     return np.full(p.shape[: p.ndim - len(space.point_shape)], np.inf), np.inf
 

@@ -161,7 +161,7 @@ class Curve(ABC, Generic[P]):
             a time zone, pass times with any time zone, or ``datetime64`` in UTC; otherwise pass times without one.
         nu : {0, 1, 2}, default 0
             Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
-        extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy for this call. None means the policy of the curve.
         per_curve : bool, default False
             True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
@@ -223,7 +223,7 @@ class Curve(ABC, Generic[P]):
         nu : {0, 1, 2}, default 0
             Order of the derivative: 0 for representatives, 1 for the velocity γ', 2 for the covariant acceleration
             ∇γ'. Velocities are the derivatives of the representatives.
-        extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy for this call. None means the policy of the curve.
         per_curve : bool, default False
             True if every curve of a batch has its own times.
@@ -373,7 +373,7 @@ class Curve(ABC, Generic[P]):
         ----------
         x : array_like of float or datetime64
             Times, of any shape and in any order, as in a call of the curve.
-        extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
+        extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
             Extrapolation policy for this call. None means the policy of the curve.
         per_curve : bool, default False
             True if every curve of a batch has its own times.
@@ -662,9 +662,9 @@ def call_at_times(
     Parameters
     ----------
     outside : str
-        The extrapolation policy in the words of the core, or ``"nan"``, which this function implements.
+        Extrapolation policy by its name in the core, or ``"nan"``, which this function implements.
     call : callable
-        Takes the curve, times as the core counts them, `per_curve`, and a policy of the core.
+        Function of the curve, times as the core counts them, `per_curve`, and a policy of the core.
     """
     per_curve = checked_flag(per_curve, "per_curve")
     if clock.plain and type(x) is float:
@@ -692,7 +692,7 @@ def call_at_times(
 def _inside(
     curve: CurveArrays, times: Doubles, per_curve: bool
 ) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
-    """Times of which those outside the knots are replaced by the first knot, and which these are, if any."""
+    """Replace times outside the knots by the first knot, and return which times these are, if any."""
     first, last = curve.times[..., 0], curve.times[..., -1]
     if curve.times.ndim > 1:
         own = times.shape[len(curve.batch) :] if per_curve else times.shape

@@ -1,4 +1,4 @@
-"""What runs here: for reports of bugs."""
+"""Information about the installation, for bug reports."""
 
 import platform
 import sys
@@ -11,12 +11,22 @@ from ._version import VERSION
 
 
 def show_config() -> None:
-    """Print what a report of a bug should say.
+    """Print information about the installation, for bug reports.
 
-    Versions of symspline, Python and NumPy; system and architecture; the compiled module in use, for which
-    processors it is built, and why it was picked; and the number of threads that parallel work uses. A wheel for
-    x86-64 holds two modules; ``plain`` or ``v3`` in the environment variable ``SYMSPLINE_CPU`` forces one.
+    The output lists the versions of symspline, Python and NumPy, the operating system and architecture, the compiled
+    module in use, the processors for which it is built and the reason for its choice, and the number of threads.
 
+    See Also
+    --------
+    set_num_threads : Limit the number of threads of parallel work.
+
+    Notes
+    -----
+    A wheel for x86-64 contains two compiled modules. ``plain`` or ``v3`` in the environment variable ``SYMSPLINE_CPU``
+    selects one of them.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.show_config()  # doctest: +ELLIPSIS
     symspline   ...
@@ -41,5 +51,8 @@ def show_config() -> None:
 
 
 def _locked() -> bool:
-    """Whether one thread runs Python at a time; the question came with the first Python of which it may be false."""
+    """Whether one thread runs Python at a time.
+
+    ``sys._is_gil_enabled`` exists from the first version of Python in which the answer may be False.
+    """
     return bool(getattr(sys, "_is_gil_enabled", lambda: True)())

@@ -65,11 +65,10 @@ class CubicSpline(Curve[P]):
         Largest relative C² residual of a converged curve, see `Report.residual`.
     max_iter : int, optional
         Largest number of iterations. By default each solver has its own limit.
-    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
-        Extrapolation policy for times beyond the knots. None raises `ValidationError`, except for closed curves,
-        which are evaluated periodically. ``"raise"`` raises for closed curves, too. False gives NaN, as in SciPy. True
-        continues the first and last segments. ``"geodesic"`` continues with constant velocity. ``"periodic"`` repeats
-        the curve.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. ``"raise"`` raises `ValidationError`, and so does None,
+        except for closed curves, which are repeated. True continues the first and last segments. False gives NaN.
+        ``"geodesic"`` continues with constant velocity. ``"periodic"`` repeats the curve.
     on_failure : {"raise", "warn", "ignore"}, default "raise"
         Action if a curve does not converge or meets a cut locus. ``"warn"`` issues a `ConvergenceWarning`. An
         unconverged curve keeps its best iterate (the last one with ``method="fixed-point"``). A curve that meets a
@@ -352,7 +351,7 @@ class CubicSpline(Curve[P]):
 
     @cached_property
     def _reports(self) -> list[Report]:
-        """The reports in every factor, made on demand: they cost as much as a third of a fit of few points."""
+        """Reports in every factor, created on demand because they cost up to a third of a fit of few points."""
         return self._fit.reports()
 
     @property

@@ -143,14 +143,14 @@ def evaluate(
     space : Space or str
         A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
     x : array_like of float or datetime64
-        Times, of any shape and in any order. Only the nodes from the first to the last segment that contain times are
-        read and checked, so that few times cost little.
+        Times, of any shape and in any order. Only the nodes of the segments between the first and the last of these
+        times are read and checked, so that few times cost little.
     nu : {0, 1, 2}, default 0
         Order of the derivative: 0 for points, 1 for the velocity γ', 2 for the covariant acceleration ∇γ'.
-    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
-        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. False gives NaN,
-        as in SciPy. True continues the first and last segments. ``"geodesic"`` continues with constant velocity.
-        ``"periodic"`` repeats the curve.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True continues
+        the first and last segments. False gives NaN. ``"geodesic"`` continues with constant velocity. ``"periodic"``
+        repeats the curve.
     per_curve : bool, default False
         True if every curve of a batch has its own times. The leading axes of x are then the batch axes.
     progress : callable, optional
@@ -196,10 +196,10 @@ def evaluate(
 def _nodes_around(
     t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
 ) -> tuple[Any, Any, Any]:
-    """The knots, points and velocities of the segments that times lie in, or all of them where they are not plain
-    arrays, or where it would not pay.
+    """Return the knots, points and velocities of the segments in which times lie.
 
-    Every segment is determined by its two ends, so that values are bit-identical.
+    All nodes are returned if they are not plain arrays or too few for a gain. Each segment is determined by its two
+    ends, so the values are bit-identical.
     """
     everything = t, points, velocities
     if type(t) is not np.ndarray or t.dtype != np.float64 or t.ndim != 1 or len(t) < _MANY:
@@ -285,7 +285,7 @@ def fit_many(
         Pairs ``(t, points)``, one per curve, as for `CubicSpline`. Each pair is a single curve, not a batch.
     space : Space or str
         Space of all curves, or its name.
-    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol
+    bc_type, method, tol, max_iter, extrapolate, on_failure, check, atol : optional
         As for `CubicSpline`. They apply to all curves.
     where : array_like of bool, optional
         Mask over the curves. Curves where it is False are not fitted and evaluate to NaN.
@@ -323,7 +323,7 @@ def fit_many(
     pairs: list[tuple[ArrayLike | None, Any]] = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
-            raise ValidationError(f"curve {number} must be a pair (t, points), not {short_repr(curve)}")
+            raise ValidationError(f"curves[{number}] must be a pair (t, points), not {short_repr(curve)}")
     if not pairs:
         return []
     mask = fitting.mask_of(where, (len(pairs),))

@@ -40,10 +40,10 @@ class HermiteSpline(Curve[P]):
         those of rotations from angular velocities.
     space : Space or str
         A space or its name, such as ``Sphere(2)`` or ``"sphere:2"``.
-    extrapolate : {None, "raise", False, True, "geodesic", "periodic"}, default None
-        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. False gives NaN,
-        as in SciPy. True continues the first and last segments. ``"geodesic"`` continues with constant velocity.
-        ``"periodic"`` repeats the curve.
+    extrapolate : {None, "raise", True, False, "geodesic", "periodic"}, default None
+        Extrapolation policy for times beyond the knots. None and ``"raise"`` raise `ValidationError`. True continues
+        the first and last segments. False gives NaN. ``"geodesic"`` continues with constant velocity. ``"periodic"``
+        repeats the curve.
     atol : float, optional
         Largest distance of a point from the manifold. By default 1e-8, or 1e-4 for points in single precision.
 

@@ -61,8 +61,10 @@ def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
 
     Returns
     -------
-    lon, lat : ndarray, shape (...)
-        Degrees east in (-180, 180], and degrees north.
+    lon : ndarray, shape (...)
+        Degrees east, in (-180, 180].
+    lat : ndarray, shape (...)
+        Degrees north.
 
     See Also
     --------
@@ -89,8 +91,10 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
 
     Returns
     -------
-    east, north : ndarray, shape (..., 3)
-        Unit tangent vectors. At a pole they are those of the meridian of 0° E.
+    east : ndarray, shape (..., 3)
+        Unit tangent vectors to the east. At a pole, that of the meridian of 0° E.
+    north : ndarray, shape (..., 3)
+        Unit tangent vectors to the north.
 
     Examples
     --------

@@ -82,7 +82,7 @@ def fit_options(
     check: Any,
     progress: Any,
 ) -> Options:
-    """The options of the solver, after validation of all options of a fit.
+    """Return the options of the solver, after validation of all options of a fit.
 
     The compiled core validates ``method`` and ``tol``. The usual defaults take no further function call.
     """

@@ -1,4 +1,4 @@
-"""Warnings about points whose representatives do not fit their neighbours."""
+"""Warnings about neighbouring points in inconsistent representations."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FAR = 0.6
 _LEAST = 4
 # Points closer to each other than this, slightly less than π/2, have a positive inner product.
 _NEAR = 1.57
-# Remedies for users of the Python interface.
+# Remedies for quaternions of opposite sign, for users of the Python interface.
 IN_PYTHON = (
     "For rotations, use so:3 (symspline.rotations.from_quaternions returns its points) or rp:3, where q and -q are the "
     "same point. For other data, silence this warning with "
@@ -39,7 +39,7 @@ def warn_of_representatives(
     curves: Sequence[CurveArrays],
     columns: Sequence[Sequence[Columns]],
 ) -> None:
-    """Warn of signs and of far points, for curves through their points.
+    """Warn about signs and about far points, for curves through their points.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def warn_of_representatives(
 
 
 def _longest_near_step(space: Space[Any]) -> float:
-    """The longest step of which there is nothing to warn, remembered for each space."""
+    """Return the longest step that never leads to a warning, cached for each space."""
     limit = FAR * space.injectivity_radius
     if _has_quaternions(space):
         limit = min(limit, _NEAR)
@@ -73,9 +73,9 @@ def _has_quaternions(space: Space[Any]) -> bool:
 
 
 def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> None:
-    """Warn if neighbours on S³ are more than a quarter turn apart.
+    """Warn if neighbouring points on S³ are more than a quarter turn apart.
 
-    As quaternions they are closer with the other sign, and the curve between them turns the long way round.
+    As quaternions they would be closer with the opposite sign. The curve between them turns the long way round.
 
     Parameters
     ----------
@@ -101,14 +101,15 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     warnings.warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
-        f"round. {IN_PYTHON}",
+        f"round. "
+        f"{IN_PYTHON}",
         UserWarning,
         stacklevel=callers_level(),
     )
 
 
 def _opposite(points: Array) -> NDArray[np.intp]:
-    """Indices of points with a negative product with the next one."""
+    """Return the indices of points whose inner product with the next point is negative."""
     return np.argwhere(np.einsum("...i,...i", points[..., :-1, :], points[..., 1:, :]) < 0)
 
 
@@ -118,7 +119,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 def warn_of_far_points(
     curves: Sequence[CurveArrays], columns: Sequence[Sequence[Columns]] | None = None
 ) -> None:
-    """Warn if more than half of the steps of a curve are beyond 0.6 of the way to the cut locus.
+    """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
     Parameters
     ----------
@@ -135,12 +136,12 @@ def warn_of_far_points(
         for k, part in enumerate(curve.parts):
             limit = FAR * part.space.injectivity_radius
             own = None if columns is None else columns[number][k]
-            # Deciding angles are at most as large as distances.
+            # The deciding angle never exceeds the distance.
             if not limit < math.inf or (own is not None and not (own.numbers[MAX_STEP] > limit).any()):
                 continue
             far = np.count_nonzero(cut_fractions(part.space, part.points) > FAR, axis=-1)
             if own is not None:
-                # Failures of curves that did not converge are reported elsewhere, as `on_failure` demands.
+                # Curves that did not converge are reported elsewhere, according to `on_failure`.
                 far = np.where(own.row("converged").reshape(curve.batch), far, 0)
             for index in np.argwhere(far > steps / 2).tolist():
                 place = tuple([number] * (len(curves) > 1) + index)
@@ -163,13 +164,14 @@ def warn_of_far_points(
 
 
 def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
-    """The deciding angle between neighbouring points, divided by the angle at which the cut locus is met.
+    """Return the deciding angle between neighbouring points, divided by the angle at which the cut locus is reached.
 
     Parameters
     ----------
     space : Space
         A space that is not a product.
     points : ndarray, shape (..., N+1, *point_shape)
+        Points.
 
     Returns
     -------
@@ -185,7 +187,7 @@ def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
     if not len(p):
         return result
     if isinstance(space, Manifold):
-        # The distance may be unknown on a manifold that is made of functions.
+        # The distance may be unknown on a manifold made of functions.
         with suppress(CutLocusError):
             result[good] = space.distance(p, q) / space.injectivity_radius
         return result

@@ -1,4 +1,4 @@
-"""How many threads parallel work uses."""
+"""The number of threads of parallel work."""
 
 import os
 import threading
@@ -9,12 +9,12 @@ from . import _core
 from ._arrays import whole_number
 from ._core import ValidationError
 
-# More would only wait for each other, and a system has no room for very many.
+# More threads would only wait for each other, and operating systems limit their number.
 _MOST = 1024
 
 
 class _Threads:
-    """The number that was asked for, 0 for all cores, and how many callers want one thread for now."""
+    """The requested number of threads, 0 for all cores, and the number of callers that currently require one thread."""
 
     def __init__(self, asked: int = 0) -> None:
         self.lock, self.asked, self.alone = threading.Lock(), asked, 0
@@ -41,7 +41,11 @@ _threads = _Threads()
 
 
 def _forked() -> None:
-    """A child has none of its parent's threads, so that nobody in it wants one only; nor may it find the lock held."""
+    """Reset the state in a forked process.
+
+    The child has none of its parent's threads, so no caller in it requires a single thread, and the lock may have been
+    held.
+    """
     global _threads
     _threads = _Threads(_threads.asked)
     _core.set_num_threads(_threads.asked)
@@ -52,8 +56,28 @@ if hasattr(os, "register_at_fork"):
 
 
 def set_num_threads(n: int) -> None:
-    """Limit the number of threads; 0 stands for all cores.
+    """Limit the number of threads of parallel work.
 
+    Parameters
+    ----------
+    n : int
+        Largest number of threads, at most 1024. 0 means all cores.
+
+    Raises
+    ------
+    ValidationError
+        If n is not an integer from 0 to 1024.
+
+    See Also
+    --------
+    num_threads : Return the number of threads.
+
+    Notes
+    ----- Results are bit-identical for every number of threads. The environment variable ``SYMSPLINE_NUM_THREADS``
+    sets the number before the package is imported.
+
+    Examples
+    --------
     >>> import symspline as ss
     >>> ss.set_num_threads(2)
     >>> ss.num_threads()
@@ -69,8 +93,9 @@ def set_num_threads(n: int) -> None:
 def one_thread() -> Iterator[None]:
     """Work on the calling thread only, as one of many workers.
 
-    The compiled core has one number for the whole process. While any thread is in here it is 1, and calls of others
-    use one thread, too; then it is again what was asked for, also if that was meanwhile.
+    The compiled core has one number of threads for the whole process. While any thread is in this context the number
+    is 1, also for calls of other threads. Afterwards it is the requested number again, even if that changed in the
+    meantime.
     """
     threads = _threads
     threads.enter()

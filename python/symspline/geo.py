@@ -176,6 +176,15 @@ def resample(
         or `symspline.fit_segments` does not accept the positions or times.
     ConvergenceError, CutLocusError
         As for `CubicSpline` and `make_smoothing_spline`. The message names the track.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> times = pd.to_datetime(["2026-01-01 00:00", "2026-01-01 00:10", "2026-01-01 00:20"])
+    >>> table = pd.DataFrame({"lon": [10.0, 10.1, 10.2], "lat": [0.0, 0.0, 0.0]}, index=times)
+    >>> track = resample(table, "5min", max_gap=3600)
+    >>> len(track), track["lon"].iloc[1].round(3), track["sog"].iloc[1].round(2)
+    (5, np.float64(10.05), np.float64(18.53))
     """
     import pandas as pd
 

@@ -71,6 +71,14 @@ class Imu(NamedTuple):
         Angular velocity, radians per unit of time.
     specific_force : ndarray, shape (..., 3)
         :math:`R^T(\\ddot x - g)`, units of length per unit of time squared.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> still = ss.CubicSpline(None, [np.eye(4), np.eye(4)], "se:3")
+    >>> gyro, specific_force = imu(still, 0.5)
+    >>> gyro + 0.0, specific_force
+    (array([0., 0., 0.]), array([0.  , 0.  , 9.81]))
     """
 
     gyro: Array
@@ -168,6 +176,14 @@ def twist(
     References
     ----------
     Lynch & Park, "Modern Robotics", 2017, section 3.3.2.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> start, end = np.eye(4), np.eye(4)
+    >>> end[:3, 3] = 1, 2, 3
+    >>> twist(ss.CubicSpline(None, [start, end], "se:3"), 0.5).round(12) + 0.0
+    array([0., 0., 0., 1., 2., 3.])
     """
     check_frame(frame)
     motion = _Motion(spline, x, extrapolate, per_curve)
@@ -204,6 +220,14 @@ def linear_velocity(
     -------
     ndarray, shape ``(*batch axes, *x.shape, 3)``
         Velocities.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> start, end = np.eye(4), np.eye(4)
+    >>> end[:3, 3] = 1, 2, 3
+    >>> linear_velocity(ss.CubicSpline(None, [start, end], "se:3"), 0.5).round(12)
+    array([1., 2., 3.])
     """
     check_frame(frame)
     motion = _Motion(spline, x, extrapolate, per_curve)
@@ -240,6 +264,13 @@ def linear_acceleration(
     -------
     ndarray, shape ``(*batch axes, *x.shape, 3)``
         Accelerations.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> turns, places = np.tile(np.eye(3), (3, 1, 1)), [[0.0, 0, 0], [1, 0, 0], [0, 0, 0]]
+    >>> linear_acceleration(ss.CubicSpline(None, (turns, places), "so:3 x r:3"), 1).round(12) + 0.0
+    array([-3.,  0.,  0.])
     """
     check_frame(frame)
     motion = _Motion(spline, x, extrapolate, per_curve)

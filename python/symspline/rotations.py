@@ -93,6 +93,13 @@ def rotation(
     ------
     ImportError
         If SciPy is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> turning = from_rotation_vectors([[0, 0, 0], [0, 0, 1], [0, 0, 2.0]])
+    >>> rotation(ss.CubicSpline(None, turning, "so:3"), 0.5).as_rotvec().round(12)
+    array([0. , 0. , 0.5])
     """
     try:
         from scipy.spatial.transform import Rotation
@@ -148,6 +155,13 @@ def angular_velocity(
     Notes
     -----
     The angular velocity ω in the body frame satisfies :math:`R' = R \\hat\\omega`.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> turning = from_rotation_vectors([[0, 0, 0], [0, 0, 1], [0, 0, 2.0]])
+    >>> angular_velocity(ss.CubicSpline([0, 0.5, 1], turning, "so:3"), 0.3).round(12) + 0.0
+    array([0., 0., 2.])
     """
     return _rate(spline, x, "velocity", frame, extrapolate, per_curve)
 
@@ -184,6 +198,13 @@ def angular_acceleration(
     ------
     ValidationError
         If the curve does not contain exactly one rotation, or `frame` is invalid.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> turning = from_rotation_vectors([[0, 0, 0], [0, 0, 1], [0, 0, 0.0]])
+    >>> angular_acceleration(ss.CubicSpline(None, turning, "so:3"), 1).round(12) + 0.0
+    array([ 0.,  0., -3.])
     """
     return _rate(spline, x, "acceleration", frame, extrapolate, per_curve)
 
@@ -438,6 +459,13 @@ def from_quaternions(
     -------
     ndarray, shape (..., 3, 3)
         Points of ``so:3``.
+
+    Examples
+    --------
+    >>> from_quaternions([1, 0, 0, 0], scalar_first=True)
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
     """
     return quaternion_to_matrix(quaternions, scalar_first=scalar_first, atol=atol)
 
@@ -463,7 +491,7 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     q = as_quaternions(rotations, scalar_first=True)
     w, v = q[..., 0], q[..., 1:]
     sine = length(v)
-    # angle / sin(angle/2); of no turn v is zero, and any number does.
+    # angle / sin(angle/2). Without a rotation v is zero, and any factor will do.
     factor = 2 * np.arctan2(sine, w) / np.where(sine > 0, sine, 1)
     result: Array = factor[..., None] * v
     return result

@@ -130,6 +130,13 @@ def reduced_operator(
     References
     ----------
     Amsallem & Farhat, "Interpolation method for adapting reduced-order models", 2008.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> spline = ss.CubicSpline(None, [[[1.0], [0], [0]], [[0.6], [0.8], [0]]], "gr:1,3")
+    >>> reduced_operator(spline, np.diag([2.0, 4, 6]), [0.0, 0.5, 1.0]).round(12).ravel()
+    array([2.  , 2.4 , 3.28])
     """
     check_curve(spline)
     space = spline.space

@@ -53,6 +53,13 @@ class Conformance:
         Largest relative deviation from each law; for the order of convergence, the distance from four.
     allowed : dict of str to float
         Largest allowed deviation from each law.
+
+    Examples
+    --------
+    >>> from symspline import testing
+    >>> found = testing.check("sphere:2")
+    >>> found.space, found.deviations.keys() == found.allowed.keys()
+    (Sphere(2), True)
     """
 
     space: Space
@@ -127,6 +134,13 @@ def check(
         If a law is violated. The message states the law and the deviation.
     ValidationError
         If the space cannot be checked.
+
+    Examples
+    --------
+    >>> from symspline import testing
+    >>> print(testing.check("sphere:2"))  # doctest: +ELLIPSIS
+    Sphere(2) obeys
+      ...
     """
     space = space_named(space)
     if isinstance(space, Product):

@@ -59,9 +59,7 @@ def test_running_product(n):
     np.testing.assert_allclose(data.running_product(q), slow, atol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("name", "bounds"), [("RotationSpline", (1e-4, 1e-3, 1e-2)), ("splines", (1e-2, 0.1))]
-)
+@pytest.mark.parametrize(("name", "bounds"), [("RotationSpline", (1e-4, 1e-3, 1e-2)), ("splines", (1e-2, 0.1))])
 def test_libraries_compute_the_same(name, bounds):
     if name == "splines":
         pytest.importorskip("splines")

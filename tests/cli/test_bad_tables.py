@@ -27,11 +27,7 @@ def test_invalid_tables(fails):
         (AXES, "--space foo:2", "unknown space 'foo:2'; known names are"),
         (AXES + "4,1,0,n/a\n", "--space s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
         (AXES + "\n\n4,1,0,\n", "--space s:2", "a.csv, line 7: column 'z' is empty"),
-        (
-            AXES + "4,1,0,inf\n",
-            "--space s:2",
-            "a.csv, line 5: column 'z' holds inf, which is not a finite number",
-        ),
+        (AXES + "4,1,0,inf\n", "--space s:2", "a.csv, line 5: column 'z' holds inf, which is not a finite number"),
         (AXES + "4,1,0\n", "--space s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
         (AXES + '4,1,0,"0\n', "--space s:2", "a.csv, line 5: unexpected end of data"),
         (AXES + "4,1.001,0,0\n", "--space s:2", "a.csv: the point in line 5 is off the space by 1.000e-3"),
@@ -142,10 +138,7 @@ def test_a_line_of_units(fails):
     assert "line 2: column" in problem
     write("a.csv", "time,lon,lat\n0,degrees_east,degrees_north\n0,1,2\n1,2,3\n")
     problem = fails("fit a.csv --lonlat -o a.npz")
-    assert (
-        "line 2: column 'lon' holds 'degrees_east', which is not a number; if this line holds units"
-        in problem
-    )
+    assert "line 2: column 'lon' holds 'degrees_east', which is not a number; if this line holds units" in problem
 
 
 def test_parquet_columns_of_other_types(fails):
@@ -166,3 +159,17 @@ def test_parquet_columns_of_other_types(fails):
             more = "" if option == "--columns" else "--columns x"
             problem = fails(f"fit a.parquet --space r:1 {option} odd {more} -o a.npz")
             assert "a.parquet" in problem and ("'odd'" in problem or "of curve" in problem)
+
+
+@pytest.mark.parametrize("cell", ["1_000", "١٢", "1_0.5", "１２"])
+def test_numbers_in_unusual_notation_are_refused(run, fails, cell):
+    for text, options, problem in [
+        (f"t,x\n0,1\n1,2\n2,{cell}\n", "", f"line 4: column 'x' holds {cell!r}, which is not a number"),
+        (f"t,x\n0,1\n1,2\n{cell},3\n", "", f"line 4: column 't' holds {cell!r}"),
+        ("t,x\n0,1\n1,2\n", "--tol 1_0", "--tol: invalid number value: '1_0'"),
+    ]:
+        write("a.csv", text)
+        assert problem in fails(f"fit a.csv --space r:1 {options} -o a.npz")
+    write("a.csv", "t,x\n0,1\n1, 2.5 \n")
+    run("fit a.csv --space r:1 -o a.npz")
+    assert "1_0" in fails("sample a.npz -n 1_0 -o b.csv")

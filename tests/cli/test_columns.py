@@ -66,10 +66,7 @@ def test_names_of_curves_that_were_made_in_python(run):
         run("sample a.npz -n 2 -o b.csv")
         assert list(table("b.csv")) == ["time", *names]
         run("sample a.npz -n 2 --nu 2 -o b.csv")
-        assert list(table("b.csv")) == [
-            "time",
-            *(re.sub("(_re|_im|)$", r"_d2\1", key, count=1) for key in names),
-        ]
+        assert list(table("b.csv")) == ["time", *(re.sub("(_re|_im|)$", r"_d2\1", key, count=1) for key in names)]
 
 
 def test_names_in_large_matrices(run):
@@ -125,11 +122,7 @@ def test_bad_columns_of_complex_numbers_and_matrices(fails):
             "a.csv: a_re and a_im are a complex number where a real one belongs: a point of sphere:1 has 2 numbers; "
             "name its columns one by one with --columns, or give a space of complex points, such as cp:1",
         ),
-        (
-            HALVES,
-            "--space r:2 --columns a",
-            "a point of euclidean:2 has 2 numbers; name its columns one by one with",
-        ),
+        (HALVES, "--space r:2 --columns a", "a point of euclidean:2 has 2 numbers; name its columns one by one with"),
         (
             HALVES,
             "--space 'r:1 x cp:1' --columns a,b_re,b_im,t --time t",
@@ -158,11 +151,7 @@ def test_bad_columns_of_complex_numbers_and_matrices(fails):
             "a.csv: column 'b_re' is half of a complex number, and there is no 'b_im' in --columns",
         ),
         (HALVES, "--space cp:1 --columns a,a_re", "column 'a_re' of a.csv cannot have two meanings"),
-        (
-            HALVES,
-            "--space cp:1 --columns a,c",
-            "a.csv has no column 'c'; there are t, a_re, a_im, b_re, b_im",
-        ),
+        (HALVES, "--space cp:1 --columns a,c", "a.csv has no column 'c'; there are t, a_re, a_im, b_re, b_im"),
         (
             HALVES.replace("b_im", "c"),
             "--space cp:1 --columns a,b",
@@ -204,11 +193,7 @@ def test_bad_points_in_matrix_spaces(fails):
         ("se:2", lambda p: p.T, "the point in line 5 is off the space by"),
         ("gr:1,2", lambda p: 2 * p, "the point in line 5 is off the space by"),
         ("r:2 x gr:2,4", lambda p: 2 * p, "the part in gr:2,4 of the point in line 5 is off the space by"),
-        (
-            "so:3",
-            lambda p: p @ np.diag([1, -1, -1]),
-            "line 4 and the point in line 5 of curve 'a' lie at or past",
-        ),
+        ("so:3", lambda p: p @ np.diag([1, -1, -1]), "line 4 and the point in line 5 of curve 'a' lie at or past"),
         ("r:1 x u:1", lambda p: -p, "line 4 and the point in line 5 of curve 'a' lie at or past"),
     ]:
         """The fourth of equal points is another one."""
@@ -238,9 +223,6 @@ def test_quaternions_of_opposite_sign_are_noted(capsys):
         note = capsys.readouterr().err
         assert note.startswith(f"symspline: {where}") and note.count("\n") == 1, note
         lines = (4, 5) if of else (2, 3)
-        assert (
-            f"the point in line {lines[0]} and the point in line {lines[1]}{of} have inner product -0.8"
-            in note
-        )
+        assert f"the point in line {lines[0]} and the point in line {lines[1]}{of} have inner product -0.8" in note
         assert note.endswith("For rotations give --space so:3, or rp:3, where signs do not count\n")
         assert "UserWarning" not in note and "symspline.rotations" not in note

@@ -19,9 +19,7 @@ def test_formats_read_the_same(run):
     parquet.write_table(
         pa.table({"time": pa.array(clock, pa.timestamp("s", "UTC")), "lon": lon, "lat": lat}), "a.parquet"
     )
-    parquet.write_table(
-        pa.table({"time": [f"{c} +00:00" for c in clock], "lon": lon, "lat": lat}), "b.parquet"
-    )
+    parquet.write_table(pa.table({"time": [f"{c} +00:00" for c in clock], "lon": lon, "lat": lat}), "b.parquet")
     splines = []
     for name in ("a.csv", "a.npz", "a.parquet", "b.parquet"):
         run(f"fit {name} --lonlat -o curve.npz")
@@ -124,14 +122,9 @@ def test_long_files_are_read_in_chunks(run, fails):
     rows.insert(3000, "\n" * 5000)
     write("a.csv", "t,x,y,remark\n" + "".join(rows))
     run("fit a.csv --space s:1 -o a.npz")
-    np.testing.assert_allclose(
-        ss.load("a.npz").points, np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-15
-    )
+    np.testing.assert_allclose(ss.load("a.npz").points, np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-15)
     rows[4000] = "17,1,one,\n"
     write("a.csv", "t,x,y,remark\n" + "".join(rows))
-    assert (
-        fails("fit a.csv --space s:1 -o b.npz")
-        == "a.csv, line 9001: column 'y' holds 'one', which is not a number"
-    )
+    assert fails("fit a.csv --space s:1 -o b.npz") == "a.csv, line 9001: column 'y' holds 'one', which is not a number"
     run("sample a.npz --every 0.5 -o b.csv")
     assert len(table("b.csv")["t"]) == 2 * n - 1

@@ -71,6 +71,7 @@ def test_longitudes_go_once_around_at_most(run, fails):
     for lon in (-360, 360, 0):
         write("a.csv", f"t,lon,lat\n0,{lon},1\n1,{lon / 1.1},2\n")
         run("fit a.csv --lonlat -o a.npz")
-    for lon in (400, -361, 3600):
+    for lon in (400, -361, 9999, -9999):
         write("a.csv", f"t,lon,lat\n0,5,1\n1,{lon},2\n")
-        assert f"a.csv, line 3: longitude {lon} is not between" in fails("fit a.csv --lonlat -o b.npz")
+        problem = fails("fit a.csv --lonlat -o b.npz")
+        assert f"a.csv, line 3: longitude {lon} is not between -360 and 360 degrees" in problem

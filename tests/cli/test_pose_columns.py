@@ -13,9 +13,7 @@ from symspline.convert import quaternion_to_matrix
 
 WXYZ = ["qw", "qx", "qy", "qz"]
 # More than a whole turn, so that signs of quaternions with w >= 0 jump.
-TURNS = Rotation.from_rotvec(
-    np.add(np.outer([0, 1.4, 2.7, 3.8, 5.5, 7.2], [0.36, 0.48, 0.8]), [0.1, 0, 0.02])
-)
+TURNS = Rotation.from_rotvec(np.add(np.outer([0, 1.4, 2.7, 3.8, 5.5, 7.2], [0.36, 0.48, 0.8]), [0.1, 0, 0.02]))
 Q = TURNS.as_quat(scalar_first=True)
 PLACES = np.random.default_rng(0).normal(size=(6, 3)).cumsum(0)
 
@@ -31,12 +29,7 @@ def columns(**more):
 
 
 def test_quaternions_by_their_names_in_any_order(run):
-    for names in [
-        WXYZ,
-        ["rot_W", "rot_X", "rot_Y", "rot_Z"],
-        [*"wxyz"],
-        ["q.w []", "q.x []", "q.y []", "q.z []"],
-    ]:
+    for names in [WXYZ, ["rot_W", "rot_X", "rot_Y", "rot_Z"], [*"wxyz"], ["q.w []", "q.x []", "q.y []", "q.z []"]]:
         for order in [[0, 1, 2, 3], [1, 2, 3, 0], [2, 0, 3, 1]]:
             write_table("a.csv", {"t": TIMES, **{names[i]: Q[:, i] for i in order}})
             run("fit a.csv --space so:3 -o a.npz")
@@ -47,9 +40,7 @@ def test_quaternions_by_their_names_in_any_order(run):
             assert list(table("b.csv")) == ["t", *(names[i] for i in order)]
             q = numbers(table("b.csv"), *names)
             x = np.linspace(0, 5, 200)
-            np.testing.assert_allclose(
-                Rotation.from_quat(q, scalar_first=True).as_matrix(), spline(x), atol=1e-14
-            )
+            np.testing.assert_allclose(Rotation.from_quat(q, scalar_first=True).as_matrix(), spline(x), atol=1e-14)
             assert ((q[1:] * q[:-1]).sum(1) > 0.99).all() and q[0, 0] >= 0 > q[:, 0].min()
 
 
@@ -93,9 +84,7 @@ def test_poses(run, space):
 def test_order_of_quaternions_from_the_option(run, fails):
     write_table("a.csv", {"t": TIMES, **{f"q{i}": Q[:, i] for i in range(4)}})
     problem = fails("fit a.csv --space so:3 -o a.npz")
-    assert problem.startswith(
-        "q0, q1, q2, q3 may be a quaternion, but the names do not say which number is which"
-    )
+    assert problem.startswith("q0, q1, q2, q3 may be a quaternion, but the names do not say which number is which")
     run("fit a.csv --space so:3 --quaternion wxyz -o a.npz")
     np.testing.assert_allclose(ss.load("a.npz").points, TURNS.as_matrix(), atol=1e-15)
     run("fit a.csv --space so:3 --quaternion xyzw --columns q1,q2,q3,q0 -o b.npz")
@@ -163,10 +152,7 @@ def test_bad_tum_trajectories(fails):
     for text, problem in [
         ("", "a.tum is empty"),
         ("# x\n", "a.tum is empty"),
-        (
-            "# x\n0 1 2 3\n",
-            "a.tum, line 2: 4 numbers, but a line of a TUM trajectory has 8: time tx ty tz qx",
-        ),
+        ("# x\n0 1 2 3\n", "a.tum, line 2: 4 numbers, but a line of a TUM trajectory has 8: time tx ty tz qx"),
         ("0 0 0 0 0 0 0 1\n1 0 0 x 0 0 0 1\n", "a.tum, line 2: column 'tz' holds 'x', which is not a number"),
         ("0 0 0 0 0 0 0 1\n1 0 nan 0 0 0 0 1\n", "a.tum, line 2: column 'ty' holds nan"),
         ("0 0 0 0 0 0 0 1\n1 0 0 0 1 0 0 1\n", "a.tum, line 2: the quaternion has length 1.41421"),
@@ -193,8 +179,6 @@ def test_damaged_quaternion_columns(fails):
     for places in ["[0, 1, 2]", "[0, 1, 2, 2]", '"wxyz"', "[0, 1, 2, true]", "{}"]:
         ss.CubicSpline(None, TURNS.as_matrix(), "so:3").save("a.npz")
         np.savez(
-            "b.npz",
-            **dict(np.load("a.npz")),
-            columns=f'{{"points": ["a", "b", "c", "d"], "quaternion": {places}}}',
+            "b.npz", **dict(np.load("a.npz")), columns=f'{{"points": ["a", "b", "c", "d"], "quaternion": {places}}}'
         )
         assert fails("sample b.npz -n 3 -o c.csv").startswith("b.npz is damaged: ")

@@ -60,9 +60,7 @@ def test_means_of_two_points_lie_halfway(run, name):
     halfway = space.geodesic(left, right, 0.5)
     middle = each(lambda part: part[[1, 3]], found)
     assert np.max(space.distance(middle, halfway)) < 1e-14 * np.max(space.rounding(halfway))
-    assert same(
-        parts(each(lambda part: part[[0, 2]], found))[0], parts(each(lambda part: part[[0, 3]], p))[0]
-    )
+    assert same(parts(each(lambda part: part[[0, 2]], found))[0], parts(each(lambda part: part[[0, 3]], p))[0])
 
 
 @pytest.mark.parametrize("name", ["s:2", "so:3", "spd:3", "h:2", "gr:2,4"])
@@ -87,15 +85,9 @@ def test_points_without_a_mean(fails):
 def test_max_gap(run, fails):
     line([0, 1, 2, 12, 13, 40, 60, 61])
     out = run("fit a.csv --space r:1 --max-gap 5 -o a.npz")
-    assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith(
-        "; 1 row alone between gaps omitted\n"
-    )
+    assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith("; 1 row alone between gaps omitted\n")
     found = ss.load_many("a.npz")
-    assert {name: spline.t.tolist() for name, spline in found.items()} == {
-        "1": [0, 1, 2],
-        "2": [12, 13],
-        "3": [60, 61],
-    }
+    assert {name: spline.t.tolist() for name, spline in found.items()} == {"1": [0, 1, 2], "2": [12, 13], "3": [60, 61]}
     assert found["2"] == ss.CubicSpline([12, 13], [[3], [4]], "r:1")
     run("sample a.npz --every 1 -o b.csv")
     assert table("b.csv")["curve"] == [*"1112233"]
@@ -115,9 +107,7 @@ def test_max_gap_of_dates_and_of_named_curves(run, fails):
     run("fit a.csv --space r:1 --curve id --max-gap 604800 -o a.npz")
     assert list(ss.load_many("a.npz")) == ["a", "b"]
     line(days, id=["a", "a", "a", "a", "a/1", "a/1"])
-    assert "two curves would have the name 'a/1'" in fails(
-        "fit a.csv --space r:1 --curve id --max-gap 36h -o b.npz"
-    )
+    assert "two curves would have the name 'a/1'" in fails("fit a.csv --space r:1 --curve id --max-gap 36h -o b.npz")
 
 
 def test_options_that_need_times(fails):

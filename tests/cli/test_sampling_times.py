@@ -15,16 +15,10 @@ def test_dates(run):
     for cells, t in [
         (["2020-01-01", "2020-02-29"], ["2020-01-01", "2020-02-29"]),
         (["2020-01-01 12:00", "2020-02-29 06:30"], ["2020-01-01T12:00", "2020-02-29T06:30"]),
-        (
-            ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"],
-            ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"],
-        ),
+        (["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"], ["2020-01-01T12:00:00", "2020-01-01T12:00:00.25"]),
         (["2020-01-01T12:00Z", "2020-01-01T12:30+00:00"], ["2020-01-01T12:00", "2020-01-01T12:30"]),
         (["2019-12-31T23:00-0300", "2020-01-01T05:00+02:30"], ["2020-01-01T02:00", "2020-01-01T02:30"]),
-        (
-            ["2020-01-01 00:00:00.5 +01", "2020-01-01 00:00:01 Z"],
-            ["2019-12-31T23:00:00.5", "2020-01-01T00:00:01"],
-        ),
+        (["2020-01-01 00:00:00.5 +01", "2020-01-01 00:00:01 Z"], ["2019-12-31T23:00:00.5", "2020-01-01T00:00:01"]),
     ]:
         dated(cells)
         run("fit a.csv --space r:1 -o a.npz")
@@ -33,10 +27,7 @@ def test_dates(run):
 
 def test_invalid_times(fails):
     for cells, found in [
-        (
-            ["2020-01-01", "2020-01-02T00:00"],
-            "line 3: column 'time' holds '2020-01-02T00:00', but '2020-01-01' before",
-        ),
+        (["2020-01-01", "2020-01-02T00:00"], "line 3: column 'time' holds '2020-01-02T00:00', but '2020-01-01' before"),
         (["2020-01-01T00:00", "2020-01-02 00:00"], "write all times in the same way"),
         (["2020-01-01T00:00Z", "2020-01-02T00:00"], "write all times in the same way"),
         (["2020-01-01", "2020-01-02", "7"], "line 4: column 'time' holds '7', but '2020-01-01' before"),
@@ -92,9 +83,7 @@ def test_times_along_a_curve(along):
     assert half.astype(str).tolist()[1] == "2020-01-01T00:00:00.500"
     assert along("--every 1e30d", day).tolist() == along("--every 2d", day).tolist()
     assert along("--every 2d", day).tolist() == [day[0].astype("datetime64[s]").item()]
-    np.testing.assert_array_equal(
-        along("--every 0.1", np.array([0.0, 1.0])), np.minimum(np.arange(11) * 0.1, 1)
-    )
+    np.testing.assert_array_equal(along("--every 0.1", np.array([0.0, 1.0])), np.minimum(np.arange(11) * 0.1, 1))
     assert along("--every 0.3", np.array([0.0, 1.0]))[-1] == 3 * 0.3
     assert along("-n 3", day).astype(str).tolist()[1] == "2020-01-01T12:00:00"
     thirds = along("-n 4", np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:01"], "datetime64[s]"))
@@ -102,9 +91,7 @@ def test_times_along_a_curve(along):
     for fine in ("ns", "ps"):
         knots = np.array([0, 10**18 + 1], f"datetime64[{fine}]")
         spread = along("-n 1000", knots)
-        assert (
-            spread[0] == knots[0] and spread[-1] == knots[-1] and (np.diff(spread) > np.timedelta64(0)).all()
-        )
+        assert spread[0] == knots[0] and spread[-1] == knots[-1] and (np.diff(spread) > np.timedelta64(0)).all()
 
 
 def test_invalid_steps(fails):

@@ -60,8 +60,6 @@ def test_problems_of_one_curve_name_it(run, fails):
     assert fails("fit bad.csv --space s:2 --curve id -o bad.npz").startswith(problem)
     write("bad.csv", PAIR + "b,4,0,0,-1\n")
     problem = fails("fit bad.csv --space s:2 --curve id -o bad.npz")
-    assert problem.startswith(
-        "bad.csv: the point in line 5 and the point in line 7 of curve 'b' lie at or past"
-    )
+    assert problem.startswith("bad.csv: the point in line 5 and the point in line 7 of curve 'b' lie at or past")
     write("bad.csv", PAIR + ",5,0,0,1\n")
     assert fails("fit bad.csv --space s:2 --curve id -o bad.npz") == "bad.csv, line 7: column 'id' is empty"

@@ -11,10 +11,7 @@ import symspline as ss
 
 RNG = np.random.default_rng(0)
 T = np.arange(60.0)
-LON, LAT = (
-    10 + 1e-2 * T + 1e-2 * RNG.standard_normal(60),
-    50 + np.sin(T / 20) + 1e-2 * RNG.standard_normal(60),
-)
+LON, LAT = (10 + 1e-2 * T + 1e-2 * RNG.standard_normal(60), 50 + np.sin(T / 20) + 1e-2 * RNG.standard_normal(60))
 PLACES = ss.geo.from_lonlat(LON, LAT)
 
 # What is compared with the command line warns of straight curves, which it reports in its summary.
@@ -66,11 +63,9 @@ def test_times_may_repeat(run, fails):
     run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
     near(ss.load("a.npz"), ss.make_smoothing_spline(T[:30], PLACES[::2], "sphere:2"))
     write_table("a.csv", {"t": -(T // 2), "lon": LON, "lat": LAT})
-    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith(
-        "must not decrease; --sort puts rows in order"
-    )
+    assert fails("fit a.csv --lonlat --smooth -o b.npz").endswith("must not decrease; --sort puts rows in order")
     write_table("a.csv", {"t": T - T, "lon": LON, "lat": LAT})
-    assert "The data lie at one time" in fails("fit a.csv --lonlat --smooth -o b.npz")
+    assert "The data have one time only" in fails("fit a.csv --lonlat --smooth -o b.npz")
 
 
 def test_segments_and_several_curves(run):
@@ -142,10 +137,7 @@ def test_contradicting_options(fails):
         ("--smooth --dedup mean", "with --smooth all points of one time count; omit --dedup mean"),
         ("--sigma 0.1", "--sigma is for noisy data; give --smooth, too"),
         ("--robust", "--robust is for noisy data; give --smooth, too"),
-        (
-            "--smooth b.csv",
-            "--smooth b.csv: give gcv, reml or a number; write the name of the table before",
-        ),
+        ("--smooth b.csv", "--smooth b.csv: give gcv, reml or a number; write the name of the table before"),
         ("--smooth 1_0", "--smooth 1_0: give gcv"),
         ("--smooth=-1", "--smooth -1: -1 is not a finite number >= 0"),
         ("--smooth nan", "--smooth nan: nan is not a finite number >= 0"),
@@ -157,10 +149,7 @@ def test_contradicting_options(fails):
 
 
 def test_a_bad_point_is_named_by_its_line(fails):
-    write(
-        "b.csv",
-        "id,t,x,y,z\n" + "".join(f"{'ab'[i > 2]},{i},1,0,{'0' if i != 4 else '2'}\n" for i in range(7)),
-    )
+    write("b.csv", "id,t,x,y,z\n" + "".join(f"{'ab'[i > 2]},{i},1,0,{'0' if i != 4 else '2'}\n" for i in range(7)))
     assert "line 6" in fails("fit b.csv --space sphere:2 --curve id --smooth -o b.npz")
 
 

@@ -27,10 +27,7 @@ def test_dates_under_a_usual_name_are_the_time(run):
         "Date (UTC)",
         "utc",
     ]:
-        write(
-            "a.csv",
-            f"{name},x\n" + "".join(f"{date},{x}\n" for date, x in zip(DATES, [0, 1, 5], strict=True)),
-        )
+        write("a.csv", f"{name},x\n" + "".join(f"{date},{x}\n" for date, x in zip(DATES, [0, 1, 5], strict=True)))
         run("fit a.csv --space r:1 -o a.npz")
         np.testing.assert_array_equal(ss.load("a.npz").t, HOURS)
         run("sample a.npz --every 6h -o b.csv")
@@ -111,9 +108,7 @@ def test_days_as_one_number_are_refused(run, fails):
 def test_days_as_one_number_are_found_under_any_name(run, fails):
     tabled(seen=[20210829, 20210831, 20210901])
     assert "seen may hold the times; say --time seen" in fails("fit a.csv --space r:1 --columns x -o a.npz")
-    assert "which is a day but not a number" in fails(
-        "fit a.csv --space r:1 --columns x --time seen -o a.npz"
-    )
+    assert "which is a day but not a number" in fails("fit a.csv --space r:1 --columns x --time seen -o a.npz")
     run("fit a.csv --space r:1 --columns x --time none -o a.npz")
     # No days: of another century, or with numbers that no month has.
     for cells in ([18990829, 18990830, 18990831], [20211329, 20211330, 20211331], [0.5, 20210829, 20210830]):

@@ -36,9 +36,7 @@ def test_a_fit_is_that_of_the_library(run):
     write("axes.csv", AXES)
     out = run("fit axes.csv --space sphere:2 --bc-type not-a-knot,clamped --extrapolate geodesic -o axes.npz")
     assert out.startswith("axes.npz: 1 curve through 3 points of sphere:2, converged: quasi-newton, ")
-    spline = ss.CubicSpline(
-        [0, 1, 3], np.eye(3), "sphere:2", bc_type=("not-a-knot", "clamped"), extrapolate="geodesic"
-    )
+    spline = ss.CubicSpline([0, 1, 3], np.eye(3), "sphere:2", bc_type=("not-a-knot", "clamped"), extrapolate="geodesic")
     loaded = ss.load("axes.npz")
     assert loaded == spline and loaded.extrapolate == "geodesic"
     run("sample axes.npz -n 7 --nu 0,1,2 -o out.csv")
@@ -59,9 +57,7 @@ def test_options_of_the_solver(run, fails):
     assert "--tol" in fails("fit axes.csv --space s:2 --tol x -o b.npz")
     assert fails("fit axes.csv --space s:2 --bc-type foo -o b.npz").startswith("--bc-type foo: give natural")
     assert fails("fit axes.csv --space s:2 --bc-type periodic,natural -o b.npz").startswith("--bc-type")
-    assert fails("fit axes.csv --space s:2 --bc-type periodic -o b.npz").startswith(
-        "axes.csv: bc_type='periodic'"
-    )
+    assert fails("fit axes.csv --space s:2 --bc-type periodic -o b.npz").startswith("axes.csv: bc_type='periodic'")
 
 
 def test_rows_without_times_are_at_whole_numbers(run):
@@ -120,19 +116,12 @@ def test_samples_at_given_times(run, fails):
     write("at.csv", "when\n1\n")
     run("sample pair.npz --at at.csv -o out.csv")
     write("at.csv", "t,id\n1.5,q\n")
-    assert (
-        fails("sample pair.npz --at at.csv -o x.csv")
-        == "at.csv, line 2: there is no curve 'q'; there are a, b"
-    )
+    assert fails("sample pair.npz --at at.csv -o x.csv") == "at.csv, line 2: there is no curve 'q'; there are a, b"
     write("at.csv", "t\n1.5\n2.5\n")
-    problem = (
-        "at.csv, line 3: time 2.5 is outside curve 'b', which runs from 1.0 to 2.0; fit with --extrapolate"
-    )
+    problem = "at.csv, line 3: time 2.5 is outside curve 'b', which runs from 1.0 to 2.0; fit with --extrapolate"
     assert fails("sample pair.npz --at at.csv -o x.csv").startswith(problem)
     write("at.csv", "when,id\n1.5,a\n")
-    assert "at.csv has no column 't' of times; there are when, id" in fails(
-        "sample pair.npz --at at.csv -o x.csv"
-    )
+    assert "at.csv has no column 't' of times; there are when, id" in fails("sample pair.npz --at at.csv -o x.csv")
     write("at.csv", "t\n2020-01-01\n")
     assert "are numbers, but these are dates" in fails("sample pair.npz --at at.csv -o x.csv")
 
@@ -155,10 +144,7 @@ def test_bad_usage(run, fails):
     run("fit a.csv --space s:2 -o a.npz")
     assert fails("").endswith("(see symspline --help)")
     assert "invalid choice: 'ft'" in fails("ft")
-    assert (
-        fails("fit a.csv --space s:2")
-        == "the following arguments are required: -o (see symspline fit --help)"
-    )
+    assert fails("fit a.csv --space s:2") == "the following arguments are required: -o (see symspline fit --help)"
     assert "unrecognized arguments: --tiem" in fails("fit a.csv --space s:2 --tiem t -o b.npz")
     assert "--every -n --at is required" in fails("sample a.npz -o b.csv")
     assert "--" in fails("sample a.npz --every=-- -o b.csv")

@@ -1,9 +1,7 @@
 """Tables whose curves would be wrong without a warning or an error."""
 
-import csv
-
 import numpy as np
-from tabular import write
+from tabular import read_table, write
 
 import symspline as ss
 
@@ -80,24 +78,15 @@ def noisy_turns():
     return t, turns, ss.rotations.as_quaternions(turns, scalar_first=True), 3 * rng.standard_normal((60, 3))
 
 
-def rows(path):
-    with open(path, newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def column(path, name):
-    return np.array([float(row[name]) for row in rows(path)])
-
-
 def test_deviations_beside_quaternions_are_of_quaternions(run):
     t, _, q, _ = noisy_turns()
     lines = (",".join(map(repr, [a, *b])) + "\n" for a, b in zip(t.tolist(), q.tolist(), strict=True))
     write("q.csv", "t,qw,qx,qy,qz\n" + "".join(lines))
     run("fit q.csv --space so:3 -o q.npz --smooth")
     run("sample q.npz -n 9 --nu 0,1 -o s.csv")
-    spline, x = ss.load("q.npz"), column("s.csv", "t")
-    np.testing.assert_allclose(column("s.csv", "std"), spline.std(x) / 2, rtol=1e-12)
-    np.testing.assert_allclose(column("s.csv", "std_d1"), spline.std(x, nu=1) / 2, rtol=1e-12)
+    spline, x = ss.load("q.npz"), read_table("s.csv")["t"]
+    np.testing.assert_allclose(read_table("s.csv")["std"], spline.std(x) / 2, rtol=1e-12)
+    np.testing.assert_allclose(read_table("s.csv")["std_d1"], spline.std(x, nu=1) / 2, rtol=1e-12)
     # A turn by a small angle moves the quaternion half as far.
     moved = spline.space.exp(spline(1.0), spline.std(1.0) * spline.space.frame(spline(1.0))[0])
     here, there = ss.rotations.as_quaternions(np.stack([spline(1.0), moved]), scalar_first=True)
@@ -109,7 +98,7 @@ def test_deviations_beside_matrices_are_radians(run):
     np.savez("m.npz", t=t, points=turns)
     run("fit m.npz --space so:3 -o c.npz --smooth")
     run("sample c.npz -n 9 -o s.csv")
-    np.testing.assert_allclose(column("s.csv", "std"), ss.load("c.npz").std(column("s.csv", "t")), rtol=1e-12)
+    np.testing.assert_allclose(read_table("s.csv")["std"], ss.load("c.npz").std(read_table("s.csv")["t"]), rtol=1e-12)
 
 
 def test_deviations_of_poses_are_of_place_and_rotation(run):
@@ -117,10 +106,10 @@ def test_deviations_of_poses_are_of_place_and_rotation(run):
     np.savez("m.npz", t=t, points=ss.poses.join(turns, places))
     run("fit m.npz --space se:3 -o c.npz --smooth 0.1")
     run("sample c.npz -n 9 --nu 0,1 -o s.csv")
-    spline, x = ss.load("c.npz"), column("s.csv", "t")
+    spline, x = ss.load("c.npz"), read_table("s.csv")["t"]
     for name, expected in zip(("std_rotation", "std_position"), spline.std(x), strict=True):
-        np.testing.assert_allclose(column("s.csv", name), expected, rtol=1e-12)
-    assert "std" not in rows("s.csv")[0] and "std_position_d1" in rows("s.csv")[0]
+        np.testing.assert_allclose(read_table("s.csv")[name], expected, rtol=1e-12)
+    assert "std" not in read_table("s.csv") and "std_position_d1" in read_table("s.csv")
     write("p.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + "".join(
         ",".join(map(repr, [a, *p.tolist(), *q.tolist()])) + "\n"
         for a, p, q in zip(t.tolist(), places, ss.rotations.as_quaternions(turns, scalar_first=False), strict=True)
@@ -128,14 +117,14 @@ def test_deviations_of_poses_are_of_place_and_rotation(run):
     run("fit p.csv --space se:3 -o c.npz --smooth 0.1")
     run("sample c.npz -n 9 -o s.csv")
     # Beside quaternions, half the angle.
-    turn, place = ss.load("c.npz").std(column("s.csv", "t"))
-    np.testing.assert_allclose(column("s.csv", "std_rotation"), turn / 2, rtol=1e-12)
-    np.testing.assert_allclose(column("s.csv", "std_position"), place, rtol=1e-12)
+    turn, place = ss.load("c.npz").std(read_table("s.csv")["t"])
+    np.testing.assert_allclose(read_table("s.csv")["std_rotation"], turn / 2, rtol=1e-12)
+    np.testing.assert_allclose(read_table("s.csv")["std_position"], place, rtol=1e-12)
     run("fit p.csv --space 'so:3 x r:3' --columns qw,qx,qy,qz,tx,ty,tz -o c.npz --smooth")
     run("sample c.npz -n 9 -o s.csv")
-    turn, place = ss.load("c.npz").std(column("s.csv", "t"))
-    np.testing.assert_allclose(column("s.csv", "std1"), turn / 2, rtol=1e-12)
-    np.testing.assert_allclose(column("s.csv", "std2"), place, rtol=1e-12)
+    turn, place = ss.load("c.npz").std(read_table("s.csv")["t"])
+    np.testing.assert_allclose(read_table("s.csv")["std1"], turn / 2, rtol=1e-12)
+    np.testing.assert_allclose(read_table("s.csv")["std2"], place, rtol=1e-12)
 
 
 def test_escape_characters_do_not_reach_the_terminal(run, fails):

@@ -161,9 +161,7 @@ ANGLES = [
 
 def axes(rng):
     """Axes in all directions, along coordinates, and almost."""
-    some = np.concatenate(
-        [rng.standard_normal((40, 3)), np.eye(3), -np.eye(3), np.eye(3) + 1e-9, 1 - np.eye(3)]
-    )
+    some = np.concatenate([rng.standard_normal((40, 3)), np.eye(3), -np.eye(3), np.eye(3) + 1e-9, 1 - np.eye(3)])
     return some / np.linalg.norm(some, axis=-1, keepdims=True)
 
 
@@ -194,9 +192,7 @@ def test_the_scalar_part_near_pi(rng):
     """It is small there, and right to ε of what the matrix holds."""
     for gap in 10.0 ** np.arange(-12, 0):
         q = np.concatenate([np.full((52, 1), np.sin(gap / 2)), np.cos(gap / 2) * axes(rng)], axis=-1)
-        back = convert.matrix_to_quaternion(
-            convert.quaternion_to_matrix(q, scalar_first=True), scalar_first=True
-        )
+        back = convert.matrix_to_quaternion(convert.quaternion_to_matrix(q, scalar_first=True), scalar_first=True)
         assert np.abs(back[:, 0] - np.sin(gap / 2)).max() <= 4 * EPS
 
 
@@ -287,9 +283,7 @@ def test_single_precision_is_enough(call, value, order):
 def test_error_names_the_first_invalid_entry(call, value, order):
     many = np.tile(value, (2, 3, *(1,) * np.ndim(value)))
     many[1, 2] = many[0, 1] = -3.0
-    with pytest.raises(
-        ss.ValidationError, match=r"^[a-z]+\[0, 1\] is (not|n't|too)|^[a-z]+\[0, 1\] does not"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"^[a-z]+\[0, 1\] is (not|n't|too)|^[a-z]+\[0, 1\] does not"):
         call(many, **order)
     many = np.tile(value, (2, 3, *(1,) * np.ndim(value)))
     many[1, 2].flat[0] = np.nan
@@ -305,11 +299,7 @@ def test_invalid_point_arrays_raise(call, value, order, bad):
 
 
 BAD = [
-    (
-        convert.hyperboloid_to_ball,
-        [2.0, 0.0, 0.0],
-        r"not on the hyperboloid.* is 2\.0, but .* is 1\.0; .*project",
-    ),
+    (convert.hyperboloid_to_ball, [2.0, 0.0, 0.0], r"not on the hyperboloid.* is 2\.0, but .* is 1\.0; .*project"),
     (convert.hyperboloid_to_ball, [-1.25, 0.75, 0.0], r"not on the hyperboloid.* -1\.25"),
     (convert.hyperboloid_to_ball, [1e17, 1e17, 0.0], "too distant for the ball.*half-space"),
     (convert.hyperboloid_to_half_space, [1.0, 0.1], "not on the hyperboloid"),
@@ -327,11 +317,7 @@ BAD = [
     (convert.projector_to_basis, [[1.0, 1.0], [0.0, 0.0]], r"not Hermitian: .* 1\.000e\+00"),
     (convert.projector_to_basis, [[0.5, 0.0], [0.0, 0.5]], r"not a projector: .* 2\.500e-01"),
     (convert.projector_to_basis, [[1e200, 0.0], [0.0, 0.5]], "not a projector"),
-    (
-        convert.projector_to_basis,
-        [np.eye(2), np.diag([1.0, 0.0])],
-        r"projector\[1\] has rank 1, but others .* 2;",
-    ),
+    (convert.projector_to_basis, [np.eye(2), np.diag([1.0, 0.0])], r"projector\[1\] has rank 1, but others .* 2;"),
     (convert.projector_to_basis, np.zeros((2, 2)), "zero or empty"),
     (convert.projector_to_basis, np.zeros((0, 2, 2)), "zero or empty"),
     (convert.projector_to_basis, np.zeros((2, 3)), "square"),
@@ -343,9 +329,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("call", "value", "message"), BAD, ids=[f"{c.__name__}-{i}" for i, (c, *_) in enumerate(BAD)]
-)
+@pytest.mark.parametrize(("call", "value", "message"), BAD, ids=[f"{c.__name__}-{i}" for i, (c, *_) in enumerate(BAD)])
 def test_invalid_points_raise(call, value, message):
     with pytest.raises(ss.ValidationError, match=message):
         call(value)

@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from dataclasses import replace
 
 import demo
 import hurdat
@@ -10,7 +11,6 @@ import pytest
 import tracks
 
 import symspline as ss
-from symspline._pairs import Segments, pairs
 from symspline.geo import from_lonlat, to_lonlat
 
 HOUR = np.timedelta64(1, "h")
@@ -76,10 +76,11 @@ def test_jumps_are_found_where_there_are_some(splines):
     spline = splines[0]
     bent = spline.velocities.copy()
     bent[3] *= 1.01
-    pieces = Segments(spline.space, *map(pairs, (spline.t, spline.points, bent)))
+    slerp = tracks.slerp_pieces(spline)
+    pieces = replace(slerp, velocities=np.stack([bent[:-1], bent[1:]], axis=1))
     _, velocity, acceleration = tracks.relative_jumps(pieces)
     assert velocity < 1e-12 and acceleration > 1e-3
-    position, velocity, _ = tracks.relative_jumps(tracks.slerp_pieces(spline))
+    position, velocity, _ = tracks.relative_jumps(slerp)
     assert position < 1e-12 and velocity > 1e-2
 
 
@@ -135,9 +136,7 @@ def test_demo_writes_its_files(tmp_path, capsys):
         assert list(arrays) == list(rows[0]) == ["storm", "time", "lon", "lat", "speed_kmh"]
         assert len(rows) == len(arrays["time"]) == 6007
         np.testing.assert_array_equal([row["storm"] for row in rows], arrays["storm"])
-        np.testing.assert_array_equal(
-            np.array([row["time"] for row in rows], "datetime64[m]"), arrays["time"]
-        )
+        np.testing.assert_array_equal(np.array([row["time"] for row in rows], "datetime64[m]"), arrays["time"])
         for name, error in (("lon", 6e-6), ("lat", 6e-6), ("speed_kmh", 6e-4)):
             np.testing.assert_allclose([float(row[name]) for row in rows], arrays[name], rtol=0, atol=error)
         own = arrays["storm"] == "Gaston 2022"

@@ -3,19 +3,7 @@ each other."""
 
 import numpy as np
 import pytest
-from cases import (
-    CASES,
-    ENDS,
-    LARGE,
-    LOOPS,
-    REPRESENTATIVE,
-    Case,
-    grouped,
-    loop,
-    loop_over,
-    unit_tangent,
-    walk,
-)
+from cases import CASES, ENDS, LARGE, LOOPS, REPRESENTATIVE, Case, grouped, loop, loop_over, unit_tangent, walk
 from changes import by_differences, data, inside, motion, moved
 from curves import S2, pair_of_curves
 
@@ -28,9 +16,7 @@ ALL_ENDS = [*ENDS, "turned"]
 EACH = {
     case.name: [
         (case, end)
-        for end in (
-            ALL_ENDS if case.space in REPRESENTATIVE else sorted({"mixed", "periodic", ALL_ENDS[i % 8]})
-        )
+        for end in (ALL_ENDS if case.space in REPRESENTATIVE else sorted({"mixed", "periodic", ALL_ENDS[i % 8]}))
     ]
     for i, case in enumerate(CASES)
 }
@@ -118,9 +104,7 @@ def test_batch_derivatives_match_single_curves():
     space, rng = ss.Sphere(2), np.random.default_rng(8)
     t = np.array([0.0, 1.0, 2.5, 3.0])
     points = np.array([[walk(space, 0.5, 4, rng) for _ in range(3)] for _ in range(2)])
-    vector = 0.3 * np.array([unit_tangent(space, p, rng) for p in points[:, :, 0].reshape(-1, 3)]).reshape(
-        2, 3, 3
-    )
+    vector = 0.3 * np.array([unit_tangent(space, p, rng) for p in points[:, :, 0].reshape(-1, 3)]).reshape(2, 3, 3)
     bc = ((1, vector), "natural")
     spline = ss.CubicSpline(t, points, space, bc_type=bc)
     x = rng.uniform(0, 3, (2, 2))
@@ -249,13 +233,10 @@ def test_derivatives_of_a_loop(name, rng):
     for nu, expected in enumerate(by_differences(space, t, p, "periodic", change, x, (0, 1))):
         found = spline.jvp(x, *change, nu=nu)
         assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
-        cotangent = rng.normal(size=found.shape) + (
-            1j * rng.normal(size=found.shape) if found.dtype == complex else 0
-        )
+        cotangent = rng.normal(size=found.shape) + (1j * rng.normal(size=found.shape) if found.dtype == complex else 0)
         gradient = spline.vjp(x, cotangent, nu=nu)
         left, *right = (
-            np.vdot(a, b).real
-            for a, b in ((cotangent, found), (gradient.points, change[0]), (gradient.t, change[1]))
+            np.vdot(a, b).real for a, b in ((cotangent, found), (gradient.points, change[0]), (gradient.t, change[1]))
         )
         assert abs(left - sum(right)) <= 1e-12 * np.linalg.norm(cotangent) * np.linalg.norm(found)
 
@@ -281,9 +262,7 @@ def test_derivatives_of_a_loop_that_ends_in_another_array(name, rng):
 @pytest.mark.parametrize("own_knots", [False, True])
 def test_derivatives_of_an_empty_batch(own_knots):
     t = np.tile(np.arange(3.0), (2, 1)) if own_knots else None
-    none = ss.CubicSpline(
-        t, np.stack([np.eye(3), np.eye(3)[[1, 0, 2]]]), S2, bc_type=((1, np.zeros(3)), "natural")
-    )[:0]
+    none = ss.CubicSpline(t, np.stack([np.eye(3), np.eye(3)[[1, 0, 2]]]), S2, bc_type=((1, np.zeros(3)), "natural"))[:0]
     assert none.jvp([0.5, 1.0], points=none.points).shape == (0, 2, 3)
     gradient = none.vjp([0.5, 1.0], np.zeros((0, 2, 3)))
     assert gradient.points.shape == (0, 3, 3)

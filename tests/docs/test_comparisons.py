@@ -167,9 +167,7 @@ def test_tables_find_their_place(tmp_path):
 
 def test_figure_is_drawn(tmp_path):
     file = tmp_path / "figure.png"
-    loglog(
-        file, (3, 6, 12), {"one": (1.0, 0.1, 0.01), "other": (1.0, 0.5, 0.2)}, {"one": 4}, "error", "title"
-    )
+    loglog(file, (3, 6, 12), {"one": (1.0, 0.1, 0.01), "other": (1.0, 0.5, 0.2)}, {"one": 4}, "error", "title")
     assert file.stat().st_size > 1000
 
 

@@ -45,10 +45,7 @@ def test_fifty_digits_are_those_of_a_dense_solution():
     rng = np.random.default_rng(1)
     t, y, lam = np.sort(rng.random(9)), rng.standard_normal(9), 1e-3
     h = np.diff(t)
-    q, r = (
-        np.zeros((9, 7)),
-        np.diag((h[1:] + h[:-1]) / 3) + np.diag(h[1:-1] / 6, 1) + np.diag(h[1:-1] / 6, -1),
-    )
+    q, r = (np.zeros((9, 7)), np.diag((h[1:] + h[:-1]) / 3) + np.diag(h[1:-1] / 6, 1) + np.diag(h[1:-1] / 6, -1))
     for j in range(7):
         q[j : j + 3, j] = 1 / h[j], -1 / h[j] - 1 / h[j + 1], 1 / h[j + 1]
     dense = np.linalg.solve(np.eye(9) + lam * q @ np.linalg.solve(r, q.T), y)

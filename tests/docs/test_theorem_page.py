@@ -198,10 +198,7 @@ def test_the_condition_on_any_knots(setting):
     for i in range(1, 5):
         here = Group(space, near[i])
         sides = []
-        for h, handle, other, end in (
-            (t[i + 1] - t[i], *controls[i, 1:]),
-            (t[i] - t[i - 1], *controls[i - 1, 2::-1]),
-        ):
+        for h, handle, other, end in ((t[i + 1] - t[i], *controls[i, 1:]), (t[i] - t[i - 1], *controls[i - 1, 2::-1])):
             v = space.log(near[i], handle)
             w = space.log(near[i], space.transvection(near[i], -v, other))
             side = here.vector(here.unstretch(here.element(v), here.element(w - v))) / h**2

@@ -11,9 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from curves import (
-    S2,
-)
+from curves import S2
 from refused import INF, NAN, P
 from stored import archive, load, npy, stored, with_arrays
 
@@ -61,14 +59,7 @@ def test_files_with_many_bad_bytes(kind):
         assert is_good_or_refused(bad.tobytes(), kind)
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        zipfile.ZIP_DEFLATED,
-        zipfile.ZIP_BZIP2,
-        zipfile.ZIP_LZMA,
-    ],
-)
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_compressed_files(method):
     file = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(stored())) as source, zipfile.ZipFile(file, "w", method) as target:
@@ -113,13 +104,7 @@ def test_messages_name_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "data",
-    [
-        npy(np.eye(3)),
-        archive(readme__txt="hello"),
-        stored()[:500],
-    ],
-    ids=["array", "archive", "truncated"],
+    "data", [npy(np.eye(3)), archive(readme__txt="hello"), stored()[:500]], ids=["array", "archive", "truncated"]
 )
 def test_files_are_closed_when_refused(tmp_path, data):
     (tmp_path / "curve.npz").write_bytes(data)
@@ -166,14 +151,11 @@ def report_with(**changes):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"format": "other"},
         {"version": 99},
         {"version": "one"},
-        {"space": "klein:2"},
         {"space": "sphere:3"},
         {"space": "sphere:" + "9" * 30},
         {"space": "sphere:2 x sphere:2"},
-        {"t": [0.0, 2, 1]},
         {"t": [0.0, 1, 1]},
         {"t": [0.0, NAN, 1]},
         {"t": [0.0, 1, INF]},
@@ -186,7 +168,6 @@ def report_with(**changes):
         {"t_unit": "parsec", "t": [0, 1, 2]},
         {"t_unit": "s CET", "t": [0, 1, 2]},
         {"t_unit": "s", "t": [0, 1, np.iinfo(np.int64).min]},
-        {"points": 2 * P},
         {"points": NAN * P},
         {"points": P + 0j},
         {"points": 3.0},
@@ -195,44 +176,23 @@ def report_with(**changes):
         {"velocities": P[:2]},
         {"velocities": NAN * P},
         {"bc_type": "{"},
-        {"bc_type": "5"},
         {"bc_type": "null"},
         {"extrapolate": '"foo"'},
         {"extrapolate": "[1]"},
         {"report": "[]"},
         {"report": "{}"},
         {"report": "[{}]"},
-        {"report": "5"},
         {"report": "[" * 100_000},
-        {"report": report_with(surprise=1)},
+        {"report": report_with(converged="no", rate={}, method=5)},
+        {"t": [0.0], "points": P[:1], "velocities": P[:1]},
+        {"bc_type": "{}"},
+        {"bc_type": '[["x", 1], "natural"]'},
     ],
     ids=lambda changes: str(changes)[:40],
 )
 def test_files_with_a_wrong_array(changes):
     with pytest.raises(ss.ValidationError):
         load(with_arrays(**changes))
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"t": [0.0], "points": P[:1], "velocities": P[:1]},
-        {"bc_type": '"foo"'},
-        {"bc_type": "{}"},
-        {"bc_type": '[["x", 1], "natural"]'},
-        {"velocities": P},
-        {"report": report_with(converged="no", rate={}, method=5)},
-    ],
-    ids=lambda changes: str(changes)[:40],
-)
-def test_files_with_a_wrong_array_that_are_read_all_the_same(changes):
-    with pytest.raises(ss.ValidationError):
-        load(with_arrays(**changes))
-
-
-def test_newer_files_say_so():
-    with pytest.raises(ss.ValidationError, match=r"entry 'version' is 99; this symspline reads version 1"):
-        load(with_arrays(version=99))
 
 
 def test_files_that_cannot_be_read(tmp_path):
@@ -270,9 +230,7 @@ def bomb(name, method, size=2**26, **more):
     """A small archive with an entry of 64 MiB, zeros all of them."""
     file = io.BytesIO(with_arrays(**{name: None} | more))
     with zipfile.ZipFile(file, "a", method) as target, target.open(f"{name}.npy", "w") as entry:
-        np.lib.format.write_array_header_1_0(
-            entry, {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
-        )
+        np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)})
         for _ in range(size // 2**20):
             entry.write(bytes(2**20))
     return file.getvalue()
@@ -284,9 +242,7 @@ def test_archives_that_unpack_to_far_more_than_their_size(name, method):
     data = bomb(name, method)
     tracemalloc.start()
     try:
-        with pytest.raises(
-            ss.ValidationError, match=rf"the file: entry '{name}' would take 671\d+ bytes of memory"
-        ):
+        with pytest.raises(ss.ValidationError, match=rf"the file: entry '{name}' would take 671\d+ bytes of memory"):
             load(data)
         assert tracemalloc.get_traced_memory()[1] < 2**24
     finally:
@@ -306,9 +262,7 @@ def test_unknown_entries_are_not_read():
 def test_arrays_that_are_smaller_than_their_header_says():
     file = io.BytesIO(with_arrays(points=None))
     with zipfile.ZipFile(file, "a") as target, target.open("points.npy", "w") as entry:
-        np.lib.format.write_array_header_1_0(
-            entry, {"descr": "<f8", "fortran_order": False, "shape": (2**40, 3)}
-        )
+        np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False, "shape": (2**40, 3)})
     with pytest.raises(ss.ValidationError, match="entry 'points' is damaged: it has 0 bytes"):
         load(file.getvalue())
 
@@ -318,6 +272,7 @@ def test_arrays_that_are_smaller_than_their_header_says():
     [
         ({"format": "other"}, "entry 'format' is 'other', but must be 'symspline-curve'"),
         ({"format": 3}, "entry 'format' is not a text: it holds int64"),
+        ({"version": 99}, "entry 'version' is 99; this symspline reads version 1"),
         ({"version": 1.5}, "entry 'version' is 1.5; this symspline reads version 1"),
         ({"version": 0}, "entry 'version' is 0; this symspline reads version 1"),
         ({"version": [1, 1]}, r"entry 'version' is \[1, 1\]"),
@@ -334,10 +289,7 @@ def test_arrays_that_are_smaller_than_their_header_says():
         ({"bc_type": '[[1, "x"], "natural"]'}, "entry 'bc_type': "),
         ({"report": "5"}, "entry 'report': it must be a list with one report for each of 1 factors"),
         ({"report": "[5]"}, "entry 'report': "),
-        (
-            {"report": report_with(method="magic")},
-            "entry 'report': the method is 'magic', but must be one of fixed",
-        ),
+        ({"report": report_with(method="magic")}, "entry 'report': the method is 'magic', but must be one of fixed"),
         ({"report": report_with(method=5)}, "entry 'report': the method is 5"),
         ({"report": report_with(surprise=5)}, "entry 'report': there is no field 'surprise'"),
         ({"report": report_with(max_gap=5)}, "entry 'report': there is no field 'max_gap'"),
@@ -362,19 +314,16 @@ def many_with(**changes):
     file = io.BytesIO()
     curve = ss.CubicSpline(None, P, S2)
     ss.save_many({"a": curve, "b": curve}, file)
-    arrays = dict(np.load(io.BytesIO(file.getvalue()))) | changes
-    file = io.BytesIO()
-    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    file.seek(0)
+    arrays, file = dict(np.load(file)) | changes, io.BytesIO()
+    np.savez(file, **arrays)
     return io.BytesIO(file.getvalue())
 
 
 @pytest.mark.parametrize(
     "changes, message",
     [
-        (
-            {"format": "symspline-hermite"},
-            "this file holds one curve or a batch; read it with symspline.load",
-        ),
+        ({"format": "symspline-hermite"}, "this file holds one curve or a batch; read it with symspline.load"),
         ({"format": "other"}, "entry 'format' is 'other', but must be 'symspline-curves'"),
         ({"names": '["a"]'}, "entry 'names' must be a list with one value for each of 2 curves"),
         ({"names": '["a", "a"]'}, "entry 'names' must hold texts, none of them twice"),

@@ -31,8 +31,6 @@ def sweeps(space, p, ends="natural"):
         q_minus = [None] + [e(p[i], -v[i], p[i]) for i in range(1, n + 1)]
         delta = np.zeros_like(v)
         for i in range(1, n):
-            delta[i] = (
-                log(p[i], e(p[i], -v[i], q_minus[i + 1])) - log(p[i], e(p[i], v[i], q_plus[i - 1])) - 2 * v[i]
-            )
+            delta[i] = log(p[i], e(p[i], -v[i], q_minus[i + 1])) - log(p[i], e(p[i], v[i], q_plus[i - 1])) - 2 * v[i]
         yield v.copy(), max(float(space.norm(p[i], delta[i])) for i in range(1, n))
         v[1:n] += delta[1:n] / 4

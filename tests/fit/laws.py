@@ -15,6 +15,4 @@ def ends_along(kind, space, p):
 
 
 def knots(kind, n, rng):
-    return np.concatenate(
-        [[0.0], np.cumsum(np.ones(n - 1) if kind == "uniform" else rng.uniform(0.7, 1.3, n - 1))]
-    )
+    return np.concatenate([[0.0], np.cumsum(np.ones(n - 1) if kind == "uniform" else rng.uniform(0.7, 1.3, n - 1))])

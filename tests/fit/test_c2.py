@@ -34,12 +34,7 @@ def rng():
 # more by Newton's method than the law of derivatives says.
 METHODS = ("fixed-point", "quasi-newton", "newton")
 TURNS = [
-    (
-        case,
-        METHODS[(i + j) % (3 if case.space.dim < 15 else 2)],
-        ("random", "uniform")[(i + j) // 3 % 2],
-        ends,
-    )
+    (case, METHODS[(i + j) % (3 if case.space.dim < 15 else 2)], ("random", "uniform")[(i + j) // 3 % 2], ends)
     for i, case in enumerate(CASES)
     for j, ends in enumerate(ENDS)
 ]
@@ -49,10 +44,7 @@ for case in LARGE:
 for case in CASES:
     if case.space in REPRESENTATIVE:
         KINDS[case.name] = [
-            (case, method, spacing, ends)
-            for method in METHODS
-            for spacing in ("uniform", "random")
-            for ends in ENDS
+            (case, method, spacing, ends) for method in METHODS for spacing in ("uniform", "random") for ends in ENDS
         ]
 
 
@@ -86,13 +78,7 @@ def test_the_curve_is_c2(case, method, spacing, ends, rng):
         assert space.distance(spline(t), p).max() <= 10 * EPS * condition(space, p)
         # The acceleration holds S(v)⁻¹, which for the longest legs is 4.
         largest = max(jumps(spline))
-        assert largest <= (1.0 if step * sharpness(space) < 1.6 else 4.0), (
-            method,
-            spacing,
-            ends,
-            step,
-            largest,
-        )
+        assert largest <= (1.0 if step * sharpness(space) < 1.6 else 4.0), (method, spacing, ends, step, largest)
 
 
 @pytest.mark.parametrize("ends", ["natural", "not-a-knot", "clamped", "periodic"])

@@ -143,10 +143,7 @@ def test_a_long_closed_curve_closes():
     p[-1] = p[0]
     t = np.concatenate([[0], np.cumsum(rng.uniform(0.5, 1.5, 1300))])
     spline = ss.CubicSpline(t, p, "sphere:2", bc_type="periodic")
-    assert (
-        np.abs(spline.velocities[-1] - spline.velocities[0]).max()
-        <= 4 * EPS * np.abs(spline.velocities).max()
-    )
+    assert np.abs(spline.velocities[-1] - spline.velocities[0]).max() <= 4 * EPS * np.abs(spline.velocities).max()
     assert truth(spline).worst <= 1.0
 
 
@@ -258,19 +255,14 @@ def test_times_may_have_any_unit(unit, ends):
     space, t = ss.Sphere(2), np.array([0, 1, 2.5, 3.0])
     p = space.project(TRIANGLE / np.linalg.norm(TRIANGLE, axis=-1, keepdims=True))
     v = 0.5 * space.log(p[0], p[1])
-    many = {
-        "velocity": lambda s: ((1, v / s), "natural"),
-        "acceleration": lambda s: ((2, v / s / s), "natural"),
-    }
+    many = {"velocity": lambda s: ((1, v / s), "natural"), "acceleration": lambda s: ((2, v / s / s), "natural")}
     if ends == "acceleration" and not 1e-140 < unit < 1e140:
         # The acceleration is no double.
         return
     one, scaled = (
         ss.CubicSpline(t * s, p, space, bc_type=many[ends](s) if ends in many else ends) for s in (1.0, unit)
     )
-    same = replace(
-        scaled.report, max_gap=one.report.max_gap, alternative_energy=one.report.alternative_energy
-    )
+    same = replace(scaled.report, max_gap=one.report.max_gap, alternative_energy=one.report.alternative_energy)
     assert same == one.report
     assert scaled.report.max_gap == one.report.max_gap * unit
     assert np.array_equal(scaled.velocities * unit, one.velocities)
@@ -289,9 +281,7 @@ def test_length_is_a_double_where_it_can_be(unit):
             continue
         spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
         assert spline.length() == pytest.approx(10 * s, rel=0.1, abs=0)
-        straight = ss.CubicSpline(
-            np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2"
-        )
+        straight = ss.CubicSpline(np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
         assert straight.length() == pytest.approx(10 * s, rel=1e-14, abs=0)
 
 
@@ -322,9 +312,7 @@ def test_hyperbolic_curves_are_true_as_far_as_they_are_allowed(r):
 def test_hyperbolic_points_that_doubles_cannot_tell_apart_are_an_error(r):
     p = ss.Hyperbolic(2).project(far_out(r))
     p[:3] = far_out(1.0)[:3]
-    with pytest.raises(
-        ss.ValidationError, match=rf"points\[3\] .*distance {r:.1f}.* from \(1, 0, .*transvection"
-    ):
+    with pytest.raises(ss.ValidationError, match=rf"points\[3\] .*distance {r:.1f}.* from \(1, 0, .*transvection"):
         ss.CubicSpline(None, p, "h:2")
 
 

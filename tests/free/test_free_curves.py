@@ -10,6 +10,7 @@ from cases import (
     QUOTIENTS,
     apart,
     base_point,
+    by_differences,
     condition,
     every_family,
     has_metric,
@@ -18,6 +19,7 @@ from cases import (
     unit_tangent,
     walk,
 )
+from curves import clamped
 from scipy.interpolate import BSpline as FlatBSpline
 
 import symspline as ss
@@ -30,13 +32,13 @@ def rng():
     return np.random.default_rng(2007)
 
 
-def control_points(space, n, rng, step=0.4):
-    return walk(space, step, n, rng)
-
-
-def clamped(interior, degree, end=3.0):
-    """Knots from 0 to ``end`` at which the curve starts and ends in its control points."""
-    return np.concatenate([[0.0] * (degree + 1), interior, [end] * (degree + 1)])
+def assert_differences(curve, x, h):
+    """Derivatives are those by differences."""
+    velocity, acceleration = curve(x, 1), curve(x, 2)
+    scale = np.abs(acceleration).max() + np.abs(velocity).max()
+    found = by_differences(curve.space, curve, x, h)
+    assert np.abs(found[0] - velocity).max() <= 1e-5 * scale
+    assert np.abs(found[1] - acceleration).max() <= 1e-4 * scale
 
 
 def here(space, x, y, v):
@@ -91,10 +93,7 @@ def test_flat_space_is_scipy(kind, degree, rng):
     h = np.diff(np.unique(knots)).min()
     for nu in range(3):
         expected = np.moveaxis(flat(x, nu), 1, 0)
-        assert (
-            np.abs(ours(x, nu) - expected).max()
-            <= 100 * degree * EPS * np.abs(points).max() * (degree / h) ** nu
-        )
+        assert np.abs(ours(x, nu) - expected).max() <= 100 * degree * EPS * np.abs(points).max() * (degree / h) ** nu
     assert np.allclose(ours.speed(x), np.linalg.norm(ours(x, 1), axis=-1), rtol=1e-13, atol=1e-13)
 
 
@@ -136,7 +135,7 @@ def test_a_cubic_is_a_segment_of_the_spline(case, rng):
 def test_clamped_ends(case, degree, rng):
     space = case.space
     n = degree + 3
-    points = control_points(space, n, rng)
+    points = walk(space, 0.4, n, rng)
     knots = clamped([0.8, 1.7], degree)
     curve = ss.BSpline(knots, points, degree, space)
     allowed = 100 * EPS * condition(space, points)
@@ -167,7 +166,7 @@ def test_control_points_on_a_geodesic(case, degree, rng):
 @every_family
 def test_points_stay_on_the_space(case, rng):
     space = case.space
-    curve = ss.BSpline(clamped([1.0, 1.0, 2.0], 3), control_points(space, 7, rng), 3, space)
+    curve = ss.BSpline(clamped([1.0, 1.0, 2.0], 3), walk(space, 0.4, 7, rng), 3, space)
     x = np.linspace(0, 3, 50)
     space.check_point(curve(x))
     for nu in (1, 2):
@@ -178,34 +177,13 @@ def test_points_stay_on_the_space(case, rng):
 @every_family
 @loop_over("degree", [2, 3, 5])
 def test_derivatives_agree_with_differences(case, degree, rng):
-    space = case.space
-    knots = clamped([0.7, 1.9], degree)
-    curve = ss.BSpline(knots, control_points(space, degree + 3, rng), degree, space)
+    curve = ss.BSpline(clamped([0.7, 1.9], degree), walk(case.space, 0.4, degree + 3, rng), degree, case.space)
     # Inside the intervals: higher derivatives jump at knots.
-    x = np.array([0.1, 0.4, 0.6, 0.8, 1.2, 1.8, 2.1, 2.5, 2.9])
-    y = curve(x)
-
-    def differences(h):
-        plus, minus = (space.log(y, curve(x + s * h)) for s in (1, -1))
-        return (plus - minus) / (2 * h), (plus + minus) / h**2
-
-    # Richardson's extrapolation of central differences at h and h/2.
-    (d1, d2), (half1, half2) = differences(0.02), differences(0.01)
-    velocity, acceleration = curve(x, 1), curve(x, 2)
-    scale = np.abs(acceleration).max() + np.abs(velocity).max()
-    assert np.abs((4 * half1 - d1) / 3 - velocity).max() <= 1e-5 * scale
-    assert np.abs((4 * half2 - d2) / 3 - acceleration).max() <= 1e-4 * scale
+    assert_differences(curve, np.array([0.1, 0.4, 0.6, 0.8, 1.2, 1.8, 2.1, 2.5, 2.9]), 0.02)
 
 
 FAR = [
-    *(
-        ("sphere:2", 2.2),
-        ("hyperbolic:2", 2.2),
-        ("so:3", 2.4),
-        ("rp:2", 1.3),
-        ("gr:2,5", 1.3),
-        ("cgr:2,4", 1.3),
-    ),
+    *(("sphere:2", 2.2), ("hyperbolic:2", 2.2), ("so:3", 2.4), ("rp:2", 1.3), ("gr:2,5", 1.3), ("cgr:2,4", 1.3)),
     *(("so:5", 2.2), ("o:4", 2.2), ("u:1", 2.2), ("u:2", 2.2), ("u:5", 2.2), ("su:2", 2.8), ("su:3", 2.8)),
     *(("spd:2", 3.0), ("spd:3", 3.0), ("hpd:2", 3.0), ("hpd:5", 3.0), ("se:2", 2.6), ("se:3", 2.6)),
 ]
@@ -230,24 +208,13 @@ def test_derivatives_far_apart(name, step, rng):
     space = ss.space(name)
     for _ in range(5):
         curve = ss.BezierCurve(far_control_points(space, step, rng), space)
-        x = np.array([0.05, 0.15, 0.3, 0.7, 0.85, 0.95])
-        y = curve(x)
-
-        def differences(h, curve=curve, x=x, y=y):
-            plus, minus = (space.log(y, curve(x + s * h)) for s in (1, -1))
-            return (plus - minus) / (2 * h), (plus + minus) / h**2
-
-        (d1, d2), (half1, half2) = differences(0.01), differences(0.005)
-        velocity, acceleration = curve(x, 1), curve(x, 2)
-        scale = np.abs(acceleration).max() + np.abs(velocity).max()
-        assert np.abs((4 * half1 - d1) / 3 - velocity).max() <= 1e-5 * scale
-        assert np.abs((4 * half2 - d2) / 3 - acceleration).max() <= 1e-4 * scale
+        assert_differences(curve, np.array([0.05, 0.15, 0.3, 0.7, 0.85, 0.95]), 0.01)
 
 
 @every_family
 def test_curves_commute_with_isometries(case, rng):
     space = case.space
-    points = control_points(space, 6, rng)
+    points = walk(space, 0.4, 6, rng)
     o = base_point(space, rng)
     v, w = (0.8 * unit_tangent(space, o, rng) for _ in range(2))
 
@@ -266,11 +233,9 @@ def test_curves_commute_with_isometries(case, rng):
 @pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,4"])
 def test_the_array_of_a_point_does_not_matter(name, rng):
     space = ss.space(name)
-    points = control_points(space, 6, rng)
+    points = walk(space, 0.4, 6, rng)
     if len(space.point_shape) == 1:
-        turn = np.array([1, -1, -1, 1, -1, 1])[:, None] * (
-            np.exp(1j * np.arange(6))[:, None] if name[0] == "c" else 1
-        )
+        turn = np.array([1, -1, -1, 1, -1, 1])[:, None] * (np.exp(1j * np.arange(6))[:, None] if name[0] == "c" else 1)
         other = points * turn
     else:
         group = (ss.Unitary if name[0] == "c" else ss.Orthogonal)(2)
@@ -291,7 +256,7 @@ def test_curves_are_c1(case, degree, times, rng):
     """At knots that are repeated less often than the degree."""
     space = case.space
     interior = [0.8, *[1.5] * times, 2.1]
-    points = control_points(space, len(interior) + degree + 1, rng)
+    points = walk(space, 0.4, len(interior) + degree + 1, rng)
     curve = ss.BSpline(clamped(interior, degree), points, degree, space)
     back = backwards(curve)
     x = np.array([0.8, 1.5, 2.1])
@@ -306,7 +271,7 @@ def test_corners(case, rng):
     """At a knot repeated as often as the degree the curve goes through a control point, and has a velocity
     from either side."""
     space = case.space
-    points = control_points(space, 7, rng)
+    points = walk(space, 0.4, 7, rng)
     curve = ss.BSpline(clamped([1.0, 1.0, 1.0], 3), points, 3, space)
     points = curve.control_points
     allowed = 100 * EPS * condition(space, points)
@@ -331,7 +296,7 @@ def test_corners(case, rng):
 def test_curves_that_jump(case, rng):
     """At a knot repeated once more often than the degree."""
     space = case.space
-    points = control_points(space, 6, rng)
+    points = walk(space, 0.4, 6, rng)
     curve = ss.BSpline(clamped([1.0] * 3, 2), points, 2, space)
     points = curve.control_points
     allowed = 100 * EPS * condition(space, points)
@@ -343,7 +308,7 @@ def test_curves_that_jump(case, rng):
 
 def test_a_control_point_matters_near_its_knots_only(rng):
     space = ss.Sphere(2)
-    knots, points = clamped([0.5, 1.0, 1.5, 2.0, 2.5], 3), control_points(space, 9, rng)
+    knots, points = clamped([0.5, 1.0, 1.5, 2.0, 2.5], 3), walk(space, 0.4, 9, rng)
     moved = points.copy()
     moved[4] = space.exp(points[4], 0.1 * space.log(points[4], points[6]))
     x = np.linspace(0, 3, 301)
@@ -354,9 +319,8 @@ def test_a_control_point_matters_near_its_knots_only(rng):
 
 @pytest.mark.parametrize("name", ["sphere:2", "gr:2,5", "u:2", "spd:3"])
 def test_the_unit_of_time_does_not_matter(name, rng):
-    space = ss.space(name)
-    knots, points = clamped([0.9, 2.0], 3), control_points(space, 6, rng)
-    one, other = ss.BSpline(knots, points, 3, space), ss.BSpline(8 * knots - 4, points, 3, space)
+    knots, points = clamped([0.9, 2.0], 3), walk(ss.space(name), 0.4, 6, rng)
+    one, other = ss.BSpline(knots, points, 3, name), ss.BSpline(8 * knots - 4, points, 3, name)
     x = np.linspace(0, 3, 31)
     for nu in range(3):
         assert np.abs(one(x, nu) - 8.0**nu * other(8 * x - 4, nu)).max() <= 1e-13

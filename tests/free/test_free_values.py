@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 import pytest
 from cases import CASES, EPS, apart, walk
+from curves import clamped
 from refused import CLAMPED, INF, NAN, REFLECTION, P
 
 import symspline as ss
@@ -20,20 +21,11 @@ def rng():
     return np.random.default_rng(2007)
 
 
-def control_points(space, n, rng, step=0.4):
-    return walk(space, step, n, rng)
-
-
-def clamped(interior, degree, end=3.0):
-    """Knots from 0 to ``end`` at which the curve starts and ends in its control points."""
-    return np.concatenate([[0.0] * (degree + 1), interior, [end] * (degree + 1)])
-
-
 @every
 @pytest.mark.parametrize("batch", [(), (2, 3)], ids=str)
 def test_batches(case, batch, rng):
     space = case.space
-    points = np.array([control_points(space, 5, rng) for _ in range(math.prod(batch))])
+    points = np.array([walk(space, 0.4, 5, rng) for _ in range(math.prod(batch))])
     points = points.reshape(*batch, 5, *space.point_shape)
     curve = ss.BSpline(clamped([1.3], 3), points, 3, space)
     alone = {i: ss.BSpline(curve.knots, points[i], 3, space) for i in np.ndindex(*batch)}
@@ -61,7 +53,7 @@ def test_many_threads_change_nothing(rng):
 @pytest.mark.parametrize("name", ["sphere:2", "u:2", "cp:1", "so:3"])
 def test_what_goes_in(name, rng):
     space = ss.space(name)
-    points, knots = control_points(space, 4, rng), clamped([], 3)
+    points, knots = walk(space, 0.4, 4, rng), clamped([], 3)
     curve = ss.BSpline(knots, points, 3, space)
     copies = points.copy(), knots.copy()
     assert curve == ss.BSpline(knots.tolist(), points.tolist(), 3, name)
@@ -79,7 +71,7 @@ def test_what_goes_in(name, rng):
 
 
 def test_real_control_points_of_a_complex_space(rng):
-    points = control_points(ss.SpecialOrthogonal(2), 4, rng)
+    points = walk(ss.SpecialOrthogonal(2), 0.4, 4, rng)
     curve = ss.BezierCurve(points, "u:2")
     assert curve == ss.BezierCurve(points + 0j, "u:2") and curve(0.3).dtype == np.complex128
 
@@ -88,7 +80,7 @@ def test_real_control_points_of_a_complex_space(rng):
 @pytest.mark.parametrize("kind", ["BSpline", "BezierCurve"])
 def test_curves_as_values(name, kind, rng):
     space = ss.space(name)
-    points = control_points(space, 4, rng)
+    points = walk(space, 0.4, 4, rng)
     if kind == "BezierCurve":
         curve = ss.BezierCurve(points, space)
     else:
@@ -107,7 +99,7 @@ def test_curves_as_values(name, kind, rng):
 
 
 def test_a_bezier_curve_is_a_bspline(rng):
-    points = control_points(ss.Sphere(2), 4, rng)
+    points = walk(ss.Sphere(2), 0.4, 4, rng)
     curve = ss.BezierCurve(points, "sphere:2")
     assert curve == ss.BSpline([0] * 4 + [1] * 4, points, 3, "sphere:2")
     assert curve.domain == (0.0, 1.0) and isinstance(curve, ss.BSpline)
@@ -129,11 +121,7 @@ def test_a_bezier_curve_is_a_bspline(rng):
         (list("aaabbb"), 2, r"knots must be a row of real numbers, not <U1"),
         (np.array(CLAMPED, "M8[s]"), 2, r"knots must be a row of real numbers, not datetime64"),
         ([[0, 0], [1]], 2, r"knots is not an array of equally long rows"),
-        (
-            [0, 0, 0, 0, 1, 1],
-            2,
-            r"knots repeat 0\.0 4 times; with degree 2 a knot may repeat at most 3 times",
-        ),
+        ([0, 0, 0, 0, 1, 1], 2, r"knots repeat 0\.0 4 times; with degree 2 a knot may repeat at most 3 times"),
         ([0, 1, 2, 2, 3, 4], 2, r"the curve lives between knots\[2\] and knots\[3\], which are equal"),
         ([-1e308] * 3 + [1e308] * 3, 2, r"knots span more than a double can hold"),
         (CLAMPED, 3, r"degree 3 needs at least 4 control points, got 3"),
@@ -175,9 +163,7 @@ def test_knots_and_degrees(knots, degree, match):
 )
 def test_control_points(kind, points, match):
     with pytest.raises(ss.ValidationError, match=match):
-        ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(
-            points, "sphere:2"
-        )
+        ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(points, "sphere:2")
 
 
 def test_control_points_of_two_parts():

@@ -11,18 +11,14 @@ leaves = st.one_of(
     st.booleans(),
     st.integers(-(2**70), 2**70),
     st.floats(),
-    st.sampled_from(
-        ["", "natural", "clamped", "periodic", "not-a-knot", "sphere:2", "x", "\x00", "\ud800", "9" * 400]
-    ),
+    st.sampled_from(["", "natural", "clamped", "periodic", "not-a-knot", "sphere:2", "x", "\x00", "\ud800", "9" * 400]),
     st.text(max_size=5),
 )
 json_values = st.recursive(
     leaves,
     lambda inner: st.one_of(
         st.lists(inner, max_size=4),
-        st.dictionaries(
-            st.one_of(st.sampled_from(["re", "im", "method"]), st.text(max_size=3)), inner, max_size=3
-        ),
+        st.dictionaries(st.one_of(st.sampled_from(["re", "im", "method"]), st.text(max_size=3)), inner, max_size=3),
     ),
     max_leaves=6,
 )
@@ -58,11 +54,7 @@ def damaged_bytes(draw, data, others=()):
 def damaged_json(draw, text):
     """JSON in which one value is another, or which is none."""
     if rarely(draw):
-        return draw(
-            st.one_of(
-                st.text(max_size=20), st.sampled_from(["[" * 100_000, '{"a":' * 50_000, "1e999", "NaN"])
-            )
-        )
+        return draw(st.one_of(st.text(max_size=20), st.sampled_from(["[" * 100_000, '{"a":' * 50_000, "1e999", "NaN"])))
     value = json.loads(text)
     return json.dumps(draw(_changed(value)))
 
@@ -73,11 +65,7 @@ def _changed(draw, value):
         key = draw(st.sampled_from(sorted(value)))
         rest = {k: v for k, v in value.items() if k != key}
         how = draw(st.sampled_from(["change", "change", "drop", "rename"]))
-        return (
-            rest
-            if how == "drop"
-            else rest | {key if how == "change" else key + "x": draw(_changed(value[key]))}
-        )
+        return rest if how == "drop" else rest | {key if how == "change" else key + "x": draw(_changed(value[key]))}
     if isinstance(value, list) and value and not rarely(draw):
         at = draw(st.integers(0, len(value) - 1))
         how = draw(st.sampled_from(["change", "change", "drop", "twice"]))

@@ -10,19 +10,10 @@ import numpy as np
 import symspline as ss
 
 MODULES = [
-    "symspline",
-    "symspline.convert",
-    "symspline.geo",
-    "symspline.manifolds",
-    "symspline.poses",
-    "symspline.quantum",
-    "symspline.rotations",
-    "symspline.shapes",
-    "symspline.subspaces",
-    "symspline.tensors",
-    "symspline.testing",
+    "symspline", "symspline.convert", "symspline.geo", "symspline.manifolds", "symspline.poses", "symspline.quantum",
+    "symspline.rotations", "symspline.shapes", "symspline.subspaces", "symspline.tensors", "symspline.testing",
     "symspline.xarray",
-]
+]  # fmt: skip
 NEEDS = {"symspline.xarray": "xarray"}
 # They change how the process runs, or take functions that the user vouches for.
 LEFT_OUT = {"set_num_threads", "show_config", "from_geomstats", "from_pymanopt", "map"}
@@ -71,9 +62,7 @@ def methods(thing):
     """Names of the public methods of an object."""
     kind = type(thing)
     names = [name for name in dir(thing) if not name.startswith("_") and name not in LEFT_OUT]
-    names += [
-        name for name in ("__call__", "__getitem__") if any(name in vars(base) for base in kind.__mro__)
-    ]
+    names += [name for name in ("__call__", "__getitem__") if any(name in vars(base) for base in kind.__mro__)]
     return [name for name in names if callable(inspect.getattr_static(kind, name, None))]
 
 
@@ -95,9 +84,7 @@ def functions():
             value = getattr(module, key)
             error = isinstance(value, type) and issubclass(value, (Warning, Exception))
             if callable(value) and key not in LEFT_OUT and not error:
-                found.setdefault(
-                    f"{name.removeprefix('symspline.')}.{key}" if name != "symspline" else key, value
-                )
+                found.setdefault(f"{name.removeprefix('symspline.')}.{key}" if name != "symspline" else key, value)
     return found
 
 
@@ -107,9 +94,7 @@ def table():
         import pandas as pd
     except ImportError:
         return None
-    return pd.DataFrame(
-        {"time": pd.to_datetime(DAYS), "lon": [1.0, 2, 3], "lat": [4.0, 5, 6], "name": ["a"] * 3}
-    )
+    return pd.DataFrame({"time": pd.to_datetime(DAYS), "lon": [1.0, 2, 3], "lat": [4.0, 5, 6], "name": ["a"] * 3})
 
 
 def labelled():
@@ -201,71 +186,14 @@ def pools(things):
         "function": [lambda x: x],
     }
     bad = [
-        None,
-        True,
-        0,
-        1,
-        -1,
-        7,
-        10**30,
-        0.5,
-        -2.5,
-        np.nan,
-        np.inf,
-        1j,
-        "",
-        "natural",
-        "x",
-        "sphere:2",
-        "\x1b[31mred\x00\n",
-        "9" * 12_000,
-        b"bytes",
-        (),
-        [],
-        {},
-        set(),
-        [1, 2],
-        (5, 2),
-        [[1, 0], [0]],
-        ["a", None],
-        [None],
-        {"a": 1},
-        Odd(),
-        object,
-        len,
-        range(3),
-        slice(2),
-        np.zeros(0),
-        np.zeros((0, 3)),
-        np.zeros((3, 0)),
-        np.array(5.0),
-        np.array([1, 0, 2]),
-        np.ones(3),
-        P,
-        np.ones((2, 3, 4)),
-        np.full((3, 3), np.nan),
-        np.array(["a", "b"]),
-        np.array([None, Odd()], object),
-        np.ma.masked_invalid([1, np.nan]),
-        np.array([True, False]),
-        np.float32(2),
-        np.int8(1),
-        np.zeros(3, "V4"),
-        np.zeros(2, [("a", float)]),
-        DAYS,
-        np.array(["NaT"], "M8[s]"),
-        np.timedelta64(5, "s"),
-        datetime.datetime(2024, 1, 1),
-        datetime.timedelta(1),
-        [datetime.date(2024, 1, 1), "x"],
-        io.BytesIO(b"not a curve"),
-        io.StringIO("1 2 3"),
-        np.arange(3000.0),
-        ss.Sphere(2),
-        np.random.default_rng(0),
-        (P, P),
-        [(T, P)],
-        [(1, 2, 3)],
-        lambda: 1,
-    ]
+        None, True, 0, 1, -1, 7, 10**30, 0.5, -2.5, np.nan, np.inf, 1j, "", "natural", "x", "sphere:2",
+        "\x1b[31mred\x00\n", "9" * 12_000, b"bytes", (), [], {}, set(), [1, 2], (5, 2), [[1, 0], [0]], ["a", None],
+        [None], {"a": 1}, Odd(), object, len, range(3), slice(2), np.zeros(0), np.zeros((0, 3)), np.zeros((3, 0)),
+        np.array(5.0), np.array([1, 0, 2]), np.ones(3), P, np.ones((2, 3, 4)), np.full((3, 3), np.nan),
+        np.array(["a", "b"]), np.array([None, Odd()], object), np.ma.masked_invalid([1, np.nan]),
+        np.array([True, False]), np.float32(2), np.int8(1), np.zeros(3, "V4"), np.zeros(2, [("a", float)]), DAYS,
+        np.array(["NaT"], "M8[s]"), np.timedelta64(5, "s"), datetime.datetime(2024, 1, 1), datetime.timedelta(1),
+        [datetime.date(2024, 1, 1), "x"], io.BytesIO(b"not a curve"), io.StringIO("1 2 3"), np.arange(3000.0),
+        ss.Sphere(2), np.random.default_rng(0), (P, P), [(T, P)], [(1, 2, 3)], lambda: 1,
+    ]  # fmt: skip
     return good, bad

@@ -38,9 +38,7 @@ _bad_options = st.fixed_dictionaries(
     },
 )
 _odd_options = st.dictionaries(
-    st.sampled_from(
-        ["method", "tol", "max_iter", "extrapolate", "on_failure", "check", "progress", "surprise"]
-    ),
+    st.sampled_from(["method", "tol", "max_iter", "extrapolate", "on_failure", "check", "progress", "surprise"]),
     nonsense,
     max_size=2,
 )
@@ -145,8 +143,5 @@ def times(draw, spline_t, mood, shape=()):
             return draw(array_like(rng.standard_normal(size) * 10.0 ** draw(exponents), mood))
         share = rng.random(size) if kind == "inside" else rng.uniform(-2, 3, size)
         return draw(
-            array_like(
-                np.clip(low + (high - low) * share, *((low, high) if kind == "inside" else (None, None))),
-                mood,
-            )
+            array_like(np.clip(low + (high - low) * share, *((low, high) if kind == "inside" else (None, None))), mood)
         )

@@ -45,11 +45,7 @@ def attempt(call, *inputs, wrong_types=False):
                 raise AssertionError(f"the compiled code panicked: {error}") from error
             raise
     # Points of sphere:3 are no quaternions here, and some walks are long.
-    expected = (
-        "neighbours of opposite sign",
-        "neighbours almost at the cut locus",
-        "more than half of the steps",
-    )
+    expected = ("neighbours of opposite sign", "neighbours almost at the cut locus", "more than half of the steps")
     told = [w for w in caught if not str(w.message).startswith(expected)]
     assert all(issubclass(w.category, ss.ConvergenceWarning) for w in told), [str(w) for w in told]
     assert np.geterr() == state

@@ -8,12 +8,9 @@ import symspline as ss
 from fuzz.values import exponents, rarely, seeds
 
 # Small ones; of what is special about large matrices nothing depends on their size.
-FACTORS = [
-    case.space for case in CASES if np.prod(case.space.point_shape) <= 10 or case.name in ("so:5", "cgr:3,8")
-]
+FACTORS = [case.space for case in CASES if np.prod(case.space.point_shape) <= 10 or case.name in ("so:5", "cgr:3,8")]
 PRODUCTS = [
-    ss.space(name)
-    for name in ("sphere:3 x r:3", "so:3 x r:3", "h:2 x s:1", "cp:1 x spd:2 x u:2", "se:2 x gr:2,5")
+    ss.space(name) for name in ("sphere:3 x r:3", "so:3 x r:3", "h:2 x s:1", "cp:1 x spd:2 x u:2", "se:2 x gr:2,5")
 ]
 
 factors = st.sampled_from(FACTORS)
@@ -48,17 +45,10 @@ def points(draw, space, shape):
         centre = base_point(space, rng)
         if kind == "still":
             return np.broadcast_to(centre, (*shape, *space.point_shape)).copy()
-        size = {
-            "near": 0.5,
-            "paused": 0.5,
-            "cut": 0.5,
-            "far": draw(st.floats(1, 2 if bent(space) else 20)),
-        }.get(kind)
+        size = {"near": 0.5, "paused": 0.5, "cut": 0.5, "far": draw(st.floats(1, 2 if bent(space) else 20))}.get(kind)
         size = 10.0 ** draw(st.integers(-18, -1)) if size is None else size
         there = np.broadcast_to(centre, (*shape, *space.point_shape))
-        v = rng.standard_normal(shape)[..., *[None] * len(space.point_shape)] * unit_tangent(
-            space, centre, rng
-        )
+        v = rng.standard_normal(shape)[..., *[None] * len(space.point_shape)] * unit_tangent(space, centre, rng)
         v = v + space.random_tangent(rng, there) / np.sqrt(space.dim)
         p = np.asarray(space.exp(there, size * v))
         if kind == "paused" and shape and shape[-1] > 2:

@@ -18,26 +18,7 @@ GOOD = [
     b"m11,m12,m21,m22\n2,0,0,1\n3,1,1,2\n1,0,0,9\n",
     b"a,b,c,d,e\n0.1,2,1,0,0\n0.5,7,0,1,0\n0.7,1,0,0,1\n",
 ]
-NAMES = [
-    "t",
-    "time",
-    "x",
-    "y",
-    "z",
-    "lon",
-    "lat",
-    "id",
-    "x_re",
-    "x_im",
-    "a",
-    "A",
-    "",
-    " x ",
-    "é",
-    "a,b",
-    'q"',
-    "x_d1",
-]
+NAMES = ["t", "time", "x", "y", "z", "lon", "lat", "id", "x_re", "x_im", "a", "A", "", " x ", "é", "a,b", 'q"', "x_d1"]
 CELLS = [
     "0", "1", "-1", "0.5", "1e-3", "1e400", "nan", "inf", "-0.0", "1_000", "0x10", "9007199254740993", "9" * 5000,
     "1e-400", "", " ", "x", "é", "None", "NaT", "2021-08-29", "2021-02-30", "2021-08-29T06:00Z", "2021-08-29 06:00",
@@ -48,20 +29,7 @@ STEPS = [
     "1", "0.5", "10min", "0", "-1", "1e-400", "1e400", "1e999999999", "1e-9", "x", "1 h", "0.1ns", "1e9d", "nan",
     "5e-324", "9" * 400, "1" + "0" * 30 + "ns", "1e-999999999", "1e99999999999999999999", ".5s", "1e20", "1e17s",
 ]  # fmt: skip
-SPACES = [
-    "sphere:2",
-    "r:1",
-    "r:2",
-    "r:3",
-    "sphere:1",
-    "h:1",
-    "cp:1",
-    "spd:2",
-    "so:2",
-    "r:1 x sphere:2",
-    "u:1",
-    "se:2",
-]
+SPACES = ["sphere:2", "r:1", "r:2", "r:3", "sphere:1", "h:1", "cp:1", "spd:2", "so:2", "r:1 x sphere:2", "u:1", "se:2"]
 
 numbers = st.sampled_from([*CELLS[:10], "0.6", "0.8", "2", "3", "178.5", "-89.9"])
 cells = st.one_of(numbers, st.sampled_from(CELLS), st.text(max_size=4))
@@ -135,9 +103,7 @@ def npz_bytes(draw):
     rng = np.random.default_rng(draw(seeds))
     arrays = {}
     for name in draw(
-        st.lists(
-            st.sampled_from(["t", "time", "x", "y", "z", "points", "id", "format", "names", "é"]), max_size=4
-        )
+        st.lists(st.sampled_from(["t", "time", "x", "y", "z", "points", "id", "format", "names", "é"]), max_size=4)
     ):
         dtype = draw(
             st.sampled_from(

@@ -18,8 +18,7 @@ from symspline.cli import main
 
 ENDINGS = {".csv": csv_bytes(), ".npz": npz_bytes(), ".parquet": parquet_bytes()}
 words = st.one_of(
-    st.sampled_from([*CELLS[:12], *NAMES, "x,y,z", "lon,lat", "a,b", '"', ",", "-", "--"]),
-    st.text(max_size=4),
+    st.sampled_from([*CELLS[:12], *NAMES, "x,y,z", "lon,lat", "a,b", '"', ",", "-", "--"]), st.text(max_size=4)
 )
 
 
@@ -52,12 +51,7 @@ def run(path, *arguments):
     if code == 0:
         assert said == ""
     else:
-        assert (
-            said.startswith("symspline: ")
-            and said.count("\n") == 1
-            and said.endswith("\n")
-            and len(said) < 3000
-        )
+        assert said.startswith("symspline: ") and said.count("\n") == 1 and said.endswith("\n") and len(said) < 3000
     after = {file.name: file.read_bytes() for file in path.iterdir()}
     new = {name for name in after if after[name] != before.get(name)}
     assert set(before) <= set(after) and len(new) <= (code == 0), new
@@ -70,9 +64,7 @@ OPTIONS = {
     "--columns": words,
     "--curve": st.one_of(st.just("id"), words),
     "--lonlat": None,
-    "--bc-type": st.one_of(
-        st.sampled_from(["clamped", "not-a-knot", "periodic", "natural,clamped", "x"]), words
-    ),
+    "--bc-type": st.one_of(st.sampled_from(["clamped", "not-a-knot", "periodic", "natural,clamped", "x"]), words),
     "--method": st.sampled_from(["auto", "fixed-point", "quasi-newton", "newton", "x"]),
     "--tol": st.sampled_from(["1e-9", "0", "-1", "nan", "inf", "x", "1e400", "1e-300"]),
     "--extrapolate": st.sampled_from(["continue", "geodesic", "periodic", "x"]),
@@ -86,11 +78,7 @@ def some_options(draw, options, most):
     for name in draw(st.lists(st.sampled_from(list(options)), max_size=most)):
         value = options[name]
         arguments += (
-            [name]
-            if value is None
-            else [f"{name}={draw(value)}"]
-            if draw(st.booleans())
-            else [name, draw(value)]
+            [name] if value is None else [f"{name}={draw(value)}"] if draw(st.booleans()) else [name, draw(value)]
         )
     return arguments
 
@@ -168,12 +156,7 @@ _CURVES = []
 def curves():
     """Files of curves that the command line wrote."""
     if not _CURVES:
-        lines = [
-            ("a", "--space=s:2"),
-            ("b", "--lonlat"),
-            ("c", "--space=s:2", "--curve=id"),
-            ("d", "--space=cp:1"),
-        ]
+        lines = [("a", "--space=s:2"), ("b", "--lonlat"), ("c", "--space=s:2", "--curve=id"), ("d", "--space=cp:1")]
         for data, (name, *options) in zip(GOOD, lines, strict=False):
             with folder() as path:
                 (path / f"{name}.csv").write_bytes(data)
@@ -198,9 +181,7 @@ def other_columns(draw, source):
     """A file of curves whose names of columns are not what they should be."""
     arrays = dict(np.load(io.BytesIO(source)))
     key = draw(
-        st.sampled_from(
-            ["columns", "columns", *(key for key in ("names", "report", "bc_type") if key in arrays)]
-        )
+        st.sampled_from(["columns", "columns", *(key for key in ("names", "report", "bc_type") if key in arrays)])
     )
     arrays[key] = np.array(draw(damaged_json(str(arrays[key]))))
     file = io.BytesIO()

@@ -22,11 +22,7 @@ TAKEN = {
 
 def test_all_are_here():
     # Totally geodesic parts and indefinite spaces have tests of their own.
-    parts = {
-        name
-        for name in ss.convert.__all__
-        if any(word in name for word in ("siegel", "subspace", "reflection"))
-    }
+    parts = {name for name in ss.convert.__all__ if any(word in name for word in ("siegel", "subspace", "reflection"))}
     assert set(TAKEN) | parts == set(ss.convert.__all__)
 
 
@@ -44,11 +40,7 @@ def taken(draw, what, shape):
     y = rng.standard_normal((*shape, 3)) * 10.0 ** draw(st.integers(-300, 300))
     if what == "half":
         return np.concatenate([y[..., :-1], np.abs(y[..., -1:])], axis=-1)
-    return (
-        y
-        / np.linalg.norm(y, axis=-1, keepdims=True)
-        * draw(st.sampled_from([0.0, 0.3, 0.999999, 1 - 2**-53, 1.0]))
-    )
+    return y / np.linalg.norm(y, axis=-1, keepdims=True) * draw(st.sampled_from([0.0, 0.3, 0.999999, 1 - 2**-53, 1.0]))
 
 
 @given(st.data())

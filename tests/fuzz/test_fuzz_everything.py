@@ -104,13 +104,7 @@ THINGS, CALLS = calls()
 def test_everything_public_is_called():
     # Every class and module of the package is among them.
     assert len(CALLS) > 300
-    for name in (
-        "CubicSpline",
-        "geo.cog",
-        "<CubicSpline>.transport",
-        "poses.imu",
-        "quantum.pulses",
-    ):
+    for name in ("CubicSpline", "geo.cog", "<CubicSpline>.transport", "poses.imu", "quantum.pulses"):
         assert name in CALLS
 
 

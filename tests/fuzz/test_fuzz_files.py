@@ -52,16 +52,9 @@ ONE = [
     stored(DATES, P, "sphere:2", bc_type=((1, [0, 1e-5, 0]), "natural"), extrapolate="geodesic"),
     stored([2**60, 2**60 + 1, 2**60 + 5], ROTATIONS, "so:3", bc_type="not-a-knot"),
     stored([[0, 1, 2], [0, 2, 3]], np.stack([P, P[::-1]]), "s:2", extrapolate=True),
-    stored(
-        None,
-        ([[1, 0], [0.6, 0.8j]], [[1.0], [2.0]]),
-        "cp:1 x r:1",
-        bc_type=((1, ([0, 1e-3j], [3.0])), "clamped"),
-    ),
+    stored(None, ([[1, 0], [0.6, 0.8j]], [[1.0], [2.0]]), "cp:1 x r:1", bc_type=((1, ([0, 1e-3j], [3.0])), "clamped")),
     stored(None, [[1, 0], [-1, 0], [0, 1]], "s:1", on_failure="ignore"),
-    stored(
-        None, [[[2, 1j], [-1j, 2]], [[1, 0], [0, 3]]], "hpd:2", bc_type=((2, [[0, 1j], [-1j, 1]]), "natural")
-    ),
+    stored(None, [[[2, 1j], [-1j, 2]], [[1, 0], [0, 3]]], "hpd:2", bc_type=((2, [[0, 1j], [-1j, 1]]), "natural")),
     stored_smooth(),
 ]
 MANY = [stored_many(), stored_many_smooth()]
@@ -115,20 +108,10 @@ def test_files_with_other_arrays(data):
             arrays[key] = np.array(draw(damaged_json(str(array))))
         elif array.ndim == 0:
             words = [
-                "symspline-curve",
-                "symspline-curves",
-                "symspline-smoothing",
-                "sphere:2",
-                "s:2 x s:2",
-                "r:1",
-                "ns",
-                "generic",
-                "Y",
-                "10s",
-            ]
-            arrays[key] = np.array(
-                draw(st.one_of(st.sampled_from(words), st.text(max_size=9), st.integers(-2, 3)))
-            )
+                "symspline-curve", "symspline-curves", "symspline-smoothing", "sphere:2", "s:2 x s:2", "r:1", "ns",
+                "generic", "Y", "10s",
+            ]  # fmt: skip
+            arrays[key] = np.array(draw(st.one_of(st.sampled_from(words), st.text(max_size=9), st.integers(-2, 3))))
         else:
             value = draw(array_like(array, BAD))
             arrays[key] = np.asarray(value)

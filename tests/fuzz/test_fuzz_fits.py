@@ -32,9 +32,7 @@ def test_fit(data):
     name = draw(st.sampled_from([space, str(space)]))
     inputs = (t, p, bc_type)
     with np.errstate(**draw(st.sampled_from([{}, {"all": "raise"}]))):
-        spline = attempt(
-            lambda: ss.CubicSpline(t, p, name, bc_type=bc_type, **more), *inputs, wrong_types=mood == ODD
-        )
+        spline = attempt(lambda: ss.CubicSpline(t, p, name, bc_type=bc_type, **more), *inputs, wrong_types=mood == ODD)
         if isinstance(spline, Refusal):
             note(repr(spline.error))
             spline = getattr(spline.error, "spline", None)
@@ -56,19 +54,12 @@ def use(draw, spline, mood, checked):
     nu = draw(st.sampled_from([0, 1, 2]))
     if mood == ODD:
         nu, policy = draw(st.one_of(st.just(nu), nonsense)), draw(st.one_of(st.just(policy), nonsense))
-    values = attempt(
-        lambda: spline(x, nu, extrapolate=policy, per_curve=per_curve), x, wrong_types=mood == ODD
-    )
+    values = attempt(lambda: spline(x, nu, extrapolate=policy, per_curve=per_curve), x, wrong_types=mood == ODD)
     if not isinstance(values, Refusal):
         lead = np.shape(x) if per_curve else batch_of(spline) + np.shape(x)
         for factor, value in zip(parts(spline.space), parts(values), strict=True):
             assert value.shape == lead + factor.point_shape and value.dtype == factor.dtype
-    for quantity in (
-        spline.length,
-        spline.bending_energy,
-        lambda: spline.control_points,
-        lambda: str(spline.report),
-    ):
+    for quantity in (spline.length, spline.bending_energy, lambda: spline.control_points, lambda: str(spline.report)):
         result = attempt(quantity)
         if quantity in (spline.length, spline.bending_energy) and not isinstance(result, Refusal):
             assert np.shape(result) == batch_of(spline)
@@ -147,13 +138,9 @@ def test_fit_many(data):
         p = joined(space, [draw(array_like(part, mood)) for part in draw(nodes(space, (), n))])
         curve = (draw(knots((), n, mood)), p)
         curves.append(draw(nonsense) if mood == ODD and rarely(draw) else curve)
-    given_ = (
-        draw(nonsense) if mood == ODD and rarely(draw) else draw(st.sampled_from([curves, tuple(curves)]))
-    )
+    given_ = draw(nonsense) if mood == ODD and rarely(draw) else draw(st.sampled_from([curves, tuple(curves)]))
     more = draw(options(mood))
-    fitted = attempt(
-        lambda: ss.fit_many(given_, space, bc_type=bc_type, **more), curves, wrong_types=mood == ODD
-    )
+    fitted = attempt(lambda: ss.fit_many(given_, space, bc_type=bc_type, **more), curves, wrong_types=mood == ODD)
     if isinstance(fitted, Refusal):
         note(repr(fitted.error))
         fitted = getattr(fitted.error, "spline", None) or []
@@ -174,9 +161,7 @@ def test_evaluate(data):
     draw = data.draw
     mood, space, batch, n = draw(moods), draw(spaces), draw(batches), draw(st.integers(2, 7))
     p = draw(nodes(space, batch, n))
-    u = joined(
-        space, [draw(array_like(draw(vectors(f, q)), mood)) for f, q in zip(parts(space), p, strict=True)]
-    )
+    u = joined(space, [draw(array_like(draw(vectors(f, q)), mood)) for f, q in zip(parts(space), p, strict=True)])
     p = joined(space, [draw(array_like(part, mood)) for part in p])
     t = draw(knots(batch, n, mood))
     nu, policy = draw(st.sampled_from([0, 1, 2])), draw(st.sampled_from(POLICIES))

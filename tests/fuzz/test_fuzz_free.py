@@ -21,9 +21,7 @@ def test_bsplines(data):
     control = draw(array_like(draw(points(parts(space)[0], (*batch, n))), mood))
     degree = draw(st.integers(1, 4))
     rng = np.random.default_rng(draw(seeds))
-    knots = np.sort(rng.choice([0, 1, 2, 3, 4.5], n + degree + 1)) * 10.0 ** draw(
-        st.sampled_from([0, 0, -9, 200])
-    )
+    knots = np.sort(rng.choice([0, 1, 2, 3, 4.5], n + degree + 1)) * 10.0 ** draw(st.sampled_from([0, 0, -9, 200]))
     if draw(st.booleans()):
         knots = np.r_[[0.0] * (degree + 1), np.arange(1.0, n - degree), [max(n - degree, 1)] * (degree + 1)]
     knots = draw(array_like(knots, mood))

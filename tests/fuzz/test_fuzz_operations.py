@@ -91,9 +91,7 @@ def test_near_points_are_where_they_should_be(data):
 def test_random_points(data):
     draw = data.draw
     space, odd = draw(spaces), rarely(draw, 3)
-    shape = draw(
-        nonsense if odd else st.sampled_from([(), 0, 3, (2,), (2, 0), [2, 2], np.int64(4), (-1,), (2**62,)])
-    )
+    shape = draw(nonsense if odd else st.sampled_from([(), 0, 3, (2,), (2, 0), [2, 2], np.int64(4), (-1,), (2**62,)]))
     rng = draw(nonsense) if odd and rarely(draw, 3) else np.random.default_rng(0)
     p = attempt(lambda: space.random_point(rng, shape), wrong_types=odd)
     if isinstance(p, Refusal):
@@ -128,13 +126,7 @@ def test_names(data):
         assert len(str(space.error)) < 2000
         return
     again = ss.space(name)
-    assert (
-        space
-        == again
-        == ss.space(str(space))
-        == pickle.loads(pickle.dumps(space))
-        == eval(repr(space), vars(ss))
-    )
+    assert space == again == ss.space(str(space)) == pickle.loads(pickle.dumps(space)) == eval(repr(space), vars(ss))
     assert hash(space) == hash(again)
     assert space.dim >= 1 and space.injectivity_radius > 0 and not space.curvature < 0
     shapes = [factor.point_shape for factor in parts(space)]

@@ -43,9 +43,7 @@ def test_times_along_a_curve(data):
         assert len(found) == count and (count == 1 or found[-1] == t[-1])
     elif len(found) > 2:
         gaps = np.diff(found)
-        assert (
-            np.abs(gaps - gaps[0]) <= (8 * EPS * np.abs(t).max() if t.dtype.kind == "f" else 0 * gaps[0])
-        ).all()
+        assert (np.abs(gaps - gaps[0]) <= (8 * EPS * np.abs(t).max() if t.dtype.kind == "f" else 0 * gaps[0])).all()
         assert t[-1] - found[-1] <= gaps[0]
 
 

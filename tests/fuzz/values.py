@@ -87,9 +87,7 @@ def spoiled(draw, array):
 def disguised(draw, array):
     """The same numbers in memory of another kind."""
     array = np.asarray(array)
-    how = draw(
-        st.sampled_from(["plain", "fortran", "steps", "back", "locked", "list", "swapped", "object", "wide"])
-    )
+    how = draw(st.sampled_from(["plain", "fortran", "steps", "back", "locked", "list", "swapped", "object", "wide"]))
     if how == "fortran":
         return np.array(array, order="F")
     if how == "steps":

@@ -47,12 +47,8 @@ def test_along_great_circles(course):
     """The formulas of the direct problem on a sphere."""
     lon, lat, angle, turn = np.radians([10, 50, 5, course])
     there = np.arcsin(np.sin(lat) * np.cos(angle) + np.cos(lat) * np.sin(angle) * np.cos(turn))
-    across = np.arctan2(
-        np.sin(turn) * np.sin(angle) * np.cos(lat), np.cos(angle) - np.sin(lat) * np.sin(there)
-    )
-    spline = ss.CubicSpline(
-        [0, 3600], from_lonlat([10, np.degrees(lon + across)], np.degrees([lat, there])), S2
-    )
+    across = np.arctan2(np.sin(turn) * np.sin(angle) * np.cos(lat), np.cos(angle) - np.sin(lat) * np.sin(there))
+    spline = ss.CubicSpline([0, 3600], from_lonlat([10, np.degrees(lon + across)], np.degrees([lat, there])), S2)
     assert sog(spline, [0, 100.0], radius=6.4e6) == pytest.approx(6.4e6 * angle / 3600, rel=1e-13)
     assert np.abs((cog(spline, 0.0) - course + 180) % 360 - 180) < 1e-11
     assert 0 <= cog(spline, 0.0) < 360

@@ -46,9 +46,7 @@ def test_it_is_the_curve_itself():
         index=pd.date_range("2026-01-01", periods=8, freq="7h"),
     )
     found = geo.resample(table, "90min", max_gap=np.timedelta64(1, "D"), bc_type="not-a-knot")
-    spline = ss.CubicSpline(
-        table.index, geo.from_lonlat(table["lon"], table["lat"]), "sphere:2", bc_type="not-a-knot"
-    )
+    spline = ss.CubicSpline(table.index, geo.from_lonlat(table["lon"], table["lat"]), "sphere:2", bc_type="not-a-knot")
     lon, lat = geo.to_lonlat(spline(found["time"].to_numpy()))
     np.testing.assert_array_equal(found["lon"], lon)
     np.testing.assert_array_equal(found["lat"], lat)
@@ -80,10 +78,7 @@ def test_noisy_tracks_are_smoothed():
         (lambda t: {"by": "ship"}, "column 'ship' does not exist; the columns are mmsi, when, lon, lat"),
         (lambda t: {"columns": ("x", "lat")}, "column 'x' does not exist"),
         (lambda t: {"time": "lon"}, "column 'lon' must hold dates"),
-        (
-            lambda t: {"duplicates": "raise"},
-            r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both",
-        ),
+        (lambda t: {"duplicates": "raise"}, r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both"),
         (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
         (lambda t: {"smooth": 0.5}, "smooth must be True or False, not 0.5"),
         (lambda t: {"smooth": True, "duplicates": "mean"}, "Omit duplicates='mean'"),
@@ -106,13 +101,7 @@ def test_noisy_tracks_are_smoothed():
 )
 def test_invalid_resampling_raises(change, what):
     table = ais()
-    arguments = {
-        "frame": table,
-        "by": "mmsi",
-        "time": "when",
-        "max_gap": 600,
-        "duplicates": "first",
-    } | change(table)
+    arguments = {"frame": table, "by": "mmsi", "time": "when", "max_gap": 600, "duplicates": "first"} | change(table)
     with pytest.raises(ss.ValidationError, match=what):
         geo.resample(**arguments)
 

@@ -53,9 +53,7 @@ def test_numpy_stays():
     assert type(u) is np.ndarray
 
 
-@pytest.mark.parametrize(
-    "wrap", [dask.array.from_array, lambda a: xr.DataArray(a).chunk(1)], ids=["dask", "xarray"]
-)
+@pytest.mark.parametrize("wrap", [dask.array.from_array, lambda a: xr.DataArray(a).chunk(1)], ids=["dask", "xarray"])
 def test_blocks_of_dask_are_refused(wrap):
     u, _ = ss.fit(None, POINTS, S2)
     spline = ss.CubicSpline(None, POINTS, S2)

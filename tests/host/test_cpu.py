@@ -116,12 +116,7 @@ def both(tmp_path_factory):
 def printed(both, asked):
     environment = os.environ | {"PYTHONPATH": str(both.parent), "SYMSPLINE_CPU": asked}
     done = subprocess.run(
-        [sys.executable, "-c", CODE],
-        env=environment,
-        cwd=both.parent,
-        capture_output=True,
-        text=True,
-        timeout=60,
+        [sys.executable, "-c", CODE], env=environment, cwd=both.parent, capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0, done.stderr[-2000:]
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("module")]

@@ -13,12 +13,7 @@ import symspline as ss
 
 
 def hard_fit(progress, n=400_000, **options):
-    options = {
-        "method": "fixed-point",
-        "max_iter": 100,
-        "on_failure": "ignore",
-        "progress": progress,
-    } | options
+    options = {"method": "fixed-point", "max_iter": 100, "on_failure": "ignore", "progress": progress} | options
     return ss.CubicSpline(None, scattered(n), S3, **options)
 
 
@@ -110,13 +105,7 @@ assert len(calls) > 2 and all(calls)
 """
 
 
-@pytest.mark.parametrize(
-    "n",
-    [
-        1,
-        2,
-    ],
-)
+@pytest.mark.parametrize("n", [1, 2])
 def test_progress_may_fit_another_curve(n):
     run_python(NESTED, n, RUST_BACKTRACE="0")
 
@@ -208,9 +197,7 @@ def test_ctrl_c_stops_long_work(name, work):
 
 
 @pytest.mark.parametrize("nu", [0, 1])
-@pytest.mark.parametrize(
-    "space, per_curve", [("sphere:2", False), ("sphere:2", True), ("sphere:2 x r:3", False)]
-)
+@pytest.mark.parametrize("space, per_curve", [("sphere:2", False), ("sphere:2", True), ("sphere:2 x r:3", False)])
 def test_progress_of_evaluation_counts_points(space, per_curve, nu):
     spline = pair_of_curves(ss.space(space))
     x = np.linspace(0, 2, 100).reshape((2, 50) if per_curve else 100)

@@ -63,9 +63,7 @@ def test_works_where_numpy_raises(space):
         assert str(strict.report) == str(spline.report)
 
 
-proc = pytest.mark.skipif(
-    not Path("/proc/self/statm").exists(), reason="reads the size of a process in /proc"
-)
+proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the size of a process in /proc")
 
 
 GROWTH = """

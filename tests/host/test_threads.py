@@ -37,22 +37,12 @@ try:
 except ImportError as error:
     print(error)
 """
-    assert "SYMSPLINE_NUM_THREADS must be a whole number, not 'many'" in run_python(
-        code, SYMSPLINE_NUM_THREADS="many"
-    )
+    assert "SYMSPLINE_NUM_THREADS must be a whole number, not 'many'" in run_python(code, SYMSPLINE_NUM_THREADS="many")
     assert run_python(code, SYMSPLINE_NUM_THREADS="") == ""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
-@pytest.mark.parametrize(
-    "counts, most",
-    [
-        ([1], 0),
-        ([2], 2),
-        ([2, 3] * 8, 5),
-    ],
-    ids=str,
-)
+@pytest.mark.parametrize("counts, most", [([1], 0), ([2], 2), ([2, 3] * 8, 5)], ids=str)
 def test_no_more_threads_than_allowed(counts, most):
     code = """
 import json, os, sys, numpy as np, symspline as ss

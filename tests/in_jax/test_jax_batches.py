@@ -51,9 +51,7 @@ def energy(*data):
 def some(axes):
     """Data of which those without an axis are the same for all curves, and of each curve."""
     data = [a if axis == 0 else a[0] for a, axis in zip((X, T, POINTS, ENDS), axes, strict=True)]
-    return data, [
-        [a[i] if axis == 0 else a for a, axis in zip(data, axes, strict=True)] for i in range(CURVES)
-    ]
+    return data, [[a[i] if axis == 0 else a for a, axis in zip(data, axes, strict=True)] for i in range(CURVES)]
 
 
 AXES = [axes for axes in itertools.product((0, None), repeat=4) if any(axis == 0 for axis in axes)]

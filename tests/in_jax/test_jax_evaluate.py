@@ -12,20 +12,7 @@ from symspline.jax import evaluate
 
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
 X = np.concatenate([np.linspace(0, 4.1, 12), [1.0, 2.2]])
-SPACES = [
-    "r:2",
-    "sphere:2",
-    "h:2",
-    "so:2",
-    "so:3",
-    "se:2",
-    "se:3",
-    "cp:2",
-    "gr:2,5",
-    "cgr:2,4",
-    "spd:3",
-    "hpd:2",
-]
+SPACES = ["r:2", "sphere:2", "h:2", "so:2", "so:3", "se:2", "se:3", "cp:2", "gr:2,5", "cgr:2,4", "spd:3", "hpd:2"]
 # Of each formula one. Compiling second derivatives takes most of the time.
 TWICE = ["spd:2"]
 RATES = ["sphere:2", "cp:2", "spd:3"]
@@ -117,9 +104,7 @@ def test_the_core_has_the_same_gradient():
     u = ss.CubicSpline(T, points, space).velocities
     rng = np.random.default_rng(1)
     dp, du = (np.array([unit_tangent(space, p, rng) for p in points]) for _ in range(2))
-    move = jax.jit(
-        lambda t, p, u, dt, dp, du: jax.jvp(lambda *a: evaluate(*a, space, X), (t, p, u), (dt, dp, du))[1]
-    )
+    move = jax.jit(lambda t, p, u, dt, dp, du: jax.jvp(lambda *a: evaluate(*a, space, X), (t, p, u), (dt, dp, du))[1])
     found = move(T, points, u, 0.1 * X[:5] * 0, dp, du)
 
     def moved(e):
@@ -133,9 +118,7 @@ def test_the_core_has_the_same_gradient():
 
 def test_batches_products_and_maps():
     names = ("sphere:2", "r:3")
-    points = tuple(
-        np.stack([walk(ss.space(n), 0.5, 5, np.random.default_rng(i)) for i in range(3)]) for n in names
-    )
+    points = tuple(np.stack([walk(ss.space(n), 0.5, 5, np.random.default_rng(i)) for i in range(3)]) for n in names)
     knots = T * np.array([[1.0], [1.1], [1.3]])
     spline = ss.CubicSpline(knots, points, " x ".join(names))
 

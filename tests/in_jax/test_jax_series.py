@@ -25,10 +25,7 @@ def worst(function, exact, at, orders=4):
     for k in range(orders):
         found = jax.jit(jax.vmap(function))(jnp.asarray(at))
         errors.append(
-            max(
-                abs(float(f) / float(mp.diff(exact, mp.mpf(z), k)) - 1)
-                for f, z in zip(found, at, strict=True)
-            )
+            max(abs(float(f) / float(mp.diff(exact, mp.mpf(z), k)) - 1) for f, z in zip(found, at, strict=True))
         )
         function = jax.grad(function)
     return errors

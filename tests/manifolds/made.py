@@ -69,11 +69,7 @@ def _torus_hess(x):
     n = np.stack([x[:, 0] / s, x[:, 1] / s, 0 * s], axis=-1)
     around = np.diag([1.0, 1.0, 0.0])
     c, k = 2 * (s - RADII[0]) / s, 2 * RADII[0] / s
-    return (
-        c[:, None, None] * around
-        + k[:, None, None] * n[:, :, None] * n[:, None, :]
-        + 2 * np.diag([0.0, 0.0, 1.0])
-    )
+    return c[:, None, None] * around + k[:, None, None] * n[:, :, None] * n[:, None, :] + 2 * np.diag([0.0, 0.0, 1.0])
 
 
 # The shortest conjugate distances are π times the smallest radius of curvature.

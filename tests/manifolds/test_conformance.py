@@ -16,11 +16,7 @@ def test_a_space_of_the_library_conforms(space):
     # Far below what is allowed of spaces of others: rounding, in second differences too.
     bent = found.deviations["acceleration is continuous"]
     assert bent <= 1e-10
-    rest = {
-        law: value
-        for law, value in found.deviations.items()
-        if not law.startswith(("acc", "the order", "vel"))
-    }
+    rest = {law: value for law, value in found.deviations.items() if not law.startswith(("acc", "the order", "vel"))}
     assert max(rest.values()) <= 2e-11, rest
     assert "log inverts exp" in str(found)
 

@@ -79,10 +79,7 @@ def test_a_smooth_curve_is_recovered_at_order_four(name):
     axes = [0.5 * v / space.norm(base, v) for v in axes]
 
     def curve(t):
-        v = sum(
-            np.multiply.outer(w, a)
-            for w, a in zip((t + 0.3 * np.sin(3 * t), np.cos(2 * t)), axes, strict=True)
-        )
+        v = sum(np.multiply.outer(w, a) for w, a in zip((t + 0.3 * np.sin(3 * t), np.cos(2 * t)), axes, strict=True))
         return space.exp(base, v)
 
     errors = []
@@ -106,8 +103,7 @@ def test_derivatives_where_a_segment_ends_almost_at_the_cut_locus(name):
     end = space.log(p[2], p[1])
     end = 1.49 * 0.98 * space.injectivity_radius * end / space.norm(p[2], end)
     ours, core = (
-        ss.CubicSpline(t, p, s, bc_type=((1, v), (1, end)), method="quasi-newton")
-        for s in (twin(space), space)
+        ss.CubicSpline(t, p, s, bc_type=((1, v), (1, end)), method="quasi-newton") for s in (twin(space), space)
     )
     x = np.append(np.linspace(2.9, 3.0, 21), [0.5, 1.0, 2.0])
     for nu, allowed in ((1, 1e-8), (2, 1e-5)):
@@ -138,9 +134,7 @@ def test_symmetric_spaces_give_the_same_curve(name, ends):
         assert np.abs(ours(x, nu) - moved).max() <= allowed
 
 
-@pytest.mark.parametrize(
-    "ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"]
-)
+@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "acceleration", "mixed"])
 @loop_over("n", [2, 3, 4, 5, 9])
 def test_flat_space_is_scipy(ends, n):
     space, rng = flat(3), np.random.default_rng(8)
@@ -163,8 +157,7 @@ def test_solution_does_not_need_transport(ends):
     if ends == "periodic":
         p[-1] = p[0]
     one, other = (
-        ss.CubicSpline(None, p, twin(space, transport=transport), bc_type=ends)
-        for transport in (None, space.transport)
+        ss.CubicSpline(None, p, twin(space, transport=transport), bc_type=ends) for transport in (None, space.transport)
     )
     assert np.abs(one.velocities - other.velocities).max() <= 1e-11
     if ends == "natural":
@@ -203,9 +196,7 @@ def test_unit_and_time_do_not_matter():
 def test_points_near_each_other_and_equal():
     p = ST52.random_point(np.random.default_rng(13))
     for size in (0.0, 1e-9, 1e-5):
-        near = ST52.exp(
-            p, size * ST52.random_tangent(np.random.default_rng(14), np.repeat(p[None], 5, axis=0))
-        )
+        near = ST52.exp(p, size * ST52.random_tangent(np.random.default_rng(14), np.repeat(p[None], 5, axis=0)))
         spline = ss.CubicSpline(None, near, ST52)
         assert spline.report.converged
         assert np.abs(spline([0.5, 2.5]) - p).max() <= 10 * size + 1e-14

@@ -252,15 +252,10 @@ def test_results_of_functions_are_checked():
         ({"exp": lambda p, v: p[0]}, r"the function exp .* gave an array of shape \(5, 2\) for 6 points"),
         ({"inner": lambda p, u, v: u}, r"the function inner .* gave an array of shape"),
         ({"log": lambda p, q: 1j * p}, "the function log .* gave numbers of type complex128"),
-        (
-            {"project_tangent": lambda p, v: v[:, :1]},
-            "the function project_tangent .* gave an array of shape",
-        ),
+        ({"project_tangent": lambda p, v: v[:, :1]}, "the function project_tangent .* gave an array of shape"),
     ):
         with pytest.raises(ss.ValidationError, match=what):
-            ss.CubicSpline(
-                None, POINTS, ss.Manifold(**FUNCTIONS | {"project": None} | changes, point_shape=(5, 2))
-            )
+            ss.CubicSpline(None, POINTS, ss.Manifold(**FUNCTIONS | {"project": None} | changes, point_shape=(5, 2)))
 
 
 def test_missing_functions_of_a_manifold_raise():

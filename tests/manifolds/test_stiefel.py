@@ -80,12 +80,8 @@ def test_all_but_one_vector_is_rotations():
     r = rotations.random_point(np.random.default_rng(4), 2)
     v = rotations.log(r[0], r[1])
     assert np.abs(space.log(r[0][:, :2], r[1][:, :2]) - v[:, :2]).max() <= 1e-14
-    assert space.distance(r[0][:, :2], r[1][:, :2]) == pytest.approx(
-        rotations.distance(r[0], r[1]), abs=1e-14
-    )
-    p = rotations.exp(
-        r[0], 0.4 * rotations.random_tangent(np.random.default_rng(5), np.repeat(r[:1], 6, axis=0))
-    )
+    assert space.distance(r[0][:, :2], r[1][:, :2]) == pytest.approx(rotations.distance(r[0], r[1]), abs=1e-14)
+    p = rotations.exp(r[0], 0.4 * rotations.random_tangent(np.random.default_rng(5), np.repeat(r[:1], 6, axis=0)))
     curve, frames = ss.CubicSpline(None, p, rotations), ss.CubicSpline(None, p[..., :2], space)
     x = np.linspace(0, 5, 30)
     assert np.abs(frames(x) - curve(x)[..., :2]).max() <= 1e-11
@@ -155,9 +151,7 @@ def test_the_curve_is_that_of_our_space(theirs, ours, scale):
 def test_rotations_have_velocities_in_the_lie_algebra():
     space = from_pymanopt(manifolds.SpecialOrthogonalGroup(2))
     turns = np.array([0.0, 0.5, 0.7])
-    p = np.stack(
-        [np.stack([np.cos(turns), -np.sin(turns)], -1), np.stack([np.sin(turns), np.cos(turns)], -1)], -2
-    )
+    p = np.stack([np.stack([np.cos(turns), -np.sin(turns)], -1), np.stack([np.sin(turns), np.cos(turns)], -1)], -2)
     spline = ss.CubicSpline(None, p, space)
     flat = ss.CubicSpline(None, turns[:, None], "r:1")
     assert np.abs(spline.velocities[:, 1, 0] - flat.velocities[:, 0]).max() <= 1e-11

@@ -89,9 +89,7 @@ def test_clairaut():
     assert np.abs(moment(p, v) - moment(q, u)).max() <= 1e-11
 
 
-@pytest.mark.parametrize(
-    ("exact", "make"), [(ELLIPSOID, ellipsoid), (TORUS, torus)], ids=["ellipsoid", "torus"]
-)
+@pytest.mark.parametrize(("exact", "make"), [(ELLIPSOID, ellipsoid), (TORUS, torus)], ids=["ellipsoid", "torus"])
 def test_second_derivatives_may_be_differences(exact, make):
     rough = make()
     p, v = steps(exact, 0.6)
@@ -118,11 +116,7 @@ def test_it_is_a_value():
 
 @pytest.mark.parametrize(
     ("arguments", "what"),
-    [
-        ((1, np.sin, 3), "F must be a function"),
-        ((np.sin, None, 3), "grad must be"),
-        ((np.sin, np.sin, 1), "n must be"),
-    ],
+    [((1, np.sin, 3), "F must be a function"), ((np.sin, None, 3), "grad must be"), ((np.sin, np.sin, 1), "n must be")],
 )
 def test_invalid_surfaces_raise(arguments, what):
     with pytest.raises(ss.ValidationError, match=what):

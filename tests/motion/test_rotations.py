@@ -67,11 +67,10 @@ def test_a_rotation_of_many_axes_is_a_batch():
     assert ss.CubicSpline(KNOTS, Turn(m), "so:3") == ss.CubicSpline(KNOTS, m, "so:3")
 
 
-def test_elsewhere_a_rotation_is_refused():
-    r = Rotation.from_matrix(points_on(SO3))
-    for space in ("so:2", "sphere:3", "se:3"):
-        with pytest.raises(ss.ValidationError):
-            ss.CubicSpline(KNOTS, r, space)
+@pytest.mark.parametrize("space", ["so:2", "sphere:3", "se:3"])
+def test_a_rotation_raises_on_other_spaces(space):
+    with pytest.raises(ss.ValidationError):
+        ss.CubicSpline(KNOTS, Rotation.from_matrix(points_on(SO3)), space)
 
 
 # ---- along a curve ----
@@ -92,8 +91,7 @@ def test_rates_are_those_of_a_gyroscope():
     spline = ss.CubicSpline(sensor.t, SO3.project(sensor.rotations), "so:3")
     x, measured = sensor.rate_times[1:], sensor.rates[1:]
     off = {
-        frame: np.median(np.abs(rotations.angular_velocity(spline, x, frame) - measured))
-        for frame in ("body", "world")
+        frame: np.median(np.abs(rotations.angular_velocity(spline, x, frame) - measured)) for frame in ("body", "world")
     }
     # The sensor corrects its attitude by gravity and the magnetic field, too. Rates are about 0.7 rad/s.
     assert off["body"] < 0.02 and off["world"] > 0.3
@@ -108,9 +106,7 @@ def test_rates_are_derivatives_of_the_rotations(space, batch):
     change = r.swapaxes(-1, -2) @ (turns(spline, x + h) - turns(spline, x - h)) / (2 * h)
     omega = rotations.angular_velocity(spline, x)
     assert omega.shape == (*batch, 10, 3)
-    assert (
-        np.abs(omega - np.stack([change[..., 2, 1], change[..., 0, 2], change[..., 1, 0]], -1)).max() < 1e-8
-    )
+    assert np.abs(omega - np.stack([change[..., 2, 1], change[..., 0, 2], change[..., 1, 0]], -1)).max() < 1e-8
     for frame in ("body", "world"):
         ahead, behind = (rotations.angular_velocity(spline, y, frame) for y in (x + h, x - h))
         found = rotations.angular_acceleration(spline, x, frame)
@@ -182,9 +178,7 @@ def test_quaternions_of_a_closed_curve_go_on(rounds, batch):
     own = np.broadcast_to(x, (*batch, len(x)))
     assert np.array_equal(rotations.quaternion(spline, own, scalar_first=True, per_curve=True), q)
     # After an odd number of turns the sign is the other one.
-    start, end = (
-        rotations.quaternion(spline, t.T[i].T[..., None], scalar_first=True, per_curve=True) for i in (0, -1)
-    )
+    start, end = (rotations.quaternion(spline, t.T[i].T[..., None], scalar_first=True, per_curve=True) for i in (0, -1))
     assert np.abs(end - (-1) ** rounds * start).max() < 1e-14
     assert (start[..., 0] > 0.9).all()
 
@@ -217,10 +211,7 @@ def test_quaternions_follow_the_curve_and_not_its_chord():
 @every_curve
 def test_calls_are_those_of_a_spline(space):
     spline = curve(space, (2,))
-    for call in (
-        rotations.angular_velocity,
-        lambda *a, **k: rotations.quaternion(*a, scalar_first=True, **k),
-    ):
+    for call in (rotations.angular_velocity, lambda *a, **k: rotations.quaternion(*a, scalar_first=True, **k)):
         both = call(spline, X)
         assert np.array_equal(call(spline, np.stack([X, X]), per_curve=True), both)
         assert np.array_equal(call(spline[1], X), both[1])
@@ -253,9 +244,7 @@ def test_forms_of_rotations():
     back = rotations.as_rotation_vectors(rotations.from_rotation_vectors(small))
     assert np.allclose(back, small, rtol=1e-15, atol=0)
     assert (
-        np.abs(
-            rotations.from_rotation_vectors([0, 0, 100.0]) - Rotation.from_rotvec([0, 0, 100.0]).as_matrix()
-        ).max()
+        np.abs(rotations.from_rotation_vectors([0, 0, 100.0]) - Rotation.from_rotvec([0, 0, 100.0]).as_matrix()).max()
         < 1e-13
     )
 
@@ -310,10 +299,7 @@ def test_six_numbers_of_nearly_parallel_vectors(order):
         (lambda s: rotations.as_quaternions(np.eye(3)), "scalar_first"),
         (lambda s: rotations.as_six_numbers(np.eye(3)), "order='columns'"),
         (lambda s: rotations.as_six_numbers(2 * np.eye(3), order="rows"), "off the space"),
-        (
-            lambda s: rotations.from_six_numbers(np.ones((2, 6)), order="rows"),
-            r"numbers\[0\] are .* not parallel",
-        ),
+        (lambda s: rotations.from_six_numbers(np.ones((2, 6)), order="rows"), r"numbers\[0\] are .* not parallel"),
         (lambda s: rotations.from_six_numbers(np.zeros(6), order="rows"), "must be nonzero"),
         (lambda s: rotations.velocities(2 * np.eye(3), [0, 0, 1]), "off the space"),
         (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
@@ -345,6 +331,4 @@ def test_quaternions_that_were_rounded():
     points, still = np.stack([rounded, rounded]), np.zeros((2, 4))
     with pytest.raises(ss.ValidationError, match="is off"):
         ss.HermiteSpline(None, points, still, "sphere:3")
-    assert np.linalg.norm(ss.HermiteSpline(None, points, still, "sphere:3", atol=1e-5)(0.5)) == pytest.approx(
-        1
-    )
+    assert np.linalg.norm(ss.HermiteSpline(None, points, still, "sphere:3", atol=1e-5)(0.5)) == pytest.approx(1)

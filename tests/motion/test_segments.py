@@ -27,18 +27,11 @@ def test_segments_are_fitted_independently(space):
 
 
 @every_kind
-def test_first_of_duplicate_times_is_kept(space):
+def test_duplicate_times_keep_the_first_point_or_the_mean(space):
     p = points_on(space, 8, step=0.3)
     t = [0, 1, 1, 1, 2, 3, 3, 4]
     (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="first")
-    kept = [0, 1, 4, 5, 7]
-    assert found == ss.CubicSpline(np.arange(5.0), each(lambda a: a[kept], p), space)
-
-
-@every_kind
-def test_merged_point_is_the_mean(space):
-    p = points_on(space, 8, step=0.3)
-    t = [0, 1, 1, 1, 2, 3, 3, 4]
+    assert found == ss.CubicSpline(np.arange(5.0), each(lambda a: a[[0, 1, 4, 5, 7]], p), space)
     (found,) = ss.fit_segments(t, p, space, max_gap=9, duplicates="mean")
     for factor, given, means in zip(factors(space), parts(p), parts(found.points), strict=True):
         for i, own in ((1, slice(1, 4)), (3, slice(5, 7))):
@@ -46,8 +39,8 @@ def test_merged_point_is_the_mean(space):
         # The mean of two points is half way.
         middle = factor.geodesic(given[5], given[6], 0.5)
         assert factor.norm(middle, factor.log(middle, means[3])) < 5e-15
-    alone = [0, 4, 7]
-    assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), each(lambda a: a[alone], p)) < 1e-15
+    single = each(lambda a: a[[0, 4, 7]], p)
+    assert largest_difference(each(lambda a: a[[0, 2, 4]], found.points), single) < 1e-15
 
 
 def test_times_close_together_are_not_one():
@@ -85,10 +78,7 @@ def test_what_scipy_and_lists_hold():
 @pytest.mark.parametrize(
     ("match", "changes"),
     [
-        (
-            r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'",
-            {"t": [0, 1, 1, 1, 2]},
-        ),
+        (r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'", {"t": [0, 1, 1, 1, 2]}),
         (r"t\[2\] = 0.5 is before t\[1\] = 1.0. Sort", {"t": [0, 1, 0.5, 2, 3]}),
         (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
         (r"t has shape \(4,\), but there are 5 points", {"t": range(4)}),
@@ -203,9 +193,7 @@ def test_failed_noisy_segments_are_all_kept():
     assert [len(piece.t) for piece in caught.value.spline] == [30, 30]
     with pytest.warns(ss.ConvergenceWarning, match="curve 0: "):
         ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="warn")
-    assert (
-        len(ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="ignore")) == 2
-    )
+    assert len(ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="ignore")) == 2
 
 
 @pytest.mark.parametrize(

@@ -14,48 +14,31 @@ import symspline as ss
 from symspline._plotting import chart, disk, ellipses, frames, graphs, sphere
 from symspline._plotting.figure import picture_of
 
-KINDS = {
-    "euclidean:1": graphs.draw_graph,
-    "euclidean:2": chart.draw_plane,
-    "euclidean:3": chart.draw_3d,
-    "euclidean:5": graphs.draw_components,
-    "sphere:1": graphs.draw_circle,
-    "sphere:2": sphere.draw_sphere,
-    "sphere:3": frames.draw_quaternions,
-    "sphere:15": graphs.draw_components,
-    "hyperbolic:1": graphs.draw_components,
-    "hyperbolic:2": disk.draw_disk,
-    "rp:1": graphs.draw_slope,
-    "rp:2": sphere.draw_lines,
-    "rp:4": graphs.draw_principal_angles,
-    "cp:1": sphere.draw_bloch,
-    "cp:2": graphs.draw_principal_angles,
-    "ch:2": graphs.draw_ratios,
-    "gr:1,2": graphs.draw_slope,
-    "gr:1,3": sphere.draw_lines,
-    "gr:2,3": sphere.draw_normals,
-    "gr:2,5": graphs.draw_principal_angles,
-    "gr:4,5": graphs.draw_principal_angles,
-    "cgr:1,2": sphere.draw_bloch,
-    "cgr:2,3": graphs.draw_principal_angles,
-    "so:2": graphs.draw_turn,
-    "so:3": frames.draw_rotations,
-    "so:4": graphs.draw_components,
-    "o:2": graphs.draw_turn,
-    "o:3": frames.draw_rotations,
-    "u:1": graphs.draw_phase,
-    "u:3": graphs.draw_components,
-    "su:2": frames.draw_spins,
-    "su:3": graphs.draw_components,
-    "spd:1": graphs.draw_components,
-    "spd:2": ellipses.draw_ellipses,
-    "spd:3": ellipses.draw_ellipsoids,
-    "spd:4": graphs.draw_components,
-    "hpd:2": graphs.draw_components,
-    "se:2": frames.draw_flat_poses,
-    "se:3": frames.draw_poses,
+DRAWN_BY = {
+    graphs.draw_graph: "euclidean:1",
+    chart.draw_plane: "euclidean:2",
+    chart.draw_3d: "euclidean:3",
+    graphs.draw_components: "euclidean:5 sphere:15 hyperbolic:1 so:4 u:3 su:3 spd:1 spd:4 hpd:2",
+    graphs.draw_circle: "sphere:1",
+    sphere.draw_sphere: "sphere:2",
+    frames.draw_quaternions: "sphere:3",
+    disk.draw_disk: "hyperbolic:2",
+    graphs.draw_slope: "rp:1 gr:1,2",
+    sphere.draw_lines: "rp:2 gr:1,3",
+    graphs.draw_principal_angles: "rp:4 cp:2 gr:2,5 gr:4,5 cgr:2,3",
+    sphere.draw_bloch: "cp:1 cgr:1,2",
+    graphs.draw_ratios: "ch:2",
+    sphere.draw_normals: "gr:2,3",
+    graphs.draw_turn: "so:2 o:2",
+    frames.draw_rotations: "so:3 o:3",
+    graphs.draw_phase: "u:1",
+    frames.draw_spins: "su:2",
+    ellipses.draw_ellipses: "spd:2",
+    ellipses.draw_ellipsoids: "spd:3",
+    frames.draw_flat_poses: "se:2",
+    frames.draw_poses: "se:3",
 }
-
+KINDS = {name: draw for draw, names in DRAWN_BY.items() for name in names.split()}
 
 # Batches, of every kind of picture.
 FIRST = {draw: name for name, draw in reversed(KINDS.items())}
@@ -131,14 +114,7 @@ def test_unconverged_curve_is_drawn_and_named():
 
 @pytest.mark.parametrize(
     "name, unit, step",
-    [
-        ("r:1", "us", 500),
-        ("r:2", "s", 3),
-        ("r:1", "m", 70),
-        ("r:2", "h", 10),
-        ("r:1", "D", 1),
-        ("r:2", "D", 300),
-    ],
+    [("r:1", "us", 500), ("r:2", "s", 3), ("r:1", "m", 70), ("r:2", "h", 10), ("r:1", "D", 1), ("r:2", "D", 300)],
 )
 def test_dates(name, unit, step):
     t = np.datetime64("2024-02-27", unit) + step * np.array([0, 1, 2, 4, 5]).astype(f"timedelta64[{unit}]")

@@ -6,78 +6,53 @@ from drawn import axes_named, lines_of, rendered, spline_on
 from matplotlib.collections import PolyCollection
 
 import symspline as ss
-from symspline._plotting import ellipses, frames, graphs
+from symspline._plotting import ellipses
+from symspline._plotting.frames import AXES, VIEW
+
+PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
+ROTATIONS = {
+    "sphere:3": lambda q: ss.convert.quaternion_to_matrix(q, scalar_first=True),
+    "so:3": np.array,
+    "o:3": np.array,
+    # U (v·σ) U* = (Rv)·σ
+    "su:2": lambda u: np.einsum("iab,mbc,jcd,mad->mij", PAULI, u, PAULI, u.conj()).real / 2,
+}
 
 
-def test_quaternions_as_rotations():
-    half = np.sqrt(0.5)
-    about_z = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    np.testing.assert_allclose(frames.rotations(np.array([half, 0, 0, half])), about_z, atol=1e-15)
-    q = ss.Sphere(3).random_point(np.random.default_rng(6), 20)
-    matrices = frames.rotations(q)
-    np.testing.assert_allclose(
-        matrices @ matrices.swapaxes(1, 2), np.broadcast_to(np.eye(3), (20, 3, 3)), atol=1e-14
-    )
-    np.testing.assert_allclose(np.linalg.det(matrices), 1)
-    np.testing.assert_allclose(frames.rotations(-q), matrices)
-    np.testing.assert_allclose(frames.VIEW @ frames.VIEW.T, np.eye(3), atol=1e-3)
-
-
-def test_spins_as_rotations():
-    """U (v·σ) U* = (Rv)·σ."""
-    pauli = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
-    u = ss.SpecialUnitary(2).random_point(np.random.default_rng(10), 20)
-    turned = u[:, None] @ pauli @ u[:, None].conj().swapaxes(-1, -2)
-    matrices = frames.rotations(frames.quaternions(u))
-    np.testing.assert_allclose(np.einsum("mij,ikl->mjkl", matrices, pauli), turned, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    "name, rotations",
-    [
-        ("sphere:3", frames.rotations),
-        ("so:3", np.array),
-        ("o:3", np.array),
-        ("su:2", lambda u: frames.rotations(frames.quaternions(u))),
-    ],
-)
-def test_given_frames_are_bold(name, rotations):
+@pytest.mark.parametrize("name", ROTATIONS)
+def test_given_frames_are_bold(name):
     spline = spline_on(name, (4,), [0, 1, 2.5, 4])
     faint, bold = (q for q in spline.plot().axes[0].collections if hasattr(q, "U"))
     np.testing.assert_allclose(np.unique(bold.X), spline.t)
     assert bold.width > faint.width and len(faint.X) > len(bold.X)
     right_up = np.sort(np.hypot(bold.U, bold.V).reshape(4, 3))
-    lengths = np.linalg.norm((frames.VIEW @ rotations(spline.points))[:, :2], axis=1)
+    np.testing.assert_allclose(VIEW @ VIEW.T, np.eye(3), atol=1e-3)
+    lengths = np.linalg.norm((VIEW @ ROTATIONS[name](spline.points))[:, :2], axis=1)
     np.testing.assert_allclose(right_up, 0.7 * np.sort(lengths), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["rp:4", "cp:2", "gr:2,5", "gr:4,5", "cgr:2,3", "cgr:2,5"])
 def test_principal_angles(name):
     """Distance is √(Σ θᵢ²), and the bases do not matter."""
-    space, rng = ss.space(name), np.random.default_rng(14)
+    space = ss.space(name)
+
+    def angles(spline):
+        axes = axes_named(rendered(spline.plot()), "principal angles to")
+        return np.array([line for line in lines_of(axes) if len(line) > 1000])
+
     spline = spline_on(name)
-    axes = axes_named(rendered(spline.plot()), "principal angles to")
-    lines = [line for line in lines_of(axes) if len(line) > 1000]
+    lines = angles(spline)
     n, k = np.reshape(spline.points[0], (space.point_shape[0], -1)).shape
     assert len(lines) == min(k, n - k)
-    distance = space.distance(spline.points[0], spline(lines[0][:, 0]))
-    norm = np.linalg.norm([np.radians(line[:, 1]) for line in lines], axis=0)
-    np.testing.assert_allclose(norm, distance, atol=1e-12)
-    p = space.random_point(rng, 5)
-    turn = ss.Orthogonal(k) if k > 1 and not np.iscomplexobj(p) else ss.Unitary(k)
-    turned = p.reshape(5, n, k) @ turn.random_point(rng, 5)
-    np.testing.assert_allclose(
-        graphs.principal_angles(turned, turned[0]), graphs.principal_angles(p, p[0]), atol=1e-12
+    distance = space.distance(spline.points[0], spline(lines[0, :, 0]))
+    np.testing.assert_allclose(np.linalg.norm(np.radians(lines[..., 1]), axis=0), distance, atol=1e-12)
+    turns = (ss.Orthogonal(k) if k > 1 and not np.iscomplexobj(spline.points) else ss.Unitary(k)).random_point(
+        np.random.default_rng(14), 6
     )
-
-
-def test_outlines_of_positive_definite_matrices():
-    matrices = ss.SymmetricPositiveDefinite(2).random_point(np.random.default_rng(15), 20)
-    rings = ellipses.outlines(matrices)
-    np.testing.assert_allclose(np.einsum("mai,mij,maj->ma", rings, np.linalg.inv(matrices), rings), 1)
-    radii = np.linalg.norm(rings, axis=-1)
-    roots = np.sqrt(np.linalg.eigvalsh(matrices))
-    np.testing.assert_allclose(np.stack([radii.min(axis=1), radii.max(axis=1)], axis=1), roots, rtol=1e-2)
+    turned = (spline.points.reshape(6, n, k) @ (turns if np.iscomplexobj(spline.points) else turns.real)).reshape(
+        spline.points.shape
+    )
+    np.testing.assert_allclose(angles(ss.CubicSpline(None, space.project(turned), space)), lines, atol=1e-9)
 
 
 def test_sections_lie_in_the_outline_of_an_ellipsoid():
@@ -104,7 +79,7 @@ def test_ellipses_are_drawn_to_scale(name):
     np.testing.assert_allclose(bold.get_offsets(), np.stack([spline.t, [0] * 4], axis=1))
     assert len(faint.get_offsets()) > 4 and bold.get_linewidth()[0] > faint.get_linewidth()[0]
     assert bold.get_facecolor()[0, 3] > 0 == faint.get_facecolor()[0, 3]
-    view = np.eye(2) if name == "spd:2" else frames.VIEW[:2]
+    view = np.eye(2) if name == "spd:2" else VIEW[:2]
     roots = np.sqrt(np.linalg.eigvalsh(view @ spline.points @ view.T))
     # The bar shows the length of a number.
     (bar,) = [line for line in axes.lines if line.get_marker() == "|"]
@@ -134,7 +109,7 @@ def test_frames_stand_on_the_path():
     axes = rendered(spline.plot()).axes[0]
     sticks = [np.stack(line.get_data_3d(), axis=1) for line in axes.lines if line.get_linewidth() == 2.0]
     length = np.linalg.norm(sticks[0][1] - sticks[0][0])
-    for i, (stick, color) in enumerate(zip(sticks, frames.AXES, strict=True)):
+    for i, (stick, color) in enumerate(zip(sticks, AXES, strict=True)):
         ends = stick.reshape(5, 3, 3)
         np.testing.assert_allclose(ends[:, 0], spline.points[:, :3, 3])
         np.testing.assert_allclose(ends[:, 1] - ends[:, 0], length * spline.points[:, :3, i])
@@ -146,18 +121,30 @@ def test_lengths_of_rigid_motions_are_those_in_the_body():
     assert {"speed\n|(ω, v)|", "acceleration\n|(ω′, v′)|"} <= labels
 
 
-def test_names_of_components():
-    assert graphs.component_names((3,), False) == ["x₁", "x₂", "x₃"]
-    assert graphs.component_names((2, 2), False) == ["x₁₁", "x₁₂", "x₂₁", "x₂₂"]
-    assert graphs.component_names((2,), True) == ["Re x₁", "Im x₁", "Re x₂", "Im x₂"]
-    assert graphs.component_names((10, 1), False)[-1] == "x₁₀,₁"
-    numbers = graphs.components(np.array([[1 + 2j, 3 + 4j], [5, 6j]]))
-    np.testing.assert_array_equal(numbers, [[1, 2, 3, 4], [5, 0, 0, 6]])
-    figure = spline_on("sphere:15").plot()
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("euclidean:5", "x₁ x₂ x₃ x₄ x₅"),
+        ("sphere:15", "x₁ x₂ x₃ x₄ x₅ x₆ x₇ x₈ x₉ x₁₀ x₁₁ x₁₂ 4_others"),
+        ("so:10", "x₁,₁ x₁,₂ x₁,₃ x₁,₄ x₁,₅ x₁,₆ x₁,₇ x₁,₈ x₁,₉ x₁,₁₀ x₂,₁ x₂,₂ 88_others"),
+        # Components that follow from others are left out.
+        ("spd:1", "x₁₁"),
+        ("spd:4", "x₁₁ x₁₂ x₁₃ x₁₄ x₂₂ x₂₃ x₂₄ x₃₃ x₃₄ x₄₄"),
+        ("hpd:1", "Re_x₁₁"),
+        ("hpd:2", "Re_x₁₁ Re_x₁₂ Im_x₁₂ Re_x₂₂"),
+    ],
+)
+def test_names_of_components(name, words):
+    figure = spline_on(name).plot()
     (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
-    assert sorted(text.get_text() for text in legend.texts) == sorted(
-        [*graphs.component_names((12,), False), "4 others"]
-    )
+    assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
+
+
+def test_the_legend_of_many_complex_components_is_short():
+    figure = rendered(spline_on("u:5", (2, 4)).plot())
+    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+    words = [text.get_text() for text in legend.texts]
+    assert len(words) == 13 and "38 others" in words
 
 
 def test_imaginary_parts_are_dashed():
@@ -170,25 +157,3 @@ def test_imaginary_parts_are_dashed():
     for i in range(4):
         drawn = lines[2 * i].get_ydata() + 1j * lines[2 * i + 1].get_ydata()
         np.testing.assert_allclose(drawn, entries[:, i], atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "name, words",
-    [
-        ("spd:1", "x₁₁"),
-        ("spd:4", "x₁₁ x₁₂ x₁₃ x₁₄ x₂₂ x₂₃ x₂₄ x₃₃ x₃₄ x₄₄"),
-        ("hpd:1", "Re_x₁₁"),
-        ("hpd:2", "Re_x₁₁ Re_x₁₂ Im_x₁₂ Re_x₂₂"),
-    ],
-)
-def test_components_that_follow_from_others_are_left_out(name, words):
-    figure = spline_on(name).plot()
-    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
-    assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
-
-
-def test_legend_of_a_large_matrix_is_short():
-    figure = rendered(spline_on("u:5", (2, 4)).plot())
-    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
-    words = [text.get_text() for text in legend.texts]
-    assert len(words) == 13 and "38 others" in words

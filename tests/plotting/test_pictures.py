@@ -35,9 +35,7 @@ def test_no_line_jumps_across_the_map(points):
 
 def test_map_line_is_broken_where_it_leaves_the_map():
     broken = sphere.broken(np.array([[170.0, 10], [-170, 20], [-160, 30]]))
-    np.testing.assert_array_equal(
-        broken, [[170, 10], [180, 15], [np.nan] * 2, [-180, 15], [-170, 20], [-160, 30]]
-    )
+    np.testing.assert_array_equal(broken, [[170, 10], [180, 15], [np.nan] * 2, [-180, 15], [-170, 20], [-160, 30]])
     broken = sphere.broken(np.array([[30.0, 88], [-150, 89]]))
     np.testing.assert_array_equal(broken, [[30, 88], [30, 90], [np.nan] * 2, [-150, 90], [-150, 89]])
 
@@ -121,9 +119,7 @@ def test_poincare_disk():
     np.testing.assert_allclose(np.linalg.norm(places, axis=-1), np.tanh(plane.distance(origin, p) / 2))
     np.testing.assert_allclose(disk.flat(p[0], p[0]), 0, atol=1e-14)
     moved = disk.flat(p, p[0])
-    np.testing.assert_allclose(
-        np.linalg.norm(moved, axis=-1), np.tanh(plane.distance(p[0], p) / 2), atol=1e-7
-    )
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=-1), np.tanh(plane.distance(p[0], p) / 2), atol=1e-7)
 
 
 def test_disk_moves_to_a_curve_that_is_far_away():
@@ -192,11 +188,7 @@ def planes(normals, rng):
 def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
     rng = np.random.default_rng(13)
     signs = rng.choice([-1, 1], (len(points), 1))
-    made = {
-        "rp:2": points * signs,
-        "gr:1,3": (points * signs)[:, :, None],
-        "gr:2,3": planes(points, rng),
-    }
+    made = {"rp:2": points * signs, "gr:1,3": (points * signs)[:, :, None], "gr:2,3": planes(points, rng)}
     spline = ss.CubicSpline(None, made[name], name)
     axes = rendered(spline.plot()).axes[0]
     (far, near), (dots, _) = [line for line in lines_of(axes) if len(line) > 1000], dots_of(axes)
@@ -212,9 +204,7 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
 
 
 def test_half_sphere_is_the_upper_one():
-    line = sphere.broken_at_rim(
-        sphere.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001)))
-    )
+    line = sphere.broken_at_rim(sphere.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001))))
     np.testing.assert_allclose(np.linalg.norm(line[~np.isnan(line[:, 0])], axis=1), 1)
     assert np.nanmin(line) >= -1 and np.nanmin(line[:, 2]) >= 0
 

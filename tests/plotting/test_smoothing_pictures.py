@@ -59,9 +59,7 @@ def test_every_space_shows_data(name):
     assert speed.get_ylim()[1] > wanted.max()
 
 
-@pytest.mark.parametrize(
-    "name", ["r:2", "r:3", "sphere:2", "h:2", "so:3", "spd:3", "se:2", "se:3", "rp:2", "s:1"]
-)
+@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "so:3", "spd:3", "se:2", "se:3", "rp:2", "s:1"])
 def test_batches(name):
     figure = rendered(smooth(name, curves=3).plot())
     assert len(bands_of(axes_named(figure, "speed"))) == (0 if name.startswith("se") else 3)

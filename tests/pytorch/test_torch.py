@@ -9,9 +9,7 @@ import symspline as ss
 from symspline.torch import curve
 
 # PyTorch's forward mode warns of itself.
-pytestmark = pytest.mark.filterwarnings(
-    "ignore:`torch.jit:FutureWarning", "ignore:`torch.jit:DeprecationWarning"
-)
+pytestmark = pytest.mark.filterwarnings("ignore:`torch.jit:FutureWarning", "ignore:`torch.jit:DeprecationWarning")
 
 X = torch.tensor([0.3, 1.7, 3.1], dtype=torch.float64)
 T = torch.tensor([0.0, 1.0, 2.2, 3.0, 4.1], dtype=torch.float64)

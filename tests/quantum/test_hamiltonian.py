@@ -55,9 +55,7 @@ def test_norms_are_the_speed(name):
     spline = curve(name)
     h, speed = hamiltonian(spline, X), spline.speed(X)
     assert np.array_equal(h, adjoint(h))
-    assert np.abs(np.linalg.norm(h, axis=(-2, -1)) - np.sqrt(2) * speed).max() < 1e-14 * np.sqrt(
-        speed.max() + 9
-    )
+    assert np.abs(np.linalg.norm(h, axis=(-2, -1)) - np.sqrt(2) * speed).max() < 1e-14 * np.sqrt(speed.max() + 9)
     if spline.space.point_shape[-1] == 2 and "cgr" in name:
         return
     assert np.abs(np.linalg.norm(h, 2, axis=(-2, -1)) - speed).max() < 1e-14
@@ -111,22 +109,14 @@ def test_the_derivative(name):
     spline = curve(name)
     x, d = np.array([0.4, 1.3, 2.2, 4.6]), 1e-3
     weights = np.array([1, -9, 45, -45, 9, -1]) / 60
-    slope = (
-        sum(w * hamiltonian(spline, x + k * d) for w, k in zip(weights, (3, 2, 1, -1, -2, -3), strict=True))
-        / d
-    )
+    slope = sum(w * hamiltonian(spline, x + k * d) for w, k in zip(weights, (3, 2, 1, -1, -2, -3), strict=True)) / d
     assert np.abs(hamiltonian(spline, x, nu=1) - slope).max() < 1e-10
     # Continuous at the knots.
     inner = KNOTS[1:-1]
-    jump = hamiltonian(spline, np.nextafter(inner, 9), nu=1) - hamiltonian(
-        spline, np.nextafter(inner, -9), nu=1
-    )
+    jump = hamiltonian(spline, np.nextafter(inner, 9), nu=1) - hamiltonian(spline, np.nextafter(inner, -9), nu=1)
     assert np.abs(jump).max() < 1e-11
     # And no smoother than that.
-    bend = [
-        hamiltonian(spline, inner + s * d, nu=1) - hamiltonian(spline, inner + s * 2 * d, nu=1)
-        for s in (1, -1)
-    ]
+    bend = [hamiltonian(spline, inner + s * d, nu=1) - hamiltonian(spline, inner + s * 2 * d, nu=1) for s in (1, -1)]
     assert np.abs(bend[0] + bend[1]).max() > 0.01 * d
 
 

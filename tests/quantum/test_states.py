@@ -160,20 +160,14 @@ def test_there_is_no_hamiltonian_before_the_first_knot(stand_in):
     assert h(0.0).shape == (3, 3)
     with pytest.raises(ss.ValidationError, match=r"dims \[2, 2\] have 4 levels, but the curve has 3"):
         qobjevo(later, dims=[2, 2])
-    with pytest.raises(
-        ss.ValidationError, match=r"dims must be a list of whole numbers, such as \[2, 2\], not 3"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"dims must be a list of whole numbers, such as \[2, 2\], not 3"):
         qobjevo(later, dims=3)
 
 
 def test_composite_systems_in_qutip():
     qutip = pytest.importorskip("qutip")
     up, down = qutip.basis(2, 0), qutip.basis(2, 1)
-    kets = [
-        qutip.tensor(up, up),
-        qutip.tensor(up, (up + down).unit()),
-        qutip.tensor(down, (up - down).unit()),
-    ]
+    kets = [qutip.tensor(up, up), qutip.tensor(up, (up + down).unit()), qutip.tensor(down, (up - down).unit())]
     spline = ss.CubicSpline([3, 4, 6], from_kets([kets[0], kets[1], (kets[1] + kets[2]).unit()]), "cp:3")
     options = {"atol": 1e-12, "rtol": 1e-12, "nsteps": 100_000}
     h = qobjevo(spline, dims=[2, 2])
@@ -197,9 +191,7 @@ def test_qutip_drives_through_every_given_state(name):
     qutip = pytest.importorskip("qutip")
     spline = curve(name)
     options = {"atol": 1e-12, "rtol": 1e-12, "nsteps": 100_000}
-    found = qutip.sesolve(
-        qobjevo(spline), qutip.Qobj(spline.points[0]), list(spline.t), options=options
-    ).states
+    found = qutip.sesolve(qobjevo(spline), qutip.Qobj(spline.points[0]), list(spline.t), options=options).states
     for state, given in zip(found, spline.points, strict=True):
         reached = state.full().reshape(given.shape)
         size = np.linalg.norm(given)

@@ -67,11 +67,7 @@ def test_dates_of_whole_days():
     dates = np.datetime64("2024-01-01") + (10 * KNOTS).astype("m8[D]")
     figure = rendered(AffineMorph(dates, turned(2, 5)).plot())
     labels = [axes.texts[-1].get_text() for axes in figure.axes[1:]]
-    assert (
-        labels[0] == "2024-01-01 00:00"
-        and labels[1] == "2024-01-04 15:16"
-        and labels[-1] == "2024-02-10 00:00"
-    )
+    assert labels[0] == "2024-01-01 00:00" and labels[1] == "2024-01-04 15:16" and labels[-1] == "2024-02-10 00:00"
 
 
 def test_saved(tmp_path):

@@ -83,17 +83,11 @@ FLAT = np.array([[0.0, 0], [1, 1], [2, 2], [3, 3]])
             r"x has shape \(3, 2\): 3 landmarks in 2 dimensions; .* need at least 4 landmarks",
             lambda: from_landmarks(FLAT[1:]),
         ),
-        (
-            "base must be None or the number of a landmark, 0 to 3, not 4",
-            lambda: from_landmarks(SQUARE, base=4),
-        ),
+        ("base must be None or the number of a landmark, 0 to 3, not 4", lambda: from_landmarks(SQUARE, base=4)),
         ("base must be .* not True", lambda: from_landmarks(SQUARE, base=True)),
         ("x must be real landmarks, not complex", lambda: from_landmarks(SQUARE * 1j)),
         (r"x\[2, 0\] is nan", lambda: from_landmarks([[0, 0], [1, 0], [np.nan, 1], [0, 1]])),
-        (
-            r"shape must be real, of shape \(..., 3, 2\)",
-            lambda: to_landmarks(from_landmarks(SQUARE), SQUARE, base=0),
-        ),
+        (r"shape must be real, of shape \(..., 3, 2\)", lambda: to_landmarks(from_landmarks(SQUARE), SQUARE, base=0)),
         ("shape does not have orthonormal columns", lambda: to_landmarks(SQUARE, SQUARE)),
     ],
 )

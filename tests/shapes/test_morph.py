@@ -57,9 +57,7 @@ def test_in_the_coordinates_of_the_first_drawing_only_the_shape_changes(base):
     # And what is done to all of them is done to the film.
     linear, shift = np.array([[1.0, 2.0], [0.5, -1.0]]), [3.0, 4.0]
     assert (
-        np.abs(
-            AffineMorph(KNOTS, x @ linear + shift, base=base, frame="first")(X) - film @ linear - shift
-        ).max()
+        np.abs(AffineMorph(KNOTS, x @ linear + shift, base=base, frame="first")(X) - film @ linear - shift).max()
         < 10 * NEAR
     )
 
@@ -73,11 +71,7 @@ def test_similar_drawings_make_similar_films():
 
 def test_drawings_of_one_shape_do_not_need_the_lift():
     """If all are similar, the film is that of the similarities."""
-    angle, size, at = (
-        np.array([0, 0.8, 1.5, 1.2, 2.0]),
-        np.array([1, 1.5, 1, 2, 1.2]),
-        np.array([0, 1, 5, 2, 0.0]),
-    )
+    angle, size, at = (np.array([0, 0.8, 1.5, 1.2, 2.0]), np.array([1, 1.5, 1, 2, 1.2]), np.array([0, 1, 5, 2, 0.0]))
     first = drawings(1)[0] - drawings(1)[0].mean(axis=0)
 
     def drawn(angle, size, at):
@@ -198,18 +192,12 @@ def flat():
             lambda: AffineMorph(KNOTS, mirrored()),
         ),
         (r"landmarks\[3\] lies in a hyperplane", lambda: AffineMorph(KNOTS, flat())),
-        (
-            "frame must be 'all' or 'first', not 'last'",
-            lambda: AffineMorph(KNOTS, turned(2, 5), frame="last"),
-        ),
+        ("frame must be 'all' or 'first', not 'last'", lambda: AffineMorph(KNOTS, turned(2, 5), frame="last")),
         (
             "bc_type must be a string or a pair of strings",
             lambda: AffineMorph(KNOTS, turned(2, 5), bc_type=((1, 0), "natural")),
         ),
-        (
-            r"landmarks must be of shape \(drawings, landmarks, n\)",
-            lambda: AffineMorph(KNOTS, turned(2, 5)[0]),
-        ),
+        (r"landmarks must be of shape \(drawings, landmarks, n\)", lambda: AffineMorph(KNOTS, turned(2, 5)[0])),
         (r"with n >= 2, not \(5, 6, 1\)", lambda: AffineMorph(KNOTS, turned(2, 5)[..., :1])),
         (
             r"x\[1\] is 4.5, but must be between the times of the first and last drawings, 0.0 and 4.0",

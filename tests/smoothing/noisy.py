@@ -37,3 +37,27 @@ def rms(space, p, q):
 def each(value):
     """One value, or those of the parts of a product or of poses."""
     return value if isinstance(value, tuple) else (value,)
+
+
+TIGHT = {"tol": 1e-8, "max_iter": 200}
+"""Steps of the search that end it, in standard deviations; the linearised solver stagnates at rounding."""
+
+
+def acceleration_energy(space, spline, lam):
+    """λ ∫ |∇γ'|² dt, by two Gauss points per segment."""
+    h = np.diff(spline.t)[:, None]
+    x = spline.t[:-1, None] + h * (0.5 + np.array([-0.5, 0.5]) / np.sqrt(3))
+    at, bends = spline(x), spline(x, nu=2)
+    return lam * np.sum(0.5 * h * space.inner(at, bends, bends))
+
+
+def distance_to_minimum(space, points, objective, step=1e-4, seed=2):
+    """How far an objective of points is from its minimum in random directions: slope over curvature."""
+    rng, found = np.random.default_rng(seed), []
+    for _ in range(3):
+        v = space.random_tangent(rng, points)
+        here, up, down = (objective(space.exp(points, s * step * v)) for s in (0, 1, -1))
+        slope, bend = (up - down) / (2 * step), (up + down - 2 * here) / step**2
+        assert bend > 0
+        found.append(abs(slope / bend))
+    return max(found)

@@ -29,9 +29,7 @@ class Dense:
             self.curve = CubicSpline(knots, np.vstack([unit, unit[:1]]), bc_type="periodic")
         else:
             pair = (ends, ends) if isinstance(ends, str) else ends
-            kinds = tuple(
-                {"natural": (2, np.zeros(count)), "clamped": (1, np.zeros(count))}[end] for end in pair
-            )
+            kinds = tuple({"natural": (2, np.zeros(count)), "clamped": (1, np.zeros(count))}[end] for end in pair)
             self.curve = CubicSpline(knots, unit, bc_type=kinds)
         self.null = 2 if ends == "natural" else 1
         self.values = self.rows(t)

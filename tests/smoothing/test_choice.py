@@ -19,8 +19,7 @@ def batch(name, sigma):
 
 @pytest.mark.parametrize(
     ("name", "sigma"),
-    [(name, sigma) for name in ("sphere:2", "so:3", "hyperbolic:2") for sigma in (0.02, 0.1, 0.4)]
-    + [("spd:3", 0.1)],
+    [(name, sigma) for name in ("sphere:2", "so:3", "hyperbolic:2") for sigma in (0.02, 0.1, 0.4)] + [("spd:3", 0.1)],
 )
 def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     space, points, noisy = batch(name, sigma)
@@ -49,9 +48,7 @@ def test_outliers_do_little_harm(name, limit):
     dirty[bad] = space.exp(points[bad], 1.2 * space.random_tangent(rng, points[bad]))
     clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
     errors = {
-        loss: rms(
-            space, ss.make_smoothing_spline(T, dirty, space, loss=loss, on_failure="ignore")(T), points
-        ).mean()
+        loss: rms(space, ss.make_smoothing_spline(T, dirty, space, loss=loss, on_failure="ignore")(T), points).mean()
         for loss in ("linear", "huber", "cauchy")
     }
     assert errors["cauchy"] < limit * clean
@@ -72,9 +69,7 @@ def test_robust_curves_of_numbers_are_where_their_loss_is_least(loss):
     t = np.linspace(0, 1, 30)
     y = np.sin(5 * t) + 0.1 * rng.standard_normal(30)
     y[[4, 17]] += 3
-    spline = ss.make_smoothing_spline(
-        t, y[:, None], "r:1", 1e-3, loss=loss, sigma=0.1, tol=1e-9, max_iter=400
-    )
+    spline = ss.make_smoothing_spline(t, y[:, None], "r:1", 1e-3, loss=loss, sigma=0.1, tol=1e-9, max_iter=400)
     # χ²₁ is below these with probability .82 and .95.
     corner = 0.1 * {"huber": 1.3407550336902165, "cauchy": 1.959963984540054}[loss]
 
@@ -98,8 +93,7 @@ CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS), 0 * TURNS], -1)
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize(
-    ("criterion", "gamma", "most"),
-    [("gcv", 1.0, 1.2), ("gcv", 1.4, 1.1), ("reml", 1.4, 1.1), ("cp", 1.4, 1.2)],
+    ("criterion", "gamma", "most"), [("gcv", 1.0, 1.2), ("gcv", 1.4, 1.1), ("reml", 1.4, 1.1), ("cp", 1.4, 1.2)]
 )
 def test_geodesic_motion_is_seen_to_be_geodesic(criterion, gamma, most):
     """Two turns of a great circle: errors are hardly larger than that of the best geodesic."""
@@ -280,9 +274,7 @@ def test_a_lambda_that_does_not_settle_is_told():
             walk = sphere.exp(start, 10 ** rng.uniform(-1, 0) * sphere.random_tangent(rng, start))
         points = walk / np.linalg.norm(walk, axis=1, keepdims=True)
         weights = 10 ** rng.uniform(-3, 3, n) if weighed else None
-        spline = ss.make_smoothing_spline(
-            t, points, sphere, gamma=gamma, weights=weights, on_failure="ignore"
-        )
+        spline = ss.make_smoothing_spline(t, points, sphere, gamma=gamma, weights=weights, on_failure="ignore")
         told.append(not spline.report.converged)
         # The λ that the message proposes has a curve.
         assert ss.make_smoothing_spline(t, points, sphere, spline.lam, weights=weights).report.converged

@@ -24,9 +24,7 @@ def data(closed, n=40, m=2, seed=0):
     t[11], t[21] = t[10], t[20] + 3e-3
     if closed:
         t = 0.97 * t
-    y = np.stack([np.sin(2 * np.pi * t), np.cos(2 * np.pi * t)], -1)[:, :m] + 0.2 * rng.standard_normal(
-        (n, m)
-    )
+    y = np.stack([np.sin(2 * np.pi * t), np.cos(2 * np.pi * t)], -1)[:, :m] + 0.2 * rng.standard_normal((n, m))
     return t, rng.uniform(0.3, 3, n), y
 
 
@@ -141,12 +139,9 @@ def test_frames_make_curves_numbers(name, kind, ends):
     chosen = ss.make_smoothing_spline(t, noisy, space, weights=w, knots=knots, bc_type=ends, **TIGHT)
     around = chosen.lam * np.exp([-0.3, 0.0, 0.3])
     fits = [
-        ss.make_smoothing_spline(t, noisy, space, lam, weights=w, knots=knots, bc_type=ends, **TIGHT)
-        for lam in around
+        ss.make_smoothing_spline(t, noisy, space, lam, weights=w, knots=knots, bc_type=ends, **TIGHT) for lam in around
     ]
-    low, middle, high = (
-        2 * np.log(fit.sigma) + np.log(40 - fit.df) - 2 * np.log(40 - 1.4 * fit.df) for fit in fits
-    )
+    low, middle, high = (2 * np.log(fit.sigma) + np.log(40 - fit.df) - 2 * np.log(40 - 1.4 * fit.df) for fit in fits)
     assert low > middle < high
     # The lowest point of the parabola through the three.
     assert abs(0.15 * (low - high) / (low + high - 2 * middle)) < 0.05

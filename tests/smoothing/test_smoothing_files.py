@@ -3,10 +3,13 @@
 import datetime
 import io
 import json
+import pickle
 
 import numpy as np
 import pytest
+from curves import parts, same
 from noisy import beside, example
+from stored import load, stored, with_arrays
 
 import symspline as ss
 from symspline.cli import main
@@ -15,9 +18,7 @@ S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
 WEIGHTS = np.where(np.arange(40) == 3, 0.0, np.linspace(0.5, 2, 40))
 DATES = np.datetime64("2024-03-01") + (T * 60).astype("timedelta64[s]")
 TEXTS = DATES[8::8].astype(str)
-ZONED = [
-    datetime.datetime(2024, 3, 1, tzinfo=datetime.UTC) + datetime.timedelta(minutes=i) for i in range(40)
-]
+ZONED = [datetime.datetime(2024, 3, 1, tzinfo=datetime.UTC) + datetime.timedelta(minutes=i) for i in range(40)]
 
 
 def saved_curves():
@@ -47,21 +48,6 @@ def saved_curves():
 SAVED = saved_curves()
 
 
-def stored(spline):
-    file = io.BytesIO()
-    spline.save(file)
-    file.seek(0)
-    return file
-
-
-def parts(value):
-    return value if isinstance(value, tuple) else (value,)
-
-
-def same(a, b):
-    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(parts(a), parts(b), strict=True))
-
-
 def assert_same(read, spline):
     assert type(read) is ss.SmoothingSpline and read == spline and repr(read) == repr(spline)
     assert read.t.dtype == spline.t.dtype and read.data[0].dtype == spline.data[0].dtype
@@ -79,12 +65,13 @@ def assert_same(read, spline):
 
 
 @pytest.mark.parametrize("name", SAVED)
-def test_files_keep_everything(name):
-    assert_same(ss.load(stored(SAVED[name])), SAVED[name])
+def test_files_and_pickles_keep_everything(name):
+    for read in (load(stored(SAVED[name])), pickle.loads(pickle.dumps(SAVED[name]))):
+        assert_same(read, SAVED[name])
 
 
 def test_zones_are_kept():
-    read = ss.load(stored(SAVED["zones"]))
+    read = load(stored(SAVED["zones"]))
     assert read.std(ZONED[3]) == SAVED["zones"].std(ZONED[3])
     with pytest.raises(ss.ValidationError, match="no time zone"):
         read.std(datetime.datetime(2024, 3, 1))
@@ -92,7 +79,7 @@ def test_zones_are_kept():
 
 def test_curves_of_a_batch_come_back_one_by_one():
     for name in ("batch", "own times", "own dates"):
-        for read, spline in zip(ss.load(stored(SAVED[name])), SAVED[name], strict=True):
+        for read, spline in zip(load(stored(SAVED[name])), SAVED[name], strict=True):
             assert_same(read, spline)
 
 
@@ -110,18 +97,15 @@ def test_many_smoothing_splines_in_one_file():
     with pytest.raises(ss.ValidationError, match="not both"):
         ss.save_many({"smooth": SAVED["one"], "plain": plain}, io.BytesIO())
     with pytest.raises(ss.ValidationError, match=r"read it with symspline\.load"):
-        ss.load_many(stored(SAVED["one"]))
+        ss.load_many(io.BytesIO(stored(SAVED["one"])))
 
 
-ARRAYS = dict(np.load(stored(SAVED["weights"])))
+ARRAYS = dict(np.load(io.BytesIO(stored(SAVED["weights"]))))
 
 
-def with_arrays(**changes):
-    file = io.BytesIO()
-    arrays = ARRAYS | changes
-    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
-    file.seek(0)
-    return file
+def load_with(**changes):
+    """The curve with weights, read from a file in which some arrays are others or missing."""
+    return load(with_arrays(SAVED["weights"], **changes))
 
 
 def noise_with(**changes):
@@ -131,11 +115,7 @@ def noise_with(**changes):
 @pytest.mark.parametrize("name", ARRAYS)
 def test_files_with_a_missing_array(name):
     with pytest.raises(ss.ValidationError, match=name if name != "format" else "not a symspline curve"):
-        ss.load(with_arrays(**{name: None}))
-
-
-def swapped(array):
-    return array[::-1].copy()
+        load_with(**{name: None})
 
 
 @pytest.mark.parametrize(
@@ -145,7 +125,7 @@ def swapped(array):
         {"data": np.nan * ARRAYS["data"]},
         {"data": ARRAYS["data"][1:]},
         {"data": ARRAYS["data"] + 0j},
-        {"data_t": swapped(ARRAYS["data_t"])},
+        {"data_t": ARRAYS["data_t"][::-1].copy()},
         {"data_t": ARRAYS["data_t"] - 1},
         {"data_t": ARRAYS["data_t"] + 1},
         {"data_t": ARRAYS["data_t"][1:]},
@@ -178,42 +158,39 @@ def swapped(array):
 )
 def test_files_with_a_wrong_array(changes):
     with pytest.raises(ss.ValidationError, match="the file"):
-        ss.load(with_arrays(**changes))
+        load_with(**changes)
 
 
-def test_collections_that_are_damaged():
-    file = io.BytesIO()
+@pytest.mark.parametrize(
+    "changes", [{"samples": [40, 41]}, {"knots": [3, 3]}, {"noise": "[]"}, {"data_weights": [1.0]}]
+)
+def test_damaged_collections_raise(changes):
+    file, damaged = io.BytesIO(), io.BytesIO()
     ss.save_many({"a": SAVED["one"], "b": SAVED["robust"]}, file)
     file.seek(0)
-    arrays = dict(np.load(file))
-    for key, value in {"samples": [40, 41], "knots": [3, 3], "noise": "[]", "data_weights": [1.0]}.items():
-        file = io.BytesIO()
-        np.savez(file, **arrays | {key: value})
-        file.seek(0)
-        with pytest.raises(ss.ValidationError, match="the file"):
-            ss.load_many(file)
+    np.savez(damaged, **dict(np.load(file)) | changes)
+    damaged.seek(0)
+    with pytest.raises(ss.ValidationError, match="the file"):
+        ss.load_many(damaged)
 
 
-@pytest.mark.parametrize("name", ["one", "batch", "dates", "product"])
-def test_command_line_reads_information(name, tmp_path, capsys):
-    SAVED[name].save(tmp_path / "smooth.npz")
-    assert main(["check", str(tmp_path / "smooth.npz")]) == 0
-    assert main(["sample", str(tmp_path / "smooth.npz"), "-n", "5", "-o", str(tmp_path / "out.csv")]) == 0
-    which = ["--curve", "1"] if name == "batch" else []
-    assert main(["plot", str(tmp_path / "smooth.npz"), *which, "-o", str(tmp_path / "out.png")]) == 0
+@pytest.mark.parametrize("name", ["one", "batch", "dates", "product", "many"])
+def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
+    file = tmp_path / "smooth.npz"
+    if name == "many":
+        ss.save_many({"a": SAVED["one"], "b": SAVED["few knots"]}, file)
+    else:
+        SAVED[name].save(file)
+    which = {"batch": ["--curve", "1"], "many": ["--curve", "b"]}.get(name, [])
+    assert main(["check", str(file)]) == 0
+    assert main(["sample", str(file), "-n", "5", "-o", str(tmp_path / "out.csv")]) == 0
+    assert main(["plot", str(file), *which, "-o", str(tmp_path / "out.png")]) == 0
     assert "rounding allows" in capsys.readouterr().out
     assert (tmp_path / "out.png").stat().st_size > 1000
-
-
-def test_the_command_line_reads_collections(tmp_path):
-    curves = {"a": SAVED["one"], "b": SAVED["few knots"]}
-    ss.save_many(curves, tmp_path / "many.npz")
-    assert main(["check", str(tmp_path / "many.npz")]) == 0
-    assert main(["plot", str(tmp_path / "many.npz"), "--curve", "b", "-o", str(tmp_path / "b.png")]) == 0
 
 
 def test_knots_of_curves_that_count_from_their_own_time():
     both = SAVED["own dates"]
     assert both.t.shape == (2, 11) and both[0].t.shape == (11,)
-    with pytest.raises(ss.ValidationError, match=r"those of all curves, shape \(K,\)"):
+    with pytest.raises(ss.ValidationError, match=r"must have shape \(K,\)"):
         ss.make_smoothing_spline(T, beside(S2, NOISY, 0.01), S2, knots=np.eye(3))

@@ -1,7 +1,5 @@
 """What people hand over, and what they get back."""
 
-import pickle
-
 import numpy as np
 import pytest
 from noisy import example, rms
@@ -36,16 +34,6 @@ def test_is_a_cubic_spline():
     assert "40 data" in repr(spline) and "degrees of freedom" in str(spline.report)
 
 
-def test_comes_back_from_a_pickle():
-    for spline in (
-        ss.make_smoothing_spline(T, NOISY, S2),
-        ss.make_smoothing_spline(T, (NOISY, NOISY), ss.Product(S2, S2)),
-        ss.make_smoothing_spline(T, np.stack([NOISY, NOISY]), S2),
-    ):
-        back = pickle.loads(pickle.dumps(spline))
-        assert back == spline and np.array_equal(back.std(T), spline.std(T))
-
-
 def test_progress_is_shown():
     seen = []
     ss.make_smoothing_spline(T, NOISY, S2, progress=lambda done, total: seen.append((done, total)))
@@ -67,7 +55,7 @@ def test_failed_curves_are_reported_and_kept():
     with pytest.warns(ss.ConvergenceWarning):
         spline = ss.make_smoothing_spline(T, NOISY, S2, max_iter=1, on_failure="warn")
     assert "NOT converged" in str(spline.report)
-    with pytest.raises(ss.ConvergenceError, match="every knot needs data beside it"):
+    with pytest.raises(ss.ConvergenceError, match="there must be data near every knot"):
         ss.make_lsq_spline(T[:6], NOISY[:6], np.linspace(0, T[5], 30), S2)
 
 
@@ -77,7 +65,7 @@ def test_bounds_are_warned_of():
     with pytest.warns(ss.SmoothingWarning, match=r"The smoothing chose the largest lam.*\(2\.0\d degrees"):
         stiff = ss.make_smoothing_spline(T, 0.3 * T[:, None] + noise, "r:1", criterion="reml")
     assert "at its bound: a geodesic" in str(stiff.report)
-    with pytest.warns(ss.SmoothingWarning, match=r"goes through nearly all data .* criterion='reml'"):
+    with pytest.warns(ss.SmoothingWarning, match=r"follows nearly all data .* criterion='reml'"):
         rough = ss.make_smoothing_spline(T, noise, "r:1", criterion="cp", sigma=1e-6)
     assert rough.df > 39
     both = np.stack([noise, np.sin(T)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))])
@@ -114,16 +102,16 @@ def test_three_points_that_are_met_are_no_geodesic():
         ({"t": T[::-1]}, r"t\[1\] is before t\[0\]"),
         ({"t": T[:-1]}, "40 points a curve need"),
         ({"t": np.where(T > 5, np.nan, T)}, "is nan"),
-        ({"t": np.zeros(40)}, "lie at one time"),
+        ({"t": np.zeros(40)}, "have one time only"),
         ({"lam": -1.0}, "lam must be finite and >= 0"),
         ({"lam": [1.0, 2.0]}, "lam must be a number"),
         ({"weights": -np.ones(40)}, r"weights\[0\] is -1.0"),
         ({"weights": np.ones(39)}, "weights has shape"),
-        ({"weights": np.eye(1, 40)[0]}, "lie at one time"),
+        ({"weights": np.eye(1, 40)[0]}, "have one time only"),
         ({"knots": 1}, "knots must be at least 2"),
         ({"knots": "many"}, "knots must be None, a number"),
         ({"knots": [0.0, 5.0]}, "from the first to the last time"),
-        ({"knots": [0.0, 5.0, 5.0, 10.0]}, r"knots\[2\] is not behind knots\[1\]"),
+        ({"knots": [0.0, 5.0, 5.0, 10.0]}, r"knots\[2\] is not after knots\[1\]"),
         ({"criterion": "aic"}, "criterion must be"),
         ({"criterion": 3}, "criterion must be a word, not 3"),
         ({"tol": True}, "tol must be"),
@@ -156,9 +144,7 @@ def test_band_and_deviation_check_their_arguments():
         ss.SmoothingSpline()
 
 
-@pytest.mark.parametrize(
-    "options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}]
-)
+@pytest.mark.parametrize("options", [{}, {"criterion": "reml"}, {"loss": "cauchy"}, {"criterion": "cp", "sigma": 0.1}])
 def test_between_two_knots_there_is_the_nearest_geodesic(options):
     two = ss.make_smoothing_spline([3.0, 5e6], NOISY[:2], S2, **options)
     assert np.abs(two.points - NOISY[:2]).max() < 1e-12 and two.df == pytest.approx(2)
@@ -184,9 +170,7 @@ def test_squares_beyond_doubles_are_no_result(size):
 def test_data_all_over_a_space_are_told(name, seed):
     space, rng = ss.space(name), np.random.default_rng(seed)
     points = space.random_point(rng, 200)
-    with pytest.warns(
-        UserWarning, match=r"half of the data are \d.* half of random points of .* would be \d"
-    ):
+    with pytest.warns(UserWarning, match=r"half of the data are \d.* For random points of .* this distance is \d"):
         spline = ss.make_smoothing_spline(None, points, space, lam=1e6)
     # Of a batch the curve is named; weights of zero do not count.
     if name == "sphere:2":

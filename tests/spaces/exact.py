@@ -63,9 +63,7 @@ class Subspaces:
 
     def exp(self, p, v):
         u, angles, w = mp.svd(v, full_matrices=False)
-        return (
-            p * w.H * mp.diag([mp.cos(x) for x in angles]) * w + u * mp.diag([mp.sin(x) for x in angles]) * w
-        )
+        return p * w.H * mp.diag([mp.cos(x) for x in angles]) * w + u * mp.diag([mp.sin(x) for x in angles]) * w
 
     def log(self, p, q):
         u, tangents, w = mp.svd((q - p * (p.H * q)) * mp.inverse(p.H * q), full_matrices=False)

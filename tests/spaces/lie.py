@@ -10,12 +10,7 @@ from scipy.linalg import expm
 
 import symspline as ss
 
-CONGRUENT = (
-    ss.SymmetricPositiveDefinite,
-    ss.HermitianPositiveDefinite,
-    ss.SpecialPositiveDefinite,
-    ss.Siegel,
-)
+CONGRUENT = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite, ss.SpecialPositiveDefinite, ss.Siegel)
 GROUPS = (
     *(ss.SpecialOrthogonal, ss.Orthogonal, ss.SpecialUnitary, ss.Unitary, ss.SpecialEuclidean),
     *(ss.GeneralLinear, ss.ComplexGeneralLinear, ss.Affine, ss.Similarity),

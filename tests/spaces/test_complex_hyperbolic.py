@@ -38,10 +38,7 @@ def test_distances_are_half_of_those_of_the_hyperbolic_plane(rng):
     np.testing.assert_allclose(LINE.norm(p, v), PLANE.norm(to_plane(p), to_plane(p, v)) / 2, rtol=1e-12)
     assert LINE.curvature == 2 * PLANE.curvature
     np.testing.assert_allclose(
-        to_plane(LINE.geodesic(p, q, 0.3)),
-        PLANE.geodesic(to_plane(p), to_plane(q), 0.3),
-        rtol=1e-12,
-        atol=1e-12,
+        to_plane(LINE.geodesic(p, q, 0.3)), PLANE.geodesic(to_plane(p), to_plane(q), 0.3), rtol=1e-12, atol=1e-12
     )
 
 

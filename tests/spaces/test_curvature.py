@@ -111,10 +111,7 @@ def curvature_tensor(space, p, rng):
     basis = orthonormal_basis(space, p, rng)
     return np.array(
         [
-            [
-                [[space.inner(p, d, x) for d in basis] for c in basis for x in [triple(space, p, a, b, c)]]
-                for b in basis
-            ]
+            [[[space.inner(p, d, x) for d in basis] for c in basis for x in [triple(space, p, a, b, c)]] for b in basis]
             for a in basis
         ]
     )

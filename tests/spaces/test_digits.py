@@ -12,9 +12,7 @@ def rng():
     return np.random.default_rng(1815)
 
 
-@pytest.mark.parametrize(
-    "name", ["so:2", "so:3", "so:5", "o:4", "u:3", "su:3", "gr:2,5", "cgr:2,4", "rp:3", "cp:2"]
-)
+@pytest.mark.parametrize("name", ["so:2", "so:3", "so:5", "o:4", "u:3", "su:3", "gr:2,5", "cgr:2,4", "rp:3", "cp:2"])
 def test_projection_is_the_nearest_point(name, rng):
     space = ss.space(name)
     for size in (1e-6, 1e-2, 0.15):
@@ -46,9 +44,7 @@ def test_random_points_are_on_the_space_to_rounding(name, rng):
 
 
 @loop_over("length", [1e-6, 0.3, 1.4])
-@pytest.mark.parametrize(
-    "name", ["so:11", "u:11", "su:13", "spd:11", "hpd:11", "gr:11,23", "cgr:11,22", "gr:5,31"]
-)
+@pytest.mark.parametrize("name", ["so:11", "u:11", "su:13", "spd:11", "hpd:11", "gr:11,23", "cgr:11,22", "gr:5,31"])
 def test_large_matrices_of_odd_size(name, length, rng):
     """Products of large matrices go by blocks of columns, which need not divide their number."""
     space = ss.space(name)

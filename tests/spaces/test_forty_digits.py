@@ -99,9 +99,7 @@ def test_unitary_near_pi(gap, rest, rng):
 
 
 ROTATIONS = [
-    (n, rest, gap)
-    for n, rest in ((3, []), (4, [0.3]), (4, [2.0]), (5, [0.3]), (8, [0.3, 0.1, 2.0]))
-    for gap in GAPS
+    (n, rest, gap) for n, rest in ((3, []), (4, [0.3]), (4, [2.0]), (5, [0.3]), (8, [0.3, 0.1, 2.0])) for gap in GAPS
 ]
 
 

@@ -167,15 +167,9 @@ IDENTITIES = [
         2.0,
         lambda x: np.stack([x[..., 0] ** 2 - x[..., 1] ** 2, 2 * x[..., 0] * x[..., 1]], axis=-1),
     ),
+    Identity("spd:1", "euclidean:1", 1.0, lambda p: np.log(p[..., 0]), lambda p, v, fp: v[..., 0] / p[..., 0]),
     Identity(
-        "spd:1", "euclidean:1", 1.0, lambda p: np.log(p[..., 0]), lambda p, v, fp: v[..., 0] / p[..., 0]
-    ),
-    Identity(
-        "hyperbolic:1",
-        "euclidean:1",
-        1.0,
-        lambda x: np.arcsinh(x[..., 1:]),
-        lambda x, v, fp: v[..., 1:] / x[..., :1],
+        "hyperbolic:1", "euclidean:1", 1.0, lambda x: np.arcsinh(x[..., 1:]), lambda x, v, fp: v[..., 1:] / x[..., :1]
     ),
     linear("hyperbolic:2", "spd:2", ROOT, minkowski_in_hermitian),
     linear("hyperbolic:3", "hpd:2", ROOT, minkowski_in_hermitian),
@@ -228,8 +222,7 @@ def test_geometry_agrees(case, length, rng):
 
 @every
 @loop_over(
-    "step, ends",
-    [(1e-6, "natural"), (0.1, "not-a-knot"), (0.1, "velocity"), (0.7, "periodic"), (0.7, "acceleration")],
+    "step, ends", [(1e-6, "natural"), (0.1, "not-a-knot"), (0.1, "velocity"), (0.7, "periodic"), (0.7, "acceleration")]
 )
 def test_splines_agree(case, ends, step, rng):
     here, there = ss.space(case.source), ss.space(case.target)
@@ -244,10 +237,7 @@ def test_splines_agree(case, ends, step, rng):
         v = [0.7 * here.log(p[i], p[j]) for i, j in ((0, 1), (-1, -2))]
         fv = [case.df(p[i], u, fp[i]) for i, u in zip((0, -1), v, strict=True)]
         bc, fbc = ([(order, u) for u in w] for w in (v, fv))
-    one, other = (
-        ss.CubicSpline(t, p, here, bc_type=bc, tol=0.0),
-        ss.CubicSpline(t, fp, there, bc_type=fbc, tol=0.0),
-    )
+    one, other = (ss.CubicSpline(t, p, here, bc_type=bc, tol=0.0), ss.CubicSpline(t, fp, there, bc_type=fbc, tol=0.0))
     x = np.concatenate([t, np.linspace(t[0], t[-1], 60)])
     y, fy = one(x), other(x)
     image = case.f(y)
@@ -269,9 +259,7 @@ def quaternion_product(a, b):
     return np.stack(
         [
             a[..., 0] * b[..., 0] - np.sum(a[..., 1:] * b[..., 1:], axis=-1),
-            *np.moveaxis(
-                a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:]), -1, 0
-            ),
+            *np.moveaxis(a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:]), -1, 0),
         ],
         axis=-1,
     )
@@ -376,14 +364,10 @@ def test_rotations_have_two_quaternions(rng):
 def gauges(space, n, rng):
     """Random signs, phases, orthogonal or unitary matrices, that multiply a point from the right."""
     if len(space.point_shape) == 1:
-        noise = rng.standard_normal((n, 1)) + (
-            1j * rng.standard_normal((n, 1)) if space.dtype.kind == "c" else 0
-        )
+        noise = rng.standard_normal((n, 1)) + (1j * rng.standard_normal((n, 1)) if space.dtype.kind == "c" else 0)
         return noise / np.abs(noise)
     k = space.point_shape[1]
-    noise = rng.standard_normal((n, k, k)) + (
-        1j * rng.standard_normal((n, k, k)) if space.dtype.kind == "c" else 0
-    )
+    noise = rng.standard_normal((n, k, k)) + (1j * rng.standard_normal((n, k, k)) if space.dtype.kind == "c" else 0)
     return np.linalg.qr(noise).Q
 
 
@@ -438,19 +422,11 @@ def test_operations_follow_the_representative(name, rng):
         g, h = gauges(space, 2, rng)
         # The direction of the logarithm is known to ε/(π/2 − length).
         allowed = 20 * EPS / (np.pi / 2 - length)
-        assert (
-            np.abs(space.log(multiply(p, g), multiply(q, h)) - multiply(space.log(p, q), g)).max() <= allowed
-        )
+        assert np.abs(space.log(multiply(p, g), multiply(q, h)) - multiply(space.log(p, q), g)).max() <= allowed
         assert abs(space.distance(multiply(p, g), multiply(q, h)) - length) <= 20 * EPS
         moved = space.transport(multiply(p, g), multiply(q, h), multiply(w, g))
-        here, there = (
-            plain_vector(space, q, space.transport(p, q, w)),
-            plain_vector(space, multiply(q, h), moved),
-        )
+        here, there = (plain_vector(space, q, space.transport(p, q, w)), plain_vector(space, multiply(q, h), moved))
         assert np.abs(here - there).max() <= allowed
         x = space.exp(p, 0.5 * w)
-        here, there = (
-            space.transvection(p, v, x),
-            space.transvection(multiply(p, g), multiply(v, g), multiply(x, h)),
-        )
+        here, there = (space.transvection(p, v, x), space.transvection(multiply(p, g), multiply(v, g), multiply(x, h)))
         assert np.abs(plain(space, here) - plain(space, there)).max() <= allowed

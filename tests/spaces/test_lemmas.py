@@ -166,10 +166,7 @@ def test_equations_6_and_10_geodesics_are_orbits(name, rng):
     v = 0.8 * min(s.scale, 1.5) * s.vector()
     q, x = s.space.exp(s.p, v), s.space.exp(s.p, 0.3 * s.vector())
     for t in (0.0, 0.3, 1.0):
-        assert (
-            s.space.distance(s.lie.act(s.lie.exp(t * s.lift(v)), s.p), s.space.geodesic(s.p, q, t))
-            <= ROUNDING
-        )
+        assert s.space.distance(s.lie.act(s.lie.exp(t * s.lift(v)), s.p), s.space.geodesic(s.p, q, t)) <= ROUNDING
     assert s.space.distance(s.lie.act(s.lie.exp(s.lift(v)), x), s.move(v, x)) <= ROUNDING
 
 
@@ -225,9 +222,7 @@ def test_lemma_a2_dexp_is_sinh_ad_over_ad(name, size, rng):
         assert norm(series - expected) <= allowed
         assert norm(opposite - expected) <= allowed
         w = s.vector()
-        found = derivative(
-            lambda h, v=v, w=w: s.move(-v, s.space.exp(s.p, v + h * s.scale * w)), s.space, 0.3
-        )
+        found = derivative(lambda h, v=v, w=w: s.move(-v, s.space.exp(s.p, v + h * s.scale * w)), s.space, 0.3)
         image = combined(s.space.frame(s.p), expected @ s.matrix(lambda e, w=w: w)[:, 0])
         assert s.space.norm(s.p, found / s.scale - image) <= DIFFERENCES * norm(expected)
 
@@ -370,23 +365,13 @@ def by_differences(function, at, direction, scale):
 
 
 # Lengths of ω, ξ_i and ξ_{i+1} in units of 1/K.
-LENGTHS = [
-    (0.01, 0.01, 0.01),
-    (0.3, 0.2, 0.2),
-    (0.05, 0.2, 1.2),
-    (1.2, 0.2, 0.05),
-    (0.8, 0.7, 0.6),
-    (1.4, 0.05, 0.02),
-]
+LENGTHS = [(0.01, 0.01, 0.01), (0.3, 0.2, 0.2), (0.05, 0.2, 1.2), (1.2, 0.2, 0.05), (0.8, 0.7, 0.6), (1.4, 0.05, 0.02)]
 lengths = loop_over(("omega", "xi", "following"), LENGTHS)
 
 
 def in_reach(segment):
     """Whether all logarithms that differences need exist."""
-    sizes = (
-        segment.space.norm(segment.p, segment.omega),
-        segment.space.norm(segment.next, segment.following),
-    )
+    sizes = (segment.space.norm(segment.p, segment.omega), segment.space.norm(segment.next, segment.following))
     return all(segment.shorter_than_the_cut_locus(size + 0.05 * segment.scale) for size in sizes)
 
 
@@ -488,9 +473,7 @@ def test_proposition_c3_derivative_by_a_neighbour(name, omega, xi, following, rn
     s = Segment(name, rng, omega, xi, following)
     assert in_reach(s)
     operator = s.matrix(
-        lambda e: by_differences(lambda x: s.phi_plus(s.xi, x), s.following, e, 0.1 * s.scale),
-        p=s.next,
-        onto=s.p,
+        lambda e: by_differences(lambda x: s.phi_plus(s.xi, x), s.following, e, 0.1 * s.scale), p=s.next, onto=s.p
     )
     at_next = Setting.__new__(Setting)
     at_next.space, at_next.lie, at_next.p = s.space, s.lie, s.next

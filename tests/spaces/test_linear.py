@@ -125,9 +125,7 @@ def test_curves_do_not_depend_on_bases_of_either_side(name, rng):
     np.testing.assert_allclose(back(x), np.linalg.inv(spline(x)), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("small", "large"), [("se:3", "gl:4"), ("se:2", "aff:2"), ("so:3", "gl:3"), ("u:2", "cgl:2")]
-)
+@pytest.mark.parametrize(("small", "large"), [("se:3", "gl:4"), ("se:2", "aff:2"), ("so:3", "gl:3"), ("u:2", "cgl:2")])
 def test_spaces_that_lie_in_it(small, large):
     p = points_on(ss.space(small), 6, step=0.7)
     x = np.linspace(KNOTS[0], KNOTS[-1], 101)
@@ -182,9 +180,7 @@ def test_points_beside_the_group_are_brought_back(name, rng):
     assert np.abs(found - near).max() <= 1e-8 * np.linalg.cond(p)
 
 
-@pytest.mark.parametrize(
-    "name", ["Symplectic(3)", "Similarity(1)", "SpecialLinear(1)", "Lorentz(0)", "Affine(0)"]
-)
+@pytest.mark.parametrize("name", ["Symplectic(3)", "Similarity(1)", "SpecialLinear(1)", "Lorentz(0)", "Affine(0)"])
 def test_sizes_that_are_none(name):
     with pytest.raises(ss.ValidationError, match="needs"):
         eval(f"ss.{name}")

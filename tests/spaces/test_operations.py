@@ -94,10 +94,6 @@ def test_operations_fit_together(space):
 # ---- random points and tangents ----
 
 
-def test_random_point_is_one_point_by_default():
-    assert S2.random_point(np.random.default_rng(0)).shape == (3,)
-
-
 @every_space
 @loop_over("shape", [(), 3, (3,), np.int64(3), (2, 3), 0])
 def test_random_points_and_tangents(space, shape):
@@ -105,7 +101,7 @@ def test_random_points_and_tangents(space, shape):
     lead = tuple(shape) if isinstance(shape, tuple) else (int(shape),)
     p = space.random_point(rng, shape)
     v = space.random_tangent(rng, p)
-    assert found(p) == found(v) == shaped(space, lead)
+    assert found(p) == found(v) == shaped(space, lead) and found(space.random_point(rng)) == shaped(space, ())
     space.check_point(p)
     space.check_tangent(p, v)
     again = np.random.default_rng(0)
@@ -145,10 +141,7 @@ def test_project_and_check(space):
     assert off(space, projected, p) < 1e-4
     assert off(space, space.project(projected), projected) < 20 * EPS
     noise = each(
-        lambda a: (
-            rng.standard_normal(a.shape) + (1j * rng.standard_normal(a.shape) if a.dtype.kind == "c" else 0)
-        ),
-        p,
+        lambda a: rng.standard_normal(a.shape) + (1j * rng.standard_normal(a.shape) if a.dtype.kind == "c" else 0), p
     )
     v = space.project_tangent(p, noise)
     assert space.check_tangent(p, v) is None
@@ -186,35 +179,21 @@ def test_checks_name_the_index(space):
         (lambda: S2.exp([1, 0], [0, 1]), r"p has shape \(2,\), but Sphere\(2\) needs shape \(\.\.\., 3\)"),
         (lambda: S2.exp(P, np.zeros((4, 3))), r"the leading axes do not broadcast: p \(3, 3\), v \(4, 3\)"),
         (lambda: S2.geodesic(P[0], P, [0, 1]), r"the leading axes do not broadcast"),
+        (lambda: S2.geodesic(P[0], P[1], "x"), "t must be real numbers, not <U1"),
+        (lambda: S2.geodesic(P[0], P[1], 1j), "t must be real numbers, not complex128"),
         (lambda: S2.distance(P, P + 0j), r"q must be an array of real numbers, not of complex128"),
-        (
-            lambda: S2.project(np.zeros((2, 3))),
-            r"x\[0\] cannot be projected: it is not finite, or no point of Sphere\(2\) is close to it",
-        ),
+        (lambda: S2.project(np.zeros((2, 3))), r"x\[0\] cannot be projected: it is not finite, or no point of"),
         (lambda: S2.project([1, NAN, 0]), r"x cannot be projected"),
+        (lambda: ss.Hyperbolic(2).project([NAN, 0, 0]), "x cannot be projected"),
         (lambda: S2.check_point(2 * P), r"point 0 is off the space by 1\.000e0: its norm is 2"),
         (lambda: S2.check_tangent(P, P), r"vector 0 is not tangent .*normal component is 1\.000e\+00"),
         (lambda: S2.check_tangent(P, NAN * P), r"vector 0 is not tangent"),
+        (lambda: S2.check_tangent(P[:2], np.zeros((3, 3))), r"p \(2, 3\) and v \(3, 3\) do not broadcast"),
         (lambda: S2.check_tangent(2 * P, P), r"point 0 is off the space"),
     ],
 )
 def test_invalid_operands_raise(call, match):
     with pytest.raises(ss.ValidationError, match=match):
-        call()
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: S2.check_tangent(P[:2], np.zeros((3, 3))),
-        lambda: S2.geodesic(P[0], P[1], "x"),
-        lambda: S2.geodesic(P[0], P[1], 1j),
-        lambda: ss.Hyperbolic(2).project([NAN, 0, 0]),
-    ],
-    ids=["check_tangent shapes", "t text", "t complex", "project NaN"],
-)
-def test_bad_operands_without_an_error_of_their_own(call):
-    with pytest.raises(ss.ValidationError):
         call()
 
 

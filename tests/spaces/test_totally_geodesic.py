@@ -122,12 +122,8 @@ def test_grassmannian_in_the_orthogonal_group():
     # The reflections 2pp* − 1.
     p = points_on(ss.Grassmannian(2, 5), 6, step=0.5)
     spline = ss.CubicSpline(KNOTS, p, "gr:2,5", bc_type="not-a-knot")
-    reflected = ss.CubicSpline(
-        KNOTS, 2 * convert.basis_to_projector(p) - np.eye(5), "o:5", bc_type="not-a-knot"
-    )
-    np.testing.assert_allclose(
-        reflected(X), 2 * convert.basis_to_projector(spline(X)) - np.eye(5), atol=1e-12
-    )
+    reflected = ss.CubicSpline(KNOTS, 2 * convert.basis_to_projector(p) - np.eye(5), "o:5", bc_type="not-a-knot")
+    np.testing.assert_allclose(reflected(X), 2 * convert.basis_to_projector(spline(X)) - np.eye(5), atol=1e-12)
 
 
 def test_siegel_of_one_dimension_is_the_half_plane():
@@ -149,10 +145,15 @@ def test_siegel_there_and_back():
     p = convert.siegel_to_positive_definite(z)
     j = symplectic(3)
     assert np.abs(turned(p) @ j @ p - j).max() <= 1e-12 * np.abs(p).max() ** 2
-    np.testing.assert_allclose(convert.positive_definite_to_siegel(p), z, atol=1e-11)
+    back = convert.positive_definite_to_siegel(p)
+    np.testing.assert_allclose(back, z, atol=1e-11)
+    assert np.array_equal(back, turned(back))
     # Symplectic maps act by Möbius transformations on one side, by congruence on the other: here z ↦ −z⁻¹.
     moved = convert.siegel_to_positive_definite(-np.linalg.inv(z))
     np.testing.assert_allclose(moved, j @ p @ j.T, rtol=0, atol=1e-11 * np.abs(p).max())
+    # Where the condition is 1e12 rounding may be 1e-4.
+    far = convert.positive_definite_to_siegel(convert.siegel_to_positive_definite([[1e3 + 1j]]))
+    np.testing.assert_allclose(far, [[1e3 + 1j]], rtol=1e-12)
 
 
 def test_quaternionic_lines():
@@ -184,8 +185,7 @@ def hopf(q):
 
 
 @pytest.mark.parametrize(
-    ("part", "whole", "step"),
-    [("sspd:3", "spd:3", 0.6), ("siegel:2", "spd:4", 0.6), ("hp:2", "cgr:2,6", 0.4)],
+    ("part", "whole", "step"), [("sspd:3", "spd:3", 0.6), ("siegel:2", "spd:4", 0.6), ("hp:2", "cgr:2,6", 0.4)]
 )
 @pytest.mark.parametrize("bc_type", ["natural", "not-a-knot", "clamped"])
 def test_a_part_has_the_curves_of_the_whole(part, whole, step, bc_type):
@@ -207,9 +207,7 @@ def test_complex_hyperbolic_in_positive_definite():
     for bc_type in ("natural", "not-a-knot"):
         lines = ss.CubicSpline(KNOTS, z, "ch:2", bc_type=bc_type)(X)
         matrices = ss.CubicSpline(KNOTS, definite(z), "hpd:3", bc_type=bc_type)(X)
-        np.testing.assert_allclose(
-            definite(lines), matrices, rtol=0, atol=1e-13 * np.abs(matrices).max() ** 2
-        )
+        np.testing.assert_allclose(definite(lines), matrices, rtol=0, atol=1e-13 * np.abs(matrices).max() ** 2)
 
 
 def test_quaternionic_projective_space_is_blind_to_units():
@@ -282,7 +280,7 @@ def test_special_tensors_have_determinant_one():
             convert.siegel_to_positive_definite(np.array([[[1e7 + 1j]], [[1e7 + 2j]]])),
             "smallest eigenvalue is .* which is rounding beside the others",
         ),
-        ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite makes them"),
+        ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite converts"),
         ("hp:1", [np.eye(4)[:, :2], np.eye(4)[:, ::2]], r"points\[1\] is off .* no quaternionic line"),
         ("hp:1", np.eye(4)[:2] * np.ones((3, 1, 1)), "looks like vectors of quaternions"),
     ],

@@ -31,9 +31,7 @@ def test_a_batch_is_a_sequence(space):
         one = ss.CubicSpline(KNOTS, pick(p, index), space, bc_type=own)
         assert same_curve(spline[index], one)
         assert all(same(a[1], b[1]) for a, b in zip(spline[index].bc_type, one.bc_type, strict=True))
-    assert same_curve(
-        spline[2][1], ss.CubicSpline(KNOTS, pick(p, (2, 1)), space, bc_type=spline[2][1].bc_type)
-    )
+    assert same_curve(spline[2][1], ss.CubicSpline(KNOTS, pick(p, (2, 1)), space, bc_type=spline[2][1].bc_type))
 
 
 def test_a_batch_ends():
@@ -59,36 +57,22 @@ def test_single_curve_is_not_a_sequence():
             use(spline)
     batch = ss.CubicSpline(None, [THREE] * 2, S2)
     for index in ("0", 0.0, (0, 1), None):
-        with pytest.raises(TypeError, match="whole number or a slice"):
+        with pytest.raises(TypeError, match="integer or a slice"):
             batch[index]
 
 
-@pytest.mark.parametrize(
-    "shape",
-    [
-        (2, 3),
-        (3,),
-        (1, 3),
-    ],
-    ids=str,
-)
-def test_picked_curves_know_their_end_conditions(shape):
+@pytest.mark.parametrize("shape", [(2, 3), (3,), (1, 3)], ids=str)
+def test_picked_curves_keep_their_end_conditions(shape):
     v = np.broadcast_to([0, 0.1, 0.2], shape)
     spline = ss.CubicSpline(None, [THREE, THREE], S2, bc_type=((1, v), (2, np.zeros(shape))))
-    one = spline[1]
-    assert same_curve(ss.CubicSpline(one.t, one.points, S2, bc_type=one.bc_type), one)
-    some = spline[:1]
-    assert same_curve(ss.CubicSpline(some.t, some.points, S2, bc_type=some.bc_type), some)
+    for some in (spline[1], spline[:1]):
+        assert same_curve(ss.CubicSpline(some.t, some.points, S2, bc_type=some.bc_type), some)
 
 
 def test_a_slice_may_be_empty():
     none = ss.CubicSpline(None, [THREE, THREE], S2)[2:]
     assert len(none) == 0 and none(0.5).shape == (0, 3) and "0 curves" in repr(none)
-
-
-@pytest.mark.parametrize("use", [lambda s: str(s.report), lambda s: s.length()], ids=["report", "length"])
-def test_an_empty_slice_can_be_used(use):
-    use(ss.CubicSpline(None, [THREE, THREE], S2)[2:])
+    assert str(none.report).startswith("no curves") and none.length().shape == (0,)
 
 
 @every_common

@@ -20,7 +20,6 @@ from curves import (
     vectors_off,
 )
 from refused import INF, NAN, TWO, P, fit_error, points
-from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
 
@@ -30,9 +29,7 @@ def held_at(space, spline, e, end):
     if end == "not-a-knot":
         return 0.0
     p = at_node(space, spline.points, e)
-    order, vector = (
-        {"natural": (2, None), "clamped": (1, None)}.get(end, end) if isinstance(end, str) else end
-    )
+    order, vector = {"natural": (2, None), "clamped": (1, None)}.get(end, end) if isinstance(end, str) else end
     found = spline(spline.t[e], nu=order)
     wanted = vector if vector is not None else each(np.zeros_like, p)
     return largest_difference(found, np.broadcast_to(wanted, found.shape) if space is S2 else wanted)
@@ -62,14 +59,10 @@ def test_a_word_holds_at_both_ends(word):
     p = points_on(S2, 6)
     spline = ss.CubicSpline(KNOTS, p, S2, bc_type=word)
     assert spline.bc_type == word
-    assert same_curve(spline, ss.CubicSpline(KNOTS, p, S2, bc_type=(word, word)))
-    assert same_curve(spline, ss.CubicSpline(KNOTS, p, S2, bc_type=[word, word]))
-
-
-def test_natural_is_the_default():
-    p = points_on(S2, 6)
-    assert ss.CubicSpline(KNOTS, p, S2) == ss.CubicSpline(KNOTS, p, S2, bc_type="natural")
-    assert ss.CubicSpline(KNOTS, p, S2).bc_type == "natural"
+    for pair in ((word, word), [word, word]):
+        assert same_curve(spline, ss.CubicSpline(KNOTS, p, S2, bc_type=pair))
+    default = ss.CubicSpline(KNOTS, p, S2)
+    assert default.bc_type == "natural" and (default == spline) == (word == "natural")
 
 
 @every_common
@@ -81,27 +74,17 @@ def test_bare_clamped_is_zero_velocity(space):
     assert spline.speed(KNOTS[[0, -1]]).max() < 4 * EPS
 
 
-def test_given_velocities_are_exact():
-    p = points_on(S2, 6)
-    v, w = tangents_at(S2, p[0]), tangents_at(S2, p[-1])
-    spline = ss.CubicSpline(KNOTS, p, S2, bc_type=((1, v), (1, w)))
-    assert np.abs(spline.velocities[0] - v).max() < 4 * EPS
-    assert np.abs(spline.velocities[-1] - w).max() < 4 * EPS
-
-
 @every_kind
 def test_end_vectors_are_kept(space):
     p = points_on(space, step=0.5)
     for orders in ((1, 2), (2, 1)):
         ends = tuple(
-            (order, tangents_at(space, at_node(space, p, e)))
-            for order, e in zip(orders, (0, -1), strict=True)
+            (order, tangents_at(space, at_node(space, p, e))) for order, e in zip(orders, (0, -1), strict=True)
         )
         spline = ss.CubicSpline(KNOTS, p, space, bc_type=ends)
         for (order, vector), e in zip(ends, (0, -1), strict=True):
             here, found = at_node(space, spline.points, e), spline(KNOTS[e], nu=order)
-            most = 1e-13 if order == 1 else 1e-11
-            assert vectors_off(space, spline(KNOTS[e]), found, here, vector) < most
+            assert vectors_off(space, spline(KNOTS[e]), found, here, vector) < (1e-13 if order == 1 else 1e-11)
 
 
 @every_kind
@@ -113,15 +96,6 @@ def test_a_closed_curve(space):
     assert off(space, x, y) < 100 * EPS
     for nu in (1, 2):
         assert vectors_off(space, x, spline(0.0, nu), y, spline(10.0, nu)) < 1e-12
-
-
-@pytest.mark.parametrize(
-    "bc_type", ["natural", "clamped", "not-a-knot", ((1, [1.0, 2]), (2, [0.5, -1]))], ids=str
-)
-def test_end_conditions_match_scipy(bc_type):
-    p = points_on(ss.Euclidean(2), 6)
-    spline, flat = ss.CubicSpline(KNOTS, p, "r:2", bc_type=bc_type), FlatSpline(KNOTS, p, bc_type=bc_type)
-    assert np.abs(spline.velocities - flat(KNOTS, 1)).max() < 1e-13
 
 
 @loop_over("shape", [(), (3,), (1,), (2, 1), (1, 3), (2, 3)])
@@ -144,21 +118,14 @@ def rng():
 
 
 @pytest.mark.parametrize("part", [0.5, 0.93, 0.97, 0.995])
-def test_given_velocities_stay_near_the_cut_locus(part, rng):
-    p = walk(ss.Sphere(2), 0.3, 5, rng)
-    v = 3 * part * np.pi * unit_tangent(ss.Sphere(2), p[0], rng)
-    spline = ss.CubicSpline(None, p, "sphere:2", bc_type=((1, v), "natural"), on_failure="ignore")
-    assert np.abs(spline.velocities[0] - v).max() <= 1e-12 * np.abs(v).max()
-
-
-@pytest.mark.parametrize("part", [0.97, 0.995])
-@pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "homotopy"])
-def test_every_solver_keeps_given_velocities_near_the_cut_locus(method, part, rng):
-    """Legs that they find themselves are kept a little further from it while they iterate."""
-    p = walk(ss.Sphere(2), 0.3, 5, rng)
-    v = 3 * part * np.pi * unit_tangent(ss.Sphere(2), p[0], rng)
-    spline = ss.CubicSpline(None, p, "sphere:2", bc_type=((1, v), "natural"), method=method)
+@pytest.mark.parametrize("method", ["auto", "fixed-point", "quasi-newton", "newton", "homotopy"])
+def test_given_velocities_stay_near_the_cut_locus(method, part, rng):
+    """Solvers keep the control handles that they compute a little further from it while they iterate."""
+    p = walk(S2, 0.3, 5, rng)
+    v = 3 * part * np.pi * unit_tangent(S2, p[0], rng)
+    spline = ss.CubicSpline(None, p, S2, bc_type=((1, v), "natural"), method=method)
     assert spline.report.converged
+    assert np.abs(spline.velocities[0] - v).max() <= 1e-12 * np.abs(v).max()
 
 
 # ---- bad end conditions ----
@@ -187,14 +154,8 @@ TANGENT, ACROSS = [0, 0.5, 0], [0.5, 0, 0]
             ((1, np.zeros((2, 3))), "natural"),
             r"the start velocity has shape \(2, 3\), which does not broadcast to \(3,\)",
         ),
-        (
-            ((1, [0, 1j, 0]), "natural"),
-            r"the start velocity must be an array of real numbers, not of complex128",
-        ),
-        (
-            ((1, None), "natural"),
-            r"the start velocity must be an array of numbers, not of object: it is a NoneType",
-        ),
+        (((1, [0, 1j, 0]), "natural"), r"the start velocity must be an array of real numbers, not of complex128"),
+        (((1, None), "natural"), r"the start velocity must be an array of numbers, not of object: it is a NoneType"),
         (("natural", (1, ["a", "b", "c"])), r"the end velocity must be an array of real numbers, not of <U1"),
         (((1, [0, NAN, 0]), "natural"), r"the start velocity holds NaN; it must be finite"),
         (("natural", (2, [0, INF, 0])), r"the end acceleration holds inf; it must be finite"),
@@ -210,20 +171,17 @@ def test_invalid_end_conditions_raise(bc_type, match):
     fit_error(match, bc_type=bc_type)
 
 
-def test_invalid_end_conditions_of_a_batch_raise():
-    fit_error(
-        r"the start velocity of curve 1 is not tangent",
-        None,
-        TWO,
-        bc_type=((1, [TANGENT, ACROSS]), "natural"),
-    )
-    fit_error(
-        r"the start velocity of curve 1 holds NaN",
-        None,
-        TWO,
-        bc_type=((1, [TANGENT, [NAN, 0, 0]]), "natural"),
-    )
-    fit_error(r"does not broadcast to \(2, 3\)", None, TWO, bc_type=((1, np.zeros((3, 3))), "natural"))
+@pytest.mark.parametrize(
+    "vectors, match",
+    [
+        ([TANGENT, ACROSS], r"the start velocity of curve 1 is not tangent"),
+        ([TANGENT, [NAN, 0, 0]], r"the start velocity of curve 1 holds NaN"),
+        (np.zeros((3, 3)), r"does not broadcast to \(2, 3\)"),
+        ([[0, 1, 0], [0, 10, 0]], r"too fast for .* of curve 1|of curve 1 .*too fast"),
+    ],
+)
+def test_invalid_end_conditions_of_a_batch_raise(vectors, match):
+    fit_error(match, None, TWO, bc_type=((1, vectors), "natural"))
 
 
 def test_curves_that_are_not_closed():
@@ -248,9 +206,7 @@ def test_end_vectors_that_are_not_finite(name):
 def test_end_vectors_that_are_not_tangent(case):
     space, p = case.space, points(case.name)
     rng = np.random.default_rng(0)
-    v = rng.standard_normal(p[0].shape) + (
-        1j * rng.standard_normal(p[0].shape) if space.dtype.kind == "c" else 0
-    )
+    v = rng.standard_normal(p[0].shape) + (1j * rng.standard_normal(p[0].shape) if space.dtype.kind == "c" else 0)
     if np.abs(space.project_tangent(p[0], v) - v).max() < 1e-6:
         flat = (ss.Euclidean, ss.GeneralLinear, ss.ComplexGeneralLinear)
         assert isinstance(space, flat) or p[0].size == 1
@@ -284,9 +240,7 @@ def test_shapes_in_messages_are_those_that_were_given(name):
 def test_too_fast_end_velocities(h, largest):
     t = [0, h, 2, 3 - h / 2, 3 + h / 2]
     p = S2.geodesic(P[0], P[1], np.linspace(0, 1, 5))
-    match = (
-        rf"velocity has speed 20\.0+, too fast for its segment of length {h:g}: .*must stay below {largest}"
-    )
+    match = rf"velocity has speed 20\.0+, too fast for its segment of length {h:g}: .*must stay below {largest}"
     fit_error("the start " + match, t, p, bc_type=((1, [0, 20, 0]), "natural"))
     fit_error("the end " + match, t, p, bc_type=("natural", (1, [-20, 0, 0])))
 
@@ -294,13 +248,7 @@ def test_too_fast_end_velocities(h, largest):
 def test_end_velocity_limit_is_reported():
     limit = 3 * np.pi
     fit_error("too fast", points=P[:2], bc_type=((1, [0, limit * (1 + 1e-15), 0]), "natural"))
-    fit_error(
-        "too fast for .* of curve 1|of curve 1 .*too fast",
-        None,
-        TWO,
-        bc_type=((1, [[0, 1, 0], [0, 10, 0]]), "natural"),
-    )
-    # Just below is no matter of validation; whether there is a curve is another question.
+    # Whether a slower one has a curve is another question.
     ss.CubicSpline(None, P, S2, bc_type=((1, [0, limit * 0.99, 0]), "natural"), on_failure="ignore")
 
 

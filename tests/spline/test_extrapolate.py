@@ -35,9 +35,7 @@ def test_false_holds_for_speed_and_lift(name):
     curve = spline(name, extrapolate=False)
     assert np.isnan(curve.speed(9.0)) and np.isfinite(curve.speed(5.0))
     np.testing.assert_array_equal(np.isnan(curve.speed(X)), OUTSIDE)
-    assert all(
-        np.isnan(own[OUTSIDE]).all() and np.isfinite(own[~OUTSIDE]).all() for own in parts(curve.lift(X))
-    )
+    assert all(np.isnan(own[OUTSIDE]).all() and np.isfinite(own[~OUTSIDE]).all() for own in parts(curve.lift(X)))
     assert np.isfinite(curve.length()) and np.isfinite(curve.bending_energy())
 
 

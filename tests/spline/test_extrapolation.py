@@ -18,7 +18,6 @@ from curves import (
     same,
     vectors_off,
 )
-from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
 
@@ -41,13 +40,6 @@ def test_true_continues_the_last_segment(space):
     for segment, x, tau in ((0, OUTSIDE[0], -0.5), (-1, OUTSIDE[1], 1.5)):
         control = pick(spline.control_points, segment)
         assert off(space, spline(x), bezier(space, control, tau)) < 1e-13
-
-
-def test_true_is_scipys_in_flat_space():
-    p = points_on(ss.Euclidean(2), 6)
-    spline, flat = ss.CubicSpline(KNOTS, p, "r:2", extrapolate=True), FlatSpline(KNOTS, p, bc_type="natural")
-    for nu in range(3):
-        assert np.abs(spline(OUTSIDE, nu=nu) - flat(OUTSIDE, nu)).max() < 1e-12
 
 
 @every_kind

@@ -82,9 +82,7 @@ def test_curves_of_three_steps_are_silent():
     ss.CubicSpline(None, on_plane([0, 2.5, 2.5, 2.5]), "so:3")
 
 
-@pytest.mark.parametrize(
-    "name", ["sphere:2", "rp:2", "cp:2", "gr:2,5", "cgr:2,5", "so:5", "u:3", "su:3", "se:3"]
-)
+@pytest.mark.parametrize("name", ["sphere:2", "rp:2", "cp:2", "gr:2,5", "cgr:2,5", "so:5", "u:3", "su:3", "se:3"])
 def test_the_angle_that_decides_counts(name):
     """One angle of 0.7 of the way to the cut locus, in every step; or of 0.5, and more of them beside it."""
     space = ss.space(name)

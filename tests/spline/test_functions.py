@@ -52,15 +52,6 @@ def test_fit_many_equals_one_at_a_time(space):
             assert (spline.bc_type, spline.extrapolate) == (bc_type, True)
 
 
-def test_fit_many_with_a_vector_for_every_curve():
-    v = tangents_at(S2, np.broadcast_to([1.0, 0, 0], (2, 3)))
-    curves = [(None, THREE), ([0, 2], THREE[:2])]
-    fitted = ss.fit_many(curves, S2, bc_type=((1, v), "natural"))
-    for i, (t, p) in enumerate(curves):
-        assert same_curve(fitted[i], ss.CubicSpline(t, p, S2, bc_type=((1, v[i]), "natural")))
-        assert same(fitted[i].bc_type[0][1], v[i])
-
-
 def test_fit_many_of_closed_curves_and_of_dates():
     closed = [(None, [*THREE, THREE[0]]), (np.datetime64("2024-01-01") + np.arange(4), [*THREE, THREE[0]])]
     for spline, (t, p) in zip(ss.fit_many(closed, S2, bc_type="periodic"), closed, strict=True):
@@ -69,12 +60,6 @@ def test_fit_many_of_closed_curves_and_of_dates():
 
 def test_fit_many_of_an_empty_list():
     assert ss.fit_many([], S2) == []
-
-
-def test_everything_is_exported():
-    for name in ss.__all__:
-        assert getattr(ss, name) is not None
-    assert {"CubicSpline", "fit", "evaluate", "fit_many", "load", "space", "Product"} <= set(ss.__all__)
 
 
 @every_kind
@@ -94,7 +79,7 @@ def test_fit_and_evaluate_are_the_class(space, batch):
 
 
 @every_kind
-def test_fit_many_is_one_at_a_time(space):
+def test_fit_many_with_a_vector_for_every_curve(space):
     curves = []
     for i, n in enumerate([5, 2, 9, 3]):
         t = None if i % 2 else np.cumsum(np.random.default_rng(i).uniform(0.5, 1.5, n))
@@ -104,8 +89,7 @@ def test_fit_many_is_one_at_a_time(space):
     fitted = ss.fit_many(curves, str(space), bc_type=((1, v), "natural"))
     for i, (t, p) in enumerate(curves):
         alone = ss.CubicSpline(t, p, space, bc_type=((1, pick(v, i)), "natural"))
-        assert same_curve(fitted[i], alone)
-        assert same(fitted[i].bc_type[0][1], alone.bc_type[0][1])
+        assert same_curve(fitted[i], alone) and same(fitted[i].bc_type[0][1], alone.bc_type[0][1])
 
 
 # ---- bad input ----
@@ -121,15 +105,8 @@ def test_evaluate_compares_shapes():
 
 
 @pytest.mark.parametrize(
-    "t, p, u",
-    [
-        ([0, 2, 1], P, 0 * P),
-        ([0, 1, 1], P, 0 * P),
-        ([0, NAN, 2], P, 0 * P),
-        ([0, 1, 2], 2 * P, 0 * P),
-        ([0, 1, 2], NAN * P, 0 * P),
-    ],
+    "t, p", [([0, 2, 1], P), ([0, 1, 1], P), ([0, NAN, 2], P), ([0, 1, 2], 2 * P), ([0, 1, 2], NAN * P)]
 )
-def test_evaluate_checks_its_input(t, p, u):
+def test_evaluate_checks_its_input(t, p):
     with pytest.raises(ss.ValidationError):
-        ss.evaluate(t, p, u, S2, 0.5)
+        ss.evaluate(t, p, 0 * P, S2, 0.5)

@@ -24,7 +24,6 @@ from curves import (
     tangents_at,
 )
 from numpy.polynomial import Polynomial
-from scipy.integrate import quad
 
 import symspline as ss
 
@@ -46,19 +45,6 @@ def test_control_points(space, batch):
         assert off(space, r, space.exp(s, each(lambda v, h=h: -v * h / 3, w))) < 20 * EPS
         middle = pick(spline(KNOTS[k] + 0.4 * h), first)
         assert off(space, middle, bezier(space, segment, 0.4)) < 20 * EPS
-
-
-@every_common
-def test_length_and_energy_by_adaptive_quadrature(space):
-    spline = ss.CubicSpline(KNOTS, points_on(space, 6), space, bc_type="not-a-knot")
-
-    def bend(x):
-        return space.norm(spline(x), spline(x, nu=2)) ** 2
-
-    for number, f in ((spline.length(), spline.speed), (spline.bending_energy(), bend)):
-        assert isinstance(number, float)
-        pieces = [quad(f, *span, epsabs=1e-13, epsrel=1e-13)[0] for span in pairwise(KNOTS)]
-        assert number == pytest.approx(sum(pieces), rel=1e-12)
 
 
 @every_common
@@ -158,6 +144,7 @@ def test_length_and_energy_by_quadrature(space, batch):
         length = length + spline.speed(x) @ weights * (b - a) / 2
         energy = energy + space.norm(spline(x), spline(x, 2)) ** 2 @ weights * (b - a) / 2
     assert np.shape(spline.length()) == np.shape(spline.bending_energy()) == batch
+    assert batch or (isinstance(spline.length(), float) and isinstance(spline.bending_energy(), float))
     # A curve in one dimension may turn back, where its speed has a kink.
-    assert space.dim == 1 or np.allclose(spline.length(), length, rtol=1e-10)
-    assert np.allclose(spline.bending_energy(), energy, rtol=1e-10)
+    assert space.dim == 1 or np.allclose(spline.length(), length, rtol=1e-12)
+    assert np.allclose(spline.bending_energy(), energy, rtol=1e-12)

@@ -175,9 +175,7 @@ def bloch(a, b):
 
 def test_a_line_field_of_half_turns_comes_back_with_the_other_sign():
     angle = np.linspace(0, np.pi, 9)
-    spline = ss.CubicSpline(
-        None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "rp:1", bc_type="periodic"
-    )
+    spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "rp:1", bc_type="periodic")
     np.testing.assert_allclose(spline.lift([8.0, 16.0, -8.0])[:, 0], [-1, 1, -1], atol=1e-14)
 
 
@@ -239,9 +237,7 @@ def test_invalid_representatives_raise(start, what):
 def test_a_lift_is_followed_so_far_and_no_further():
     spline = ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1", extrapolate=True)
     assert np.isfinite(spline.lift([-99.0, 99.0])).all()
-    with pytest.raises(
-        ss.ValidationError, match=r"x\[1\] = 102.0 is more than 100 lengths of the last segment"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"x\[1\] = 102.0 is more than 100 lengths of the last segment"):
         spline.lift([0.5, 102.0])
     with pytest.raises(ss.ValidationError, match="outside the knots"):
         ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1").lift(1.5)

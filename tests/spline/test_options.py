@@ -15,19 +15,11 @@ import symspline as ss
 def test_methods_agree(space):
     p = points_on(space, 6)
     reference = ss.CubicSpline(KNOTS, p, space)
-    for method in ("fixed-point", "quasi-newton"):
+    for method in ("fixed-point", "quasi-newton", "newton"):
         spline = ss.CubicSpline(KNOTS, p, space, method=method)
-        assert spline.report.method == method
-        assert spline.report.converged
+        assert spline.report.method == method and spline.report.converged
         assert largest_difference(spline.velocities, reference.velocities) < 1e-12
-
-
-def test_newton_is_a_method():
-    p = points_on(S2, 6)
-    newton, auto = (ss.CubicSpline(KNOTS, p, S2, method=method) for method in ("newton", "auto"))
-    assert newton.report.method == "newton"
-    assert newton.report.iterations < auto.report.iterations
-    assert largest_difference(newton.velocities, auto.velocities) < 1e-12
+        assert method != "newton" or spline.report.iterations <= reference.report.iterations
 
 
 def test_tol_and_max_iter_bound_the_work():
@@ -74,34 +66,29 @@ def test_invalid_options_raise(options, match, how):
             ss.fit(None, P, S2, **options)
 
 
-@pytest.mark.parametrize("options", [{"max_iter": 1.5}, {"tol": "small"}, {"method": None}], ids=str)
-def test_options_of_a_wrong_type(options):
-    with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
-        ss.CubicSpline(None, P, S2, **options)
-
-
 @pytest.mark.parametrize(
     "options",
     [
+        {"max_iter": 1.5},
         {"max_iter": -1},
         {"max_iter": 10**30},
+        {"tol": "small"},
+        {"method": None},
         {"extrapolate": np.array([1, 2])},
         {"bc_type": (([1], [0, 0.5, 0]), "natural")},
         {"progress": 5},
     ],
     ids=str,
 )
-def test_options_that_cannot_be_understood(options):
+def test_options_of_a_wrong_type_raise(options):
     with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
         ss.CubicSpline(None, P, S2, **options)
 
 
-def test_unknown_options():
-    for call in (ss.CubicSpline, ss.fit):
+def test_unknown_options_raise():
+    for call in (ss.CubicSpline, ss.fit, lambda t, p, space, **options: ss.fit_many([(t, p)], space, **options)):
         with pytest.raises(TypeError, match="smooth"):
             call(None, P, S2, smooth=True)
-    with pytest.raises(TypeError, match="smooth"):
-        ss.fit_many([(None, P)], S2, smooth=True)
 
 
 def test_messages_quote_no_large_arrays():

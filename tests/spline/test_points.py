@@ -172,10 +172,7 @@ def test_splines_copy_their_input(space):
     [
         (np.ones((3, 4)), r"points has shape \(3, 4\), but Sphere\(2\) needs shape \(\.\.\., 3\)"),
         (np.ones((3, 1)), r"points has shape \(3, 1\), but Sphere\(2\) needs"),
-        (
-            np.ones(3),
-            r"shape \(3,\), which is one point; a curve needs shape \(\.\.\., N\+1, \*point_shape\)",
-        ),
+        (np.ones(3), r"shape \(3,\), which is one point; a curve needs shape \(\.\.\., N\+1, \*point_shape\)"),
         (np.ones(()), r"no points given; a curve needs at least two"),
         ([], r"no points given; a curve needs at least two"),
         (np.ones((0, 3)), r"no points given; a curve needs at least two"),
@@ -188,7 +185,14 @@ def test_invalid_shapes_of_points_raise(points, match):
     fit_error(match, points=points)
 
 
-@loop_over("points", [P + 0j, P.astype(str), P.astype(object), None, P.astype("M8[s]"), "points"])
+@pytest.mark.parametrize("name", ["sphere:2", "cp:2", "so:3", "sspd:3"])
+@loop_over("dtype", [str, object, "M8[s]"])
+def test_points_of_invalid_type_raise(name, dtype):
+    p = np.zeros((3, *ss.space(name).point_shape), int).astype(dtype)
+    fit_error(r"points must be an array of (real )?numbers, not of ", points=p, space=name)
+
+
+@loop_over("points", [P + 0j, None, "points"])
 def test_points_that_are_not_real_raise(points):
     fit_error(r"points must be an array of (real )?numbers, not of|no points given", points=points)
 
@@ -203,15 +207,6 @@ def test_ragged_lists_raise(argument):
             ss.CubicSpline(None, P, S2, bc_type=((1, ragged), "natural"))
         else:
             ss.CubicSpline(**{"t": None, "points": P, argument: ragged}, space=S2)
-
-
-@pytest.mark.parametrize("name", ["sphere:2", "cp:2", "so:3", "sspd:3"])
-@loop_over("dtype", [str, object, "M8[s]"])
-def test_points_of_invalid_type_raise(name, dtype):
-    space = ss.space(name)
-    p = np.zeros((3, *space.point_shape), int).astype(dtype)
-    with pytest.raises(ss.ValidationError, match=r"points must be an array of (real )?numbers, not of "):
-        ss.CubicSpline(None, p, space)
 
 
 @pytest.mark.parametrize(
@@ -239,8 +234,7 @@ def test_complex_points_of_a_real_space(name, meant):
 
 @loop_over("name", ["euclidean:3", "hyperbolic:2", "se:3"])
 def test_complex_points_without_a_complex_space_raise(name):
-    with pytest.raises(ss.ValidationError, match=r"real numbers, not of complex128$"):
-        ss.CubicSpline(None, points(name) + 0j, name)
+    fit_error(r"real numbers, not of complex128$", points=points(name) + 0j, space=name)
 
 
 @pytest.mark.parametrize("name", ["sphere:3", "so:3", "sphere:3 x r:1", "cp:2"])
@@ -298,19 +292,13 @@ def test_points_a_hair_apart_are_as_in_flat_space(space, size, bc_type):
 
 
 @every_common
-def test_a_curve_that_pauses(space):
-    q = points_on(space, 5)
-    p = each(lambda a: a[[0, 1, 2, 2, 2, 2, 3, 4]], q)
+@loop_over("order", [[0, 1, 2, 2, 2, 2, 3, 4], [0, 0, 0, 1, 1, 1, 4, 4, 4]])
+def test_a_curve_that_pauses(space, order):
+    p = each(lambda a: a[order], points_on(space, 5))
     spline = ss.CubicSpline(None, p, space)
     assert spline.report.converged
     assert largest_difference(spline(spline.t), p) < 20 * EPS
-    assert np.isfinite(spline.length()) and spline.length() > 4 * 0.69
-
-
-def test_repeated_points_with_a_jump_between():
-    p = np.repeat(np.eye(3), 3, axis=0)
-    spline = ss.CubicSpline(None, p, S2)
-    assert spline.report.converged and largest_difference(spline(spline.t), p) < 20 * EPS
+    assert 4 * 0.69 < spline.length() < np.inf or len(order) == 9
 
 
 @pytest.fixture

@@ -43,9 +43,7 @@ def test_max_step_of_a_product():
 def test_another_curve_of_a_product_is_another_curve_of_a_factor(batch):
     far, near = zigzag(2.5), points_on(S2, len(zigzag(2.5)))
     p = np.array([far, near]) if batch else far
-    factors = [
-        ss.CubicSpline(None, x, S2) for x in (p, p[..., ::-1, :], np.broadcast_to([0, 0, 1.0], p.shape))
-    ]
+    factors = [ss.CubicSpline(None, x, S2) for x in (p, p[..., ::-1, :], np.broadcast_to([0, 0, 1.0], p.shape))]
     report = ss.CubicSpline(None, tuple(f.points for f in factors), "s:2 x s:2 x s:2").report
     total = sum(f.bending_energy() for f in factors)
     other = total + np.minimum(*(f.report.alternative_energy - f.bending_energy() for f in factors[:2]))
@@ -65,20 +63,19 @@ def test_a_product_of_near_points_has_no_other_curve():
 PRODUCT = "sphere:2 x r:1"
 
 
-FLAT = np.zeros((3, 1))
+FLAT, OFF = np.zeros((3, 1)), changed(2, [0, 0, 2])
 
 
 @pytest.mark.parametrize(
     "points, options, match",
     [
-        (
-            P,
-            {},
-            r"points must be a tuple of 2 arrays, one per factor of Product\(Sphere\(2\), Euclidean\(1\)\)",
-        ),
+        (P, {}, r"points must be a tuple of 2 arrays, one per factor of Product\(Sphere\(2\), Euclidean\(1\)\)"),
         ((P,), {}, r"points must be a tuple of 2 arrays"),
         ((P, FLAT, FLAT), {}, r"points must be a tuple of 2 arrays"),
         ((FLAT, P), {}, r"points has shape \(3, 1\), but Sphere\(2\) needs"),
+        ((P, np.zeros((4, 1))), {}, r"points"),
+        ((TWO, np.zeros((3, 3, 1))), {}, r"batch axes differ"),
+        ((OFF, FLAT), {}, r"factor 0, Sphere\(2\): points\[2\] is off the space"),
         ((P, FLAT), {"bc_type": ((1, [0, 0, 0]), "natural")}, r"an end vector must be a tuple of 2 arrays"),
         ((P, FLAT), {"bc_type": "foo"}, r"the start is 'foo'"),
         ((P, FLAT), {"bc_type": ("natural",)}, r"a pair, not \('natural',\)"),
@@ -95,20 +92,3 @@ def test_a_product_has_factors():
     space = ss.space(PRODUCT)
     with pytest.raises(ss.ValidationError, match=r"needs tuples of 2 arrays, one per factor"):
         space.exp((P, FLAT), (P,))
-
-
-def test_factors_of_different_lengths():
-    fit_error("points", None, (P, np.zeros((4, 1))), PRODUCT)
-
-
-def test_factors_of_different_batch_axes():
-    fit_error("batch axes differ", None, (TWO, np.zeros((3, 3, 1))), PRODUCT)
-
-
-def test_error_names_the_factor():
-    flat = np.zeros((3, 1))
-    fit_error(r"points\[1\]\[2\]|factor 1|Sphere\(2\)", None, (flat, changed(2, [0, 0, 2])), "r:1 x sphere:2")
-
-
-def test_a_product_is_checked_before_any_work():
-    fit_error("off the space", None, (np.zeros((3, 1)), changed(2, [0, 0, 2])), "r:1 x sphere:2")

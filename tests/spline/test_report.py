@@ -5,36 +5,14 @@ import json
 import numpy as np
 import pytest
 from cases import has_metric
-from curves import (
-    KNOTS,
-    S2,
-    at_node,
-    every_batch,
-    every_common,
-    every_kind,
-    every_single,
-    failing,
-    points_on,
-)
+from curves import KNOTS, S2, at_node, every_batch, every_common, every_kind, every_single, failing, points_on
 
 import symspline as ss
 
 FIELDS = [
-    "method",
-    "converged",
-    "iterations",
-    "residual",
-    "max_step",
-    "max_gap",
-    "curvature",
-    "invariant_radius",
-    "rate",
-    "alternative_energy",
-    "contraction_bound",
-    "guaranteed_sweeps",
-    "skipped",
-    "velocity_error",
-]
+    "method", "converged", "iterations", "residual", "max_step", "max_gap", "curvature", "invariant_radius", "rate",
+    "alternative_energy", "contraction_bound", "guaranteed_sweeps", "skipped", "velocity_error",
+]  # fmt: skip
 
 
 @every_kind
@@ -105,7 +83,7 @@ def test_report_describes_the_failure():
     assert "NOT converged" in str(spline[1].report)
 
 
-def test_state_is_described_by_plain_json():
-    # Used by whoever logs reports.
+def test_report_of_one_curve_is_plain_json():
+    # For those who log reports.
     report = ss.CubicSpline(None, np.eye(3), S2).report
     assert json.loads(json.dumps(vars(report)))["converged"] is True

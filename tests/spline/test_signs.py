@@ -42,28 +42,23 @@ def test_a_flipped_sample_warns_once_and_says_what_to_do():
     assert warning.category is UserWarning
 
 
-def test_half_a_turn_of_rotations_goes_either_way():
-    """Of two quaternions at right angles neither sign is the nearer one."""
-    silent(lambda: ss.CubicSpline(None, np.eye(4)[:3], "sphere:3"))
-
-
 def test_a_little_more_than_half_a_turn_warns():
     q = np.array([[1, 0, 0, 0], [np.cos(1.572), np.sin(1.572), 0, 0]])
     with pytest.warns(UserWarning, match="inner product -0.0012"):
         ss.CubicSpline(None, q, "sphere:3")
 
 
-def test_which_curve_it_was():
-    batch = np.stack([motion(), flipped(9)])
-    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
-        ss.CubicSpline(None, batch, "sphere:3")
-    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
-        ss.fit_many([(None, motion()), (None, flipped(9))], "sphere:3")
-    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] of curve 1 have"):
-        ss.fit_many([(None, flipped(3)), (None, flipped(9))], "sphere:3", where=[False, True])
-    silent(lambda: ss.fit_many([(None, flipped(3))], "sphere:3", where=[False]))
-    with pytest.warns(UserWarning, match=r"points\[8\] and points\[9\] have"):
-        ss.CubicSpline(None, (np.zeros((10, 2)), flipped(9)), "r:2 x sphere:3")
+def test_warning_names_the_curve():
+    good, bad, late = motion(), flipped(3), flipped(9)
+    for call, curve in (
+        (lambda: ss.CubicSpline(None, np.stack([good, late]), S3), " of curve 1"),
+        (lambda: ss.fit_many([(None, good), (None, late)], S3), " of curve 1"),
+        (lambda: ss.fit_many([(None, bad), (None, late)], S3, where=[False, True]), " of curve 1"),
+        (lambda: ss.CubicSpline(None, (np.zeros((10, 2)), late), "r:2 x sphere:3"), ""),
+    ):
+        with pytest.warns(UserWarning, match=rf"points\[8\] and points\[9\]{curve} have"):
+            call()
+    silent(lambda: ss.fit_many([(None, bad)], S3, where=[False]))
 
 
 @pytest.mark.filterwarnings("error")
@@ -73,16 +68,15 @@ def test_it_can_be_silenced_as_it_says():
         ss.CubicSpline(None, flipped(9), "sphere:3")
 
 
-@pytest.mark.parametrize("q", [motion(), -motion(), motion()[::-1]], ids=["plus", "minus", "back"])
-def test_motions_of_one_sign_do_not_warn(q):
-    silent(lambda: ss.CubicSpline(None, q, S3))
-
-
-def test_other_spaces_do_not_warn():
-    silent(lambda: ss.CubicSpline(None, flipped(4), "rp:3"))
+def test_other_motions_do_not_warn():
+    q, turns = motion(), ss.rotations.from_quaternions(flipped(4), scalar_first=True)
+    # Of two quaternions at right angles neither sign is the nearer one.
+    for space, points in ((S3, q), (S3, -q), (S3, q[::-1]), (S3, np.eye(4)[:3]), ("rp:3", flipped(4)), ("so:3", turns)):
+        silent(lambda space=space, points=points: ss.CubicSpline(None, points, space))
     silent(lambda: ss.CubicSpline(None, points_on(ss.Sphere(2), step=1.8), "sphere:2", on_failure="ignore"))
-    turns = ss.rotations.from_quaternions(flipped(4), scalar_first=True)
-    silent(lambda: ss.CubicSpline(None, turns, "so:3"))
+    q[3] = -q[2]
+    with pytest.raises(ss.CutLocusError):
+        silent(lambda: ss.CubicSpline(None, q, S3))
 
 
 def test_warning_conditions():
@@ -94,13 +88,6 @@ def test_warning_conditions():
     with pytest.warns(UserWarning):
         spline = ss.CubicSpline(None, flipped(4), "sphere:3", method="newton")
     assert spline.length() > 5
-
-
-def test_errors_come_before_it():
-    far = motion()
-    far[3] = -far[2]
-    with pytest.raises(ss.CutLocusError):
-        silent(lambda: ss.CubicSpline(None, far, "sphere:3"))
 
 
 def test_noisy_quaternions_and_those_with_velocities():

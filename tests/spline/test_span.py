@@ -162,7 +162,7 @@ every_large = pytest.mark.parametrize("space", [ss.space(name) for name in SMALL
 
 
 @every_large
-def test_batches_are_bit_identical_to_single_curves(space, rng):
+def test_batches_and_lists_are_bit_identical_to_single_curves(space, rng):
     p = np.stack([walk(space, 0.4, 6, rng) for _ in range(3)])
     v = 0.3 * space.random_tangent(rng, p[:, 0]) / np.sqrt(space.dim)
     batch = ss.CubicSpline(None, p, space, bc_type=((1, v), "natural"))
@@ -170,23 +170,14 @@ def test_batches_are_bit_identical_to_single_curves(space, rng):
     x = np.linspace(0, 5, 11)
     for i in range(3):
         one = ss.CubicSpline(None, p[i], space, bc_type=((1, v[i]), "natural"))
-        assert batch[i] == many[i] == one
-        assert batch[i].report == many[i].report == one.report
+        assert batch[i] == many[i] == one and batch[i].report == many[i].report == one.report
         for nu in range(3):
             assert np.array_equal(batch(x, nu)[i], one(x, nu)) and np.array_equal(many[i](x, nu), one(x, nu))
-
-
-@every_large
-def test_fit_many(space, rng):
-    curves = [
-        (None, walk(space, 0.4, 6, rng)),
-        ([0.0, 2.0], walk(space, 0.4, 2, rng)),
-        (None, walk(space, 0.4, 9, rng)),
-    ]
-    calls = []
+    # Curves of other lengths.
+    curves, calls = [(None, p[0]), ([0.0, 2.0], p[1, :2]), (None, walk(space, 0.4, 9, rng))], []
     fitted = ss.fit_many(curves, space, bc_type="not-a-knot", progress=lambda *call: calls.append(call))
-    for spline, (t, p) in zip(fitted, curves, strict=True):
-        alone = ss.CubicSpline(t, p, space, bc_type="not-a-knot")
+    for spline, (t, q) in zip(fitted, curves, strict=True):
+        alone = ss.CubicSpline(t, q, space, bc_type="not-a-knot")
         assert spline == alone and spline.report == alone.report
     assert all(0 <= done <= total == 17 for done, total in calls) and sorted(calls) == calls
 

@@ -15,7 +15,6 @@ from curves import (
     every_kind,
     found,
     pair_of_curves,
-    pick,
     points_on,
     same,
     same_curve,
@@ -89,17 +88,6 @@ def test_splines_compare():
 
 
 @every_kind
-def test_curves_compare(space):
-    p = points_on(space, step=0.5)
-    spline = ss.CubicSpline(KNOTS, p, space)
-    assert spline == ss.CubicSpline(KNOTS, p, str(space))
-    assert spline != ss.CubicSpline(None, p, space)
-    assert spline != ss.CubicSpline(KNOTS, p, space, bc_type="clamped")
-    assert spline != ss.CubicSpline(KNOTS, pick(p, slice(None, None, -1)), space)
-    assert spline != ss.CubicSpline(KNOTS, points_on(ss.Sphere(5), step=0.5), "sphere:5")
-
-
-@every_kind
 @every_batch
 def test_curves_print(space, batch):
     line = repr(ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space))
@@ -109,10 +97,8 @@ def test_curves_print(space, batch):
 
 
 @pytest.mark.parametrize("space", ["sphere:2", "sphere:2 x r:3"])
-def test_pickles_and_parts_of_a_batch_are_splines(space):
+def test_parts_of_a_batch_are_splines(space):
     batch = pair_of_curves(ss.space(space))
-    for spline in (batch, batch[1], batch[:1], pickle.loads(pickle.dumps(batch))):
-        assert type(spline) is ss.CubicSpline
-        assert type(spline.report) is ss.Report
-    assert pickle.loads(pickle.dumps(batch)) == batch
+    for spline in (batch[1], batch[:1]):
+        assert type(spline) is ss.CubicSpline and type(spline.report) is ss.Report
     assert pickle.loads(pickle.dumps(batch[1])).report == batch[1].report == batch.report.map(lambda c: c[1])

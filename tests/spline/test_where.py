@@ -55,9 +55,7 @@ def test_a_bad_sensor_stops_no_other(name, value):
     keep = np.delete(np.arange(50), [17, 30])
     assert np.array_equal(some.velocities[keep], good.velocities[keep])
     assert np.isnan(some(X)[[17, 30]]).all() and np.count_nonzero(some.report.converged) == 48
-    with pytest.warns(
-        ss.ConvergenceWarning, match=r"points\[2\] of curve 17 is (off|not).*and 1 more curves failed"
-    ):
+    with pytest.warns(ss.ConvergenceWarning, match=r"points\[2\] of curve 17 is (off|not).*and 1 more curves failed"):
         ss.CubicSpline(None, p, name, on_failure="warn")
     with pytest.raises(ss.ValidationError, match=r"points\[2\] of curve 17"):
         ss.CubicSpline(None, p, name)
@@ -76,10 +74,12 @@ def test_faults_and_errors_name_the_curve_in_the_whole_batch():
 
 def test_times_are_those_of_the_curve_in_the_whole_batch():
     t, mask = [[0, 1, 2], [0, 1, 2], [0, 2, 1]], np.array([False, True, True])
-    with pytest.raises(ss.ValidationError, match=r"t\[2\]\[2\] = 1 is before t\[2\]\[1\] = 2"):
-        ss.CubicSpline(t, [np.eye(3)] * 3, "s:2", where=mask)
-    with pytest.raises(ss.ValidationError, match=r"t\[2\]\[2\] = 1 is before t\[2\]\[1\] = 2"):
-        ss.fit_many([(row, np.eye(3)) for row in t], "s:2", where=mask)
+    for fit in (
+        lambda: ss.CubicSpline(t, [np.eye(3)] * 3, "s:2", where=mask),
+        lambda: ss.fit_many([(row, np.eye(3)) for row in t], "s:2", where=mask),
+    ):
+        with pytest.raises(ss.ValidationError, match=r"t\[2\]\[2\] = 1 is before t\[2\]\[1\] = 2"):
+            fit()
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "cp:1", "sphere:2 x r:3", "sphere:300"])
@@ -116,18 +116,14 @@ def test_errors_name_the_curve_in_the_whole_list():
     bad[2] = (None, (1 + 1e-6) * np.eye(3))
     with pytest.raises(ss.ValidationError, match=r"^curve 2: points\[0\] is off"):
         ss.fit_many(bad, "s:2", where=mask)
-    with pytest.raises(
-        ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"
-    ):
+    with pytest.raises(ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"):
         ss.fit_many(bad, "s:2", where=mask[:2])
 
 
 @pytest.mark.parametrize("where", [[True], [1, 0], [True, False, True], True])
 def test_bad_masks(where):
     fit_error(
-        r"where must be True or False for every curve, of shape \(2,\)",
-        points=np.stack([np.eye(3)] * 2),
-        where=where,
+        r"where must be True or False for every curve, of shape \(2,\)", points=np.stack([np.eye(3)] * 2), where=where
     )
 
 

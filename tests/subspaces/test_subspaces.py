@@ -34,9 +34,7 @@ ALL = np.stack([snapshots(mu) for mu in PARAMETERS])
 
 
 def curve(rank=4, **options):
-    return ss.CubicSpline(
-        PARAMETERS, from_snapshots(ALL, rank), f"gr:{rank},{N}", bc_type="not-a-knot", **options
-    )
+    return ss.CubicSpline(PARAMETERS, from_snapshots(ALL, rank), f"gr:{rank},{N}", bc_type="not-a-knot", **options)
 
 
 @pytest.mark.parametrize("field", [float, complex])
@@ -105,12 +103,7 @@ def test_they_are_the_operator_in_the_subspace():
     wanted = np.linalg.eigvalsh(y.swapaxes(1, 2) @ LAPLACE.toarray() @ y)
     assert np.abs(np.linalg.eigvalsh(found[0]) - wanted).max() < 1e-11 * np.abs(wanted).max()
     # Whatever multiplies arrays is an operator.
-    for same in (
-        LAPLACE.toarray(),
-        LAPLACE.toarray().tolist(),
-        aslinearoperator(LAPLACE),
-        lambda mu: LAPLACE,
-    ):
+    for same in (LAPLACE.toarray(), LAPLACE.toarray().tolist(), aslinearoperator(LAPLACE), lambda mu: LAPLACE):
         assert np.abs(reduced_operator(spline, same, X) - found[0]).max() < 1e-12 * np.abs(found).max()
 
 
@@ -151,28 +144,13 @@ def test_a_reduced_model_between_the_parameters():
         ("pass either rank, .* or energy", lambda: from_snapshots(ALL, 3, energy=0.9)),
         ("energy must be a fraction above 0 and at most 1, not 99", lambda: from_snapshots(ALL, energy=99)),
         ("rank must be at least 1", lambda: from_snapshots(ALL, 0)),
-        (
-            r"31 dimensions needs .* 31 snapshots; x has shape \(5, 60, 30\)",
-            lambda: from_snapshots(ALL, 31),
-        ),
+        (r"31 dimensions needs .* 31 snapshots; x has shape \(5, 60, 30\)", lambda: from_snapshots(ALL, 31)),
         ("3 dimensions needs more than 3 numbers", lambda: from_snapshots(np.eye(3), 3)),
-        (
-            r"x\[1\] does not determine .* singular values 2 and 3 are 1 and 1",
-            lambda: from_snapshots(equal(), 2),
-        ),
-        (
-            "values 2 and 3 are 0 and 0",
-            lambda: from_snapshots(np.outer([1, 2, 3.0], [1, 1, 1]) * [1, 0, 0], 2),
-        ),
+        (r"x\[1\] does not determine .* singular values 2 and 3 are 1 and 1", lambda: from_snapshots(equal(), 2)),
+        ("values 2 and 3 are 0 and 0", lambda: from_snapshots(np.outer([1, 2, 3.0], [1, 1, 1]) * [1, 0, 0], 2)),
         ("must contain at least one snapshot", lambda: from_snapshots(np.zeros((5, 0)), 1)),
-        (
-            "one curve on a Grassmannian, not <CubicSpline on Sphere",
-            lambda: reduced_operator(sphere(), np.eye(3), 0.5),
-        ),
-        (
-            r"operator has shape \(59, 60\), but bases of 60",
-            lambda: reduced_operator(curve(), np.ones((59, N)), 0.5),
-        ),
+        ("one curve on a Grassmannian, not <CubicSpline on Sphere", lambda: reduced_operator(sphere(), np.eye(3), 0.5)),
+        (r"operator has shape \(59, 60\), but bases of 60", lambda: reduced_operator(curve(), np.ones((59, N)), 0.5)),
         (r"the operator has shape \(2, 2\)", lambda: reduced_operator(curve(), lambda mu: np.eye(2), 0.5)),
     ],
 )

@@ -160,9 +160,7 @@ def test_the_header_of_the_volume_that_was_read_is_kept(order, tmp_path):
     image.set_sform(AFFINE, 4)
     nibabel.save(image, first)
     read = read_nifti(first)
-    write_nifti(
-        second, dataclasses.replace(read, tensors=read.tensors.astype(float) + np.eye(3) / 3), order=order
-    )
+    write_nifti(second, dataclasses.replace(read, tensors=read.tensors.astype(float) + np.eye(3) / 3), order=order)
     header = nibabel.load(second).header
     assert header.get_xyzt_units() == ("mm", "sec") and header["descrip"].item() == b"tensors of one subject"
     assert (int(header["qform_code"]), int(header["sform_code"])) == (1, 4)

@@ -22,9 +22,7 @@ def documented(order):
     text = DOCUMENTED[order]
     if order == "itk":
         matrix = [["a", "b", "c"], ["b", "d", "e"], ["c", "e", "f"]]
-        first = [
-            next((i, j) for i in range(3) for j in range(3) if matrix[i][j] == letter) for letter in "abcdef"
-        ]
+        first = [next((i, j) for i in range(3) for j in range(3) if matrix[i][j] == letter) for letter in "abcdef"]
         return [NAMED[place] for place in first]
     digits = ["".join(WORDS.get(letter, letter) for letter in name[1:]) for name in text.split(", ")]
     return [int(name) for name in digits]
@@ -59,32 +57,18 @@ def test_curves_through_many_voxels():
     voxels = ss.SymmetricPositiveDefinite(3).random_point(rng, (30, 4)).astype(np.float32)
     vectors = to_vectors(voxels, order="mrtrix")
     spline = ss.CubicSpline(None, from_vectors(vectors, order="mrtrix"), "spd:3")
-    assert (
-        np.abs(to_vectors(spline(2.0), order="mrtrix") - vectors[:, 2]).max() < 1e-6 * np.abs(vectors).max()
-    )
+    assert np.abs(to_vectors(spline(2.0), order="mrtrix") - vectors[:, 2]).max() < 1e-6 * np.abs(vectors).max()
 
 
 @pytest.mark.parametrize(
     ("match", "call"),
     [
-        (
-            "order must be 'dipy', 'fsl', 'mrtrix', 'itk', .* not 'ants'",
-            lambda: from_vectors(np.ones(6), order="ants"),
-        ),
+        ("order must be 'dipy', 'fsl', 'mrtrix', 'itk', .* not 'ants'", lambda: from_vectors(np.ones(6), order="ants")),
         ("order must be .* not None: the numbers do not show it", lambda: to_vectors(np.eye(3), order=None)),
-        (
-            r"x has shape \(2, 5\), but needs shape \(..., 6\)",
-            lambda: from_vectors(np.ones((2, 5)), order="fsl"),
-        ),
-        (
-            "x must be an array of real numbers, not of complex",
-            lambda: from_vectors(np.ones(6) * 1j, order="fsl"),
-        ),
+        (r"x has shape \(2, 5\), but needs shape \(..., 6\)", lambda: from_vectors(np.ones((2, 5)), order="fsl")),
+        ("x must be an array of real numbers, not of complex", lambda: from_vectors(np.ones(6) * 1j, order="fsl")),
         (r"matrices has shape \(3,\)", lambda: to_vectors(np.ones(3), order="fsl")),
-        (
-            r"matrices\[1\] is not symmetric: .* is 1.000e-03",
-            lambda: to_vectors([np.eye(3), skewed()], order="fsl"),
-        ),
+        (r"matrices\[1\] is not symmetric: .* is 1.000e-03", lambda: to_vectors([np.eye(3), skewed()], order="fsl")),
     ],
 )
 def test_invalid_tensors_raise(match, call):

@@ -86,9 +86,7 @@ assert_type(ss.CubicSpline(None, p, "sphere:2")(0.5), NDArray[Any])
 assert_type(ss.CubicSpline(None, poses.random_point(rng, 3), poses)(0.5), Pose)
 rotation, position = ss.CubicSpline(None, poses.random_point(rng, 3), poses)(x, 1)
 assert_type(position, Float)
-assert_type(
-    ss.CubicSpline(None, poses.random_point(rng, 3), poses)(x, dtype="float32"), tuple[NDArray[Any], ...]
-)
+assert_type(ss.CubicSpline(None, poses.random_point(rng, 3), poses)(x, dtype="float32"), tuple[NDArray[Any], ...])
 
 assert_type(ss.HermiteSpline(t, p, np.zeros((3, 3)), sphere)(x), Float)
 assert_type(ss.BezierCurve(p, sphere)(0.5), Float)

@@ -28,9 +28,7 @@ def test_blocks_are_bit_identical_to_the_whole(scheduler):
     made = sx.resample(blocks, "so:3", X, point_dims=dims, where=where)
     lazy = (ds, values, speed, made)
     assert all(dask.is_dask_collection(found) for found in lazy)
-    ds, values, speed, made = dask.compute(
-        *lazy, scheduler=scheduler, num_workers=1 if scheduler == "processes" else 2
-    )
+    ds, values, speed, made = dask.compute(*lazy, scheduler=scheduler, num_workers=1 if scheduler == "processes" else 2)
     assert same(numbers(ds.velocities, "time", *dims), expected.velocities.values)
     assert same(numbers(ds.converged), expected.converged.values) and ds.converged.sum() == 11
     assert same(numbers(values, "time", *dims), sx.evaluate(expected, X, nu=1).values)
@@ -79,9 +77,7 @@ def test_end_vectors_in_blocks():
     start = S2.random_tangent(np.random.default_rng(0), da.values[:, :, 0])
     start = xr.DataArray(start, dims=("lat", "lon", "r"))
     whole = sx.fit(da, S2, point_dims=("r",), bc_type=((1, start), "not-a-knot"))
-    parts = sx.fit(
-        da.chunk(lat=1, lon=4), S2, point_dims=("r",), bc_type=((1, start.chunk(lon=3)), "not-a-knot")
-    )
+    parts = sx.fit(da.chunk(lat=1, lon=4), S2, point_dims=("r",), bc_type=((1, start.chunk(lon=3)), "not-a-knot"))
     assert same(whole.velocities.values, parts.velocities.values)
 
 
@@ -111,18 +107,11 @@ def test_blocks_use_one_thread_each(threads):
         return S2.exp(p, v)
 
     space = ss.Manifold(
-        exp=exp,
-        log=S2.log,
-        project_tangent=S2.project_tangent,
-        inner=S2.inner,
-        project=S2.project,
-        point_shape=(3,),
+        exp=exp, log=S2.log, project_tangent=S2.project_tangent, inner=S2.inner, project=S2.project, point_shape=(3,)
     )
     x = S2.geodesic([1, 0, 0], [0, 1, 0], np.linspace(0, 1, 5))
     ss.set_num_threads(3)
-    ds = sx.fit(
-        xr.DataArray(x, dims=("time", "r")).expand_dims(curve=6).chunk(curve=2), space, point_dims=("r",)
-    )
+    ds = sx.fit(xr.DataArray(x, dims=("time", "r")).expand_dims(curve=6).chunk(curve=2), space, point_dims=("r",))
     seen.clear()
     ds.compute(scheduler="threads", num_workers=2)
     assert set(seen) == {1} and ss.num_threads() == 3

@@ -30,11 +30,7 @@ def client(tmp_path_factory):
     with (
         dask.config.set(settings),
         LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            dashboard_address=":0",
-            local_directory=folder,
-            silence_logs="CRITICAL",
+            n_workers=2, threads_per_worker=1, dashboard_address=":0", local_directory=folder, silence_logs="CRITICAL"
         ) as cluster,
         Client(cluster) as client,
     ):

@@ -55,9 +55,7 @@ def test_a_great_circle_with_dates_has_its_angular_velocity_per_second():
     at = sx.evaluate(ds, x).sel(time="2021-08-28T00:16:40").values[0]
     np.testing.assert_allclose(at, [np.cos(1), np.sin(1), 0], atol=1e-14)
     np.testing.assert_allclose(sx.speed(ds, x), 1e-3, rtol=1e-12)
-    np.testing.assert_allclose(
-        sx.evaluate(ds, x, nu=1)[0, 1], 1e-3 * np.array([-np.sin(1), np.cos(1), 0]), atol=1e-15
-    )
+    np.testing.assert_allclose(sx.evaluate(ds, x, nu=1)[0, 1], 1e-3 * np.array([-np.sin(1), np.cos(1), 0]), atol=1e-15)
 
 
 def test_flat_curves_are_scipys():
@@ -70,9 +68,7 @@ def test_flat_curves_are_scipys():
 
 @pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
 def test_dates_keep_their_unit(unit):
-    dates = np.datetime64("2021-08-28", unit) + np.arange(KNOTS) * np.timedelta64(1, "h").astype(
-        f"m8[{unit}]"
-    )
+    dates = np.datetime64("2021-08-28", unit) + np.arange(KNOTS) * np.timedelta64(1, "h").astype(f"m8[{unit}]")
     da = field().assign_coords(time=dates)
     ds = sx.fit(da, S2, point_dims=("r",))
     assert ds.time.dtype == dates.dtype and (ds.time.values == dates).all()
@@ -125,9 +121,7 @@ def test_one_curve_and_one_time():
 def test_times_of_any_dimensions():
     da = field()
     ds, expected = sx.fit(da, S2, point_dims=("r",)), plain(da, "sphere:2")
-    grid = xr.DataArray(
-        np.linspace(0, 13, 12).reshape(3, 4), dims=("run", "sample"), coords={"run": [7, 8, 9]}
-    )
+    grid = xr.DataArray(np.linspace(0, 13, 12).reshape(3, 4), dims=("run", "sample"), coords={"run": [7, 8, 9]})
     for values in (sx.evaluate(ds, grid), sx.resample(da, S2, grid, point_dims=("r",))):
         assert values.dims == ("lat", "lon", "run", "sample", "r")
         assert same(values.values, expected(grid.values))
@@ -140,9 +134,7 @@ def test_every_curve_has_its_own_times(dims):
     sizes = {"lat": LAT, "lon": LON, "sample": 4, "time": 4}
     x = xr.DataArray(np.random.default_rng(0).uniform(0, 13, [sizes[d] for d in dims]), dims=dims)
     own = [d for d in dims if d in ("sample", "time")]
-    each = x.broadcast_like(xr.DataArray(np.zeros((LAT, LON)), dims=("lat", "lon"))).transpose(
-        "lat", "lon", *own
-    )
+    each = x.broadcast_like(xr.DataArray(np.zeros((LAT, LON)), dims=("lat", "lon"))).transpose("lat", "lon", *own)
     expected = plain(da, "sphere:2")(each.values, per_curve=True)
     ds = sx.fit(da, S2, point_dims=("r",))
     for values in (sx.evaluate(ds, x), sx.resample(da, S2, x, point_dims=("r",))):
@@ -237,16 +229,12 @@ def test_beyond_the_knots():
 
 
 def test_the_holonomy_of_closed_curves():
-    p = ss.ComplexProjective(1).project(
-        np.array([[1, 0], [1, 1], [1, 1j], [1, 0]]) / np.sqrt([[1], [2], [2], [1]])
-    )
+    p = ss.ComplexProjective(1).project(np.array([[1, 0], [1, 1], [1, 1j], [1, 0]]) / np.sqrt([[1], [2], [2], [1]]))
     da = xr.DataArray(p[None], dims=("curve", "time", "q"))
     ds = sx.fit(da, "cp:1", bc_type="periodic")
     spline = ss.CubicSpline(None, p[None], "cp:1", bc_type="periodic")
     x = np.linspace(0, 6, 13)
-    assert same(sx.lift(ds, x).values, spline.lift(x)) and same(
-        sx.lift(ds, x, nu=1).values, spline.lift(x, nu=1)
-    )
+    assert same(sx.lift(ds, x).values, spline.lift(x)) and same(sx.lift(ds, x, nu=1).values, spline.lift(x, nu=1))
     # One eighth of the sphere is enclosed: the phase is half of π/2.
     turn = np.vdot(*sx.lift(ds, [0.0, 3.0]).values[0])
     closed = ss.CubicSpline(None, p, "cp:1", bc_type="periodic").lift([0.0, 3.0])

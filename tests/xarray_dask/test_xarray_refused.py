@@ -94,16 +94,12 @@ def test_dates_need_dates():
 
 
 def test_derivatives_of_higher_order():
-    refused(
-        "nu must be 0, 1 or 2, not 3", lambda: sx.evaluate(sx.fit(field(), S2, point_dims=("r",)), 0.5, nu=3)
-    )
+    refused("nu must be 0, 1 or 2, not 3", lambda: sx.evaluate(sx.fit(field(), S2, point_dims=("r",)), 0.5, nu=3))
 
 
 def test_invalid_datasets_raise():
     ds = sx.fit(field(), S2, point_dims=("r",))
-    refused(
-        "ds is not what symspline.xarray.fit returns", lambda: sx.evaluate(ds.drop_vars("velocities"), 0.5)
-    )
+    refused("ds is not what symspline.xarray.fit returns", lambda: sx.evaluate(ds.drop_vars("velocities"), 0.5))
     refused("it has no 'space'", lambda: sx.evaluate(ds.drop_attrs(), 0.5))
     refused("is not what symspline.xarray.fit returns", lambda: sx.evaluate(field(), 0.5))
     refused("'time' is cut into 10 chunks", lambda: sx.evaluate(ds.chunk(time=1), 0.5))
@@ -135,10 +131,7 @@ def test_times_under_another_name_are_not_left_out(coords, names):
     """As in files of trajectories by the CF conventions; they were replaced by 0, 1, 2."""
     points = np.broadcast_to(np.eye(3), (2, 3, 3))
     da = xr.DataArray(points, dims=("traj", "obs", "q"), coords=coords)
-    for call in (
-        lambda: sx.fit(da, "sphere:2", dim="obs"),
-        lambda: sx.resample(da, "sphere:2", [0.5], dim="obs"),
-    ):
+    for call in (lambda: sx.fit(da, "sphere:2", dim="obs"), lambda: sx.resample(da, "sphere:2", [0.5], dim="obs")):
         with pytest.raises(ss.ValidationError, match=f"other coordinates look like times: {names}"):
             call()
     if "time" not in coords:

@@ -1,4 +1,4 @@
-"""Derivatives with respect to data: where they are wanted, and what comes of them."""
+"""Derivatives with respect to data: the times at which they are computed, and their results."""
 
 from __future__ import annotations
 
@@ -13,13 +13,31 @@ from .._typing import FloatArray, P
 
 @dataclass(frozen=True)
 class Gradient(Generic[P]):
-    """The gradient of a number with respect to what a spline is made of, see `symspline.CubicSpline.vjp`.
+    """Gradient of a function of a spline with respect to its data.
 
-    Attributes:
-        points: tangent vectors at the points, of their shape.
-        t: one number a knot, of the shape of the knots.
-        ends: tangent vectors for the velocity or acceleration that was given at either end, of its shape; None
-            where none was given.
+    `CubicSpline.vjp` returns objects of this class.
+
+    Attributes
+    ----------
+    points : ndarray or tuple of ndarray
+        Tangent vectors at the points, with their shape.
+    t : ndarray
+        One number per knot, with the shape of the knots.
+    ends : tuple
+        Tangent vectors for the velocity or acceleration prescribed at either end, with its shape; None where none was
+        prescribed.
+
+    See Also
+    --------
+    CubicSpline.vjp : Compute the gradient of a function of the curve.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+    >>> gradient = spline.vjp(0.5, [1.0])
+    >>> gradient.points.shape, gradient.t.shape, gradient.ends
+    ((3, 1), (3,), (None, None))
     """
 
     points: P
@@ -28,12 +46,16 @@ class Gradient(Generic[P]):
 
 
 class Places(NamedTuple):
-    """Where on the curves of a batch derivatives are wanted.
+    """Times on the curves of a batch at which derivatives are computed.
 
-    Attributes:
-        x: times, shape (curves, times of each).
-        shape: of a result, but for the axes of a point.
-        nu: of γ, γ' or ∇γ'.
+    Attributes
+    ----------
+    x : ndarray, shape (curves, times)
+        Times of each curve.
+    shape : tuple of int
+        Shape of a result, without the axes of a point.
+    nu : {0, 1, 2}
+        Order of the derivative in time.
     """
 
     x: NDArray[np.float64]

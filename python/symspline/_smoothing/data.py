@@ -1,4 +1,4 @@
-"""Noisy data as users give them."""
+"""Noisy data: validation, and the choice of knots."""
 
 from __future__ import annotations
 
@@ -23,19 +23,27 @@ from .precision import Precision, read_precision
 Doubles = NDArray[np.float64]
 
 
-# Segments that are longer than the whole over this get further knots where a curve was not found without them.
+# Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12
 
 
 class SmoothingData(NamedTuple):
-    """Noisy data of curves.
+    """Noisy data of curves after validation.
 
-    Attributes:
-        clock: how times are counted.
-        t: times, shape (N,) or (..., N), as they are shown.
-        times: the same in the core.
-        points: in every factor, on the space; data of weight zero stand for others. NaN for curves that are left out.
-        weighing: in every space in which data are smoothed.
+    Attributes
+    ----------
+    clock : TimeAxis
+        Conversion of times.
+    t : ndarray, shape (N,) or (..., N)
+        Times as the user sees them.
+    times : ndarray
+        The same times as the core counts them.
+    points : list of ndarray
+        Points on the space in every factor. Data of weight zero are replaced by others; masked curves are NaN.
+    weighing : list of Precision
+        Weights in every space in which data are smoothed.
+    batch : tuple of int
+        Batch axes.
     """
 
     clock: TimeAxis
@@ -47,18 +55,18 @@ class SmoothingData(NamedTuple):
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Which data count in some factor, shape (N,) or (..., N)."""
+        """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
         return reduce(np.logical_or, [own.weights > 0 for own in self.weighing])
 
 
 class Knots(NamedTuple):
-    """Knots as they are shown, and in the core; shape (K,) or (..., K)."""
+    """Knots as the user sees them, and as the core counts them; shape (K,) or (..., K)."""
 
     t: Array
     times: Doubles
 
     def of_curves(self, chosen: NDArray[np.intp] | None) -> Knots:
-        """The knots of these curves of a batch, None for all."""
+        """Return the knots of some curves of a batch; None selects all curves."""
         if chosen is None or self.times.ndim == 1:
             return self
         t, times = (x.reshape(-1, x.shape[-1])[chosen] for x in (self.t, self.times))
@@ -74,10 +82,12 @@ def read_noisy(
     bc_type: Any,
     atol: float | None,
 ) -> Given:
-    """The data as a user gives them, after all checks but those of points.
+    """Return the data as a user passes them, after all checks except those of points.
 
-    Raises:
-        ValidationError: something is wrong with them; it says where.
+    Raises
+    ------
+    ValidationError
+        If an argument is invalid.
     """
     data = with_atol(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
@@ -90,19 +100,23 @@ def read_noisy(
     for kind, _ in (end for own in ends for end in own or []):
         if kind not in ("natural", "velocity"):
             raise ValidationError(
-                f"bc_type {kind!r} is not an end condition of a smooth curve. Use 'natural', 'clamped', 'periodic' or "
+                f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
     return Given(clock, shown_times, times, data, weighing, ends, batch, None)
 
 
 class Given(NamedTuple):
-    """Noisy data before their points are checked, as `SmoothingData`.
+    """Noisy data before their points are checked. The fields are those of `SmoothingData`, and further ones.
 
-    Attributes:
-        data: points in every factor.
-        ends: conditions at the ends, in every factor.
-        chosen: the numbers of these curves in the batch of a user; None for all of them.
+    Attributes
+    ----------
+    data : list of Points
+        Points in every factor.
+    ends : list
+        End conditions in every factor.
+    chosen : ndarray of int or None
+        Indices of these curves in the batch of the user; None for all curves.
     """
 
     clock: TimeAxis
@@ -115,8 +129,10 @@ class Given(NamedTuple):
     chosen: NDArray[np.intp] | None
 
     def sound(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
-        """The curves that are to be made, and what is wrong with others: unless ``strict`` those with points that are
-        none or too few are left out."""
+        """Return the valid curves of the mask, and the faults of the others.
+
+        Unless `strict`, curves with invalid or too few points are masked.
+        """
         chosen = np.ones(self.batch, bool) if mask is None else mask.copy()
         faults: list[Fault] = []
         if self.batch and not strict:
@@ -132,15 +148,17 @@ class Given(NamedTuple):
         return self._some(space, np.flatnonzero(chosen)), faults
 
     def _plain(self, space: Space) -> tuple[Space, Doubles, list[Points], list[list[End] | None]]:
-        """What is to be checked of points only: times may repeat, knots need not be where data are, and the ends of a
-        closed curve are noisy, too, and differ."""
+        """Return the data in a form in which only points are checked.
+
+        Times may repeat, knots need not be times of the data, and the ends of a closed curve are noisy and differ.
+        """
         plain = np.arange(self.data[0].nodes, dtype=np.float64)
         natural = read_ends("natural", space, self.batch)
         ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
         return space, plain, self.data, ends
 
     def _some(self, space: Space, chosen: NDArray[np.intp]) -> Given:
-        """These curves alone, along one axis."""
+        """Return some of the curves, along one batch axis."""
         lead = len(self.batch)
 
         def rows(array: Any) -> Any:
@@ -159,10 +177,12 @@ class Given(NamedTuple):
         )
 
     def checked(self, space: Space) -> SmoothingData:
-        """With points that are moved onto the space.
+        """Return the data with points projected onto the space.
 
-        Raises:
-            ValidationError: some are none; it says where.
+        Raises
+        ------
+        ValidationError
+            If a point is invalid, or a curve has data at fewer than two times.
         """
         on_space, _ = validated(*self._plain(space))
         for own in self.weighing:
@@ -182,14 +202,17 @@ def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[
     if len(back):
         *curve, i = back[0].tolist()
         raise ValidationError(
-            f"t{[*curve, i + 1]} is before t{[*curve, i]}; sort times and points together, e.g. "
-            "order = np.argsort(t)"
+            f"t{[*curve, i + 1]} is before t{[*curve, i]}. Sort times and points together, for instance with "
+            "order = np.argsort(t)."
         )
     return clock, shown_times, times
 
 
 def _without_missing(part: Points, weights: list[Doubles]) -> Points:
-    """Points of weight zero, which may be NaN, stand for the nearest others before or after them."""
+    """Replace points of weight zero, which may be NaN, by the last point with a weight before them.
+
+    Points without such a predecessor become the first point that has a weight.
+    """
     missing = reduce(
         np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights]
     )
@@ -205,7 +228,7 @@ def _without_missing(part: Points, weights: list[Doubles]) -> Points:
 
 
 def _enough(times: Doubles, weights: Doubles, batch: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which curves have data at two different times at least."""
+    """Return which curves have data at two or more different times."""
     shape = (*batch, times.shape[-1])
     used, own = np.broadcast_to(weights > 0, shape), np.broadcast_to(times, shape)
     first, last = np.where(used, own, np.inf).min(-1), np.where(used, own, -np.inf).max(-1)
@@ -217,12 +240,12 @@ def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
     of = f" of curve {','.join(map(str, index))}" if batch else ""
     own = weights[index] if weights.ndim > 1 else weights
     if not np.any(own > 0):
-        return f"All weights of the data{of} are 0. A curve needs points at two times at least."
-    return f"The data{of} lie at one time. A curve needs points at two times at least."
+        return f"All weights of the data{of} are 0. A curve needs points at two or more times."
+    return f"The data{of} have one time only. A curve needs points at two or more times."
 
 
 def knots_for(noisy: Given, knots: Any) -> Knots:
-    """Knots: None for all different times, a number of them, or the knots themselves."""
+    """Return the knots of a curve from the argument `knots`: None, their number, or the knots themselves."""
     t, times = noisy.t, noisy.times
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
         return thin_knots(_different(t, times), int(knots))
@@ -234,19 +257,21 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
         )
     given = as_array(times_of(knots, "knots")[0], "knots")
     if given.ndim != 1:
-        raise ValidationError("knots are those of all curves, shape (K,)")
+        raise ValidationError(
+            f"knots has shape {given.shape}, but must have shape (K,). All curves have the same knots."
+        )
     found, _ = noisy.clock.at(knots, noisy.batch, False)
     if found.shape[-1:] < (2,):
-        raise ValidationError("knots: a curve needs at least two")
+        raise ValidationError("knots must have at least two entries")
     if not np.all(np.diff(found) > 0):
         index = int(np.argwhere(~(np.diff(found) > 0))[0][-1])
-        raise ValidationError(f"knots[{index + 1}] is not behind knots[{index}]; knots must increase")
+        raise ValidationError(f"knots[{index + 1}] is not after knots[{index}], but knots must increase")
     ends = np.stack([found[..., 0], found[..., -1]], axis=-1)
     data_ends = np.stack([times[..., 0], times[..., -1]], axis=-1)
     size = np.abs(data_ends).max(axis=-1, keepdims=True)
     if noisy.clock.origin is not None and not noisy.clock.dates:
         size = size + np.abs(np.asarray(noisy.clock.origin, np.float64))[..., None]
-    # Knots made by linspace may end a few units in the last place before the data do.
+    # The last knot of linspace may be a few units in the last place before the last datum.
     beside = (ends != data_ends) & (np.abs(ends - data_ends) <= 4 * np.spacing(size))
     if beside.any():
         found = np.broadcast_to(
@@ -259,12 +284,12 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
         given = given.astype(np.promote_types(given.dtype, t.dtype))
     elif noisy.clock.plain:
         given = found
-    # Curves that count from a time of their own each have them.
+    # Curves with an origin of time of their own have one row of knots each.
     return Knots(np.broadcast_to(given, found.shape).copy(), found)
 
 
 def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
-    """Whether there is a knot at every time of data that count."""
+    """Whether there is a knot at every time of data with a nonzero weight."""
     used = np.broadcast_to(noisy.used, (*noisy.batch, noisy.times.shape[-1]))
     if noisy.times.ndim == 1:
         used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
@@ -281,14 +306,17 @@ def _different(t: Array, times: Doubles) -> Knots:
         return Knots(t[index], times[index])
     if np.any(np.diff(times) == 0):
         raise ValidationError(
-            "times repeat, and curves have times of their own: give knots, which all curves have alike, or smooth "
-            "the curves one by one"
+            "times repeat, and each curve has its own times. Pass knots, which apply to all curves, or smooth the "
+            "curves one by one."
         )
     return Knots(t, times)
 
 
 def thin_knots(knots: Knots, count: int) -> Knots:
-    """So many of the knots, even in what is half their number and half time: neither crowds nor thin places get few."""
+    """Select a number of knots, distributed evenly in the mean of index and time.
+
+    Neither crowded nor sparse parts then receive too few.
+    """
     there = knots.times.shape[-1]
     if count < 2:
         raise ValidationError(f"knots must be at least 2, not {count}")
@@ -302,8 +330,11 @@ def thin_knots(knots: Knots, count: int) -> Knots:
 
 
 def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> Knots:
-    """The knots without those that lie too near to each other: beside λ/h³ rounding makes the weights of data vanish.
-    None for a λ like a weight on knots at equal distances."""
+    """Remove knots that are too close together.
+
+    Rounding errors of λ/h³ would otherwise exceed the weights of the data. If λ is None, a λ is assumed that has the
+    same effect as the weights for evenly distributed knots.
+    """
     most = 1e11
     times = knots.times
     if times.ndim > 1 or len(times) <= 16:
@@ -311,12 +342,12 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
     span = float(times[-1] - times[0])
     mean = span / (len(times) - 1)
     weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.weighing)
-    # In units of the mean distance nothing overflows.
+    # Units of the mean distance prevent overflow.
     ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
     least = min(mean * (ratio / most) ** (1 / 3), span / 15)
     if np.diff(times).min() >= least:
         return knots
-    # From each knot to the first that is far enough.
+    # Index of the first knot that is far enough from each knot.
     following = np.searchsorted(times, times + least).tolist()
     stop = int(np.searchsorted(times, times[-1] - least, side="right"))
     kept, i = [], 0
@@ -327,8 +358,10 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
 
 
 def in_gaps(knots: Knots, given: Given) -> Knots:
-    """The knots with further ones in long gaps. There the curve of the space through two points that are far apart may
-    turn faster than one segment can."""
+    """Add knots in long gaps.
+
+    Between two points far apart, the curve of the space may turn faster than one segment can.
+    """
     if knots.times.ndim > 1 or len(knots.times) < 3:
         return knots
     h = np.diff(knots.times)
@@ -350,6 +383,6 @@ def _picked(knots: Knots, index: NDArray[np.intp]) -> Knots:
 
 
 def points_of(noisy: SmoothingData, space: Space) -> list[tuple[Space, Array]]:
-    """Every space in which data are smoothed, with its points."""
+    """Return every space in which data are smoothed, with its points."""
     points = [own for pair in zip(factors_of(space), noisy.points, strict=True) for own in split(*pair)]
     return list(zip(smoothed_spaces(space), points, strict=True))

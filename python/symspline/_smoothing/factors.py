@@ -1,8 +1,8 @@
 """The spaces in which noisy data are smoothed.
 
-Rigid motions have no metric that is invariant from both sides. In frames along a path, noise in the attitude turns into
-noise in the position that grows with the distance travelled. So poses are smoothed as a rotation and a position each,
-with a λ and a noise level of their own. That choice is invariant under a change of the fixed frame.
+Rigid motions have no bi-invariant metric. In frames along a path, noise of the attitude becomes noise of the position
+that grows with the distance travelled. Poses are therefore smoothed as a rotation and a position, each with its own λ
+and noise level. This choice is invariant under a change of the fixed frame.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 
 
 def parts_of_factor(space: Space) -> tuple[Space, ...]:
-    """The spaces in which points of a space that is no product are smoothed."""
+    """Return the spaces in which points of one factor are smoothed."""
     if isinstance(space, SpecialEuclidean):
         n = space.point_shape[0] - 1
         return SpecialOrthogonal(n), Euclidean(n)
@@ -28,31 +28,33 @@ def parts_of_factor(space: Space) -> tuple[Space, ...]:
 
 
 def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
-    """The spaces in which points are smoothed, each with its own λ: the factors, and for poses rotations and
-    positions."""
+    """Return the spaces in which points are smoothed, each with its own λ.
+
+    They are the factors of the space, with rotations and positions in place of poses.
+    """
     return tuple(part for factor in factors_of(space) for part in parts_of_factor(factor))
 
 
 def is_several(space: Space[Any]) -> bool:
-    """Whether numbers that belong to the noise are tuples."""
+    """Whether properties of the noise are tuples."""
     return isinstance(space, Product) or len(smoothed_spaces(space)) > 1
 
 
 def grouped(space: Space[Any], values: Iterable[_T]) -> list[list[_T]]:
-    """What belongs to the smoothed spaces, in lists for each factor."""
+    """Group values of the smoothed spaces by factor."""
     rest = iter(values)
     return [list(islice(rest, len(parts_of_factor(factor)))) for factor in factors_of(space)]
 
 
 def split(space: Space, points: Array) -> list[Array]:
-    """Points of a factor, or tangent vectors at them, in the spaces in which they are smoothed."""
+    """Split points of a factor, or tangent vectors at them, into the spaces in which they are smoothed."""
     if isinstance(space, SpecialEuclidean):
         return [np.ascontiguousarray(points[..., :-1, :-1]), np.ascontiguousarray(points[..., :-1, -1])]
     return [points]
 
 
 def join(space: Space, parts: Sequence[Array], corner: float = 1.0) -> Array:
-    """Points of a factor from those in the spaces in which they were smoothed; tangent vectors have the corner 0."""
+    """Combine points of the smoothed spaces into points of the factor. For tangent vectors, pass the corner 0."""
     if not isinstance(space, SpecialEuclidean):
         return parts[0]
     rotations, positions = parts
@@ -63,7 +65,7 @@ def join(space: Space, parts: Sequence[Array], corner: float = 1.0) -> Array:
 
 
 def split_ends(space: Space, ends: list[End] | None) -> list[list[End] | None]:
-    """The conditions at the ends of a factor, in the spaces in which it is smoothed."""
+    """Split the end conditions of a factor into the spaces in which it is smoothed."""
     parts = parts_of_factor(space)
     if ends is None or len(parts) == 1:
         return [ends] * len(parts)
@@ -78,7 +80,7 @@ def split_ends(space: Space, ends: list[End] | None) -> list[list[End] | None]:
 
 
 def coordinates_in_parts(space: Space, points: Array) -> Array:
-    """Matrices that turn coordinates in ``space.frame(points)`` into those in the frames of the parts, stacked."""
+    """Return matrices that convert coordinates in ``space.frame(points)`` to those in the frames of the parts."""
     vectors = split(space, space.frame(points))
     rows: list[Any] = []
     for part, own, at in zip(parts_of_factor(space), vectors, split(space, points), strict=True):

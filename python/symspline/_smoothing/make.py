@@ -131,9 +131,9 @@ def make_smoothing_spline(
         and noise level, because rigid motions have no invariant metric. The curve is the spline of the space through
         the smoothed poses.
     lam : float, array_like or tuple, optional
-        λ ≥ 0 in units of weight · time³. With 0 the curve is as close to the data as its knots allow; large values
-        give a geodesic. For a batch also an array with one value per curve; for products and poses also a tuple with
-        one entry per part. By default `criterion` chooses λ.
+        Weight λ ≥ 0 of the bending energy, in units of weight · time³. With 0 the curve is as close to the data as its
+        knots allow; large values give a geodesic. For a batch also an array with one value per curve; for products and
+        poses also a tuple with one entry per part. By default `criterion` chooses λ.
     weights : array_like or tuple, optional
         Weights ≥ 0 of the data, shape (N,) or (..., N): the inverse variances of their noise up to a common factor.
         Points of weight 0 are ignored and may be NaN. Alternatively information matrices W, shape (N, m, m) or (...,
@@ -172,11 +172,13 @@ def make_smoothing_spline(
     max_iter : int, default 50
         Largest number of iterations, each of which fits a spline. Robust losses have three stages with a limit each;
         the last of them may take 20 times as many.
-    extrapolate, on_failure, atol, progress
+    extrapolate, on_failure, atol : optional
         As for `CubicSpline`.
     where : array_like of bool, optional
         Mask over the batch. Curves where it is False are not fitted and evaluate to NaN. With ``on_failure="warn"`` or
         ``"ignore"`` the same holds for curves with invalid points or with data at fewer than two times.
+    progress : callable, optional
+        Function that is called from time to time with the finished and the total number of points.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Smoothing splines of different lengths, one after the other."""
+"""Smoothing splines of different lengths, fitted one after the other."""
 
 from __future__ import annotations
 
@@ -25,14 +25,21 @@ def smooth_many(
     progress: Progress | None = None,
     **options: Any,
 ) -> list[SmoothingSpline[Any, Any]]:
-    """One spline a curve of times, points and keywords of its own, each with a λ of its own.
+    """Fit one spline per curve, each with its own λ.
 
-    Args:
-        options: those of `make_smoothing_spline`, for all curves alike.
+    Parameters
+    ----------
+    curves : iterable of tuple
+        Times, points and keyword arguments of each curve.
+    **options
+        Keyword arguments of `make_smoothing_spline` for all curves.
 
-    Raises:
-        ValidationError: something is wrong with a curve; it says with which.
-        ConvergenceError: a curve failed; the exception's ``.spline`` is the list of all.
+    Raises
+    ------
+    ValidationError
+        If a curve is invalid. The message names the curve.
+    ConvergenceError
+        If a curve fails. The attribute ``spline`` is the list of all curves.
     """
     check_on_failure(on_failure)
     check_progress(progress)
@@ -53,7 +60,7 @@ def smooth_many(
         noted += [(number, note) for note in seen]
         if progress is not None:
             progress(number + 1, len(given))
-    # One warning of a kind for all curves.
+    # All curves share one warning of each category.
     for kind in dict.fromkeys(note.category for _, note in noted):
         first, *more = [(number, note) for number, note in noted if note.category is kind]
         others = f" (and {len(more)} more curves)" if more else ""

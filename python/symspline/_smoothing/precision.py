@@ -1,4 +1,4 @@
-"""How much data count: numbers, or information matrices where some directions are better known than others."""
+"""Weights of data, as numbers or as information matrices for data whose accuracy depends on the direction."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ from .._spaces.base import LARGE
 from .factors import coordinates_in_parts, parts_of_factor, split
 
 Doubles = NDArray[np.float64]
-# Parts of a matrix or of a vector that are rounding errors.
+# Relative size of the entries of a matrix or vector that count as rounding errors.
 _ROUNDING = 1e-8
-# Eigenvalues of a matrix, over the largest, that are zero to the core.
+# Relative size of the eigenvalues of a matrix that the core treats as zero.
 _SINGULAR = 1e-10
 
 
 class Precision(NamedTuple):
-    """What data count in a space that is no product.
+    """Weights of data in a space that is not a product.
 
-    Attributes:
-        weights: shape (N,) or (..., N); of matrices the mean of the diagonal.
-        information: matrices in coordinates of ``space.frame(point)``, shape (N, m, m) or (..., N, m, m), or None.
+    Attributes
+    ----------
+    weights : ndarray, shape (N,) or (..., N)
+        Weights; for matrices, the mean of their diagonal.
+    information : ndarray or None, shape (N, m, m) or (..., N, m, m)
+        Information matrices in the coordinates of ``space.frame(point)``.
     """
 
     weights: Doubles
@@ -34,14 +37,14 @@ class Precision(NamedTuple):
 
     @property
     def is_singular(self) -> bool:
-        """Whether there are data of which some directions are unknown."""
+        """Whether some matrices have no information in some directions."""
         if self.information is None:
             return False
         values = np.linalg.eigvalsh(self.information)
         return bool(np.any((values[..., 0] <= _SINGULAR * values[..., -1]) & (values[..., -1] > 0)))
 
     def map(self, function: Any) -> Precision:
-        """The same for a part of a batch."""
+        """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
         information = self.information
         if information is not None and information.ndim > 3:
             information = function(information)
@@ -49,14 +52,16 @@ class Precision(NamedTuple):
 
 
 def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) -> list[Precision]:
-    """Weights or matrices in every space in which data are smoothed, after all checks.
+    """Return weights or matrices in every space in which data are smoothed, after all checks.
 
-    Args:
-        weights: None, numbers (N,) or (..., N), or matrices (N, m, m) or (..., N, m, m); of a product a tuple with
-            one of these for every factor, or numbers for all of them; of poses perhaps a pair, for rotations and
-            positions.
-        frames: m tangent vectors at every point which matrices refer to, shape (..., N, m, *point_shape); None for
-            those of ``space.frame``. In a product a tuple.
+    Parameters
+    ----------
+    weights : array_like, tuple or None
+        Numbers of shape (N,) or (..., N), or matrices of shape (N, m, m) or (..., N, m, m). For a product, a tuple
+        with one of these per factor, or numbers for all factors. For poses also a pair, for rotations and positions.
+    frames : array_like, tuple or None
+        Tangent vectors to which matrices refer, m at every point, shape (..., N, m, *point_shape). For a product, a
+        tuple. None means ``space.frame``.
     """
     factors = factors_of(space)
     own = [weights] * len(factors)
@@ -89,15 +94,15 @@ def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Precision
     if array is None or array.shape in ((data.nodes,), lead) or array.shape[-2:] != shape:
         if frames is not None:
             raise ValidationError(
-                "`frames` says what information matrices refer to, and `weights` are numbers. Leave `frames` out, or "
-                "pass matrices."
+                "`frames` is given, but `weights` are numbers, which do not refer to frames. Omit `frames`, or pass "
+                "information matrices."
             )
         return Precision(checked_weights(given, data.batch, data.nodes, shape), None)
     return _with_matrices(array, frames, space, data)
 
 
 def _in_parts(weighing: Precision, space: Space, data: Points) -> list[Precision]:
-    """The weighing of each part of poses: the inverse of its marginal covariance, a Schur complement."""
+    """Return the inverse of the marginal covariance of each part of poses, a Schur complement."""
     parts = parts_of_factor(space)
     if weighing.information is None:
         return [weighing] * len(parts)
@@ -123,19 +128,19 @@ def _in_parts(weighing: Precision, space: Space, data: Points) -> list[Precision
 
 def _one_a_factor(values: Any, name: str, count: int) -> list[Any]:
     if not isinstance(values, tuple) or len(values) != count:
-        raise ValidationError(
-            f"{name} of a product must be a tuple with {count} entries, one of every factor"
-        )
+        raise ValidationError(f"{name} of a product must be a tuple with {count} entries, one per factor")
     return list(values)
 
 
 def checked_weights(
     weights: ArrayLike | None, batch: tuple[int, ...], count: int, matrix: tuple[int, ...] = ()
 ) -> Doubles:
-    """Weights, one of every point.
+    """Return weights, one per point.
 
-    Args:
-        matrix: the shape of matrices that would do as well.
+    Parameters
+    ----------
+    matrix : tuple of int
+        Shape of the matrices that are accepted as well, for the message.
     """
     if weights is None:
         return np.ones(count)
@@ -150,7 +155,7 @@ def checked_weights(
     if bad.any():
         index = np.argwhere(bad)[0].tolist()
         raise ValidationError(
-            f"weights{index} is {found[tuple(index)]}; weights are numbers >= 0, and 0 leaves a point out"
+            f"weights{index} is {found[tuple(index)]}, but weights must be >= 0. A weight of 0 excludes a point."
         )
     return found
 
@@ -172,7 +177,9 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
             f"{(count, m, m)}{own}"
         )
     if space.point_shape[0] >= LARGE:
-        raise ValidationError(f"in as many dimensions as {space!r} has, weights must be numbers")
+        raise ValidationError(
+            f"the dimension of {space!r} is too large for information matrices. Pass numbers as weights."
+        )
     finite = np.isfinite(matrices).all(axis=(-2, -1))
     skew = np.abs(matrices - np.swapaxes(matrices, -1, -2)).max(axis=(-2, -1), initial=0.0)
     _check(finite, "is not finite")
@@ -180,7 +187,7 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
     least, most = (np.linalg.eigvalsh(matrices)[..., i] for i in (0, -1))
     _check(
         least >= -_ROUNDING * np.maximum(most, 0.0),
-        "has a negative eigenvalue; it is the inverse of a covariance",
+        "has a negative eigenvalue, but it must be the inverse of a covariance",
     )
     if frames is not None:
         into = _inverse_frames(frames, space, data, np.any(matrices != 0, axis=(-2, -1)))
@@ -196,7 +203,10 @@ def _check(good: Any, complaint: str, name: str = "weights", places: Any = None)
 
 
 def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubles:
-    """Matrices that make coordinates in given frames of those in ``space.frame``; one where data are missing."""
+    """Return matrices that convert coordinates in ``space.frame`` to coordinates in the given frames.
+
+    Data that are missing have unit matrices.
+    """
     m, axes = space.dim, len(space.point_shape)
     given = space._numbers(space._doubles(frames, "frames"))
     lead = (*data.batch, data.nodes)
@@ -222,7 +232,7 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
     off = np.abs(flat(own) @ coordinates - columns).max(axis=(-2, -1))
     size = np.abs(columns).max(axis=(-2, -1))
     for bad, complaint in (
-        (~(off <= 1e-6 * size), "are not tangent at their point: use space.project_tangent"),
+        (~(off <= 1e-6 * size), "are not tangent at their point. Project them with space.project_tangent."),
         (np.linalg.cond(coordinates) > 1e8, "do not span the tangent space"),
     ):
         _check(~bad, complaint, "frames", np.argwhere(used))

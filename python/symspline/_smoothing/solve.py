@@ -1,4 +1,4 @@
-"""From noisy data to points of the smooth curve, in the compiled core."""
+"""Calls of the compiled core that compute the points of a smooth curve from noisy data."""
 
 from __future__ import annotations
 
@@ -22,21 +22,27 @@ from .report import SmoothingReport
 
 Doubles = NDArray[np.float64]
 
-# Part of the message where a smoothing ended without a curve.
+# Part of the message for a smoothing that ended without a curve.
 NO_CURVE = "no spline joins"
 _STATES = ("converged", "unconverged", "no curve", "undetermined", "unsettled")
 
 
 class Smoothed(NamedTuple):
-    """What is kept of the smoothing in one space.
+    """Properties of the smoothing in one space.
 
-    Attributes:
-        band: the band of A⁻¹, shape (..., K, 4), (..., K + 2, 4) for closed curves: variances of the curve, at noise of
-            variance one.
-        band_lam: the λ that goes with it, that of the pseudo-data of a robust loss.
-        sigma: the standard deviation of a coordinate by which bands are scaled, estimated or known.
-        between: whether the curve is the mean of a process that is free between its knots, as it is with a knot at
-            every time of the data; with knots of a user it is a spline, which is not.
+    Attributes
+    ----------
+    report : SmoothingReport
+        Report.
+    band : ndarray, shape (..., K, 4), or (..., K + 2, 4) for closed curves
+        Band of A⁻¹, from which the variances of the curve for noise of variance one follow.
+    band_lam : float or ndarray
+        The λ that belongs to `band`; for a robust loss, that of the pseudo-data.
+    sigma : float or ndarray
+        Standard deviation of one coordinate that scales the bands, estimated or given.
+    between : bool
+        Whether the variance between the knots is included. It is if there is a knot at every time of the data: the
+        curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
     """
 
     report: SmoothingReport
@@ -46,7 +52,7 @@ class Smoothed(NamedTuple):
     between: bool
 
     def map(self, function: Any) -> Smoothed:
-        """The same for a part of a batch."""
+        """Apply a function to all arrays, such as the selection of some curves."""
         return Smoothed(
             self.report.map(function),
             function(self.band),
@@ -57,7 +63,7 @@ class Smoothed(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """How to smooth; the core checks the words."""
+    """Options of the smoothing. The core validates the words."""
 
     criterion: str
     gamma: float
@@ -82,11 +88,13 @@ def smoothed(
     between: bool,
     progress: Progress | None,
 ) -> tuple[Array, Smoothed, list[Fault]]:
-    """The points of smooth curves at the knots, in a space that is no product."""
+    """Compute the points of smooth curves at the knots, in a space that is not a product."""
     small, inside, span = reduced(space, points)
     batch = noisy.batch
     if span is not None and any(vector is not None for _, vector in ends or []):
-        raise ValidationError(f"in as many dimensions as {space} has, end velocities cannot be given")
+        raise ValidationError(
+            f"the dimension of {space!r} is too large for end velocities. Use natural ends."
+        )
     matrices = weighing.information
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
@@ -141,30 +149,33 @@ def _reason(state: str, of: str, number: int, report: SmoothingReport, asked: As
         )
     if state == "undetermined":
         return (
-            f"The data{of} do not determine the curve. With lam=0 every knot needs data beside it: give fewer knots. "
-            "Otherwise the weights differ by more than the precision of floating-point numbers: leave out data of tiny "
-            "weight."
+            f"The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
+            "knots. Otherwise the weights differ by more than the precision of floating-point numbers: remove data "
+            "with tiny weights."
         )
     if state == "unsettled":
         return (
-            f"The smoothing{of} found no lam: it still moved after many rounds, last to "
-            f"{np.ravel(report.lam)[number]:.3g}. Pass this lam, or another criterion."
+            f"The choice of lam{of} did not converge; its last value is {np.ravel(report.lam)[number]:.3g}. Pass this "
+            "lam, or another criterion."
         )
     step = np.ravel(report.step)[number]
     other = "" if asked.method == "newton" else " or pass method='newton'"
     return (
-        f"No convergence of the smoothing{of}: a last step of {step:.1e} standard deviations after "
+        f"No convergence of the smoothing{of}: the last step is {step:.1e} standard deviations after "
         f"{np.ravel(report.iterations)[number]} iterations (tol {asked.tol:.1e}). Raise max_iter{other}."
     )
 
 
 def n_knots_for_df(df: Any) -> int:
-    """How many knots are enough for so many degrees of freedom: with three times as many nothing is lost."""
+    """Return a number of knots that is enough for these degrees of freedom.
+
+    Three times as many knots would already lose nothing.
+    """
     return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
 
 
 def one_a_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
-    """A number >= 0 of each curve; NaN for None."""
+    """Return a number >= 0 per curve; NaN for None."""
     if value is None:
         return np.full(int(np.prod(batch)), np.nan)
     array = np.asarray(value)

@@ -1,4 +1,4 @@
-"""Data that are spread over all of a compact space, where a smooth curve through them means little."""
+"""Warning about data that are spread over all of a compact space, so that a smooth curve has little meaning."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from .._spaces import Array, Space, factors_of
 from .data import SmoothingData, points_of
 from .factors import split
 
-# Of squared distances. Where smoothing still finds the curve, as with noise of half a radian on S², SO(3) or RP², the
-# quotient is below; of random points it is above, but where the curve follows them.
+# Limit of the ratio of squared distances. The ratio is below it where smoothing still recovers the curve, as with noise
+# of half a radian on S², SO(3) or RP². It is above it for random points, unless the curve follows them.
 _FAR = 0.5
-# So many data of a curve tell.
+# Number of data of a curve that are enough for the check.
 _ENOUGH = 1000
 
 
 def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: list[Any]) -> None:
-    """Warn once if data of a curve are about as far from it as random points of the space would be, but for what it
-    follows them with its degrees of freedom."""
+    """Warn once if data of a curve are about as far from it as random points of the space would be.
+
+    The degrees of freedom with which the curve follows the data are taken into account.
+    """
     every = -(-noisy.times.shape[-1] // _ENOUGH)
     at = np.ascontiguousarray(noisy.times[..., ::every])
     chosen = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
@@ -33,7 +35,7 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
     for x, (factor, own), weighing, df in zip(
         at_curve, points_of(noisy, space), noisy.weighing, dfs, strict=True
     ):
-        # Elsewhere no points are random ones, or none are far.
+        # Other spaces have no uniform distribution of points, or no largest distance.
         if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
             continue
         found = _median_distance(factor, x, own[chosen], _counts(weighing.weights)[..., ::every])
@@ -42,16 +44,16 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
         count = np.sum(
             np.broadcast_to(_counts(weighing.weights), (*noisy.batch, noisy.times.shape[-1])), axis=-1
         )
-        # A curve through all data says nothing of noise.
+        # A curve through all data has no residuals to compare.
         far = np.argwhere((found**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1))
         if len(far):
             index = tuple(far[0])
             of = f" of curve {','.join(map(str, index))}" if index else ""
             more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
             warnings.warn(
-                f"half of the data{of} are {found[index]:.2g} or more from their smooth curve{more}, and half of "
-                f"random points of {factor!r} would be {expected:.2g}: data so spread have hardly a mean, and the "
-                "curve means little. Check units and signs of the data",
+                f"half of the data{of} are {found[index]:.2g} or more away from their smooth curve{more}. For random "
+                f"points of {factor!r} this distance is {expected:.2g}, so the curve has little meaning. Check the "
+                "units and signs of the data.",
                 UserWarning,
                 stacklevel=callers_level(),
             )
@@ -59,12 +61,12 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
 
 
 def _counts(weights: Array) -> Any:
-    """Which data have a weight beside that of others."""
+    """Return which data have a weight that is not negligible."""
     return weights > 1e-6 * weights.max(axis=-1, keepdims=True)
 
 
 def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
-    """The median distance of the data y that count from the curve at their times; 0 of a curve that was not found."""
+    """Return the median distance between the curve and the data that count; 0 for curves that failed."""
     lead = x.shape[: x.ndim - len(space.point_shape)]
     used = np.broadcast_to(counts, lead) & np.isfinite(x).all(axis=tuple(range(len(lead), x.ndim)))
     distances = np.full(lead, np.nan)

@@ -1,4 +1,4 @@
-"""What a file keeps of noisy data, beside the curve."""
+"""Entries of NPZ files for smoothing splines: the data and the properties of the noise."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NUMBERS = ("step", "rate", "lam", "df", "sigma", "band_lam", "scale")
 
 
 def noisy_arrays(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
-    """The arrays that a smoothing spline has more than another one."""
+    """Return the entries of a smoothing spline besides those of the curve."""
     arrays: dict[str, Any] = {
         "format": SMOOTHING,
         **times_arrays("data_t", noisy.t, noisy.clock),
@@ -49,7 +49,7 @@ def noisy_arrays(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothe
 
 
 def _suffix(space: Space, i: int) -> str:
-    """Of what belongs to the i-th space in which data were smoothed."""
+    """Return the suffix of entries for the i-th space in which data were smoothed."""
     return f"_{i}" if is_several(space) else ""
 
 
@@ -61,30 +61,35 @@ def _plain(found: Smoothed) -> dict[str, Any]:
 def read_stored(
     arrays: Mapping[str, NDArray[Any]], clock: TimeAxis, t: NDArray[Any], curve: CurveArrays, closed: bool
 ) -> tuple[SmoothingData, list[Smoothed]]:
-    """The data of a curve, and what is known of their noise.
+    """Return the data of a curve and the properties of their noise from the entries of a file.
 
-    Args:
-        clock, t: of the data.
-        closed: whether the curve is.
+    Parameters
+    ----------
+    clock, t
+        Time axis and times of the data.
+    closed : bool
+        Whether the curve is closed.
 
-    Raises:
-        ValidationError: something does not fit.
+    Raises
+    ------
+    ValidationError
+        If an entry is invalid.
     """
     space, batch, times = curve.space, curve.batch, clock.knots(t)
     count, knots = times.shape[-1], curve.times.shape[-1]
     if times.shape not in ((count,), (*batch, count)):
         raise ValidationError(f"the times of the data have shape {times.shape}")
     if not (np.isfinite(times).all() and (np.diff(times) >= 0).all()):
-        raise ValidationError("the times of the data go back")
+        raise ValidationError("the times of the data are not finite, or decrease")
     if np.any(times[..., 0] < curve.times[..., 0]) or np.any(times[..., -1] > curve.times[..., -1]):
-        raise ValidationError("there are data before the first or behind the last knot")
+        raise ValidationError("there are data before the first or after the last knot")
     points, weighing, smoothed = [], [], []
     for i, factor in enumerate(factors_of(space)):
         name = f"data_{i}" if isinstance(space, Product) else "data"
         rows = factor._numbers(factor._doubles(arrays[name], name))
         if rows.shape != (*batch, count, *factor.point_shape):
             raise ValidationError(f"the data have shape {rows.shape}")
-        # Curves that were left out are NaN, and so are their data.
+        # Masked curves are NaN, and so are their data.
         own = curve.parts[i].points
         there = np.isfinite(own).all(axis=tuple(range(len(batch), own.ndim)))
         factor.check_point(rows[there])
@@ -94,7 +99,7 @@ def read_stored(
         suffix = _suffix(space, i)
         weighing.append(_weighing(arrays, suffix, part.dim, batch, count))
         band = arrays["band" + suffix]
-        # The coefficients of a closed curve: the first ones come again at the end.
+        # The first coefficients of a closed curve are repeated at the end.
         _check_shape("the band", band, (*batch, knots + (2 if closed else 0), 4))
         found = _smoothed(numbers, band, batch)
         if not np.isfinite(band[np.asarray(found.report.converged)]).all():
@@ -106,12 +111,12 @@ def read_stored(
 def _weighing(
     arrays: Mapping[str, NDArray[Any]], suffix: str, m: int, batch: tuple[int, ...], count: int
 ) -> Precision:
-    """What the data count in one factor."""
+    """Return the weights of the data in one factor."""
     own = "data_weights" + suffix
     weights = arrays[own if own in arrays else "data_weights"]
     _check_shape("the weights", weights, (count,), (*batch, count))
     if not (np.isfinite(weights) & (weights >= 0)).all():
-        raise ValidationError("the weights are no numbers >= 0")
+        raise ValidationError("the weights are not numbers >= 0")
     information = arrays.get("data_information" + suffix)
     if information is not None:
         _check_shape("the information matrices", information, (count, m, m), (*batch, count, m, m))

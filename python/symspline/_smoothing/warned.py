@@ -1,4 +1,4 @@
-"""Warnings about the amount of smoothing that the data ask for."""
+"""Warnings about the chosen amount of smoothing."""
 
 from __future__ import annotations
 
@@ -11,21 +11,25 @@ from .._errors import callers_level
 from .._spaces import Space
 from .factors import is_several, smoothed_spaces
 
-# Degrees of freedom, over the number of data, from which a curve goes through nearly all of them.
+# Ratio of the degrees of freedom to the number of data from which a curve follows nearly all data.
 _ALL = 0.9
 
 
 class SmoothingWarning(UserWarning):
-    """The λ that was chosen makes a curve through nearly all data, or one without any bending."""
+    """Warning that the chosen λ is at a bound: the curve follows nearly all data or has no bending energy."""
 
 
 def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: list[Any]) -> None:
-    """Warn once if a λ that was chosen lies at a bound, or nearly.
+    """Warn once if a chosen λ is at a bound, or close to it.
 
-    Args:
-        reports: of every space in which data were smoothed.
-        chosen: whether λ was chosen there, for each curve.
-        counts: the number of data there, for each curve.
+    Parameters
+    ----------
+    reports : list of SmoothingReport
+        Reports of every space in which data were smoothed.
+    chosen : list of ndarray of bool
+        Whether λ was chosen from the data, for each curve.
+    counts : list of ndarray of int
+        Number of data of each curve.
     """
     spaces = smoothed_spaces(space)
     for number, (report, asked, count) in enumerate(zip(reports, chosen, counts, strict=True)):
@@ -57,22 +61,22 @@ def _message(of: str, more: str, df: float, rough: bool, stiff: bool) -> str:
 def _least(of: str, more: str, df: float) -> str:
     return (
         f"The smoothing{of}{more} chose the smallest lam for which a curve was found ({df:.3g} degrees of freedom). "
-        "With less smoothing the curve turns too far between two knots. Pass more knots in the gaps of the data, or "
-        "cut the recording at its gaps (symspline.fit_segments)."
+        "With less smoothing, the curve would turn too far between two knots. Pass more knots in the gaps of the data, "
+        "or cut the recording at its gaps (symspline.fit_segments)."
     )
 
 
 def _rough(of: str, more: str, df: float) -> str:
     return (
-        f"The smoothing{of}{more} chose so small a lam that the curve goes through nearly all data ({df:.3g} degrees "
-        "of freedom). Its standard deviations mean nothing unless the data are that good. Data at nearly equal times "
+        f"The smoothing{of}{more} chose a lam so small that the curve follows nearly all data ({df:.3g} degrees of "
+        "freedom). Its standard deviations are only valid if the data are that accurate. Data at nearly equal times "
         "and correlated noise cause this. Pass a larger gamma, criterion='reml', sigma= with criterion='cp', or lam=."
     )
 
 
 def _stiff(of: str, more: str, df: float) -> str:
     return (
-        f"The smoothing{of}{more} chose the largest lam: the curve bends nowhere ({df:.3g} degrees of freedom). This "
-        "is right for data beside a geodesic. Otherwise the truth bends faster than the data are sampled, or less than "
-        "their noise: plot the data, and pass lam= to set the smoothness."
+        f"The smoothing{of}{more} chose the largest lam: the curve is a geodesic ({df:.3g} degrees of freedom). This "
+        "is correct for data along a geodesic. Otherwise the true curve bends faster than the data are sampled, or "
+        "less than their noise: plot the data, and pass lam= to set the smoothness."
     )

@@ -14,7 +14,7 @@ from .base import Space
 from .registry import spaces_named
 
 Tuple = tuple[Any, ...]
-# Points of factors, which are no products themselves.
+# Points of factors, which are not products themselves.
 _A = TypeVar("_A", bound=AnyArray)
 _B = TypeVar("_B", bound=AnyArray)
 _C = TypeVar("_C", bound=AnyArray)

@@ -10,7 +10,7 @@ from .._arrays import short_repr
 from .._core import Handle, ValidationError
 from .base import CLASSES, Space, example_of
 
-# No parameter of a space has as many decimal digits.
+# Longer parameters are rejected before they are converted to integers.
 _DIGITS = 40
 
 

@@ -102,6 +102,14 @@ def curve(
 
     With ``on_failure="ignore"`` or ``"warn"``, a curve that did not converge has the values of the best iterate. Its
     derivatives are NaN, because they are derived from the C² condition, which the iterate does not satisfy.
+
+    Examples
+    --------
+    >>> import jax
+    >>> from symspline.jax import curve
+    >>> gradient = jax.grad(lambda p: curve(0.5, [0.0, 1.0, 2.0], p, "r:1").sum())([[0.0], [1.0], [0.0]])
+    >>> [round(float(g[0]), 4) for g in gradient]
+    [0.4062, 0.6875, -0.0938]
     """
     nu = order_of(nu)
     space = space_named(space)

@@ -48,6 +48,14 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEv
     -----
     Solvers evaluate the Hamiltonian beyond the last knot. If the curve raises an error there, the final Hamiltonian is
     used instead. For SciPy's solvers, do the same with ``hamiltonian(spline, t, extrapolate="geodesic")``.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> from symspline import quantum
+    >>> flip = ss.CubicSpline([0, 10], [[1, 0], [0.6, 0.8]], "cp:1")
+    >>> quantum.qobjevo(flip)(5.0).shape
+    (2, 2)
     """
     quantum_space(spline)
     if spline._batch:

@@ -171,6 +171,11 @@ class AffineMorph:
             If matplotlib is not installed.
         ValidationError
             If the landmarks have four or more dimensions.
+
+        Examples
+        --------
+        >>> square, kite = [[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 0], [1, 0], [1.5, 1.5], [0, 1]]
+        >>> figure = AffineMorph([0, 1], [square, kite]).plot()
         """
         if find_spec("matplotlib") is None:
             raise ImportError("plots need matplotlib; install it with: pip install 'symspline[plot]'")

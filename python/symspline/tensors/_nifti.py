@@ -36,6 +36,15 @@ class Volume:
         Map from voxels to millimetres.
     header : object, optional
         Header of the file that was read. `write_nifti` keeps its units, codes and texts. None for a new volume.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from symspline import tensors
+    >>> mask = np.zeros((2, 2, 1), bool)
+    >>> mask[0, 0] = True
+    >>> tensors.Volume(1e-3 * np.eye(3)[None], mask, np.eye(4)).tensors.shape
+    (1, 3, 3)
     """
 
     tensors: Array
@@ -76,6 +85,17 @@ def read_nifti(
     ValidationError
         If the file or the mask has another shape, the mask is negative, not finite, or a file with another affine map,
         or the order is missing or contradicts the file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from symspline import tensors
+    >>> volume = tensors.Volume(np.eye(3)[None], np.ones((1, 1, 1), bool), np.eye(4))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tensors.write_nifti(f"{folder}/dti.nii.gz", volume, order="fsl")
+    ...     tensors.read_nifti(f"{folder}/dti.nii.gz", order="fsl").mask.shape
+    (1, 1, 1)
     """
     path = _path(file)
     image, numbers = _load(path)
@@ -126,6 +146,17 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
     -----
     The numbers are reordered, but their axes do not change. FSL writes tensors in the axes of the voxels, MRtrix in
     those of the scanner. To convert between such programs, rotate the tensors by the rotation of the affine map.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from symspline import tensors
+    >>> volume = tensors.Volume(np.eye(3)[None], np.ones((1, 1, 1), bool), np.eye(4))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tensors.write_nifti(f"{folder}/dti.nii.gz", volume, order="fsl")
+    ...     tensors.read_nifti(f"{folder}/dti.nii.gz", order="fsl").tensors.shape
+    (1, 3, 3)
     """
     nibabel = _nibabel()
     path = _path(file)

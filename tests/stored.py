@@ -20,9 +20,9 @@ def load(data):
     return ss.load(io.BytesIO(data))
 
 
-def with_arrays(**changes):
+def with_arrays(spline=None, **changes):
     """A well-formed file with some arrays replaced, or taken out."""
-    arrays = dict(np.load(io.BytesIO(stored()))) | changes
+    arrays = dict(np.load(io.BytesIO(stored(spline)))) | changes
     file = io.BytesIO()
     np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
     return file.getvalue()
