@@ -24,7 +24,7 @@ from ._input import times_of
 from ._options import check_progress, checked_extrapolate, outside, quantity_of
 from ._spaces import Array, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
-from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Number, Out, P
+from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Number, Out, P, TimesLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,7 +95,7 @@ class Curve(ABC, Generic[P]):
     @overload
     def __call__(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         nu: int = 0,
         *,
         extrapolate: Extrapolate = None,
@@ -108,7 +108,7 @@ class Curve(ABC, Generic[P]):
     @overload
     def __call__(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         nu: int = 0,
         *,
         extrapolate: Extrapolate = None,
@@ -120,7 +120,7 @@ class Curve(ABC, Generic[P]):
     @overload
     def __call__(
         self: Curve[AnyArrays],
-        x: ArrayLike,
+        x: TimesLike,
         nu: int = 0,
         *,
         extrapolate: Extrapolate = None,
@@ -132,7 +132,7 @@ class Curve(ABC, Generic[P]):
     @overload
     def __call__(
         self: Curve[AnyArray],
-        x: ArrayLike,
+        x: TimesLike,
         nu: int = 0,
         *,
         extrapolate: Extrapolate = None,
@@ -143,7 +143,7 @@ class Curve(ABC, Generic[P]):
 
     def __call__(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         nu: int = 0,
         *,
         extrapolate: Extrapolate = None,
@@ -198,7 +198,7 @@ class Curve(ABC, Generic[P]):
 
     def lift(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         start: ArrayLike | tuple[ArrayLike | None, ...] | None = None,
         *,
         nu: int = 0,
@@ -269,7 +269,7 @@ class Curve(ABC, Generic[P]):
         )
         return values
 
-    def transport(self, x0: ArrayLike, x1: ArrayLike, v: ArrayLike) -> P:
+    def transport(self, x0: TimesLike, x1: TimesLike, v: ArrayLike) -> P:
         r"""Transport tangent vectors in parallel along the curve.
 
         Parameters
@@ -361,7 +361,7 @@ class Curve(ABC, Generic[P]):
 
     def speed(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         *,
         extrapolate: Extrapolate = None,
         per_curve: bool = False,
@@ -404,7 +404,7 @@ class Curve(ABC, Generic[P]):
 
     def _at(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         quantity: str,
         extrapolate: Any,
         per_curve: bool,
@@ -632,7 +632,7 @@ def check_curve(spline: Any, name: str = "spline") -> None:
 def evaluated(
     curve: CurveArrays,
     clock: TimeAxis,
-    x: ArrayLike,
+    x: TimesLike,
     quantity: str,
     outside: str,
     per_curve: bool,
@@ -652,7 +652,7 @@ def evaluated(
 def call_at_times(
     curve: CurveArrays,
     clock: TimeAxis,
-    x: ArrayLike,
+    x: TimesLike,
     per_curve: bool,
     outside: str,
     call: Callable[[CurveArrays, Doubles, bool, str], Any],

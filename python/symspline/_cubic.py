@@ -26,7 +26,7 @@ from ._representatives import warn_of_representatives
 from ._spaces import Array, Space
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
-from ._typing import BCType, Extrapolate, File, Method, OnFailure, P, PointsLike
+from ._typing import BCType, Extrapolate, File, Method, OnFailure, P, PointsLike, TimesLike
 
 
 class CubicSpline(Curve[P]):
@@ -144,7 +144,7 @@ class CubicSpline(Curve[P]):
 
     def __init__(
         self,
-        t: ArrayLike | None,
+        t: TimesLike | None,
         points: PointsLike,
         space: Space[P] | str,
         *,
@@ -215,9 +215,9 @@ class CubicSpline(Curve[P]):
 
     def jvp(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         points: ArrayLike | tuple[ArrayLike | None, ...] | None = None,
-        t: ArrayLike | None = None,
+        t: TimesLike | None = None,
         ends: tuple[ArrayLike | None, ArrayLike | None] | None = None,
         *,
         nu: int = 0,
@@ -278,7 +278,7 @@ class CubicSpline(Curve[P]):
         moved: P = self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
         return moved
 
-    def vjp(self, x: ArrayLike, cotangent: ArrayLike, *, nu: int = 0) -> Gradient[P]:
+    def vjp(self, x: TimesLike, cotangent: ArrayLike, *, nu: int = 0) -> Gradient[P]:
         """Compute the gradient of a function of the curve with respect to its data.
 
         The function is ``sum(cotangent * spline(x, nu))``. This is reverse mode, the transpose of `jvp`.
@@ -334,7 +334,7 @@ class CubicSpline(Curve[P]):
             found.append((part.points, velocities))
         return curve_of(self.space, self._times, found)
 
-    def _places(self, x: ArrayLike, nu: int) -> Places:
+    def _places(self, x: TimesLike, nu: int) -> Places:
         nu, curve = order_of(nu), self._curve
         times, per_curve = self._clock.at(x, curve.batch, False, curve.times)
         try:

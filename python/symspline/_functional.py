@@ -35,6 +35,7 @@ from ._typing import (
     Out,
     P,
     PointsLike,
+    TimesLike,
 )
 
 # With fewer knots, all of them are read.
@@ -42,7 +43,7 @@ _MANY = 64
 
 
 def fit(
-    t: ArrayLike | None, points: PointsLike, space: Space[P] | str, **options: Unpack[FitOptions]
+    t: TimesLike | None, points: PointsLike, space: Space[P] | str, **options: Unpack[FitOptions]
 ) -> tuple[P, Report]:
     """Compute the velocities of a C² cubic spline as plain arrays.
 
@@ -89,11 +90,11 @@ def fit(
 
 @overload
 def evaluate(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     velocities: ArrayLike,
     space: Space[P] | str,
-    x: ArrayLike,
+    x: TimesLike,
     *,
     nu: int = 0,
     extrapolate: Extrapolate = None,
@@ -105,11 +106,11 @@ def evaluate(
 
 @overload
 def evaluate(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     velocities: ArrayLike,
     space: Space[Any] | str,
-    x: ArrayLike,
+    x: TimesLike,
     *,
     nu: int = 0,
     extrapolate: Extrapolate = None,
@@ -120,11 +121,11 @@ def evaluate(
 
 
 def evaluate(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     velocities: ArrayLike,
     space: Space[Any] | str,
-    x: ArrayLike,
+    x: TimesLike,
     *,
     nu: int = 0,
     extrapolate: Extrapolate = None,
@@ -194,7 +195,7 @@ def evaluate(
 
 
 def _nodes_around(
-    t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
+    t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any
 ) -> tuple[Any, Any, Any]:
     """Return the knots, points and velocities of the segments in which times lie.
 
@@ -229,7 +230,7 @@ def _nodes_around(
 
 
 def given(
-    t: ArrayLike | None, points: Any, velocities: Any, space: Space[Any]
+    t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]
 ) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
@@ -263,7 +264,7 @@ def velocities_of(space: Space, points: Array, velocities: Any) -> Array:
 
 
 def fit_many(
-    curves: Iterable[tuple[ArrayLike | None, PointsLike]],
+    curves: Iterable[tuple[TimesLike | None, PointsLike]],
     space: Space[P] | str,
     *,
     bc_type: BCType = "natural",
@@ -320,7 +321,7 @@ def fit_many(
     options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
-    pairs: list[tuple[ArrayLike | None, Any]] = list(curves)
+    pairs: list[tuple[TimesLike | None, Any]] = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
             raise ValidationError(f"curves[{number}] must be a pair (t, points), not {short_repr(curve)}")

@@ -17,7 +17,7 @@ from ._representatives import warn_of_far_points, warn_of_signs
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
-from ._typing import BCType, Extrapolate, File, P, PointsLike
+from ._typing import BCType, Extrapolate, File, P, PointsLike, TimesLike
 
 
 class HermiteSpline(Curve[P]):
@@ -94,7 +94,7 @@ class HermiteSpline(Curve[P]):
 
     def __init__(
         self,
-        t: ArrayLike | None,
+        t: TimesLike | None,
         points: PointsLike,
         velocities: ArrayLike,
         space: Space[P] | str,

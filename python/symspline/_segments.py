@@ -6,7 +6,7 @@ from datetime import timedelta
 from typing import Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ._arrays import as_array, short_repr, whole_number
 from ._core import ValidationError
@@ -20,7 +20,7 @@ from ._smoothing.precision import read_precision
 from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import Moments, time_axis_of
-from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions
+from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 
 _DUPLICATES = ("raise", "first", "mean")
 # Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
@@ -30,7 +30,7 @@ _STEPS = 50
 
 @overload
 def fit_segments(  # type: ignore[overload-overlap]
-    t: ArrayLike,
+    t: TimesLike,
     points: PointsLike,
     space: Product[PProduct],
     *,
@@ -44,7 +44,7 @@ def fit_segments(  # type: ignore[overload-overlap]
 
 @overload
 def fit_segments(
-    t: ArrayLike,
+    t: TimesLike,
     points: PointsLike,
     space: SpecialEuclidean,
     *,
@@ -58,7 +58,7 @@ def fit_segments(
 
 @overload
 def fit_segments(
-    t: ArrayLike,
+    t: TimesLike,
     points: PointsLike,
     space: Space[P] | str,
     *,
@@ -72,7 +72,7 @@ def fit_segments(
 
 @overload
 def fit_segments(
-    t: ArrayLike,
+    t: TimesLike,
     points: PointsLike,
     space: Space[P] | str,
     *,
@@ -85,7 +85,7 @@ def fit_segments(
 
 
 def fit_segments(
-    t: ArrayLike,
+    t: TimesLike,
     points: PointsLike,
     space: Space[Any] | str,
     *,
@@ -230,7 +230,7 @@ class Cut(NamedTuple):
 
 
 def cut(
-    t: ArrayLike,
+    t: TimesLike,
     points: Any,
     space: Space[Any] | str,
     max_gap: Any,

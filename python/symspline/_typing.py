@@ -8,7 +8,8 @@ means the same. Annotate with ``CubicSpline[Any]`` to accept curves on products 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import date, timedelta
 from os import PathLike
 from typing import IO, TYPE_CHECKING, Any, Literal, Protocol, TypedDict
 
@@ -56,6 +57,8 @@ class _Rotations(Protocol):
 
 # Points, also as rotations of SciPy, or as lists of objects such as quantum states.
 PointsLike = ArrayLike | list[Any] | tuple[Any, ...] | _Rotations
+# Times: numbers, dates or durations, or arrays or lists of one of them.
+TimesLike = ArrayLike | date | timedelta | Sequence[date] | Sequence[timedelta]
 # Called with the finished and the total number of points.
 Progress = Callable[[int, int], object]
 File = str | PathLike[str] | IO[bytes]
@@ -126,7 +129,7 @@ class ChoiceOptions(LsqOptions, total=False):
     """The keywords of `make_smoothing_spline`."""
 
     weights: Numbers | None
-    knots: ArrayLike | None
+    knots: TimesLike | None
     criterion: Criterion
     gamma: float
     loss: Loss

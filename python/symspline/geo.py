@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ._arrays import short_repr
 from ._base_curve import check_curve
@@ -30,7 +29,7 @@ from ._lonlat import compass, from_lonlat, to_lonlat
 from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
-from ._typing import Duplicates, FloatArray
+from ._typing import Duplicates, FloatArray, TimesLike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +40,7 @@ EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
 
-def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> FloatArray:
+def sog(spline: CubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS) -> FloatArray:
     """Compute the speed over ground.
 
     Parameters
@@ -77,7 +76,7 @@ def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> F
     return radius * spline.speed(x)
 
 
-def cog(spline: CubicSpline, x: ArrayLike) -> FloatArray:
+def cog(spline: CubicSpline, x: TimesLike) -> FloatArray:
     """Compute the course over ground.
 
     The course is in degrees clockwise from north, in [0, 360). It is NaN where the velocity is zero. At a pole, north

@@ -40,7 +40,7 @@ from ._pose_files import (
     write_tum,
 )
 from ._spaces import Array, Euclidean, SpecialEuclidean
-from ._typing import Extrapolate, Frame
+from ._typing import Extrapolate, Frame, TimesLike
 from .rotations import Spline, attitude, check_frame, turned
 
 __all__ = [
@@ -87,7 +87,7 @@ class Imu(NamedTuple):
 
 def imu(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     *,
     extrapolate: Extrapolate = None,
@@ -146,7 +146,7 @@ def imu(
 
 def twist(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     frame: Frame = "body",
     *,
     extrapolate: Extrapolate = None,
@@ -195,7 +195,7 @@ def twist(
 
 def linear_velocity(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     frame: Frame = "world",
     *,
     extrapolate: Extrapolate = None,
@@ -236,7 +236,7 @@ def linear_velocity(
 
 def linear_acceleration(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     frame: Frame = "world",
     *,
     extrapolate: Extrapolate = None,
@@ -280,7 +280,7 @@ def linear_acceleration(
 class _Motion:
     """Motion of a body at times x; each quantity is evaluated on first access and cached."""
 
-    def __init__(self, spline: Spline, x: ArrayLike, extrapolate: Any, per_curve: bool) -> None:
+    def __init__(self, spline: Spline, x: TimesLike, extrapolate: Any, per_curve: bool) -> None:
         self._attitude, self._position = attitude(spline), _position(spline)
         self._clock, self._x = spline._clock, x
         self._where, self._per_curve = spline._where(extrapolate), per_curve

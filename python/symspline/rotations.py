@@ -30,7 +30,7 @@ from ._curves.curve import CurveArrays, Doubles
 from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
 from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
-from ._typing import Extrapolate, Frame, RotationOrder
+from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
 from .convert._reading import length, real_numbers, refuse
@@ -52,7 +52,7 @@ __all__ = [
     "velocities",
 ]
 
-Spline = CubicSpline | HermiteSpline
+Spline = CubicSpline[Any] | HermiteSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _FRAMES = ("body", "world")
@@ -69,7 +69,7 @@ _LIFTS: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
 
 
 def rotation(
-    spline: Spline, x: ArrayLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
+    spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Rotation:
     """Evaluate a curve as a SciPy ``Rotation``.
 
@@ -120,7 +120,7 @@ def rotation(
 
 def angular_velocity(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     frame: Frame = "body",
     *,
     extrapolate: Extrapolate = None,
@@ -168,7 +168,7 @@ def angular_velocity(
 
 def angular_acceleration(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     frame: Frame = "body",
     *,
     extrapolate: Extrapolate = None,
@@ -211,7 +211,7 @@ def angular_acceleration(
 
 def quaternion(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     *,
     scalar_first: bool | None = None,
     extrapolate: Extrapolate = None,
@@ -328,14 +328,14 @@ def check_frame(frame: Any) -> None:
         raise ValidationError(f"frame must be 'body' or 'world', not {short_repr(frame)}")
 
 
-def _at(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
+def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._clock, x, quantity, where, per_curve, None)
     return values
 
 
 def _rate(
-    spline: Spline, x: ArrayLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
+    spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
 ) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
     check_frame(frame)

@@ -1,6 +1,7 @@
 """Types that type checkers infer. Never run: `test_typing.py` gives this file to mypy and Pyright."""
 
 import io
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, assert_type
 
@@ -105,6 +106,12 @@ def anywhere(curve: ss.Curve[Any], at: float) -> Number:
     return curve.length()
 
 
+# Dates and durations.
+days = [datetime(2024, 1, 1), datetime(2024, 1, 2), datetime(2024, 1, 4)]
+ss.CubicSpline(days, p, sphere)(datetime(2024, 1, 3))
+ss.CubicSpline(np.array(days, "datetime64[s]"), p, sphere)(np.datetime64("2024-01-03"))
+ss.CubicSpline([timedelta(0), timedelta(1), timedelta(3)], p, sphere)([timedelta(2)])
+
 halfway(spline)
 anywhere(ss.CubicSpline(None, poses.random_point(rng, 3), poses), 0.5)
 
@@ -163,5 +170,6 @@ assert_type(ss.make_lsq_spline(t, p, 2, "sphere:2").sigma, Number)
 
 turning = ss.CubicSpline(None, np.stack([np.eye(3)] * 2), "so:3")
 assert_type(ss.rotations.angular_velocity(turning, x, "world"), NDArray[Any])
+assert_type(ss.poses.twist(ss.CubicSpline(None, poses.random_point(rng, 3), poses), x, "world"), NDArray[Any])
 ss.tensors.to_vectors(np.eye(3), order="dipy")
 assert_type(ss.shapes.AffineMorph([0, 1], np.zeros((2, 4, 2)), frame="first").t, NDArray[Any])

@@ -32,6 +32,7 @@ from .._typing import (
     PProduct,
     SmoothingBCType,
     SmoothingMethod,
+    TimesLike,
 )
 from ..manifolds._manifold import refuse_functions
 from .data import (
@@ -62,7 +63,7 @@ _TRIES = 4
 
 @overload
 def make_smoothing_spline(  # type: ignore[overload-overlap]
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     space: Product[PProduct],
     lam: Numbers | None = None,
@@ -72,7 +73,7 @@ def make_smoothing_spline(  # type: ignore[overload-overlap]
 
 @overload
 def make_smoothing_spline(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     space: SpecialEuclidean,
     lam: Numbers | None = None,
@@ -82,7 +83,7 @@ def make_smoothing_spline(
 
 @overload
 def make_smoothing_spline(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     space: Space[P] | str,
     lam: Numbers | None = None,
@@ -91,14 +92,14 @@ def make_smoothing_spline(
 
 
 def make_smoothing_spline(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
     space: Space[Any] | str,
     lam: Numbers | None = None,
     *,
     weights: Numbers | None = None,
     frames: Numbers | None = None,
-    knots: ArrayLike | None = None,
+    knots: TimesLike | None = None,
     criterion: Criterion = "gcv",
     gamma: float = 1.4,
     sigma: Numbers | None = None,
@@ -362,9 +363,9 @@ def make_smoothing_spline(
 
 @overload
 def make_lsq_spline(  # type: ignore[overload-overlap]
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
-    knots: ArrayLike,
+    knots: TimesLike,
     space: Product[PProduct],
     *,
     weights: Numbers | None = None,
@@ -375,9 +376,9 @@ def make_lsq_spline(  # type: ignore[overload-overlap]
 
 @overload
 def make_lsq_spline(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
-    knots: ArrayLike,
+    knots: TimesLike,
     space: SpecialEuclidean,
     *,
     weights: Numbers | None = None,
@@ -388,9 +389,9 @@ def make_lsq_spline(
 
 @overload
 def make_lsq_spline(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
-    knots: ArrayLike,
+    knots: TimesLike,
     space: Space[P] | str,
     *,
     weights: Numbers | None = None,
@@ -400,9 +401,9 @@ def make_lsq_spline(
 
 
 def make_lsq_spline(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: PointsLike,
-    knots: ArrayLike,
+    knots: TimesLike,
     space: Space[Any] | str,
     *,
     weights: Numbers | None = None,

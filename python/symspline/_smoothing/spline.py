@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import _core
 from .._arrays import short_repr
@@ -19,7 +18,7 @@ from .._options import order_of
 from .._report import Report
 from .._spaces import Array, Product, Space, factors_of
 from .._time import TimeAxis
-from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P
+from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P, TimesLike
 from .data import Doubles, SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
 from .report import SmoothingReport
@@ -168,14 +167,14 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return residuals
 
     @overload
-    def std(self: SmoothingSpline[Any, SmoothingReport], x: ArrayLike, *, nu: int = 0) -> FloatArray: ...
+    def std(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, *, nu: int = 0) -> FloatArray: ...
 
     @overload
     def std(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: ArrayLike, *, nu: int = 0
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, *, nu: int = 0
     ) -> tuple[FloatArray, ...]: ...
 
-    def std(self, x: ArrayLike, *, nu: int = 0) -> Any:
+    def std(self, x: TimesLike, *, nu: int = 0) -> Any:
         r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
         Parameters
@@ -255,15 +254,15 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     @overload
     def band(
-        self: SmoothingSpline[Any, SmoothingReport], x: ArrayLike, level: float = 0.95
+        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95
     ) -> FloatArray: ...
 
     @overload
     def band(
-        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: ArrayLike, level: float = 0.95
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, level: float = 0.95
     ) -> tuple[FloatArray, ...]: ...
 
-    def band(self, x: ArrayLike, level: float = 0.95) -> Any:
+    def band(self, x: TimesLike, level: float = 0.95) -> Any:
         """Compute the radius of the ball that contains the true point with a given probability.
 
         Parameters

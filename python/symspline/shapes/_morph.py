@@ -13,7 +13,7 @@ from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
 from .._spaces import Euclidean, SpecialOrthogonal, SymmetricPositiveDefinite
-from .._typing import AnyArray, BCWords, File
+from .._typing import AnyArray, BCWords, File, TimesLike
 from ..convert._reading import refuse
 from ._bases import Bases
 from ._landmarks import Array, orthonormal, place, placed, read, relative
@@ -69,7 +69,7 @@ class AffineMorph:
 
     def __init__(
         self,
-        t: ArrayLike | None,
+        t: TimesLike | None,
         landmarks: ArrayLike,
         *,
         base: int | None = None,
@@ -96,7 +96,7 @@ class AffineMorph:
             else _Between(self._bases, moved, places, bc_type)
         )
 
-    def __call__(self, x: ArrayLike) -> Array:
+    def __call__(self, x: TimesLike) -> Array:
         """Evaluate the film.
 
         Parameters
