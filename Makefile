@@ -96,7 +96,7 @@ crate:
 	$(INSTALL) --editable '.[plot]'
 	touch $@
 
-# What tests and benchmarks need besides: 1.3 GB with JAX.
+# What tests and benchmarks need besides: 1.6 GB with JAX and Pyright.
 .venv/tools: .venv/built
 	$(BIN)/python -c 'import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
 		print(*extras["bench"], *extras["test"], sep="\n")' > .venv/requirements.txt

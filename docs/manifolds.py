@@ -128,7 +128,7 @@ def acceleration(spline: ss.CubicSpline) -> tuple[float, float]:
     h = np.diff(spline.t)
     ends = np.stack([0 * h, h], axis=1)
     p, u = (np.stack([x[:-1], x[1:]], axis=1) for x in (spline.points, spline.velocities))
-    values = ss.evaluate(ends, p, u, spline.space, ends, 2, per_curve=True)
+    values = ss.evaluate(ends, p, u, spline.space, ends, nu=2, per_curve=True)
     left, right = values[:-1, 1], values[1:, 0]
     at = spline.points[1:-1]
     largest = max(spline.space.norm(at, side).max() for side in (left, right))

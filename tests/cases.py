@@ -389,7 +389,7 @@ def one_sided(spline, nu):
     h = np.diff(t)
     pairs = np.stack([p[:-1], p[1:]], axis=1), np.stack([u[:-1], u[1:]], axis=1)
     knots = np.stack([0 * h, h], axis=1)
-    values = ss.evaluate(knots, *pairs, spline.space, knots, nu, per_curve=True)
+    values = ss.evaluate(knots, *pairs, spline.space, knots, nu=nu, per_curve=True)
     return values[:, 0], values[:, 1]
 
 

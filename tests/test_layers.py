@@ -22,6 +22,7 @@ LAYERS = [
         "_faults",
         "_threads",
         "_time",
+        "_typing",
         "_version",
     ],
     ["_spaces"],

@@ -71,7 +71,7 @@ def _measured(space, t, p, u, controls, residual, closed):
     # Every segment as a curve of its own.
     pairs = [np.stack([x[:, :-1], x[:, 1:]], axis=2) for x in (p, u)]
     knots = np.stack([0 * h, h], axis=-1)
-    place, rate, bend = (ss.evaluate(knots, *pairs, space, knots, nu, per_curve=True) for nu in range(3))
+    place, rate, bend = (ss.evaluate(knots, *pairs, space, knots, nu=nu, per_curve=True) for nu in range(3))
     ends = np.stack([p[:, :-1], p[:, 1:]], axis=2)
     # At its end a segment goes through the logarithm of a leg, which may nearly reach the cut locus.
     off = space.distance(place, ends).max(axis=2) / (50 * EPS * inner)

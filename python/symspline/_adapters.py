@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._arrays import cast
-from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
 from ._curves.derivatives import places
+from ._curves.ends import split_ends
 from ._spaces import Array, Space
 from ._time import onto_ends
 
@@ -22,13 +22,7 @@ def split(bc_type: Any) -> tuple[Kinds, tuple[Any, Any]]:
     """End conditions as something to hash, and the vectors in them (None where there is none)."""
     if isinstance(bc_type, str):
         return bc_type, (None, None)
-    try:
-        pair = [(end, None) if isinstance(end, str) else (int(end[0]), end[1]) for end in bc_type]
-        (first, a), (last, b) = pair
-    except (TypeError, ValueError, IndexError):
-        raise ValidationError(
-            "bc_type must be a word or a pair of words and (order, vector), as for CubicSpline"
-        ) from None
+    (_, first, a), (_, last, b) = split_ends(bc_type)
     return (first, last), (a, b)
 
 

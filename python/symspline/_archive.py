@@ -233,7 +233,7 @@ def entry(name: str) -> Iterator[None]:
 
 
 def segments_state(
-    format: str, space: Space, t: Array, clock: TimeAxis, extrapolate: Any, curve: CurveArrays
+    format: str, space: Space[Any], t: Array, clock: TimeAxis, extrapolate: Any, curve: CurveArrays
 ) -> dict[str, Any]:
     """Return the entries of curves of cubic segments, of any class."""
     parts = {

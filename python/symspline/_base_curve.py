@@ -8,22 +8,23 @@ from collections.abc import Callable
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
 from ._curve import Curve
 from ._curves.band import UncertaintyBand
-from ._curves.curve import CurveArrays, Doubles, quantity_of
+from ._curves.curve import CurveArrays, Doubles
 from ._curves.solve import Progress
 from ._input import times_of
-from ._options import check_progress, checked_extrapolate, outside
+from ._options import check_progress, checked_extrapolate, outside, quantity_of
 from ._spaces import Array, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
+from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Time, TimesLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 _DOTS = 60
 
 
-class SegmentedCurve(Curve):
+class SegmentedCurve(Curve[P]):
     """Base class of curves of cubic Bézier segments, which are given by knots, points and velocities."""
 
     # Title of plots.
@@ -63,11 +64,11 @@ class SegmentedCurve(Curve):
     _clock: TimeAxis
     _t: Array
     _curve: CurveArrays
-    _extrapolate: Any
+    _extrapolate: Extrapolate
     # Extrapolation policy, by its name in the core.
     _outside: str
     # End conditions, which determine whether curves are closed.
-    _bc_type: Any
+    _bc_type: BCType
 
     @abstractmethod
     def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
@@ -75,16 +76,65 @@ class SegmentedCurve(Curve):
 
     # ---- the curve ----
 
+    @overload
     def __call__(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         nu: int = 0,
         *,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         per_curve: bool = False,
-        dtype: Any = None,
+        dtype: None = None,
         progress: Progress | None = None,
-        out: Any = None,
+        out: None = None,
+    ) -> P: ...
+
+    @overload
+    def __call__(
+        self,
+        x: TimesLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        progress: Progress | None = None,
+        out: Out,
+    ) -> Out: ...
+
+    @overload
+    def __call__(
+        self: Curve[AnyArrays],
+        x: TimesLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        dtype: DTypeLike,
+        progress: Progress | None = None,
+    ) -> AnyArrays: ...
+
+    @overload
+    def __call__(
+        self: Curve[AnyArray],
+        x: TimesLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        dtype: DTypeLike,
+        progress: Progress | None = None,
+    ) -> AnyArray: ...
+
+    def __call__(
+        self,
+        x: TimesLike,
+        nu: int = 0,
+        *,
+        extrapolate: Extrapolate = None,
+        per_curve: bool = False,
+        dtype: DTypeLike | None = None,
+        progress: Progress | None = None,
+        out: AnyArray | AnyArrays | None = None,
     ) -> Any:
         """Evaluate the curve or its derivatives.
 
@@ -132,14 +182,14 @@ class SegmentedCurve(Curve):
 
     def lift(
         self,
-        x: ArrayLike,
-        start: Any = None,
-        nu: int = 0,
+        x: TimesLike,
+        start: ArrayLike | tuple[ArrayLike | None, ...] | None = None,
         *,
-        extrapolate: bool | str | None = None,
+        nu: int = 0,
+        extrapolate: Extrapolate = None,
         per_curve: bool = False,
         progress: Progress | None = None,
-    ) -> Any:
+    ) -> P:
         """Evaluate the horizontal lift of the curve, a continuous choice of representatives.
 
         On projective spaces and Grassmannians, several arrays represent one point: they differ by a sign, a phase or a
@@ -193,7 +243,7 @@ class SegmentedCurve(Curve):
         if progress is not None:
             check_progress(progress)
         quantity, where = quantity_of(nu), self._where(extrapolate)
-        return call_at_times(
+        values: P = call_at_times(
             self._curve,
             self._clock,
             x,
@@ -201,8 +251,9 @@ class SegmentedCurve(Curve):
             where,
             lambda curve, x, per_curve, where: curve.lift(x, quantity, where, per_curve, start, progress),
         )
+        return values
 
-    def transport(self, x0: Any, x1: Any, v: Any) -> Any:
+    def transport(self, x0: TimesLike, x1: TimesLike, v: ArrayLike) -> P:
         r"""Transport tangent vectors in parallel along the curve.
 
         Parameters
@@ -281,22 +332,25 @@ class SegmentedCurve(Curve):
         if own:
             # Curves that count time from their own first knots are processed one by one.
             product = isinstance(self.space, Product)
-            each = [
+            each: list[Any] = [
                 self[i].transport(x0, x1, tuple(v[i] for v in vectors) if product else vectors[0][i])
                 for i in range(len(self))
             ]
-            return tuple(map(np.stack, zip(*each, strict=True))) if product else np.stack(each)
+            stacked: Any = tuple(map(np.stack, zip(*each, strict=True))) if product else np.stack(each)
+            result: P = stacked
+            return result
         moved = tuple(vectors) if isinstance(self.space, Product) else vectors[0]
-        return self._curve.transport((float(times[0]), float(times[1])), where, moved)
+        result = self._curve.transport((float(times[0]), float(times[1])), where, moved)
+        return result
 
     def speed(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         *,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         per_curve: bool = False,
-        dtype: Any = None,
-    ) -> Any:
+        dtype: DTypeLike | None = None,
+    ) -> FloatArray:
         """Compute the speed of the curve.
 
         Parameters
@@ -329,11 +383,12 @@ class SegmentedCurve(Curve):
         """
         single = dtype is not None and is_single(dtype)
         values = self._at(x, "speed", extrapolate, per_curve)
-        return (in_single(values) if single else values)[()]
+        speeds: FloatArray = (in_single(values) if single else values)[()]
+        return speeds
 
     def _at(
         self,
-        x: ArrayLike,
+        x: TimesLike,
         quantity: str,
         extrapolate: Any,
         per_curve: bool,
@@ -358,30 +413,33 @@ class SegmentedCurve(Curve):
         return read_only(self._t)
 
     @property
-    def points(self) -> Any:
+    def points(self) -> P:
         """Points at the knots, shape (..., n, *point_shape)."""
-        return self._curve.points
+        points: P = self._curve.points
+        return points
 
     @property
-    def velocities(self) -> Any:
+    def velocities(self) -> P:
         """Velocities γ' at the knots, with the shape of the points.
 
         Knots, points and velocities determine the curve.
         """
-        return self._curve.velocities
+        velocities: P = self._curve.velocities
+        return velocities
 
     @property
-    def control_points(self) -> Any:
+    def control_points(self) -> P:
         """Control points of the Bézier segments, shape (..., n - 1, 4, *point_shape)."""
-        return self._curve.control_points()
+        control_points: P = self._curve.control_points()
+        return control_points
 
     @property
-    def space(self) -> Space:
+    def space(self) -> Space[P]:
         """Space of the curve."""
         return self._curve.space
 
     @property
-    def extrapolate(self) -> Any:
+    def extrapolate(self) -> Extrapolate:
         """Extrapolation policy, as passed to the constructor."""
         return self._extrapolate
 
@@ -391,7 +449,7 @@ class SegmentedCurve(Curve):
         return self._curve.times
 
     @property
-    def domain(self) -> tuple[Any, Any]:
+    def domain(self) -> tuple[Time, Time]:
         return self._t[..., 0][()], self._t[..., -1][()]
 
     def _picked(self, index: Any) -> Self:
@@ -434,7 +492,7 @@ class SegmentedCurve(Curve):
         data = b64encode(picture.getvalue()).decode()
         return f'{text}<img src="data:image/png;base64,{data}" alt="{escape(repr(self))}">'
 
-    def plot(self, file: Any = None) -> Figure:
+    def plot(self, file: File | None = None) -> Figure:
         """Plot the curve, its speed and the size of its covariant acceleration.
 
         The first panel depends on the space:
@@ -496,7 +554,7 @@ def check_curve(spline: Any, name: str = "spline") -> None:
 def evaluated(
     curve: CurveArrays,
     clock: TimeAxis,
-    x: ArrayLike,
+    x: TimesLike,
     quantity: str,
     outside: str,
     per_curve: bool,
@@ -516,7 +574,7 @@ def evaluated(
 def call_at_times(
     curve: CurveArrays,
     clock: TimeAxis,
-    x: ArrayLike,
+    x: TimesLike,
     per_curve: bool,
     outside: str,
     call: Callable[[CurveArrays, Doubles, bool, str], Any],

@@ -13,16 +13,18 @@ from ._arrays import as_array, cast, whole_number
 from ._core import ValidationError
 from ._curve import Curve
 from ._curves.control import checked_knots, checked_points, control_array
-from ._curves.curve import NORMS, quantity_of
+from ._curves.curve import NORMS
 from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
-from ._spaces import Array, Product, Space
+from ._options import quantity_of
+from ._spaces import Product, Space
 from ._spaces import space as space_named
 from ._time import onto_ends
+from ._typing import FloatArray, P
 from .manifolds._manifold import refuse_functions
 
 
-class BSpline(Curve):
+class BSpline(Curve[P]):
     """Construct a B-spline curve from control points.
 
     The curve is evaluated by de Boor's algorithm with geodesics in place of straight lines. On a Euclidean space the
@@ -73,14 +75,16 @@ class BSpline(Curve):
     _format = "symspline-bspline"
     _curve: ControlledCurve
 
-    def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space | str) -> None:
+    def __init__(
+        self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str
+    ) -> None:
         space = _factor(space)
         degree = whole_number(degree, "degree", 1)
         doubles, tol = control_array(control_points, space, 2)
         knots = checked_knots(knots, space._lead(doubles)[-1], degree)
         self._curve = ControlledCurve(space, knots, checked_points(space, doubles, tol), degree)
 
-    def __call__(self, x: ArrayLike, nu: int = 0) -> Array:
+    def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """Evaluate the curve or its derivatives.
 
         Parameters
@@ -100,10 +104,10 @@ class BSpline(Curve):
         ValidationError
             If a time is not finite or lies outside the domain of the curve.
         """
-        quantity = quantity_of(nu)
-        return self._curve.evaluate(self._times(x), quantity)
+        values: P = self._curve.evaluate(self._times(x), quantity_of(nu))
+        return values
 
-    def speed(self, x: ArrayLike) -> Array:
+    def speed(self, x: ArrayLike) -> FloatArray:
         """Compute the speed of the curve.
 
         Parameters
@@ -128,7 +132,8 @@ class BSpline(Curve):
         >>> line.speed([0.5, 1.0])
         array([1.5, 1.5])
         """
-        return self._curve.evaluate(self._times(x), "speed")[()]
+        speeds: FloatArray = self._curve.evaluate(self._times(x), "speed")[()]
+        return speeds
 
     def _times(self, x: ArrayLike) -> NDArray[np.float64]:
         """Return times in the domain of the curve as float64."""
@@ -156,9 +161,10 @@ class BSpline(Curve):
         return self._curve.knots
 
     @property
-    def control_points(self) -> Array:
+    def control_points(self) -> P:
         """Control points, shape (..., n, *point_shape)."""
-        return self._curve.control_points
+        points: P = self._curve.control_points
+        return points
 
     @property
     def degree(self) -> int:
@@ -166,7 +172,7 @@ class BSpline(Curve):
         return self._curve.degree
 
     @property
-    def space(self) -> Space:
+    def space(self) -> Space[P]:
         """Space of the curve."""
         return self._curve.space
 
@@ -217,7 +223,7 @@ class BSpline(Curve):
         )
 
     def __repr__(self) -> str:
-        count = self.control_points.shape[-1 - len(self.space.point_shape)]
+        count = self._curve.control_points.shape[-1 - len(self.space.point_shape)]
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         return (
             f"<{type(self).__name__} on {self.space!r}: {curves}{count} control points, degree {self.degree}>"
@@ -235,19 +241,21 @@ class ControlledCurve:
 
     exact = EXACT
 
-    def __init__(self, space: Space, knots: NDArray[np.float64], control_points: Array, degree: int) -> None:
+    def __init__(
+        self, space: Space[Any], knots: NDArray[np.float64], control_points: Any, degree: int
+    ) -> None:
         self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
         self.times = np.unique(knots[degree : knots.size - degree])
         control_points.flags.writeable = knots.flags.writeable = False
 
     @property
     def batch(self) -> tuple[int, ...]:
-        shape = self.control_points.shape
+        shape: tuple[int, ...] = self.control_points.shape
         return shape[: len(shape) - len(self.space.point_shape) - 1]
 
     def evaluate(
         self, x: NDArray[np.float64], quantity: str, outside: str = "raise", per_curve: bool = False
-    ) -> Array:
+    ) -> Any:
         """A quantity at times in the domain; with ``per_curve`` x has the batch axes, along which it is constant."""
         if per_curve:
             x = np.ascontiguousarray(x[(0,) * len(self.batch)])
@@ -262,7 +270,7 @@ class ControlledCurve:
         )
 
 
-class BezierCurve(BSpline):
+class BezierCurve(BSpline[P]):
     r"""Construct a Bézier curve of any degree, for times from 0 to 1.
 
     The curve is evaluated by de Casteljau's algorithm with geodesics in place of straight lines. The degree is the
@@ -311,7 +319,7 @@ class BezierCurve(BSpline):
 
     _format = "symspline-bezier"
 
-    def __init__(self, control_points: ArrayLike, space: Space | str) -> None:
+    def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
         space = _factor(space)
         count = space._lead(control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
@@ -327,7 +335,7 @@ class BezierCurve(BSpline):
         return curve
 
 
-def _factor(space: Space | str) -> Space:
+def _factor(space: Space[P] | str) -> Space[P]:
     """Return the space, which must not be a product."""
     space = space_named(space)
     if isinstance(space, Product):

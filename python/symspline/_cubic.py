@@ -20,15 +20,16 @@ from ._curves.gradient import Gradient, Places
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._options import fit_options, outside, with_atol
+from ._options import fit_options, order_of, outside, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, TimesLike
 
 
-class CubicSpline(SegmentedCurve):
+class CubicSpline(SegmentedCurve[P]):
     r"""Interpolate points on a space by a C² cubic spline.
 
     Each segment is a cubic Bézier curve built from geodesics. At every knot the values, velocities and covariant
@@ -143,16 +144,16 @@ class CubicSpline(SegmentedCurve):
 
     def __init__(
         self,
-        t: ArrayLike | None,
-        points: Any,
-        space: Space | str,
+        t: TimesLike | None,
+        points: PointsLike,
+        space: Space[P] | str,
         *,
-        bc_type: Any = "natural",
-        method: str = "auto",
+        bc_type: BCType = "natural",
+        method: Method = "auto",
         tol: float = 1e-12,
         max_iter: int | None = None,
-        extrapolate: bool | str | None = None,
-        on_failure: str = "raise",
+        extrapolate: Extrapolate = None,
+        on_failure: OnFailure = "raise",
         check: bool = True,
         atol: float | None = None,
         where: ArrayLike | None = None,
@@ -191,8 +192,8 @@ class CubicSpline(SegmentedCurve):
         clock: TimeAxis,
         t: Array,
         curve: CurveArrays,
-        bc_type: Any,
-        extrapolate: Any,
+        bc_type: BCType,
+        extrapolate: Extrapolate,
         reports: list[Report] | Fit,
     ) -> None:
         self._clock, self._t, self._curve = clock, t, curve
@@ -214,12 +215,13 @@ class CubicSpline(SegmentedCurve):
 
     def jvp(
         self,
-        x: ArrayLike,
-        points: Any = None,
-        t: ArrayLike | None = None,
-        ends: tuple[Any, Any] | None = None,
+        x: TimesLike,
+        points: ArrayLike | tuple[ArrayLike | None, ...] | None = None,
+        t: TimesLike | None = None,
+        ends: tuple[ArrayLike | None, ArrayLike | None] | None = None,
+        *,
         nu: int = 0,
-    ) -> Any:
+    ) -> P:
         """Compute the change of the curve for a change of its data (forward mode).
 
         This is the directional derivative of the curve in the direction given by `points`, `t` and `ends`. Omitted
@@ -273,9 +275,10 @@ class CubicSpline(SegmentedCurve):
         >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
         array([0.6875])
         """
-        return self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
+        moved: P = self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
+        return moved
 
-    def vjp(self, x: ArrayLike, cotangent: Any, nu: int = 0) -> Gradient:
+    def vjp(self, x: TimesLike, cotangent: ArrayLike, *, nu: int = 0) -> Gradient[P]:
         """Compute the gradient of a function of the curve with respect to its data.
 
         The function is ``sum(cotangent * spline(x, nu))``. This is reverse mode, the transpose of `jvp`.
@@ -293,7 +296,7 @@ class CubicSpline(SegmentedCurve):
         Returns
         -------
         Gradient
-            A gradient g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu))`` equals ``sum(g.points *
+            A gradient g such that ``sum(cotangent * spline.jvp(x, points, t, ends, nu=nu))`` equals ``sum(g.points *
             points) + sum(g.t * t)`` plus the same sums for the end vectors. Its vectors are tangent. The last point of
             a closed curve has no separate gradient. Curves that did not converge give NaN.
 
@@ -313,7 +316,8 @@ class CubicSpline(SegmentedCurve):
         >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
         [[0.40625], [0.6875], [-0.09375]]
         """
-        return self._solved().pull(self._places(x, nu), self._bc_type, cotangent)
+        gradient: Gradient[P] = self._solved().pull(self._places(x, nu), self._bc_type, cotangent)
+        return gradient
 
     def _solved(self) -> CurveArrays:
         """Return the curve with NaN for all curves that did not converge.
@@ -330,8 +334,8 @@ class CubicSpline(SegmentedCurve):
             found.append((part.points, velocities))
         return curve_of(self.space, self._times, found)
 
-    def _places(self, x: ArrayLike, nu: int) -> Places:
-        curve = self._curve
+    def _places(self, x: TimesLike, nu: int) -> Places:
+        nu, curve = order_of(nu), self._curve
         times, per_curve = self._clock.at(x, curve.batch, False, curve.times)
         try:
             return places(curve.times, curve.batch, times, per_curve, nu)
@@ -341,7 +345,7 @@ class CubicSpline(SegmentedCurve):
     # ---- data and report ----
 
     @property
-    def bc_type(self) -> Any:
+    def bc_type(self) -> BCType:
         """End conditions, as passed to the constructor."""
         return self._bc_type
 
@@ -365,7 +369,7 @@ class CubicSpline(SegmentedCurve):
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
-    def _parts(self) -> tuple[CubicSpline, ...]:
+    def _parts(self) -> tuple[CubicSpline[Any], ...]:
         """Splines in the factors of a product; in any other space, the spline itself."""
         if len(self._reports) == 1:
             return (self,)
@@ -377,7 +381,7 @@ class CubicSpline(SegmentedCurve):
 
     # ---- batches ----
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> CubicSpline:
+    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return CubicSpline._of(
             clock,
             t,

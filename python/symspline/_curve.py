@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Generic, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +14,10 @@ from ._arrays import short_repr
 from ._curves.energy import Evaluable, bending_energy
 from ._curves.integrals import integrate
 from ._spaces import Space
+from ._typing import File, Number, P, Time
 
 
-class Curve(ABC):
+class Curve(ABC, Generic[P]):
     """A curve on a space, or a batch of curves.
 
     This is the base class of `CubicSpline`, `HermiteSpline`, `SmoothingSpline`, `BSpline` and `BezierCurve`. Call a
@@ -42,7 +43,7 @@ class Curve(ABC):
             _archive.FORMATS[cls._format] = cls
 
     @abstractmethod
-    def __call__(self, x: ArrayLike, nu: int = 0) -> Any:
+    def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """Evaluate the curve or its derivatives.
 
         Parameters
@@ -66,7 +67,7 @@ class Curve(ABC):
         """
 
     @abstractmethod
-    def speed(self, x: ArrayLike) -> Any:
+    def speed(self, x: ArrayLike) -> Number:
         """Compute the speed of the curve, the norm of the velocity.
 
         Parameters
@@ -88,15 +89,15 @@ class Curve(ABC):
 
     @property
     @abstractmethod
-    def space(self) -> Space:
+    def space(self) -> Space[P]:
         """Space of the curve."""
 
     @property
     @abstractmethod
-    def domain(self) -> tuple[Any, Any]:
+    def domain(self) -> tuple[Time, Time]:
         """First and last time. They are arrays with the batch axes if every curve has its own times."""
 
-    def length(self) -> Any:
+    def length(self) -> Number:
         r"""Compute the length of the curve from the first to the last knot.
 
         Returns
@@ -116,7 +117,7 @@ class Curve(ABC):
             curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
         )
 
-    def bending_energy(self) -> Any:
+    def bending_energy(self) -> Number:
         r"""Compute the bending energy of the curve.
 
         Returns
@@ -158,7 +159,7 @@ class Curve(ABC):
             raise TypeError("this is one curve; only a batch of curves has a length (see also .length())")
         return self._batch[0]
 
-    def __getitem__(self, index: Any) -> Self:
+    def __getitem__(self, index: int | np.integer[Any] | slice[Any, Any, Any]) -> Self:
         """Return one curve of a batch, or a slice of the batch."""
         if not self._batch:
             raise TypeError("this is one curve; only a batch of curves can be indexed")
@@ -176,9 +177,9 @@ class Curve(ABC):
 
     # ---- files and pickles ----
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__: ClassVar[None] = None  # type: ignore[assignment]
 
-    def save(self, file: Any) -> None:
+    def save(self, file: File) -> None:
         """Write the curve to an NPZ file.
 
         `load` reads it back without a new fit.

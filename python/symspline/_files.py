@@ -12,12 +12,13 @@ from ._arrays import brief, short_repr
 from ._core import ValidationError
 from ._curve import Curve
 from ._disk import path_of
+from ._typing import File
 
 # Entries with one value for all curves of a file.
 _SHARED = (*TEXTS, "version")
 
 
-def save(curves: Curve | Mapping[str, Curve], file: Any) -> None:
+def save(curves: Curve | Mapping[str, Curve], file: File) -> None:
     """Write a curve, or several curves by name, to an NPZ file that `load` reads.
 
     Parameters
@@ -63,7 +64,7 @@ def save(curves: Curve | Mapping[str, Curve], file: Any) -> None:
         raise TypeError(f"curves must be a Curve or a mapping of names to Curves, not {short_repr(curves)}")
 
 
-def load(file: Any) -> Any:
+def load(file: File) -> Any:
     """Read what `save`, the method `CubicSpline.save` or ``symspline fit`` on the command line wrote.
 
     Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,23 +13,38 @@ from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves import fit as fitting
-from ._curves.curve import CurveArrays, quantity_of
+from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, picked
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._input import in_library, library_of
-from ._options import check_progress, checked_extrapolate, fit_options, outside, with_atol
+from ._options import check_progress, checked_extrapolate, fit_options, outside, quantity_of, with_atol
 from ._report import Report
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+from ._typing import (
+    AnyArray,
+    AnyArrays,
+    BCType,
+    Extrapolate,
+    FitOptions,
+    Method,
+    OnFailure,
+    Out,
+    P,
+    PointsLike,
+    TimesLike,
+)
 
 # With fewer knots, all of them are read.
 _MANY = 64
 
 
-def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) -> tuple[Any, Report]:
+def fit(
+    t: TimesLike | None, points: PointsLike, space: Space[P] | str, **options: Unpack[FitOptions]
+) -> tuple[P, Report]:
     """Compute the velocities of a C² cubic spline as plain arrays.
 
     Parameters
@@ -69,21 +84,54 @@ def fit(t: ArrayLike | None, points: Any, space: Space | str, **options: Any) ->
     ((3, 3), True)
     """
     spline = CubicSpline(t, points, space, **options)
-    return in_library(library_of(points), spline.velocities), spline.report
+    velocities: P = in_library(library_of(points), spline.velocities)
+    return velocities, spline.report
+
+
+@overload
+def evaluate(
+    t: TimesLike | None,
+    points: PointsLike,
+    velocities: ArrayLike,
+    space: Space[P] | str,
+    x: TimesLike,
+    *,
+    nu: int = 0,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    progress: Progress | None = None,
+    out: None = None,
+) -> P: ...
+
+
+@overload
+def evaluate(
+    t: TimesLike | None,
+    points: PointsLike,
+    velocities: ArrayLike,
+    space: Space[Any] | str,
+    x: TimesLike,
+    *,
+    nu: int = 0,
+    extrapolate: Extrapolate = None,
+    per_curve: bool = False,
+    progress: Progress | None = None,
+    out: Out,
+) -> Out: ...
 
 
 def evaluate(
-    t: ArrayLike | None,
-    points: Any,
-    velocities: Any,
-    space: Space | str,
-    x: ArrayLike,
-    nu: int = 0,
+    t: TimesLike | None,
+    points: PointsLike,
+    velocities: ArrayLike,
+    space: Space[Any] | str,
+    x: TimesLike,
     *,
-    extrapolate: bool | str | None = None,
+    nu: int = 0,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
     progress: Progress | None = None,
-    out: Any = None,
+    out: AnyArray | AnyArrays | None = None,
 ) -> Any:
     """Evaluate a curve that is given by knots, points and velocities.
 
@@ -147,7 +195,7 @@ def evaluate(
 
 
 def _nodes_around(
-    t: ArrayLike | None, points: Any, velocities: Any, space: Space, x: Any
+    t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any
 ) -> tuple[Any, Any, Any]:
     """Return the knots, points and velocities of the segments in which times lie.
 
@@ -181,7 +229,9 @@ def _nodes_around(
     return t[start:stop], arrays[0], arrays[1]
 
 
-def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tuple[TimeAxis, CurveArrays]:
+def given(
+    t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]
+) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
@@ -218,20 +268,20 @@ def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, 
 
 
 def fit_many(
-    curves: Iterable[tuple[ArrayLike | None, Any]],
-    space: Space | str,
+    curves: Iterable[tuple[TimesLike | None, PointsLike]],
+    space: Space[P] | str,
     *,
-    bc_type: Any = "natural",
-    method: str = "auto",
+    bc_type: BCType = "natural",
+    method: Method = "auto",
     tol: float = 1e-12,
     max_iter: int | None = None,
-    extrapolate: bool | str | None = None,
-    on_failure: str = "raise",
+    extrapolate: Extrapolate = None,
+    on_failure: OnFailure = "raise",
     check: bool = True,
     atol: float | None = None,
     where: ArrayLike | None = None,
     progress: Progress | None = None,
-) -> list[CubicSpline]:
+) -> list[CubicSpline[P]]:
     """Fit curves of different lengths in one parallel call.
 
     Parameters
@@ -275,7 +325,7 @@ def fit_many(
     options = fit_options(method, tol, max_iter, extrapolate, on_failure, check, progress)
     if not isinstance(curves, Iterable):
         raise ValidationError(f"curves must be pairs (t, points), not {short_repr(curves)}")
-    pairs = list(curves)
+    pairs: list[tuple[TimesLike | None, Any]] = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
             raise ValidationError(f"curve {number} must be a pair (t, points), not {short_repr(curve)}")
@@ -299,7 +349,7 @@ def fit_many(
     )
     fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
-    fitted = [
+    fitted: list[CubicSpline[P]] = [
         CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), extrapolate, found)
         for i, ((clock, t, _), found) in enumerate(zip(knots, fits, strict=True))
     ]

@@ -17,9 +17,10 @@ from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
+from ._typing import BCType, Extrapolate, P, PointsLike, TimesLike
 
 
-class HermiteSpline(SegmentedCurve):
+class HermiteSpline(SegmentedCurve[P]):
     r"""Interpolate points and velocities by a C¹ cubic Hermite spline.
 
     Each segment is the cubic Bézier curve of a `CubicSpline`, with control points that follow from the given
@@ -90,16 +91,16 @@ class HermiteSpline(SegmentedCurve):
     _format = "symspline-hermite"
     _ends = "given velocities"
     _unconverged = 0
-    _bc_type = "natural"  # Hermite splines are never closed.
+    _bc_type: BCType = "natural"  # Hermite splines are never closed.
 
     def __init__(
         self,
-        t: ArrayLike | None,
-        points: Any,
-        velocities: Any,
-        space: Space | str,
+        t: TimesLike | None,
+        points: PointsLike,
+        velocities: ArrayLike,
+        space: Space[P] | str,
         *,
-        extrapolate: bool | str | None = None,
+        extrapolate: Extrapolate = None,
         atol: float | None = None,
     ) -> None:
         space = space_named(space)
@@ -145,5 +146,5 @@ class HermiteSpline(SegmentedCurve):
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> HermiteSpline:
+    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return HermiteSpline._of(clock, t, curve, self._extrapolate)

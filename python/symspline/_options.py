@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ._arrays import checked_atol, checked_flag, short_repr, whole_number
 from ._core import ValidationError
 from ._curves.ends import is_closed
 from ._curves.fit import Points
 from ._curves.solve import Options
 
+_QUANTITIES = ("point", "velocity", "acceleration")
 _RAISE = "raise"
 _OUTSIDE = {
     None: "raise",
@@ -19,6 +22,25 @@ _OUTSIDE = {
     "geodesic": "geodesic",
     "periodic": "periodic",
 }
+
+
+def quantity_of(nu: Any) -> str:
+    """The core's name of the derivative of order `nu`."""
+    return _QUANTITIES[order_of(nu)]
+
+
+def order_of(nu: Any, most: int = 2) -> int:
+    """Validate the order of a derivative, an integer from 0 to `most`.
+
+    Raises
+    ------
+    ValidationError
+        If `nu` is not an integer, such as True or 1.0, or is out of range.
+    """
+    if isinstance(nu, bool) or not isinstance(nu, (int, np.integer)) or not 0 <= nu <= most:
+        words = "0, 1 or 2" if most == 2 else "0 or 1"
+        raise ValidationError(f"nu must be {words}, not {short_repr(nu)}")
+    return int(nu)
 
 
 def with_atol(data: list[Points], atol: float | None) -> list[Points]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ IN_PYTHON = (
 
 
 def warn_of_representatives(
-    space: Space,
+    space: Space[Any],
     points: Sequence[list[Points] | None],
     curves: Sequence[CurveArrays],
     longest_steps: Sequence[Sequence[Columns | Doubles]],
@@ -61,7 +62,7 @@ def _longest(steps: Columns | Doubles) -> Doubles:
     return steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
 
 
-def _longest_near_step(space: Space) -> float:
+def _longest_near_step(space: Space[Any]) -> float:
     """Return the longest step that never leads to a warning, cached for each space."""
     limit = FAR * space.injectivity_radius
     if _has_quaternions(space):
@@ -70,14 +71,14 @@ def _longest_near_step(space: Space) -> float:
     return limit
 
 
-def _has_quaternions(space: Space) -> bool:
+def _has_quaternions(space: Space[Any]) -> bool:
     return isinstance(space, Sphere) and space._parameters == (3,)
 
 
 # ---- quaternions of opposite sign ----
 
 
-def warn_of_signs(space: Space, curves: Sequence[list[Points] | None]) -> None:
+def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> None:
     """Warn if neighbouring points on S³ are more than a quarter turn apart.
 
     As quaternions they would be closer with the opposite sign. The curve between them turns the long way round.
@@ -169,7 +170,7 @@ def warn_of_far_points(
     )
 
 
-def cut_fractions(space: Space, points: Array) -> NDArray[np.float64]:
+def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
     """Return the deciding angle between neighbouring points, divided by the angle at which the cut locus is reached.
 
     Parameters

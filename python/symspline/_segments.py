@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from datetime import timedelta
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ._arrays import as_array, short_repr, whole_number
 from ._core import ValidationError
@@ -14,12 +14,13 @@ from ._cubic import CubicSpline
 from ._curves.fit import read
 from ._functional import fit_many
 from ._input import times_of
-from ._smoothing import SmoothingSpline
+from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
-from ._spaces import Array, Product, Space, factors_of, parts_of
+from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import Moments, time_axis_of
+from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 
 _DUPLICATES = ("raise", "first", "mean")
 # Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
@@ -28,28 +29,72 @@ _STEPS = 50
 
 
 @overload
-def fit_segments(
-    t: ArrayLike, points: Any, space: Space | str, *, max_gap: Any, smooth: Literal[True], **options: Any
-) -> list[SmoothingSpline]: ...
+def fit_segments(  # type: ignore[overload-overlap]
+    t: TimesLike,
+    points: PointsLike,
+    space: Product[PProduct],
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[True],
+    **options: Unpack[SmoothingOptions],
+) -> list[SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
-    t: ArrayLike, points: Any, space: Space | str, *, max_gap: Any, smooth: bool = False, **options: Any
-) -> list[CubicSpline]: ...
+    t: TimesLike,
+    points: PointsLike,
+    space: SpecialEuclidean,
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[True],
+    **options: Unpack[SmoothingOptions],
+) -> list[SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
+
+
+@overload
+def fit_segments(
+    t: TimesLike,
+    points: PointsLike,
+    space: Space[P] | str,
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[True],
+    **options: Unpack[SmoothingOptions],
+) -> list[SmoothingSpline[P]]: ...
+
+
+@overload
+def fit_segments(
+    t: TimesLike,
+    points: PointsLike,
+    space: Space[P] | str,
+    *,
+    max_gap: float | timedelta | np.timedelta64,
+    min_points: int = 2,
+    duplicates: Duplicates = "raise",
+    smooth: Literal[False] = False,
+    **options: Unpack[FitOptions],
+) -> list[CubicSpline[P]]: ...
 
 
 def fit_segments(
-    t: ArrayLike,
-    points: Any,
-    space: Space | str,
+    t: TimesLike,
+    points: PointsLike,
+    space: Space[Any] | str,
     *,
-    max_gap: Any,
+    max_gap: float | timedelta | np.timedelta64,
     min_points: int = 2,
-    duplicates: str = "raise",
+    duplicates: Duplicates = "raise",
     smooth: bool = False,
     **options: Any,
-) -> list[CubicSpline] | list[SmoothingSpline]:
+) -> list[Any]:
     """Fit a recording with gaps, one curve per segment.
 
     The recording is cut wherever neighbouring times are more than `max_gap` apart. A single curve across a long gap
@@ -185,9 +230,9 @@ class Cut(NamedTuple):
 
 
 def cut(
-    t: ArrayLike,
+    t: TimesLike,
     points: Any,
-    space: Space | str,
+    space: Space[Any] | str,
     max_gap: Any,
     min_points: int,
     duplicates: str,

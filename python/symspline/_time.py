@@ -7,11 +7,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ._arrays import as_array, cast
 from ._core import ValidationError
 from ._input import NO_ZONE, UTC_ZONE, times_of
+from ._typing import TimesLike
 
 Doubles = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class TimeAxis:
         return self._doubles(knots, self.origin, "t")
 
     def at(
-        self, x: ArrayLike, batch: tuple[int, ...], per_curve: bool, knots: Doubles | None = None
+        self, x: TimesLike, batch: tuple[int, ...], per_curve: bool, knots: Doubles | None = None
     ) -> tuple[Doubles, bool]:
         """Times to evaluate at, and whether every curve now has its own.
 
@@ -127,8 +128,9 @@ class TimeAxis:
 _NUMBERS = TimeAxis()
 
 
-def time_axis_of(knots: ArrayLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
+def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
     """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
+    given: Any
     given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
     array = as_array(given, "t")
     if array.size == 0 and (array.ndim < 2 or array.shape[-1] == 0):
@@ -149,7 +151,7 @@ def time_axis_of(knots: ArrayLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
 
 
 def knots_of(
-    t: ArrayLike | None, batch: tuple[int, ...], nodes: int
+    t: TimesLike | None, batch: tuple[int, ...], nodes: int
 ) -> tuple[TimeAxis, NDArray[Any], Doubles]:
     """The clock of curves with so many knots each, the knots as shown, and as the core counts them."""
     if t is None:

@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ._arrays import short_repr
 from ._base_curve import check_curve
@@ -29,6 +28,7 @@ from ._lonlat import compass, from_lonlat, to_lonlat
 from ._segments import check_smooth, cut
 from ._smoothing.many import smooth_many
 from ._spaces import Sphere
+from ._typing import Duplicates, FloatArray, TimesLike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +39,7 @@ EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
 
-def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> Any:
+def sog(spline: CubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS) -> FloatArray:
     """Compute the speed over ground.
 
     Parameters
@@ -75,7 +75,7 @@ def sog(spline: CubicSpline, x: ArrayLike, *, radius: float = EARTH_RADIUS) -> A
     return radius * spline.speed(x)
 
 
-def cog(spline: CubicSpline, x: ArrayLike) -> Any:
+def cog(spline: CubicSpline, x: TimesLike) -> FloatArray:
     """Compute the course over ground.
 
     The course is in degrees clockwise from north, in [0, 360). It is NaN where the velocity is zero. At a pole, north
@@ -111,7 +111,8 @@ def cog(spline: CubicSpline, x: ArrayLike) -> Any:
     eastward, northward = (velocity * east).sum(-1), (velocity * north).sum(-1)
     # By rounding a tiny negative angle becomes 360 itself.
     degrees = np.degrees(np.arctan2(eastward, northward)) % 360 % 360
-    return np.where((eastward == 0) & (northward == 0), np.nan, degrees)[()]
+    course: FloatArray = np.where((eastward == 0) & (northward == 0), np.nan, degrees)[()]
+    return course
 
 
 def resample(
@@ -123,7 +124,7 @@ def resample(
     columns: tuple[str, str] = ("lon", "lat"),
     max_gap: Any,
     min_points: int = 2,
-    duplicates: str = "raise",
+    duplicates: Duplicates = "raise",
     smooth: bool = False,
     radius: float = EARTH_RADIUS,
     **options: Any,

@@ -40,6 +40,7 @@ from ._pose_files import (
     write_tum,
 )
 from ._spaces import Array, Euclidean, SpecialEuclidean
+from ._typing import Extrapolate, Frame, TimesLike
 from .rotations import Spline, attitude, check_frame, turned
 
 __all__ = [
@@ -86,10 +87,10 @@ class Imu(NamedTuple):
 
 def imu(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Imu:
     """Compute the signals of a gyroscope and an accelerometer at the origin of the body.
@@ -145,10 +146,10 @@ def imu(
 
 def twist(
     spline: Spline,
-    x: ArrayLike,
-    frame: str = "body",
+    x: TimesLike,
+    frame: Frame = "body",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the twist (ω, v), angular part first.
@@ -194,10 +195,10 @@ def twist(
 
 def linear_velocity(
     spline: Spline,
-    x: ArrayLike,
-    frame: str = "world",
+    x: TimesLike,
+    frame: Frame = "world",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the velocity ẋ of the position.
@@ -235,10 +236,10 @@ def linear_velocity(
 
 def linear_acceleration(
     spline: Spline,
-    x: ArrayLike,
-    frame: str = "world",
+    x: TimesLike,
+    frame: Frame = "world",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the acceleration ẍ of the position, without gravity.
@@ -279,7 +280,7 @@ def linear_acceleration(
 class _Motion:
     """Motion of a body at times x; each quantity is evaluated on first access and cached."""
 
-    def __init__(self, spline: Spline, x: ArrayLike, extrapolate: Any, per_curve: bool) -> None:
+    def __init__(self, spline: Spline, x: TimesLike, extrapolate: Any, per_curve: bool) -> None:
         self._attitude, self._position = attitude(spline), _position(spline)
         self._clock, self._x = spline._clock, x
         self._where, self._per_curve = spline._where(extrapolate), per_curve

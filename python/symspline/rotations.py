@@ -30,6 +30,7 @@ from ._curves.curve import CurveArrays, Doubles
 from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
 from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
+from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
 from .convert._reading import length, real_numbers, refuse
@@ -51,7 +52,7 @@ __all__ = [
     "velocities",
 ]
 
-Spline = CubicSpline | HermiteSpline
+Spline = CubicSpline[Any] | HermiteSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _FRAMES = ("body", "world")
@@ -68,7 +69,7 @@ _LIFTS: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
 
 
 def rotation(
-    spline: Spline, x: ArrayLike, *, extrapolate: bool | str | None = None, per_curve: bool = False
+    spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Rotation:
     """Evaluate a curve as a SciPy ``Rotation``.
 
@@ -119,10 +120,10 @@ def rotation(
 
 def angular_velocity(
     spline: Spline,
-    x: ArrayLike,
-    frame: str = "body",
+    x: TimesLike,
+    frame: Frame = "body",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the angular velocity of a curve.
@@ -167,10 +168,10 @@ def angular_velocity(
 
 def angular_acceleration(
     spline: Spline,
-    x: ArrayLike,
-    frame: str = "body",
+    x: TimesLike,
+    frame: Frame = "body",
     *,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Compute the angular acceleration of a curve, which is continuous.
@@ -210,10 +211,10 @@ def angular_acceleration(
 
 def quaternion(
     spline: Spline,
-    x: ArrayLike,
+    x: TimesLike,
     *,
     scalar_first: bool | None = None,
-    extrapolate: bool | str | None = None,
+    extrapolate: Extrapolate = None,
     per_curve: bool = False,
 ) -> Array:
     """Evaluate a curve as unit quaternions without jumps of sign.
@@ -263,7 +264,7 @@ def quaternion(
     return q if first else np.roll(q, -1, axis=-1)
 
 
-def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: str = "body") -> Array:
+def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: Frame = "body") -> Array:
     """Convert angular velocities to tangent vectors at rotations.
 
     This is the inverse of `angular_velocity`. Use the result as velocities of a `symspline.HermiteSpline` or as end
@@ -327,14 +328,14 @@ def check_frame(frame: Any) -> None:
         raise ValidationError(f"frame must be 'body' or 'world', not {short_repr(frame)}")
 
 
-def _at(spline: Spline, x: ArrayLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
+def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._clock, x, quantity, where, per_curve, None)
     return values
 
 
 def _rate(
-    spline: Spline, x: ArrayLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
+    spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
 ) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
     check_frame(frame)
@@ -519,7 +520,7 @@ def from_rotation_vectors(vectors: ArrayLike) -> Array:
     return _SO3.exp(np.eye(3), _hat(real_numbers(vectors, "vectors", (3,))[0]))
 
 
-def as_rotation_6d(rotations: ArrayLike | Rotation, *, order: str | None = None) -> Array:
+def as_rotation_6d(rotations: ArrayLike | Rotation, *, order: RotationOrder | None = None) -> Array:
     """Convert rotations to the 6-D representation of machine learning.
 
     The representation consists of two columns, or rows, of the matrix. It is continuous over all rotations [1]_.
@@ -558,7 +559,7 @@ def as_rotation_6d(rotations: ArrayLike | Rotation, *, order: str | None = None)
     return six.reshape(*r.shape[:-2], 6)
 
 
-def from_rotation_6d(numbers: ArrayLike, *, order: str | None = None) -> Array:
+def from_rotation_6d(numbers: ArrayLike, *, order: RotationOrder | None = None) -> Array:
     """Convert the 6-D representation, such as the output of a neural network, to rotations.
 
     The two vectors are orthonormalised by the Gram–Schmidt process ([1]_, equation 15).

@@ -26,6 +26,7 @@ from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._input import times_of
 from ._spaces import ComplexGrassmannian, Grassmannian
+from ._typing import TimesLike
 from .convert._reading import Array, adjoint, numbers, refuse
 
 # Singular values closer than this, in units of the largest, are equal but for rounding.
@@ -98,7 +99,7 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
 
 
 def reduced_operator(
-    spline: CubicSpline, operator: Any | Callable[[float], Any], x: ArrayLike, start: ArrayLike | None = None
+    spline: CubicSpline, operator: Any | Callable[[float], Any], x: TimesLike, start: ArrayLike | None = None
 ) -> Array:
     """Compute the reduced operator X*AX in bases X that vary smoothly along a curve.
 

@@ -89,7 +89,7 @@ def _check_number(name: str, value: Any) -> None:
 
 
 def check(
-    space: Space | str,
+    space: Space[Any] | str,
     *,
     point: ArrayLike | None = None,
     length: float | None = None,
@@ -302,7 +302,7 @@ def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
     points, velocities = (np.stack([x[:-1], x[1:]], axis=1) for x in (p, u))
 
     def sides(nu: int) -> tuple[Array, Array]:
-        values = evaluate(knots, points, velocities, space, knots, nu, per_curve=True)
+        values = evaluate(knots, points, velocities, space, knots, nu=nu, per_curve=True)
         return values[:-1, 1], values[1:, 0]
 
     def jump(nu: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack, overload
 
 import numpy as np
 import torch
@@ -11,11 +11,42 @@ from ._adapters import fitted, movable, split
 from ._curves.ends import ends_in_factors
 from ._spaces import Product, Space, parts_of
 from ._spaces import space as space_named
+from ._typing import SolverOptions
 from .manifolds._manifold import refuse_functions
 
 
+@overload
 def curve(
-    x: Any, t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", **options: Any
+    x: Any,
+    t: Any,
+    points: Any,
+    space: Space | str,
+    *,
+    bc_type: Any = "natural",
+    **options: Unpack[SolverOptions],
+) -> torch.Tensor: ...
+
+
+@overload
+def curve(
+    x: Any,
+    t: Any,
+    points: Any,
+    space: Product,
+    *,
+    bc_type: Any = "natural",
+    **options: Unpack[SolverOptions],
+) -> tuple[torch.Tensor, ...]: ...
+
+
+def curve(
+    x: Any,
+    t: Any,
+    points: Any,
+    space: Space[Any] | str,
+    *,
+    bc_type: Any = "natural",
+    **options: Unpack[SolverOptions],
 ) -> Any:
     """Evaluate a spline through points, with derivatives in PyTorch.
 

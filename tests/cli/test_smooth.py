@@ -160,7 +160,7 @@ def test_samples_have_standard_deviations(run):
     found, x = read_table("b.npz"), np.linspace(0, 59, 7)
     assert [name for name in found if name.startswith("std")] == ["std", "std_d1"]
     assert np.array_equal(found["std"], np.degrees(spline.std(x)))
-    assert np.array_equal(found["std_d1"], np.degrees(spline.std(x, 1)))
+    assert np.array_equal(found["std_d1"], np.degrees(spline.std(x, nu=1)))
 
 
 def test_deviations_of_every_factor(run):

@@ -86,7 +86,7 @@ def test_deviations_beside_quaternions_are_of_quaternions(run):
     run("sample q.npz -n 9 --nu 0,1 -o s.csv")
     spline, x = ss.load("q.npz"), read_table("s.csv")["t"]
     np.testing.assert_allclose(read_table("s.csv")["std"], spline.std(x) / 2, rtol=1e-12)
-    np.testing.assert_allclose(read_table("s.csv")["std_d1"], spline.std(x, 1) / 2, rtol=1e-12)
+    np.testing.assert_allclose(read_table("s.csv")["std_d1"], spline.std(x, nu=1) / 2, rtol=1e-12)
     # A turn by a small angle moves the quaternion half as far.
     moved = spline.space.exp(spline(1.0), spline.std(1.0) * spline.space.frame(spline(1.0))[0])
     here, there = ss.rotations.as_quaternions(np.stack([spline(1.0), moved]), scalar_first=True)

@@ -26,7 +26,7 @@ FURTHER = {case.name: [(case, "mixed")] for case in LARGE if case.name in ("so:8
 def assert_differences(spline, data, change, x, orders=(0, 1, 2)):
     """`jvp` is the change by finite differences."""
     for nu, expected in enumerate(by_differences(*data, change, x, orders)):
-        found = spline.jvp(x, *change, nu)
+        found = spline.jvp(x, *change, nu=nu)
         # Of the differences: the fourth power of the step, and residuals of 1e-14 divided by it.
         assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
 
@@ -39,7 +39,7 @@ def assert_transpose(spline, change, x, rng, orders=(0, 1, 2)):
         if spline.space.dtype.kind == "c":
             cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
         gradient = spline.vjp(x, cotangent, nu)
-        pairs = [(cotangent, spline.jvp(x, *change, nu)), (gradient.points, vectors), (gradient.t, knots)]
+        pairs = [(cotangent, spline.jvp(x, *change, nu=nu)), (gradient.points, vectors), (gradient.t, knots)]
         pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
         left, *right = [np.vdot(a, b).real for a, b in pairs]
         scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
@@ -104,7 +104,7 @@ def test_derivatives_are_finite_at_coinciding_points(case, end):
     still = np.repeat(points[:1], len(t), axis=0)
     spline = ss.CubicSpline(t, still, space, bc_type="periodic" if end == "periodic" else "natural")
     for nu in (0, 1, 2):
-        assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu).points).all()
+        assert np.isfinite(spline.vjp(x, np.ones(spline(x).shape), nu=nu).points).all()
 
 
 def test_batch_derivatives_match_single_curves():

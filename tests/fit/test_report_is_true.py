@@ -209,7 +209,7 @@ def test_gradients_keep_their_digits(name, scale):
     x = np.array([0.4, 1.7, 2.2, 4.9])
     for nu in range(2):
         weights = rng.standard_normal(spline(x).shape)
-        gradient = spline.vjp(x, weights, nu).points
+        gradient = spline.vjp(x, weights, nu=nu).points
         for _ in range(5):
             motion = space.random_tangent(rng, p)
             moved = weights * spline.jvp(x, motion, nu=nu)

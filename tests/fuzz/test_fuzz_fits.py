@@ -169,7 +169,7 @@ def test_evaluate(data):
     if mood == ODD:
         p, u, nu = (draw(nonsense) if rarely(draw) else value for value in (p, u, nu))
     values = attempt(
-        lambda: ss.evaluate(t, p, u, space, x, nu, extrapolate=policy), x, t, p, u, wrong_types=mood == ODD
+        lambda: ss.evaluate(t, p, u, space, x, nu=nu, extrapolate=policy), x, t, p, u, wrong_types=mood == ODD
     )
     if not isinstance(values, Refusal):
         for factor, value in zip(parts(space), parts(values), strict=True):

@@ -199,8 +199,8 @@ def test_progress_of_evaluation_counts_points(space, per_curve, nu):
     total = 2 * (50 if per_curve else 100) * (2 if "x" in space else 1)
     assert calls[-1] == (total, total) and calls == sorted(calls)
     calls.clear()
-    arrays = (None, spline.points, spline.velocities, space, x, nu)
-    ss.evaluate(*arrays, per_curve=per_curve, progress=lambda *call: calls.append(call))
+    arrays = (None, spline.points, spline.velocities, space, x)
+    ss.evaluate(*arrays, nu=nu, per_curve=per_curve, progress=lambda *call: calls.append(call))
     assert calls[-1] == (total, total)
 
 

@@ -37,7 +37,7 @@ def test_curves_are_those_of_the_core(name):
 
     @jax.jit
     def curves(*data):
-        return [evaluate(*data, space, X, nu) for nu in orders]
+        return [evaluate(*data, space, X, nu=nu) for nu in orders]
 
     found = curves(T, points, spline.velocities)
     for nu, value in zip(orders, found, strict=True):
@@ -153,4 +153,4 @@ def test_invalid_arguments_raise():
     with pytest.raises(ss.ValidationError, match=r"points has shape \(2, 3\)"):
         evaluate([0, 1], p, p, "sphere:3", 0.5)
     with pytest.raises(ss.ValidationError, match="nu must be"):
-        evaluate([0, 1], p, p, "sphere:2", 0.5, 3)
+        evaluate([0, 1], p, p, "sphere:2", 0.5, nu=3)

@@ -53,7 +53,7 @@ def test_every_space_shows_data(name):
         return
     (band,) = bands_of(speed)
     corners = band.get_paths()[0].vertices
-    wanted = y + 1.96 * spline.std(x, 1)
+    wanted = y + 1.96 * spline.std(x, nu=1)
     assert np.abs(corners[:, None] - np.column_stack([x, wanted])).sum(axis=2).min(axis=0).max() < 1e-12
     assert speed.get_ylim()[1] > wanted.max()
 

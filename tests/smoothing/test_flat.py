@@ -122,7 +122,7 @@ def test_deviations_are_those_of_an_integrated_wiener_process(nu):
     cross = prior(x, t, nu, 0)
     variance = np.diag(prior(x, x, nu, nu)) - np.einsum("ij,ji->i", cross, np.linalg.solve(data, cross.T))
     # The flat prior costs the reference digits.
-    assert np.abs(spline.std(x, nu) / (sigma * np.sqrt(variance)) - 1).max() < 1e-5
+    assert np.abs(spline.std(x, nu=nu) / (sigma * np.sqrt(variance)) - 1).max() < 1e-5
 
 
 def test_beyond_the_ends_the_deviation_is_that_of_a_straight_line():

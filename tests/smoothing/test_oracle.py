@@ -56,7 +56,7 @@ def test_fits_of_numbers(ends, kind, lam):
             variance = process_variance(t, w, lam, x, nu, ends, 1.0)
         inner = slice(1, -1) if nu == 1 and ends == "clamped" else slice(None)
         wanted = spline.sigma * np.sqrt(variance[inner])
-        assert spline.std(x[inner], nu) == pytest.approx(wanted, rel=1e-6)
+        assert spline.std(x[inner], nu=nu) == pytest.approx(wanted, rel=1e-6)
     radius = np.sqrt(chi2.ppf(0.9, 2)) * spline.std(x)
     assert spline.band(x, 0.9) == pytest.approx(radius, rel=1e-9)
 

@@ -40,7 +40,7 @@ def test_given_velocities(name, far):
     assert np.abs(still.velocities[[0, -1]]).max() == 0
     # What is fixed is less uncertain.
     free = ss.make_smoothing_spline(t, noisy, space, still.lam)
-    assert still.std(0.0) < free.std(0.0) and still.std(0.0, 1) < 1e-3 * free.std(0.0, 1)
+    assert still.std(0.0) < free.std(0.0) and still.std(0.0, nu=1) < 1e-3 * free.std(0.0, nu=1)
     assert still.std(5.0) == pytest.approx(free.std(5.0), rel=0.1)
 
 

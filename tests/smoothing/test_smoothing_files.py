@@ -62,7 +62,7 @@ def assert_same(read, spline):
         assert same(getattr(read, name), getattr(spline, name))
     x = spline.t.ravel()[1:3]
     for nu in (0, 1):
-        assert same(read.std(x, nu), spline.std(x, nu)) and same(read(x, nu), spline(x, nu))
+        assert same(read.std(x, nu=nu), spline.std(x, nu=nu)) and same(read(x, nu), spline(x, nu))
     assert same(read.band(x), spline.band(x)) and read.extrapolate == spline.extrapolate
 
 

@@ -66,7 +66,7 @@ def test_time_unit_does_not_matter(name, unit):
     other = ss.make_smoothing_spline(unit * t, noisy, space, **TIGHT)
     assert np.divide(each(other.lam), unit**3) == pytest.approx(each(spline.lam), rel=1e-6)
     assert space.distance(other.points, spline.points).max() < 1e-7
-    assert np.multiply(each(other.std(3.3 * unit, 1)), unit) == pytest.approx(each(spline.std(3.3, 1)), rel=1e-5)
+    assert np.multiply(each(other.std(3.3 * unit, nu=1)), unit) == pytest.approx(each(spline.std(3.3, nu=1)), rel=1e-5)
 
 
 @every

@@ -45,7 +45,7 @@ def test_curves_of_a_batch_may_have_times_of_their_own():
     batch = ss.make_smoothing_spline(own, np.stack([NOISY, NOISY]), S2, [0.1, 0.8])
     assert np.array_equal(batch.t, own)
     assert S2.distance(batch[0].points, batch[1].points).max() < 1e-12
-    assert batch.std(own, 0).shape == (2, 2, 40)
+    assert batch.std(own, nu=0).shape == (2, 2, 40)
 
 
 def test_failed_curves_are_reported_and_kept():
@@ -137,7 +137,7 @@ def test_band_and_deviation_check_their_arguments():
     spline = ss.make_smoothing_spline(T, NOISY, S2)
     assert spline.band(2.0, 0.5) < spline.band(2.0) == pytest.approx(np.sqrt(5.991464547) * spline.std(2.0))
     with pytest.raises(ss.ValidationError, match="nu must be 0 or 1"):
-        spline.std(2.0, 2)
+        spline.std(2.0, nu=2)
     with pytest.raises(ss.ValidationError, match="level must lie"):
         spline.band(2.0, 95)
     with pytest.raises(TypeError, match="make_smoothing_spline"):

@@ -31,9 +31,9 @@ def test_values_are_bit_identical_to_those_of_all_nodes(name, nu):
         np.sort(rng.choice(t, 4)),
     ]
     for x in times:
-        few = ss.evaluate(t, points, velocities, space, x, nu)
+        few = ss.evaluate(t, points, velocities, space, x, nu=nu)
         # Knots in a list are read as a whole.
-        every = ss.evaluate(t.tolist(), points, velocities, space, x, nu)
+        every = ss.evaluate(t.tolist(), points, velocities, space, x, nu=nu)
         for own, expected in zip(parts(few), parts(every), strict=True):
             np.testing.assert_array_equal(own, expected)
 

@@ -34,7 +34,7 @@ def test_evaluate_per_curve(space):
 def test_evaluate_over_dates():
     spline = ss.CubicSpline(np.datetime64("2024-01-01T00", "h") + np.array([0, 1, 3]), THREE, S2)
     x = spline.t[0] + np.timedelta64(90, "m")
-    assert same(ss.evaluate(spline.t, spline.points, spline.velocities, S2, x, 1), spline(x, nu=1))
+    assert same(ss.evaluate(spline.t, spline.points, spline.velocities, S2, x, nu=1), spline(x, nu=1))
 
 
 @every_common
@@ -72,8 +72,8 @@ def test_fit_and_evaluate_are_the_class(space, batch):
     assert same(u, spline.velocities) and report == spline.report
     x = np.linspace(-0.5, 4.75, 8)
     for nu in range(3):
-        values = ss.evaluate(KNOTS, spline.points, u, str(space), x, nu, extrapolate="geodesic")
-        assert same(values, spline(x, nu, extrapolate="geodesic"))
+        values = ss.evaluate(KNOTS, spline.points, u, str(space), x, nu=nu, extrapolate="geodesic")
+        assert same(values, spline(x, nu=nu, extrapolate="geodesic"))
     with pytest.raises(ss.ValidationError, match="outside the knots"):
         ss.evaluate(KNOTS, spline.points, u, space, x)
 

@@ -112,7 +112,7 @@ def test_lift_does_not_depend_on_representatives(name, rng):
         for nu in range(3):
             expected = a.lift(x, nu=nu)
             size = np.abs(expected).max() * np.max(rounding(space, expected if nu == 0 else points))
-            np.testing.assert_allclose(b.lift(x, points[0], nu), expected, rtol=0, atol=3e-13 * size)
+            np.testing.assert_allclose(b.lift(x, points[0], nu=nu), expected, rtol=0, atol=3e-13 * size)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -126,8 +126,8 @@ def test_velocities_outside_the_span_of_the_points(name, rng):
     u = embed.small.random_tangent(rng, p)
     u *= 0.3 / embed.small.norm(p, u).reshape(-1, *[1] * len(embed.small.point_shape))
     x = np.linspace(t[0], t[-1], 20)
-    ours = [ss.evaluate(t, embed(p), embed(u), embed.space, x, nu) for nu in range(3)]
-    embed.agree(ours, [ss.evaluate(t, p, u, embed.small, x, nu) for nu in range(3)], 10)
+    ours = [ss.evaluate(t, embed(p), embed(u), embed.space, x, nu=nu) for nu in range(3)]
+    embed.agree(ours, [ss.evaluate(t, p, u, embed.small, x, nu=nu) for nu in range(3)], 10)
 
 
 @every_space

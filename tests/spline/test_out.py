@@ -82,7 +82,7 @@ def test_times_may_lie_where_results_go():
 def test_of_evaluate():
     spline, x = spline_of("cp:2", (2,)), np.linspace(0, 4, 6)
     out = np.empty((2, 6, 3), complex)
-    assert ss.evaluate(spline.t, spline.points, spline.velocities, "cp:2", x, 1, out=out) is out
+    assert ss.evaluate(spline.t, spline.points, spline.velocities, "cp:2", x, nu=1, out=out) is out
     assert same(out, spline(x, 1))
 
 

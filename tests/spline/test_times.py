@@ -178,9 +178,9 @@ for t, nu, extrapolate in itertools.product(knots, range(3), (None, True, "geode
         x = rng.uniform(-1, 13, size)
         try:
             if sys.argv[1] == "evaluate":
-                ss.evaluate(t, p, 0 * p, "sphere:2", x, nu, extrapolate=extrapolate)
+                ss.evaluate(t, p, 0 * p, "sphere:2", x, nu=nu, extrapolate=extrapolate)
             else:
-                ss.CubicSpline(t, p, "sphere:2", check=False, on_failure="ignore")(x, nu, extrapolate=extrapolate)
+                ss.CubicSpline(t, p, "sphere:2", check=False, on_failure="ignore")(x, nu=nu, extrapolate=extrapolate)
         except ss.ValidationError:
             pass
 """

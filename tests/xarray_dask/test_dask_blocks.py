@@ -24,14 +24,14 @@ def test_blocks_are_bit_identical_to_the_whole(scheduler):
     expected = sx.fit(da, "so:3", point_dims=dims, where=where)
     blocks = da.transpose("s", "lon", ...).chunk(lon=4, lat=1)
     ds = sx.fit(blocks, "so:3", point_dims=dims, where=where.chunk(lon=2))
-    values, speed = sx.evaluate(ds, X, 1), sx.speed(ds, X)
+    values, speed = sx.evaluate(ds, X, nu=1), sx.speed(ds, X)
     made = sx.resample(blocks, "so:3", X, point_dims=dims, where=where)
     lazy = (ds, values, speed, made)
     assert all(dask.is_dask_collection(found) for found in lazy)
     ds, values, speed, made = dask.compute(*lazy, scheduler=scheduler, num_workers=1 if scheduler == "processes" else 2)
     assert same(numbers(ds.velocities, "time", *dims), expected.velocities.values)
     assert same(numbers(ds.converged), expected.converged.values) and ds.converged.sum() == 11
-    assert same(numbers(values, "time", *dims), sx.evaluate(expected, X, 1).values)
+    assert same(numbers(values, "time", *dims), sx.evaluate(expected, X, nu=1).values)
     assert same(numbers(speed, "time"), sx.speed(expected, X).values)
     assert same(numbers(made, "time", *dims), sx.evaluate(expected, X).values)
 

@@ -52,7 +52,7 @@ def test_workers_are_bit_identical_to_this_process(client):
     da = curves()
     expected = ss.CubicSpline(None, da.values, S2, on_failure="ignore")
     ds = sx.fit(da.chunk(curve=EACH), S2)
-    values, found = dask.compute(sx.evaluate(ds, X, 1), ds)
+    values, found = dask.compute(sx.evaluate(ds, X, nu=1), ds)
     assert same(values.values, expected(X, nu=1)) and same(found.residual.values, expected.report.residual)
 
 

@@ -39,7 +39,7 @@ def test_numbers_are_those_of_the_spline(space, turned):
     # Velocities that are given may be off the span of the points by rounding.
     off = {"rtol": 1e-12, "atol": 1e-13} if space == "sphere:300" else {"rtol": 0}
     for nu in range(3):
-        values = sx.evaluate(ds, X, nu)
+        values = sx.evaluate(ds, X, nu=nu)
         assert values.dims == (*ds.converged.dims, "time", *dims)
         np.testing.assert_allclose(numbers(values, "time", *dims), expected(X, nu=nu), **off)
     np.testing.assert_allclose(numbers(sx.speed(ds, X), "time"), expected.speed(X), **off)
@@ -59,7 +59,7 @@ def test_a_great_circle_with_dates_has_its_angular_velocity_per_second():
     at = sx.evaluate(ds, x).sel(time="2021-08-28T00:16:40").values[0]
     np.testing.assert_allclose(at, [np.cos(1), np.sin(1), 0], atol=1e-14)
     np.testing.assert_allclose(sx.speed(ds, x), 1e-3, rtol=1e-12)
-    np.testing.assert_allclose(sx.evaluate(ds, x, 1)[0, 1], 1e-3 * np.array([-np.sin(1), np.cos(1), 0]), atol=1e-15)
+    np.testing.assert_allclose(sx.evaluate(ds, x, nu=1)[0, 1], 1e-3 * np.array([-np.sin(1), np.cos(1), 0]), atol=1e-15)
 
 
 def test_flat_curves_are_scipys():
@@ -96,7 +96,7 @@ def test_coordinates_and_attributes_carry_over():
     values = sx.evaluate(ds, X)
     assert set(values.coords) == {"time", "lat", "place", "r"} and values.attrs == da.attrs
     assert values.lat.attrs == da.lat.attrs and (values.time == X).all()
-    assert not sx.evaluate(ds, X, 1).attrs and not sx.speed(ds, X).attrs
+    assert not sx.evaluate(ds, X, nu=1).attrs and not sx.speed(ds, X).attrs
     assert set(sx.speed(ds, X).coords) == {"time", "lat", "place"}
     made = sx.resample(da, S2, X, point_dims=("r",))
     assert made.name == "direction" and made.attrs == da.attrs and set(made.coords) == set(values.coords)
@@ -238,7 +238,7 @@ def test_the_holonomy_of_closed_curves():
     ds = sx.fit(da, "cp:1", bc_type="periodic")
     spline = ss.CubicSpline(None, p[None], "cp:1", bc_type="periodic")
     x = np.linspace(0, 6, 13)
-    assert same(sx.lift(ds, x).values, spline.lift(x)) and same(sx.lift(ds, x, 1).values, spline.lift(x, nu=1))
+    assert same(sx.lift(ds, x).values, spline.lift(x)) and same(sx.lift(ds, x, nu=1).values, spline.lift(x, nu=1))
     # One eighth of the sphere is enclosed: the phase is half of π/2.
     turn = np.vdot(*sx.lift(ds, [0.0, 3.0]).values[0])
     closed = ss.CubicSpline(None, p, "cp:1", bc_type="periodic").lift([0.0, 3.0])

@@ -94,7 +94,7 @@ def test_dates_need_dates():
 
 
 def test_derivatives_of_higher_order():
-    refused("nu must be 0, 1 or 2, not 3", lambda: sx.evaluate(sx.fit(field(), S2, point_dims=("r",)), 0.5, 3))
+    refused("nu must be 0, 1 or 2, not 3", lambda: sx.evaluate(sx.fit(field(), S2, point_dims=("r",)), 0.5, nu=3))
 
 
 def test_invalid_datasets_raise():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,7 +14,7 @@ from .ends import ends_of
 from .fit import Points, validated
 
 
-def control_array(value: ArrayLike, space: Space, least: int) -> tuple[NDArray[np.float64], float]:
+def control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[NDArray[np.float64], float]:
     """Control points as doubles, and how far off the space they may be."""
     array = space._array(value, "control_points")
     doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
@@ -24,7 +26,7 @@ def control_array(value: ArrayLike, space: Space, least: int) -> tuple[NDArray[n
     return doubles, point_tol(array.dtype)
 
 
-def checked_points(space: Space, doubles: NDArray[np.float64], tol: float) -> Array:
+def checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float) -> Array:
     """The control points, on the space and each within reach of the next."""
     *batch, count = space._lead(doubles)
     try:

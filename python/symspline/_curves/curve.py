@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import short_repr
-from .._core import ValidationError
 from .._spaces import Space
 from .gradient import Gradient, Places
 from .integrals import EXACT
@@ -20,25 +18,6 @@ Doubles = NDArray[np.float64]
 NORMS = ("speed", "bend")
 # What is no point or vector of the space.
 REAL = (*NORMS, "body velocity", "body acceleration")
-_QUANTITIES = {0: "point", 1: "velocity", 2: "acceleration"}
-
-
-def quantity_of(nu: Any) -> str:
-    """What the core calls a derivative of order nu."""
-    return _QUANTITIES[order_of(nu)]
-
-
-def order_of(nu: Any, most: int = 2) -> int:
-    """The order of a derivative as a whole number, at most ``most``; 1.0 is one, too.
-
-    Raises:
-        ValidationError: it is none.
-    """
-    number = isinstance(nu, (int, float, np.integer, np.floating)) and not isinstance(nu, bool)
-    if not number or nu not in range(most + 1):
-        words = "0, 1 or 2" if most == 2 else "0 or 1"
-        raise ValidationError(f"nu must be {words}, not {short_repr(nu)}")
-    return int(nu)
 
 
 class CurveArrays(ABC):
@@ -52,7 +31,7 @@ class CurveArrays(ABC):
     """
 
     exact: float = EXACT
-    space: Space
+    space: Space[Any]
     times: Doubles
     points: Any
     velocities: Any
@@ -107,7 +86,7 @@ class CurveArrays(ABC):
         """How the curve moves with its data, see `symspline.CubicSpline.jvp`."""
 
     @abstractmethod
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         """The transpose, see `symspline.CubicSpline.vjp`."""
 
     @abstractmethod

@@ -13,7 +13,7 @@ from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
 from .._spaces import Array
 from .._time import onto_ends
-from .curve import CurveArrays, order_of
+from .curve import CurveArrays
 from .ends import End, ends_of
 from .gradient import Gradient, Places
 
@@ -24,7 +24,6 @@ def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: 
     Raises:
         ValidationError: a time is outside the knots.
     """
-    nu = order_of(nu)
     dtype = x.dtype if x.dtype.kind == "f" else np.dtype(np.float64)
     x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
     shape = x.shape if per_curve else batch + x.shape

@@ -31,27 +31,42 @@ def ends_of(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[End] | N
         if bc_type == "natural":
             return _NATURAL
         bc_type = (bc_type, bc_type)
+    return [_end(name, word, vector, space, batch) for name, word, vector in split_ends(bc_type)]
+
+
+def split_ends(bc_type: Any) -> list[tuple[str, str | int, Any]]:
+    """Return the name of each end of a pair, its word or order, and the vector that it prescribes or None.
+
+    Raises
+    ------
+    ValidationError
+        If the conditions are not a pair, or an end is neither a word nor a pair of an order and a vector.
+    """
     if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
         raise ValidationError(f"{_HELP}; got {short_repr(bc_type)}")
-    return [_end(end, name, space, batch) for end, name in zip(bc_type, ("start", "end"), strict=True)]
-
-
-def _end(end: Any, name: str, space: Space, batch: tuple[int, ...]) -> End:
-    shape = batch + space._doubles_shape
-    if isinstance(end, str):
-        if end not in _WORDS:
+    split: list[tuple[str, str | int, Any]] = []
+    for name, end in zip(("start", "end"), bc_type, strict=True):
+        if isinstance(end, str) and end in _WORDS:
+            split.append((name, end, None))
+            continue
+        pair = isinstance(end, (tuple, list)) and len(end) == 2
+        if not pair or not isinstance(end[0], (int, np.integer)) or end[0] not in _ORDERS:
             raise ValidationError(f"{_HELP}; the {name} is {short_repr(end)}")
-        return ("velocity", np.zeros(shape)) if end == "clamped" else (end, None)
-    pair = isinstance(end, (tuple, list)) and len(end) == 2
-    if not pair or not isinstance(end[0], (int, np.integer)) or end[0] not in _ORDERS:
-        raise ValidationError(f"{_HELP}; the {name} is {short_repr(end)}")
-    kind = _ORDERS[int(end[0])]
-    value = space._doubles(end[1], f"the {name} {kind}")
+        split.append((name, int(end[0]), end[1]))
+    return split
+
+
+def _end(name: str, word: str | int, vector: Any, space: Space, batch: tuple[int, ...]) -> End:
+    shape = batch + space._doubles_shape
+    if isinstance(word, str):
+        return ("velocity", np.zeros(shape)) if word == "clamped" else (word, None)
+    kind = _ORDERS[word]
+    value = space._doubles(vector, f"the {name} {kind}")
     try:
         return kind, np.ascontiguousarray(np.broadcast_to(value, shape))
     except ValueError:
         raise ValidationError(
-            f"the {name} {kind} has shape {np.shape(end[1])}, which does not broadcast to {batch + space.point_shape}"
+            f"the {name} {kind} has shape {np.shape(vector)}, which does not broadcast to {batch + space.point_shape}"
         ) from None
 
 
@@ -86,7 +101,7 @@ def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
     return fixed[0], fixed[1]
 
 
-def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
+def picked(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:
     """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
     if isinstance(bc_type, str):
         return bc_type
@@ -111,24 +126,18 @@ def picked(bc_type: Any, index: Any, batch_axes: int, space: Space) -> Any:
 # ---- in a product, where prescribed vectors are tuples ----
 
 
-def ends_in_factors(bc_type: Any, space: Space) -> list[Any]:
+def ends_in_factors(bc_type: Any, space: Space[Any]) -> list[Any]:
     """End conditions for each factor; those of a space that is no product are the only ones."""
     factors = factors_of(space)
     if isinstance(bc_type, str) or len(factors) == 1:
         return [bc_type] * len(factors)
-    if not isinstance(bc_type, (tuple, list)) or len(bc_type) != 2:
-        raise ValidationError(f"bc_type must be a word or a pair, not {short_repr(bc_type)}")
-
-    def vectors(end: Any) -> Any:
-        if isinstance(end, str):
-            return (end,) * len(factors)
-        if not isinstance(end, (tuple, list)) or len(end) != 2:
-            raise ValidationError(
-                f"an end condition is a word or a pair (order, tuple of vectors), not {short_repr(end)}"
-            )
-        return tuple((end[0], vector) for vector in parts_of(end[1], space, "an end vector"))
-
-    return list(zip(*map(vectors, bc_type), strict=True))
+    start, end = (
+        (word,) * len(factors)
+        if isinstance(word, str)
+        else tuple((word, part) for part in parts_of(vector, space, "an end vector"))
+        for _, word, vector in split_ends(bc_type)
+    )
+    return list(zip(start, end, strict=True))
 
 
 def _joined(ends: list[Any]) -> Any:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .._report import Report
+from .._typing import Number
 from .curve import CurveArrays, Doubles
 from .integrals import integrate
 
@@ -24,7 +25,7 @@ class Evaluable(Protocol):
     def evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool) -> Any: ...
 
 
-def bending_energy(curve: Evaluable) -> Any:
+def bending_energy(curve: Evaluable) -> Number:
     """∫ |∇γ'|² dt, (1); shape of the batch axes."""
     # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
     times = curve.times
@@ -43,7 +44,7 @@ def alternative_energy(curve: CurveArrays, reports: list[Report]) -> Any:
     of one factor, if any has one."""
     if all(report.alternative_energy is None for report in reports):
         return None
-    energies = [bending_energy(part) for part in curve.parts]
+    energies: list[Any] = [bending_energy(part) for part in curve.parts]
     others = [
         sum(energies) - energy + report.alternative_energy
         for energy, report in zip(energies, reports, strict=True)

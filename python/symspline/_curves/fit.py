@@ -61,7 +61,7 @@ class FitProblem(NamedTuple):
         skip_invalid: whether curves with points off the space are masked instead of an error.
     """
 
-    space: Space
+    space: Space[Any]
     times: NDArray[np.float64]
     points: list[Points]
     ends: list[list[End] | None]
@@ -75,7 +75,7 @@ class ManyProblem(NamedTuple):
     """Single curves of different lengths to fit, with one entry per curve in ``times`` and ``points``, and otherwise as
     `FitProblem`."""
 
-    space: Space
+    space: Space[Any]
     times: list[NDArray[np.float64]]
     points: list[list[Points]]
     ends: list[list[End] | None]
@@ -121,7 +121,7 @@ def kind_of(space: Space) -> type[CoreCurve]:
     return known
 
 
-def read(points: Any, space: Space) -> list[Points]:
+def read(points: Any, space: Space[Any]) -> list[Points]:
     """Points as a user gives them, in every factor."""
     if not isinstance(space, Product):
         return [_read(space, points)]
@@ -155,7 +155,7 @@ def _read(space: Space, points: Any) -> Points:
     return Points(doubles, point_tol(array.dtype), lead[:-1], lead[-1])
 
 
-def read_ends(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[list[End] | None]:
+def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[list[End] | None]:
     """End conditions in every factor."""
     if not isinstance(space, Product):
         return [ends_of(bc_type, space, batch)]
@@ -164,7 +164,7 @@ def read_ends(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[list[E
 
 
 def curve_of(
-    space: Space, times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
+    space: Space[Any], times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
     """The curve with points and velocities, which are there for every factor.
 
@@ -255,7 +255,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
 
 
 def validated(
-    space: Space,
+    space: Space[Any],
     times: NDArray[np.float64],
     points: list[Points],
     ends: list[list[End] | None],
@@ -272,7 +272,7 @@ def validated(
 
 
 def hermite_data(
-    space: Space, times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
+    space: Space[Any], times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
 ) -> list[tuple[Array, Array, Array]]:
     """Points on the space, tangent velocities, and the longest distance between neighbours of each curve, in every
     factor.
@@ -349,7 +349,7 @@ def _number(fault: Fault) -> int:
     return fault.curve
 
 
-def _in_factors(space: Space, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
+def _in_factors(space: Space[Any], work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
     """What work gives in every factor for its value; errors say in which."""
     if not isinstance(space, Product):
         return [work(space, values[0])]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._spaces import Array
+from .._typing import FloatArray, P
 
 
 @dataclass(frozen=True)
-class Gradient:
+class Gradient(Generic[P]):
     """Gradient of a function of a spline with respect to its data.
 
     `CubicSpline.vjp` returns objects of this class.
@@ -40,9 +40,9 @@ class Gradient:
     ((3, 1), (3,), (None, None))
     """
 
-    points: Any
-    t: Array
-    ends: tuple[Any, Any]
+    points: P
+    t: FloatArray
+    ends: tuple[P | None, P | None]
 
 
 class Places(NamedTuple):

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._typing import Number
+
 Doubles = NDArray[np.float64]
 
 # Gauss's rule with this many nodes, on an interval and on its halves.
@@ -16,7 +18,9 @@ EXACT = 1e-14
 _PATIENCE = 5
 
 
-def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT) -> Any:
+def integrate(
+    times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT
+) -> Number:
     """∫ f dt over all segments, adaptively; f takes times of shape batch + (m,), and is exact to ``tol``.
 
     Where f is smooth the error falls fast; speed has kinks where a curve stops and turns, and
@@ -31,7 +35,9 @@ def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...
         return _refined(a, b, f, batch, tol)
 
 
-def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float) -> Any:
+def _refined(
+    a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float
+) -> Number:
     total = np.zeros(batch)
     whole = _rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)
@@ -48,7 +54,8 @@ def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[i
         open_still = (stalled <= _PATIENCE)[..., None] & (error > tol * scale[..., None])
         rough = open_still.reshape(-1, a.shape[-1]).any(axis=0)
         if not rough.any():
-            return (total + better.sum(axis=-1))[()]
+            result: Number = (total + better.sum(axis=-1))[()]
+            return result
         total = total + better[..., ~rough].sum(axis=-1)
         ends = ((a, middle), (middle, b))
         a, b = (np.concatenate([x[..., rough], y[..., rough]], axis=-1) for x, y in ends)

@@ -93,13 +93,14 @@ class ProductCurve(CurveArrays):
         pieces = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
         return tuple(part.push(at, bc, p, t, pair) for part, bc, p, pair in pieces)
 
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         cotangents = parts_of(cotangent, self.space, "cotangent")
         pieces = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
         parts = [part.pull(at, bc, c) for part, bc, c in pieces]
         first, last = (None if parts[0].ends[e] is None else tuple(g.ends[e] for g in parts) for e in (0, 1))
         t = np.sum([g.t for g in parts], axis=0)
-        return Gradient(tuple(g.points for g in parts), t, (first, last))
+        points: Any = tuple(g.points for g in parts)
+        return Gradient(points, t, (first, last))
 
     def picked(self, index: Any) -> ProductCurve:
         return ProductCurve(self.space, tuple(part.picked(index) for part in self._parts))

@@ -22,7 +22,7 @@ from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, so
 from .subspan import Span, span_of
 
 
-def reduced(space: Space, points: Array) -> tuple[Space, Array, Span | None]:
+def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span | None]:
     """A space, and points in it, to compute with; and the span to lift results from, if they lie in one."""
     if not ReducedCurve.suits(space):
         return space, points, None

@@ -6,7 +6,7 @@ from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._arrays import as_array, short_repr
 from .._core import ValidationError
@@ -17,6 +17,7 @@ from .._input import times_of
 from .._options import with_atol
 from .._spaces import Array, Space, factors_of
 from .._time import TimeAxis, knots_of
+from .._typing import TimesLike
 from .factors import grouped, smoothed_spaces, split
 from .precision import Precision, read_precision
 
@@ -74,7 +75,7 @@ class Knots(NamedTuple):
 
 
 def read_noisy(
-    t: ArrayLike | None,
+    t: TimesLike | None,
     points: Any,
     space: Space,
     weights: Any,
@@ -193,7 +194,7 @@ class Given(NamedTuple):
         return SmoothingData(self.clock, self.t, self.times, on_space, self.weighing, self.batch)
 
 
-def _times_of(t: ArrayLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
+def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
     clock, shown_times, times = knots_of(t, batch, count)
     if not np.isfinite(times).all():
         index = np.argwhere(~np.isfinite(times))[0].tolist()

@@ -27,7 +27,7 @@ def parts_of_factor(space: Space) -> tuple[Space, ...]:
     return (space,)
 
 
-def smoothed_spaces(space: Space) -> tuple[Space, ...]:
+def smoothed_spaces(space: Space[Any]) -> tuple[Space, ...]:
     """Return the spaces in which points are smoothed, each with its own λ.
 
     They are the factors of the space, with rotations and positions in place of poses.
@@ -35,12 +35,12 @@ def smoothed_spaces(space: Space) -> tuple[Space, ...]:
     return tuple(part for factor in factors_of(space) for part in parts_of_factor(factor))
 
 
-def is_several(space: Space) -> bool:
+def is_several(space: Space[Any]) -> bool:
     """Whether properties of the noise are tuples."""
     return isinstance(space, Product) or len(smoothed_spaces(space)) > 1
 
 
-def grouped(space: Space, values: Iterable[_T]) -> list[list[_T]]:
+def grouped(space: Space[Any], values: Iterable[_T]) -> list[list[_T]]:
     """Group values of the smoothed spaces by factor."""
     rest = iter(values)
     return [list(islice(rest, len(parts_of_factor(factor)))) for factor in factors_of(space)]

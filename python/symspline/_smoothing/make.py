@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +16,24 @@ from .._curves.solve import Options, Progress
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_points, warn_of_signs
-from .._spaces import Product, Space, factors_of
+from .._spaces import Product, Space, SpecialEuclidean, factors_of
 from .._spaces import space as space_named
+from .._typing import (
+    ChoiceOptions,
+    Criterion,
+    Extrapolate,
+    FloatArray,
+    Loss,
+    LsqOptions,
+    Numbers,
+    OnFailure,
+    P,
+    PointsLike,
+    PProduct,
+    SmoothingBCType,
+    SmoothingMethod,
+    TimesLike,
+)
 from ..manifolds._manifold import refuse_functions
 from .data import (
     Given,
@@ -32,6 +48,7 @@ from .data import (
     thin_knots,
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
+from .report import SmoothingReport
 from .solve import NO_CURVE, Asked, n_knots_for_df, one_a_curve, smoothed
 from .spline import SmoothingSpline
 from .spread import warn_of_spread
@@ -44,29 +61,59 @@ _MANY, _FIRST = 4000, 2000
 _TRIES = 4
 
 
+@overload
+def make_smoothing_spline(  # type: ignore[overload-overlap]
+    t: TimesLike | None,
+    points: PointsLike,
+    space: Product[PProduct],
+    lam: Numbers | None = None,
+    **options: Unpack[ChoiceOptions],
+) -> SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]: ...
+
+
+@overload
 def make_smoothing_spline(
-    t: ArrayLike | None,
-    points: Any,
-    space: Space | str,
-    lam: Any = None,
+    t: TimesLike | None,
+    points: PointsLike,
+    space: SpecialEuclidean,
+    lam: Numbers | None = None,
+    **options: Unpack[ChoiceOptions],
+) -> SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]: ...
+
+
+@overload
+def make_smoothing_spline(
+    t: TimesLike | None,
+    points: PointsLike,
+    space: Space[P] | str,
+    lam: Numbers | None = None,
+    **options: Unpack[ChoiceOptions],
+) -> SmoothingSpline[P]: ...
+
+
+def make_smoothing_spline(
+    t: TimesLike | None,
+    points: PointsLike,
+    space: Space[Any] | str,
+    lam: Numbers | None = None,
     *,
-    weights: Any = None,
-    frames: Any = None,
-    knots: Any = None,
-    criterion: str = "gcv",
+    weights: Numbers | None = None,
+    frames: Numbers | None = None,
+    knots: TimesLike | None = None,
+    criterion: Criterion = "gcv",
     gamma: float = 1.4,
-    sigma: Any = None,
-    bc_type: Any = "natural",
-    loss: str = "linear",
-    method: str = "auto",
+    sigma: Numbers | None = None,
+    bc_type: SmoothingBCType = "natural",
+    loss: Loss = "linear",
+    method: SmoothingMethod = "auto",
     tol: float = 1e-3,
     max_iter: int = 50,
-    extrapolate: bool | str | None = None,
-    on_failure: str = "raise",
+    extrapolate: Extrapolate = None,
+    on_failure: OnFailure = "raise",
     atol: float | None = None,
     where: ArrayLike | None = None,
     progress: Progress | None = None,
-) -> SmoothingSpline:
+) -> SmoothingSpline[Any, Any]:
     r"""Fit a C² curve close to noisy points.
 
     The curve minimises a weighted sum of squared distances to the data and the integrated squared acceleration. The
@@ -314,16 +361,55 @@ def make_smoothing_spline(
     return spline
 
 
-def make_lsq_spline(
-    t: ArrayLike | None,
-    points: Any,
-    knots: Any,
-    space: Space | str,
+@overload
+def make_lsq_spline(  # type: ignore[overload-overlap]
+    t: TimesLike | None,
+    points: PointsLike,
+    knots: TimesLike,
+    space: Product[PProduct],
     *,
-    weights: Any = None,
-    loss: str = "linear",
-    **options: Any,
-) -> SmoothingSpline:
+    weights: Numbers | None = None,
+    loss: Loss = "linear",
+    **options: Unpack[LsqOptions],
+) -> SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]: ...
+
+
+@overload
+def make_lsq_spline(
+    t: TimesLike | None,
+    points: PointsLike,
+    knots: TimesLike,
+    space: SpecialEuclidean,
+    *,
+    weights: Numbers | None = None,
+    loss: Loss = "linear",
+    **options: Unpack[LsqOptions],
+) -> SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]: ...
+
+
+@overload
+def make_lsq_spline(
+    t: TimesLike | None,
+    points: PointsLike,
+    knots: TimesLike,
+    space: Space[P] | str,
+    *,
+    weights: Numbers | None = None,
+    loss: Loss = "linear",
+    **options: Unpack[LsqOptions],
+) -> SmoothingSpline[P]: ...
+
+
+def make_lsq_spline(
+    t: TimesLike | None,
+    points: PointsLike,
+    knots: TimesLike,
+    space: Space[Any] | str,
+    *,
+    weights: Numbers | None = None,
+    loss: Loss = "linear",
+    **options: Unpack[LsqOptions],
+) -> SmoothingSpline[Any, Any]:
     """Fit a C² curve with given knots to noisy points by least squares.
 
     The curve minimises the weighted sum of squared distances to the data. There is no penalty on its acceleration; the

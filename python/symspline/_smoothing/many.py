@@ -12,18 +12,19 @@ from .._errors import raise_or_warn, warn
 from .._faults import UNCONVERGED, Fault
 from .._options import check_on_failure, check_progress
 from .._spaces import Space
+from .._typing import OnFailure
 from .make import make_smoothing_spline
 from .spline import SmoothingSpline
 
 
 def smooth_many(
     curves: Iterable[tuple[Any, Any, dict[str, Any]]],
-    space: Space,
+    space: Space[Any],
     *,
-    on_failure: str = "raise",
+    on_failure: OnFailure = "raise",
     progress: Progress | None = None,
     **options: Any,
-) -> list[SmoothingSpline]:
+) -> list[SmoothingSpline[Any, Any]]:
     """Fit one spline per curve, each with its own λ.
 
     Parameters
@@ -43,7 +44,7 @@ def smooth_many(
     check_on_failure(on_failure)
     check_progress(progress)
     given = list(curves)
-    found: list[SmoothingSpline] = []
+    found: list[SmoothingSpline[Any, Any]] = []
     faults: list[Fault] = []
     noted: list[tuple[int, Any]] = []
     for number, (t, points, own) in enumerate(given):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._report import BOOL, FLOAT, INT, mapped_columns, same_report
+from .._typing import Number
 
 METHODS = ("linearized", "newton")
 
@@ -57,15 +59,15 @@ class SmoothingReport:
     ('linearized', True, False)
     """
 
-    method: str = field(metadata={"words": METHODS})
-    converged: Any = field(metadata=BOOL)
-    iterations: Any = field(metadata=INT)
-    step: Any = field(metadata=FLOAT)
-    rate: Any = field(metadata=FLOAT)
-    lam: Any = field(metadata=FLOAT)
-    at_bound: Any = field(metadata=BOOL)
-    df: Any = field(metadata=FLOAT)
-    sigma: Any = field(metadata=FLOAT)
+    method: Literal["linearized", "newton"] = field(metadata={"words": METHODS})
+    converged: bool | NDArray[np.bool_] = field(metadata=BOOL)
+    iterations: int | NDArray[np.int64] = field(metadata=INT)
+    step: Number = field(metadata=FLOAT)
+    rate: Number = field(metadata=FLOAT)
+    lam: Number = field(metadata=FLOAT)
+    at_bound: bool | NDArray[np.bool_] = field(metadata=BOOL)
+    df: Number = field(metadata=FLOAT)
+    sigma: Number = field(metadata=FLOAT)
 
     def __str__(self) -> str:
         good = np.asarray(self.converged)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import _core
 from .._archive import Entries, read_fitted, read_times
@@ -13,18 +13,50 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.band import UncertaintyBand
-from .._curves.curve import CurveArrays, order_of
+from .._curves.curve import CurveArrays
 from .._curves.ends import fixed_velocities, is_closed
+from .._options import order_of
 from .._report import Report
 from .._spaces import Array, Product, Space, factors_of
 from .._time import TimeAxis
+from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P, TimesLike
 from .data import Doubles, SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
+from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
 
-class SmoothingSpline(CubicSpline):
+    # The report: one, or on products and for poses one for each part.
+    R = TypeVar(
+        "R", bound=SmoothingReport | tuple[SmoothingReport, ...], covariant=True, default=SmoothingReport
+    )
+
+    class noise_property:
+        """A property with the type of a number for one report, and of a tuple of them for several."""
+
+        def __init__(self, get: Callable[[Any], Number | tuple[Number, ...]]) -> None: ...
+
+        @overload
+        def __get__(self, spline: SmoothingSpline[Any, SmoothingReport], owner: Any = None) -> Number: ...
+
+        @overload
+        def __get__(
+            self, spline: SmoothingSpline[Any, tuple[SmoothingReport, ...]], owner: Any = None
+        ) -> tuple[Number, ...]: ...
+
+        def __get__(self, spline: SmoothingSpline[Any, Any], owner: Any = None) -> Any: ...
+
+else:
+    from typing import TypeVar
+
+    R = TypeVar("R", covariant=True)
+    noise_property = property
+
+
+class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     """A C² cubic spline close to noisy data.
 
     `make_smoothing_spline` and `make_lsq_spline` return objects of this class; it has no public constructor. All
@@ -61,8 +93,8 @@ class SmoothingSpline(CubicSpline):
         clock: TimeAxis,
         t: Array,
         curve: CurveArrays,
-        bc_type: Any,
-        extrapolate: Any,
+        bc_type: BCType,
+        extrapolate: Extrapolate,
         reports: list[Report],
         noisy: SmoothingData,
         smoothed: list[Smoothed],
@@ -79,39 +111,43 @@ class SmoothingSpline(CubicSpline):
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
-    def report(self) -> Any:
+    def report(self) -> R:  # type: ignore[override]
         """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
-        return self._each([found.report for found in self._smoothed])
+        reports: R = self._each([found.report for found in self._smoothed])
+        return reports
 
-    @property
-    def lam(self) -> Any:
+    @noise_property
+    def lam(self) -> Number | tuple[Number, ...]:
         """Weight λ of the bending energy."""
-        return self._each([found.report.lam for found in self._smoothed])
+        lam: Number | tuple[Number, ...] = self._each([found.report.lam for found in self._smoothed])
+        return lam
 
-    @property
-    def df(self) -> Any:
+    @noise_property
+    def df(self) -> Number | tuple[Number, ...]:
         """Effective degrees of freedom per coordinate.
 
         They are 2 for a geodesic, and the number of data for interpolation.
         """
-        return self._each([found.report.df for found in self._smoothed])
+        df: Number | tuple[Number, ...] = self._each([found.report.df for found in self._smoothed])
+        return df
 
-    @property
-    def sigma(self) -> Any:
+    @noise_property
+    def sigma(self) -> Number | tuple[Number, ...]:
         """Standard deviation of the noise in one coordinate, for weight one.
 
         This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))``.
         Coordinates refer to an orthonormal frame.
         """
-        return self._each([found.sigma for found in self._smoothed])
+        sigma: Number | tuple[Number, ...] = self._each([found.sigma for found in self._smoothed])
+        return sigma
 
     @property
-    def data(self) -> tuple[Array, Any]:
+    def data(self) -> tuple[AnyArray, P]:
         """Times and points that were smoothed."""
         return self._noisy.t, self._in_factors(self._noisy.points)
 
     @property
-    def residuals(self) -> Any:
+    def residuals(self) -> P:
         """Tangent vectors from the curve to the data, shape (..., N, *point_shape).
 
         They are logarithms at the curve, and their lengths are the distances. Data of weight zero have NaN.
@@ -129,9 +165,18 @@ class SmoothingSpline(CubicSpline):
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
             found.append(vectors)
-        return self._in_factors(found)
+        residuals: P = self._in_factors(found)
+        return residuals
 
-    def std(self, x: ArrayLike, nu: int = 0) -> Any:
+    @overload
+    def std(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, *, nu: int = 0) -> FloatArray: ...
+
+    @overload
+    def std(
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, *, nu: int = 0
+    ) -> tuple[FloatArray, ...]: ...
+
+    def std(self, x: TimesLike, *, nu: int = 0) -> Any:
         r"""Compute the standard deviation of the curve in one coordinate of an orthonormal frame.
 
         Parameters
@@ -211,7 +256,17 @@ class SmoothingSpline(CubicSpline):
         spread: Doubles = sigma * np.sqrt(variance)
         return spread
 
-    def band(self, x: ArrayLike, level: float = 0.95) -> Any:
+    @overload
+    def band(
+        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95
+    ) -> FloatArray: ...
+
+    @overload
+    def band(
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike, level: float = 0.95
+    ) -> tuple[FloatArray, ...]: ...
+
+    def band(self, x: TimesLike, level: float = 0.95) -> Any:
         """Compute the radius of the ball that contains the true point with a given probability.
 
         Parameters
@@ -254,7 +309,8 @@ class SmoothingSpline(CubicSpline):
         number = isinstance(level, (int, float, np.integer, np.floating)) and not isinstance(level, bool)
         if not number or not 0 < level < 1:
             raise ValidationError(f"level must lie between 0 and 1, not {short_repr(level)}")
-        spreads = self.std(x)
+        whole: SmoothingSpline[Any, Any] = self
+        spreads = whole.std(x)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
             [
@@ -291,7 +347,7 @@ class SmoothingSpline(CubicSpline):
         good = np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)
         return int(np.size(good) - np.sum(good))
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> SmoothingSpline:
+    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(clock, t, curve, index)
         noisy = self._noisy
         own = noisy._replace(
@@ -305,7 +361,7 @@ class SmoothingSpline(CubicSpline):
         return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
 
     @property
-    def _parts(self) -> tuple[SmoothingSpline, ...]:
+    def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
         """Splines in the factors of a product."""
         noisy = self._noisy
         weighing = grouped(self.space, noisy.weighing)
@@ -316,7 +372,7 @@ class SmoothingSpline(CubicSpline):
         )
 
     @classmethod
-    def _like(cls, spline: CubicSpline, noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
+    def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
         parts = (
             spline._clock,

@@ -19,7 +19,7 @@ from .report import SmoothingReport
 from .solve import Smoothed
 
 
-def noise_state(space: Space, noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
+def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
     """Return the entries of a smoothing spline in addition to those of a `CubicSpline`."""
     state: dict[str, Any] = {
         **times_state("data_t", noisy.t, noisy.clock),

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
+from .._typing import P
 from .base import Array, Space
 from .tolerance import point_tol
 
@@ -18,7 +19,7 @@ def adjoint(x: Array) -> Array:
     return np.swapaxes(x.conj(), -1, -2)
 
 
-def matrices(space: Space, g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:
+def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Array, float]:
     """Return the argument `g` of `Space.act` as square matrices, and the tolerance for its type."""
     array = as_array(g, "g")
     if array.dtype.kind not in ("biufc" if np.dtype(dtype).kind == "c" else "biuf"):
@@ -37,7 +38,7 @@ def matrices(space: Space, g: ArrayLike, size: int, dtype: Any) -> tuple[Array, 
     return cast(array, np.dtype(dtype)), point_tol(array.dtype)
 
 
-def require(space: Space, defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
+def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
     """Raise ValidationError for the first matrix whose deviation exceeds the limit."""
     bad = np.argwhere(~(np.isfinite(defects) & (defects <= allowed)))
     if len(bad):
@@ -55,7 +56,7 @@ def largest(x: Array) -> NDArray[np.float64]:
     return sizes
 
 
-def preserves(space: Space, g: Array, form: Array, tol: float, remedy: str) -> None:
+def preserves(space: Space[Any], g: Array, form: Array, tol: float, remedy: str) -> None:
     """Raise ValidationError unless g*Jg = J for the form J, to a tolerance relative to the squared size of g."""
     defects = largest(adjoint(g) @ form @ g - form)
     star = "*" if np.iscomplexobj(g) else "ᵀ"
@@ -63,7 +64,7 @@ def preserves(space: Space, g: Array, form: Array, tol: float, remedy: str) -> N
     require(space, defects, tol * np.maximum(1.0, largest(g)) ** 2, what, remedy)
 
 
-class Preserving(Space):
+class Preserving(Space[P]):
     """Vectors and bases of subspaces of a linear space with a form J: g acts as x ↦ gx, where g*Jg = J."""
 
     # Indices of the entries −1 of the diagonal matrix J; the other entries are 1.
@@ -96,7 +97,7 @@ class Preserving(Space):
         return (g @ x[..., None])[..., 0] if len(self.point_shape) == 1 else g @ x
 
 
-class Congruent(Space):
+class Congruent(Space[P]):
     """Positive definite matrices: g acts as x ↦ g x g*."""
 
     def _reflected(self, p: Array, x: Array) -> Any:
@@ -120,7 +121,7 @@ class Congruent(Space):
         return g @ x @ adjoint(g)
 
 
-class Group(Space):
+class Group(Space[P]):
     """Groups as symmetric spaces: a pair (a, b) of elements acts as x ↦ a x b⁻¹."""
 
     # Whether x⁻¹ = x*.
@@ -154,7 +155,7 @@ class Group(Space):
         return a @ (x @ adjoint(b) if self._unitary else adjoint(np.linalg.solve(adjoint(b), adjoint(x))))
 
 
-def homogeneous(space: Space, g: Any, dim: int) -> Array:
+def homogeneous(space: Space[Any], g: Any, dim: int) -> Array:
     """Return isometries of Euclidean space as homogeneous matrices (A, b; 0, 1)."""
     array, tol = matrices(space, g, dim + 1, np.float64)
     remedy = "Pass [[A, b], [0, 1]] with an orthogonal matrix A and a vector b."

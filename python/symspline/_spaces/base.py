@@ -7,16 +7,17 @@ import re
 from collections.abc import Callable, Mapping
 from functools import cached_property, wraps
 from inspect import signature
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import as_array, cast, short_repr, whole_number
 from .._core import Handle, ValidationError
+from .._typing import AnyArray, FloatArray, P
 from .tolerance import point_tol
 
-Array = NDArray[Any]
+Array = AnyArray
 
 # From this ambient dimension on, frames of the whole tangent space are not computed.
 LARGE = 256
@@ -27,7 +28,7 @@ _MOST = 2**40
 
 
 # The classes of all spaces except products, by name.
-CLASSES: dict[str, type[Space]] = {}
+CLASSES: dict[str, type[Space[Any]]] = {}
 # Complex counterparts of real spaces, for the message about complex points.
 COMPLEX_TWINS = {
     "rp": "ComplexProjective",
@@ -39,7 +40,7 @@ COMPLEX_TWINS = {
 }
 
 
-class Space:
+class Space(Generic[P]):
     """Base class of symmetric spaces.
 
     All methods work on arrays of points, whose leading axes broadcast. Tangent vectors are arrays with the shape of
@@ -82,6 +83,7 @@ class Space:
     _handle: Handle
     _parameters: tuple[int, ...]
     _complex: bool
+    _dtype: np.dtype[np.float64] | np.dtype[np.complex128]
     # Shape of the floating-point numbers of one point; a complex number is two.
     _doubles_shape: tuple[int, ...]
 
@@ -104,7 +106,7 @@ class Space:
         if max(self._parameters, default=0) >= _MOST or math.prod(self._point_shape) >= _MOST:
             raise ValidationError(f"{self!r} is too large: one point would not fit into memory")
         self._complex = self._handle.is_complex()
-        self._dtype = np.dtype(np.complex128 if self._complex else np.float64)
+        self._dtype = np.dtype(np.complex128) if self._complex else np.dtype(np.float64)
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
 
@@ -135,7 +137,7 @@ class Space:
         return self._handle.curvature()
 
     @property
-    def dtype(self) -> Any:
+    def dtype(self) -> np.dtype[np.float64] | np.dtype[np.complex128]:
         """Type of the numbers of a point, float64 or complex128."""
         return self._dtype
 
@@ -161,7 +163,7 @@ class Space:
 
     # ---- geometry ----
 
-    def exp(self, p: ArrayLike, v: ArrayLike) -> Array:
+    def exp(self, p: ArrayLike, v: ArrayLike) -> P:
         r"""Follow the geodesic from p with velocity v for unit time.
 
         Parameters
@@ -194,7 +196,7 @@ class Space:
         """
         return self._finite("exp", p=p, v=v)
 
-    def log(self, p: ArrayLike, q: ArrayLike) -> Array:
+    def log(self, p: ArrayLike, q: ArrayLike) -> P:
         r"""Compute the velocity at p of the geodesic that reaches q in unit time.
 
         Parameters
@@ -231,7 +233,7 @@ class Space:
         """
         return self._finite("log", p=p, q=q)
 
-    def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> Array:
+    def geodesic(self, p: ArrayLike, q: ArrayLike, t: ArrayLike) -> P:
         """Evaluate the geodesic from p to q at times t.
 
         Parameters
@@ -273,7 +275,7 @@ class Space:
             raise ValidationError(f"t must be real numbers, not {times.dtype}")
         return self._finite("geodesic", t=cast(times), p=p, q=q)
 
-    def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
+    def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
         """Compute the length of the shortest geodesic between p and q.
 
         Parameters
@@ -303,7 +305,7 @@ class Space:
         """
         return self._finite("distance", p=p, q=q)
 
-    def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> Array:
+    def transvection(self, p: ArrayLike, v: ArrayLike, x: ArrayLike) -> P:
         r"""Move points x by the transvection along a geodesic.
 
         Parameters
@@ -343,7 +345,7 @@ class Space:
         """
         return self._finite("transvection", p=p, v=v, x=x)
 
-    def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> Array:
+    def transport(self, p: ArrayLike, q: ArrayLike, v: ArrayLike) -> P:
         """Transport tangent vectors in parallel along the geodesic from p to q.
 
         Parameters
@@ -377,7 +379,7 @@ class Space:
         """
         return self._finite("transport", p=p, q=q, v=v)
 
-    def symmetry(self, p: ArrayLike, x: ArrayLike) -> Array:
+    def symmetry(self, p: ArrayLike, x: ArrayLike) -> P:
         """Apply the geodesic symmetry at p to points x.
 
         The symmetry reverses every geodesic through p. It is computed without a logarithm, so that it is also
@@ -424,7 +426,7 @@ class Space:
         """
         return self._isometric("symmetry", self._reflected, p=p, x=x)
 
-    def act(self, g: Any, x: ArrayLike) -> Array:
+    def act(self, g: ArrayLike | tuple[Any, ...], x: ArrayLike) -> P:
         """Apply an element g of the group of the space to points x.
 
         Every element is an isometry, or on groups without a metric an automorphism of the connection: the spline
@@ -495,7 +497,7 @@ class Space:
             element = self._element(g)
         return self._isometric("act", lambda x: self._moved(element, x), x=x)
 
-    def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> Array:
+    def _isometric(self, name: str, function: Callable[..., Array], **inputs: ArrayLike) -> P:
         """Apply a formula to arrays of points, and project the result onto the space to remove rounding errors."""
         arrays = {key: self._numbers(self._doubles(value, key)) for key, value in inputs.items()}
         self._leads({key: array.shape for key, array in arrays.items()})
@@ -510,7 +512,8 @@ class Space:
             raise ValidationError(
                 f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast"
             ) from None
-        return self._require_finite(name, result)
+        points: P = self._require_finite(name, result)
+        return points
 
     # The classes in `actions` define these methods for `symmetry` and `act`.
 
@@ -527,7 +530,7 @@ class Space:
     def _not_symmetric(self, what: str) -> ValidationError:
         return ValidationError(f"{self!r} is not known to be symmetric: it has no {what}")
 
-    def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
+    def inner(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> FloatArray:
         """Compute the inner product of two tangent vectors at p.
 
         Parameters
@@ -559,7 +562,7 @@ class Space:
         """
         return self._finite("inner", p=p, u=u, v=v)
 
-    def norm(self, p: ArrayLike, v: ArrayLike) -> Array:
+    def norm(self, p: ArrayLike, v: ArrayLike) -> FloatArray:
         """Compute the length of a tangent vector at p.
 
         Parameters
@@ -589,12 +592,12 @@ class Space:
         >>> ss.Sphere(2).norm([1, 0, 0], [0, 3, 4])
         np.float64(5.0)
         """
-        result: Array = np.sqrt(np.maximum(self._finite("inner", p=p, v=v, again=v), 0.0))
+        result: FloatArray = np.sqrt(np.maximum(self._finite("inner", p=p, v=v, again=v), 0.0))
         return result
 
     # ---- membership ----
 
-    def project(self, x: ArrayLike) -> Array:
+    def project(self, x: ArrayLike) -> P:
         """Project arrays near the manifold onto it.
 
         Parameters
@@ -622,7 +625,7 @@ class Space:
         >>> ss.Sphere(2).project([3, 0, 4])
         array([0.6, 0. , 0.8])
         """
-        result = self._apply("project", x=x)
+        result: Any = self._apply("project", x=x)
         good = np.isfinite(result) & np.isfinite(cast(self._array(x, "x"), self.dtype))
         if not good.all():
             bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
@@ -633,9 +636,10 @@ class Space:
             self.check_point(result)
         except ValidationError as error:
             raise ValidationError(f"x cannot be projected; for the nearest array, {error}") from None
-        return result
+        points: P = result
+        return points
 
-    def project_tangent(self, p: ArrayLike, v: ArrayLike) -> Array:
+    def project_tangent(self, p: ArrayLike, v: ArrayLike) -> P:
         """Project arrays onto the tangent space at p.
 
         Parameters
@@ -667,7 +671,7 @@ class Space:
         """
         return self._finite("project_tangent", p=p, v=v)
 
-    def _rounding(self, p: ArrayLike) -> Any:
+    def _rounding(self, p: ArrayLike) -> FloatArray:
         """Return the distance between neighbouring floating-point points at p in units of 2.2e-16.
 
         The result has the shape of the leading axes. It is |p|² in hyperbolic space, tr p · tr p⁻¹ (about the
@@ -743,7 +747,7 @@ class Space:
                 f"(allowed: {tol:.0e}); use space.project_tangent(p, v)"
             )
 
-    def frame(self, p: ArrayLike) -> Array:
+    def frame(self, p: ArrayLike) -> P:
         """Compute a basis of the tangent space at every point.
 
         Parameters
@@ -783,7 +787,7 @@ class Space:
 
     # ---- random points ----
 
-    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Array:
+    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> P:
         """Draw random points.
 
         Parameters
@@ -817,14 +821,16 @@ class Space:
             raise ValidationError(f"shape must be an integer or a tuple of integers, not {short_repr(shape)}")
         sizes = (shape,) if isinstance(shape, (int, np.integer)) else tuple(shape)
         noise = self._noise(rng, tuple(whole_number(n, "shape", 0) for n in sizes))
-        return self._apply("scatter", x=self._scatter_scale * noise)
+        points: Any = self._apply("scatter", x=self._scatter_scale * noise)
+        result: P = points
+        return result
 
     @property
     def _scatter_scale(self) -> float:
         """Factor of the standard normal numbers from which random points are computed."""
         return 1.0
 
-    def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> Array:
+    def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> P:
         """Draw random tangent vectors with the standard normal distribution.
 
         Parameters
@@ -863,7 +869,7 @@ class Space:
             return self._normal_tangent(p, noise)
         return self._finite("random_tangent", p=p, noise=noise)
 
-    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> P:
         """Return standard normal tangent vectors without a frame at p."""
         return self.project_tangent(p, noise)
 
@@ -942,11 +948,22 @@ class Space:
             return result.reshape(lead)[()]
         return self._numbers(result.reshape(lead + self._doubles_shape))
 
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+    @overload
+    def _finite(
+        self,
+        operation: Literal["distance", "inner"],
+        t: NDArray[np.float64] | None = None,
+        **inputs: ArrayLike,
+    ) -> FloatArray: ...
+
+    @overload
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> P: ...
+
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         """Apply an operation of the core, and raise ValidationError if a result is not finite."""
         return self._require_finite(operation, self._apply(operation, t, **inputs))
 
-    def _require_finite(self, operation: str, result: Array) -> Array:
+    def _require_finite(self, operation: str, result: Array) -> Any:
         if not np.isfinite(result).all():
             axes = () if operation in _NUMBERS else self._point_axes(result)
             bad = np.argwhere(~np.isfinite(result).all(axis=axes))[0].tolist()
@@ -957,23 +974,24 @@ class Space:
         return result
 
     def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
         if hasattr(cls, "_name"):
             CLASSES[cls._name] = cls
             cls.__init__ = _taking_numbers(cls, cls.__init__)  # type: ignore[method-assign]
 
 
-def example_of(cls: type[Space]) -> str:
+def example_of(cls: type[Space[Any]]) -> str:
     """Return an example of a space of this class, as a constructor call and as a name."""
     numbers = {"gr": "2, 4", "cgr": "2, 4", "stiefel": "2, 4", "igr": "0, 1, 1, 2"}.get(cls._name, "2")
     return f"{cls.__name__}({numbers}) or '{cls._name}:{numbers.replace(' ', '')}'"
 
 
-def _taking_numbers(cls: type[Space], init: Callable[..., None]) -> Callable[..., None]:
+def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callable[..., None]:
     """Wrap a constructor so that a wrong number of arguments raises an error that names the parameters."""
     names = [*signature(init).parameters][1:]
 
     @wraps(init)
-    def checked(self: Space, *numbers: Any, **named: Any) -> None:
+    def checked(self: Space[Any], *numbers: Any, **named: Any) -> None:
         # A check in advance would take longer than the constructor.
         try:
             init(self, *numbers, **named)

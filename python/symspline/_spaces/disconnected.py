@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import CutLocusError, ValidationError
+from .._typing import P
 from .base import Array, Space
 
 
-class DisconnectedGroup(Space):
+class DisconnectedGroup(Space[P]):
     """Group with two components. Operations on points in different components fail with an explanation."""
 
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         try:
             return super()._finite(operation, t, **inputs)
         except (CutLocusError, ValidationError):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from .._typing import ComplexArray, FloatArray
 from .actions import Group
 from .base import Array
 from .disconnected import DisconnectedGroup
 
 
-class SpecialOrthogonal(Group):
+class SpecialOrthogonal(Group[FloatArray]):
     r"""The rotation group SO(n).
 
     A point is an orthogonal n × n matrix of determinant 1. In SO(3), distance is the angle of the rotation from one
@@ -60,7 +61,7 @@ def _matrices(value: Any) -> Any:
     return value
 
 
-class Orthogonal(DisconnectedGroup, Group):
+class Orthogonal(DisconnectedGroup[FloatArray], Group[FloatArray]):
     r"""The orthogonal group O(n).
 
     A point is an orthogonal n × n matrix, a rotation or a reflection. The group has two components, and a curve stays
@@ -93,7 +94,7 @@ class Orthogonal(DisconnectedGroup, Group):
         super().__init__(n)
 
 
-class SpecialUnitary(Group):
+class SpecialUnitary(Group[ComplexArray]):
     r"""The special unitary group SU(n).
 
     A point is a unitary n × n matrix of determinant 1, such as a quantum gate without a global phase.
@@ -125,7 +126,7 @@ class SpecialUnitary(Group):
         super().__init__(n)
 
 
-class Unitary(Group):
+class Unitary(Group[ComplexArray]):
     r"""The unitary group U(n).
 
     A point is a unitary n × n matrix.
@@ -157,7 +158,7 @@ class Unitary(Group):
         super().__init__(n)
 
 
-class SpecialEuclidean(Group):
+class SpecialEuclidean(Group[FloatArray]):
     r"""The group SE(n) of rigid motions, or poses.
 
     A point is a homogeneous (n + 1) × (n + 1) matrix [[R, t], [0, 1]]. Geodesics are screw motions. For positions that

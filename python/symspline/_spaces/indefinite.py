@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._typing import FloatArray, P
 from .actions import Preserving, adjoint, matrices, preserves
 from .base import Array, Space
 
 
-class Indefinite(Space):
+class Indefinite(Space[P]):
     """Base class of spaces whose invariant metric is indefinite.
 
     Such a metric does not give lengths, so ``inner``, ``norm`` and ``distance`` do not use it. They are Euclidean ones
@@ -22,7 +23,7 @@ class Indefinite(Space):
     Splines do not depend on them: they commute with every isometry of the indefinite metric.
     """
 
-    def invariant_form(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> Array:
+    def invariant_form(self, p: ArrayLike, u: ArrayLike, v: ArrayLike) -> FloatArray:
         """Evaluate the invariant indefinite metric.
 
         Parameters
@@ -52,7 +53,7 @@ class Indefinite(Space):
         result = self._form(arrays["u"], arrays["v"])
         return np.broadcast_to(result, lead)[()].copy()
 
-    def distance(self, p: ArrayLike, q: ArrayLike) -> Array:
+    def distance(self, p: ArrayLike, q: ArrayLike) -> FloatArray:
         """Compute the length of ``log(p, q)`` with the norm at p.
 
         The invariant metric does not give distances. This number depends on the coordinate system, and it is not
@@ -85,7 +86,7 @@ class Indefinite(Space):
         raise NotImplementedError
 
 
-class DeSitter(Indefinite, Preserving):
+class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
     r"""De Sitter space dSⁿ.
 
     A point is an array (x₀, x₁, …, xₙ) with −x₀² + x₁² + … + xₙ² = 1; the time-like coordinate comes first.
@@ -130,7 +131,7 @@ class DeSitter(Indefinite, Preserving):
         return np.asarray((u[..., 1:] * v[..., 1:]).sum(axis=-1) - u[..., 0] * v[..., 0])
 
 
-class AntiDeSitter(Indefinite, Preserving):
+class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
     r"""Anti-de Sitter space AdSⁿ.
 
     A point is an array (x₀, x₁, …, xₙ) with −x₀² − x₁² + x₂² + … + xₙ² = −1; the two time-like coordinates come first.
@@ -172,7 +173,7 @@ class AntiDeSitter(Indefinite, Preserving):
         return np.asarray((u[..., 2:] * v[..., 2:]).sum(axis=-1) - (u[..., :2] * v[..., :2]).sum(axis=-1))
 
 
-class IndefiniteGrassmannian(Indefinite):
+class IndefiniteGrassmannian(Indefinite[FloatArray]):
     """Subspaces on which an indefinite form of signature (p, q) has signature (a, b).
 
     The form on ℝᵖ⁺ᑫ is −x₁² − … − x_p² + x_{p+1}² + …: in both signatures the number of negative squares comes first.

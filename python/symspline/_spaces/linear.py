@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from .._typing import ComplexArray, FloatArray
 from .actions import Group
 from .disconnected import DisconnectedGroup
 
 
-class GeneralLinear(DisconnectedGroup, Group):
+class GeneralLinear(DisconnectedGroup[FloatArray], Group[FloatArray]):
     r"""The general linear group GL(n, ℝ).
 
     A point is an invertible real n × n matrix. Curves through points of a closed subgroup stay in the subgroup.
@@ -43,7 +44,7 @@ class GeneralLinear(DisconnectedGroup, Group):
         super().__init__(n)
 
 
-class ComplexGeneralLinear(Group):
+class ComplexGeneralLinear(Group[ComplexArray]):
     """The complex general linear group GL(n, ℂ).
 
     A point is an invertible complex n × n matrix. Geodesics and lengths are as in `GeneralLinear`.
@@ -70,7 +71,7 @@ class ComplexGeneralLinear(Group):
         super().__init__(n)
 
 
-class Affine(DisconnectedGroup, Group):
+class Affine(DisconnectedGroup[FloatArray], Group[FloatArray]):
     """The group of affine maps x ↦ Ax + b.
 
     A point is a matrix [[A, b], [0, 1]] with an invertible n × n matrix A. Geodesics and lengths are as in
@@ -99,7 +100,7 @@ class Affine(DisconnectedGroup, Group):
         super().__init__(n)
 
 
-class Similarity(Group):
+class Similarity(Group[FloatArray]):
     """The group of similarities x ↦ sRx + b.
 
     A point is a matrix [[sR, b], [0, 1]] with a rotation R and a scale s > 0, such as a camera pose with a scale that
@@ -127,7 +128,7 @@ class Similarity(Group):
         super().__init__(n)
 
 
-class SpecialLinear(Group):
+class SpecialLinear(Group[FloatArray]):
     """The special linear group SL(n, ℝ).
 
     A point is a real n × n matrix of determinant 1. For n = 3 these represent homographies of the plane. Geodesics and
@@ -155,7 +156,7 @@ class SpecialLinear(Group):
         super().__init__(n)
 
 
-class Symplectic(Group):
+class Symplectic(Group[FloatArray]):
     """The symplectic group Sp(n, ℝ).
 
     A point is a real n × n matrix X with XᵀJX = J, where J = [[0, 1], [−1, 0]]: a linear canonical transformation of
@@ -184,7 +185,7 @@ class Symplectic(Group):
         super().__init__(n)
 
 
-class Lorentz(Group):
+class Lorentz(Group[FloatArray]):
     """The Lorentz group SO⁺(1, n).
 
     A point is a (1 + n) × (1 + n) matrix that preserves −t² + x², the orientation and the direction of time. The first

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any, overload
+
+from .._typing import P
 from .base import Space
 from .product import Product
 from .registry import spaces_named
 
 
-def space(name: str | Space) -> Space:
+@overload
+def space(name: str) -> Space: ...
+
+
+@overload
+def space(name: str | Space[P]) -> Space[P]: ...
+
+
+def space(name: str | Space[Any]) -> Space[Any]:
     """Return the space with a name.
 
     Parameters

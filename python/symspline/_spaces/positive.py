@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._core import ValidationError
+from .._typing import ComplexArray, FloatArray, P
 from .actions import Congruent, preserves, require
 from .base import Array
 
@@ -17,7 +18,7 @@ from .base import Array
 _FREE_SIZE = 20
 
 
-class _PositiveDefinite(Congruent):
+class _PositiveDefinite(Congruent[P]):
     """Positive definite matrices, whose random points are exponentials of random matrices."""
 
     @property
@@ -25,7 +26,7 @@ class _PositiveDefinite(Congruent):
         return min(1.0, math.sqrt(_FREE_SIZE / self.point_shape[0]))
 
 
-class SymmetricPositiveDefinite(_PositiveDefinite):
+class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
     r"""Symmetric positive definite matrices with the affine-invariant metric.
 
     A point is a symmetric positive definite n × n matrix, such as a covariance matrix or a diffusion tensor.
@@ -60,7 +61,7 @@ class SymmetricPositiveDefinite(_PositiveDefinite):
         super().__init__(n)
 
 
-class SpecialPositiveDefinite(_PositiveDefinite):
+class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):
     """Symmetric positive definite matrices of determinant 1, SL(n)/SO(n).
 
     A point describes the shape of a tensor without its size. The space is a totally geodesic subspace of
@@ -93,7 +94,7 @@ class SpecialPositiveDefinite(_PositiveDefinite):
         require(self, defects, tol, "|det g| − 1", "Divide g by abs(numpy.linalg.det(g)) ** (1 / n).")
 
 
-class HermitianPositiveDefinite(_PositiveDefinite):
+class HermitianPositiveDefinite(_PositiveDefinite[ComplexArray]):
     r"""Hermitian positive definite matrices with the affine-invariant metric.
 
     A point is a Hermitian positive definite n × n matrix.
@@ -124,7 +125,7 @@ class HermitianPositiveDefinite(_PositiveDefinite):
         super().__init__(n)
 
 
-class Siegel(_PositiveDefinite):
+class Siegel(_PositiveDefinite[FloatArray]):
     r"""Siegel's upper half space Sp(2n, ℝ)/U(n).
 
     The elements of the half space are complex symmetric n × n matrices X + iY with positive definite Y. A point is the

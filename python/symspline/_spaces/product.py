@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
+from .._typing import AnyArray, AnyArrays, FloatArray, PProduct
 from .base import Space
 from .registry import spaces_named
 
 Tuple = tuple[Any, ...]
+# Points of factors, which are not products themselves.
+_A = TypeVar("_A", bound=AnyArray)
+_B = TypeVar("_B", bound=AnyArray)
+_C = TypeVar("_C", bound=AnyArray)
+_D = TypeVar("_D", bound=AnyArray)
 
 
-class Product(Space):
+class Product(Space[PProduct]):
     """The product of several spaces.
 
     A point is a tuple with one point per factor. Geodesics and splines are computed in every factor separately, and
@@ -51,14 +57,35 @@ class Product(Space):
     'sphere:3 x euclidean:3'
     """
 
-    def __init__(self, *factors: Space | str) -> None:
+    @overload
+    def __init__(self: Product[tuple[_A, _B]], first: Space[_A], second: Space[_B], /) -> None: ...
+
+    @overload
+    def __init__(
+        self: Product[tuple[_A, _B, _C]], first: Space[_A], second: Space[_B], third: Space[_C], /
+    ) -> None: ...
+
+    @overload
+    def __init__(
+        self: Product[tuple[_A, _B, _C, _D]],
+        first: Space[_A],
+        second: Space[_B],
+        third: Space[_C],
+        fourth: Space[_D],
+        /,
+    ) -> None: ...
+
+    @overload
+    def __init__(self: Product[AnyArrays], *factors: Space[Any] | str) -> None: ...
+
+    def __init__(self, *factors: Space[Any] | str) -> None:
         if len(factors) < 2:
             raise ValidationError("a Product needs at least two factors")
         given = [factors_of(f) if isinstance(f, Space) else spaces_named(f) for f in factors]
-        self.factors: tuple[Space, ...] = tuple(part for parts in given for part in parts)
+        self.factors: tuple[Space[AnyArray], ...] = tuple(part for parts in given for part in parts)
 
     @property
-    def point_shape(self) -> Tuple:
+    def point_shape(self) -> tuple[tuple[int, ...], ...]:  # type: ignore[override]
         """Shapes of the arrays of one point, a tuple of tuples."""
         return tuple(f.point_shape for f in self.factors)
 
@@ -78,7 +105,9 @@ class Product(Space):
         return float(np.max([f.curvature for f in self.factors]))
 
     @property
-    def dtype(self) -> Tuple:
+    def dtype(  # type: ignore[override]
+        self,
+    ) -> tuple[np.dtype[np.float64] | np.dtype[np.complex128], ...]:
         """Types of the numbers of one point, a tuple with one entry per factor.
 
         Examples
@@ -98,16 +127,16 @@ class Product(Space):
     def __reduce__(self) -> Tuple:
         return Product, self.factors
 
-    def norm(self, p: Any, v: Any) -> Any:
+    def norm(self, p: ArrayLike, v: ArrayLike) -> FloatArray:
         return together(self._each("norm", p, v))
 
-    def project(self, x: Any) -> Any:
+    def project(self, x: ArrayLike) -> PProduct:
         return self._each("project", x)
 
-    def symmetry(self, p: Any, x: Any) -> Any:
+    def symmetry(self, p: ArrayLike, x: ArrayLike) -> PProduct:
         return self._each("symmetry", p, x)
 
-    def act(self, g: Any, x: Any) -> Any:
+    def act(self, g: ArrayLike | tuple[Any, ...], x: ArrayLike) -> PProduct:
         if not isinstance(g, (tuple, list)) or len(g) != len(self.factors):
             raise ValidationError(
                 f"g must be a tuple of {len(self.factors)} group elements, one per factor of {self!r}. "
@@ -115,24 +144,31 @@ class Product(Space):
             )
         return self._each("act", g, x)
 
-    def _rounding(self, p: Any) -> Any:
-        return np.max(np.stack(np.broadcast_arrays(*self._each("_rounding", p))), axis=0)[()]
+    def _rounding(self, p: ArrayLike) -> FloatArray:
+        largest: FloatArray = np.max(np.stack(np.broadcast_arrays(*self._each("_rounding", p))), axis=0)[()]
+        return largest
 
-    def check_point(self, p: Any) -> None:
+    def check_point(self, p: ArrayLike) -> None:
         self._each("check_point", p)
 
-    def check_tangent(self, p: Any, v: Any) -> None:
+    def check_tangent(self, p: ArrayLike, v: ArrayLike) -> None:
         self._each("check_tangent", p, v)
 
-    def frame(self, p: Any) -> Any:
+    def frame(self, p: ArrayLike) -> PProduct:
         return self._each("frame", p)
 
-    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> Any:
-        return tuple(factor.random_point(rng, shape) for factor in self.factors)
+    def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> PProduct:
+        each: Any = tuple(factor.random_point(rng, shape) for factor in self.factors)
+        points: PProduct = each
+        return points
 
-    def random_tangent(self, rng: np.random.Generator, p: Any) -> Any:
-        check_tuple(p, self, "p")
-        return tuple(factor.random_tangent(rng, q) for factor, q in zip(self.factors, p, strict=True))
+    def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> PProduct:
+        each: Any = tuple(
+            factor.random_tangent(rng, q)
+            for factor, q in zip(self.factors, parts_of(p, self, "p"), strict=True)
+        )
+        vectors: PProduct = each
+        return vectors
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
         each = tuple(
@@ -143,10 +179,12 @@ class Product(Space):
             return together(each)
         return sum(each) if operation == "inner" else each
 
-    def _each(self, method: str, *arguments: Any) -> Tuple:
+    def _each(self, method: str, *arguments: Any) -> PProduct:
         """Call a method of every factor with the entries of the arguments that belong to it."""
         parts = zip(self.factors, self._split(*arguments), strict=True)
-        return tuple(getattr(factor, method)(*part) for factor, part in parts)
+        each: Any = tuple(getattr(factor, method)(*part) for factor, part in parts)
+        result: PProduct = each
+        return result
 
     def _split(self, *arguments: Any) -> list[Tuple]:
         """Return the entries of the arguments that belong to each factor."""
@@ -156,19 +194,19 @@ class Product(Space):
         return list(zip(*arguments, strict=True))
 
 
-def factors_of(space: Space) -> tuple[Space, ...]:
+def factors_of(space: Space[Any]) -> tuple[Space[AnyArray], ...]:
     """Return the factors of a product, or the space itself in a tuple."""
     return space.factors if isinstance(space, Product) else (space,)
 
 
-def check_tuple(points: Any, space: Space, name: str) -> None:
+def check_tuple(points: Any, space: Space[Any], name: str) -> None:
     """Raise ValidationError unless there is one array per factor of the product."""
     count = len(factors_of(space))
     if not isinstance(points, (tuple, list)) or len(points) != count:
         raise ValidationError(f"{name} must be a tuple of {count} arrays, one per factor of {space!r}")
 
 
-def parts_of(value: Any, space: Space, name: str) -> Tuple:
+def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
     """Return the entries of a value that belong to each factor; in a space that is not a product, the value itself."""
     if not isinstance(space, Product):
         return (value,)
@@ -176,7 +214,8 @@ def parts_of(value: Any, space: Space, name: str) -> Tuple:
     return tuple(value)
 
 
-def together(lengths: Tuple) -> Any:
+def together(lengths: Tuple) -> FloatArray:
     """Combine the lengths in the factors by Pythagoras' theorem."""
     with np.errstate(all="ignore"):
-        return reduce(np.hypot, lengths)
+        length: FloatArray = reduce(np.hypot, lengths)
+        return length

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import ValidationError
+from .._typing import ComplexArray, FloatArray, P
 from .actions import Preserving, largest, require
 from .base import LARGE, Array
 from .tolerance import point_tol
@@ -17,7 +18,7 @@ from .tolerance import point_tol
 _NEAR = 1e-4
 
 
-class _Projective(Preserving):
+class _Projective(Preserving[P]):
     """Projective spaces, whose lines are sometimes given as projection matrices."""
 
     # The space of positive definite matrices of the same numbers.
@@ -60,7 +61,7 @@ def _is_density(x: Array) -> bool:
         )
 
 
-class RealProjective(_Projective):
+class RealProjective(_Projective[FloatArray]):
     """Real projective space ℝPⁿ, the lines through the origin of ℝⁿ⁺¹.
 
     A point is a unit vector of n + 1 numbers; x and −x are the same point. Distance is the angle between lines, at
@@ -91,7 +92,7 @@ class RealProjective(_Projective):
         super().__init__(n)
 
 
-class ComplexProjective(_Projective):
+class ComplexProjective(_Projective[ComplexArray]):
     r"""Complex projective space ℂPⁿ, the pure quantum states of n + 1 levels.
 
     A point is a complex unit vector of n + 1 numbers, up to a phase. `symspline.convert.density_to_state` converts
@@ -126,7 +127,7 @@ class ComplexProjective(_Projective):
         super().__init__(n)
 
 
-class ComplexHyperbolic(Preserving):
+class ComplexHyperbolic(Preserving[ComplexArray]):
     r"""Complex hyperbolic space ℂHⁿ.
 
     A point is a complex array (z₀, z₁, …, zₙ) with −|z₀|² + |z₁|² + … + |zₙ|² = −1, up to a phase.
@@ -159,12 +160,12 @@ class ComplexHyperbolic(Preserving):
         super().__init__(n)
 
 
-class _Subspaces(Preserving):
+class _Subspaces(Preserving[P]):
     """Grassmannians. In large ambient spaces, operations on two points are computed in the span of both."""
 
     _linear = True
 
-    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Array:
+    def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         k, n = self._parameters
         if operation not in ("exp", "log", "geodesic", "distance") or n < LARGE or n <= 2 * k:
             return super()._finite(operation, t, **inputs)
@@ -185,7 +186,7 @@ class _Subspaces(Preserving):
         return result if operation == "distance" else p @ result[..., :k, :] + basis @ result[..., k:, :]
 
 
-class Grassmannian(_Subspaces):
+class Grassmannian(_Subspaces[FloatArray]):
     r"""The Grassmannian Gr(k, n) of k-dimensional subspaces of ℝⁿ.
 
     A point is an n × k matrix with orthonormal columns, any basis of the subspace.
@@ -219,7 +220,7 @@ class Grassmannian(_Subspaces):
         super().__init__(k, n)
 
 
-class ComplexGrassmannian(_Subspaces):
+class ComplexGrassmannian(_Subspaces[ComplexArray]):
     """The complex Grassmannian of k-dimensional subspaces of ℂⁿ.
 
     A point is a complex n × k matrix with orthonormal columns, any basis of the subspace.
@@ -248,7 +249,7 @@ class ComplexGrassmannian(_Subspaces):
         super().__init__(k, n)
 
 
-class QuaternionicProjective(Preserving):
+class QuaternionicProjective(Preserving[ComplexArray]):
     r"""Quaternionic projective space ℍPⁿ, the lines of n + 1 quaternions.
 
     A point is a complex (2n + 2) × 2 matrix with orthonormal columns, any basis of the plane in ℂ²ⁿ⁺² that represents

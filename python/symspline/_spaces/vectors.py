@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._typing import FloatArray
 from .actions import Preserving, homogeneous, require
 from .base import Array, Space
 
 
-class Euclidean(Space):
+class Euclidean(Space[FloatArray]):
     """Euclidean space ℝⁿ.
 
     A point is an array of n numbers. Splines are the classical cubic splines.
@@ -47,7 +48,7 @@ class Euclidean(Space):
         return (g[..., :-1, :-1] @ x[..., None])[..., 0] + g[..., :-1, -1]
 
 
-class Sphere(Preserving):
+class Sphere(Preserving[FloatArray]):
     """The unit sphere Sⁿ.
 
     A point is a unit vector of n + 1 numbers. Distance is the angle between two vectors. S² describes directions and
@@ -78,7 +79,7 @@ class Sphere(Preserving):
         super().__init__(n)
 
 
-class Hyperbolic(Preserving):
+class Hyperbolic(Preserving[FloatArray]):
     r"""Hyperbolic space Hⁿ as a hyperboloid.
 
     A point is an array (x₀, x₁, …, xₙ) with −x₀² + x₁² + … + xₙ² = −1 and x₀ > 0; the time-like coordinate comes
@@ -119,7 +120,7 @@ class Hyperbolic(Preserving):
         require(self, -g[..., 0, 0], 0.0, "−g[0, 0]", "Pass −g, which keeps the sheet x₀ > 0.")
         return g
 
-    def _normal_tangent(self, p: ArrayLike, noise: Array) -> Array:
+    def _normal_tangent(self, p: ArrayLike, noise: Array) -> FloatArray:
         # The metric equals that of the ambient space at the origin (1, 0, …) only.
         middle = np.eye(1, self.point_shape[0])[0]
         noise[..., 0] = 0.0

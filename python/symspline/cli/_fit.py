@@ -162,7 +162,7 @@ def _fitted(
     return fitted
 
 
-def _bc_type(text: str) -> str | tuple[str, ...]:
+def _bc_type(text: str) -> Any:
     ends = tuple(end.strip() for end in text.split(","))
     if ends != ("periodic",) and (len(ends) > 2 or not set(ends) <= {"natural", "not-a-knot", "clamped"}):
         raise Problem(f"--bc-type {text}: give {_ENDS.replace(' (default)', '')}")

@@ -231,7 +231,7 @@ def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) ->
         return found
     factors, end = factors_of(spline.space), f"_d{nu}" if nu else ""
     half = 2 if columns.quaternion is not None else 1
-    stds: Sequence[Any] = parts_of(spline.std(x, nu), spline.space, "std")
+    stds: Sequence[Any] = parts_of(spline.std(x, nu=nu), spline.space, "std")
     for number, (factor, std) in enumerate(zip(factors, stds, strict=True), 1):
         name = f"std{number if len(factors) > 1 else ''}"
         if factor._name == "se":

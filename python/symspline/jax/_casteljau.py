@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
 
 from .._core import ValidationError
-from .._curves.curve import order_of
+from .._options import order_of
 from .._spaces import Product, Space, parts_of
 from .._spaces import space as space_named
 from ._embedding import second_fundamental_form
@@ -17,7 +17,19 @@ from ._registry import QUOTIENTS, model_of
 from ._spectral import adjoint
 
 
-def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, nu: int = 0) -> Any:
+@overload
+def evaluate(
+    t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0
+) -> jax.Array: ...
+
+
+@overload
+def evaluate(
+    t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0
+) -> tuple[jax.Array, ...]: ...
+
+
+def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
     """Evaluate curves with given knots, points and velocities, in JAX alone.
 
     This is `symspline.evaluate` written in JAX. It runs on the device of JAX and has derivatives of any order, in
@@ -77,7 +89,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, n
             space.factors,
             strict=True,
         )
-        return tuple(evaluate(t, p, v, factor, x, nu) for p, v, factor in pieces)
+        return tuple(evaluate(t, p, v, factor, x, nu=nu) for p, v, factor in pieces)
     model = model_of(space)
     points, velocities, t, x = arrays_of(space, points, velocities, t, x)
     batch = points.ndim - 1 - len(space.point_shape)

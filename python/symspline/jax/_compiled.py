@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, Unpack, overload
 
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
 from .._adapters import split
-from .._curves.curve import order_of
 from .._curves.ends import ends_in_factors
+from .._options import order_of
 from .._spaces import Product, Space, parts_of
 from .._spaces import space as space_named
+from .._typing import SolverOptions
 from ..manifolds._manifold import refuse_functions
 from ._embedding import second_fundamental_form
 from ._primitives import Fixed, fit_p, push_p
@@ -21,6 +22,7 @@ from ._primitives import Fixed, fit_p, push_p
 Array = jax.Array
 
 
+@overload
 def curve(
     x: Any,
     t: Any,
@@ -29,7 +31,32 @@ def curve(
     *,
     nu: int = 0,
     bc_type: Any = "natural",
-    **options: Any,
+    **options: Unpack[SolverOptions],
+) -> Array: ...
+
+
+@overload
+def curve(
+    x: Any,
+    t: Any,
+    points: Any,
+    space: Product,
+    *,
+    nu: int = 0,
+    bc_type: Any = "natural",
+    **options: Unpack[SolverOptions],
+) -> tuple[Array, ...]: ...
+
+
+def curve(
+    x: Any,
+    t: Any,
+    points: Any,
+    space: Space[Any] | str,
+    *,
+    nu: int = 0,
+    bc_type: Any = "natural",
+    **options: Unpack[SolverOptions],
 ) -> Any:
     """Evaluate a spline through points by the compiled core, with derivatives in JAX.
 
@@ -98,7 +125,7 @@ def curve(
     real = points.real.dtype
     x, t = jnp.asarray(x, real), jnp.asarray(t, real)
     vectors = tuple(jnp.asarray(v, points.dtype) for v in given if v is not None)
-    return _curve(Fixed(space, kinds, tuple(sorted(options.items()))), int(nu), x, t, points, *vectors)
+    return _curve(Fixed(space, kinds, tuple(sorted(options.items()))), nu, x, t, points, *vectors)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))

@@ -21,7 +21,7 @@ from ._motions import Rotations
 
 def fit(
     t: Any, points: Any, space: Space | str, *, bc_type: Any = "natural", steps: int = 40
-) -> tuple[Any, Any]:
+) -> tuple[jax.Array, jax.Array]:
     """Compute the velocities of C² splines through points of a sphere or rotations, in JAX alone.
 
     This is `symspline.fit` written in JAX. It runs on the device of JAX and has derivatives of any order, in forward

@@ -119,7 +119,7 @@ class Manifold(Space):
         dim: int | None = None,
         dtype: Any = np.float64,
     ) -> None:
-        self.functions = Functions(exp, log, project_tangent, inner, dlog, transport, project)
+        self.functions: Functions = Functions(exp, log, project_tangent, inner, dlog, transport, project)
         for name, function in self.functions._asdict().items():
             if not callable(function) and (function is not None or name in _NEEDED):
                 raise ValidationError(f"{name} must be a function, not {short_repr(function)}")
@@ -132,7 +132,7 @@ class Manifold(Space):
         self._complex = self._dtype == np.complex128
         *first, last = self._point_shape
         self._doubles_shape = (*first, 2 * last if self._complex else last)
-        self.operations = Operations(self)
+        self.operations: Operations = Operations(self)
         # The counterpart of the operations of the compiled core.
         self._handle: Any = self.operations
 
@@ -326,7 +326,7 @@ def _radius(value: Any) -> float:
     return float(value)
 
 
-def refuse_functions(space: Space, what: str, named: bool = False) -> None:
+def refuse_functions(space: Space[Any], what: str, named: bool = False) -> None:
     """Raise ValidationError if the space or a factor of it is a manifold made of functions.
 
     With `named`, the manifolds of the library, which have a name, are accepted.

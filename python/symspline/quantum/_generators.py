@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import ArrayLike
-
 from .._base_curve import check_curve
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.curve import order_of
+from .._options import order_of
 from .._spaces import ComplexGrassmannian, ComplexProjective, Space, SpecialUnitary, Unitary
+from .._typing import Extrapolate, TimesLike
 from ..convert._reading import Array, adjoint
 
 
-def hamiltonian(
-    spline: CubicSpline, x: ArrayLike, *, nu: int = 0, extrapolate: bool | str | None = None
-) -> Array:
+def hamiltonian(spline: CubicSpline, x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
     """Compute the Hamiltonian that drives states along a curve, or its derivative.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._cubic import CubicSpline
@@ -14,6 +14,7 @@ from .._curves.curve import CurveArrays
 from .._curves.subspan import span_of
 from .._spaces import ComplexGrassmannian, ComplexProjective
 from .._time import onto_ends
+from .._typing import TimesLike
 from ..convert._reading import Array, adjoint, refuse
 from ._generators import generator, quantum_space
 
@@ -26,7 +27,7 @@ _LEG = 0.4
 _BLOCK = 2**26
 
 
-def propagator(spline: CubicSpline, x: ArrayLike) -> Array:
+def propagator(spline: CubicSpline, x: TimesLike) -> Array:
     """Compute the unitary U(x) that propagates states from the first knot to time x.
 
     U satisfies iU' = HU, with U = 1 at the first knot. It moves the first point along the curve, and transports the
@@ -105,7 +106,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
     return small, span.basis
 
 
-def _times(spline: CubicSpline, x: ArrayLike) -> Doubles:
+def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
     """Return the times in the units of the core, the same for all curves."""
     times, per_curve = spline._clock.at(x, spline._batch, False)
     if per_curve:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,12 +11,17 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
+from .._typing import TimesLike
 from ..convert._reading import Array, adjoint, largest, refuse, square_matrices
 from ._generators import generator, hamiltonian, quantum_space
 
 
 def pulses(
-    spline: CubicSpline, edges: ArrayLike, *, kind: str = "exact", operators: ArrayLike | None = None
+    spline: CubicSpline,
+    edges: TimesLike,
+    *,
+    kind: Literal["exact", "midpoint"] = "exact",
+    operators: ArrayLike | None = None,
 ) -> Array:
     """Compute piecewise constant Hamiltonians that steer along a curve.
 
@@ -74,7 +79,7 @@ def pulses(
     return h if basis is None else _coefficients(h, basis)
 
 
-def _edges(spline: CubicSpline, edges: ArrayLike) -> tuple[Array, Array]:
+def _edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
     """Return the edges in their original type, and the intervals between them."""
     times = as_array(times_of(edges, "edges")[0], "edges")
     if times.ndim != 1 or len(times) < 2:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
+from .._typing import Extrapolate
 from ._generators import hamiltonian, quantum_space
 
+if TYPE_CHECKING:
+    from qutip import QobjEvo
 
-def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> Any:
+
+def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEvo:
     """Convert the Hamiltonian of a curve to a ``QobjEvo`` for QuTiP's solvers.
 
     With ħ = 1, times in ns give a Hamiltonian in rad/ns. The solver's states agree with the points of the curve up to a
@@ -64,7 +68,7 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> Any:
         import qutip
     except ImportError:
         raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
-    beyond = "geodesic" if spline._outside in ("raise", "nan") else None
+    beyond: Extrapolate = "geodesic" if spline._outside in ("raise", "nan") else None
     first, levels = float(spline.t[0]), spline.space.point_shape[0]
     if dims is not None and not (
         isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)

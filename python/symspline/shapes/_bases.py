@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .._cubic import CubicSpline
 from .._spaces import Grassmannian
+from .._typing import TimesLike
 from ..convert._reading import refuse
 from ._landmarks import Array
 
@@ -26,7 +26,7 @@ class Bases:
         Whether the spline is closed.
     """
 
-    def __init__(self, t: ArrayLike | None, points: Array, bc_type: Any) -> None:
+    def __init__(self, t: TimesLike | None, points: Array, bc_type: Any) -> None:
         self.shape = CubicSpline(t, points, Grassmannian(*points.shape[:0:-1]), bc_type=bc_type)
         self.start, self.closed = points[0], bc_type == "periodic"
 

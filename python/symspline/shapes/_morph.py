@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
 from .._spaces import Euclidean, SpecialOrthogonal, SymmetricPositiveDefinite
+from .._typing import AnyArray, BCWords, File, TimesLike
 from ..convert._reading import refuse
 from ._bases import Bases
 from ._landmarks import Array, orthonormal, place, placed, read, relative
@@ -68,12 +69,12 @@ class AffineMorph:
 
     def __init__(
         self,
-        t: ArrayLike | None,
+        t: TimesLike | None,
         landmarks: ArrayLike,
         *,
         base: int | None = None,
-        frame: str = "all",
-        bc_type: Any = "natural",
+        frame: Literal["all", "first"] = "all",
+        bc_type: BCWords = "natural",
     ) -> None:
         if not isinstance(frame, str) or frame not in ("all", "first"):
             raise ValidationError(f"frame must be 'all' or 'first', not {short_repr(frame)}")
@@ -95,7 +96,7 @@ class AffineMorph:
             else _Between(self._bases, moved, places, bc_type)
         )
 
-    def __call__(self, x: ArrayLike) -> Array:
+    def __call__(self, x: TimesLike) -> Array:
         """Evaluate the film.
 
         Parameters
@@ -124,7 +125,7 @@ class AffineMorph:
         return self._bases.shape
 
     @property
-    def t(self) -> Any:
+    def t(self) -> AnyArray:
         """Times of the drawings."""
         return self.shape.t
 
@@ -151,7 +152,7 @@ class AffineMorph:
         first = self._bases.start.T @ relative(self._drawings[0], self._base)
         return np.linalg.solve(first, self._bases.turn() @ first)
 
-    def plot(self, file: Any = None) -> Figure:
+    def plot(self, file: File | None = None) -> Figure:
         """Plot a film strip and small multiples of the film, in the plane or in space.
 
         Parameters

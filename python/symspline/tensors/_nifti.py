@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, brief, short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
+from .._typing import TensorOrder
 from ._orders import Array, from_vectors, to_vectors
 
 File = str | PathLike[str]
@@ -52,7 +53,9 @@ class Volume:
     header: Any = field(default=None, compare=False, repr=False)
 
 
-def read_nifti(file: File, *, order: str | None = None, mask: ArrayLike | File | None = None) -> Volume:
+def read_nifti(
+    file: File, *, order: TensorOrder | None = None, mask: ArrayLike | File | None = None
+) -> Volume:
     """Read diffusion tensors from a NIfTI file with six volumes.
 
     Several files with V voxels in the same mask form a batch of curves: stack their ``tensors`` along axis 1 to shape
@@ -118,7 +121,7 @@ def read_nifti(file: File, *, order: str | None = None, mask: ArrayLike | File |
     )
 
 
-def write_nifti(file: File, volume: Volume, *, order: str) -> None:
+def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
     """Write diffusion tensors to a NIfTI file, with zeros outside the mask.
 
     Parameters

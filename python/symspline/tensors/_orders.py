@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._spaces import point_tol
+from .._typing import TensorOrder
 from ..convert._reading import largest, refuse
 
 Array = NDArray[Any]
@@ -28,7 +29,7 @@ _ORDERS = {
 }
 
 
-def from_vectors(x: ArrayLike, *, order: str) -> Array:
+def from_vectors(x: ArrayLike, *, order: TensorOrder) -> Array:
     """Convert six numbers per tensor to symmetric matrices, points of ``SymmetricPositiveDefinite(3)``.
 
     Parameters
@@ -73,7 +74,7 @@ def from_vectors(x: ArrayLike, *, order: str) -> Array:
     return array[..., index]
 
 
-def to_vectors(matrices: ArrayLike, *, order: str) -> Array:
+def to_vectors(matrices: ArrayLike, *, order: TensorOrder) -> Array:
     """Convert symmetric matrices to six numbers per tensor, the inverse of `from_vectors`.
 
     Parameters

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Hashable, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import xarray as xr
 
-from .._curves.curve import quantity_of
-from .._options import checked_extrapolate, outside
+from .._options import checked_extrapolate, outside, quantity_of
 from .._spaces import Space
+from .._typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
 from .._version import VERSION
 from ._blocks import COLUMNS, Inputs, apply, fitted, resampled
 from ._results import KNOTS, along, bare, timed_by
@@ -30,12 +30,12 @@ def fit(
     *,
     dim: str = "time",
     point_dims: Sequence[str] = ("q",),
-    bc_type: Any = "natural",
-    method: str = "auto",
+    bc_type: BCType = "natural",
+    method: Method = "auto",
     tol: float = 1e-12,
     max_iter: int | None = None,
-    extrapolate: bool | str | None = None,
-    on_failure: str = "ignore",
+    extrapolate: Extrapolate = None,
+    on_failure: OnFailure = "ignore",
     atol: float | None = None,
     where: xr.DataArray | None = None,
 ) -> xr.Dataset:
@@ -122,7 +122,7 @@ def fit(
     return ds
 
 
-def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
+def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None) -> xr.DataArray:
     """Evaluate the curves of `fit`.
 
     Parameters
@@ -159,7 +159,7 @@ def evaluate(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | N
     return along(ds, x, quantity_of(nu), extrapolate)
 
 
-def lift(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None = None) -> xr.DataArray:
+def lift(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None) -> xr.DataArray:
     """Evaluate the curves by continuous representatives, see `CubicSpline.lift`.
 
     Parameters
@@ -190,7 +190,7 @@ def lift(ds: xr.Dataset, x: Any, nu: int = 0, *, extrapolate: bool | str | None 
     return along(ds, x, quantity_of(nu), extrapolate, lifted=True)
 
 
-def speed(ds: xr.Dataset, x: Any, *, extrapolate: bool | str | None = None) -> xr.DataArray:
+def speed(ds: xr.Dataset, x: Any, *, extrapolate: Extrapolate = None) -> xr.DataArray:
     """Compute the speed of the curves, the norm of γ'.
 
     Parameters
@@ -226,8 +226,8 @@ def resample(
     dim: str = "time",
     point_dims: Sequence[str] = ("q",),
     where: xr.DataArray | None = None,
-    bc_type: Any = "natural",
-    **options: Any,
+    bc_type: BCType = "natural",
+    **options: Unpack[SolverOptions],
 ) -> xr.DataArray:
     """Fit splines and evaluate them at other times in one call.
 

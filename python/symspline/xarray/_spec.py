@@ -36,7 +36,7 @@ class FitSpec(NamedTuple):
 
 def spec_of(
     da: xr.DataArray,
-    space: Space | str,
+    space: Space[Any] | str,
     dim: str,
     point_dims: Sequence[str],
     where: xr.DataArray | None,

@@ -1,0 +1,143 @@
+"""Types of arguments and results: points, and the words that options accept.
+
+A point is an array, or a tuple of arrays on a product of spaces. Spaces and curves are generic in this type:
+``CubicSpline(t, points, Sphere(2))`` is a ``CubicSpline[NDArray[np.float64]]``. Type checkers do not read names of
+spaces, so that ``"sphere:2"`` gives ``NDArray[Any]``. An annotation without a parameter, such as ``CubicSpline``,
+means the same. Annotate with ``CubicSpline[Any]`` to accept curves on products as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import date, timedelta
+from os import PathLike
+from typing import IO, TYPE_CHECKING, Any, Literal, Protocol, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+AnyArray = NDArray[Any]
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+# A point of a product whose factors a type checker does not know.
+AnyArrays = tuple[NDArray[Any], ...]
+# A number of one curve, or the numbers of a batch.
+Number = float | NDArray[np.float64]
+
+if TYPE_CHECKING:
+    # Type checkers bring this module with them; Python has defaults of type variables from 3.13 on.
+    from typing_extensions import TypeVar
+
+    # The type of a point.
+    P = TypeVar(
+        "P",
+        bound=NDArray[Any] | tuple[NDArray[Any], ...],
+        covariant=True,
+        default=NDArray[Any],
+    )
+    # The type of a point of a product.
+    PProduct = TypeVar(
+        "PProduct", bound=tuple[NDArray[Any], ...], covariant=True, default=tuple[NDArray[Any], ...]
+    )
+    # Arrays that results are written into.
+    Out = TypeVar("Out", bound=NDArray[Any] | tuple[NDArray[Any], ...])
+else:
+    from typing import TypeVar
+
+    P = TypeVar("P", covariant=True)
+    PProduct = TypeVar("PProduct", covariant=True)
+    Out = TypeVar("Out")
+
+
+class _Rotations(Protocol):
+    """What SciPy's ``Rotation`` has."""
+
+    def as_matrix(self) -> Any: ...
+
+
+# A time of a curve, or the times of the curves of a batch.
+Time = float | np.datetime64 | NDArray[Any]
+# Points, also as rotations of SciPy, or as lists of objects such as quantum states.
+PointsLike = ArrayLike | list[Any] | tuple[Any, ...] | _Rotations
+# Times: numbers, dates or durations, or arrays or lists of one of them.
+TimesLike = ArrayLike | date | timedelta | Sequence[date] | Sequence[timedelta]
+# Called with the finished and the total number of points.
+Progress = Callable[[int, int], object]
+File = str | PathLike[str] | IO[bytes]
+
+Extrapolate = Literal["raise", "geodesic", "periodic"] | bool | None
+OnFailure = Literal["raise", "warn", "ignore"]
+Method = Literal["auto", "quasi-newton", "newton", "fixed-point", "homotopy"]
+
+# The condition at one end: a word, or the order of a derivative and its value.
+End = Literal["natural", "clamped", "not-a-knot"] | tuple[int, ArrayLike]
+BCType = Literal["natural", "clamped", "not-a-knot", "periodic"] | tuple[End, End]
+BCWords = (
+    Literal["natural", "clamped", "not-a-knot", "periodic"]
+    | tuple[Literal["natural", "clamped", "not-a-knot"], Literal["natural", "clamped", "not-a-knot"]]
+)
+
+SmoothingEnd = Literal["natural", "clamped"] | tuple[int, ArrayLike]
+SmoothingBCType = Literal["natural", "clamped", "periodic"] | tuple[SmoothingEnd, SmoothingEnd]
+SmoothingMethod = Literal["auto", "linearized", "newton"]
+Criterion = Literal["gcv", "reml", "cp"]
+Loss = Literal["linear", "huber", "cauchy"]
+# One number, one for each curve of a batch, or a tuple with one of these for each factor of a product.
+Numbers = ArrayLike | tuple[ArrayLike | None, ...]
+
+Duplicates = Literal["raise", "first", "mean"]
+Frame = Literal["body", "world"]
+RotationOrder = Literal["columns", "rows", "interleaved"]
+TensorOrder = Literal["dipy", "fsl", "mrtrix", "itk"]
+
+
+class SolverOptions(TypedDict, total=False):
+    """Keywords of `CubicSpline` that functions for other libraries pass on."""
+
+    method: Method
+    tol: float
+    max_iter: int | None
+    extrapolate: Extrapolate
+    on_failure: OnFailure
+    atol: float | None
+
+
+class FitOptions(SolverOptions, total=False):
+    """The keywords of `CubicSpline`."""
+
+    bc_type: BCType
+    check: bool
+    where: ArrayLike | None
+    progress: Progress | None
+
+
+class LsqOptions(TypedDict, total=False):
+    """The keywords of `make_smoothing_spline` that `make_lsq_spline` passes on."""
+
+    frames: Numbers | None
+    sigma: Numbers | None
+    bc_type: SmoothingBCType
+    method: SmoothingMethod
+    tol: float
+    max_iter: int
+    extrapolate: Extrapolate
+    on_failure: OnFailure
+    atol: float | None
+    where: ArrayLike | None
+    progress: Progress | None
+
+
+class ChoiceOptions(LsqOptions, total=False):
+    """The keywords of `make_smoothing_spline`."""
+
+    weights: Numbers | None
+    knots: TimesLike | None
+    criterion: Criterion
+    gamma: float
+    loss: Loss
+
+
+class SmoothingOptions(ChoiceOptions, total=False):
+    """The keywords of `make_smoothing_spline`, and λ."""
+
+    lam: Numbers | None
