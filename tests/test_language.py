@@ -23,50 +23,19 @@ PAGES = [
     *(path for path in (ROOT / "docs").rglob("*.md") if not {"gallery", "generated"} & set(path.parts)),
 ]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-# The modules whose texts have been revised. The goal is all of them.
-MODULES = [
-    *(
-        PACKAGE / f"{name}.py"
-        for name in (
-            "_base_curve",
-            "_bspline",
-            "_config",
-            "_cubic",
-            "_errors",
-            "_exceptions",
-            "_functional",
-            "_hermite",
-            "_lonlat",
-            "_options",
-            "_pairs",
-            "_quaternions",
-            "_report",
-            "_representatives",
-            "_segments",
-            "_threads",
-            "geo",
-            "poses",
-            "rotations",
-            "subspaces",
-            "testing",
-            "torch",
-        )
-    ),
-    *(
-        path
-        for folder in (
-            "_smoothing",
-            "_spaces",
-            "convert",
-            "jax",
-            "quantum",
-            "shapes",
-            "tensors",
-            "xarray",
-        )
-        for path in (PACKAGE / folder).glob("*.py")
-    ),
-]
+# Modules whose texts have not been revised yet. The goal is none.
+PENDING = {
+    "_curves/control.py",
+    "_curves/core_curve.py",
+    "_curves/curve.py",
+    "_curves/ends.py",
+    "_curves/fit.py",
+    "_curves/integrals.py",
+    "_curves/reduced.py",
+    "_input.py",
+    "_time.py",
+}
+MODULES = [path for path in PACKAGE.rglob("*.py") if path.relative_to(PACKAGE).as_posix() not in PENDING]
 
 
 class Retired(NamedTuple):

@@ -50,7 +50,7 @@ def fitted(
 
 
 class Movable(NamedTuple):
-    """A fitted curve in a space that is no product, and the end conditions that it follows its data by."""
+    """A fitted curve in a space that is not a product, and its end conditions."""
 
     curve: CurveArrays
     bc_type: Any
@@ -80,5 +80,5 @@ class Movable(NamedTuple):
 
 
 def movable(spline: CubicSpline) -> Movable:
-    """A spline, not in a product, whose derivatives are wanted."""
+    """A spline, not in a product, whose derivatives are computed."""
     return Movable(spline._solved(), spline.bc_type)

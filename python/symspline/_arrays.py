@@ -20,7 +20,7 @@ def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
     masked = _first_masked(value)
     if masked is not None:
         raise ValidationError(
-            f"{name}{list(masked) or ''} is masked: what stands below a mask is no number; leave out what is missing"
+            f"{name}{list(masked) or ''} is masked, but masked entries have no value. Remove missing entries."
         )
     try:
         array = np.asarray(value)
@@ -100,7 +100,7 @@ def checked_flag(value: Any, name: str) -> bool:
 
 def is_single(dtype: Any) -> bool:
     """Whether a type of results is single precision; it may be double precision, too."""
-    # Texts are read as Python is, and may be no Python.
+    # NumPy parses texts as Python expressions, which may be invalid.
     with suppress(TypeError, ValueError, SyntaxError):
         if np.dtype(dtype) in (np.float32, np.complex64):
             return True

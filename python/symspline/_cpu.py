@@ -21,7 +21,7 @@ reason = ""
 
 
 def _has_v3() -> bool:
-    """Whether the processor has x86-64-v3, as its system says; True where it cannot be found out."""
+    """Whether the operating system reports that the processor has x86-64-v3; True if it is unknown."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return True
     try:
@@ -40,7 +40,7 @@ def _has_v3() -> bool:
 
 
 def _sysctl(name: bytes) -> int | None:
-    """A number that macOS knows of the processor; None if it does not know this one."""
+    """A number that macOS reports for the processor; None if it does not report this one."""
     value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
     # man 3 sysctl; the C library is part of every process.
     ask = ctypes.CDLL(None).sysctlbyname
@@ -50,7 +50,7 @@ def _sysctl(name: bytes) -> int | None:
 
 
 def _says_v3(plain: Path) -> bool:
-    """Whether the processor has x86-64-v3, as it says itself.
+    """Whether the processor itself reports that it has x86-64-v3.
 
     Asked through a module that it can run in any case: emulators show programs the files of another processor.
     """
@@ -108,7 +108,7 @@ def load(folder: Path) -> None:
     if file is None:
         return
     name = f"{__package__}._core"
-    # The compiled file knows itself as `_core`, whatever it is called.
+    # The compiled file identifies itself as `_core`, whatever it is called.
     spec = spec_from_file_location(name, file, loader=ExtensionFileLoader(name, str(file)))
     assert spec and spec.loader
     module = module_from_spec(spec)

@@ -23,7 +23,7 @@ class Fault(NamedTuple):
         `CUT_LOCUS`, `UNCONVERGED`, `INVALID`, or `ALMOST_CUT` for a good curve that would turn the other way round
         if its points moved a little.
     what, remedy : str
-        The problem, and what to do about it. ``{of}`` stands for words that name the curve.
+        The problem, and what to do about it. ``{of}`` is replaced by the name of the curve.
     node : int or None
         The node at which the problem was found.
     value, limit : float

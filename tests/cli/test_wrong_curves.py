@@ -38,7 +38,7 @@ def test_merged_tracks_are_reported(run):
     ships()
     out = run("fit ships.csv --lonlat --sort --dedup mean -o a.npz", notes=True)
     assert "12 rows merged with others of the same time (--dedup mean)" in out
-    assert "column 'ship' tells them apart" in out and "--curve ship" in out
+    assert "column 'ship' distinguishes them" in out and "--curve ship" in out
 
 
 def test_tracks_smoothed_as_one_are_reported(run):

@@ -123,8 +123,8 @@ def run(options: argparse.Namespace) -> int:
     column = hint() if same else None
     if column is not None:
         say(
-            f"{same} rows have a time that another row has, and column {column!r} tells them apart: if the table holds "
-            f"several tracks, fit each of them with --curve {column}"
+            f"{same} rows have a time that another row has, and column {column!r} distinguishes them: if the table "
+            f"holds several tracks, fit each of them with --curve {column}"
         )
     return 0
 
