@@ -34,20 +34,16 @@ _Ends = Sequence[tuple[str, _Doubles | None]] | None
 _Fault = tuple[int, str, int | None, float, float, str | None]
 
 def fit(
-    handle: Handle,
+    factors: Sequence[tuple[Handle, _Doubles, _Ends, float | None]],
     t: _Doubles,
-    points: _Doubles,
-    ends: _Ends,
     method: str,
     tol: float,
     max_iter: int | None,
-    check: bool,
-    point_tol: float,
     offsets: Sequence[int] | None = None,
     mask: Sequence[bool] | None = None,
     skip_invalid: bool = False,
     progress: _Progress | None = None,
-) -> tuple[_Doubles, _Doubles, tuple[NDArray[np.int64], _Doubles], list[_Fault]]: ...
+) -> list[tuple[_Doubles, _Doubles, tuple[NDArray[np.int64], _Doubles], list[_Fault]]]: ...
 def validate(
     handle: Handle,
     t: _Doubles,

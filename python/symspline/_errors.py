@@ -35,24 +35,37 @@ def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
     batch = (len(spline),) if isinstance(spline, (list, tuple)) else spline._batch
     failed = [fault for fault in faults if fault.failed]
     if failed and on_failure != "ignore":
-        first = failed[0]
-        remedy = _remedy_for_close_times(first, batch, spline) or first.remedy
-        message = first._replace(remedy=remedy).message(batch) + _more(failed, "curves failed")
+        first = _explained_by_close_times(failed[0], batch, spline)
+        message = first.message(batch) + _more(failed, "curves failed")
         if on_failure == "raise":
             error: Any = _ERRORS.get(first.kind, ConvergenceError)(message)
             error.spline = spline
             error.curve = first.batch_index(batch)
             error.node, error.value, error.limit = first.node, first.value, first.limit
             raise error
-        warnings.warn(message, ConvergenceWarning, stacklevel=callers_level())
+        warn(message, ConvergenceWarning, first.batch_index(batch), first.node)
     almost = [fault for fault in faults if not fault.failed]
     if almost:
         message = almost[0].message(batch) + _more(almost, "curves")
-        warnings.warn(message, UserWarning, stacklevel=callers_level())
+        warn(message, UserWarning, almost[0].batch_index(batch), almost[0].node)
 
 
-def _remedy_for_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> str | None:
-    """Return a remedy that names two times too close together for their points, or None.
+def warn(
+    message: str, category: type[Warning], curve: tuple[int, ...] | None = None, node: int | None = None
+) -> None:
+    """Issue a warning at the line that called this package.
+
+    The warning has the attributes ``curve`` and ``node`` of a `SymsplineError`.
+    """
+    warning: Any = category(message)
+    warning.curve, warning.node = curve, node
+    warnings.warn(warning, stacklevel=callers_level())
+
+
+def _explained_by_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -> Fault:
+    """Return the fault with a remedy that names two times too close together for their points, if there are any.
+
+    The first of the two times becomes the node of a fault that has none.
 
     Notes
     -----
@@ -60,13 +73,13 @@ def _remedy_for_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -
     shorter than its neighbours, this speed moves the curve in them much farther than their points are apart.
     """
     if not fault.about_times:
-        return None
+        return fault
     single = isinstance(spline, (list, tuple))
     curve = spline[fault.curve] if single else spline
     index = np.unravel_index(fault.curve, batch) if batch and not single else ()
     h = np.diff(curve._times[index] if curve._times.ndim > 1 else curve._times)
     if len(h) < 2:
-        return None
+        return fault
     around = np.minimum(np.append(np.inf, h[:-1]), np.append(h[1:], np.inf))
     i = int(np.argmax(around / h))
     steps = []
@@ -76,18 +89,19 @@ def _remedy_for_close_times(fault: Fault, batch: tuple[int, ...], spline: Any) -
             try:
                 own = np.asarray(part.space.distance(points[:-1], points[1:]))
             except (CutLocusError, ValidationError):
-                return None
+                return fault
         if not own.max() <= 0.5 * part.space.injectivity_radius:
-            return None
+            return fault
         steps.append(own)
     step = np.linalg.norm(steps, axis=0)
     if not (around[i] > _CLOSE * h[i] and step[i] / h[i] > _CLOSE * np.median(step / h)):
-        return None
+        return fault
     t = curve._t[index] if curve._t.ndim > 1 else curve._t
-    return (
+    remedy = (
         f"t[{i}] = {t[i]} and t[{i + 1}] = {t[i + 1]} are too close for the distance {step[i]:.3g} between "
         "their points: merge the two samples, smooth the data with make_smoothing_spline, or correct the times"
     )
+    return fault._replace(remedy=remedy, node=i if fault.node is None else fault.node)
 
 
 def _more(faults: list[Fault], what: str) -> str:

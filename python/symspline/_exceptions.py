@@ -33,6 +33,12 @@ class SymsplineError(Exception):
         vars(error).update(vars(self))
         return error
 
+    def _of_curve(self, number: int) -> Self:
+        """Return the error of one of several curves, which the message names."""
+        error = self._with_message(f"curve {number}: {self}")
+        error.curve = (number,)
+        return error
+
 
 class ValidationError(SymsplineError, ValueError):
     """The input does not meet the requirements. The message names the argument, the index, the value and the remedy."""

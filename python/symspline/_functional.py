@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import read_only, short_repr
+from ._arrays import short_repr
 from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -21,7 +21,7 @@ from ._input import in_library, library_of
 from ._options import check_progress, checked_extrapolate, fit_options, outside, with_atol
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of
+from ._spaces import Array, Space, factors_of, parts_of, point_tol
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
@@ -186,7 +186,7 @@ def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tu
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
     read = [
-        velocities_of(*each)
+        velocities_of(*each)[0]
         for each in zip(factors_of(space), (part.doubles for part in data), own, strict=True)
     ]
     batch, nodes = data[0].batch, data[0].nodes
@@ -199,18 +199,22 @@ def given(t: ArrayLike | None, points: Any, velocities: Any, space: Space) -> tu
     return clock, fitting.curve_of(space, times, arrays, fitted=False)
 
 
-def velocities_of(space: Space, points: Array, velocities: Any) -> Array:
-    """Return velocities in one factor as a read-only array, after checks of their shape and numbers."""
-    doubles = space._doubles(velocities, "velocities")
-    array = read_only(space._numbers(doubles))
+def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
+    """Return velocities in one factor, after checks of their shape and numbers, and how far they may be from tangent.
+
+    The array has flags of its own, so that making it read-only leaves the user's array as it is.
+    """
+    array = space._array(velocities, "velocities")
+    doubles = space._doubles(array, "velocities")
+    numbers = space._numbers(doubles).view()
     if doubles.shape != points.shape:
         raise ValidationError(
-            f"velocities has shape {array.shape}, but points {space._numbers(points).shape}"
+            f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}"
         )
-    if not np.isfinite(array).all():
-        index = np.argwhere(~np.isfinite(array))[0].tolist()
+    if not np.isfinite(numbers).all():
+        index = np.argwhere(~np.isfinite(numbers))[0].tolist()
         raise ValidationError(f"velocities{index} is not finite")
-    return array
+    return numbers, point_tol(array.dtype)
 
 
 def fit_many(
@@ -287,7 +291,7 @@ def fit_many(
             points.append(data)
             knots.append(knots_of(t, (), data[0].nodes))
         except (ValidationError, TypeError, ValueError) as error:
-            raise ValidationError(f"curve {number}: {error}") from None
+            raise ValidationError(str(error))._of_curve(number) from None
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
     problem = fitting.ManyProblem(

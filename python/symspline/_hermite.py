@@ -13,8 +13,8 @@ from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
 from ._functional import velocities_of
 from ._options import checked_extrapolate, outside, with_atol
-from ._representatives import warn_of_far_points, warn_of_signs
-from ._spaces import Array, Space, factors_of, parts_of, point_tol
+from ._representatives import warn_of_representatives
+from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
 from ._time import TimeAxis, knots_of
 
@@ -103,23 +103,25 @@ class HermiteSpline(SegmentedCurve):
         atol: float | None = None,
     ) -> None:
         space = space_named(space)
-        policy = checked_extrapolate(extrapolate)
-        data = with_atol(read(points, space), atol)
+        if extrapolate is not None:
+            checked_extrapolate(extrapolate)
+        data = read(points, space)
+        if atol is not None:
+            data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
         given = parts_of(velocities, space, "velocities")
         vectors = [
-            (velocities_of(factor, part.doubles, own), point_tol(factor._array(own, "velocities").dtype))
+            velocities_of(factor, part.doubles, own)
             for factor, part, own in zip(factors_of(space), data, given, strict=True)
         ]
         clock, shown_times, times = knots_of(t, batch, nodes)
         try:
-            arrays = hermite_data(space, times, data, vectors)
+            found = hermite_data(space, times, data, vectors)
         except ValidationError as error:
             raise clock.explain(error) from None
-        curve = curve_of(space, times, arrays, fitted=False)
-        self._fill(clock, shown_times, curve, policy)
-        warn_of_signs(space, [data])
-        warn_of_far_points([curve])
+        curve = curve_of(space, times, [own[:2] for own in found], fitted=False)
+        self._fill(clock, shown_times, curve, extrapolate)
+        warn_of_representatives(space, [data], [curve], [[own[2] for own in found]])
 
     def _fill(self, clock: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
         self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -13,10 +12,12 @@ from numpy.typing import NDArray
 from ._core import CutLocusError
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points
-from ._errors import callers_level
+from ._errors import warn
 from ._report import MAX_STEP, Columns, FarPointsWarning
 from ._spaces import Array, Space, Sphere, Unitary, factors_of
 from .manifolds import Manifold
+
+Doubles = NDArray[np.float64]
 
 # The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6
@@ -36,23 +37,28 @@ def warn_of_representatives(
     space: Space,
     points: Sequence[list[Points] | None],
     curves: Sequence[CurveArrays],
-    columns: Sequence[Sequence[Columns]],
+    longest_steps: Sequence[Sequence[Columns | Doubles]],
 ) -> None:
     """Warn about signs and about far points, for curves through their points.
 
     Parameters
     ----------
-    points, curves, columns
+    points, curves, longest_steps
         As for `warn_of_signs` and `warn_of_far_points`.
     """
     factors = factors_of(space)
-    for each in columns:
+    for each in longest_steps:
         for factor, own in zip(factors, each, strict=True):
             limit = factor.__dict__.get("_longest_near_step") or _longest_near_step(factor)
-            if np.count_nonzero(own.numbers[MAX_STEP] > limit):
+            if np.count_nonzero(_longest(own) > limit):
                 warn_of_signs(space, points)
-                warn_of_far_points(curves, columns)
+                warn_of_far_points(curves, longest_steps)
                 return
+
+
+def _longest(steps: Columns | Doubles) -> Doubles:
+    """Return the longest step of every curve."""
+    return steps.numbers[MAX_STEP] if isinstance(steps, Columns) else steps
 
 
 def _longest_near_step(space: Space) -> float:
@@ -97,13 +103,14 @@ def warn_of_signs(space: Space, curves: Sequence[list[Points] | None]) -> None:
     of = f" of curve {','.join(map(str, curve))}" if curve else ""
     more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
-    warnings.warn(
+    warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
         f"round. "
         f"{IN_PYTHON}",
         UserWarning,
-        stacklevel=callers_level(),
+        tuple(curve),
+        i,
     )
 
 
@@ -116,7 +123,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 
 
 def warn_of_far_points(
-    curves: Sequence[CurveArrays], columns: Sequence[Sequence[Columns]] | None = None
+    curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]
 ) -> None:
     """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
@@ -124,8 +131,8 @@ def warn_of_far_points(
     ----------
     curves : sequence of CurveArrays
         The curves of one fit.
-    columns : sequence of sequence of Columns, optional
-        The reports of each curve in every factor. Points whose longest step is short need not be examined.
+    longest_steps : sequence of sequence of Columns or ndarray
+        The longest steps of each curve in every factor, or its reports. Points need not be examined if these are short.
     """
     found: list[tuple[tuple[int, ...], int, int, Space]] = []
     for number, curve in enumerate(curves):
@@ -134,12 +141,12 @@ def warn_of_far_points(
             continue
         for k, part in enumerate(curve.parts):
             limit = FAR * part.space.injectivity_radius
-            own = None if columns is None else columns[number][k]
+            own = longest_steps[number][k]
             # The deciding angle never exceeds the distance.
-            if not limit < math.inf or (own is not None and not (own.numbers[MAX_STEP] > limit).any()):
+            if not (_longest(own) > limit).any():
                 continue
             far = np.count_nonzero(cut_fractions(part.space, part.points) > FAR, axis=-1)
-            if own is not None:
+            if isinstance(own, Columns):
                 # Curves that did not converge are reported elsewhere, according to `on_failure`.
                 far = np.where(own.row("converged").reshape(curve.batch), far, 0)
             for index in np.argwhere(far > steps / 2).tolist():
@@ -151,14 +158,14 @@ def warn_of_far_points(
     of = f" of curve {','.join(map(str, place))}" if place else ""
     others = len({place for place, *_ in found}) - 1
     more = f" (and of {others} more curves)" if others else ""
-    warnings.warn(
+    warn(
         f"more than half of the steps are long: {count} of {steps} steps between neighbouring points{of}{more} are "
         f"beyond {FAR} of the way to the cut locus of {space!r}, where several C² curves may exist. Where points have "
         "equivalent representatives, as orientations of crystals do, take the one nearest to the previous point. Where "
         "phases, signs or bases do not count, remove them, or use a projective space or a Grassmannian. Otherwise put "
         "points in between.",
         FarPointsWarning,
-        stacklevel=callers_level(),
+        place,
     )
 
 

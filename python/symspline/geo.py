@@ -12,7 +12,6 @@ Examples
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -24,7 +23,7 @@ from ._arrays import short_repr
 from ._base_curve import check_curve
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
-from ._errors import callers_level
+from ._errors import warn
 from ._functional import fit_many
 from ._lonlat import compass, from_lonlat, to_lonlat
 from ._segments import check_smooth, cut
@@ -232,12 +231,12 @@ def resample(
         own = rows[np.argsort(utc[rows], kind="stable")]
         try:
             used = np.ones(len(own), bool) if smooth else None
-            pieces = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
+            segments = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
         except ValidationError as error:
             of = f"{_named(keys, label)}, rows in the order of time: " if keys else ""
             raise ValidationError(f"{of}{error}") from None
-        curves += pieces
-        owners += [label] * len(pieces)
+        curves += segments
+        owners += [label] * len(segments)
     if not curves and len(frame):
         raise ValidationError(
             f"every track has fewer than {min_points} positions between gaps longer than max_gap={short_repr(max_gap)} "
@@ -271,12 +270,13 @@ def _named(keys: list[Any], label: tuple[Any, ...]) -> str:
 
 
 def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: dict[str, Any]) -> Any:
-    """Fit the curves, and replace their numbers in messages by their names."""
+    """Fit the curves, and name them in messages by their names instead of their numbers."""
     if not curves:
         return []
 
-    def renamed(message: object) -> str:
-        return re.sub(r"\bcurve (\d+)\b", lambda found: names[int(found[1])], str(message))
+    def renamed(found: Any) -> str:
+        curve = getattr(found, "curve", None)
+        return str(found).replace(f"curve {curve[0]}", names[curve[0]]) if curve else str(found)
 
     caught: list[warnings.WarningMessage] = []
     try:
@@ -287,11 +287,11 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
             else:
                 found = fit_many(curves, Sphere(2), **options)
     except (ValidationError, ConvergenceError, CutLocusError) as error:
-        own: Any = type(error)(renamed(error))
-        vars(own).update(vars(error))
-        raise own from None
+        raise error._with_message(renamed(error)) from None
     for warning in caught:
-        warnings.warn(renamed(warning.message), warning.category, stacklevel=callers_level())
+        note = warning.message
+        fields = (getattr(note, field, None) for field in ("curve", "node"))
+        warn(renamed(note), warning.category, *fields)
     return found
 
 

@@ -280,5 +280,5 @@ def test_a_lambda_that_does_not_settle_is_told():
         assert ss.make_smoothing_spline(t, points, sphere, spline.lam, weights=weights).report.converged
     # Rounding may settle one of them elsewhere.
     assert any(told)
-    with pytest.raises(ss.ConvergenceError, match=r"do not determine .* leave out data of tiny weight"):
+    with pytest.raises(ss.ConvergenceError, match=r"do not determine .* remove data with tiny weights"):
         ss.make_smoothing_spline(None, points, sphere, weights=np.r_[1e300, np.ones(n - 1)])

@@ -333,3 +333,15 @@ def test_errors_carry_the_curve_the_node_and_the_numbers():
     frames[1, 1] *= 2
     error = raised(ss.ValidationError, None, frames, ss.Stiefel(2, 4))
     assert (error.curve, error.node) == ((1,), 1)
+
+
+def test_warnings_about_a_curve_have_its_index_and_node():
+    t = [0, 1, 2]
+    good, turned = np.eye(4)[[0, 1, 2]], np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, -0.8, 0.6, 0]])
+    with pytest.warns(UserWarning, match="opposite sign") as caught:
+        ss.fit_many([(t, good), (t, turned)], "sphere:3")
+    (warning,) = [found.message for found in caught]
+    assert (warning.curve, warning.node) == ((1,), 1)
+    with pytest.warns(ss.ConvergenceWarning, match="cut locus") as caught:
+        ss.CubicSpline(None, [good, [good[0], -good[0], good[1]]], "sphere:3", on_failure="warn")
+    assert [(found.message.curve, found.message.node) for found in caught if "cut" in str(found.message)] == [((1,), 0)]

@@ -213,6 +213,7 @@ def test_the_two_times_are_named(close):
     assert f"t[20] = {t[20]} and t[21] = {t[21]} are too close for the distance 0.0958 " in message
     assert "merge the two samples, smooth the data with make_smoothing_spline, or correct the times" in message
     assert "long" not in message.partition("t[20]")[2]
+    assert caught.value.node == 20
 
 
 def test_times_too_close_are_named_in_batches_lists_products_and_dates():

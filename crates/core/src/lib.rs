@@ -17,3 +17,4 @@ pub mod rows;
 pub mod scalar;
 pub mod space;
 pub mod special;
+pub mod validate;

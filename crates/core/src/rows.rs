@@ -87,11 +87,8 @@ pub fn apply(
             }
             let [a, b, c] = &mut x;
             let measures = matches!(operation, Operation::Distance | Operation::CutFraction);
-            let angle = if operation.needs_log() || measures {
-                space.log(a, b, &mut log)
-            } else {
-                Lane::ZERO
-            };
+            let angle =
+                if operation.needs_log() || measures { space.log(a, b, &mut log) } else { Lane::ZERO };
             match operation {
                 Operation::Exp => space.ray(a, b, Lane::ONE, &mut result),
                 Operation::Log => result.copy_from_slice(&log),

@@ -3,11 +3,12 @@
 use crate::arrays::{in_order, room, zeros};
 use crate::errors::{Invalid, invalid};
 use crate::space::Handle;
-use crate::validate::{self, Names};
+use crate::validate::Names;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline::fit::{End, Ends, Problem};
 use symspline::space::{Ambient, Erased};
+use symspline::validate;
 
 pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A kind, and the vectors that it prescribes: one per curve.
@@ -67,6 +68,26 @@ impl<'a> Curves<'a> {
             offsets,
             chosen: mask.map(|mask| (0..curves).filter(|&c| mask[c]).collect()),
         })
+    }
+
+    /// Whether a curve is to be fitted.
+    pub fn fits(&self, curve: usize) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| chosen.binary_search(&curve).is_ok())
+    }
+
+    /// Masks all curves but those in a list, which are to be fitted, and removes their points.
+    pub fn keep(&mut self, valid: &[usize], points: &mut Vec<f64>) {
+        let len = self.space.point_len();
+        let (mut kept, mut start) = (Vec::new(), 0);
+        for c in (0..self.offsets.len() - 1).filter(|&c| self.fits(c)) {
+            let size = (self.offsets[c + 1] - self.offsets[c]) * len;
+            if valid.binary_search(&c).is_ok() {
+                kept.extend_from_slice(&points[start..start + size]);
+            }
+            start += size;
+        }
+        *points = kept;
+        self.chosen = Some(valid.to_vec());
     }
 
     /// The nodes of the longest curve.
@@ -161,34 +182,38 @@ impl<'a> Curves<'a> {
     /// Validates the curves to fit and projects their points onto the space. With `skip`, curves with points off the space
     /// are masked, and their faults are returned.
     pub fn check(&mut self, points: &mut Vec<f64>, tol: f64, skip: bool) -> Result<Vec<Fault>, Invalid> {
-        let batch = self.batch.clone();
         let mut own = self.gathered();
-        let names = Names { batch: &batch, chosen: self.chosen.as_deref() };
+        let knots = |c: usize| &own.t.get()[own.offsets[c]..own.offsets[c + 1]];
         if self.shared {
-            validate::knots(self.t, 0, &names, true)?;
+            validate::knots(self.t, 0)
         } else {
-            for (c, ends) in own.offsets.windows(2).enumerate() {
-                validate::knots(&own.t.get()[ends[0]..ends[1]], c, &names, false)?;
-            }
+            (0..own.offsets.len() - 1).try_for_each(|c| validate::knots(knots(c), c))
         }
+        .map_err(|fault| self.names(tol).describe(fault))?;
         let mut faults = Vec::new();
-        if let Err(first) = validate::points(&self.space, points, &own.offsets, &names, tol) {
+        if let Err(first) = validate::points(&self.space, points, &own.offsets, tol) {
             if !skip {
-                return Err(first);
+                return Err(self.names(tol).describe(first));
             }
             faults = self.leave_out_invalid(tol);
             // Some points were projected before the invalid one was found, so start again from the input.
             own = self.gathered();
             let _ = self.gather_points(points);
-            let names = Names { batch: &batch, chosen: self.chosen.as_deref() };
-            validate::points(&self.space, points, &own.offsets, &names, tol)?;
+            validate::points(&self.space, points, &own.offsets, tol)
+                .map_err(|fault| self.names(tol).describe(fault))?;
         }
-        let names = Names { batch: &batch, chosen: self.chosen.as_deref() };
-        if own.ends.is_none() {
-            validate::closed(&self.space, points, &own.offsets, &names, tol)?;
-        }
-        validate::ends(&self.space, &own.problem(self.shared, points), &names, tol)?;
+        let closed = match own.ends {
+            None => validate::closed(&self.space, points, &own.offsets, tol),
+            Some(_) => Ok(()),
+        };
+        closed
+            .and_then(|()| validate::ends(&self.space, &own.problem(self.shared, points), tol))
+            .map_err(|fault| self.names(tol).describe(fault))?;
         Ok(faults)
+    }
+
+    fn names(&self, tol: f64) -> Names<'_> {
+        Names { batch: &self.batch, chosen: self.chosen.as_deref(), shared: self.shared, tol }
     }
 
     /// Masks the curves with points off the space, and returns their faults.
@@ -199,11 +224,11 @@ impl<'a> Curves<'a> {
         for number in wanted {
             let nodes = self.offsets[number]..self.offsets[number + 1];
             let mut copy = self.points[nodes.start * len..nodes.end * len].to_vec();
-            let one = [number];
-            let names = Names { batch: &self.batch, chosen: Some(&one) };
-            match validate::points(&self.space, &mut copy, &[0, nodes.len()], &names, tol) {
+            match validate::points(&self.space, &mut copy, &[0, nodes.len()], tol) {
                 Ok(()) => valid.push(number),
                 Err(fault) => {
+                    let one = [number];
+                    let fault = Names { chosen: Some(&one), ..self.names(tol) }.describe(fault);
                     faults.push((number, "invalid", fault.node, f64::NAN, tol, Some(fault.message)));
                 }
             }

@@ -42,6 +42,15 @@ impl Invalid {
     }
 }
 
+/// The same error, with the number of the factor in which it was found. `_curves/fit.py` names the factor.
+pub fn in_factor(py: Python, error: PyErr, factor: usize, factors: usize) -> PyErr {
+    if factors == 1 {
+        return error;
+    }
+    let set = error.value(py).setattr("_factor", factor);
+    set.err().unwrap_or(error)
+}
+
 /// The index of an element in an array of a shape.
 fn index_of(mut element: usize, shape: &[usize]) -> Vec<usize> {
     let mut index = Vec::with_capacity(shape.len());

@@ -4,7 +4,7 @@ use crate::arrays::{in_order, zeros};
 use crate::errors::{invalid, number, place};
 use crate::space::Handle;
 use crate::validate::of_curve;
-use crate::watch::{is_heavy, watched};
+use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline::curve::{
@@ -187,7 +187,9 @@ fn sampled<'py>(
     }
     let result = write.as_slice_mut()?;
     let asked = Asked { curves: &curves, times: &times, quantity, outside: policy };
-    watched(py, progress, samples, is_heavy(&space), |monitor| compute(&space, &asked, monitor, result))?;
+    watched(py, Progress::whole(progress), samples, is_heavy(&space), |monitor| {
+        compute(&space, &asked, monitor, result)
+    })?;
     drop(write);
     Ok(out)
 }

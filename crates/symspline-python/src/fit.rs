@@ -2,9 +2,9 @@
 
 use crate::arrays::{require_room, room, zeros};
 use crate::curves::{Array, Curves, EndOf, Fault, require_room_for_checks};
-use crate::errors::invalid;
+use crate::errors::{in_factor, invalid};
 use crate::space::Handle;
-use crate::watch::{is_heavy, watched};
+use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use symspline::fit::{Method, Options, Report, Solver, Status, fit as solve, memory};
@@ -12,80 +12,124 @@ use symspline::space::{Ambient, Erased};
 
 /// Points on the space, velocities, the columns of the report, and faults.
 type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<Fault>);
+/// Curves in one factor of a product: the space, points, ends, and how far off the space points may be; None if nothing
+/// is to be validated.
+type Factor<'py> = (PyRef<'py, Handle>, Array<'py>, Option<[EndOf<'py>; 2]>, Option<f64>);
 
-/// Fits curves. `offsets` are the nodes before each curve when they differ in length (then `points` is one long list of
-/// points). Curves whose `mask` is false are NaN. With `skip_invalid`, so are curves with points off the space.
+/// Fits curves in every factor of a product; a space that is not a product is its only factor. All factors are validated
+/// before the first is solved. `offsets` are the nodes before each curve when they differ in length (then points are one
+/// long list). Curves whose `mask` is false are NaN. With `skip_invalid`, so are curves with points off the space in any
+/// factor.
 #[pyfunction]
 #[pyo3(signature = (
-    handle, t, points, ends, method, tol, max_iter, check, point_tol, offsets=None, mask=None, skip_invalid=false,
-    progress=None
+    factors, t, method, tol, max_iter, offsets=None, mask=None, skip_invalid=false, progress=None
 ))]
 pub fn fit<'py>(
     py: Python<'py>,
-    handle: &Handle,
+    factors: Vec<Factor<'py>>,
     t: Array<'py>,
-    points: Array<'py>,
-    ends: Option<[EndOf<'py>; 2]>,
     method: &str,
     tol: f64,
     max_iter: Option<usize>,
-    check: bool,
-    point_tol: f64,
     offsets: Option<Vec<usize>>,
     mask: Option<Vec<bool>>,
     skip_invalid: bool,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Fitted<'py>> {
+) -> PyResult<Vec<Fitted<'py>>> {
     let options = options(method, tol, max_iter)?;
-    let mut curves = Curves::new(handle, &t, &points, &ends, offsets, mask)?;
-    let (space, all) = (curves.space, curves.offsets.len() - 1);
-    require_room_for_checks(handle, &curves)?;
-    require_room(memory(&space, curves.longest(), options.method), || {
-        let least = match options.method {
-            Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
-            _ => "",
-        };
-        (
-            format!("fitting {} points on {} with method='{method}'", curves.longest(), handle.described()),
-            least,
-        )
-    })?;
-    let mut own = Vec::new();
-    curves.gather_points(&mut own)?;
-    let mut faults = Vec::new();
-    if check {
-        faults = py
-            .detach(|| curves.check(&mut own, point_tol, skip_invalid))
-            .map_err(|fault| fault.raise(py, &curves.batch))?;
-    }
-    let velocities = zeros(py, points.shape())?;
-    let gathered = curves.gathered();
-    let problem = gathered.problem(curves.shared, &own);
-    let nodes = own.len() / space.point_len();
-    let mut velocities_write = velocities.readwrite();
-    let u = velocities_write.as_slice_mut()?;
-    let found = match &curves.chosen {
-        None => watched(py, progress, nodes, is_heavy(&space), |monitor| {
-            solve(&space, &problem, &options, monitor, u)
-        })?,
-        Some(_) => {
-            let mut own_velocities = room(own.len())?;
-            own_velocities.resize(own.len(), 0.0);
-            let found = watched(py, progress, nodes, is_heavy(&space), |monitor| {
-                solve(&space, &problem, &options, monitor, &mut own_velocities)
-            })?;
-            curves.scatter(&own_velocities, u);
-            found
+    let count = factors.len();
+    let mut tasks = Vec::with_capacity(count);
+    for (i, (handle, points, ends, point_tol)) in factors.iter().enumerate() {
+        let curves = Curves::new(handle, &t, points, ends, offsets.clone(), mask.clone())?;
+        require_room_for_checks(handle, &curves)?;
+        require_room(memory(&curves.space, curves.longest(), options.method), || {
+            let least = match options.method {
+                Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
+                _ => "",
+            };
+            (
+                format!(
+                    "fitting {} points on {} with method='{method}'",
+                    curves.longest(),
+                    handle.described()
+                ),
+                least,
+            )
+        })?;
+        let mut task = Task { curves, points: Vec::new(), faults: Vec::new() };
+        task.curves.gather_points(&mut task.points)?;
+        if let Some(point_tol) = *point_tol {
+            task.faults = py
+                .detach(|| task.curves.check(&mut task.points, point_tol, skip_invalid))
+                .map_err(|fault| in_factor(py, fault.raise(py, &task.curves.batch), i, count))?;
         }
-    };
-    drop((velocities_write, gathered));
-    let out = curves.points(py, own, points.shape())?;
-    let numbers: Vec<usize> = curves.chosen.clone().unwrap_or_else(|| (0..all).collect());
-    faults.extend(numbers.iter().zip(&found).filter_map(|(&number, report)| fault(&space, number, report)));
-    faults.sort_by_key(|fault| fault.0);
-    let mut reports: Vec<Option<&Report>> = vec![None; all];
-    numbers.iter().zip(&found).for_each(|(&number, report)| reports[number] = Some(report));
-    Ok((out, velocities, columns(py, &reports)?, faults))
+        tasks.push(task);
+    }
+    if count > 1 && tasks.iter().any(|task| !task.faults.is_empty()) {
+        // A curve that is skipped in one factor is masked in all.
+        let all = 0..tasks[0].curves.offsets.len() - 1;
+        let valid: Vec<usize> = all.filter(|c| tasks.iter().all(|task| task.curves.fits(*c))).collect();
+        tasks.iter_mut().for_each(|task| task.curves.keep(&valid, &mut task.points));
+    }
+    tasks
+        .into_iter()
+        .zip(&factors)
+        .enumerate()
+        .map(|(i, (task, factor))| {
+            let progress =
+                progress.as_ref().map(|p| Progress { call: p.clone_ref(py), part: i, parts: count });
+            task.solve(py, &options, factor.1.shape(), progress)
+        })
+        .collect()
+}
+
+/// Curves in one space, their points on it, and the faults of skipped curves.
+struct Task<'a> {
+    curves: Curves<'a>,
+    points: Vec<f64>,
+    faults: Vec<Fault>,
+}
+
+impl Task<'_> {
+    fn solve<'py>(
+        self,
+        py: Python<'py>,
+        options: &Options,
+        shape: &[usize],
+        progress: Option<Progress>,
+    ) -> PyResult<Fitted<'py>> {
+        let Task { curves, points, mut faults } = self;
+        let (space, all) = (curves.space, curves.offsets.len() - 1);
+        let velocities = zeros(py, shape)?;
+        let gathered = curves.gathered();
+        let problem = gathered.problem(curves.shared, &points);
+        let nodes = points.len() / space.point_len();
+        let mut velocities_write = velocities.readwrite();
+        let u = velocities_write.as_slice_mut()?;
+        let found = match &curves.chosen {
+            None => watched(py, progress, nodes, is_heavy(&space), |monitor| {
+                solve(&space, &problem, options, monitor, u)
+            })?,
+            Some(_) => {
+                let mut own_velocities = room(points.len())?;
+                own_velocities.resize(points.len(), 0.0);
+                let found = watched(py, progress, nodes, is_heavy(&space), |monitor| {
+                    solve(&space, &problem, options, monitor, &mut own_velocities)
+                })?;
+                curves.scatter(&own_velocities, u);
+                found
+            }
+        };
+        drop((velocities_write, gathered));
+        let out = curves.points(py, points, shape)?;
+        let numbers: Vec<usize> = curves.chosen.clone().unwrap_or_else(|| (0..all).collect());
+        faults
+            .extend(numbers.iter().zip(&found).filter_map(|(&number, report)| fault(&space, number, report)));
+        faults.sort_by_key(|fault| fault.0);
+        let mut reports: Vec<Option<&Report>> = vec![None; all];
+        numbers.iter().zip(&found).for_each(|(&number, report)| reports[number] = Some(report));
+        Ok((out, velocities, columns(py, &reports)?, faults))
+    }
 }
 
 fn options(method: &str, tol: f64, max_iter: Option<usize>) -> PyResult<Options> {

@@ -12,7 +12,8 @@ use symspline::rows::{Operation, apply, tangent_defects};
 use symspline::space::Ambient;
 
 /// Validates points and velocities, and requires a unique geodesic between the inner control points of every segment.
-/// Returns the points on the space and the tangential parts of the velocities.
+/// Returns the points on the space, the tangential parts of the velocities, and the longest distance between neighbours of
+/// each curve.
 #[pyfunction]
 pub fn hermite<'py>(
     py: Python<'py>,
@@ -22,7 +23,7 @@ pub fn hermite<'py>(
     velocities: Array<'py>,
     point_tol: f64,
     tangent_tol: f64,
-) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 2]> {
+) -> PyResult<[Bound<'py, PyArrayDyn<f64>>; 3]> {
     let natural = || ("natural".to_owned(), None);
     let ends = Some([natural(), natural()]);
     let mut curves = Curves::new(handle, &t, &points, &ends, None, None)?;
@@ -68,9 +69,17 @@ pub fn hermite<'py>(
         }
         let mut between = vec![0.0; segments * len];
         apply(&space, Operation::Log, &[&inner[0], &inner[1]], &[], monitor, &mut between)
-            .map_err(|(segment, angle)| Handles::Far { segment, angle, segments: nodes - 1 })
+            .map_err(|(segment, angle)| Handles::Far { segment, angle, segments: nodes - 1 })?;
+        let [here, next] = [0, 1].map(|side| {
+            let of = |segment: usize| (segment / (nodes - 1) * nodes + segment % (nodes - 1) + side) * len;
+            (0..segments).flat_map(|segment| own[of(segment)..][..len].iter().copied()).collect::<Vec<f64>>()
+        });
+        let mut steps = vec![0.0; segments];
+        let _ = apply(&space, Operation::Distance, &[&here, &next], &[], monitor, &mut steps);
+        let longest = |steps: &[f64]| steps.iter().fold(0.0, |most: f64, &step| most.max(step));
+        Ok(steps.chunks(nodes.max(2) - 1).map(longest).collect::<Vec<f64>>())
     })?;
-    found.map_err(|fault| match fault {
+    let longest = found.map_err(|fault| match fault {
         Handles::Invalid(fault) => fault.raise(py, &curves.batch),
         Handles::Far { segment, angle, segments } => {
             let (curve, i, limit) = (segment / segments, segment % segments, space.cut_angle());
@@ -84,7 +93,8 @@ pub fn hermite<'py>(
         }
     })?;
     let velocities = PyArray1::from_vec(py, tangent).reshape(points.shape())?.to_dyn().clone();
-    Ok([curves.points(py, own, points.shape())?, velocities])
+    let longest = PyArray1::from_vec(py, longest).to_dyn().clone();
+    Ok([curves.points(py, own, points.shape())?, velocities, longest])
 }
 
 /// Why there is no curve with given velocities.

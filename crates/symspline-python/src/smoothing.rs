@@ -4,7 +4,7 @@ use crate::arrays::{in_order, room, zeros};
 use crate::curves::EndOf;
 use crate::errors::invalid;
 use crate::space::Handle;
-use crate::watch::{is_heavy, watched};
+use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
@@ -146,8 +146,9 @@ pub fn smooth<'py>(
         .collect();
     // One iteration factors banded matrices of three blocks for every knot.
     let heavy = is_heavy(&space) || count * space.dim().pow(3) > HEAVY_FACTORS;
-    let found =
-        watched(py, progress, curves * count, heavy, |monitor| run(&space, &data, &options, monitor))?;
+    let found = watched(py, Progress::whole(progress), curves * count, heavy, |monitor| {
+        run(&space, &data, &options, monitor)
+    })?;
 
     let coefficients = count + if ends.is_none() { 2 } else { 0 };
     let shape = [batch, &[count], &points.shape()[lead + 1..]].concat();

@@ -22,11 +22,29 @@ pub fn is_heavy(space: &Erased) -> bool {
     (space.point_len() >= HEAVY_POINT || space.dim() >= HEAVY_DIM) && space.point_shape().len() > 1
 }
 
+/// A function of a user that is called with the finished and the total amount of work, of which this is one of several
+/// equal parts.
+pub struct Progress {
+    pub call: Py<PyAny>,
+    pub part: usize,
+    pub parts: usize,
+}
+
+impl Progress {
+    pub fn whole(call: Option<Py<PyAny>>) -> Option<Self> {
+        call.map(|call| Progress { call, part: 0, parts: 1 })
+    }
+
+    fn report(&self, py: Python, finished: usize, total: usize) -> PyResult<()> {
+        self.call.call1(py, (self.part * total + finished, self.parts * total)).map(drop)
+    }
+}
+
 /// Runs `work` without the GIL. From time to time signals are checked and `progress` is called with
 /// the finished and the total number of units; an exception in either stops the work. A panic is a RuntimeError.
 pub fn watched<T: Send>(
     py: Python,
-    progress: Option<Py<PyAny>>,
+    progress: Option<Progress>,
     total: usize,
     heavy: bool,
     work: impl FnOnce(&Monitor) -> T + Send,
@@ -39,7 +57,7 @@ pub fn watched<T: Send>(
         }
         let seen = Python::attach(|py| {
             py.check_signals()?;
-            progress.as_ref().map_or(Ok(()), |p| p.call1(py, (finished, total)).map(|_| ()))
+            progress.as_ref().map_or(Ok(()), |p| p.report(py, finished, total))
         });
         *state = (Instant::now(), seen.err());
         state.1.is_none()
@@ -76,7 +94,7 @@ pub fn watched<T: Send>(
         PyRuntimeError::new_err(format!("this is an error in symspline, please report it: {what}"))
     })?;
     if let Some(progress) = progress {
-        progress.call1(py, (total, total))?;
+        progress.report(py, total, total)?;
     }
     Ok(result)
 }

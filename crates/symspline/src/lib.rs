@@ -55,8 +55,8 @@
 //! Rotations whose quaternions have any sign are points of [`spaces::Rotations`] as matrices.
 //! [`spaces::AnySpace`] makes a space of a name, such as `"so"` with `[3]`.
 //!
-//! Nothing here checks that points lie on their space; [`rows::apply`] with [`rows::Operation::Project`]
-//! puts them there.
+//! [`fit`] does not check its input: pass a problem to [`validate::validate`] first. It describes the first fault, or
+//! returns the points projected onto their space.
 
 pub mod spaces;
 
@@ -64,4 +64,6 @@ pub use symspline_smoothing as smoothing;
 
 #[cfg(feature = "laws")]
 pub use symspline_core::laws;
-pub use symspline_core::{curve, derivative, fit, matrix, monitor, parallel, rows, scalar, space, special};
+pub use symspline_core::{
+    curve, derivative, fit, matrix, monitor, parallel, rows, scalar, space, special, validate,
+};

@@ -16,7 +16,7 @@ from .curve import REAL, CurveArrays, Doubles
 from .gradient import Gradient, Places
 from .lift import check_reach, check_start, factors, is_quotient
 from .out import check_out, is_room
-from .solve import Options, Progress, Task, solve, validate
+from .solve import Options, Progress, Task, solve_single, validate
 
 # Their matrices have the same last row everywhere, which the core writes of curves that were not found, too.
 _CONSTANT_ROW = (SpecialEuclidean, Similarity, Affine)
@@ -49,7 +49,7 @@ class CoreCurve(CurveArrays):
         return True
 
     # The velocities that make the curve C². The core validates such curves on the way.
-    solve = staticmethod(solve)
+    solve = staticmethod(solve_single)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:

@@ -6,6 +6,7 @@ product, one in every factor. A further kind is a class with the methods of `Cor
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
@@ -27,7 +28,7 @@ from .curve import CurveArrays
 from .ends import End, ends_in_factors, ends_of
 from .product import ProductCurve, share
 from .reduced import ReducedCurve
-from .solve import Mask, Options, Progress, Solved, Task, without
+from .solve import Mask, Options, Progress, Solved, Task, solve, without
 
 _T = TypeVar("_T")
 # Options for a fit that is not carried out.
@@ -172,7 +173,7 @@ def curve_of(
     """
     if isinstance(space, Product):
         each = zip(space.factors, arrays, strict=True)
-        return ProductCurve(space, tuple(_part(factor, times, *pair, fitted) for factor, pair in each))
+        return ProductCurve(space, tuple([_part(factor, times, *pair, fitted) for factor, pair in each]))
     return _part(space, times, *arrays[0], fitted)
 
 
@@ -206,7 +207,7 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         task = Task(
             space, times, data.doubles, ends[0], data.tol if check else None, None, mask, check and skip
         )
-        found = CoreCurve.solve(task, options, progress)
+        (found,) = solve((task,), options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
     tasks = [
@@ -221,10 +222,9 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         )
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
-    solved, invalid = _solve(space, tasks, options, progress)
+    solved, faults = _solve(space, tasks, options, progress)
     curve = curve_of(space, times, [found[:2] for found in solved])
-    columns = [found.columns for found in solved]
-    return Fit(curve, columns, options.method, _sorted(invalid + _first_faults(solved)))
+    return Fit(curve, [found.columns for found in solved], options.method, faults)
 
 
 def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit], list[Fault]]:
@@ -242,7 +242,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         tol = max(part.tol for part in parts) if check else None
         numbers = np.concatenate([part.doubles for part in parts])
         tasks.append(Task(factor, row, numbers, end, tol, offsets, mask, check and skip))
-    solved, more = _solve(space, tasks, options, progress)
+    solved, faults = _solve(space, tasks, options, progress)
 
     def one(i: int, start: int, stop: int) -> Fit:
         own = slice(start, stop)
@@ -251,7 +251,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
         return Fit(curve_of(space, times[i], arrays), columns, options.method, [])
 
     fits = [one(i, *pair) for i, pair in enumerate(pairwise(offsets))]
-    return fits, _sorted(invalid + more + _first_faults(solved))
+    return fits, sorted(invalid + faults, key=_number)
 
 
 def validated(
@@ -273,24 +273,28 @@ def validated(
 
 def hermite_data(
     space: Space, times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
-) -> list[tuple[Array, Array]]:
-    """Points on the space and tangent velocities in every factor, of curves whose control points are within reach.
+) -> list[tuple[Array, Array, Array]]:
+    """Points on the space, tangent velocities, and the longest distance between neighbours of each curve, in every
+    factor.
 
     Args:
-        velocities: in every factor, with how far they may be from tangent.
+        velocities: contiguous, in every factor, with how far they may be from tangent.
 
     Raises:
         ValidationError: points or times are invalid, or a velocity is not tangent.
         CutLocusError: inner control points of a segment lie at or past each other's cut locus.
     """
 
-    def checked(factor: Space, own: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array]:
+    def checked(factor: Space, own: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array, Array]:
         part, (vectors, tangent_tol) = own
         if isinstance(factor, Manifold):
-            return hermite_on_manifold(Task(factor, times, part.doubles, _NATURAL, part.tol), vectors)
-        doubles = np.ascontiguousarray(factor._as_doubles(vectors))
-        found, tangent = _core.hermite(factor._handle, times, part.doubles, doubles, part.tol, tangent_tol)
-        return factor._numbers(found), factor._numbers(tangent)
+            task = Task(factor, times, part.doubles, _NATURAL, part.tol)
+            return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
+        doubles = factor._as_doubles(vectors)
+        found, tangent, longest = _core.hermite(
+            factor._handle, times, part.doubles, doubles, part.tol, tangent_tol
+        )
+        return factor._numbers(found), factor._numbers(tangent), longest
 
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
 
@@ -298,16 +302,20 @@ def hermite_data(
 def _solve(
     space: Space, tasks: list[Task], options: Options, progress: Progress | None
 ) -> tuple[list[Solved], list[Fault]]:
-    """Solve the task of every factor. All factors are validated before the first is solved."""
-    if len(tasks) == 1 and kind_of(space) is CoreCurve:
-        # The core checks before it solves.
-        return [CoreCurve.solve(tasks[0], options, progress)], []
-    tasks, faults = _validated(space, tasks, options)
-    each = [
+    """Solve the task of every factor, and return the faults. All factors are validated before the first is solved."""
+    if all(kind_of(task.space) is CoreCurve for task in tasks):
+        try:
+            solved = solve(tasks, options, progress)
+        except ValidationError as error:
+            number = vars(error).pop("_factor", None)
+            raise (error if number is None else _in_factor(error, number, tasks[number].space)) from None
+        return solved, _faults_of(solved, [])
+    tasks, invalid = _validated(space, tasks, options)
+    solved = [
         kind_of(task.space).solve(task, options, share(progress, i, len(tasks)))
         for i, task in enumerate(tasks)
     ]
-    return each, faults
+    return solved, _faults_of(solved, invalid)
 
 
 def _validated(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
@@ -319,16 +327,26 @@ def _validated(space: Space, tasks: list[Task], options: Options) -> tuple[list[
     return [task._replace(mask=mask) for task, _ in each], faults
 
 
-def _first_faults(solved: list[Solved]) -> list[Fault]:
-    """The faults in the first factor in which curves failed, or else in which there is something to report."""
-    faults = [found.faults for found in solved if found.faults]
-    faults.sort(key=lambda own: not any(fault.failed for fault in own))
-    return faults[0] if faults else []
+def _faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
+    """The faults of invalid curves, and those in the first factor in which curves failed, or else in which there is
+    something to report, in the order of curves."""
+    skipped = {fault.curve: fault for fault in invalid}
+    others = []
+    for found in solved:
+        rest = []
+        for fault in found.faults:
+            if fault.kind == INVALID:
+                skipped.setdefault(fault.curve, fault)
+            else:
+                rest.append(fault)
+        if rest:
+            others.append(rest)
+    others.sort(key=lambda own: not any(fault.failed for fault in own))
+    return sorted([*skipped.values(), *(others[0] if others else [])], key=_number)
 
 
-def _sorted(faults: list[Fault]) -> list[Fault]:
-    """In the order of curves."""
-    return sorted(faults, key=lambda fault: fault.curve)
+def _number(fault: Fault) -> int:
+    return fault.curve
 
 
 def _in_factors(space: Space, work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
@@ -340,8 +358,13 @@ def _in_factors(space: Space, work: Callable[[Space, Any], _T], values: Sequence
         try:
             results.append(work(factor, value))
         except ValidationError as error:
-            raise error._with_message(f"factor {i}, {factor!r}: {error}") from None
+            raise _in_factor(error, i, factor) from None
     return results
+
+
+def _in_factor(error: ValidationError, number: int, factor: Space) -> ValidationError:
+    """The error with the factor in which it was found."""
+    return error._with_message(f"factor {number}, {factor!r}: {error}")
 
 
 def _check_precision(problem: ManyProblem) -> list[Fault]:
@@ -358,6 +381,6 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
                     )
                 except ValidationError as error:
                     if not skip:
-                        raise ValidationError(f"curve {number}: {error}") from None
+                        raise error._of_curve(number) from None
                     faults.setdefault(number, Fault(number, INVALID, f"curve {number}: {error}"))
     return list(faults.values())

@@ -25,9 +25,12 @@ class ProductCurve(CurveArrays):
 
     def __init__(self, space: Product, parts: tuple[CoreCurve, ...]) -> None:
         self.space, self._parts, self.times = space, parts, parts[0].times
-        self.exact = max(part.exact for part in parts)
-        self.points: Tuple = tuple(part.points for part in parts)
-        self.velocities: Tuple = tuple(part.velocities for part in parts)
+        self.points: Tuple = tuple([part.points for part in parts])
+        self.velocities: Tuple = tuple([part.velocities for part in parts])
+
+    @property
+    def exact(self) -> float:  # type: ignore[override]
+        return max(part.exact for part in self._parts)
 
     @property
     def batch(self) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
 from .curve import NORMS, Doubles
 from .gradient import Places
-from .solve import Options, Progress, Solved, Task, one_by_one, solve, solve_some
+from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_some
 from .subspan import Span, span_of
 
 
@@ -135,5 +135,5 @@ def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
     small = task._replace(
         space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends
     )
-    found = solve(small, options, progress)
+    found = solve_single(small, options, progress)
     return found._replace(points=points, velocities=span.embed(found.velocities))

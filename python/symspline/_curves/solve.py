@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -68,30 +68,29 @@ class Solved(NamedTuple):
     faults: list[Fault]
 
 
-def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-    """Check and solve."""
-    space, times, points, ends, tol, offsets, mask, skip = task
-    found, velocities, tables, raw = _core.fit(
-        space._handle,
-        times,
-        points,
-        ends,
-        *options,
-        tol is not None,
-        tol or 0.0,
-        offsets,
-        None if mask is None else mask.ravel().tolist(),
-        skip,
-        progress,
+def solve(tasks: Sequence[Task], options: Options, progress: Progress | None = None) -> list[Solved]:
+    """Validate and solve the tasks of all factors, which share knots and masks, in one call of the core."""
+    _, times, _, _, _, offsets, mask, skip = tasks[0]
+    factors = [(task.space._handle, task.points, task.ends, task.tol) for task in tasks]
+    each = _core.fit(
+        factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress
     )
-    columns = Columns(*tables)
-    faults = []
-    if raw:
-        quaternions = space._name == "sphere"
-        faults = [from_core(one, columns, options.tol, quaternions) for one in raw]
-    if space._complex:
-        found, velocities = space._numbers(found), space._numbers(velocities)
-    return Solved(found, velocities, columns, faults)
+    solved = []
+    for task, (points, velocities, tables, raw) in zip(tasks, each, strict=True):
+        space, columns = task.space, Columns(*tables)
+        faults = []
+        if raw:
+            quaternions = space._name == "sphere"
+            faults = [from_core(one, columns, options.tol, quaternions) for one in raw]
+        if space._complex:
+            points, velocities = space._numbers(points), space._numbers(velocities)
+        solved.append(Solved(points, velocities, columns, faults))
+    return solved
+
+
+def solve_single(task: Task, options: Options, progress: Progress | None = None) -> Solved:
+    """Validate and solve the task of one space."""
+    return solve((task,), options, progress)[0]
 
 
 def validate(task: Task) -> tuple[Task, list[Fault]]:

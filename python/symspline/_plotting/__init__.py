@@ -1,7 +1,7 @@
-"""Pictures of curves: what `symspline.CubicSpline.plot` draws. Needs matplotlib.
+"""Pictures of curves, as `symspline.CubicSpline.plot` draws them with matplotlib.
 
-Every figure has a picture that depends on the space, and speed and acceleration against time. The module `figure`
-lists the picture of every space; the modules that it imports draw them.
+Every figure has a picture that depends on the space, and graphs of speed and acceleration. The module `figure` has a
+table of the picture of every space; the modules that it imports draw the pictures.
 """
 
 from .figure import plot

@@ -10,20 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 
-from .bands import CIRCLE, draw_in_plane, places_of_discs
-from .curves import Curve
+from .curves import CIRCLE, Curve, disc_indices, draw_in_plane
 from .style import EDGE, GRID, INK, Array, inside, plain, window
 
 
 def draw_plane(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """R²: the curve, with equal scales."""
+    """Draw curves in R² with equal scales."""
     axes = plane(panel)
     for curve in curves:
         draw_in_plane(axes, curve, np.asarray, lambda p, radii: p[:, None] + radii[:, None, None] * CIRCLE)
 
 
 def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """R³: the curve in a box with equal scales, and its shadow on the floor."""
+    """Draw curves in R³ in a box with equal scales, with their shadows on the floor."""
     axes = box(panel, [curve.points for curve in curves], [curve.given for curve in curves])
     for curve in curves:
         if curve.radii is not None:
@@ -33,25 +32,25 @@ def draw_3d(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def _draw_hose(axes: Any, curve: Curve, radii: Array) -> None:
-    """The surface at these distances from a curve in space."""
-    some = places_of_discs(curve)[::2]
-    along = np.gradient(curve.points[some], axis=0)
+    """Draw the surface at given distances from a curve in R³."""
+    discs = disc_indices(curve)[::2]
+    along = np.gradient(curve.points[discs], axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     aside = np.empty_like(along)
     last = np.eye(3)[np.abs(along[0]).argmin()]
     for i, direction in enumerate(along):
-        # It turns as little as it can.
+        # The next normal vector is the projection of the last one, so that the frame does not twist.
         last = last - (last @ direction) * direction
         last = aside[i] = last / np.linalg.norm(last)
     frame = np.stack([aside, np.cross(along, aside)], axis=1)
-    ring = np.concatenate([CIRCLE, CIRCLE[:1]]) @ frame * radii[some, None, None]
-    x, y, z = np.moveaxis(curve.points[some, None] + ring, -1, 0)
+    ring = np.concatenate([CIRCLE, CIRCLE[:1]]) @ frame * radii[discs, None, None]
+    x, y, z = np.moveaxis(curve.points[discs, None] + ring, -1, 0)
     look: Any = {"color": curve.color, "alpha": 0.08, "linewidth": 0, "shade": False}
     axes.plot_surface(x, y, z, rstride=1, cstride=2, antialiased=False, **look)
 
 
 def plane(panel: SubFigure) -> Axes:
-    """Axes with equal scales."""
+    """Add axes with equal scales."""
     axes = panel.add_axes(inside(panel, 0.8, 0.55, 0.25, 0.2), xlabel="x₁", ylabel="x₂")
     plain(axes)
     axes.set_aspect("equal", adjustable="datalim")
@@ -61,12 +60,10 @@ def plane(panel: SubFigure) -> Axes:
 def box(
     panel: SubFigure, lines: Sequence[Array], others: Sequence[Array], margin: float = 1.1, below: float = 0.1
 ) -> Any:
-    """A box with equal scales around lines of shape (m, 3), with their shadows on the floor.
+    """Add a box with equal scales around lines of shape (m, 3), with their shadows on the floor.
 
-    Args:
-        others: places that are in the box, too.
-        margin: width of the box as a multiple of that of the lines.
-        below: inches that are left free.
+    The box contains the points ``others``, too. Its width is ``margin`` times that of the lines, and ``below`` inches
+    under it stay empty.
     """
     axes: Any = panel.add_axes(inside(panel, 0.0, below, 0.3, 0.0), projection="3d", facecolor="none")
     everything = np.concatenate([*lines, *others])
@@ -79,7 +76,7 @@ def box(
     for axis, number, name in zip("xyz", middle, "₁₂₃", strict=True):
         getattr(axes, f"set_{axis}lim")(number - half, number + half)
         _lighten(getattr(axes, f"{axis}axis"), f"x{name}")
-    # From where the curve looks widest.
+    # Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
     axes.view_init(elev=24, azim=(-60, -30, 30, 60)[np.std(right, axis=0).argmax()])
@@ -87,7 +84,7 @@ def box(
 
 
 def _lighten(axis: Any, label: str) -> None:
-    """A white wall with faint lines."""
+    """Draw a white wall with faint lines."""
     axis.set_pane_color("white")
     axis.pane.set_edgecolor(GRID)
     axis.line.set_color(EDGE)

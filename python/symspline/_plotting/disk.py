@@ -1,4 +1,4 @@
-"""Curves in the hyperbolic plane, in the Poincaré disk."""
+"""Curves in the hyperbolic plane, drawn in the Poincaré disk."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from matplotlib.figure import SubFigure
 from matplotlib.patches import Circle
 
 from .._spaces import Hyperbolic
-from .bands import CIRCLE, draw_in_plane
-from .curves import Curve
+from .curves import CIRCLE, Curve, draw_in_plane
 from .globe import centre_of
 from .style import EDGE, GRID, PAPER, Array, closest, inside, note
 
@@ -23,9 +22,9 @@ _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 
 
 def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """The disk, with two families of geodesics at right angles to the axes.
+    """Draw curves in the disk, with two families of geodesics at right angles to the axes.
 
-    A curve that is far from the middle is moved there, and a small one is enlarged.
+    Curves far from the middle are moved there, and small ones are enlarged.
     """
     everything = np.concatenate([curve.extent for curve in curves])
     middle, reach = _middle(everything)
@@ -44,34 +43,38 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def flat(points: Array, middle: Array) -> Array:
-    """Where points are in the disk with a given middle, shape (..., 2)."""
+    """Return the positions of points in the disk with a given middle, shape (..., 2)."""
     moved = _PLANE.transvection(middle, _PLANE.log(middle, _ORIGIN), points)
-    places: Array = moved[..., 1:] / (1 + moved[..., :1])
-    return places
+    positions: Array = moved[..., 1:] / (1 + moved[..., :1])
+    return positions
 
 
-def rims(places: Array, radii: Array) -> Array:
-    """The rims of discs of the hyperbolic plane around places, shape (m, k, 2): circles around the middle, moved by
-    Möbius transformations."""
-    middle = (places @ [1, 1j])[:, None]
+def rims(positions: Array, radii: Array) -> Array:
+    """Return the rims of hyperbolic discs around positions in the disk, shape (m, k, 2).
+
+    They are circles around the middle, moved by Möbius transformations.
+    """
+    middle = (positions @ [1, 1j])[:, None]
     around = np.tanh(radii / 2)[:, None] * (CIRCLE @ [1, 1j])
     moved = (around + middle) / (1 + middle.conj() * around)
     return np.stack([moved.real, moved.imag], axis=-1)
 
 
 def _middle(points: Array) -> tuple[Array, float]:
-    """The middle of the disk, and the distance to the farthest point from there.
+    """Return the middle of the disk, and its distance to the farthest point.
 
-    It is that of the smallest circle around the points, unless they lie around (1, 0, 0) anyway.
+    The middle is the centre of the smallest circle around the points, unless they lie around (1, 0, 0).
     """
     points = points[:: 1 + len(points) // 2000]
     middle = centre_of(_PLANE, points)
-    around, beside = (float(_PLANE.distance(place, points).max()) for place in (_ORIGIN, middle))
-    return (middle, beside) if beside < 0.8 * around else (_ORIGIN, around)
+    around_origin, around_middle = (
+        float(_PLANE.distance(centre, points).max()) for centre in (_ORIGIN, middle)
+    )
+    return (middle, around_middle) if around_middle < 0.8 * around_origin else (_ORIGIN, around_origin)
 
 
 def _draw_grid(axes: Axes, spacing: float) -> None:
-    """The disk, and geodesics at right angles to either axis, ten on each side of the other."""
+    """Draw the disk, and geodesics at right angles to either axis, ten on each side of the other axis."""
     axes.add_patch(Circle((0, 0), 1, facecolor=PAPER, edgecolor=EDGE, linewidth=1, zorder=0))
     along = 14 * np.linspace(-1, 1, 301) ** 3
     for number in range(-10, 11):

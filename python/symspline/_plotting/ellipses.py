@@ -1,7 +1,7 @@
 """Positive definite matrices as ellipses and ellipsoids along a time axis.
 
-Half axes are the eigenvectors, as long as the roots of the eigenvalues: one standard deviation, if the matrices
-are covariances.
+Semi-axes are parallel to the eigenvectors and as long as the square roots of the eigenvalues: one standard deviation,
+if the matrices are covariances.
 """
 
 from __future__ import annotations
@@ -20,46 +20,45 @@ from matplotlib.transforms import Affine2D
 
 from .curves import Curve
 from .frames import VIEW
+from .graphs import LEFT, RIGHT, row_axes
 from .style import INK, Array, size, time_colors
-from .timeline import LEFT, RIGHT, row_axes
 
 _ANGLES = np.linspace(0, 2 * np.pi, 97)
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 
 
 def outlines(matrices: Array) -> Array:
-    """The ellipses of matrices or the outlines of ellipsoids, shape (m, 97, 2): right and up."""
-    roots, turn = _half_axes(matrices[:, :2, :2])
-    ellipses: Array = _CIRCLE[:, :2] * roots[:, None] @ turn
+    """Return the ellipses of matrices or the outlines of ellipsoids, shape (m, 97, 2)."""
+    roots, axes = _half_axes(matrices[:, :2, :2])
+    ellipses: Array = _CIRCLE[:, :2] * roots[:, None] @ axes
     return ellipses
 
 
 def sections(matrices: Array) -> Array:
-    """The near halves of the ellipsoids' sections between two half axes, shape (m, 3, 97, 2); NaN beyond."""
-    roots, turn = (array[:, None] for array in _half_axes(matrices))
+    """Return the near halves of the sections through two semi-axes, shape (m, 3, 97, 2); the far halves are NaN."""
+    roots, axes = (array[:, None] for array in _half_axes(matrices))
     rings = np.stack([np.roll(_CIRCLE[:, [1, 0, 2]], i + 1, axis=1) for i in range(3)])
-    normals = rings / roots[..., None, :] @ turn
-    near: Array = np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ turn)[..., :2], np.nan)
+    normals = rings / roots[..., None, :] @ axes
+    near: Array = np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ axes)[..., :2], np.nan)
     return near
 
 
 def _half_axes(matrices: Array) -> tuple[Array, Array]:
-    """The roots of the eigenvalues, and the eigenvectors in rows."""
+    """Return the square roots of the eigenvalues, and the eigenvectors in rows."""
     values, vectors = np.linalg.eigh(matrices)
-    # By rounding an eigenvalue may be 0.
+    # Rounding can make an eigenvalue 0 or negative.
     return np.sqrt(np.maximum(values, 1e-16 * values[:, -1:])), vectors.swapaxes(1, 2)
 
 
 def _draw(view: Array, panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Rows of ellipses along the time axis, coloured by time, all on the same scale; the given ones filled.
+    """Draw rows of ellipses along the time axis, coloured by time and on the same scale. Given ones are filled.
 
-    Args:
-        view: right, up and, for ellipsoids, towards the viewer.
+    The rows of ``view`` are the directions to the right, up and, for ellipsoids, towards the viewer.
     """
     words = "half axes: √eigenvalues; filled: "
     words += "given" if curves[0].noise is None else "curve, outlines: data"
     words += "; x₁ forwards, x₂ right, x₃ up" * (len(view) == 3)
-    # Beside the scale, which is an inch wide.
+    # The scale to the right of the words is an inch wide.
     words = fill(words, int((size(panel)[0] - LEFT - RIGHT - 1) / 0.075))
     axes, rows = row_axes(panel, curves, top=0.25 + 0.15 * (1 + words.count("\n")))
     if len(rows) < len(curves):
@@ -80,7 +79,7 @@ draw_ellipsoids = partial(_draw, VIEW)
 
 
 def _draw_scale(axes: Axes, width: float, inches: float) -> None:
-    """A bar above the right corner that is 1, 2 or 5 times a power of ten long."""
+    """Draw a bar above the right corner whose length is 1, 2 or 5 times a power of ten."""
     longest = 0.8 / inches
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step for step in (power, 2 * power, 5 * power) if step < 1.01 * longest)
@@ -91,11 +90,9 @@ def _draw_scale(axes: Axes, width: float, inches: float) -> None:
 
 
 def _draw_row(axes: Axes, row: int, inches: float, times: Array, matrices: Array, group: str) -> None:
-    """Ellipses in a row of the axes, in colours by time, those of noisy data in one colour.
+    """Draw ellipses in a row of the axes, coloured by time; those of noisy data have one colour.
 
-    Args:
-        inches: the length of 1 on paper: the time axis has another scale.
-        group: as in `Curve.samples`.
+    ``inches`` is the length of 1 on paper, as the time axis has another scale. The groups are those of `Curve.samples`.
     """
     first, last = axes.get_xlim()
     colors, bold = time_colors((times - first) / (last - first)), group == "bold"

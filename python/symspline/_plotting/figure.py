@@ -1,6 +1,7 @@
 """The figure: a heading, the picture of the space, and speed and acceleration against time.
 
-A new space adds a function that draws, and one line of `_DRAWN` or, for all sizes alike, of `_FAMILIES`.
+To give a new space its picture, add a drawing function and a line of `_DRAWN`, or of `_FAMILIES` for spaces of all
+sizes.
 """
 
 from __future__ import annotations
@@ -18,25 +19,27 @@ from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Product, Space, SpecialEuclidean, factors_of
 from . import chart, ellipses, frames, graphs, sphere
-from .bands import fill_band
-from .curves import Curve, Spline, curves_of
+from .curves import Curve, curves_of, fill_band
 from .disk import draw_disk
+from .graphs import timelines
 from .style import DPI, INK, heading
-from .timeline import timelines
 
 _HEAD, _RATES_WIDTH, _RATES_HEIGHT = 0.95, 5.8, 4.0
 _FACTORS = 6
 _NORMAL = 1.96
-"""A normal variable is nearer to its mean than so many deviations with probability 95 %."""
+"""Half width of the 95 % interval of a normal distribution, in standard deviations."""
 
 
 class Picture(NamedTuple):
-    """How curves in a space are drawn.
+    """The picture of a space.
 
-    Attributes:
-        draw: draws curves into a panel, whatever its size.
-        width, height: of the panel in inches when the picture is the only one. Beside a panel that is much
-            wider than high there is no room for speed and acceleration: they go below.
+    Attributes
+    ----------
+    draw : callable
+        Draws curves into a panel of any size.
+    width, height : float
+        Size of the panel in inches if the picture is the only one. Speed and acceleration are beside the panel, or
+        below a panel that is much wider than high.
     """
 
     draw: Callable[[SubFigure, Sequence[Curve]], None]
@@ -73,13 +76,13 @@ _OTHERS = Picture(graphs.draw_components, 10.5, 3.8)
 
 
 def picture_of(space: Space) -> Picture:
-    """The picture of a space or of its family; the components against time if it has none of its own."""
+    """Return the picture of a space or its family, or graphs of the components if there is none."""
     name = str(space)
     return _PICTURES.get(name) or _FAMILIES.get(name.partition(":")[0], _OTHERS)
 
 
 class CurveFigure(Figure):
-    """A figure that notebooks show although pyplot does not hold it."""
+    """A figure that notebooks show although it does not belong to pyplot."""
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
@@ -87,8 +90,8 @@ class CurveFigure(Figure):
         return buffer.getvalue()
 
 
-def plot(spline: Spline, file: Any = None) -> Figure:
-    """The figure of a spline, saved if ``file`` is given. See `symspline.CubicSpline.plot`."""
+def plot(spline: Any, file: Any = None) -> Figure:
+    """Draw the figure of a spline, and save it if ``file`` is given. See `symspline.CubicSpline.plot`."""
     curves, words = curves_of(spline)
     picture = _of_factors(curves) if isinstance(spline.space, Product) else picture_of(spline.space)
     wide = picture.width > 1.5 * picture.height
@@ -106,7 +109,7 @@ def plot(spline: Spline, file: Any = None) -> Figure:
 
 
 def save(figure: Figure, file: Any) -> None:
-    """Write a figure to an open file, or replace a file by its name, whose ending says the format."""
+    """Write a figure to an open file, or to a path whose suffix selects the format."""
     path = path_of(file, method="write")
     if path is None:
         figure.savefig(file)
@@ -124,8 +127,8 @@ def save(figure: Figure, file: Any) -> None:
         figure.savefig(temporary, format=ending)
 
 
-def _description(spline: Spline, curves: Sequence[Curve]) -> str:
-    """The data, whether the solver converged, how many curves have bands, and how many bands mark missing points."""
+def _description(spline: Any, curves: Sequence[Curve]) -> str:
+    """Describe the data, the convergence of the solver, the number of curves with bands, and the number of gaps."""
     words = [spline._made_of]
     factors = len(factors_of(spline.space))
     if factors > _FACTORS:
@@ -142,7 +145,7 @@ def _description(spline: Spline, curves: Sequence[Curve]) -> str:
 
 
 def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """|γ'| and |∇γ'| of every curve, and the band of the speed where noise is known."""
+    """Draw |γ'| and |∇γ'| of every curve, and the band of the speed if the noise is known."""
     per = ("", "") if curves[0].time_name == "t" else (", 1/s", ", 1/s²")
     # Rigid motions have no invariant lengths, see `SpecialEuclidean`.
     rigid = isinstance(curves[0].space, SpecialEuclidean)
@@ -162,12 +165,12 @@ def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
     top = top or 1.0
     unit = top / max(curve.x[-1] - curve.x[0] for curve in curves)
     upper.set_ylim(0, 1.08 * top)
-    # The rounding of a geodesic is not magnified.
+    # Rounding errors of a geodesic, whose acceleration is 0, are not magnified.
     lower.set_ylim(0, 1.08 * (highest if highest > 1e-9 * unit else unit))
 
 
 def _of_factors(curves: Sequence[Curve]) -> Picture:
-    """The pictures of a product's factors, side by side."""
+    """Return the picture of a product space, which has the pictures of its factors."""
     factors = factors_of(curves[0].space)[:_FACTORS]
     rows = 1 if len(factors) <= 3 else 2
     columns = -(-len(factors) // rows)

@@ -1,4 +1,4 @@
-"""Films of landmarks: a strip along the time axis, and small multiples."""
+"""Films of landmarks: a film strip along the time axis, and small multiples."""
 
 from __future__ import annotations
 
@@ -21,12 +21,18 @@ _WIDTH, _HEIGHT = 11.4, 7.6
 
 
 def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], file: Any = None) -> Figure:
-    """The figure of a film, saved if ``file`` is given. See `symspline.shapes.AffineMorph.plot`.
+    """Draw the figure of a film, and save it if ``file`` is given. See `symspline.shapes.AffineMorph.plot`.
 
-    Args:
-        t: the times of the given drawings.
-        landmarks: the given drawings, shape (N+1, landmarks, n).
-        film: drawings at times.
+    Parameters
+    ----------
+    t : ndarray
+        Times of the given drawings.
+    landmarks : ndarray, shape (N+1, landmarks, n)
+        Given drawings.
+    film : callable
+        Returns the drawings at given times.
+    file : path or file object, optional
+        File to save the figure to.
     """
     drawings, count, n = landmarks.shape
     if n > 3:
@@ -37,7 +43,7 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     heading(
         figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93
     )
-    # Every drawing fits into a square of this size around its middle.
+    # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
     middle, half = window(seen[2].reshape(-1, 2), 1.25)
@@ -53,9 +59,9 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
 
 
 def _times(t: NDArray[Any], number: int) -> NDArray[Any]:
-    """Times from the first to the last, equally spaced."""
+    """Return equidistant times from the first to the last."""
     if t.dtype.kind == "M":
-        # Those in whole days would be rounded to days.
+        # Times that count whole days would be rounded to days.
         t = t.astype("datetime64[us]")
     times: NDArray[Any] = t[0] + (t[-1] - t[0]) * np.arange(number) / (number - 1)
     times[-1] = t[-1]
@@ -63,7 +69,7 @@ def _times(t: NDArray[Any], number: int) -> NDArray[Any]:
 
 
 def _centred(drawings: Array) -> Array:
-    """Drawings around the middles of their rectangles."""
+    """Return drawings relative to the centres of their bounding boxes."""
     middles: Array = (drawings.max(axis=-2, keepdims=True) + drawings.min(axis=-2, keepdims=True)) / 2
     return drawings - middles
 
@@ -71,41 +77,41 @@ def _centred(drawings: Array) -> Array:
 def _draw_strip(
     axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, film: Array, size: float
 ) -> None:
-    """Drawings beside one another, their middles on the time axis; the given ones filled."""
+    """Draw a row of drawings with their centres at their times. Given ones are filled."""
     plain(axes)
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)
     axes.set(yticks=[], ylim=(-1, 1))
     dates = t.dtype.kind == "M"
-    places, knots = (np.asarray(DATES.date2num(values) if dates else values, float) for values in (strip, t))
+    positions, knots = (
+        np.asarray(DATES.date2num(values) if dates else values, float) for values in (strip, t)
+    )
     if dates:
         show_dates(axes, 3, 8)
     else:
         axes.set_xlabel("t")
-    span = places[-1] - places[0]
-    # Half a drawing of the axes' height fits before the first time and behind the last.
+    span = positions[-1] - positions[0]
+    # There is space for half a drawing of the axes' height before the first time and after the last.
     box = axes.get_position()
     share = box.height * _HEIGHT / (box.width * _WIDTH)
     half = share * span / (1 - share) / 2
-    axes.set_xlim(places[0] - half, places[-1] + half)
-    # In these units height and width are the same on paper.
+    axes.set_xlim(positions[0] - half, positions[-1] + half)
+    # These units are equally long on paper in both directions.
     upright = np.array([half, 1]) * 1.9 / size
-    for times, drawings, bold in ((places, film, False), (knots, given, True)):
+    for times, drawings, bold in ((positions, film, False), (knots, given, True)):
         width, fill = (1.8, 0.25) if bold else (0.7, 0.0)
-        for place, (x, y) in zip(times, np.moveaxis(_centred(drawings) * upright, -1, 1), strict=True):
-            color = time_colors((place - places[0]) / span)
-            axes.fill(
-                place + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold
-            )
+        for at, (x, y) in zip(times, np.moveaxis(_centred(drawings) * upright, -1, 1), strict=True):
+            color = time_colors((at - positions[0]) / span)
+            axes.fill(at + x, y, facecolor=(color, fill), edgecolor=color, linewidth=width, zorder=3 + bold)
 
 
 def _draw_one(axes: Axes, x: Any, drawing: Array, color: Any) -> None:
-    """One drawing, where it is, with the numbers of its landmarks."""
+    """Draw one drawing at its position, with the numbers of its landmarks."""
     axes.spines[:].set(color=EDGE, linewidth=0.5)
     axes.fill(*drawing.T, facecolor=(color, 0.15), edgecolor=color, linewidth=1.4)
     axes.plot(*drawing.T, "o", color=color, markersize=3)
     look: Any = {"textcoords": "offset points", "fontsize": 7, "color": INK, "path_effects": HALO}
-    for number, place in enumerate(drawing):
-        axes.annotate(str(number), place, (3, 3), **look)
+    for number, at in enumerate(drawing):
+        axes.annotate(str(number), at, (3, 3), **look)
     name = np.datetime_as_string(x, "m").replace("T", " ") if isinstance(x, np.datetime64) else f"t = {x:.3g}"
     axes.text(0.03, 0.95, name, transform=axes.transAxes, va="top", fontsize=8, color=INK)

@@ -16,23 +16,23 @@ from numpy.typing import NDArray
 from .._quaternions import rotation_rows
 from .chart import box, plane
 from .curves import Curve
+from .graphs import LEFT, RIGHT, row_axes
 from .style import AXES, DATA, INK, Array, legend, size, window
-from .timeline import LEFT, RIGHT, row_axes
 
 VIEW = np.array([[-0.5, 0.866, 0.0], [-0.296, -0.171, 0.940], [0.814, 0.470, 0.342]])
-"""Right, up and towards the viewer, for whom the first axis points forwards and the third up."""
+"""Directions to the right, up and towards the viewer, who sees the first axis point forwards and the third up."""
 
 _ARROW = np.array([[1.0, 0.0], [-0.7, 0.55], [-0.35, 0.0], [-0.7, -0.55]])
-"""A body of the plane that points along its first axis."""
+"""A body in the plane that points along its first axis."""
 _MANY = 24
-"""The number of bodies of all curves together, or two each."""
+"""The number of bodies of all curves, or two per curve if that is more."""
 
 
 # ---- rotations ----
 
 
 def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """The columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis; the given ones bold."""
+    """Draw the columns of rotation matrices, shape (..., 3, 3), as arrows along a time axis. Given ones are bold."""
     width, height = size(panel)
     axes, rows = row_axes(panel, curves)
     length = min(0.7, 0.4 * height / len(rows))
@@ -44,24 +44,24 @@ def _draw_rotations(matrices: Callable[[Any], Array], panel: SubFigure, curves: 
 
 
 def rotations(quaternions: Array) -> Array:
-    """The rotation matrices of unit quaternions w, x, y, z; shape (..., 3, 3)."""
+    """Return the rotation matrices of unit quaternions w, x, y, z; shape (..., 3, 3)."""
     return np.moveaxis(np.array(rotation_rows(*np.moveaxis(quaternions, -1, 0))), (0, 1), (-2, -1))
 
 
 def quaternions(matrices: NDArray[Any]) -> Array:
-    """The unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
+    """Return the unit quaternions w, x, y, z of matrices w − i(xσ₁ + yσ₂ + zσ₃) of SU(2), shape (..., 4)."""
     a, b = matrices[..., 0, 0], matrices[..., 1, 0]
     return np.stack([a.real, -b.imag, b.real, -a.imag], axis=-1)
 
 
-# S³: unit quaternions, scalar first. SO(3) and O(3): matrices as they are. SU(2): the rotations of space.
+# Points of S³ are unit quaternions, scalar first. Those of SU(2) act on R³ as rotations.
 draw_quaternions = partial(_draw_rotations, rotations)
 draw_rotations = partial(_draw_rotations, np.asarray)
 draw_spins = partial(_draw_rotations, lambda matrices: rotations(quaternions(matrices)))
 
 
 def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) -> None:
-    """The columns of matrices, shape (m, 3, 3), in inches; nearer ones are drawn later."""
+    """Draw the columns of matrices, shape (m, 3, 3), in inches. Nearer columns cover farther ones."""
     seen = VIEW @ frames
     order = np.argsort(seen[:, 2], axis=-1)
     right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
@@ -70,25 +70,25 @@ def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) 
     look |= (
         {"width": 0.032, "alpha": 1, "zorder": 4} if bold else {"width": 0.014, "alpha": 0.55, "zorder": 3}
     )
-    places = np.repeat(times, 3), np.full(3 * len(times), row)
-    axes.quiver(*places, right.ravel(), up.ravel(), color=np.array(AXES)[order.ravel()], **look)
+    positions = np.repeat(times, 3), np.full(3 * len(times), row)
+    axes.quiver(*positions, right.ravel(), up.ravel(), color=np.array(AXES)[order.ravel()], **look)
 
 
 def _explain(axes: Axes, curves: Sequence[Curve], more: str, height: float = 1.0) -> None:
-    """A legend of the colours in a line at a height of the axes."""
+    """Draw a legend of the colours in one line at a given height of the axes."""
     handles = [Line2D([], [], color=color, linewidth=2.4) for color in AXES]
     given = "bold: given" if curves[0].noise is None else "bold: curve, light: data"
-    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, height), "ncols": 4, "borderaxespad": 0.2}
+    anchor: Any = {"loc": "lower left", "bbox_to_anchor": (0, height), "ncols": 4, "borderaxespad": 0.2}
     handles.append(Line2D([], [], linestyle="none"))
     labels = ["first axis", "second", "third", given + more]
-    legend(axes, handles, labels, handlelength=1.2, columnspacing=1.2, **place)
+    legend(axes, handles, labels, handlelength=1.2, columnspacing=1.2, **anchor)
 
 
 # ---- rigid motions: the path of a body, and its orientation ----
 
 
 def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """SE(2): arrow heads that stand on the path and point along their first axis; the given ones filled."""
+    """Draw poses of SE(2) as arrow heads on the path that point along their first axis. Given ones are filled."""
     axes = plane(panel)
     _, half = window(np.concatenate([curve.extent[:, :2, 2] for curve in curves]), 1.0)
     number = max(2, _MANY // len(curves))
@@ -112,7 +112,7 @@ def draw_flat_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """SE(3): frames that stand on the path; the given ones bold."""
+    """Draw poses of SE(3) as frames on the path. Given ones are bold."""
     paths = [curve.points[:, :3, 3] for curve in curves]
     axes = box(panel, paths, [curve.given[:, :3, 3] for curve in curves], 1.2, below=0.4)
     number = max(2, _MANY // len(curves))
@@ -121,7 +121,7 @@ def draw_poses(panel: SubFigure, curves: Sequence[Curve]) -> None:
     def draw(poses: Array, length: float, **look: Any) -> None:
         feet = poses[:, :3, 3]
         for i, color in enumerate(AXES):
-            # One line of all sticks of a colour.
+            # All sticks of one colour are one line with breaks.
             sticks = np.stack([feet, feet + length * poses[:, :3, i], np.full_like(feet, np.nan)], axis=1)
             axes.plot(*sticks.reshape(-1, 3).T, color=color, zorder=5, **look)
 

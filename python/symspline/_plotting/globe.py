@@ -1,4 +1,4 @@
-"""A globe seen from far away, with a graticule: for places, directions and all curves that live on S²."""
+"""A globe seen from far away, with a graticule, for all curves on S²."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STEPS = np.append(np.multiply.outer(10.0 ** np.arange(-9, 1), [1, 2, 5]).ravel(
 
 @dataclass(frozen=True)
 class View:
-    """A globe seen from far above a place: unit vectors to the east, to the north and up."""
+    """A globe seen from far above a position, by unit vectors to the east, to the north and up."""
 
     east: Array
     north: Array
@@ -28,33 +28,33 @@ class View:
 
     @classmethod
     def above(cls, lon: float, lat: float) -> View:
-        """The view with a place in the middle."""
+        """Return the view with a position in the middle."""
         east, up = from_lonlat(lon + 90, 0), from_lonlat(lon, lat)
         return cls(east, np.cross(up, east), up)
 
     def flat(self, points: Array) -> Array:
-        """The orthographic projection, shape (..., 2)."""
+        """Return the orthographic projection, shape (..., 2)."""
         return np.stack([points @ self.east, points @ self.north], axis=-1)
 
     def visible(self, points: Array) -> Array:
-        """The projection of the near side; NaN, which breaks a line, on the far side."""
+        """Return the projection of points on the near side; NaN, which breaks a line, on the far side."""
         return np.where((points @ self.up > 0)[..., None], self.flat(points), np.nan)
 
     def hidden(self, points: Array) -> Array:
-        """The projection of the far side; NaN on the near side."""
+        """Return the projection of points on the far side; NaN on the near side."""
         return np.where((points @ self.up > 0)[..., None], np.nan, self.flat(points))
 
     def outline(self, ring: Array) -> Array:
-        """The projection of a ring of points, its far part pressed onto the horizon."""
+        """Return the projection of a ring of points, with its far part moved to the horizon."""
         flat = self.flat(ring)
         horizon = flat / np.linalg.norm(flat, axis=-1, keepdims=True)
         return np.where((ring @ self.up > 0)[..., None], flat, horizon)
 
 
 def centre_of(space: Space, points: Array) -> Array:
-    """The centre of the smallest ball around points of a space.
+    """Return the centre of the smallest ball around points of a space.
 
-    Bădoiu and Clarkson (2003): ever shorter steps to the farthest point.
+    The steps towards the farthest point become shorter, as in Bădoiu and Clarkson, Smaller core-sets for balls (2003).
     """
     centre = space.project(points.mean(axis=0))
     for i in range(2, 200):
@@ -63,10 +63,10 @@ def centre_of(space: Space, points: Array) -> Array:
 
 
 def middle_of(points: Array) -> tuple[float, float]:
-    """Longitude and latitude of the place above which points, shape (m, 3), are seen well.
+    """Return longitude and latitude of a position above which points, shape (m, 3), are seen well.
 
-    The middle of the smallest circle around them, their mean if they do not fit into one half of the globe, or,
-    where they are all around, a place from which the plane closest to them is seen obliquely.
+    It is the centre of the smallest circle around the points, or their mean if they do not fit into a hemisphere. If
+    the points are all around the globe, the plane closest to them is seen at an angle.
     """
     points = points[:: 1 + len(points) // 2000]
     middle = centre_of(Euclidean(3), points)
@@ -82,7 +82,7 @@ def middle_of(points: Array) -> tuple[float, float]:
 
 
 def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None:
-    """A shaded globe with a graticule, or its northern half above the rim."""
+    """Draw a shaded globe with a graticule, or its northern half above the rim."""
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=(-1.06, 1.06), ylim=(-1.06, 1.06))
     steps, south = np.linspace(-180, 180, 721), 0 if half else -90
@@ -94,7 +94,7 @@ def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None
         arc = np.radians(np.linspace(0, 180, 181))
         outline = Polygon([*zip(np.cos(arc), np.sin(arc), strict=True), *front[front[:, 0].argsort()]])
         axes.plot(*view.hidden(rim).T, color=EDGE, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
-    # Light as on a ball of radius 1 around the middle.
+    # The brightness of a ball of radius 1 around the middle.
     x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
     light = np.sqrt(np.maximum(1 - ((x + 0.25) ** 2 + (y - 0.25) ** 2) / 1.9, 0))
     image = axes.imshow(light, extent=(-1, 1, -1, 1), origin="lower", cmap=SEA, zorder=0)
@@ -107,7 +107,7 @@ def draw_globe(axes: Axes, view: View, spacing: int, half: bool = False) -> None
 
 
 def label_directions(axes: Axes, view: View, directions: Mapping[str, tuple[float, float, float]]) -> None:
-    """Labelled half axes from the middle of a ball, those on the far side faint."""
+    """Draw labelled half axes from the centre of a ball. Those on the far side are faint."""
     for label, direction in directions.items():
         end = np.array(direction)
         alpha = 0.9 if end @ view.up > -1e-9 else 0.5
@@ -119,10 +119,9 @@ def label_directions(axes: Axes, view: View, directions: Mapping[str, tuple[floa
 
 
 def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:
-    """A square frame, with a graticule that is labelled at the left and at the bottom.
+    """Draw a square frame with a graticule, which has labels on the left and at the bottom.
 
-    Args:
-        middle, half: where the frame is in the projection, and half its width.
+    ``middle`` and ``half`` are the centre of the frame in the projection, and half of its width.
     """
     (west, south), (east, north) = middle - half, middle + half
     lon, lat = (float(value) for value in to_lonlat(view.up))
@@ -145,7 +144,7 @@ def draw_frame(axes: Axes, view: View, middle: Array, half: float) -> None:
 
 
 def _multiples(step: float, low: float, high: float) -> list[float]:
-    """Multiples of a step that divides a turn, each direction once."""
+    """Return multiples of a step that divides 360 degrees, each direction once."""
     numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
     return [round(float(step * number), 9) for number in numbers if low + 360 - step * number > 1e-9]
 
@@ -153,7 +152,7 @@ def _multiples(step: float, low: float, high: float) -> list[float]:
 def _ticks(
     lines: Iterable[Array], values: Iterable[float], letters: str, level: float, low: float, high: float
 ) -> tuple[list[float], list[str]]:
-    """Where lines cross a level of the second coordinate, and labels, none of them too close to another."""
+    """Return the positions where lines cross a level of the second coordinate, and labels that do not overlap."""
     found = []
     for line, value in zip(lines, values, strict=True):
         above = line[:, 1] > level
@@ -164,8 +163,8 @@ def _ticks(
     kept: dict[float, str] = {}
     last = -np.inf
     for x, label in sorted(found):
-        room = (0.02 + (0.018 * len(label) if letters == "EW" else 0.03)) * (high - low)
-        if low <= x <= high and x - last > room:
+        width = (0.02 + (0.018 * len(label) if letters == "EW" else 0.03)) * (high - low)
+        if low <= x <= high and x - last > width:
             kept[x], last = label, x
     return list(kept), list(kept.values())
 

@@ -1,4 +1,4 @@
-"""Numbers against time: coordinates, angles, principal angles and the components of points."""
+"""Axes with a time axis, and graphs of coordinates, angles and components of points against time."""
 
 from __future__ import annotations
 
@@ -7,25 +7,88 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from .._spaces import HermitianPositiveDefinite, Space, SymmetricPositiveDefinite
-from .bands import draw_graph_of
-from .curves import Curve
-from .style import DISTINCT, INK, Array, Indices, legend, size
-from .timeline import LEFT, RIGHT, timelines
+from .curves import Curve, draw_graph_of
+from .style import DISTINCT, EDGE, GAP, INK, Array, Indices, evenly, inside, legend, plain, show_dates, size
 
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _NAMED, _OTHERS = 12, 100
+LEFT, RIGHT, BOTTOM, TOP = 0.95, 0.6, 0.55, 0.25
+"""Margins in inches, which align the time axes of several panels."""
+
+_LINES, _TICKS = 60, 2000
+
+
+# ---- axes ----
+
+
+def timelines(
+    panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], top: float = TOP
+) -> list[Axes]:
+    """Add a column of axes with the same time axis, one per label of the vertical axis."""
+    height = (size(panel)[1] - BOTTOM - top) / len(labels)
+    made = []
+    for i, label in enumerate(labels):
+        lower, upper = BOTTOM + (len(labels) - 1 - i) * height, top + i * height
+        axes = panel.add_axes(inside(panel, LEFT, lower + (0.3 if lower > BOTTOM else 0), RIGHT, upper))
+        plain(axes)
+        axes.grid(visible=False, axis="x")
+        axes.set_ylabel(label)
+        _set_times(axes, curves, size(panel)[0] - LEFT - RIGHT, lowest=i == len(labels) - 1)
+        _mark_knots(axes, curves)
+        made.append(axes)
+    return made
+
+
+def row_axes(panel: SubFigure, curves: Sequence[Curve], top: float = 0.4) -> tuple[Axes, Indices]:
+    """Add axes for rows of pictures along the time axis, and return the indices of the curves that have a row.
+
+    Row i is at height −i. There are as many rows as fit.
+    """
+    rows = evenly(len(curves), int(size(panel)[1] // 0.8))
+    (axes,) = timelines(panel, curves, [""], top=top)
+    axes.set(ylim=(0.5 - len(rows), 0.5), yticks=[])
+    axes.spines["left"].set_visible(False)
+    return axes, rows
+
+
+def _set_times(axes: Axes, curves: Sequence[Curve], width: float, lowest: bool) -> None:
+    first, last = min(curve.times[0] for curve in curves), max(curve.times[-1] for curve in curves)
+    axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
+    if curves[0].dates:
+        # For some spans the locator does not find an interval between narrower limits.
+        show_dates(axes, *((3, 10) if width > 7 else (2, 5)))
+    axes.set_xlabel(curves[0].time_name if lowest else "")
+    axes.tick_params(labelbottom=lowest)
+    axes.xaxis.offsetText.set_visible(lowest)
+
+
+def _mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
+    """Mark knots or noisy data by thin lines, or by short ticks if lines would be too many.
+
+    Bands mark long gaps between points.
+    """
+    knots = np.unique(np.concatenate([curve.marks for curve in curves]))
+    height = 1.0 if len(knots) <= _LINES else 0.04
+    look: Any = {"transform": axes.get_xaxis_transform()}
+    line: Any = {"color": EDGE, "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
+    axes.vlines(knots[:: 1 + len(knots) // _TICKS], 0, height, **look, **line)
+    gaps = np.unique(np.concatenate([curve.gaps for curve in curves]), axis=0)
+    if len(gaps):
+        spans = [(start, end - start) for start, end in gaps.tolist()]
+        axes.broken_barh(spans, (0, 1), label="gaps", facecolor=GAP, linewidth=0, zorder=0.5, **look)
 
 
 # ---- one number ----
 
 
 def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """R¹: the graph."""
+    """Draw the graphs of curves in R¹."""
     (axes,) = timelines(panel, curves, ["x"])
     for curve in curves:
         draw_graph_of(axes, curve, *curve.marked(np.ravel))
@@ -34,17 +97,17 @@ def draw_graph(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def _draw_angle(
     angles: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve], period: float = 2 * np.pi
 ) -> None:
-    """An angle against time, without jumps."""
+    """Draw an angle against time, without jumps."""
     (axes,) = timelines(panel, curves, ["angle, degrees"])
     for curve in curves:
         line, given = curve.marked(angles)
         line = np.unwrap(line, period=period)
-        given = given + period * np.rint((curve.beside(line) - given) / period)
+        given = given + period * np.rint((curve.closest_samples(line) - given) / period)
         draw_graph_of(axes, curve, np.degrees(line), np.degrees(given), np.degrees(1.0))
 
 
-# S¹: the angle of unit vectors. RP¹ and Gr(1, 2): that of a line, which is back after half a turn. SO(2) and O(2): the
-# angle by which the first axis is turned. U(1): the phase.
+# Points of S¹ have the angle of a unit vector. Points of RP¹ and Gr(1, 2) are lines, whose angle has the period π.
+# Points of SO(2) and O(2) have the angle of the first axis, and points of U(1) their phase.
 draw_circle = partial(_draw_angle, lambda points: np.arctan2(points[:, 1], points[:, 0]))
 draw_slope = partial(_draw_angle, lambda lines: np.arctan2(lines[:, 1], lines[:, 0]).ravel(), period=np.pi)
 draw_turn = partial(_draw_angle, lambda matrices: np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]))
@@ -61,12 +124,20 @@ def draw_numbers(
     names: Sequence[str],
     numbers: Callable[[Any, Any], Array],
 ) -> None:
-    """Several numbers against time, the first twelve with their names.
+    """Draw several numbers against time, the first twelve with their names.
 
-    Args:
-        label: of the vertical axis.
-        names: one per number; "Im ..." follows the real part of the same number.
-        numbers: a function of the first point of a curve and of points, one row per point.
+    Parameters
+    ----------
+    panel : SubFigure
+        Panel to draw into.
+    curves : sequence of Curve
+        Curves to draw.
+    label : str
+        Label of the vertical axis.
+    names : sequence of str
+        Names of the numbers. The name "Im ..." follows that of the real part.
+    numbers : callable
+        Function of the first point of a curve and of several points, with one row per point.
     """
     in_row = min(6, int((size(panel)[0] - LEFT - RIGHT) / 0.9))
     width = 1.8 if curves[0].alone else 0.9
@@ -84,18 +155,18 @@ def draw_numbers(
         axes.plot(curve.times, values[:, rest], color=INK, linewidth=0.4, alpha=0.4)
         for i, look in enumerate(looks):
             axes.plot(curve.times, values[:, i], linewidth=width, **look)
-            places, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
+            positions, color = np.column_stack([curve.on_axis(curve.given_x), given[:, i]]), look["color"]
             if curve.alone and curve.noise is None:
-                axes.plot(*places.T, "o", color=color, markersize=3)
+                axes.plot(*positions.T, "o", color=color, markersize=3)
             elif curve.alone:
-                curve.draw_dots(axes, places, color=color, alpha=0.4)
+                curve.draw_dots(axes, positions, color=color, alpha=0.4)
     order = [i for column in range(in_row) for i in range(column, len(labels), in_row)]
-    place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
-    legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **place)
+    anchor: Any = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": in_row, "borderaxespad": 0}
+    legend(axes, [handles[i] for i in order], [labels[i] for i in order], handlelength=1.6, **anchor)
 
 
 def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
-    """Colour and line style of every number: an imaginary part is dashed in the colour of its real part."""
+    """Return colour and line style of every number. An imaginary part is dashed in the colour of its real part."""
     is_complex = any(name.startswith("Im ") for name in names)
     made, entry = [], -1
     for name in names:
@@ -107,7 +178,7 @@ def _looks(names: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """The components of a point: the picture for spaces without a better one."""
+    """Draw the components of points, for spaces without a picture of their own."""
     space = curves[0].space
     kept = independent(space)
     names = component_names(space.point_shape, space.dtype.kind == "c")
@@ -116,13 +187,13 @@ def draw_components(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def components(points: NDArray[Any]) -> Array:
-    """One row per point; the real and the imaginary parts of complex numbers alternate."""
+    """Return one row per point, in which the real and imaginary parts of complex numbers alternate."""
     flat = np.ascontiguousarray(points.reshape(len(points), -1))
     return flat.view(np.float64) if np.iscomplexobj(flat) else flat
 
 
 def component_names(shape: tuple[int, ...], is_complex: bool) -> list[str]:
-    """Names such as x₁, x₂ or, for matrices, x₁₁; counted from 1."""
+    """Return names such as x₁, x₂ or, for matrices, x₁₁."""
     comma = "," if max(shape) > 9 else ""
     indices = [comma.join(str(i + 1) for i in index) for index in np.ndindex(*shape)]
     names = [f"x{index.translate(SUBSCRIPTS)}" for index in indices]
@@ -130,7 +201,7 @@ def component_names(shape: tuple[int, ...], is_complex: bool) -> list[str]:
 
 
 def independent(space: Space) -> Indices:
-    """The numbers of the components to draw: of a Hermitian matrix those that do not follow from others."""
+    """Return the indices of the components to draw, which determine a Hermitian matrix."""
     whole = np.ones(space.point_shape)
     if isinstance(space, SymmetricPositiveDefinite):
         return np.flatnonzero(np.triu(whole))
@@ -140,7 +211,7 @@ def independent(space: Space) -> Indices:
 
 
 def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Complex hyperbolic space: the ratios zᵢ/z₀, which fill the unit ball whatever the phases, against time."""
+    """Draw the ratios zᵢ/z₀ of points of complex hyperbolic space, which do not depend on the phase."""
     n = curves[0].points.shape[1] - 1
     names = [f"{part} z{i + 1}/z0".translate(SUBSCRIPTS) for i in range(n) for part in ("Re", "Im")]
     ratios = lambda _, points: components(points[:, 1:] / points[:, :1])  # noqa: E731
@@ -148,7 +219,7 @@ def draw_ratios(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
-    """Grassmannians and projective spaces: the principal angles to the first point against time."""
+    """Draw the principal angles to the first point, for Grassmannians and projective spaces."""
     n, k = np.reshape(curves[0].points[0], (len(curves[0].points[0]), -1)).shape
     names = [f"θ{i + 1}".translate(SUBSCRIPTS) for i in range(min(k, n - k))]
     numbers = lambda first, points: principal_angles(points, first)[:, : len(names)]  # noqa: E731
@@ -156,9 +227,9 @@ def draw_principal_angles(panel: SubFigure, curves: Sequence[Curve]) -> None:
 
 
 def principal_angles(points: NDArray[Any], first: NDArray[Any]) -> Array:
-    """Degrees between a subspace and others, the largest first; shape (m, k).
+    """Return the principal angles between a subspace and others in degrees, the largest first; shape (m, k).
 
-    Of small angles the sines are exact, of large ones the cosines.
+    The sines are accurate for small angles, and the cosines for large ones.
     """
     bases = points.reshape(*points.shape[:2], -1)
     base = first.reshape(bases.shape[1:])

@@ -8,7 +8,7 @@ from typing import Any
 
 from .._core import ConvergenceError, ValidationError
 from .._curves.solve import Progress
-from .._errors import callers_level, raise_or_warn
+from .._errors import raise_or_warn, warn
 from .._faults import UNCONVERGED, Fault
 from .._options import check_on_failure, check_progress
 from .._spaces import Space
@@ -53,9 +53,9 @@ def smooth_many(
                 found.append(make_smoothing_spline(t, points, space, **own, **options))
             except ConvergenceError as error:
                 found.append(error.spline)
-                faults.append(Fault(number, UNCONVERGED, f"curve {number}: {error}"))
+                faults.append(Fault(number, UNCONVERGED, f"curve {number}: {error}", node=error.node))
             except ValidationError as error:
-                raise ValidationError(f"curve {number}: {error}") from None
+                raise error._of_curve(number) from None
         noted += [(number, note) for note in seen]
         if progress is not None:
             progress(number + 1, len(given))
@@ -63,7 +63,8 @@ def smooth_many(
     for kind in dict.fromkeys(note.category for _, note in noted):
         first, *more = [(number, note) for number, note in noted if note.category is kind]
         others = f" (and {len(more)} more curves)" if more else ""
-        warnings.warn(f"curve {first[0]}: {first[1].message}{others}", kind, stacklevel=callers_level())
+        number, note = first
+        warn(f"curve {number}: {note.message}{others}", kind, (number,), getattr(note.message, "node", None))
     if faults:
         raise_or_warn(faults, on_failure, found)
     return found

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
 from .._curves.curve import CurveArrays
-from .._errors import callers_level
+from .._errors import warn
 from .._spaces import Array, Space, factors_of
 from .data import SmoothingData, points_of
 from .factors import split
@@ -47,15 +46,15 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
         # A curve through all data has no residuals to compare.
         far = np.argwhere((found**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1))
         if len(far):
-            index = tuple(far[0])
+            index = tuple(map(int, far[0]))
             of = f" of curve {','.join(map(str, index))}" if index else ""
             more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
-            warnings.warn(
+            warn(
                 f"half of the data{of} are {found[index]:.2g} or more away from their smooth curve{more}. For random "
                 f"points of {factor!r} this distance is {expected:.2g}, so the curve has little meaning. Check the "
                 "units and signs of the data.",
                 UserWarning,
-                stacklevel=callers_level(),
+                index,
             )
             return
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
-from .._errors import callers_level
+from .._errors import warn
 from .._spaces import Space
 from .factors import is_several, smoothed_spaces
 
@@ -38,16 +37,16 @@ def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: 
         found = np.argwhere(good & np.reshape(asked, good.shape))
         if not len(found):
             continue
-        index = tuple(found[0])
+        index = tuple(map(int, found[0]))
         of = f" of curve {','.join(map(str, index))}" if index else ""
         of += f" in factor {number}, {spaces[number]!r}" if is_several(space) else ""
         more = f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
-        warnings.warn(
+        warn(
             _message(
                 of, more, float(np.asarray(report.df)[index]), bool(rough[index]), report.is_stiff(index)
             ),
             SmoothingWarning,
-            stacklevel=callers_level(),
+            index,
         )
         return
 

@@ -19,10 +19,10 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from .._core import ConvergenceError, CutLocusError, ValidationError
+from .._exceptions import ConvergenceError, SymsplineError
 from .._version import VERSION
 from . import _check, _fit, _plot, _sample
-from ._errors import Problem, with_names
+from ._errors import Problem, for_command_line
 from ._terminal import say
 
 __all__ = ["main"]
@@ -34,7 +34,7 @@ FAILED, BAD, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # Names of curves may hold letters that the terminal cannot show.
+        # Names of curves may contain characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
@@ -49,8 +49,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except KeyboardInterrupt:
         return _failed("interrupted", INTERRUPTED)
-    except ConvergenceError as error:
-        return _failed(error, FAILED)
     except MemoryError:
         return _failed("there is not enough memory for this", BAD)
     except OSError as error:
@@ -59,8 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(f"cannot write {error.filename or 'the output'}: {error.strerror or error}", BAD)
     except Problem as error:
         return _failed(error, error.code)
-    except (ValidationError, CutLocusError) as error:
-        return _failed(with_names(str(error)), BAD)
+    except SymsplineError as error:
+        return _failed(for_command_line(error), FAILED if isinstance(error, ConvergenceError) else BAD)
 
 
 def _failed(message: object, code: int) -> int:
@@ -69,7 +67,7 @@ def _failed(message: object, code: int) -> int:
 
 
 def _drop_output() -> None:
-    """Discard what would be flushed at exit, as nobody reads it."""
+    """Discard output that would be flushed at exit, as its reader has stopped."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

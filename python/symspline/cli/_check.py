@@ -42,7 +42,7 @@ _MEASURES = ("distance", "position", "velocity", "acceleration")
 _RELATIVE = 1e-12
 _OF_FUNCTIONS = 1e-7
 _ROUNDING = 100 * float(np.finfo(np.float64).eps)
-# Lengths of their metric are relative to the matrices: 1 m² and 10⁶ mm² are the same.
+# Their metric is relative: it does not depend on the unit of the matrices.
 _POSITIVE = (SymmetricPositiveDefinite, HermitianPositiveDefinite)
 
 
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     line("curve", "points", *_MEASURES)
     failed = []
     for name, spline in curves.splines.items():
-        # The worst factor of a product counts.
+        # The largest values of all factors of a product count.
         measured = [_measure(part) for part in spline._parts]
         values = np.max([values for values, _ in measured], axis=0)
         line(brief(name), len(spline.t), *(f"{value:.1e}" for value in values))
@@ -81,16 +81,16 @@ def _measure(spline: CubicSpline) -> tuple[list[float], float]:
     """Return the numbers of the table, and the largest of them divided by what is allowed."""
     if not np.isfinite(spline.velocities).all():
         return [np.nan] * len(_MEASURES), np.inf
-    pieces = segments_of(spline)
+    segments = segments_of(spline)
     closed = is_closed(spline.bc_type)
     steps = np.diff(spline._times)
     shorter = np.minimum(steps, np.roll(steps, -1))[: None if closed else -1]
     relative = _OF_FUNCTIONS if isinstance(spline.space, Manifold) else _RELATIVE
     floor = _ROUNDING * float(spline.space._rounding(spline.points).max())
-    distance = float(spline.space.distance(pieces.at(pieces.t), pieces.points).max())
+    distance = float(spline.space.distance(segments.at(segments.t), segments.points).max())
     values, excess = [distance], [distance / (relative + floor)]
     for nu in range(3):
-        jumps = pieces.jumps(nu, closed)
+        jumps = segments.jumps(nu, closed)
         if nu == 0 and isinstance(spline.space, _POSITIVE):
             jumps = replace(jumps, largest=1.0)
         rounding = floor / shorter**nu

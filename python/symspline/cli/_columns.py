@@ -48,13 +48,13 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
         return None if given == NUMBERED and given not in table.names else table.require(given)
     left = [name for name in table.names if name not in others]
     usual = [name for name in left if _TIME.fullmatch(_words(name))]
-    # Numbers are taken silently under the two plainest names only: others leave their unit in doubt.
+    # Numbers are accepted as times only under the two plainest names, as the unit of others is in doubt.
     certain = [name for name in usual if name not in table.numeric or name.lower() in ("t", "time")]
     doubtful = [
         name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))
     ]
     if len(certain) == 1:
-        # A date with its time of day, as its name says, needs none of the parts.
+        # A column of dates with their time of day needs no other columns.
         is_whole = certain[0] not in table.numeric and "time" in certain[0].lower()
         if is_whole or not doubtful:
             return certain[0]
@@ -91,7 +91,7 @@ def check_days(table: Table, name: str | None, rows: Rows) -> None:
 
 
 def column_of_names(table: Table, time: str | None, used: Sequence[str | None]) -> str | None:
-    """Return an unused column that tells rows of equal times apart: it may hold the names of several curves.
+    """Return an unused column that distinguishes rows of equal times: it may hold the names of several curves.
 
     Each of its values occurs in two rows or more, never twice at one time.
     """
@@ -140,7 +140,7 @@ def _paired(columns: Sequence[str]) -> list[Entry]:
 
 
 def completed(numbers: Array, entries: Sequence[Entry], space: Space) -> Array:
-    """Insert zeros for the imaginary parts of complex numbers that have one column only."""
+    """Insert zeros for the imaginary parts of complex numbers that have one column."""
     counts = np.array([len(entry.columns) for entry in entries])
     missing = np.cumsum(counts)[np.array(complex_numbers(space)) & (counts == 1)]
     return np.insert(numbers, missing, 0.0, axis=1)
@@ -158,7 +158,7 @@ def split_names(text: str | None) -> list[str]:
 def point_entries(
     table: Table, given: list[str], others: list[str | None], space: Space, lonlat: bool, order: str | None
 ) -> tuple[list[Entry], list[int] | None]:
-    """Return the numbers of a point, in the given columns or in all that are left.
+    """Return the numbers of a point, in the given columns or in all other columns.
 
     If a rotation is a quaternion, the second value is the column of each of its numbers (`Columns.quaternion`).
     """
@@ -202,7 +202,7 @@ def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool)
     """Raise `Problem` unless real numbers have one column, and complex ones both or one without an ending."""
     kinds = complex_numbers(space)
     if len(entries) != len(kinds):
-        # It is not known which number a column is for, but all may be of one kind.
+        # The number of a column is unknown, but all numbers may be of one kind.
         kinds = kinds[:1] * len(entries) if len(set(kinds)) == 1 else []
     for entry, two in zip(entries, kinds, strict=False):
         if len(entry.columns) > 1 and not two:
@@ -243,7 +243,7 @@ def _quaternion_columns(names: list[str], space: Space, order: str | None) -> li
     Raises
     ------
     Problem
-        The names do not tell which number is which, or contradict ``order``.
+        The names do not show which number is which, or contradict ``order``.
     """
     found = quaternion_by_names(names, space)
     if order is None and found is None:
@@ -269,17 +269,17 @@ def _quaternion_in_order(space: Space, scalar_last: int) -> list[int]:
 
 
 def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
-    """Return the same for names that end in w, x, y and z after a common beginning; None if they do not.
+    """Return these columns for names that end in w, x, y and z after a common beginning; None for other names.
 
-    Positions whose names end in x, y and z may stand in any order, too.
+    Positions whose names end in x, y and z may also be in any order.
     """
     plain = [_IN_BRACKETS.sub("", name).strip().lower() for name in names]
     scalars = [name for name in plain if name.endswith("w")]
     quaternion = [scalars[0][:-1] + letter for letter in "wxyz"] if len(scalars) == 1 else []
     if not quaternion or any(plain.count(name) != 1 for name in quaternion):
         return None
-    turn = [plain.index(name) for name in quaternion]
-    rest = [i for i in range(len(names)) if i not in turn]
+    scalar_first = [plain.index(name) for name in quaternion]
+    rest = [i for i in range(len(names)) if i not in scalar_first]
     columns: list[int] = []
     for factor in factors_of(space):
         count = width(factor, True) - (4 if factor in (ROTATIONS, POSES) else 0)
@@ -289,5 +289,5 @@ def quaternion_by_names(names: Sequence[str], space: Space) -> list[int] | None:
             own = by_letter
         elif factor == POSES:
             return None
-        columns += own + (turn if factor in (ROTATIONS, POSES) else [])
+        columns += own + (scalar_first if factor in (ROTATIONS, POSES) else [])
     return columns

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import BinaryIO
 
@@ -26,7 +27,7 @@ _COLUMNS = "columns"
 
 @dataclass(frozen=True)
 class Curves:
-    """Curves of one space by name, and their columns. The name of a single curve may be without meaning."""
+    """Curves of one space by name, and their columns. If ``named`` is False, the name has no meaning."""
 
     splines: dict[str, CubicSpline]
     named: bool
@@ -57,8 +58,13 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
             if not isinstance(curve, CubicSpline):
                 kind = type(curve).__name__
                 raise Problem(f"{path} is a {kind}, whose acceleration jumps at knots; use symspline.load")
-        splines = found if named else dict(_singles(found))
-        named = named or len(splines) > 1
+        if named:
+            splines = found
+        else:
+            # The curves of a batch are named by their indices.
+            indices = np.ndindex(found._batch)
+            splines = {",".join(map(str, index)): reduce(getitem, index, found) for index in indices}
+            named = len(splines) > 1
         space = next(iter(splines.values())).space
         if lonlat:
             require_globe(space)
@@ -70,7 +76,7 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
 
 
 def _entries(path: Path, file: BinaryIO) -> list[str]:
-    """The names of the entries of the file."""
+    """Return the names of the entries of the file."""
     try:
         with zipfile.ZipFile(file) as archive:
             return archive.namelist()
@@ -86,7 +92,7 @@ def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
     except OSError:
         raise
     except Exception as error:
-        # Damage appears as errors of zipfile, of its decompressors and of NumPy.
+        # Damaged files raise errors of zipfile, of its decompressors and of NumPy.
         raise Problem(f"{path} is damaged: {brief(error)}") from None
     names, order = columns.points, columns.quaternion
     count = len(labels(space)) if order is None else count_with_quaternion(space)
@@ -102,12 +108,3 @@ def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
     )
     refuse(path, (not good, f" is damaged: its names of columns do not suit {space}"))
     return columns
-
-
-def _singles(spline: CubicSpline, name: str = "") -> Iterator[tuple[str, CubicSpline]]:
-    """The curves of a batch, named by their indices."""
-    if not spline._batch:
-        yield name, spline
-        return
-    for i, part in enumerate(spline):
-        yield from _singles(part, f"{name},{i}" if name else str(i))

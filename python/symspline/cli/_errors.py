@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,10 +12,13 @@ from pathlib import Path
 from .._disk import replacing
 from .._spaces.base import CLASSES
 
-_NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
-_SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\(([\w, ]+)\)")
-# Advice for Python only.
-_ADVICE = re.compile(r"; use space\.project\(x\).*|, or raise max_iter| \(np\.[^()]*\)")
+# Long names first: Unitary is a part of SpecialUnitary.
+_NAMES = sorted(((cls.__name__, name) for name, cls in CLASSES.items()), key=lambda pair: -len(pair[0]))
+_FOR_PYTHON = (
+    "; use space.project(x) if these are meant to be points",
+    " (np.linalg.qr gives an orthonormal basis)",
+    ", or raise max_iter",
+)
 
 
 class Problem(Exception):
@@ -38,14 +40,16 @@ def refuse(where: object, *checks: tuple[object, str]) -> None:
             raise Problem(f"{where}{message}")
 
 
-def with_names(message: str) -> str:
-    """Write spaces in a message of the library as --space takes them: so:3, not SpecialOrthogonal(3)."""
-    return _SPACE.sub(lambda m: f"{_NAMES[m[1]]}:{m[2].replace(' ', '')}", message)
-
-
-def without_advice(message: str) -> str:
-    """Remove the advice from a message of the library that is for Python only."""
-    return _ADVICE.sub("", message)
+def for_command_line(error: Exception) -> str:
+    """Return a message of the library without advice for Python, and with so:3 for SpecialOrthogonal(3)."""
+    message = str(error)
+    for advice in _FOR_PYTHON:
+        message = message.replace(advice, "")
+    for class_name, name in _NAMES:
+        before, *after = message.split(f"{class_name}(")
+        parts = (text.partition(")") for text in after)
+        message = before + "".join(f"{name}:{numbers.replace(' ', '')}{rest}" for numbers, _, rest in parts)
+    return message
 
 
 def did_you_mean(name: str, names: Sequence[str]) -> str:
@@ -67,12 +71,12 @@ def listed(names: Sequence[str]) -> str:
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
-    """Report a file that cannot be read."""
+def reading(path: Path, verb: str = "read") -> Iterator[None]:
+    """Raise `Problem` if the file cannot be read."""
     try:
         yield
     except OSError as error:
-        raise Problem(f"cannot read {path}: {error.strerror or error}") from None
+        raise Problem(f"cannot {verb} {path}: {error.strerror or error}") from None
 
 
 def check_target(path: Path) -> None:
@@ -92,8 +96,5 @@ def check_target(path: Path) -> None:
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
     """Yield a temporary file that replaces ``path`` if the body succeeds."""
-    try:
-        with replacing(path) as temporary:
-            yield temporary
-    except OSError as error:
-        raise Problem(f"cannot write {path}: {error.strerror or error}") from None
+    with reading(path, "write"), replacing(path) as temporary:
+        yield temporary

@@ -4,7 +4,7 @@ A table is a CSV, NPZ or Parquet file or a TUM trajectory; the ending of its nam
 point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or 2021-08-29T16:55:00.5+02:00,
 all written in the same way. Dates with Z or an offset are converted to UTC, and rates are per second.
 
-The numbers of a point stand in columns in the order of its array, and --columns names them in that order: a matrix
+The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix
 row by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
 calls A, or one column A if it is real. Points within 1e-4 of the space are projected onto it. A rotation of so:3 may
 also be a unit quaternion in columns whose names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3
@@ -42,8 +42,8 @@ from typing import Any
 
 import numpy as np
 
-from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
+from .._exceptions import SymsplineError
 from .._functional import fit_many
 from .._report import long_gaps
 from .._representatives import IN_PYTHON
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help="column of names: the rows with one name are one curve")
     add("--lonlat", action="store_true", help="points on sphere:2 are longitude and latitude in degrees")
-    add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not tell")
+    add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
     add(
@@ -155,10 +155,10 @@ def _fitted(
                 fitted = fit_many(data.curves, space, bc_type=ends, method=options.method, **tol, **common)
             else:
                 fitted = smooth_many([(*curve, {}) for curve in data.curves], space, **common, **smooth)
-    except (ValidationError, CutLocusError, ConvergenceError) as error:
-        raise type(error)(data.located(str(error))) from None
+    except SymsplineError as error:
+        raise error._with_message(data.located(error)) from None
     for note in noted:
-        say(data.located(str(note.message).replace(IN_PYTHON, _FOR_ROTATIONS)))
+        say(data.located(note.message).replace(IN_PYTHON, _FOR_ROTATIONS))
     return fitted
 
 

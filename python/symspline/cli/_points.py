@@ -1,4 +1,4 @@
-"""Points in columns: number by number, as quaternions, or as longitude and latitude in degrees."""
+"""Points in columns: their components, quaternions, or longitude and latitude in degrees."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._lonlat import compass, from_lonlat, to_lonlat
 from .._pose_files import join, rotations_in_rows
+from .._smoothing import SmoothingSpline
 from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of
 from .._spaces import space as space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
-from ._errors import Problem, with_names, without_advice
+from ._errors import Problem, for_command_line
 from ._tables import IM, RE, Place
 
 Doubles = NDArray[np.float64]
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
 LONLAT = ["lon", "lat"]
-# From -180, from 0, or counted on where a track goes around the globe; 400 is a slip, and 999 a missing value.
+# Longitudes may start at -180 or at 0, or continue across the date line. 400 is an error, and 999 a missing value.
 _LARGEST = (360, 90)
 
 
@@ -89,17 +90,6 @@ def labels(space: Space) -> list[str]:
             names += [f"x{i}" for i in range(vectors, vectors + length)]
             vectors += length
     return names
-
-
-def column_names(space: Space, columns: Columns, nu: int) -> list[str]:
-    """Name the columns of points, velocities or accelerations."""
-    end = f"_d{nu}" if nu else ""
-    if columns.lonlat:
-        return [f"east{end}", f"north{end}"] if nu else columns.points
-    if columns.quaternion is not None:
-        return [name + end for name in columns.points]
-    pairs = zip(columns.points, complex_numbers(space), strict=True)
-    return [name + end + part for name, two in pairs for part in ((RE, IM) if two else ("",))]
 
 
 def described(space: Space) -> str:
@@ -172,8 +162,8 @@ def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, pl
         own = np.ascontiguousarray(numbers[:, start : start + width(factor, columns.quaternion is not None)])
         start += own.shape[1]
         if columns.quaternion is not None and factor in (ROTATIONS, POSES):
-            turns = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
-            part = join(turns, own[:, :3]) if factor == POSES else turns
+            rotations = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
+            part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:
             part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)
         of = f"the part in {factor} of " if isinstance(space, Product) else ""
@@ -187,23 +177,29 @@ def _projected(space: Space, points: NDArray[Any], file: object, place: Place, o
     try:
         space._handle.check_points(space._rows(doubles, lead), lead, POINT_TOL_FLOAT32)
     except ValidationError as error:
-        row, _, found = with_names(without_advice(str(error))).removeprefix("point ").partition(" ")
+        row, _, found = for_command_line(error).removeprefix("point ").partition(" ")
         order = f"; the columns of the table are a {matrix(space)}" if matrix(space) else ""
         raise Problem(f"{file}: {of}the point in {place(int(row))} {found}{order}") from None
     return space.project(points)
 
 
-def numbers_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Doubles:
-    """Return points, velocities or accelerations at times x, shape (rows, columns).
+# ---- samples ----
 
-    Derivatives of a unit quaternion are those on S³, which covers the rotations without stretching angles.
+Samples = list[tuple[str, Doubles]]
+"""Names and numbers of columns."""
+
+
+def samples_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Samples:
+    """Return the columns of points, velocities or accelerations at times x.
+
+    Derivatives of a unit quaternion are those on S³, which covers the rotations.
     """
-    values = spline(x, nu)
+    values, end = spline(x, nu), f"_d{nu}" if nu else ""
     if columns.lonlat:
-        axes = compass(spline(x)) if nu else ()
-        return np.stack(
-            [np.degrees((values * axis).sum(axis=-1)) for axis in axes] or to_lonlat(values), axis=1
-        )
+        if not nu:
+            return list(zip(columns.points, to_lonlat(values), strict=True))
+        axes = zip(("east", "north"), compass(spline(x)), strict=True)
+        return [(name + end, np.degrees((values * axis).sum(axis=-1))) for name, axis in axes]
     blocks = []
     for factor, own in zip(factors_of(spline.space), parts_of(values, spline.space, "values"), strict=True):
         if columns.quaternion is not None and factor in (ROTATIONS, POSES):
@@ -211,8 +207,12 @@ def numbers_of(spline: CubicSpline, x: Any, nu: int, columns: Columns) -> Double
             blocks.append(_quaternions(spline, x, nu))
         else:
             blocks.append(np.ascontiguousarray(own.reshape(len(own), -1)).view(np.float64))
-    found: Doubles = np.concatenate(blocks, axis=1)
-    return found if columns.quaternion is None else found[:, np.argsort(columns.quaternion)]
+    numbers, names = np.concatenate(blocks, axis=1).T, [name + end for name in columns.points]
+    if columns.quaternion is not None:
+        return list(zip(names, numbers[np.argsort(columns.quaternion)], strict=True))
+    pairs = zip(names, complex_numbers(spline.space), strict=True)
+    names = [name + part for name, two in pairs for part in ((RE, IM) if two else ("",))]
+    return list(zip(names, numbers, strict=True))
 
 
 def _quaternions(spline: CubicSpline, x: Any, nu: int) -> Doubles:
@@ -220,31 +220,23 @@ def _quaternions(spline: CubicSpline, x: Any, nu: int) -> Doubles:
     return quaternion_velocity(q, (angular_velocity, angular_acceleration)[nu - 1](spline, x)) if nu else q
 
 
-# ---- standard deviations ----
+def deviations_of(spline: SmoothingSpline, x: Any, nu: int, columns: Columns) -> Samples:
+    """Return the columns of standard deviations of points or velocities: one per factor, and two per pose.
 
-
-def std_names(space: Space, nu: int) -> list[str]:
-    """Name the standard deviations of points or velocities, one per factor, and two per pose."""
-    factors, end = factors_of(space), f"_d{nu}" if nu else ""
-    return [
-        f"std{number if len(factors) > 1 else ''}{part}{end}"
-        for number, factor in enumerate(factors, 1)
-        for part in (("_position", "_rotation") if factor._name == "se" else ("",))
-        if nu < 2
-    ]
-
-
-def std_numbers(spline: Any, x: Any, nu: int, columns: Columns) -> Doubles:
-    """Return these columns at times x, each in the unit of the columns next to it.
-
-    Numbers of a unit quaternion change half as much as the angle of its rotation.
+    They have the units of the columns next to them. A component of a unit quaternion changes half as much as the angle
+    of its rotation.
     """
-    found: list[Doubles] = []
+    found: Samples = []
+    if nu > 1:
+        return found
+    factors, end = factors_of(spline.space), f"_d{nu}" if nu else ""
     half = 2 if columns.quaternion is not None else 1
-    stds: Sequence[Any] = parts_of(spline.std(x, nu), spline.space, "std") if nu < 2 else ()
-    for factor, std in zip(factors_of(spline.space), stds, strict=False):
+    stds: Sequence[Any] = parts_of(spline.std(x, nu), spline.space, "std")
+    for number, (factor, std) in enumerate(zip(factors, stds, strict=True), 1):
+        name = f"std{number if len(factors) > 1 else ''}"
         if factor._name == "se":
-            found += [std[1], std[0] / half]
+            found += [(f"{name}_position{end}", std[1]), (f"{name}_rotation{end}", std[0] / half)]
         else:
-            found.append(std / half if factor == ROTATIONS else np.degrees(std) if columns.lonlat else std)
-    return np.stack(found, axis=-1) if found else np.empty((len(x), 0))
+            unit = std / half if factor == ROTATIONS else np.degrees(std) if columns.lonlat else std
+            found.append((name + end, unit))
+    return found

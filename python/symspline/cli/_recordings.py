@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from .._core import CutLocusError
 from .._segments import cut
 from .._spaces import Space
-from ._errors import Problem, refuse, without_advice
+from ._errors import Problem, refuse
 from ._tables import Rows
 from ._times import longest_gap
 
@@ -30,18 +29,18 @@ class Recordings:
     curves : list of tuple
         Times and points of each curve.
     groups : dict
-        The name of each curve, in the order in which they begin, and its rows.
+        Name and rows of each curve, in the order in which the curves begin.
     named : bool
         Whether these names have a meaning.
     merged, alone, repeated : int
-        Rows with the time of another one that were merged with it, single points between gaps, which are omitted,
-        and rows with the time of another one that are smoothed.
+        Numbers of rows: those merged with another row of the same time, single points between gaps, which are omitted,
+        and those that share their time with another row of noisy data.
     """
 
     def __init__(
         self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint
     ) -> None:
-        """``hint`` returns a column that may hold the names of several curves."""
+        """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
         self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
         self._options, self._smooth = options, options.smooth is not None
         self.named = rows.labels is not None or options.max_gap is not None
@@ -67,22 +66,28 @@ class Recordings:
         none_left = f": with --max-gap {options.max_gap} every point is alone; a curve needs two"
         refuse(path, (not self.groups, none_left))
 
-    def located(self, message: str) -> str:
-        """Rewrite a message of the library with lines of the file and names of curves instead of numbers."""
-        found = re.search(r"\bcurve (\d+)", message)
-        name = list(self.groups)[int(found[1]) if found else 0]
+    def located(self, note: Any) -> str:
+        """Return the message of an error or a warning with lines of the file and names instead of numbers.
 
-        def place(number: str) -> str:
-            return self._rows.place(int(self.groups[name][int(number)]))
-
-        text = re.sub(r"points\[(\d+)\]", lambda m: f"the point in {place(m[1])}", message)
-        text = re.sub(r"\bt\[(\d+)\] = (\S+)", lambda m: f"time {m[2]} in {place(m[1])}", text)
-        called = f"curve {name!r}" if self.named else "the curve"
-        text = text.replace(found[0], called) if found else text
-        return (f"{self._path}: " if text != message else "") + without_advice(text)
+        ``note`` has the fields of a `SymsplineError`.
+        """
+        curve, node, fitted = (getattr(note, field, None) for field in ("curve", "node", "spline"))
+        number = curve[0] if curve else 0
+        name, own = list(self.groups.items())[number]
+        times = fitted[number].t if isinstance(fitted, list) else ()
+        text = str(note)
+        # A message is about a node and its neighbours.
+        for i in () if node is None else range(max(node - 1, 0), min(node + 2, len(own))):
+            place = self._rows.place(int(own[i]))
+            text = text.replace(f"points[{i}]", f"the point in {place}")
+            if i < len(times):
+                text = text.replace(f"t[{i}] = {times[i]}", f"time {times[i]} in {place}")
+        if curve:
+            text = text.replace(f"curve {number}", f"curve {name!r}" if self.named else "the curve")
+        return f"{self._path}: {text}" if text != str(note) else text
 
     def _segments(self, name: str, own: NDArray[np.int64]) -> list[tuple[tuple[Any, Any], NDArray[np.int64]]]:
-        """The curves in the rows of one name, and the rows of each."""
+        """Return the curves in the rows of one name, and the rows of each."""
         times, options = self._rows.times, self._options
         times = times[own] if times.size else times
         of = f" of curve {name!r}" if self._rows.labels is not None else ""

@@ -27,6 +27,7 @@ the column of the curves' names, every row is for its curve, otherwise for all c
 from __future__ import annotations
 
 import argparse
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves
 from ._errors import Problem, check_target, did_you_mean, first_duplicate, refuse
-from ._points import Columns, column_names, numbers_of, std_names, std_numbers
+from ._points import Columns, Samples, deviations_of, samples_of
 from ._recordings import Groups, group
 from ._tables import TUM_ENDINGS, Rows, check_ending, open_table, write_table
 from ._terminal import Progress
@@ -80,26 +81,23 @@ def run(options: argparse.Namespace) -> int:
         times, rows = _given(options.at, curves)
     else:
         times, rows = {name: _along(spline.t, options) for name, spline in splines.items()}, None
-    names = [columns.time, *([columns.curve] if curves.named else [])]
-    blocks: list[NDArray[np.float64]] = []
-    space = next(iter(splines.values())).space
-    for nu in orders:
-        names += column_names(space, columns, nu) + (std_names(space, nu) if stds else [])
-    twice = first_duplicate(names)
-    refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
-    functions = (numbers_of, std_numbers) if stds else (numbers_of,)
+    functions: Any = (samples_of, deviations_of) if stds else (samples_of,)
+    samples: list[Samples] = []
     with Progress("sampling") as progress:
         for done, (name, x) in enumerate(times.items(), 1):
-            parts = [function(splines[name], x, nu, columns) for nu in orders for function in functions]
-            blocks.append(np.concatenate(parts, axis=1))
+            blocks = [function(splines[name], x, nu, columns) for nu in orders for function in functions]
+            samples.append(list(chain.from_iterable(blocks)))
             progress(done, len(times))
-    values: list[NDArray[Any]] = [np.concatenate(list(times.values())), *np.concatenate(blocks).T]
+    pairs: list[tuple[str, NDArray[Any]]] = [(columns.time, np.concatenate(list(times.values())))]
     if curves.named:
-        values.insert(1, np.repeat(list(times), [len(x) for x in times.values()]))
-    if rows is not None:
-        values = [column[np.argsort(rows)] for column in values]
-    write_table(options.output, dict(zip(names, values, strict=True)), bool(columns.utc))
-    print(f"{options.output}: {len(values[0])} rows")
+        pairs.append((columns.curve, np.repeat(list(times), [len(x) for x in times.values()])))
+    for parts in zip(*samples, strict=True):
+        pairs.append((parts[0][0], np.concatenate([numbers for _, numbers in parts])))
+    twice = first_duplicate([name for name, _ in pairs])
+    refuse("", (twice is not None, f"two columns would have the name {twice!r}; rename them"))
+    order = slice(None) if rows is None else np.argsort(rows)
+    write_table(options.output, {name: column[order] for name, column in pairs}, bool(columns.utc))
+    print(f"{options.output}: {len(pairs[0][1])} rows")
     return 0
 
 
@@ -159,9 +157,9 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
     spline, called = curves.splines[name], curves.called(name)
     times, knots = rows.times[own], spline.t
     dates = knots.dtype.kind == "M"
-    wanted, found = ("dates", "numbers") if dates else ("numbers", "dates")
+    expected, found = ("dates", "numbers") if dates else ("numbers", "dates")
     these, those = ("a time zone", "none") if rows.utc else ("no time zone", "one")
-    kinds = f": the times of {called} are {wanted}, but these are {found}"
+    kinds = f": the times of {called} are {expected}, but these are {found}"
     zones = f": its times have {these}, but those of {called} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
     refuse(

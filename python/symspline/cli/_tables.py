@@ -6,10 +6,9 @@ import csv
 import io
 import math
 import zipfile
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, time, timedelta
 from itertools import islice, zip_longest
 from os import fstat
@@ -31,10 +30,18 @@ Array = NDArray[Any]
 Place = Callable[[int], str]
 
 RE, IM = "_re", "_im"
-# Few enough rows to stay in the processor's cache: three times faster than many.
+# So few rows stay in the processor's cache, which is three times faster than reading all at once.
 _CHUNK = 2000
-# Rows in which dates are searched for: the first ones may hold units, or be empty.
+# Rows that are searched for dates, as the first ones may hold units or be empty.
 _FIRST = 50
+
+
+def _row(row: int) -> str:
+    return f"row {row} (counted from 0)"
+
+
+def _problem(path: Path, place: str, name: str, found: str) -> Problem:
+    return Problem(f"{path}, {place}: column {name!r} {found}")
 
 
 @dataclass(frozen=True)
@@ -47,11 +54,11 @@ class Rows:
     times : ndarray
         Numbers or ``datetime64``; empty without a column of times.
     utc : bool or None
-        Whether the times had a Z or an offset and are UTC now. None where the file does not tell.
+        Whether the times had a Z or an offset and are UTC now. None if it is unknown.
     labels : list of str or None
         Names of the curves, None without such a column.
     place : callable
-        Describes the place of a row, such as ``"line 7"``.
+        Describes the position of a row, such as ``"line 7"``.
     """
 
     numbers: NDArray[np.float64]
@@ -61,37 +68,36 @@ class Rows:
     place: Place
 
 
-class Table(ABC):
+@dataclass
+class Table:
     """A file with named columns.
 
     Attributes
     ----------
     path : Path
     names, numeric, dates : list of str
-        All columns in the order of the file, those with numbers, and those with dates or what looks like them.
+        All columns in the order of the file, those with numbers, and those with dates or text that looks like dates.
+    column : callable
+        Returns a column with the type that it has in the file.
+    groups : dict
+        The columns of each array of an NPZ file.
+    place : callable
+        Describes the position of a row.
+    is_utc : callable
+        Whether a column of dates has the time zone UTC; None if it is unknown.
+    load : callable
+        Reads columns of numbers and columns of text, if the file was not read as a whole.
     """
 
+    path: Path
     names: list[str]
     numeric: list[str]
     dates: list[str]
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        # The columns of each array of an NPZ file.
-        self.groups: dict[str, list[str]] = {}
-
-    @abstractmethod
-    def _column(self, name: str) -> Array | list[str]:
-        """Return one column with the type that it has in the file."""
-
-    def _load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:  # noqa: B027
-        """Read the columns that `_column` will return, if the whole file was not read."""
-
-    def _is_utc(self, name: str) -> bool | None:
-        return None
-
-    def _place(self, row: int) -> str:
-        return f"row {row} (counted from 0)"
+    column: Callable[[str], Array | list[str]]
+    groups: dict[str, list[str]] = field(default_factory=dict)
+    place: Place = _row
+    is_utc: Callable[[str], bool | None] = lambda name: None
+    load: Callable[[Sequence[str], Sequence[str], Progress], None] = lambda *_: None
 
     def require(self, name: str) -> str:
         """Return the name if there is such a column."""
@@ -119,7 +125,7 @@ class Table(ABC):
     def read(self, numbers: Sequence[str], time: str | None, label: str | None) -> Rows:
         """Read some columns as numbers, one as times and one as labels."""
         with Progress("reading") as progress:
-            self._load(numbers, [name for name in (time, label) if name is not None], progress)
+            self.load(numbers, [name for name in (time, label) if name is not None], progress)
         columns = [self._numbers(name) for name in numbers]
         times, utc = self._times(time) if time is not None else (np.empty(0), False)
         labels = self._texts(label) if label is not None else None
@@ -128,10 +134,10 @@ class Table(ABC):
         differ = f": arrays differ in length: {' and '.join(map(str, lengths))}"
         refuse(self.path, (len(lengths) > 1, differ), (lengths == [0], " has no rows"))
         table = np.stack(columns, axis=1) if columns else np.empty((0, 0))
-        return Rows(table, times, utc, labels, self._place)
+        return Rows(table, times, utc, labels, self.place)
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
-        array = np.asarray(self._column(name))
+        array = np.asarray(self.column(name))
         if array.dtype.kind not in "biuf":
             raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
         values = array.astype(np.float64)
@@ -141,7 +147,7 @@ class Table(ABC):
         return values
 
     def _texts(self, name: str) -> list[str]:
-        column = self._column(name)
+        column = self.column(name)
         if isinstance(column, list):
             texts = [cell.strip() for cell in column]
         else:
@@ -155,7 +161,7 @@ class Table(ABC):
         return texts
 
     def _times(self, name: str) -> tuple[Array, bool | None]:
-        column = self._column(name)
+        column = self.column(name)
         if isinstance(column, list) or column.dtype.kind in "OUT":
             return parse_times(self._texts(name), lambda row, found: self._problem(name, row, found))
         if column.dtype.kind in "iu":
@@ -164,63 +170,56 @@ class Table(ABC):
             return self._numbers(name), False
         if np.isnat(column).any():
             raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
-        return column, self._is_utc(name)
+        return column, self.is_utc(name)
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
-        return Problem(f"{self.path}, {self._place(row)}: column {name!r} {found}")
+        return _problem(self.path, self.place(row), name, found)
 
 
-class CsvTable(Table):
-    """Text in UTF-8 with cells separated by commas and names of columns in the first line.
+# ---- reading ----
 
-    Blank lines are skipped. A column is numeric if it has a name and its first cell is a number.
+
+class _Csv:
+    """Text in UTF-8 with cells separated by commas and names of columns in the first line; blank lines are skipped.
+
+    Only the columns that are needed are read.
     """
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
+        self._path = path
         with self._reader() as (reader, _):
-            head = list(islice(filter(None, reader), _FIRST))
-        refuse(path, (not head, " is empty"))
-        self.names = names = [name.strip() for name in head[0]]
-        twice = first_duplicate([name for name in names if name])
-        semicolons = len(names) == 1 and set(";\t") & set(names[0])
-        refuse(
-            path,
-            (semicolons, f": cells must be separated by commas; the first line is {names[0]!r}"),
-            (all(map(is_number, names)), ": the first line must name the columns, but holds numbers"),
-            (twice is not None, f": the first line names two columns {twice!r}"),
-            (len(head) < 2, " has no rows below the names of its columns"),
-        )
-        self.numeric = [name for name, cell in zip(names, head[1], strict=False) if name and is_number(cell)]
-        columns = zip(names, zip_longest(*head[1:], fillvalue=""), strict=False)
-        self.dates = [name for name, cells in columns if _holds_dates(cells)]
+            self.head = list(islice(filter(None, reader), _FIRST))
+        refuse(path, (not self.head, " is empty"))
+        self.names = [name.strip() for name in self.head[0]]
 
-    def _load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
+    def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
         index = {name: i for i, name in enumerate(self.names)}
         self._lines: list[int] = []
-        self._cells: dict[str, list[Any]] = {name: [] for name in (*numbers, *texts)}
+        cells: dict[str, list[Any]] = {name: [] for name in (*numbers, *texts)}
         with self._reader() as (reader, file):
             size = fstat(file.fileno()).st_size
             next(filter(None, reader))
             while chunk := [(reader.line_num, row) for row in islice(reader, _CHUNK)]:
-                start = len(self._lines)
+                rows = []
                 for line, row in chunk:
                     if row and len(row) != len(self.names):
                         width = f"{len(row)} cells, but the first line names {len(self.names)} columns"
-                        raise Problem(f"{self.path}, line {line}: {width}")
+                        raise Problem(f"{self._path}, line {line}: {width}")
+                    rows += [row] if row else []
+                start = len(self._lines)
                 self._lines += [line for line, row in chunk if row]
-                columns = list(zip(*(row for _, row in chunk if row), strict=True)) or [()] * len(self.names)
+                columns = list(zip(*rows, strict=True)) or [()] * len(self.names)
                 for name in numbers:
-                    self._cells[name].append(self._converted(columns[index[name]], name, start))
+                    cells[name].append(self._converted(columns[index[name]], name, start))
                 for name in texts:
-                    self._cells[name] += columns[index[name]]
+                    cells[name] += columns[index[name]]
                 progress(file.tell(), size)
-        self._cells |= {name: np.concatenate(self._cells[name]) for name in numbers}  # type: ignore[misc]
+        self._cells: dict[str, Any] = cells | {name: np.concatenate(cells[name]) for name in numbers}
 
-    def _column(self, name: str) -> Array | list[str]:
-        return self._cells[name]
+    def column(self, name: str) -> Array | list[str]:
+        return self._cells[name]  # type: ignore[no-any-return]
 
-    def _place(self, row: int) -> str:
+    def place(self, row: int) -> str:
         return f"line {self._lines[row]}"
 
     def _converted(self, cells: Sequence[str], name: str, start: int) -> Array:
@@ -230,20 +229,39 @@ class CsvTable(Table):
             i = next(i for i, cell in enumerate(cells) if not is_number(cell))
             found = f"holds {cells[i]!r}, which is not a number" if cells[i].strip() else "is empty"
             units = "; if this line holds units, remove it" if start + i == 0 and cells[i].strip() else ""
-            raise self._problem(name, start + i, found + units) from None
+            raise _problem(self._path, self.place(start + i), name, found + units) from None
 
     @contextmanager
     def _reader(self) -> Iterator[tuple[Any, BinaryIO]]:
         """Yield a reader of rows and the file below it, whose position shows the progress."""
-        with reading(self.path), open(self.path, "rb") as file:
+        with reading(self._path), open(self._path, "rb") as file:
             text = io.TextIOWrapper(file, "utf-8-sig", newline="")
             reader = csv.reader(text, skipinitialspace=True, strict=True)
             try:
                 yield reader, file
             except UnicodeDecodeError:
-                raise Problem(f"{self.path} is not text in UTF-8") from None
+                raise Problem(f"{self._path} is not text in UTF-8") from None
             except csv.Error as error:
-                raise Problem(f"{self.path}, line {reader.line_num}: {error}") from None
+                raise Problem(f"{self._path}, line {reader.line_num}: {error}") from None
+
+
+def _open_csv(path: Path) -> Table:
+    """Open a CSV file. A column is numeric if it has a name and its first cell is a number."""
+    file = _Csv(path)
+    names, rows = file.names, file.head[1:]
+    twice = first_duplicate([name for name in names if name])
+    semicolons = len(names) == 1 and set(";\t") & set(names[0])
+    refuse(
+        path,
+        (semicolons, f": cells must be separated by commas; the first line is {names[0]!r}"),
+        (all(map(is_number, names)), ": the first line must name the columns, but holds numbers"),
+        (twice is not None, f": the first line names two columns {twice!r}"),
+        (not rows, " has no rows below the names of its columns"),
+    )
+    numeric = [name for name, cell in zip(names, rows[0], strict=False) if name and is_number(cell)]
+    columns = zip(names, zip_longest(*rows, fillvalue=""), strict=False)
+    dates = [name for name, cells in columns if _holds_dates(cells)]
+    return Table(path, names, numeric, dates, file.column, place=file.place, load=file.load)
 
 
 def _holds_dates(cells: Sequence[str]) -> bool:
@@ -252,27 +270,22 @@ def _holds_dates(cells: Sequence[str]) -> bool:
     return next((not is_number(cell) or is_packed_day(cell) for cell in found), False)
 
 
-class NpzTable(Table):
-    """The arrays of an NPZ file, with one entry per row.
+def _open_npz(path: Path) -> Table:
+    """Open an NPZ file, whose arrays have one entry per row.
 
     The entries of an array ``a`` with more axes are the columns ``a_0``, ``a_1``, … row by row; complex numbers are
     two columns ``a_0_re`` and ``a_0_im``.
     """
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        arrays = {key: a for key, a in _arrays(path).items() if a.ndim and a.dtype.kind in "biufcMmSU"}
-        columns = {key: _split(key, array) for key, array in arrays.items()}
-        self.groups = {key: [*own] for key, own in columns.items()}
-        self._columns = {name: column for own in columns.values() for name, column in own.items()}
-        kinds = {name: column.dtype.kind for name, column in self._columns.items()}
-        self.names = list(kinds)
-        self.numeric = [name for name, kind in kinds.items() if kind in "biuf"]
-        first = {name: "".join(self._columns[name][:1]) for name, kind in kinds.items() if kind == "U"}
-        self.dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
-
-    def _column(self, name: str) -> Array:
-        return self._columns[name]
+    arrays = {key: a for key, a in _arrays(path).items() if a.ndim and a.dtype.kind in "biufcMmSU"}
+    groups = {key: _split(key, array) for key, array in arrays.items()}
+    columns = {name: column for own in groups.values() for name, column in own.items()}
+    kinds = {name: column.dtype.kind for name, column in columns.items()}
+    first = {name: "".join(columns[name][:1]) for name, kind in kinds.items() if kind == "U"}
+    numeric = [name for name, kind in kinds.items() if kind in "biuf"]
+    dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
+    return Table(
+        path, list(kinds), numeric, dates, columns.__getitem__, {key: [*own] for key, own in groups.items()}
+    )
 
 
 def _arrays(path: Path) -> dict[str, Array]:
@@ -286,7 +299,7 @@ def _arrays(path: Path) -> dict[str, Array]:
         except ValidationError as error:
             raise Problem(f"{path}: {error}") from None
         except Exception as error:
-            # Damage appears as errors of zipfile, of its decompressors and of NumPy.
+            # Damaged files raise errors of zipfile, of its decompressors and of NumPy.
             raise Problem(f"{path} is damaged, or holds other objects than numbers: {brief(error)}") from None
     refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
     return arrays
@@ -301,67 +314,46 @@ def _split(key: str, array: Array) -> dict[str, Array]:
     return {name + end: part for name, z in columns.items() for end, part in ((RE, z.real), (IM, z.imag))}
 
 
-class ParquetTable(Table):
-    """The columns of a Parquet file."""
+def _open_parquet(path: Path) -> Table:
+    pa, parquet = _pyarrow()
+    with reading(path), open(path, "rb") as file:
+        try:
+            table = parquet.read_table(file)
+        except pa.ArrowInvalid:
+            raise Problem(f"{path} is damaged or not a Parquet file") from None
+    types = {column.name: column.type for column in table.schema}
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        self._pa, parquet = _pyarrow()
-        with reading(path), open(path, "rb") as file:
-            try:
-                self._table = parquet.read_table(file)
-            except self._pa.ArrowInvalid:
-                raise Problem(f"{path} is damaged or not a Parquet file") from None
-        types = self._pa.types
-        self.names = self._table.column_names
-        fields = list(self._table.schema)
-        numeric = (types.is_integer, types.is_floating, types.is_decimal)
-        self.numeric = [field.name for field in fields if any(test(field.type) for test in numeric)]
-        dates = (
-            field
-            for field in fields
-            if types.is_temporal(field.type) or is_date_like(self._first_text(field))
-        )
-        self.dates = [field.name for field in dates]
-
-    def _column(self, name: str) -> Array:
-        column = self._table.column(name)
-        if column.null_count:
-            raise self._problem(name, int(column.is_null().to_numpy().argmax()), "is empty")
-        decimal = self._pa.types.is_decimal(column.type)
-        values: Array = (column.cast(self._pa.float64()) if decimal else column).to_numpy()
+    def column(name: str) -> Array:
+        cells = table.column(name)
+        if cells.null_count:
+            raise _problem(path, _row(int(cells.is_null().to_numpy().argmax())), name, "is empty")
+        values: Array = (cells.cast(pa.float64()) if pa.types.is_decimal(types[name]) else cells).to_numpy()
         return values
 
-    def _first_text(self, field: Any) -> str:
-        is_text = str(field.type) in ("string", "large_string", "string_view")
-        cells = self._table.column(field.name)[:_FIRST] if is_text else ()
+    def first_text(name: str) -> str:
+        is_text = str(types[name]) in ("string", "large_string", "string_view")
+        cells = table.column(name)[:_FIRST] if is_text else ()
         return next((cell.as_py() for cell in cells if cell.is_valid), "")
 
-    def _is_utc(self, name: str) -> bool:
-        return getattr(self._table.schema.field(name).type, "tz", None) is not None
+    is_kind = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
+    numeric = [name for name, own in types.items() if any(test(own) for test in is_kind)]
+    dates = [name for name in types if pa.types.is_temporal(types[name]) or is_date_like(first_text(name))]
+    is_utc = lambda name: getattr(types[name], "tz", None) is not None  # noqa: E731
+    return Table(path, table.column_names, numeric, dates, column, is_utc=is_utc)
 
 
-class TumTable(Table):
-    """A trajectory of the TUM RGB-D benchmark: lines of time, position and quaternion, its scalar last."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        self.names, self.numeric, self.dates = list(TUM), list(TUM), []
-        with reading(path):
-            self._rows, self._line = tum_rows(path)
-
-    def _place(self, row: int) -> str:
-        return self._line(row)
-
-    def _column(self, name: str) -> Array:
-        return self._rows[:, self.names.index(name)]
+def _open_tum(path: Path) -> Table:
+    """Open a trajectory of the TUM RGB-D benchmark: lines of time, position and quaternion, its scalar last."""
+    with reading(path):
+        rows, place = tum_rows(path)
+    return Table(path, [*TUM], [*TUM], [], dict(zip(TUM, rows.T, strict=True)).__getitem__, place=place)
 
 
 # ---- writing ----
 
 
 def _write_csv(file: BinaryIO, columns: Mapping[str, Array], utc: bool) -> None:
-    """Write numbers with as many digits as tell them apart, and dates in ISO 8601."""
+    """Write numbers as the shortest text that reads back equal, and dates in ISO 8601."""
     text = io.TextIOWrapper(file, "utf-8", newline="")
     writer = csv.writer(text)
     writer.writerow(columns)
@@ -418,11 +410,11 @@ def _pyarrow() -> tuple[Any, Any]:
 
 
 _FORMATS: dict[str, tuple[Callable[[Path], Table], Callable[[BinaryIO, Mapping[str, Array], bool], None]]] = {
-    ".csv": (CsvTable, _write_csv),
-    ".npz": (NpzTable, _write_npz),
-    ".parquet": (ParquetTable, _write_parquet),
-    ".tum": (TumTable, _write_tum),
-    ".txt": (TumTable, _write_tum),
+    ".csv": (_open_csv, _write_csv),
+    ".npz": (_open_npz, _write_npz),
+    ".parquet": (_open_parquet, _write_parquet),
+    ".tum": (_open_tum, _write_tum),
+    ".txt": (_open_tum, _write_tum),
 }
 ENDINGS, TUM_ENDINGS = tuple(_FORMATS), (".tum", ".txt")
 

@@ -8,7 +8,7 @@ from typing import Self
 
 from .._arrays import brief
 
-# Messages may quote any file.
+# Messages may quote any part of a file.
 _LONGEST = 1000
 _WAIT = 0.3
 """Seconds between two updates; shorter work shows nothing."""

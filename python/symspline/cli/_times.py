@@ -17,7 +17,7 @@ from ._errors import Problem, refuse
 
 Times = NDArray[Any]
 Fail = Callable[[int, str], Problem]
-"""Makes the problem of a row from a description of its cell."""
+"""Makes the `Problem` of a row from a description of its cell."""
 
 # 2021-08-29, 29.8.2021, 8/29/21, 20210829T1655, 16:55, 29 Aug 2021, Aug 29, 2021
 _MONTH = r"(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*"
@@ -44,7 +44,7 @@ _EXPONENT = 400
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number, without the underscores and other scripts' digits that Python accepts."""
+    """Whether a text is a number, without the underscores and numerals of other scripts that Python accepts."""
     try:
         float(text)
     except ValueError:
@@ -54,7 +54,7 @@ def is_number(text: str) -> bool:
 
 def numbers(texts: Sequence[str]) -> NDArray[np.float64]:
     """Convert texts to numbers; raise ValueError if one of them is not a number."""
-    # One look at all letters takes no time compared with reading the numbers.
+    # Checking all characters takes little time compared with reading the numbers.
     if not _is_usual("".join(texts)) and not all(map(is_number, texts)):
         raise ValueError
     return np.fromiter(map(float, texts), np.float64, len(texts))
@@ -110,7 +110,7 @@ def _numeric_times(cells: Sequence[str], fail: Fail) -> Times:
 
 
 def _style(cell: str) -> object:
-    """What the times of a column must have in common; fractions and offsets may differ."""
+    """Return the properties that all times of a column must share; fractions and offsets may differ."""
     match = ISO_DATE.fullmatch(cell)
     if match is not None and (len(match["body"]) > 10 or not match["zone"]):
         return match["body"][10:11], len(match["body"]) > 16, match["zone"] is None
@@ -156,7 +156,7 @@ def every(step: str, knots: Times) -> Times:
         length = float(count)
         if not 0 < length < float("inf"):
             raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
-        # A step that divides the curve up to rounding reaches its end.
+        # The last sample is at the end if the step divides the curve up to rounding.
         samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
         times: Times = np.minimum(knots[0] + length * np.arange(samples), knots[-1])
         return times
@@ -189,23 +189,23 @@ def spread(count: int, knots: Times) -> Times:
 
 
 def _span(knots: Times) -> int:
-    """The exact difference between the last and the first knot."""
+    """Return the exact difference between the last and the first knot."""
     first, last = knots[[0, -1]].astype(np.int64 if knots.dtype.kind == "M" else knots.dtype).tolist()
     return int(last - first)
 
 
 def _after(knots: Times, steps: NDArray[np.uint64]) -> Times:
-    """The first knot plus these whole numbers, exact because it is computed modulo 2**64."""
+    """Return the first knot plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
     times: Times = (knots[:1].astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(knots.dtype)
     return times
 
 
 def _in_unit(knots: Times, unit: Any) -> Times:
-    """The first and the last date, in this unit or a finer one."""
+    """Return the first and the last date in a unit or a finer one."""
     ends = knots[[0, -1]]
     with suppress(OverflowError):
         fine = ends.astype(np.promote_types(knots.dtype, f"datetime64[{unit}]"))
-        # NumPy reports an overflow between some units only.
+        # NumPy does not report all overflows.
         if (fine.astype(knots.dtype) == ends).all():
             return fine
     tick = np.timedelta64(1, unit)
@@ -213,9 +213,9 @@ def _in_unit(knots: Times, unit: Any) -> Times:
 
 
 def _coarsest(dates: Times) -> Times:
-    """The same dates in seconds if they are whole seconds, otherwise in the next finer unit that is exact."""
+    """Return the dates in the coarsest unit from seconds on that represents them exactly."""
     for unit in ("s", "ms", "us"):
-        # Attoseconds cannot become seconds.
+        # Dates in attoseconds cannot be converted to seconds.
         with suppress(OverflowError):
             coarse = dates.astype(f"datetime64[{unit}]")
             if (coarse == dates).all():
