@@ -45,7 +45,7 @@ ROWS = [
         "(1)",
         "energy that Riemannian cubics minimise",
         "CubicSpline.bending_energy",
-        "tests/spline/test_lengths.py::test_length_and_energy_by_adaptive_quadrature "
+        "tests/spline/test_lengths.py::test_length_and_energy_by_quadrature "
         "tests/docs/test_comparisons.py::test_spline_is_close_to_the_cubic_and_bends_more",
         "comparisons.md#how-close-to-riemannian-cubics",
     ),

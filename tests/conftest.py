@@ -23,8 +23,8 @@
     oracles, pytorch   have environments of their own: `make test-oracles`, `make test-torch`
 
 Shared modules: `cases` has the one list of spaces, the one list of end conditions, data on them, and decorators that
-run several values within one case of pytest; `curves` has arrays and comparisons, `refused` invalid input, `lifting`
-the horizontal lift by a general solver.
+run several values within one case of pytest; `curves` has arrays and comparisons, `refused` invalid input, `stored`
+files of curves and damaged copies of them, `truth` an independent measure of the C² condition.
 
 A law of spaces runs as one case per family (`cases.every_family`), whatever does not depend on the formulas of a
 space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
@@ -33,6 +33,7 @@ space on `cases.REPRESENTATIVE`. Lists that would multiply take turns instead.
 import signal
 import sys
 
+import numpy as np
 import pytest
 
 import symspline as ss
@@ -40,6 +41,12 @@ import symspline as ss
 # What a shell starts in the background ignores Ctrl-C, and so would all that tests start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def rng(request):
+    """Random numbers, the same in every run. A module chooses others by ``SEED``."""
+    return np.random.default_rng(getattr(request.module, "SEED", 1815))
 
 
 @pytest.fixture

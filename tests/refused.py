@@ -1,4 +1,4 @@
-"""Input that must be refused: an error of its own that names the place, the value and what to do."""
+"""Invalid input, and assertions that it raises an error with the place, the value and the remedy."""
 
 import re
 import warnings

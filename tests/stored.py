@@ -1,4 +1,4 @@
-"""Files that tests damage."""
+"""Files of curves, and damaged copies of them."""
 
 import io
 import zipfile

@@ -3,6 +3,7 @@
 import dataclasses
 import importlib
 import inspect
+from itertools import pairwise
 
 import pytest
 from numpydoc.docscrape import FunctionDoc
@@ -19,6 +20,18 @@ MODULES = [
     "symspline.xarray",
     *(f"symspline.{name}" for name in symspline.__all__ if inspect.ismodule(getattr(symspline, name))),
 ]
+TITLES = {
+    "Parameters",
+    "Attributes",
+    "Returns",
+    "Yields",
+    "Raises",
+    "Warns",
+    "See Also",
+    "Notes",
+    "References",
+    "Examples",
+}
 # Not every object has related ones (SA01), or more to say than its summary (ES01).
 IGNORED = {"ES01", "SA01"}
 # Objects whose docstrings have not been revised yet. The goal is none.
@@ -77,6 +90,13 @@ def problems(name, thing):
     ):
         ignored.add("EX01")
     found = [f"{name}: {code} {text}" for code, text in validate(name)["errors"] if code not in ignored]
+    # The validator treats a title that is not underlined as text.
+    lines = inspect.cleandoc(thing.__doc__ or "").splitlines()
+    found += [
+        f"{name}: {title} is not underlined"
+        for title, line in pairwise(lines)
+        if title in TITLES and line != "-" * len(title)
+    ]
     return found + [f"{name}: field {field!r} is not described" for field in sorted(missing)]
 
 

@@ -468,9 +468,10 @@ class SegmentedCurve(Curve):
             If Matplotlib is not installed.
 
         Notes
-        ----- A smoothing spline is drawn with its data and, where possible, with 95 % bands of the curve and the
-        speed; bands of a batch are drawn for a few curves only. The function uses neither pyplot nor any global
-        setting of Matplotlib.
+        -----
+        A smoothing spline is drawn with its data and, where possible, with 95 % bands of the curve and the speed;
+        bands of a batch are drawn for a few curves only. The function uses neither pyplot nor any global setting of
+        Matplotlib.
 
         Examples
         --------

@@ -74,7 +74,8 @@ class Segments:
             Whether the last segment is compared with the first one as well.
 
         Notes
-        ----- Each value is computed from its segment alone. One point may have several representatives, so vectors are
+        -----
+        Each value is computed from its segment alone. One point may have several representatives, so vectors are
         transported in parallel from end to start before they are compared. Their lengths are those of the space.
         Rounding errors far out in hyperbolic space are then comparable to those near its origin, up to the condition
         number |p|².

@@ -96,7 +96,7 @@ class Report:
     :math:`1 + h_0/h_1`.
 
     Let u be the velocities and h the length of an interval. If all :math:`\lVert h u/3 \rVert \le V`, Algorithm 1
-    keeps them so (Theorem 3.1). `contraction_bound` bounds its contraction per sweep in this region, in the norm of
+    keeps them so (Theorem 3.1). ``contraction_bound`` bounds its contraction per sweep in this region, in the norm of
     the largest velocity. With such a bound the region contains exactly one C² curve, and Algorithm 1 converges to it
     from zero velocities.
 

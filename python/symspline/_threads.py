@@ -73,8 +73,9 @@ def set_num_threads(n: int) -> None:
     num_threads : Return the number of threads.
 
     Notes
-    ----- Results are bit-identical for every number of threads. The environment variable ``SYMSPLINE_NUM_THREADS``
-    sets the number before the package is imported.
+    -----
+    Results are bit-identical for every number of threads. The environment variable ``SYMSPLINE_NUM_THREADS`` sets the
+    number before the package is imported.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The benchmarks run, and what they compute is the same thing."""
+"""The benchmarks run, and the libraries that they compare compute the same values."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A folder for every test, and the command line in it."""
+"""Fixtures: an empty current folder for every test, and the command line."""
 
 import os
 import shlex

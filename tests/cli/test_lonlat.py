@@ -1,4 +1,4 @@
-"""Longitude and latitude."""
+"""Tables of longitudes and latitudes."""
 
 import numpy as np
 from tabular import FIXES, TRACK, numbers, table, write

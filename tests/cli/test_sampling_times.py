@@ -1,4 +1,4 @@
-"""Times in tables, and steps along a curve."""
+"""Times in tables, and sampling times along a curve."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Column of times: found by its name, and never ignored silently."""
+"""The column of times is found by its name and never ignored silently."""
 
 import numpy as np
 from tabular import table, write, write_table

@@ -1,4 +1,4 @@
-"""Commands of the command line, and their errors of usage."""
+"""The commands of the command line and their usage errors."""
 
 import re
 import shlex
@@ -139,7 +139,7 @@ def test_samples_outside(run):
     run("check ring.npz")
 
 
-def test_bad_usage(run, fails):
+def test_invalid_usage_fails(run, fails):
     write("a.csv", AXES)
     run("fit a.csv --space s:2 -o a.npz")
     assert fails("").endswith("(see symspline --help)")

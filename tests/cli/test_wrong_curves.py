@@ -1,4 +1,4 @@
-"""Tables whose curves would be wrong without a warning or an error."""
+"""Tables that would silently give wrong curves raise an error or a warning."""
 
 import numpy as np
 from tabular import read_table, write

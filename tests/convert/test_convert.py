@@ -1,4 +1,4 @@
-"""Other coordinates of points: there and back, distances in them, and what is no point."""
+"""Conversions between coordinates: round trips, distances, and invalid input."""
 
 import numpy as np
 import pytest
@@ -8,14 +8,11 @@ from scipy.spatial.transform import Rotation
 import symspline as ss
 from symspline import convert
 
+SEED = 7
+
 EPS = np.finfo(float).eps
 # Distances from the middle; in the ball 1 − |y| is some 2e^−d.
 DISTANCES = [*(10.0 ** np.arange(-12, 1)), 3.0, 10.0, 17.0, 30.0]
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(7)
 
 
 def far_points(n, distance, rng):

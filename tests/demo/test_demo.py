@@ -46,7 +46,7 @@ def test_hemispheres_and_times():
     assert storm.times[1] - storm.times[0] == np.timedelta64(390, "m")
 
 
-def test_only_extra_fixes_close_to_another_are_left_out(storms):
+def test_only_extra_fixes_close_to_another_are_dropped(storms):
     for before, after in zip(hurdat.read_sample(), storms, strict=True):
         assert np.diff(after.times).min() >= HOUR
         left_out = before.times[~np.isin(before.times, after.times)]

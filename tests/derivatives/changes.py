@@ -1,4 +1,4 @@
-"""Data that move a little, and what the curve does then by finite differences."""
+"""Small changes of the data, and their effect on the curve by finite differences."""
 
 import numpy as np
 from cases import closed_walk, end_conditions, unit_tangent, walk

@@ -23,38 +23,45 @@ EACH = {
 FURTHER = {case.name: [(case, "mixed")] for case in LARGE if case.name in ("so:8", "spd:8")}
 
 
-@grouped("case, end", EACH | FURTHER)
-def test_derivatives_match_finite_differences(case, end):
-    rng = np.random.default_rng(5)
-    space, t, points, bc = data(case, end, n=4 if case in LARGE else 6)
-    change = motion(space, t, points, bc, rng)
-    x = inside(t, rng)
-    spline = moved(space, t, points, bc, change, 0.0)
-    for nu, expected in enumerate(by_differences(space, t, points, bc, change, x)):
+def assert_differences(spline, data, change, x, orders=(0, 1, 2)):
+    """`jvp` is the change by finite differences."""
+    for nu, expected in enumerate(by_differences(*data, change, x, orders)):
         found = spline.jvp(x, *change, nu)
         # Of the differences: the fourth power of the step, and residuals of 1e-14 divided by it.
         assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
+
+
+def assert_transpose(spline, change, x, rng, orders=(0, 1, 2)):
+    """`vjp` is the transpose of `jvp`."""
+    vectors, knots, ends = change
+    for nu in orders:
+        cotangent = rng.normal(size=spline(x).shape)
+        if spline.space.dtype.kind == "c":
+            cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
+        gradient = spline.vjp(x, cotangent, nu)
+        pairs = [(cotangent, spline.jvp(x, *change, nu)), (gradient.points, vectors), (gradient.t, knots)]
+        pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
+        left, *right = [np.vdot(a, b).real for a, b in pairs]
+        scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
+        assert abs(left - sum(right)) <= 1e-12 * scale, nu
+        spline.space.check_tangent(spline.points, gradient.points)
+
+
+@grouped("case, end", EACH | FURTHER)
+def test_derivatives_match_finite_differences(case, end):
+    rng = np.random.default_rng(5)
+    given = data(case, end, n=4 if case in LARGE else 6)
+    change = motion(*given, rng)
+    assert_differences(moved(*given, change, 0.0), given, change, inside(given[1], rng))
 
 
 @grouped("case, end", EACH)
 def test_the_gradient_is_the_transpose(case, end):
     rng = np.random.default_rng(6)
     space, t, points, bc = data(case, end)
-    vectors, knots, ends = motion(space, t, points, bc, rng)
+    change = motion(space, t, points, bc, rng)
     x = inside(t, rng)
-    spline = ss.CubicSpline(t, points, space, bc_type=bc)
-    for nu in range(3):
-        cotangent = rng.normal(size=spline(x).shape)
-        if space.dtype.kind == "c":
-            cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
-        forward = spline.jvp(x, vectors, knots, ends, nu)
-        gradient = spline.vjp(x, cotangent, nu)
-        pairs = [(cotangent, forward), (gradient.points, vectors), (gradient.t, knots)]
-        pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
-        left, *right = [np.vdot(a, b).real for a, b in pairs]
-        scale = sum(np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs)
-        assert abs(left - sum(right)) <= 1e-12 * scale, nu
-        space.check_tangent(points, gradient.points)
+    assert_transpose(ss.CubicSpline(t, points, space, bc_type=bc), change, x, rng)
 
 
 def test_flat_derivatives_match_scipy():
@@ -204,23 +211,13 @@ def test_cotangents_must_have_the_shape_of_the_curve():
 @loop_over("end", ["not-a-knot", "mixed", "turned", "natural", "acceleration"])
 @pytest.mark.parametrize("name", ["r:1", "sphere:2", "so:3", "gr:2,5", "se:3", "spd:2"])
 def test_derivatives_of_curves_of_few_points(name, end, n):
-    case = Case(name)
     rng = np.random.default_rng(14)
-    space, t, p, bc = data(case, end, n=n)
-    change = motion(space, t, p, bc, rng)
-    x = inside(t, rng)
-    spline = moved(space, t, p, bc, change, 0.0)
-    for nu, expected in enumerate(by_differences(space, t, p, bc, change, x, (0, 1))):
-        found = spline.jvp(x, *change, nu)
-        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max()), nu
+    given = data(Case(name), end, n=n)
+    change = motion(*given, rng)
+    assert_differences(moved(*given, change, 0.0), given, change, inside(given[1], rng), (0, 1))
 
 
 # ---- loops ----
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
 
 
 @pytest.mark.parametrize("name", LOOPS)
@@ -230,15 +227,8 @@ def test_derivatives_of_a_loop(name, rng):
     change = motion(space, t, p, "periodic", rng)
     x = inside(t, rng)
     spline = ss.CubicSpline(t, p, space, bc_type="periodic")
-    for nu, expected in enumerate(by_differences(space, t, p, "periodic", change, x, (0, 1))):
-        found = spline.jvp(x, *change, nu)
-        assert np.abs(found - expected).max() <= 1e-8 * max(1.0, np.abs(expected).max())
-        cotangent = rng.normal(size=found.shape) + (1j * rng.normal(size=found.shape) if found.dtype == complex else 0)
-        gradient = spline.vjp(x, cotangent, nu)
-        left, *right = (
-            np.vdot(a, b).real for a, b in ((cotangent, found), (gradient.points, change[0]), (gradient.t, change[1]))
-        )
-        assert abs(left - sum(right)) <= 1e-12 * np.linalg.norm(cotangent) * np.linalg.norm(found)
+    assert_differences(spline, (space, t, p, "periodic"), change, x, (0, 1))
+    assert_transpose(spline, change, x, rng, (0, 1))
 
 
 @pytest.mark.parametrize("name", ["rp:2", "cp:2", "gr:2,5", "cgr:2,4"])

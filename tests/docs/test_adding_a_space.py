@@ -1,24 +1,22 @@
-"""What docs/adding-a-space.md quotes is what is there."""
+"""The code quoted in docs/adding-a-space.md exists."""
 
 import re
 from pathlib import Path
 
+from pages import blocks
+
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/adding-a-space.md").read_text(encoding="utf-8")
-
-
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.M | re.S)
+PAGE = ROOT / "docs/adding-a-space.md"
 
 
 def test_the_page_of_rust_is_the_one_that_is_tested():
     source = (ROOT / "crates/symspline/tests/torus.rs").read_text(encoding="utf-8")
     region = source.split("// ---- the page begins ----\n")[1].split("// ---- the page ends ----\n")[0]
-    assert "\n".join(blocks("rust")) == region
+    assert "\n".join(blocks(PAGE, "rust")) == region
 
 
 def test_lines_are_added_between_lines_that_are_there():
-    additions = blocks("diff")
+    additions = blocks(PAGE, "diff")
     assert additions
     for addition in additions:
         head, *lines = addition.splitlines()
@@ -30,13 +28,13 @@ def test_lines_are_added_between_lines_that_are_there():
 
 
 def test_the_class_is_python():
-    for block in blocks("python"):
+    for block in blocks(PAGE):
         compile(block, "adding-a-space.md", "exec")
 
 
 def test_files_exist():
-    links = re.findall(r"\]\((\.\./[^)]+)\)", PAGE)
-    names = re.findall(r"`((?:crates|python|tests)/[^`]+)`", PAGE)
+    links = re.findall(r"\]\((\.\./[^)]+)\)", PAGE.read_text(encoding="utf-8"))
+    names = re.findall(r"`((?:crates|python|tests)/[^`]+)`", PAGE.read_text(encoding="utf-8"))
     assert links and names
     paths = [*links, *(f"../{name}" for name in names)]
     missing = {path for path in paths if not (ROOT / "docs" / path).exists()}

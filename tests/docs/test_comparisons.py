@@ -1,4 +1,4 @@
-"""The comparisons of ``docs/comparisons`` run, and find what mathematics says they must."""
+"""The comparisons of ``docs/comparisons`` run and agree with theory."""
 
 import sys
 

@@ -1,12 +1,12 @@
 """The examples of ``docs/jax.md``, and the table of times."""
 
-import re
 from pathlib import Path
 
 import jax
 import jax_times
 import numpy as np
 import pytest
+from pages import blocks, run
 
 PAGE = Path(__file__).parents[2] / "docs/jax.md"
 
@@ -24,11 +24,9 @@ def double_precision():
 
 def test_examples_run():
     names = {}
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
-    assert len(blocks) == 2
-    for block in blocks:
-        # A Hessian takes half a minute to compile; what it is made of is tested with the functions.
-        exec(compile(block.replace("jax.hessian(", "jax.grad("), PAGE.name, "exec"), names)
+    first, second = blocks(PAGE)
+    # A Hessian takes half a minute to compile; what it is made of is tested with the functions.
+    run(f"{first}\n{second}".replace("jax.hessian(", "jax.grad("), PAGE, names)
     assert names["error"] < 1e-5 and np.isfinite(names["jerk"]).all()
     assert names["hessian"].shape == (5, 3)
 

@@ -1,22 +1,17 @@
-"""The example and the tables of ``docs/manifolds.md`` can be made, and say what mathematics says they must."""
-
-import re
+"""The example and the tables of ``docs/manifolds.md`` can be made and agree with theory."""
 
 import manifolds
 import numpy as np
 import pytest
+from pages import blocks, cells, run
 
 import symspline as ss
 
 
-def cells(table):
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
-
-
 def test_the_example_runs(capsys):
     names = {}
-    (block,) = re.findall(r"```python\n(.*?)```", manifolds.PAGE.read_text(encoding="utf-8"), re.S)
-    exec(compile(block, manifolds.PAGE.name, "exec"), names)
+    (block,) = blocks(manifolds.PAGE)
+    run(block, manifolds.PAGE, names)
     assert names["spline"].report.converged
     assert "acceleration is continuous" in capsys.readouterr().out
 
@@ -43,9 +38,3 @@ def test_order_and_data():
     assert torus.distance(p[:-1], p[1:]) == pytest.approx(np.full(3, 0.3), abs=1e-10)
     oblique = manifolds._oblique(0.5)
     assert np.linalg.norm(oblique, axis=1) == pytest.approx(np.ones((manifolds.POINTS, 3)))
-
-
-def test_the_page_has_a_place_for_every_table():
-    text = manifolds.PAGE.read_text(encoding="utf-8")
-    for part in manifolds.PARTS:
-        assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1

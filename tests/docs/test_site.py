@@ -1,4 +1,4 @@
-"""What is cheap to check of the site that `make docs` builds: nothing is left out, and what pages say runs."""
+"""Inexpensive checks of the site that `make docs` builds: it is complete, and the code of its pages runs."""
 
 import doctest
 import importlib
@@ -6,8 +6,13 @@ import re
 import types
 from pathlib import Path
 
+import derivatives_figure
 import links
+import manifolds
+import many_curves
 import pytest
+import smoothing
+from pages import blocks, run
 
 import symspline as ss
 
@@ -18,11 +23,7 @@ PAGES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".md", ".rst"
 PAGES = [path for path in PAGES if not {"gallery", "generated", "backreferences", "_templates"} & set(path.parts)]
 GALLERY = (ROOT / "examples/index.rst").read_text(encoding="utf-8")
 # Their own tests run or compare what they quote.
-OTHERS = {"adding-a-space.md", "derivatives.md", "jax.md", "smoothing.md", "solvers.md"}
-
-
-def blocks(page, language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S)
+OTHERS = {"adding-a-space.md", "jax.md", "shapes.md", "smoothing.md", "solvers.md"}
 
 
 def listed(page):
@@ -64,7 +65,7 @@ def test_every_public_name_has_a_description():
             assert all(getattr(thing, member).__doc__ for member in members)
 
 
-def test_notation_names_what_exists():
+def test_notation_page_names_existing_attributes():
     spline = ss.CubicSpline(None, [[1, 0, 0], [0, 1, 0]], "sphere:2")
     things = {"spline": spline, "space": spline.space, "report": spline.report, "ss": ss}
     text = (DOCS / "notation.md").read_text(encoding="utf-8")
@@ -104,16 +105,28 @@ def test_sessions_are_as_printed(page):
 
 @pytest.mark.parametrize(
     "page",
-    [page for page in [*PAGES, ROOT / "README.md"] if blocks(page, "python") and page.name not in OTHERS],
+    [page for page in [*PAGES, ROOT / "README.md"] if blocks(page) and page.name not in OTHERS],
     ids=lambda page: page.stem,
 )
 def test_code_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
-    for block in blocks(page, "python"):
-        exec(compile(block, page.name, "exec"), names)
-    if page.stem == "shapes":
-        assert names["film"].shape == (100, 4, 2)
+    for block in blocks(page):
+        run(block, page, names)
+    assert page.stem != "derivatives" or names["gradient"].points.shape == (5, 3)
+
+
+@pytest.mark.parametrize("module", [manifolds, many_curves, smoothing], ids=lambda module: module.__name__)
+def test_a_page_has_a_place_for_every_table(module):
+    text = module.PAGE.read_text(encoding="utf-8")
+    for part in module.PARTS:
+        assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1
+
+
+def test_the_figure_of_derivatives_can_be_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(derivatives_figure, "__file__", str(tmp_path / "figure.py"))
+    derivatives_figure.main()
+    assert (tmp_path / "derivatives.png").stat().st_size > 10_000
 
 
 def test_links_to_files_lead_somewhere():

@@ -1,12 +1,11 @@
-"""The example and the tables of ``docs/smoothing.md`` can be made, and say what mathematics says they must."""
-
-import re
+"""The example and the tables of ``docs/smoothing.md`` can be made and agree with theory."""
 
 import numpy as np
 import pytest
 import smoothing
 import smoothing_others as others
 import smoothing_peers as peers
+from pages import blocks, cells, run
 
 import symspline as ss
 
@@ -14,22 +13,16 @@ import symspline as ss
 pytestmark = pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 
 
-def cells(table):
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
-
-
 def test_the_examples_run():
     names = {}
-    first, _, matrices, covariances = re.findall(
-        r"```python\n(.*?)```", smoothing.PAGE.read_text(encoding="utf-8"), re.S
-    )
-    exec(compile(first, smoothing.PAGE.name, "exec"), names)
+    first, _, matrices, covariances = blocks(smoothing.PAGE)
+    run(first, smoothing.PAGE, names)
     sphere, t, truth = names["sphere"], names["t"], names["truth"]
     errors = [smoothing.rms(sphere, points, truth) for points in (names["s"](t), names["noisy"])]
     assert errors == pytest.approx([0.013, 0.071], abs=5e-4)
-    exec(compile(matrices, smoothing.PAGE.name, "exec"), names)
+    run(matrices, smoothing.PAGE, names)
     assert f"s.sigma  # {names['s'].sigma:.2f}:" in matrices
-    exec(compile(covariances, smoothing.PAGE.name, "exec"), names)
+    run(covariances, smoothing.PAGE, names)
     assert f"# {names['factor']:.2f}\n" in covariances
     variances = np.trace(names["smooth"](np.arange(200)), axis1=1, axis2=2) / 3
     assert np.mean(variances) / names["factor"] == pytest.approx(1, abs=0.02)
@@ -98,12 +91,6 @@ def test_scipy_on_a_sphere_removes_noise():
     found = peers.scipy_spline(given.t, peers.ambient(ss.Sphere(2), given.noisy[0]))
     errors = [smoothing.rms(given.space, points, given.truth[0]) for points in (found, given.noisy[0])]
     assert errors[0] < 0.5 * errors[1]
-
-
-def test_the_page_has_a_place_for_every_table():
-    text = smoothing.PAGE.read_text(encoding="utf-8")
-    for part in smoothing.PARTS:
-        assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1
 
 
 def test_other_programs_are_compared_on_the_same_data():

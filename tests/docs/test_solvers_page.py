@@ -1,4 +1,4 @@
-"""The tables and figures of ``docs/solvers.md`` can be made, and say what mathematics says they must."""
+"""The tables and figures of ``docs/solvers.md`` can be made and agree with theory."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,9 @@ import solvers
 import solvers_energy
 import solvers_figures as figures
 import solvers_uneven
+from pages import cells
 
 import symspline as ss
-
-
-def cells(table):
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
 
 
 def test_zigzag_table():
@@ -89,7 +86,7 @@ def test_figures_are_drawn(tmp_path):
     figures.sweeps(dict.fromkeys("abcd", lines)).savefig(tmp_path / "sweeps.png")
 
 
-def test_the_page_has_a_place_for_every_table():
+def test_the_page_has_a_place_for_every_table_and_figure():
     text = solvers.PAGE.read_text(encoding="utf-8")
     for part in ("zigzags", "walks", "energy", "spaces", "uneven", "knots", "time"):
         assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1

@@ -1,23 +1,19 @@
-"""The example and the tables of ``docs/xarray.md`` can be made, and say what they must."""
+"""The example and the tables of ``docs/xarray.md`` can be made."""
 
 import re
 
 import many_curves
 import numpy as np
-import pytest
+from pages import blocks, cells, run
 
 import symspline as ss
-
-
-def cells(table):
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]
 
 
 def test_the_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
-    (block,) = re.findall(r"```python\n(.*?)```", many_curves.PAGE.read_text(encoding="utf-8"), re.S)
-    exec(compile(block, many_curves.PAGE.name, "exec"), names)
+    (block,) = blocks(many_curves.PAGE)
+    run(block, many_curves.PAGE, names)
     assert names["ds"].converged.all()
     # Geodesics at constant speed.
     speed = names["sx"].speed(names["ds"], names["hours"]).compute()
@@ -46,9 +42,3 @@ def test_from_store_to_store_in_little_memory():
     assert rows["converged"] == "40 000" and rows["bit-identical to the run without dask"] == "yes"
     most, before = map(int, re.findall(r"(\d+) MiB", rows["peak memory of a worker"]))
     assert most - before < 40
-
-
-@pytest.mark.parametrize("part", many_curves.PARTS)
-def test_the_page_has_a_place_for_every_table(part):
-    text = many_curves.PAGE.read_text(encoding="utf-8")
-    assert text.count(f"<!-- {part}: begin -->") == text.count(f"<!-- {part}: end -->") == 1

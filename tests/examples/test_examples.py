@@ -1,4 +1,4 @@
-"""The recipes run, draw their pictures, and do what they say."""
+"""The examples run and draw their pictures."""
 
 import re
 import runpy

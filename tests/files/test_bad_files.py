@@ -1,4 +1,4 @@
-"""Files that are damaged, foreign, or not there."""
+"""Damaged, foreign and missing files raise an error."""
 
 import contextlib
 import gc

@@ -1,4 +1,4 @@
-"""Files keep a curve to the last bit."""
+"""Curves read from a file are bit-identical to those that were saved."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""Files are replaced as a whole: their permissions, links to them, and what is no regular file."""
+"""Files are replaced as a whole: permissions, links, and targets that are not regular files."""
 
 import os
 import stat

@@ -23,10 +23,7 @@ from laws import ends_along, knots, sharpness
 
 import symspline as ss
 
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20180308)
+SEED = 20180308
 
 
 # Every space meets every end condition; solvers and spacings take turns, since they know no more of a space than a

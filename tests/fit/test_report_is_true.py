@@ -1,4 +1,4 @@
-"""What a report says is true of the curve that is returned, and what cannot be true is an error."""
+"""The values in a report are true of the returned curve, and impossible input raises an error."""
 
 import itertools
 import zlib
@@ -110,7 +110,7 @@ def test_a_closed_curve_on_unequal_knots_closes(method):
 
 @pytest.mark.parametrize("method", ["auto", "newton"])
 @pytest.mark.parametrize(("name", "step"), [("sphere:2", 3.0), ("so:3", 1.2), ("cp:1", 0.7)])
-def test_far_closed_curves_have_no_kink_at_the_seam(name, step, method):
+def test_far_closed_curves_have_no_kink_where_they_close(name, step, method):
     space, rng = ss.space(name), seeded(name, method)
     centre = np.stack([space.random_point(rng) for _ in range(60)])[:, None]
     noise = space.random_tangent(rng, np.repeat(centre, 4, axis=1))

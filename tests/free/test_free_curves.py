@@ -24,12 +24,9 @@ from scipy.interpolate import BSpline as FlatBSpline
 
 import symspline as ss
 
+SEED = 2007
+
 every_degree = loop_over("degree", range(1, 6))
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(2007)
 
 
 def assert_differences(curve, x, h):

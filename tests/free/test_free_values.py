@@ -1,4 +1,4 @@
-"""Curves with control points as arrays and values, and bad input."""
+"""`BSpline` and `BezierCurve` as values: arrays, copies, and invalid input."""
 
 import copy
 import math
@@ -13,12 +13,9 @@ from refused import CLAMPED, INF, NAN, REFLECTION, P
 
 import symspline as ss
 
+SEED = 2007
+
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(2007)
 
 
 @every
@@ -51,7 +48,7 @@ def test_many_threads_change_nothing(rng):
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "u:2", "cp:1", "so:3"])
-def test_what_goes_in(name, rng):
+def test_input_of_any_type_and_layout(name, rng):
     space = ss.space(name)
     points, knots = walk(space, 0.4, 4, rng), clamped([], 3)
     curve = ss.BSpline(knots, points, 3, space)
@@ -201,7 +198,7 @@ def test_a_great_circle_has_its_length():
     ],
     ids=str,
 )
-def test_knots_and_degrees(knots, degree, match):
+def test_invalid_knots_and_degrees_raise(knots, degree, match):
     with warnings.catch_warnings(), pytest.raises(ss.ValidationError, match=match):
         warnings.simplefilter("error")
         ss.BSpline(knots, P, degree, "sphere:2")
@@ -233,7 +230,7 @@ def test_control_points(kind, points, match):
         ss.BSpline(CLAMPED, points, 2, "sphere:2") if kind == "BSpline" else ss.BezierCurve(points, "sphere:2")
 
 
-def test_control_points_of_two_parts():
+def test_control_points_in_two_components_raise():
     match = r"control_points\[0\] and control_points\[1\] have opposite determinants"
     with pytest.raises(ss.ValidationError, match=match):
         ss.BezierCurve([np.eye(3), REFLECTION], "o:3")
@@ -241,7 +238,7 @@ def test_control_points_of_two_parts():
         ss.BezierCurve([np.eye(3), REFLECTION], "so:3")
 
 
-def test_control_points_in_a_product():
+def test_control_points_in_a_product_raise():
     for make in (lambda s: ss.BezierCurve((P, P), s), lambda s: ss.BSpline(CLAMPED, (P, P), 2, s)):
         with pytest.raises(ss.ValidationError, match="Make one curve for each factor"):
             make("sphere:2 x r:3")

@@ -1,4 +1,4 @@
-"""How long the fuzzers look: "short" is part of every test run and always the same, "long" is for `make fuzz`."""
+"""Profiles of the fuzzers: "short" is part of every test run and deterministic, "long" is for `make fuzz`."""
 
 import numpy as np
 import pytest

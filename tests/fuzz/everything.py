@@ -1,4 +1,4 @@
-"""All that is public, and a pool of arguments for it: good ones by the names of parameters, and bad ones."""
+"""All public functions and methods, and a pool of valid and invalid arguments for them."""
 
 import datetime
 import importlib

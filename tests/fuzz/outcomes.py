@@ -1,4 +1,4 @@
-"""What a call may do: give a result, or refuse with an error that a user can read and catch."""
+"""Permitted outcomes of a call: a result, or an error that a user can read and catch."""
 
 import signal
 import warnings

@@ -1,4 +1,4 @@
-"""Spaces, and points on them, near each other and far apart, at the cut locus and past it."""
+"""Spaces, and points on them: close together, far apart, at the cut locus and past it."""
 
 import numpy as np
 from cases import CASES, HYPERBOLIC, POSITIVE, base_point, steep_tangent, unit_tangent

@@ -1,4 +1,4 @@
-"""The command line: exit code 0, 1 or 2, one line that says why, and no half of a file."""
+"""The command line: exit code 0, 1 or 2, an error of one line, and no partial files."""
 
 import io
 import shutil

@@ -1,4 +1,4 @@
-"""Files of curves: what is damaged is refused, or is a curve all the same."""
+"""Damaged files of curves raise an error or give a valid curve."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""Fits, and what can be done with the curve: whatever comes in, a good curve or an error comes out."""
+"""Fits and the use of their curves: any input gives a valid curve or an error."""
 
 import io
 import pickle

@@ -1,4 +1,4 @@
-"""The operations of spaces: whatever comes in, numbers that make sense or an error come out."""
+"""The operations of spaces: any input gives valid numbers or an error."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""Times along curves on the command line: in order, from the first knot to the last, and none beyond."""
+"""Sampling times on the command line are sorted and lie between the first and the last knot."""
 
 from unittest.mock import patch
 

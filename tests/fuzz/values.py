@@ -1,4 +1,4 @@
-"""Numbers, arrays and things that are none, as users give them by accident."""
+"""Invalid numbers and arrays, and objects that are neither, as users pass them by accident."""
 
 import numpy as np
 from hypothesis import strategies as st

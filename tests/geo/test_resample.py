@@ -1,4 +1,4 @@
-"""Tables of places at regular times."""
+"""Tables of positions at regular times."""
 
 import numpy as np
 import pytest

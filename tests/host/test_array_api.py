@@ -1,4 +1,4 @@
-"""Arrays of other libraries come back as such from functions of plain arrays; blocks of dask do not come in."""
+"""Functions return arrays of the library that their input comes from; blocks of dask raise an error."""
 
 import array_api_strict as strict
 import dask.array

@@ -1,4 +1,4 @@
-"""The compiled module is picked, or refused, before it is imported."""
+"""The compiled module is selected or rejected before it is imported."""
 
 import ctypes
 import os

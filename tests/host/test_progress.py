@@ -1,4 +1,4 @@
-"""Progress, exceptions in it, and Ctrl-C."""
+"""Progress callbacks, exceptions in them, and Ctrl-C."""
 
 import signal
 import subprocess
@@ -125,25 +125,28 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
-@pytest.mark.parametrize("n", [1, 2])
-def test_ctrl_c_stops_a_long_fit(n):
-    command = [sys.executable, "-c", INTERRUPTED, str(n)]
+def interrupted(code, *arguments, after=0.0):
+    """What a script prints once it is interrupted some time after its start, and the seconds until it ends."""
+    command = [sys.executable, "-c", code, *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "started\n"
+            time.sleep(after)
             start = time.perf_counter()
             process.send_signal(signal.SIGINT)
-            while (line := process.stdout.readline()) == "started\n":
-                pass
-            seconds = time.perf_counter() - start
-            assert line == "interrupted\n"
-            assert process.stdout.read() == "well\n"
-            assert process.wait(10) == 0
-            # It takes about 0.05 s; the whole fit takes minutes.
-            assert seconds < 2
+            out, _ = process.communicate(timeout=10)
+            assert process.returncode == 0
+            return out.replace("started\n", ""), time.perf_counter() - start
         finally:
             process.kill()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
+@pytest.mark.parametrize("n", [1, 2])
+def test_ctrl_c_stops_a_long_fit(n):
+    out, seconds = interrupted(INTERRUPTED, n)
+    # It takes about 0.05 s; the whole fit takes minutes.
+    assert out == "interrupted\nwell\n" and seconds < 2
 
 
 WORKING = """
@@ -177,20 +180,10 @@ print("well", flush=True)
     ids=["points", "speeds", "operations", "large-matrices"],
 )
 def test_ctrl_c_stops_long_work(name, work):
-    command = [sys.executable, "-c", WORKING.format(name=name, work=work)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout.readline() == "started\n"
-            # By then arrays are copied, and compiled code runs.
-            time.sleep(0.6)
-            start = time.perf_counter()
-            process.send_signal(signal.SIGINT)
-            # It takes about 0.05 s, with six other programs on two cores up to 2 s.
-            out, _ = process.communicate(timeout=5)
-            assert time.perf_counter() - start < 5
-            assert out == "interrupted\nwell\n" and process.returncode == 0
-        finally:
-            process.kill()
+    # After this time arrays are copied, and compiled code runs.
+    out, seconds = interrupted(WORKING.format(name=name, work=work), after=0.6)
+    # It takes about 0.05 s, with six other programs on two cores up to 2 s.
+    assert out == "interrupted\nwell\n" and seconds < 5
 
 
 # ---- progress of evaluations ----
@@ -229,10 +222,9 @@ def test_progress_within_an_evaluation():
 
 
 def test_progress_of_evaluation_must_be_a_function():
-    with pytest.raises(ss.ValidationError, match="progress must be a function"):
-        pair_of_curves(S2)(0.5, progress=3)
-    with pytest.raises(ss.ValidationError, match="progress must be a function"):
-        ss.evaluate(None, np.eye(3), np.eye(3), S2, 0.5, progress=3)
+    for call in (pair_of_curves(S2), lambda x, **options: ss.evaluate(None, np.eye(3), np.eye(3), S2, x, **options)):
+        with pytest.raises(ss.ValidationError, match="progress must be a function"):
+            call(0.5, progress=3)
 
 
 def test_an_exception_in_progress_stops_an_evaluation():

@@ -1,4 +1,4 @@
-"""What the library does to the program that uses it: nothing."""
+"""The library does not change the state of the program that uses it."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Threads: how many there are, and that they change no bit."""
+"""The number of threads, and bit-identical results for every number of them."""
 
 import multiprocessing
 import os
@@ -95,7 +95,7 @@ def work(seed):
     return spline, *(spline(x, nu=nu) for nu in range(3))
 
 
-def test_calls_from_many_threads_give_the_same_bits(threads):
+def test_calls_from_many_threads_are_bit_identical(threads):
     ss.set_num_threads(2)
     expected = [work(seed) for seed in range(8)]
     with ThreadPoolExecutor(8) as pool:
@@ -123,7 +123,7 @@ def test_one_spline_asked_by_many_threads(threads, space):
         assert all(pool.map(ask, range(8)))
 
 
-def test_parallel_calls_from_many_threads_give_the_same_bits(threads):
+def test_parallel_calls_from_many_threads_are_bit_identical(threads):
     ss.set_num_threads(2)
     p = S3.geodesic([1, 0, 0, 0], [0, 1, 0, 0], np.linspace(0, 9, 20_000))
     x = np.random.default_rng(0).uniform(0, 19_999, 30_000)

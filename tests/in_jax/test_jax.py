@@ -10,13 +10,6 @@ from jax.test_util import check_grads
 import symspline as ss
 from symspline.jax import curve
 
-
-@pytest.fixture(autouse=True)
-def double_precision():
-    with jax.enable_x64(True):
-        yield
-
-
 X = np.array([0.3, 1.7, 3.1])
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
 # Spaces whose projection on a tangent space is orthogonal for arrays, so that their motions off the space, which

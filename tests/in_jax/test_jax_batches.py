@@ -20,12 +20,6 @@ POINTS = np.stack([walk(SPHERE, 0.5, 5, np.random.default_rng(seed)) for seed in
 ENDS = np.stack([0.3 * unit_tangent(SPHERE, p[0], np.random.default_rng(9)) for p in POINTS])
 
 
-@pytest.fixture(autouse=True)
-def double_precision():
-    with jax.enable_x64(True):
-        yield
-
-
 @pytest.fixture
 def calls(monkeypatch):
     """How often the core was asked to fit."""

@@ -1,22 +1,17 @@
-"""Fits in JAX itself beside the compiled core."""
+"""Fits in JAX against the compiled core."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from cases import unit_tangent, walk
-from double import double_and_quickly_compiled
 
 import symspline as ss
 from symspline.jax import curve, evaluate, fit
 
+QUICK = True
+
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1, 5.0])
-
-
-@pytest.fixture(autouse=True)
-def double_precision():
-    with double_and_quickly_compiled():
-        yield
 
 
 def data(name, step=0.8):
@@ -109,13 +104,15 @@ def test_a_curve_that_stands_still_has_a_gradient():
     np.testing.assert_array_equal(gradient, np.zeros((4, 3)))
 
 
-def test_invalid_arguments_raise():
-    p = np.eye(3)
-    with pytest.raises(ss.ValidationError, match="does not support"):
-        fit(T[:3], p, "h:2")
-    with pytest.raises(ss.ValidationError, match="bc_type must be 'natural'"):
-        fit(T[:3], p, "sphere:2", bc_type="periodic")
-    with pytest.raises(ss.ValidationError, match="steps must be"):
-        fit(T[:3], p, "sphere:2", steps=0)
-    with pytest.raises(ss.ValidationError, match="start velocity has shape"):
-        fit(T[:3], p, "sphere:2", bc_type=((1, np.zeros(2)), "natural"))
+@pytest.mark.parametrize(
+    ("space", "options", "match"),
+    [
+        ("h:2", {}, "does not support"),
+        ("sphere:2", {"bc_type": "periodic"}, "bc_type must be 'natural'"),
+        ("sphere:2", {"steps": 0}, "steps must be"),
+        ("sphere:2", {"bc_type": ((1, np.zeros(2)), "natural")}, "start velocity has shape"),
+    ],
+)
+def test_invalid_arguments_raise(space, options, match):
+    with pytest.raises(ss.ValidationError, match=match):
+        fit(T[:3], np.eye(3), space, **options)

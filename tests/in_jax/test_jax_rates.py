@@ -1,4 +1,4 @@
-"""Velocities and covariant accelerations of the compiled spline in JAX, and how they follow their data."""
+"""Velocities and covariant accelerations of the compiled spline in JAX, and their sensitivity to the data."""
 
 import jax
 import jax.numpy as jnp
@@ -14,12 +14,6 @@ T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
 LATER = 0.1 * np.arange(5.0)
 PLAIN = ["r:2", "sphere:2", "h:2", "so:3", "u:2", "spd:2", "hpd:2", "siegel:1", "se:3"]
 QUOTIENTS = ["rp:2", "cp:2", "gr:2,5", "cgr:2,4", "hp:1", "ch:2"]
-
-
-@pytest.fixture(autouse=True)
-def double_precision():
-    with jax.enable_x64(True):
-        yield
 
 
 def data(name):

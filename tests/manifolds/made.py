@@ -1,4 +1,4 @@
-"""Manifolds to test with, and curves on them."""
+"""Manifolds for the tests, and curves on them."""
 
 from functools import partial
 

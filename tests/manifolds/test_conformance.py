@@ -1,4 +1,4 @@
-"""The public suite of laws: our spaces pass it, and broken ones do not."""
+"""The public conformance test: the spaces of the library pass it, and incorrect ones fail."""
 
 import numpy as np
 import pytest

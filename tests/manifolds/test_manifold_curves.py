@@ -1,4 +1,4 @@
-"""Curves on manifolds that are made of functions are C² splines."""
+"""Curves on manifolds made of functions are C² splines."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What curves on manifolds can do beside being smooth, and what they refuse."""
+"""The interface of curves on manifolds made of functions, and its errors."""
 
 import io
 import pickle
@@ -68,7 +68,7 @@ def test_outside_the_knots():
     assert SPLINE([], nu=2).shape == (0, 5, 2)
 
 
-def test_other_ways_to_the_same_curve():
+def test_other_functions_give_the_same_curve():
     x, t = [0.2, 3.3], SPLINE.t
     assert np.array_equal(ss.evaluate(t, POINTS, SPLINE.velocities, SPACE, x), SPLINE(x))
     hermite = ss.HermiteSpline(t, POINTS, SPLINE.velocities, SPACE)
@@ -161,7 +161,7 @@ def opposite(p):
         (opposite, ss.CutLocusError, r"points\[1\] and points\[2\]{} have no geodesic between them"),
     ],
 )
-def test_points_that_are_none(change, error, what):
+def test_invalid_points_raise(change, error, what):
     with pytest.raises(error, match=what.format("")):
         ss.CubicSpline(None, changed(change), SPACE)
     two = np.stack([POINTS, changed(change)])
@@ -219,7 +219,7 @@ def test_functions_that_do_not_fit_do_not_converge():
         ("smooth", "bc_type is 'natural'"),
     ],
 )
-def test_ends_that_are_none(bc, what):
+def test_invalid_ends_raise(bc, what):
     with pytest.raises(ss.ValidationError, match=what):
         ss.CubicSpline(None, POINTS, SPACE, bc_type=bc)
 
@@ -242,7 +242,7 @@ def test_times_are_checked():
         ({"dtype": np.float32}, "dtype must be float64 or complex128"),
     ],
 )
-def test_manifolds_that_are_none(changes, what):
+def test_invalid_manifolds_raise(changes, what):
     with pytest.raises(ss.ValidationError, match=what):
         ss.Manifold(**FUNCTIONS | {"point_shape": (5, 2)} | changes)
 
@@ -274,7 +274,7 @@ def test_missing_functions_of_a_manifold_raise():
 
 
 @pytest.mark.parametrize(("digits", "allowed"), [(9, 1e-4), (10, 1e-5), (11, 1e-6), (12, 1e-7)])
-def test_noise_of_a_logarithm_is_no_reason_for_short_steps(digits, allowed):
+def test_noise_of_a_logarithm_does_not_shorten_steps(digits, allowed):
     """Noise does not shrink with the steps of differences, and the shortest make most of it."""
     sphere = ss.Sphere(2)
     noisy = ss.Manifold(

@@ -1,4 +1,4 @@
-"""Stiefel manifolds by other formulas."""
+"""Stiefel manifolds against independent formulas."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def test_opposite_frames_have_no_logarithm():
 
 
 @pytest.mark.parametrize("arguments", [(2, 2), (5, 2), (0, 3), (-1, 3), (1.5, 3), (True, 3)])
-def test_sizes_that_are_none(arguments):
+def test_invalid_sizes_raise(arguments):
     with pytest.raises(ss.ValidationError, match="Stiefel"):
         ss.Stiefel(*arguments)
 

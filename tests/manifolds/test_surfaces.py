@@ -1,4 +1,4 @@
-"""Surfaces given by an equation, by what is known of their geodesics."""
+"""Surfaces given by an equation, against known properties of their geodesics."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""`report.velocity_error` bounds the error of the velocities, sharply, and notices functions that are wrong."""
+"""`report.velocity_error` is a sharp bound of the error of the velocities and detects incorrect functions."""
 
 import numpy as np
 import pytest

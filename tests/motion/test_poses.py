@@ -1,4 +1,4 @@
-"""Velocities and accelerations of poses beside closed forms and finite differences; files of poses."""
+"""Velocities and accelerations of poses against closed forms and finite differences; files of poses."""
 
 import gzip
 import io
@@ -279,7 +279,7 @@ def test_dates_in_tum_files():
         (poses.read_euroc, "1,0,0,0,1\n", "nanoseconds"),
     ],
 )
-def test_bad_files(read, text, match):
+def test_invalid_files_raise(read, text, match):
     with pytest.raises(ss.ValidationError, match=match):
         read(io.StringIO(text))
 
@@ -296,7 +296,7 @@ def test_bad_files(read, text, match):
         (lambda f: poses.split(np.eye(3)), r"\(\.\.\., 4, 4\)"),
     ],
 )
-def test_bad_poses(tmp_path, call, match):
+def test_invalid_poses_raise(tmp_path, call, match):
     with pytest.raises(ss.ValidationError, match=match):
         call(tmp_path / "a.txt")
     assert not list(tmp_path.iterdir())

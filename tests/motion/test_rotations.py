@@ -1,4 +1,4 @@
-"""Rotations in the words of those who turn things, beside SciPy and finite differences."""
+"""Curves of rotations: rates, quaternions and other forms, against SciPy and finite differences."""
 
 import gc
 import weakref
@@ -116,7 +116,7 @@ def test_rates_are_derivatives_of_the_rotations(space, batch):
 
 
 @every_curve
-def test_rotation_gives_back_what_scipy_has(space):
+def test_rotation_is_a_scipy_rotation(space):
     spline = curve(space)
     assert np.abs(rotations.rotation(spline, X).as_matrix() - turns(spline, X)).max() < 1e-14
     assert rotations.rotation(spline, 1.0).as_matrix().shape == (3, 3)

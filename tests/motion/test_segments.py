@@ -1,4 +1,4 @@
-"""Recordings cut where they pause, and times that come twice."""
+"""Recordings cut at gaps, and repeated times."""
 
 import numpy as np
 import pytest

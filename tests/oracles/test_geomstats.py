@@ -17,12 +17,9 @@ from geomstats.geometry.special_orthogonal import SpecialOrthogonal
 
 import symspline as ss
 
+SEED = 2024
+
 LENGTHS = [1e-3, 0.1, 0.7, 1.4]
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(2024)
 
 
 def bi_invariant(n):

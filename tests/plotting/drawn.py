@@ -1,4 +1,4 @@
-"""Pictures that tests look at."""
+"""Helpers that inspect figures."""
 
 from io import BytesIO
 

@@ -1,4 +1,4 @@
-"""Figures: what is in them, batches, times, files, and what they leave alone."""
+"""Figures: their content, batches, times and files, and no changes of global state."""
 
 import subprocess
 import sys
@@ -97,7 +97,7 @@ def test_batch_is_thinned_with_a_note():
     assert "50 of 70 curves, 4 points each, natural ends" in texts_of(figure)
 
 
-def test_bad_curves_are_left_out():
+def test_failed_curves_are_not_drawn():
     good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     points = [good, [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]], good]
     figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())

@@ -1,4 +1,4 @@
-"""What a notebook shows of a curve."""
+"""The representation of a curve in a notebook."""
 
 import base64
 import re

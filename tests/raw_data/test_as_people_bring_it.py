@@ -1,4 +1,4 @@
-"""Data as people bring them: every entry gives what the same data cleaned by hand give, or a clear error."""
+"""Uncleaned recordings: every function gives the result for data cleaned by hand, or a clear error."""
 
 import numpy as np
 import pytest

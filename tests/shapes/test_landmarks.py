@@ -1,4 +1,4 @@
-"""Landmarks as points of Grassmannians: the same for all affine images, and back."""
+"""Landmarks as points of Grassmannians: invariance under affine maps, and the way back."""
 
 import numpy as np
 import pytest

@@ -102,7 +102,7 @@ def test_films_are_c2(frame):
 
 
 @pytest.mark.parametrize("base", [None, 0])
-def test_closed_films_are_c2_at_the_seam(base):
+def test_closed_films_are_c2_where_they_close(base):
     x = turned(2, 5, closed=True)
     morph = AffineMorph(KNOTS, x, base=base, bc_type="periodic")
     assert np.abs(morph(KNOTS) - x).max() < NEAR

@@ -1,4 +1,4 @@
-"""How good the choice of λ, the bands and the robust losses are, on fixed random data."""
+"""The quality of the chosen λ, of the bands and of robust losses, on fixed random data."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def test_geodesic_motion_is_seen_to_be_geodesic(criterion, gamma, most):
 
 
 @pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e8])
-def test_both_ways_lead_to_stiff_curves(lam):
+def test_both_solvers_find_stiff_curves(lam):
     sphere = ss.Sphere(2)
     flat, exact = (
         ss.make_smoothing_spline(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam, method=method)
@@ -155,7 +155,7 @@ def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
 
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_where_lambda_hardly_matters_it_is_not_sought_for_long():
+def test_the_search_ends_soon_where_lambda_hardly_matters():
     # Near a geodesic the best λ wanders from round to round, but the degrees of freedom do not.
     space, rng = ss.space("so:3"), np.random.default_rng(0)
     ends = space.random_point(rng, (40, 2))
@@ -166,7 +166,7 @@ def test_where_lambda_hardly_matters_it_is_not_sought_for_long():
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
-def test_both_ways_leave_outliers_out(loss):
+def test_both_solvers_reject_outliers(loss):
     space, _, noisy = batch("so:3", 0.1)
     dirty = noisy[0]
     dirty[5::9] = space.exp(dirty[5::9], 1.2 * space.random_tangent(np.random.default_rng(1), dirty[5::9]))
@@ -260,7 +260,7 @@ def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
 
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_a_lambda_that_does_not_settle_is_told():
+def test_a_lambda_that_does_not_settle_is_reported():
     """Random walks for which the choice at one curve leads to another curve, with another choice, and back."""
     sphere, told = ss.Sphere(2), []
     for seed, gamma, weighed in ((826, 1.4, False), (1129, 1.0, True)):

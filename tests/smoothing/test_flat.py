@@ -1,4 +1,4 @@
-"""Smoothing of numbers, where everything is known otherwise."""
+"""Smoothing of numbers, for which everything is known from other sources."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Weights that are matrices: data of which some directions are better known than others."""
+"""Information matrices as weights: some directions of the data are better known than others."""
 
 import numpy as np
 import pytest
@@ -253,7 +253,7 @@ def test_a_product_takes_one_of_every_factor(tmp_path):
         assert all(np.array_equal(a, b) for a, b in zip(again.residuals, both.residuals, strict=True))
 
 
-def test_pieces_have_matrices_of_their_own():
+def test_segments_have_information_matrices_of_their_own():
     rng = np.random.default_rng(10)
     space = ss.space("so:3")
     t = np.r_[0:10:0.2, 30:40:0.2]

@@ -1,4 +1,4 @@
-"""Smoothing data as people bring them: irregular, long, with gaps and copies, rounded, with a bad curve in a batch."""
+"""Smoothing of realistic data: irregular, long, with gaps, copies and rounding, and with failing curves."""
 
 import warnings
 
@@ -123,7 +123,7 @@ def test_knots_that_end_a_rounding_before_the_data():
         ss.make_lsq_spline([0, 0.4, 0.7, 1], np.zeros((4, 1)), [0, 0.5, 1 - 1e-12], "r:1")
 
 
-def test_the_size_of_the_noise_survives_outliers():
+def test_the_noise_level_is_estimated_despite_outliers():
     found = []
     for seed in range(20):
         _, t, _, noisy, _ = recorded("r:2", "uniform", 150, seed, True)
@@ -233,7 +233,7 @@ def test_a_bad_curve_does_not_stop_a_batch():
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "se:3", "sphere:2 x r:3"])
-def test_files_keep_curves_that_were_left_out(name, tmp_path):
+def test_files_keep_masked_curves(name, tmp_path):
     space, rng = ss.space(name), np.random.default_rng(0)
     points = space.exp(space.random_point(rng), 0.1 * rng.random()) if name == "r:3" else None
     t = np.linspace(0, 1, 12)

@@ -1,4 +1,4 @@
-"""Smooth curves with given velocities at their ends, and closed ones."""
+"""Smoothing splines with given end velocities, and closed ones."""
 
 import numpy as np
 import pytest
@@ -151,7 +151,7 @@ def test_a_closed_curve_of_numbers_is_a_filter():
     assert spline.df == pytest.approx(shrink.sum(), rel=1e-6)
 
 
-def test_other_ends_are_refused():
+def test_invalid_ends_raise():
     space, t, noisy, _ = example("sphere:2", 0.05, n=10)
     with pytest.raises(ss.ValidationError, match="is not available for smoothing splines"):
         ss.make_smoothing_spline(t, noisy, space, bc_type="not-a-knot")
@@ -160,7 +160,7 @@ def test_other_ends_are_refused():
 
 
 @pytest.mark.parametrize("bc_type", ["periodic", "clamped"])
-def test_their_deviations_come_back_from_files(bc_type, tmp_path):
+def test_files_keep_standard_deviations(bc_type, tmp_path):
     space, t, noisy, _ = ring("sphere:2", 20)
     spline = ss.make_smoothing_spline(t, noisy, space, 0.1, knots=np.append(t, 10.0), bc_type=bc_type)
     spline.save(tmp_path / "curve.npz")

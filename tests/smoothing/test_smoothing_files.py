@@ -1,4 +1,4 @@
-"""Files keep the curve, its data and what is known of their noise, to the last bit."""
+"""Files keep a smoothing spline, its data and its noise level bit for bit."""
 
 import datetime
 import io

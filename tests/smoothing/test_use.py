@@ -1,4 +1,4 @@
-"""What people hand over, and what they get back."""
+"""The interface of smoothing splines: input, output, warnings and errors."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_failed_curves_are_reported_and_kept():
         ss.make_lsq_spline(T[:6], NOISY[:6], np.linspace(0, T[5], 30), S2)
 
 
-def test_bounds_are_warned_of():
+def test_a_lambda_at_its_bound_warns():
     """White noise has no curve: the smoothest one is chosen. With much too small a noise level the data are met."""
     noise = np.random.default_rng(1).standard_normal((40, 1))
     with pytest.warns(ss.SmoothingWarning, match=r"The smoothing chose the largest lam.*\(2\.0\d degrees"):
@@ -91,7 +91,7 @@ def test_two_times_make_a_geodesic():
 
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_three_points_that_are_met_are_no_geodesic():
+def test_interpolated_points_are_not_reported_as_a_geodesic():
     spline = ss.make_smoothing_spline([0.0, 1.0, 2.0], NOISY[[0, 20, 30]], S2, criterion="reml")
     assert "a geodesic" not in str(spline.report) or spline.df < 2.5
 
@@ -160,14 +160,14 @@ def test_between_two_knots_there_is_the_nearest_geodesic(options):
 
 
 @pytest.mark.parametrize("size", [1e-200, 1e200])
-def test_squares_beyond_doubles_are_no_result(size):
+def test_data_whose_squares_overflow_raise(size):
     data = size * np.random.default_rng(0).standard_normal((20, 2))
     with pytest.raises(ss.ConvergenceError):
         ss.make_smoothing_spline(np.arange(20.0), data, "r:2")
 
 
 @pytest.mark.parametrize(("name", "seed"), [("sphere:2", 4), ("so:3", 0), ("rp:2", 4), ("sphere:2 x r:1", 4)])
-def test_data_all_over_a_space_are_told(name, seed):
+def test_data_spread_over_the_whole_space_warn(name, seed):
     space, rng = ss.space(name), np.random.default_rng(seed)
     points = space.random_point(rng, 200)
     with pytest.warns(UserWarning, match=r"half of the data are \d.* For random points of .* this distance is \d"):
@@ -183,14 +183,14 @@ def test_data_all_over_a_space_are_told(name, seed):
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "so:3", "rp:2", "so:4", "u:2"])
-def test_noise_of_half_a_radian_is_no_reason_to_warn(name):
+def test_noise_of_half_a_radian_does_not_warn(name):
     for seed in range(3):
         space, t, noisy, points = example(name, 0.5, seed=seed)
         spline = ss.make_smoothing_spline(t, noisy, space)
         assert rms(space, spline(t), points) < 0.5 * rms(space, noisy, points)
 
 
-def test_a_curve_through_all_data_is_no_reason_to_warn():
+def test_a_curve_through_all_data_does_not_warn():
     for n in (80, 81, 160):
         _, t, noisy, _ = example("sphere:2", 0.1, n=n)
         spline = ss.make_smoothing_spline(t, noisy, "sphere:2", 0.0)

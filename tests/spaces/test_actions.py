@@ -7,13 +7,9 @@ from lie import Lie
 
 import symspline as ss
 
-every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+SEED = 1703
+
 one_per_family = pytest.mark.parametrize("case", [c for c in CASES if c.interface], ids=lambda case: case.name)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1703)
 
 
 # ---- symmetries ----

@@ -10,6 +10,8 @@ from cases import CASES, EPS, LINEAR, base_point, compact, has_metric, unit_tang
 
 import symspline as ss
 
+SEED = 22
+
 NAMES = [
     *("euclidean:3", "sphere:1", "sphere:2", "sphere:4", "hyperbolic:1", "hyperbolic:2", "hyperbolic:4"),
     *("rp:1", "rp:2", "rp:4", "cp:1", "cp:2", "cp:4"),
@@ -18,11 +20,6 @@ NAMES = [
     *("spd:1", "spd:2", "spd:3", "spd:4", "hpd:1", "hpd:2", "hpd:3"),
 ]
 every = pytest.mark.parametrize("name", NAMES)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(22)
 
 
 def bracket(a, b):

@@ -9,11 +9,6 @@ from refused import CLAMPED, NAN, P, fails, fit_error
 import symspline as ss
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
-
-
 @pytest.mark.parametrize("gap", [10.0**e for e in range(-7, 0)])
 def test_geodesics_between_nearly_opposite_points(gap, rng):
     space = ss.Sphere(3)

@@ -1,4 +1,4 @@
-"""What rounding leaves of projections, of random points, and of large matrices."""
+"""Rounding errors of projections, of random points, and of large matrices."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,6 @@ from cases import EPS, condition, loop_over, unit_tangent, walk
 from rounding import rounding
 
 import symspline as ss
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
 
 
 @pytest.mark.parametrize("name", ["so:2", "so:3", "so:5", "o:4", "u:3", "su:3", "gr:2,5", "cgr:2,4", "rp:3", "cp:2"])

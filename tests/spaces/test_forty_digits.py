@@ -8,10 +8,7 @@ from exact import DIGITS, Poses, PositiveDefinite, Sphere, Subspaces, Unitary, d
 
 import symspline as ss
 
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(40)
+SEED = 40
 
 
 @pytest.fixture(autouse=True)

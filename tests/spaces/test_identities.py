@@ -1,4 +1,4 @@
-"""Spaces that are each other under another name: distances, exp and log, and whole splines must agree."""
+"""Isometric spaces agree in distances, exp, log and whole splines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,10 +10,7 @@ from cases import EPS, QUOTIENTS, base_point, closed_walk, condition, loop_over,
 
 import symspline as ss
 
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1729)
+SEED = 1729
 
 
 def adjoint(x):

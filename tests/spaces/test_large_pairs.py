@@ -1,4 +1,4 @@
-"""exp, log, geodesic and distance of subspaces of large spaces, which are computed in the span of two."""
+"""exp, log, geodesic and distance of subspaces of large spaces, computed in the span of two points."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,9 @@ from cases import loop_over
 
 import symspline as ss
 
+SEED = 1000
+
 N = 300
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1000)
 
 
 def isometry(space, m, rng):

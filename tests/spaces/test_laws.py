@@ -18,6 +18,8 @@ from cases import (
     unit_tangent,
 )
 
+SEED = 20180308
+
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
@@ -30,11 +32,6 @@ LENGTHS = [
     2.0,
     3.0,
 ]
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20180308)
 
 
 def test_every_family_is_in_the_suite():

@@ -13,6 +13,8 @@ from lie import Lie, bracket
 
 import symspline as ss
 
+SEED = 20180308
+
 # Rows of Table 1, with sizes in which the curvature is constant and in which it is not.
 TABLE_1 = [
     "euclidean:3",
@@ -28,11 +30,6 @@ FLAT = ("euclidean:3",)
 DIFFERENCES, ROUNDING = 1e-8, 1e-13
 # Multiples of 1/K: decades, and up to near π, where the bounds with sin end.
 SIZES = [1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.1]
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20180308)
 
 
 STEEPEST = {}

@@ -1,4 +1,4 @@
-"""Spaces as values: their names, what they say of themselves, and spaces that there are not."""
+"""Spaces as values: names, properties, and invalid spaces."""
 
 import copy
 import inspect
@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 from cases import COMMON, FAMILIES, INDEFINITE, LINEAR, SINGLE, SPACES, loop_over
-from curves import every_single, every_space, points_on
+from curves import every_space, points_on
 from refused import INF, fit_error
 
 import symspline as ss
@@ -97,51 +97,21 @@ def test_numbers_of_some_spaces(space, point_shape, dtype, dim, radius, curvatur
     np.testing.assert_equal(space.curvature, curvature)
 
 
-DIMENSIONS = {
-    "euclidean": lambda n: n,
-    "sphere": lambda n: n,
-    "hyperbolic": lambda n: n,
-    "rp": lambda n: n,
-    "cp": lambda n: 2 * n,
-    "ch": lambda n: 2 * n,
-    "hp": lambda n: 4 * n,
-    "gr": lambda k, n: k * (n - k),
-    "cgr": lambda k, n: 2 * k * (n - k),
-    "so": lambda n: n * (n - 1) // 2,
-    "o": lambda n: n * (n - 1) // 2,
-    "u": lambda n: n * n,
-    "su": lambda n: n * n - 1,
-    "spd": lambda n: n * (n + 1) // 2,
-    "hpd": lambda n: n * n,
-    "sspd": lambda n: n * (n + 1) // 2 - 1,
-    "siegel": lambda n: n * (n + 1),
-    "se": lambda n: n * (n + 1) // 2,
-    "gl": lambda n: n * n,
-    "cgl": lambda n: 2 * n * n,
-    "aff": lambda n: n * (n + 1),
-    "sim": lambda n: n * (n + 1) // 2 + 1,
-    "sl": lambda n: n * n - 1,
-    "sp": lambda n: n * (n + 1) // 2,
-    "lorentz": lambda n: n * (n + 1) // 2,
-    "ds": lambda n: n,
-    "ads": lambda n: n,
-    "igr": lambda a, b, p, q: (a + b) * (p + q - a - b),
-}
-
-
 COMPLEX_FAMILIES = {"cp", "ch", "hp", "cgr", "u", "su", "hpd", "cgl"}
 
 
-@every_single
+@pytest.mark.parametrize("space", SINGLE, ids=str)
 def test_properties_of_spaces(space):
-    family, _, size = str(space).partition(":")
-    assert space.dim == DIMENSIONS[family](*map(int, size.split(",")))
+    family = str(space).partition(":")[0]
+    p, rng = points_on(space), np.random.default_rng(0)
+    assert p.shape[1:] == space.point_shape
+    vectors = space.random_tangent(rng, np.broadcast_to(p[0], (2 * space.dim + 1, *p[0].shape)))
+    assert np.linalg.matrix_rank(vectors.reshape(len(vectors), -1).view(float)) == space.dim
     assert space.dtype == (np.complex128 if family in COMPLEX_FAMILIES else np.float64)
     assert space.injectivity_radius > 0
     # Without an invariant metric that is positive definite there is no K.
     without = family == "se" or isinstance(space, (*LINEAR, *INDEFINITE))
     assert np.isnan(space.curvature) if without else space.curvature >= 0
-    assert points_on(space).shape[1:] == space.point_shape
 
 
 # ---- spaces that there are not ----
@@ -174,6 +144,12 @@ def test_properties_of_spaces(space):
         *((f"{name}:1", r"\(n\) needs n >= 2") for name in ("o", "so", "su")),
         *((f"{name}:0", r"\(n\) needs n >= ")
           for name in ("sphere", "rp", "cp", "o", "so", "u", "su", "spd", "hpd", "r", "h")),
+        ("sp:3", r"Symplectic\(n\) needs an even n, not 3"),
+        *((name, r"needs n") for name in ("sim:1", "sl:1", "lorentz:0", "aff:0", "ch:0")),
+        ("ds:1", r"DeSitter\(n\) needs n >= 2, not 1"),
+        ("ads:1", r"AntiDeSitter\(n\) needs n >= 2, not 1"),
+        ("igr:2,0,1,2", r"needs a <= p, b <= q and 0 < a \+ b < p \+ q, not \(2, 0, 1, 2\)"),
+        *((name, "0 < a") for name in ("igr:1,2,1,2", "igr:0,0,1,2")),
         ("cp:1 x ", r"unknown space"),
         *((name, r"too large") for name in ("so:99999999999", "gr:3,99999999999999999999", f"sphere:{2**64 - 1}")),
         ("sphere:" + "9" * 30, "too large"),

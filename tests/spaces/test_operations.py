@@ -1,4 +1,4 @@
-"""Operations of spaces on arrays: shapes, types, and bad operands."""
+"""Operations of spaces on arrays: shapes, types, and invalid operands."""
 
 import numpy as np
 import pytest

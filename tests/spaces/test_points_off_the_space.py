@@ -1,4 +1,4 @@
-"""Points that are off a space: what is wrong, where, by how much, and what to do."""
+"""Points off a space: errors state the problem, the point, the distance and the remedy."""
 
 import numpy as np
 import pytest
@@ -155,15 +155,13 @@ def test_the_rotation_of_a_pose(name):
 # ---- spheres and hyperbolic space ----
 
 
-OFF = r" is off the space"
-
-
 @pytest.mark.parametrize(
     "space, points, match",
     [
         ("sphere:2", changed(2, [0, 0, 1.1]), r"\[2\] is off the space by 1\.000e-1: its norm is 1\.1, not 1"),
         ("sphere:2", changed(1, 0), r"\[1\] is off the space by 1\.000e0: it is the zero vector"),
         ("h:2", [[1, 0, 0], [1.1, 0, 0]], r"\[1\] is off .* by 1\.000e-1: its Minkowski square is -1\.21"),
+        ("ch:1", [[1, 0], [0, 2j]], r"\[1\] is off .*its square -\|x0\|\^2 .* is 4, not -1"),
         ("h:2", [[-1, 0, 0], [1, 0, 0]], r"\[0\] is off .*the first, is -1, not positive"),
         ("h:2", [[1, 0, 0], [0, 0, 0]], r"\[1\] is off .*the first, is 0, not positive"),
     ],
@@ -282,6 +280,7 @@ def test_the_nearest_rotation_is_the_factor_of_the_polar_decomposition():
         ([np.diag([0.5, 0.6])] * 3, False),
         # The purity of a state is 1 at most.
         ([np.diag([1.5, -0.5])] * 3, False),
+        ([np.diag([0.9, 0.5, -0.4])] * 3, False),
         ([np.diag([0.5, 0.5]), np.diag([0.5, 0.6])], False),
     ],
 )

@@ -7,10 +7,7 @@ from pymanopt import manifolds
 
 import symspline as ss
 
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(40)
+SEED = 40
 
 
 def plain(space, x):

@@ -1,4 +1,4 @@
-"""Arrays that NumPy lays out or masks in its own ways."""
+"""Misaligned and masked arrays of NumPy."""
 
 import numpy as np
 import pytest

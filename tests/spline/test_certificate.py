@@ -8,14 +8,11 @@ from cases import CURVED, base_point, closed_walk, loop_over, unit_tangent, walk
 
 import symspline as ss
 
+SEED = 2
+
 S2 = ss.Sphere(2)
 # Where the smallest and the largest V of (38) meet.
 LARGEST_KD, LARGEST_KV = 0.2610895, 0.4420886
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(2)
 
 
 def steps(space, kd, rng, n=10, turn=3.0):

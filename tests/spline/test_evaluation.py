@@ -1,4 +1,4 @@
-"""Evaluation: shapes, times in any order, derivatives, speed, and bad times."""
+"""Evaluation: shapes, unsorted times, derivatives, speed, and invalid times."""
 
 import math
 import re
@@ -106,14 +106,14 @@ def test_velocity_and_speed(space):
     ],
     ids=str,
 )
-def test_bad_times_of_evaluation(x, match):
+def test_invalid_times_raise(x, match):
     spline = ss.CubicSpline(None, P, S2)
     for call in (spline, spline.speed, lambda x: ss.evaluate(None, P, spline.velocities, S2, x)):
         with pytest.raises(ss.ValidationError, match=match):
             call(x)
 
 
-@pytest.mark.parametrize("policy", [None, True, "geodesic", "periodic"])
+@pytest.mark.parametrize("policy", [None, False, True, "geodesic", "periodic"])
 @loop_over("x", [NAN, INF, -INF])
 def test_nan_times_raise_under_every_policy(policy, x):
     spline = ss.CubicSpline(None, P, S2, extrapolate=policy)
@@ -174,7 +174,7 @@ def test_messages_are_short():
     assert len(str(caught.value)) < 250
 
 
-def test_bad_policies_of_a_call():
+def test_invalid_policies_of_a_call_raise():
     with pytest.raises(ss.ValidationError, match=r"extrapolate must be .*not 'foo'"):
         ss.CubicSpline(None, P, S2)(0.5, extrapolate="foo")
 

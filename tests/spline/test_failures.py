@@ -1,4 +1,4 @@
-"""Curves that fail: errors, warnings, and what becomes of the others."""
+"""Failing curves: errors, warnings, and the other curves of a batch."""
 
 import pickle
 import re
@@ -291,7 +291,7 @@ def test_any_factor_of_a_product():
 
 
 @pytest.mark.parametrize("bc_type", ["natural", "periodic"])
-def test_long_curves_that_are_solved_in_pieces(bc_type):
+def test_long_curves_solved_by_blocks_name_the_point(bc_type):
     angles = np.full(4000, 360 / 4000)
     angles[3210] = 179.9999
     points = rotations(*angles[:-1], 360 - angles[:-1].sum() % 360)

@@ -1,4 +1,4 @@
-"""Data in representations that do not fit each other: most steps are long, and a warning says so."""
+"""Inconsistent representations of the data: a warning if most steps are long. Huge and tiny numbers."""
 
 import itertools
 import warnings
@@ -130,7 +130,7 @@ def test_one_warning_counts_the_curves_of_a_call():
         ss.CubicSpline(None, (points[1], np.zeros((12, 2))), "so:3 x r:2", **options)
 
 
-def test_other_ways_to_a_curve():
+def test_other_functions_warn_too():
     points = orientations()
     with pytest.warns(ss.FarPointsWarning):
         ss.HermiteSpline(None, points, np.zeros_like(points), "so:3")

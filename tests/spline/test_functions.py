@@ -1,4 +1,4 @@
-"""`fit`, `evaluate` and `fit_many` do what the class does."""
+"""`fit`, `evaluate` and `fit_many` agree with `CubicSpline`."""
 
 import numpy as np
 import pytest
@@ -110,3 +110,11 @@ def test_evaluate_compares_shapes():
 def test_evaluate_checks_its_input(t, p):
     with pytest.raises(ss.ValidationError):
         ss.evaluate(t, p, 0 * P, S2, 0.5)
+
+
+@pytest.mark.parametrize("curve", [5, "ab", (None,), (None, P, P)], ids=str)
+def test_curves_that_are_not_pairs_raise(curve):
+    with pytest.raises(ss.ValidationError, match=r"curves\[1\] must be a pair \(t, points\)"):
+        ss.fit_many([(None, P), curve], S2)
+    with pytest.raises(ss.ValidationError, match=r"curves must be pairs \(t, points\), not 5"):
+        ss.fit_many(5, S2)

@@ -1,4 +1,4 @@
-"""Tracks on a globe: the date line and the poles are places like any other."""
+"""Tracks on a globe: the date line and the poles are not special."""
 
 import numpy as np
 import pytest

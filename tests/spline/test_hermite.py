@@ -1,4 +1,4 @@
-"""Curves with given velocities, promise by promise."""
+"""The interface of `HermiteSpline`."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""Horizontal lifts: representatives that are continuous, and turn no more than their subspaces do."""
+"""Horizontal lifts: representatives that are continuous and turn no more than their subspaces."""
 
 from itertools import pairwise
 
@@ -10,6 +10,8 @@ from rounding import rounding
 from scipy.integrate import solve_ivp
 
 import symspline as ss
+
+SEED = 11
 
 NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "hp:2", "ch:2"]
 ORTHONORMAL = NAMES[:-1]
@@ -46,11 +48,6 @@ def inner(space, x, y):
     if isinstance(space, ss.ComplexHyperbolic):
         x = x * np.array([[-1.0], *[[1.0]] * (x.shape[-2] - 1)])
     return np.swapaxes(x.conj(), -1, -2) @ y
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(11)
 
 
 @pytest.mark.parametrize("name", NAMES)

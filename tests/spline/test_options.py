@@ -1,4 +1,4 @@
-"""Options of a fit: methods and limits, and what is none."""
+"""Options of a fit: methods, limits, and invalid values."""
 
 import inspect
 
@@ -81,8 +81,9 @@ def test_invalid_options_raise(options, match, how):
     ids=str,
 )
 def test_options_of_a_wrong_type_raise(options):
-    with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
-        ss.CubicSpline(None, P, S2, **options)
+    for fit, data in ((ss.CubicSpline, (None, P)), (ss.fit_many, ([(None, P)],))):
+        with pytest.raises((ss.ValidationError, TypeError), match=next(iter(options))):
+            fit(*data, S2, **options)
 
 
 def test_unknown_options_raise():

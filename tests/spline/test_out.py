@@ -1,4 +1,4 @@
-"""Results in arrays that users bring: ``out`` of calls and of `symspline.evaluate`."""
+"""Results in existing arrays: ``out`` of calls and of `symspline.evaluate`."""
 
 import numpy as np
 import pytest

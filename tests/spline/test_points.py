@@ -1,4 +1,4 @@
-"""Points of a curve: arrays of any type and layout, batches, and what is no array of points."""
+"""Points of a curve: arrays of any type and layout, batches, and invalid points."""
 
 import pickle
 
@@ -299,11 +299,6 @@ def test_a_curve_that_pauses(space, order):
     assert spline.report.converged
     assert largest_difference(spline(spline.t), p) < 20 * EPS
     assert 4 * 0.69 < spline.length() < np.inf or len(order) == 9
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1815)
 
 
 @loop_over("ends", ["periodic", "clamped"])

@@ -1,4 +1,4 @@
-"""Products: tuples go in, tuples come out, and every factor is a curve of its own."""
+"""Products take and return tuples, and every factor is a curve of its own."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a report says of a fit."""
+"""The fields of reports, and their text."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Times of knots: numbers, dates, whole numbers too large for doubles; and bad ones."""
+"""Times of knots: numbers, dates, integers beyond 2⁵³, and invalid times."""
 
 from pathlib import Path
 

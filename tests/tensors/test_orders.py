@@ -1,4 +1,4 @@
-"""Six numbers in the order of each program."""
+"""Six components in the order of each program."""
 
 import numpy as np
 import pytest

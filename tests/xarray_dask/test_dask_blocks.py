@@ -1,4 +1,4 @@
-"""Blocks of dask: nothing is computed before it is asked for, by any scheduler, and one thread a worker is enough."""
+"""Blocks of dask: lazy, bit-identical for every scheduler, and one thread per worker."""
 
 import pickle
 import sys

@@ -1,4 +1,4 @@
-"""A cluster of worker processes on this machine: curves are the same whatever happens to a worker."""
+"""A cluster of worker processes on this machine: results do not depend on failing workers."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Curves in xarray objects are those of plain arrays, bit for bit, whatever the order of dimensions."""
+"""Curves in xarray objects are bit-identical to those of plain arrays, whatever the order of dimensions."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""What is wrong is said when it is asked for, before any block is worked on."""
+"""Invalid input raises an error at once, before any block is computed."""
 
 import re
 
@@ -127,7 +127,7 @@ assert not {"xarray", "dask", "zarr", "pandas"} & set(sys.modules)
         ({"s": ("obs", [0.0, 1, 5], {"standard_name": "time"})}, "'s'"),
     ],
 )
-def test_times_under_another_name_are_not_left_out(coords, names):
+def test_times_under_another_name_raise(coords, names):
     """As in files of trajectories by the CF conventions; they were replaced by 0, 1, 2."""
     points = np.broadcast_to(np.eye(3), (2, 3, 3))
     da = xr.DataArray(points, dims=("traj", "obs", "q"), coords=coords)

@@ -21,8 +21,9 @@ class SmoothingReport:
 
     Attributes
     ----------
-    method : {"linearized", "newton"}
-        Solver that found the minimum. For a batch, ``"newton"`` if any curve needed it.
+    method : str
+        Solver that found the minimum, ``"linearized"`` or ``"newton"``. For a batch, ``"newton"`` if any curve needed
+        it.
     converged : bool or ndarray of bool
         Whether the last step was below the tolerance.
     iterations : int or ndarray of int

@@ -157,14 +157,16 @@ class SmoothingSpline(CubicSpline):
         SmoothingSpline.band : Compute the radius of a credible ball.
 
         Notes
-        ----- The variance at time t is :math:`\sigma^2 b(t)^T A^{-1} b(t)`, the posterior variance of a spline in
-        frames along the curve. b(t) are the values of the B-splines, and A is the matrix of the linearised problem. If
-        the knots are the times of the data, as they are by default, the variance of the curve between the knots is
-        added, as the smoothness determines it. A spline with knots of your own has no such freedom.
+        -----
+        The variance at time t is :math:`\sigma^2 b(t)^T A^{-1} b(t)`, the posterior variance of a spline in frames
+        along the curve. b(t) are the values of the B-splines, and A is the matrix of the linearised problem. If the
+        knots are the times of the data, as they are by default, the variance of the curve between the knots is added,
+        as the smoothness determines it. A spline with knots of your own has no such freedom.
 
         References
-        ---------- G. Wahba, Bayesian "confidence intervals" for the cross-validated smoothing spline, J. R. Stat. Soc.
-        B 45 (1983).
+        ----------
+        G. Wahba, Bayesian "confidence intervals" for the cross-validated smoothing spline, J. R. Stat. Soc. B 45
+        (1983).
 
         Examples
         --------
@@ -234,8 +236,9 @@ class SmoothingSpline(CubicSpline):
         SmoothingSpline.std : Compute the standard deviation of the curve.
 
         Notes
-        ----- `level` is the coverage on average over all times. The coverage is lower in long gaps, and at end points
-        with natural conditions if the true curve has an acceleration there. The band is not valid if λ is at its bound
+        -----
+        `level` is the coverage on average over all times. The coverage is lower in long gaps, and at end points with
+        natural conditions if the true curve has an acceleration there. The band is not valid if λ is at its bound
         (``report.at_bound``).
 
         Examples

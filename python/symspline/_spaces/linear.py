@@ -23,7 +23,8 @@ class GeneralLinear(DisconnectedGroup, Group):
     SpecialLinear : Matrices of determinant 1.
 
     Notes
-    ----- The geodesic symmetry at p is :math:`x \mapsto p x^{-1} p`. Geodesics are :math:`p \exp(t \Omega)`, and
+    -----
+    The geodesic symmetry at p is :math:`x \mapsto p x^{-1} p`. Geodesics are :math:`p \exp(t \Omega)`, and
     :math:`\log_p(q) = p \log(p^{-1} q)` with the principal logarithm, which exists unless :math:`p^{-1} q` has a
     negative eigenvalue. The group has no bi-invariant metric. Lengths are Frobenius norms of :math:`\Omega = p^{-1} v`
     and serve for reporting only. The relative rounding error is proportional to the condition number of a point.

@@ -142,9 +142,10 @@ class Siegel(_PositiveDefinite):
     Symplectic : The group that acts on it.
 
     Notes
-    ----- The space is a totally geodesic subspace of `SymmetricPositiveDefinite` and has its metric. Distances are √2
-    times those of Siegel's metric :math:`\operatorname{tr} Y^{-1} dZ\, Y^{-1} d\bar Z`. For n = 1 it is the hyperbolic
-    plane with distances multiplied by √2.
+    -----
+    The space is a totally geodesic subspace of `SymmetricPositiveDefinite` and has its metric. Distances are √2 times
+    those of Siegel's metric :math:`\operatorname{tr} Y^{-1} dZ\, Y^{-1} d\bar Z`. For n = 1 it is the hyperbolic plane
+    with distances multiplied by √2.
 
     Examples
     --------

@@ -19,7 +19,8 @@ class Product(Space):
     """The product of several spaces.
 
     A point is a tuple with one point per factor. Geodesics and splines are computed in every factor separately, and
-    distances add as in Pythagoras' theorem. All methods take and return tuples with one entry per factor.
+    distances add as in Pythagoras' theorem. In all methods, points and tangent vectors are tuples with one array per
+    factor.
 
     Parameters
     ----------

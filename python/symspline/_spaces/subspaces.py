@@ -105,7 +105,7 @@ class ComplexProjective(_Projective):
     See Also
     --------
     ComplexGrassmannian : Complex subspaces of any dimension.
-    symspline.quantum : States, gates and pulses.
+    symspline.quantum : Hamiltonians, pulses and propagators of curves.
 
     Notes
     -----
@@ -200,7 +200,7 @@ class Grassmannian(_Subspaces):
     See Also
     --------
     ComplexGrassmannian : Complex subspaces.
-    symspline.subspaces : Subspaces of data.
+    symspline.subspaces : Reduced bases over a parameter.
 
     Notes
     -----
@@ -264,8 +264,9 @@ class QuaternionicProjective(Preserving):
     ComplexGrassmannian : The space that contains it.
 
     Notes
-    ----- The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are √2 times
-    the angles :math:`\arccos |\langle p, q \rangle|` between lines. HP¹ is the sphere S⁴ of radius 1/√2.
+    -----
+    The space is a totally geodesic subspace of `ComplexGrassmannian` and has its metric. Distances are √2 times the
+    angles :math:`\arccos |\langle p, q \rangle|` between lines. HP¹ is the sphere S⁴ of radius 1/√2.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Curves of high ambient dimension, which are made in the span of their points."""
+"""Curves of high ambient dimension, which are computed in the span of their points."""
 
 import pickle
 import sys
@@ -9,6 +9,8 @@ from cases import ENDS, QUOTIENTS, apart, closed_walk, end_conditions, loop_over
 from curves import run_python
 
 import symspline as ss
+
+SEED = 1000000
 
 # Spaces of high dimension, and small ones in them that hold the data.
 SMALL = {
@@ -21,11 +23,6 @@ SMALL = {
 }
 every_space = pytest.mark.parametrize("name", SMALL)
 N = 7
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1_000_000)
 
 
 class Embedded:

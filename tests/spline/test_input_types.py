@@ -1,4 +1,4 @@
-"""What people hand over: dates, durations, tensors, quantum objects, tables; and what would be wrong in silence.
+"""Input of other types: dates, durations, tensors, quantum objects and tables; and input that could be misread.
 
 pandas, PyTorch and QuTiP need not be there: stand-ins do what the library looks at, as those do it.
 """

@@ -1,9 +1,9 @@
-"""What the tests in JAX run with."""
+"""Precision and compiler options of the tests in JAX."""
 
-import contextlib
 import os
 
 import jax
+import pytest
 
 # Without these emitters XLA compiles a quarter faster; it reads this when the first array is made. Versions that do not
 # know the flag end the process.
@@ -11,11 +11,11 @@ if jax.__version__.startswith("0.10."):
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false")
 
 
-@contextlib.contextmanager
-def double_and_quickly_compiled():
-    """In double precision; XLA's optimisation would take most of the time of a test."""
+@pytest.fixture(autouse=True)
+def double_precision(request):
+    """Double precision. In modules with ``QUICK`` XLA does not optimise, which would take most of their time."""
     before = jax.config.read("jax_disable_most_optimizations")
-    jax.config.update("jax_disable_most_optimizations", True)
+    jax.config.update("jax_disable_most_optimizations", before or getattr(request.module, "QUICK", False))
     try:
         with jax.enable_x64(True):
             yield

@@ -1,4 +1,4 @@
-"""Some curves of a batch: those that are wanted, and those whose points are valid."""
+"""Masks: curves of a batch that are not fitted, and curves with invalid points."""
 
 import tracemalloc
 import warnings
@@ -15,7 +15,7 @@ X = [0.0, 0.7, 2.9]
 
 @pytest.mark.parametrize("name", ["sphere:2", "spd:3", "cp:1", "sphere:2 x r:3", "sphere:300"])
 @pytest.mark.parametrize("own_times", [False, True])
-def test_wanted_curves_are_those_of_the_whole_batch(name, own_times):
+def test_unmasked_curves_equal_those_of_the_whole_batch(name, own_times):
     space, p = ss.space(name), points_on(ss.space(name), 4, (2, 3), step=0.4)
     t = np.cumsum(np.ones((2, 3, 4)), axis=-1) - 1 if own_times else None
     mask = np.array([[True, False, True], [False, False, True]])
@@ -83,7 +83,7 @@ def test_times_are_those_of_the_curve_in_the_whole_batch():
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "cp:1", "sphere:2 x r:3", "sphere:300"])
-def test_wanted_curves_of_different_lengths(name):
+def test_masks_of_curves_of_different_lengths(name):
     space = ss.space(name)
     pairs = [(np.arange(n) + 3.0, points_on(space, n, step=0.4)) for n in (4, 2, 5, 3)]
     start = points_on(space, 4, (4,), step=0.4)
@@ -121,7 +121,7 @@ def test_errors_name_the_curve_in_the_whole_list():
 
 
 @pytest.mark.parametrize("where", [[True], [1, 0], [True, False, True], True])
-def test_bad_masks(where):
+def test_invalid_masks_raise(where):
     fit_error(
         r"where must be True or False for every curve, of shape \(2,\)", points=np.stack([np.eye(3)] * 2), where=where
     )
@@ -145,7 +145,7 @@ def test_a_background_costs_no_more_memory_than_it_fills(part):
 
 
 @pytest.mark.parametrize("name", ["se:2", "se:3", "aff:2", "sim:3", "so:3"])
-def test_matrices_of_curves_that_are_left_out_are_nan_throughout(name):
+def test_matrices_of_masked_curves_are_nan_throughout(name):
     space = ss.space(name)
     p = points_on(space, 4, batch=(3,), step=0.2)
     spline = ss.CubicSpline(None, p, space, where=[True, False, True])

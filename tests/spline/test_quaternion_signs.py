@@ -27,7 +27,7 @@ def silent(call):
         return call()
 
 
-def test_a_flipped_sample_warns_once_and_says_what_to_do():
+def test_a_flipped_sample_warns_once_with_advice():
     with pytest.warns(UserWarning) as caught:
         ss.CubicSpline(None, flipped(4), "sphere:3", method="newton")
     (warning,) = caught
