@@ -223,5 +223,5 @@ def test_functions_may_return_arrays_that_cannot_be_written_to(ends):
 
 @pytest.mark.parametrize("method", ["homotopy", "newton", "fixed-point"])
 def test_solvers_that_are_not_made_for_functions(method):
-    with pytest.raises(ss.ValidationError, match=f"method '{method}' is not made on a manifold"):
+    with pytest.raises(ss.ValidationError, match=f"method '{method}' is not available on a manifold"):
         ss.CubicSpline(None, walk(ST52, 0.3, 5, 1), ST52, method=method)
