@@ -113,7 +113,7 @@ class _Curve(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *cotangents: Any) -> Any:
         cotangent = cotangents[0].detach().resolve_conj().numpy()
-        along, t, points, ends = ctx.movable.pull(ctx.x, cotangent)
+        along, t, points, ends = ctx.movable.vjp(ctx.x, cotangent)
         return *(_tensor(a, like) for a, like in zip((along, t, points, *ends), ctx.like, strict=True)), None
 
     @staticmethod
@@ -121,7 +121,7 @@ class _Curve(torch.autograd.Function):
         dx, dt, points, *ends = (
             None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5]
         )
-        moved = ctx.movable.push(ctx.x, dx, points, dt, ends)
+        moved = ctx.movable.jvp(ctx.x, dx, points, dt, ends)
         return torch.as_tensor(moved).to(ctx.like[2][0])
 
 

@@ -17,7 +17,7 @@ from .._spaces import space as space_named
 from .._typing import SolverOptions
 from ..manifolds._manifold import refuse_functions
 from ._embedding import second_fundamental_form
-from ._primitives import Fixed, fit_p, push_p
+from ._primitives import Fixed, fit_p, jvp_p
 
 Array = jax.Array
 
@@ -155,10 +155,10 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
     if any(moving):
         # One vector: its transpose is asked for as a whole.
         pieces = [jnp.ravel(c).astype(value.dtype) for c, m in zip(changes, moving, strict=True) if m]
-        push = partial(push_p.bind, jnp.concatenate(pieces), x, *data, velocities)
-        moved += push(fixed=fixed, lead=0, nu=nu, moving=moving)
+        jvp = partial(jvp_p.bind, jnp.concatenate(pieces), x, *data, velocities)
+        moved += jvp(fixed=fixed, lead=0, nu=nu, moving=moving)
         if nu:
             moved += second_fundamental_form(
-                fixed.space, point, value, push(fixed=fixed, lead=0, nu=0, moving=moving)
+                fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving)
             )
     return value, moved

@@ -108,7 +108,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
 
 def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
     """Return the times in the units of the core, the same for all curves."""
-    times, per_curve = spline._clock.at(x, spline._batch, False)
+    times, per_curve = spline._time_axis.at(x, spline._batch, False)
     if per_curve:
         raise ValidationError(
             "the curves have different first knots; compute the propagator of one curve at a time: "
