@@ -275,7 +275,7 @@ def cut(
         rows, moments, seconds, new = rows[new], moments[new], seconds[new], new[new]
     gap = _seconds(max_gap, time_axis.dates)
     cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
-    pieces = [
+    segments = [
         slice(a, b)
         for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True)
         if np.count_nonzero(new[a:b]) >= least
@@ -285,9 +285,9 @@ def cut(
             Moments(moments[own], zone),
             tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own],
         )
-        for own in pieces
+        for own in segments
     ]
-    return Cut(curves, [rows[own] for own in pieces], np.diff(seconds), gap)
+    return Cut(curves, [rows[own] for own in segments], np.diff(seconds), gap)
 
 
 def _seconds(max_gap: Any, dates: bool) -> float:

@@ -86,10 +86,10 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not available")
     if isinstance(space, Product):
-        pieces = zip(
+        each = zip(
             parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
         )
-        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in pieces)
+        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in each)
     kinds, vectors = split(bc_type)
     points = torch.as_tensor(points)
     x, t = torch.as_tensor(x), torch.as_tensor(t)

@@ -90,13 +90,13 @@ class ProductCurve(CurveArrays):
             for end in pair_of(ends)
         ]
         conditions = ends_in_factors(bc_type, self.space)
-        pieces = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
-        return tuple(part.jvp(at, bc, p, t, pair) for part, bc, p, pair in pieces)
+        each = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
+        return tuple(part.jvp(at, bc, p, t, pair) for part, bc, p, pair in each)
 
     def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         cotangents = parts_of(cotangent, self.space, "cotangent")
-        pieces = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
-        parts = [part.vjp(at, bc, c) for part, bc, c in pieces]
+        each = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
+        parts = [part.vjp(at, bc, c) for part, bc, c in each]
         first, last = (None if parts[0].ends[e] is None else tuple(g.ends[e] for g in parts) for e in (0, 1))
         t = np.sum([g.t for g in parts], axis=0)
         points: Any = tuple(g.points for g in parts)

@@ -312,7 +312,7 @@ def make_smoothing_spline(
             found, at = run(finer, raise_lam=True), finer
     else:
         found, at = run(every), every
-    carried = [
+    transported = [
         transport_end_velocities(end, part, own, curve_points, noisy)
         for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
@@ -323,7 +323,7 @@ def make_smoothing_spline(
     ]
     conditions = [
         _joined(factor, [_ends_in_batch(one, given.batch, chosen) for one in own])
-        for factor, own in zip(factors_of(space), grouped(space, carried), strict=True)
+        for factor, own in zip(factors_of(space), grouped(space, transported), strict=True)
     ]
     parts = [
         Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, given.batch, at.times.shape[-1])
@@ -592,13 +592,13 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     return joined
 
 
-def _conditions(bc_type: Any, carried: list[list[End] | None], space: Space) -> Any:
+def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space) -> Any:
     """Return end conditions in the form of the argument `bc_type`."""
     if isinstance(bc_type, str):
         return bc_type
 
     def one(e: int) -> Any:
-        each = [(ends or [])[e] for ends in carried]
+        each = [(ends or [])[e] for ends in transported]
         if each[0][1] is None:
             return "natural"
         vectors = tuple(
