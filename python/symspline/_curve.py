@@ -114,7 +114,7 @@ class Curve(ABC, Generic[P]):
         """
         curve = self._curve
         return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
+            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.quad_rtol
         )
 
     def bending_energy(self) -> Number:
