@@ -218,7 +218,7 @@ pub fn points(space: &Erased, points: &mut [f64], offsets: &[usize], tol: f64) -
     if let Err((row, distance, condition)) = project_points(space, points, tol) {
         return at(row, Reason::OffSpace { distance, condition });
     }
-    if let Some((row, why)) = space.beyond_doubles(points) {
+    if let Some((row, why)) = space.imprecise_point(points) {
         return at(row, Reason::TooFewDigits(why));
     }
     if space.is_connected() {

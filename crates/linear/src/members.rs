@@ -147,7 +147,7 @@ impl Members {
     }
 
     /// Says in words and numbers why x, which is finite, is not a point.
-    pub fn complaint<const D: usize>(self, p: &Point<D>) -> String {
+    pub fn violation<const D: usize>(self, p: &Point<D>) -> String {
         let n = p.rows();
         let number = |x: Lane| x.to_array()[0];
         if self.maps() {

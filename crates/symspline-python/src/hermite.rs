@@ -1,7 +1,7 @@
 //! Validation of curves with given velocities, called from Python.
 
-use crate::arrays::{in_order, room};
-use crate::curves::{Array, Curves, require_room_for_checks};
+use crate::arrays::{in_order, reserve};
+use crate::curves::{Array, Curves, require_memory_for_checks};
 use crate::errors::{CutLocusError, Invalid};
 use crate::space::Handle;
 use crate::validate;
@@ -27,12 +27,12 @@ pub fn hermite<'py>(
     let natural = || ("natural".to_owned(), None);
     let ends = Some([natural(), natural()]);
     let mut curves = Curves::new(handle, &t, &points, &ends, None, None)?;
-    require_room_for_checks(handle, &curves)?;
+    require_memory_for_checks(handle, &curves)?;
     let (space, len) = (curves.space, curves.space.point_len());
     let mut own = Vec::new();
     curves.gather_points(&mut own)?;
     let given = in_order(&velocities)?;
-    let mut tangent = room(given.len())?;
+    let mut tangent = reserve(given.len())?;
     tangent.resize(given.len(), 0.0);
     let t = in_order(&t)?;
     let found = watched(py, None, own.len() / len, is_heavy(&space), |monitor| {

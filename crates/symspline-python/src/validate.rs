@@ -1,6 +1,6 @@
 //! Messages for invalid curves, with the names that arguments have in Python.
 
-use crate::errors::{Invalid, number, place};
+use crate::errors::{Invalid, format_index, number};
 use crate::space::off_space;
 use symspline::validate::{Invalid as Fault, Reason};
 
@@ -17,7 +17,7 @@ pub struct Names<'a> {
 
 /// Words for a curve of a batch; empty for a single curve.
 pub fn of_curve(curve: usize, batch: &[usize]) -> String {
-    if batch.is_empty() { String::new() } else { format!(" of curve {}", place(curve, batch)) }
+    if batch.is_empty() { String::new() } else { format!(" of curve {}", format_index(curve, batch)) }
 }
 
 impl Names<'_> {
@@ -33,7 +33,7 @@ impl Names<'_> {
         let knots = if self.shared || self.batch.is_empty() {
             String::new()
         } else {
-            format!("[{}]", place(curve, self.batch))
+            format!("[{}]", format_index(curve, self.batch))
         };
         match reason {
             Reason::TimeNotFinite(time) => {
