@@ -111,7 +111,7 @@ impl fmt::Display for Reason {
             Reason::NotClosed { distance } => {
                 write!(f, "first and last point of a closed curve are {distance:.3e} apart")
             }
-            Reason::EndNotFinite(which, value) => write!(f, "{which} holds {value}; it must be finite"),
+            Reason::EndNotFinite(which, value) => write!(f, "{which} contains {value}; it must be finite"),
             Reason::EndNotTangent { which, normal } => {
                 write!(f, "{which} is not tangent at its point: its normal component is {normal:.3e}")
             }

@@ -115,8 +115,8 @@ impl Part for Siegel {
         let rounding = self.whole.rounding(p).to_array()[0];
         if rounding * f64::EPSILON > 1e-9 {
             return format!(
-                "it is not symplectic, of which doubles do not tell at its condition of {rounding:.1e}: move all points \
-                 by one isometry, such as z - x for a symmetric x"
+                "its condition number of {rounding:.1e} is too large to verify in double precision that it is symplectic; \
+                 move all points by one isometry, such as z - x for a symmetric x"
             );
         }
         let p = self.read(p);

@@ -158,7 +158,7 @@ impl Members {
         }
         let (condition, size) = (number(condition(p)), number(p.size()));
         if !(size > 0.0 && size.is_finite()) {
-            return "it is zero, or squares of its numbers are too large or too small for doubles".into();
+            return "it is zero, or the squares of its entries overflow or underflow".into();
         }
         if !(condition < SINGULAR) {
             return format!("it is singular: its condition number is {condition:.1e}");

@@ -13,7 +13,7 @@ pub fn in_order<'a>(array: &'a PyReadonlyArrayDyn<f64>) -> PyResult<&'a [f64]> {
     if array.is_c_contiguous() {
         Ok(array.as_slice()?)
     } else {
-        Err(PyTypeError::new_err("an array whose numbers do not lie in the order of its axes"))
+        Err(PyTypeError::new_err("the array must be C-contiguous; pass np.ascontiguousarray(array)"))
     }
 }
 
@@ -52,7 +52,7 @@ pub fn reserve<T>(count: usize) -> PyResult<Vec<T>> {
     let mut vector = Vec::new();
     vector.try_reserve_exact(count).map_err(|_| {
         let size = count.saturating_mul(size_of::<T>());
-        PyMemoryError::new_err(format!("{size} bytes are needed and not there"))
+        PyMemoryError::new_err(format!("{size} bytes of memory are needed, more than is free"))
     })?;
     Ok(vector)
 }

@@ -44,7 +44,7 @@ pub fn fit<'py>(
         require_memory_for_checks(handle, &curves)?;
         require_memory(memory(&curves.space, curves.longest(), options.method), || {
             let least = match options.method {
-                Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
+                Method::Newton | Method::Homotopy => "; pass method='quasi-newton', which needs far less",
                 _ => "",
             };
             (

@@ -45,8 +45,8 @@ pub fn hermite<'py>(
             let node = row % nodes;
             let of = validate::of_curve(row / nodes, &curves.batch);
             let message = format!(
-                "velocities[{node}]{of} is not tangent at its point: a part of {part:.3e} of it points off the space \
-                 (allowed: {tangent_tol:.0e}); use space.project_tangent(p, v)"
+                "velocities[{node}]{of} is not tangent at its point: its normal component is {part:.3e} (allowed: \
+                 {tangent_tol:.0e}); use space.project_tangent(p, v)"
             );
             return Err(Handles::Invalid(Invalid::new(row / nodes, Some(node), message)));
         }
@@ -87,8 +87,8 @@ pub fn hermite<'py>(
             let after = i + 1;
             CutLocusError::new_err(format!(
                 "segment {i}{of}, between t[{i}] and t[{after}]: its inner control points lie at or past each other's cut \
-                 locus: angle {angle}, limit {limit}; the geodesic between them is not unique; velocities are too large \
-                 for its time"
+                 locus: angle {angle}, limit {limit}; the geodesic between them is not unique. Reduce the velocities \
+                 at its ends, or allow the segment more time"
             ))
         }
     })?;

@@ -170,7 +170,7 @@ fn kind((name, _): &EndOf) -> PyResult<EndCondition> {
     match name.as_str() {
         "natural" => Ok(EndCondition::Natural),
         "velocity" => Ok(EndCondition::Velocity),
-        _ => Err(invalid(format!("a smooth curve cannot have the end condition {name:?}"))),
+        _ => Err(invalid(format!("a smoothing spline cannot have the end condition {name:?}"))),
     }
 }
 

@@ -109,7 +109,7 @@ impl Handle {
         done.map_err(|(row, angle)| {
             if angle.is_nan() {
                 return invalid(format!(
-                    "pair {row} holds a number that is not finite, or no point of the space"
+                    "pair {row} contains a number that is not finite, or an array that is not a point of the space"
                 ));
             }
             let limit = self.space.get().cut_angle();
@@ -164,7 +164,7 @@ impl Handle {
 pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> String {
     if !off.is_finite() {
         // Nor has `space.project` an answer.
-        return format!("{which} is off the space: {why}. No point is close to it; mend it or leave it out");
+        return format!("{which} is off the space: {why}. No point is close to it; correct it or remove it");
     }
     format!(
         "{which} is off the space by {off:.3e}: {why}. Points within {tol:.0e} are projected; use space.project(x) \

@@ -44,7 +44,7 @@ pub fn imprecise_point(points: &[f64], len: usize) -> Option<(usize, String)> {
     let square = |p: &[f64]| p.iter().map(|x| x * x).sum::<f64>();
     let row = points.chunks_exact(len).position(|p| !(square(p) <= FARTHEST))?;
     let why = format!(
-        "has the sum of squares {:.1e}, and rounding errors, 2.2e-16 times that, leave too few digits (largest: \
+        "has the sum of squares {:.1e}, and rounding errors, 2.2e-16 times that, leave too few significant digits (largest: \
          {FARTHEST:.1e}); move all points by one isometry, space.transvection, to where their numbers are small",
         square(&points[row * len..(row + 1) * len])
     );
