@@ -33,7 +33,7 @@ class Moments(NamedTuple):
 
     Attributes:
         times: as NumPy has them.
-        zone: what was known of their zone, see `handed.times_of`.
+        zone: what was known of their zone, see `_input.times_of`.
     """
 
     times: Any
@@ -46,7 +46,7 @@ class TimeAxis:
 
     Numbers are taken as they are. Dates become seconds, and integers too large for a double
     differences, since the first knot of each curve: ``origin``, of shape batch + (1,) where curves
-    have their own knots. Durations are seconds. ``zone`` is that of dates, see `handed.times_of`.
+    have their own knots. Durations are seconds. ``zone`` is that of dates, see `_input.times_of`.
     """
 
     origin: Any = None
