@@ -18,7 +18,7 @@ from ._typing import File
 _SHARED = (*TEXTS, "version")
 
 
-def save(curves: Curve | Mapping[str, Curve], file: File) -> None:
+def save(curves: Curve[Any] | Mapping[str, Curve[Any]], file: File) -> None:
     """Write a curve, or several curves by name, to an NPZ file that `load` reads.
 
     Parameters

@@ -136,8 +136,11 @@ assert_type(ss.evaluate(t, p, np.zeros((3, 3)), "sphere:2", x), NDArray[Any])
 assert_type(ss.fit_many([(t, p), (None, p)], sphere), list[ss.CubicSpline[Float]])
 assert_type(ss.fit_segments(t, p, sphere, max_gap=1.5, bc_type="not-a-knot"), list[ss.CubicSpline[Float]])
 ss.fit_segments(t, p, sphere, max_gap=np.timedelta64(5, "m"), duplicates="mean")
-loaded: ss.CubicSpline[Float] = ss.load("curve.npz")
+# A file does not show to type checkers what it holds.
+loaded: ss.CubicSpline[Float] = ss.load("curve.npz")  # pyright: ignore[reportAny]
 assert_type(loaded(0.5), Float)
+ss.save({"one": spline}, "curves.npz")
+ss.save(ss.CubicSpline(None, poses.random_point(rng, 3), poses), "curve.npz")
 
 # ---- smoothing ----
 
