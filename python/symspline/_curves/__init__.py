@@ -1,4 +1,4 @@
-"""Curves in a space: what a spline is made of, and how it is found from points.
+"""Curves in a space: knots, points and velocities in arrays, and fits through points.
 
-`fit` finds them; `plain`, `in_span` and `together` are their kinds.
+`fit` fits curves. `core_curve`, `reduced` and `product` have the classes of curves.
 """

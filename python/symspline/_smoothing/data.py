@@ -172,7 +172,7 @@ class Given(NamedTuple):
             self.time_axis,
             self.t if self.t.ndim == 1 else rows(self.t),
             self.times if shared else rows(self.times),
-            [part._replace(doubles=rows(part.doubles), batch=(len(chosen),)) for part in self.data],
+            [part._replace(numbers=rows(part.numbers), batch=(len(chosen),)) for part in self.data],
             [own.map(rows) for own in self.precisions],
             [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
             (len(chosen),),
@@ -225,9 +225,9 @@ def _without_missing(part: Points, weights: list[Doubles]) -> Points:
     last = np.maximum.accumulate(np.where(missing, -1, order), axis=-1)
     first = np.argmin(missing, axis=-1)[..., None]
     found = np.where(last < 0, first, last)
-    axes = part.doubles.ndim - found.ndim
-    doubles = np.take_along_axis(part.doubles, found.reshape(*found.shape, *[1] * axes), axis=found.ndim - 1)
-    return part._replace(doubles=np.ascontiguousarray(doubles))
+    axes = part.numbers.ndim - found.ndim
+    doubles = np.take_along_axis(part.numbers, found.reshape(*found.shape, *[1] * axes), axis=found.ndim - 1)
+    return part._replace(numbers=np.ascontiguousarray(doubles))
 
 
 def _enough(times: Doubles, weights: Doubles, batch: tuple[int, ...]) -> NDArray[np.bool_]:
