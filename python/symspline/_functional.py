@@ -335,7 +335,7 @@ def fit_many(
     pairs: list[tuple[TimesLike | None, Any]] = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
-            raise ValidationError(f"curve {number} must be a pair (t, points), not {short_repr(curve)}")
+            raise ValidationError(f"curves[{number}] must be a pair (t, points), not {short_repr(curve)}")
     if not pairs:
         return []
     mask = fitting.mask_of(where, (len(pairs),))

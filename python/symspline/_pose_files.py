@@ -125,7 +125,7 @@ def _bad_line(lines: list[Line], name: str, form: str) -> str | None:
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
-    """Write poses as lines of ``time x y z qx qy qz qw``, from which `read_tum` restores every number.
+    r"""Write poses as lines of ``time x y z qx qy qz qw``, from which `read_tum` restores every number.
 
     Parameters
     ----------

@@ -1,4 +1,5 @@
 """Curves in a space: knots, points and velocities in arrays, and fits through points.
 
-`fit` fits curves. `core_curve`, `reduced` and `product` have the classes of curves.
+`fit` computes them. The kinds of curves are in `core_curve` (computed by the compiled core), `reduced` (in the span of
+the points) and `product` (one curve per factor). Curves on a `Manifold` are `manifolds._on_manifold.OnManifold`.
 """

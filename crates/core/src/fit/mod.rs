@@ -1,4 +1,20 @@
 //! From points to velocities: the spline through given points.
+//!
+//! A fit runs through the modules in this order:
+//!
+//! 1. `fit`, in this file, calls the cutting of long curves, which distributes the work over threads.
+//! 2. `lanes` fits up to eight curves, or parts of curves, of equal length, one in each lane of a SIMD register.
+//! 3. `unroll` transports a frame along the eight polygons and writes their chords into a `chain`.
+//! 4. `auto` dispatches to the solver of the requested method, or runs several solvers in turn.
+//! 5. `minimum_energy` runs further solvers if points are far apart, and keeps the curve with the lowest `energy`.
+//!
+//! The solvers:
+//! - `solve` is the loop that quasi-Newton and Newton share; `line_search` and `convergence` limit its steps.
+//! - `quasi_newton` and `tridiagonal`: steps with the flat-space matrix; `newton` and `blocks`: with the Jacobian.
+//! - `fixed_point` is Algorithm 1, `homotopy` continues from flat space, and `trust_region` minimises the residual.
+//!
+//! All of them evaluate the C² condition (13) in `condition`, whose end rows are in `ends`. `handles` keeps control
+//! handles inside the cut locus; `rounded` and `certificate` examine the result.
 
 mod auto;
 mod blocks;
@@ -18,11 +34,11 @@ mod line_search;
 mod minimum_energy;
 mod newton;
 pub(crate) mod node;
-mod piece;
-mod pieces;
 mod problem;
 mod quasi_newton;
 mod rounded;
+mod section;
+mod sections;
 mod solve;
 mod tridiagonal;
 mod trust_region;
@@ -40,9 +56,9 @@ pub use problem::{End, Ends, Method, Options, Problem, Report, Solver, SolverSet
 use crate::monitor::Monitor;
 use crate::scalar::LANES;
 use crate::space::{Ambient, Erased, Frame, Origin};
-use pieces::{OVERLAP, fit_cut};
+use sections::{OVERLAP, fit_cut};
 
-/// Curves with more segments than this are cut into pieces.
+/// Curves with more segments than this are cut into sections.
 const LONG: usize = 512;
 
 /// About how many numbers of eight bytes the fit of eight curves takes at a time.
@@ -82,7 +98,7 @@ pub fn fit(
         if report.status.is_fault() {
             own.fill(f64::NAN);
         } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
-            // Pieces agree to the tolerance; first and last velocity are one.
+            // Sections agree to the tolerance; first and last velocity are one.
             let transported = problem.across_closure(space, curve, &own[..len]);
             own[problem.segments(curve) * len..].copy_from_slice(&transported);
         }

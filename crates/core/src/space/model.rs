@@ -26,6 +26,11 @@ pub trait Model: Copy + Send + Sync {
     fn longest_handle(&self) -> f64 {
         self.cut_angle()
     }
+    /// See [`Ambient::injectivity_radius`]; by default the cut angle, which is right if the deciding angle of a vector
+    /// is at most its length and equals it in some direction.
+    fn injectivity_radius(&self) -> f64 {
+        self.cut_angle()
+    }
     /// See [`Origin::dim`].
     fn dim(&self) -> usize;
     /// See [`Origin::curvature`].
@@ -79,10 +84,10 @@ pub trait Model: Copy + Send + Sync {
     fn random_point(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
-    /// See [`Ambient::complaint`].
-    fn complaint(&self, x: &[f64]) -> String;
-    /// See [`Ambient::beyond_doubles`].
-    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
+    /// See [`Ambient::violation`].
+    fn violation(&self, x: &[f64]) -> String;
+    /// See [`Ambient::imprecise_point`].
+    fn imprecise_point(&self, _points: &[f64]) -> Option<(usize, String)> {
         None
     }
     /// See [`Ambient::rounding`].
@@ -132,6 +137,9 @@ impl<M: Model> Ambient for M {
     fn longest_handle(&self) -> f64 {
         Model::longest_handle(self)
     }
+    fn injectivity_radius(&self) -> f64 {
+        Model::injectivity_radius(self)
+    }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         self.exp(&constant(p), &scaled(&constant(v), t), out);
     }
@@ -171,11 +179,11 @@ impl<M: Model> Ambient for M {
     fn random_point(&self, noise: &mut [Lane]) {
         Model::random_point(self, noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
-        Model::complaint(self, x)
+    fn violation(&self, x: &[f64]) -> String {
+        Model::violation(self, x)
     }
-    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
-        Model::beyond_doubles(self, points)
+    fn imprecise_point(&self, points: &[f64]) -> Option<(usize, String)> {
+        Model::imprecise_point(self, points)
     }
     fn rounding(&self, p: &[Lane]) -> Lane {
         Model::rounding(self, p)

@@ -25,8 +25,8 @@ pub trait Ambient: Copy + Send + Sync {
     fn is_complex(&self) -> bool {
         false
     }
-    /// The size k of the unitary factor up to which an array is a point: the k × k matrices on its right. 0 where a
-    /// point has one array only.
+    /// The rank k of the fibre of arrays that represent the same point: X and Xg are one point for every k × k matrix
+    /// g, unitary on complex spaces and orthogonal on real ones. 0 where a point has one array only.
     fn fiber_rank(&self) -> usize {
         0
     }
@@ -96,9 +96,9 @@ pub trait Ambient: Copy + Send + Sync {
     /// Turns independent standard normal numbers into a random point.
     fn random_point(&self, noise: &mut [Lane]);
     /// Describes why x, which is finite, is not a point.
-    fn complaint(&self, x: &[f64]) -> String;
+    fn violation(&self, x: &[f64]) -> String;
     /// The first point that floating-point numbers represent with too few significant digits, and a description of it.
-    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
+    fn imprecise_point(&self, _points: &[f64]) -> Option<(usize, String)> {
         None
     }
     /// How far apart neighbouring floating-point points are at p, in units of a rounding error; 1 or more.
