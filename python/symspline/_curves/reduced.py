@@ -18,7 +18,7 @@ from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
 from .curve import NORMS, Doubles
 from .gradient import SampleTimes
-from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_some
+from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
 from .subspan import Span, span_of
 
 
@@ -54,7 +54,7 @@ class ReducedCurve(CoreCurve):
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
         if task.offsets is None:
-            return solve_some(task, options, progress, _solve)
+            return solve_unmasked(task, options, progress, _solve)
         return one_by_one(task, options, progress, _solve)
 
     @cached_property

@@ -169,7 +169,7 @@ def one_by_one(
     return Solved(points, velocities, columns, faults)
 
 
-def solve_some(
+def solve_unmasked(
     task: Task,
     options: Options,
     progress: Progress | None,
