@@ -238,7 +238,7 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
 
 
 def write_kitti(file: Any, poses: Any) -> None:
-    """Write poses as lines with the twelve numbers of [R | x].
+    r"""Write poses as lines with the twelve numbers of [R | x].
 
     KITTI stores times in a separate file.
 
