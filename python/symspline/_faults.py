@@ -20,16 +20,16 @@ class Fault(NamedTuple):
     curve : int
         Number of the curve in the flattened batch.
     kind : str
-        `CUT_LOCUS`, `UNCONVERGED`, `INVALID`, or `ALMOST_CUT` for a good curve that would turn the other way round
-        if its points moved a little.
+        `CUT_LOCUS`, `UNCONVERGED`, `INVALID`, or `ALMOST_CUT` for a valid curve that would take the opposite
+        direction after a small motion of its points.
     what, remedy : str
-        The problem, and what to do about it. ``{of}`` is replaced by the name of the curve.
+        The problem and its remedy. The name of the curve replaces ``{of}``.
     node : int or None
         The node at which the problem was found.
     value, limit : float
-        What was found there and how large it may be; NaN if there is no such number.
+        The value at that node and its limit; NaN if there is none.
     about_times : bool
-        Whether unsuitable times may be the reason.
+        Whether unsuitable times may be the cause.
     """
 
     curve: int
@@ -42,20 +42,20 @@ class Fault(NamedTuple):
     about_times: bool = False
 
     def batch_index(self, batch: Sequence[int]) -> tuple[int, ...]:
-        """The index of the curve in the batch; () for a single curve."""
+        """Return the index of the curve in the batch; () for a single curve."""
         return tuple(map(int, np.unravel_index(self.curve, batch))) if batch else ()
 
     def problem(self, batch: Sequence[int]) -> str:
-        """The problem, which names the curve by its index in the batch."""
+        """Return the problem with the index of the curve in the batch."""
         return self.what.replace("{of}", of_curve(self.curve, batch))
 
     def message(self, batch: Sequence[int]) -> str:
-        """The problem and the remedy."""
+        """Return the problem and the remedy."""
         return "; ".join(filter(None, (self.problem(batch), self.remedy)))
 
     @property
     def failed(self) -> bool:
-        """Whether there is no good curve."""
+        """Whether there is no valid curve."""
         return self.kind != ALMOST_CUT
 
 
@@ -64,12 +64,12 @@ CoreFault = tuple[int, str, int | None, float, float, str | None]
 
 
 def of_curve(number: int, batch: Sequence[int]) -> str:
-    """Words for a curve of a batch; none for a single curve."""
+    """Return " of curve ..." for a curve of a batch, or an empty text for a single curve."""
     return f" of curve {','.join(map(str, np.unravel_index(number, batch)))}" if batch else ""
 
 
 def unconverged(number: int, columns: Columns, tol: float, more_advice: str = "") -> Fault:
-    """The fault of a curve whose residual stayed above the tolerance."""
+    """Return the fault of a curve whose residual exceeds the tolerance."""
     residual, iterations, longest = (columns.row(x)[number] for x in ("residual", "iterations", "max_step"))
     return Fault(
         number,
@@ -84,20 +84,20 @@ def unconverged(number: int, columns: Columns, tol: float, more_advice: str = ""
 
 
 def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -> Fault:
-    """A fault of the compiled core, in words.
+    """Convert a fault from the compiled core, with its message.
 
     Parameters
     ----------
     columns : Columns
-        The reports of all curves.
+        Reports of all curves.
     tol : float
-        The tolerance of the fit.
+        Tolerance of the fit.
     quaternions : bool
-        Whether points may be unit quaternions, whose sign is the usual reason for antipodes.
+        Whether points may be unit quaternions, whose inconsistent signs are the usual cause of antipodes.
     """
     number, kind, node, value, limit, why = raw
     i, after = (node, node + 1) if node is not None else (None, None)
-    times = "give times that suit the distances"
+    times = "choose times that suit the distances"
 
     def fault(kind: str, what: str, remedy: str, about_times: bool = False) -> Fault:
         return Fault(number, kind, what, remedy, node, value, limit, about_times)
@@ -123,8 +123,8 @@ def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -
     if kind == "outer-handle" and limit == float("inf"):
         return fault(
             UNCONVERGED,
-            f"the control handle at points[{i}]{{of}} has length {value:.1f}, which rounding errors outgrow",
-            f"{times}: the segments beside it differ too much in length",
+            f"the control handle at points[{i}]{{of}} has length {value:.1f}, too long for floating-point numbers",
+            f"{times}: the segments next to it differ too much in length",
             about_times=True,
         )
     if kind == "outer-handle":
@@ -144,7 +144,7 @@ def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -
     if kind == "homotopy":
         return fault(
             UNCONVERGED,
-            f"no convergence{{of}}: after {iterations} iterations the homotopy had not come to these points (longest "
+            f"no convergence{{of}}: after {iterations} iterations the homotopy did not reach these points (longest "
             f"step {_length(longest)})",
             "try another method, put more points where steps are long, or choose times that suit the distances",
         )

@@ -244,7 +244,7 @@ def given(
     own = parts_of(velocities, space, "velocities")
     read = [
         velocities_of(*each)[0]
-        for each in zip(factors_of(space), (part.doubles for part in data), own, strict=True)
+        for each in zip(factors_of(space), (part.numbers for part in data), own, strict=True)
     ]
     batch, nodes = data[0].batch, data[0].nodes
     time_axis, _, times = knots_of(t, batch, nodes)

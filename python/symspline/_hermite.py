@@ -112,7 +112,7 @@ class HermiteSpline(SegmentedCurve[P]):
         batch, nodes = data[0].batch, data[0].nodes
         given = parts_of(velocities, space, "velocities")
         vectors = [
-            velocities_of(factor, part.doubles, own)
+            velocities_of(factor, part.numbers, own)
             for factor, part, own in zip(factors_of(space), data, given, strict=True)
         ]
         time_axis, shown_times, times = knots_of(t, batch, nodes)

@@ -1,4 +1,4 @@
-"""Objects of other libraries as arrays. They are known by what they can do; no library is imported to find out."""
+"""Objects of other libraries as arrays. Their attributes identify them, so that no library is imported."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ._core import ValidationError
 
 _SIMPLE = {bool, int, float, complex, str, np.ndarray, np.float64, np.float32, np.int64, np.complex128}
-# What turns an object into an array, by the object that has it.
+# Attributes that convert an object to an array, in the order in which messages suggest them.
 _CONVERSIONS = (
     "as_matrix",
     "full",
@@ -32,10 +32,12 @@ UTC_ZONE, NO_ZONE = "UTC", "none"
 
 
 def to_numpy(value: Any, name: str) -> Any:
-    """A value in which tensors, quantum objects and columns of tables are arrays, also within lists.
+    """Convert tensors and quantum objects to arrays, also within lists. Other values do not change.
 
-    Raises:
-        ValidationError: a part would lose its gradient or its unit.
+    Raises
+    ------
+    ValidationError
+        If the conversion would discard a gradient or a unit.
     """
     kind = type(value)
     if kind in _SIMPLE:
@@ -59,19 +61,20 @@ def to_numpy(value: Any, name: str) -> Any:
 def _tensor(value: Any, name: str) -> Any:
     if value.requires_grad:
         raise ValidationError(
-            f"{name} requires a gradient, which would be lost; symspline.torch.curve keeps it, and "
-            f"{name}.detach() does without"
+            f"{name} requires a gradient, which would be lost; use symspline.torch.curve, or pass {name}.detach()"
         )
     for step in ("detach", "cpu", "resolve_conj", "resolve_neg"):
         value = getattr(value, step)() if hasattr(value, step) else value
     try:
         return value.numpy()
     except (TypeError, RuntimeError) as error:
-        raise ValidationError(f"{name} cannot become an array: {error}; pass {name}.double()") from None
+        raise ValidationError(
+            f"{name} cannot be converted to an array: {error}; pass {name}.double()"
+        ) from None
 
 
 def _quantum(value: Any, name: str) -> Any:
-    """A ket as a vector, an operator as a matrix."""
+    """Convert a ket to a vector, and an operator to a matrix."""
     array = np.asarray(value.full())
     if value.isket:
         return array[:, 0]
@@ -81,7 +84,7 @@ def _quantum(value: Any, name: str) -> Any:
 
 
 def refuse_blocks(value: Any, name: str) -> None:
-    """Raise ValidationError for what dask has not computed yet, which would be loaded as a whole."""
+    """Raise ValidationError for dask arrays that are not computed, which would be loaded as a whole."""
     if hasattr(value, "__dask_graph__") and value.__dask_graph__() is not None:
         raise ValidationError(
             f"{name} is in blocks of dask, which would be loaded as a whole; symspline.xarray works block by block, "
@@ -90,8 +93,10 @@ def refuse_blocks(value: Any, name: str) -> None:
 
 
 def library_of(*values: Any) -> Any:
-    """The namespace (array API standard) of the first array that is not NumPy's, None if there is none. A tuple stands
-    for its parts."""
+    """Return the namespace (array API standard) of the first array that is not from NumPy, or None.
+
+    Arrays may be entries of a tuple.
+    """
     for value in values:
         for part in value if isinstance(value, tuple) else (value,):
             if type(part) not in _SIMPLE and hasattr(part, "__array_namespace__"):
@@ -100,14 +105,14 @@ def library_of(*values: Any) -> Any:
 
 
 def in_library(library: Any, values: Any) -> Any:
-    """Arrays of NumPy, or a tuple of them, as those of another library."""
+    """Convert NumPy arrays, or a tuple of them, to arrays of another library; None means NumPy."""
     if library is None:
         return values
     return tuple(map(library.asarray, values)) if isinstance(values, tuple) else library.asarray(values)
 
 
 def refuse_objects(array: NDArray[Any], name: str) -> None:
-    """Raise ValidationError, naming the first entry that is no number, and what makes an array of it."""
+    """Raise ValidationError that names the first entry other than a number, and suggests a conversion."""
     flat = array.ravel()
     i = next((i for i, entry in enumerate(flat) if not isinstance(entry, (int, float, complex))), None)
     if i is None:
@@ -125,11 +130,19 @@ def refuse_objects(array: NDArray[Any], name: str) -> None:
 
 
 def times_of(value: Any, name: str) -> tuple[Any, str | None]:
-    """Times as NumPy's, and whether they had a time zone: ``"UTC"``, to which they were moved, ``"none"``, or None of
-    arrays of NumPy, where it is not known.
+    """Convert times to a type of NumPy.
 
-    Raises:
-        ValidationError: some have a time zone and others not, or a text is no date.
+    Returns
+    -------
+    times : array_like
+        Times; those with a time zone are converted to UTC.
+    zone : {"UTC", "none"} or None
+        Whether the times had a time zone. None if it is unknown, as for NumPy arrays.
+
+    Raises
+    ------
+    ValidationError
+        If only some times have a time zone, or a text is not a date.
     """
     refuse_blocks(value, name)
     kind = getattr(value, "dtype", None)
@@ -137,7 +150,7 @@ def times_of(value: Any, name: str) -> tuple[Any, str | None]:
         if value.dtype.kind not in "OU":
             return value, None
     elif kind is not None and hasattr(kind, "tz"):
-        # The type of a column of a table: pandas' DatetimeTZDtype.
+        # The type is DatetimeTZDtype of pandas.
         return np.asarray(value, dtype=f"datetime64[{getattr(kind, 'unit', 'ns')}]"), UTC_ZONE
     elif getattr(kind, "kind", "") == "M":
         return np.asarray(value), NO_ZONE
@@ -160,16 +173,16 @@ def times_of(value: Any, name: str) -> tuple[Any, str | None]:
 
 
 def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
-    """Dates, texts and durations as Python knows them."""
+    """Convert dates, texts and durations of Python to NumPy, and return whether they had a time zone."""
     cells = array.ravel().tolist()
     first = cells[0]
-    wanted = str if isinstance(first, str) else timedelta if isinstance(first, timedelta) else date
+    required = str if isinstance(first, str) else timedelta if isinstance(first, timedelta) else date
     for i, cell in enumerate(cells):
-        if not isinstance(cell, wanted) or cell != cell:
+        if not isinstance(cell, required) or cell != cell:
             raise ValidationError(
                 f"{name}{_index(i, array)} is {_short(cell)}, but {_short(first)} before; write all times alike"
             )
-    if wanted is timedelta:
+    if required is timedelta:
         durations = [getattr(cell, "asm8", cell) for cell in cells]
         return np.array(durations, "timedelta64").reshape(array.shape), None
     pairs = [_moment(cell, name, i, array) for i, cell in enumerate(cells)]
@@ -184,7 +197,7 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
 
 
 def _short(cell: Any) -> str:
-    """A value in a message."""
+    """Return the text of a value, shortened for messages."""
     text = repr(cell) if isinstance(cell, str) else str(cell)
     return text if len(text) <= 80 else f"{text[:80]}…"
 
@@ -198,7 +211,7 @@ def _moment(cell: Any, name: str, i: int, array: NDArray[Any]) -> tuple[Any, boo
             moment = np.datetime64(match["body"])
         except ValueError:
             raise ValidationError(
-                f"{name}{_index(i, array)} is {_short(cell)}, no date such as 2021-08-29 or 2021-08-29T16:55:00Z"
+                f"{name}{_index(i, array)} is {_short(cell)}, not a date such as 2021-08-29 or 2021-08-29T16:55:00Z"
             ) from None
         zone = match["zone"]
         return (moment if zone is None else moment - np.timedelta64(minutes_of(zone), "m")), zone is not None
@@ -206,13 +219,13 @@ def _moment(cell: Any, name: str, i: int, array: NDArray[Any]) -> tuple[Any, boo
         return np.datetime64(cell), False
     aware = cell.utcoffset() is not None
     if hasattr(cell, "asm8"):
-        # pandas counts finer than Python, and this is UTC.
+        # Timestamps of pandas have nanoseconds, which datetime lacks. This value is in UTC.
         return cell.asm8, aware
     return np.datetime64(cell.astimezone(UTC).replace(tzinfo=None) if aware else cell), aware
 
 
 def minutes_of(zone: str) -> int:
-    """``"+02:30"`` is 150."""
+    """Return the offset of a time zone in minutes, such as 150 for ``"+02:30"``."""
     if zone == "Z":
         return 0
     digits = zone[1:].replace(":", "").ljust(4, "0")

@@ -14,7 +14,7 @@ from ._curves.solve import Options
 
 _QUANTITIES = ("point", "velocity", "acceleration")
 _RAISE = "raise"
-_OUTSIDE = {
+_EXTRAPOLATION_MODES = {
     None: "raise",
     "raise": "raise",
     True: "continue",
@@ -53,7 +53,7 @@ def with_atol(data: list[Points], atol: float | None) -> list[Points]:
 
 def checked_extrapolate(extrapolate: Any) -> Any:
     """Return the extrapolation policy, or raise ValidationError if it is invalid."""
-    known = isinstance(extrapolate, str) and extrapolate in _OUTSIDE
+    known = isinstance(extrapolate, str) and extrapolate in _EXTRAPOLATION_MODES
     if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
             "extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not "
@@ -64,7 +64,7 @@ def checked_extrapolate(extrapolate: Any) -> Any:
 
 def extrapolation_mode(policy: Any, bc_type: Any) -> str:
     """Return the core's name of an extrapolation policy. Closed curves repeat unless another policy is given."""
-    return "periodic" if policy is None and is_closed(bc_type) else _OUTSIDE[policy]
+    return "periodic" if policy is None and is_closed(bc_type) else _EXTRAPOLATION_MODES[policy]
 
 
 def check_progress(progress: Any) -> None:

@@ -89,12 +89,12 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
         The given points of each curve in every factor. A batch counts as one curve. None for masked curves.
     """
     found = [
-        (number, index, part.doubles)
+        (number, index, part.numbers)
         for number, parts in enumerate(curves)
         if parts is not None
         for part, factor in zip(parts, factors_of(space), strict=True)
         if _has_quaternions(factor)
-        for index in _opposite(part.doubles)
+        for index in _opposite(part.numbers)
     ]
     if not found:
         return

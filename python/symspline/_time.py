@@ -1,4 +1,4 @@
-"""Times as a user gives them, and as plain doubles in the core."""
+"""Conversion between times of the user and floating-point numbers of the core."""
 
 from __future__ import annotations
 
@@ -16,24 +16,27 @@ from ._typing import TimesLike
 
 Doubles = NDArray[np.float64]
 
-# Integers up to here are exact as doubles.
+# Integers up to this one are exact as floating-point numbers.
 _EXACT = 2**53
 _SECONDS = {
     "W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0,
     "ms": 1e3, "us": 1e6, "ns": 1e9, "ps": 1e12, "fs": 1e15, "as": 1e18,
 }  # fmt: skip
 _DOUBLE = np.dtype(np.float64)
-# Units in the last place that are rounding of one sum or difference and of the end itself.
+# Rounding error of a sum or difference and of the end itself, in units in the last place.
 _ROUNDING = 4
 _MULTIPLES = ("W", "D", "h", "m", "s")
 
 
 class Moments(NamedTuple):
-    """Times of a user that were read before.
+    """Times of the user after `_input.times_of`.
 
-    Attributes:
-        times: as NumPy has them.
-        zone: what was known of their zone, see `_input.times_of`.
+    Attributes
+    ----------
+    times : array_like
+        Times in a type of NumPy.
+    zone : str or None
+        Whether the times had a time zone; see `_input.times_of`.
     """
 
     times: Any
@@ -42,11 +45,19 @@ class Moments(NamedTuple):
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """How times become doubles.
+    """Conversion of times to floating-point numbers.
 
-    Numbers are taken as they are. Dates become seconds, and integers too large for a double
-    differences, since the first knot of each curve: ``origin``, of shape batch + (1,) where curves
-    have their own knots. Durations are seconds. ``zone`` is that of dates, see `_input.times_of`.
+    Numbers do not change, and durations become seconds. Dates become seconds since the first knot of each curve.
+    Integers that are too large for exact floating-point numbers become differences from the first knot.
+
+    Attributes
+    ----------
+    origin : scalar, ndarray or None
+        First knot, of shape batch + (1,) if each curve has its own knots. None if times are not differences.
+    dates, durations : bool
+        Whether times are dates, or durations.
+    zone : str or None
+        Whether dates had a time zone; see `_input.times_of`.
     """
 
     origin: Any = None
@@ -56,46 +67,45 @@ class TimeAxis:
 
     @cached_property
     def plain(self) -> bool:
-        """Whether times are taken as they are."""
+        """Whether times have no origin."""
         return self.origin is None
 
     def knots(self, knots: NDArray[Any]) -> Doubles:
-        """Knots as the core counts them."""
+        """Convert knots to numbers of the core."""
         return self._doubles(knots, self.origin, "t")
 
     def at(
         self, x: TimesLike, batch: tuple[int, ...], per_curve: bool, knots: Doubles | None = None
     ) -> tuple[Doubles, bool]:
-        """Times to evaluate at, and whether every curve now has its own.
+        """Convert sampling times to numbers of the core, and return whether each curve then has its own times.
 
         Parameters
         ----------
         x : array_like
-            Times as a user gives them.
+            Times from the user.
         batch : tuple of int
             The batch axes of the curves.
         per_curve : bool
             Whether the leading axes of x are the batch axes.
         knots : ndarray, optional
-            Knots as the core counts them. Numbers that lie beyond the first or last one by rounding become that knot.
+            Knots as numbers of the core. A time that exceeds the first or last knot by rounding becomes that knot.
         """
         given, zone = times_of(x, "x")
         array = as_array(given, "x")
         if {zone, self.zone} == {UTC_ZONE, NO_ZONE}:
             here, there = ("a time zone", "none") if zone == UTC_ZONE else ("no time zone", "one")
             raise ValidationError(
-                f"x has {here}, but the knots have {there}: which time is meant is in doubt; pass both with a zone, or "
-                "both without"
+                f"x has {here}, but the knots have {there}; pass both with a time zone, or both without"
             )
         if self.durations and array.dtype.kind == "m":
             array = _durations(array, "x")
         if array.dtype.kind not in ("M" if self.dates else "iufb"):
-            wanted = "dates, so x must be datetime64" if self.dates else "numbers, so x must be numbers"
-            raise ValidationError(f"the knots are {wanted}, not {array.dtype}")
+            required = "dates, so x must be datetime64" if self.dates else "numbers, so x must be numbers"
+            raise ValidationError(f"the knots are {required}, not {array.dtype}")
         if np.ndim(self.origin) == 0:
             times = self._doubles(array, self.origin, "x")
         else:
-            # Every curve counts from its own first knot.
+            # Times of each curve are differences from its own first knot.
             own = array.shape[len(batch) :] if per_curve else array.shape
             origin = self.origin.reshape(batch + (1,) * len(own))
             times, per_curve = self._doubles(np.broadcast_to(array, batch + own), origin, "x"), True
@@ -104,7 +114,7 @@ class TimeAxis:
         return onto_ends(times, knots, batch, per_curve, array.dtype, 0.0 if self.dates else self.origin)
 
     def take_batch(self, index: Any) -> TimeAxis:
-        """The time axis of some curves of a batch."""
+        """Return the time axis of one curve or a slice of curves along the first batch axis."""
         return replace(self, origin=self.origin[index][()]) if np.ndim(self.origin) else self
 
     def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
@@ -115,7 +125,7 @@ class TimeAxis:
         return cast(array)
 
     def explain(self, error: ValidationError) -> ValidationError:
-        """The error, saying from where its times are counted."""
+        """Add to an error what its times are measured from."""
         if self.origin is None:
             return error
         since = np.ravel(self.origin)[0]
@@ -124,12 +134,12 @@ class TimeAxis:
         return error._with_message(f"{error}; times are {what} since {since}{more}")
 
 
-# The axis of times that are taken as they are.
+# The time axis of numbers.
 _NUMBERS = TimeAxis()
 
 
 def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
-    """The time axis for some knots, and the knots as `CubicSpline.t` shows them."""
+    """Return the time axis of knots, and the knots as in `CubicSpline.t`."""
     given: Any
     given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
     array = as_array(given, "t")
@@ -153,18 +163,18 @@ def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
 def knots_of(
     t: TimesLike | None, batch: tuple[int, ...], nodes: int
 ) -> tuple[TimeAxis, NDArray[Any], Doubles]:
-    """The time axis of curves with so many knots each, the knots as shown, and as the core counts them."""
+    """Return the time axis, the knots as in `CubicSpline.t`, and the knots as numbers of the core."""
     if t is None:
         knots = np.arange(nodes, dtype=np.float64)
         return TimeAxis(), knots, knots
     if type(t) is np.ndarray and t.dtype == np.float64 and t.shape == (nodes,):
-        # What most programs pass.
+        # The usual case takes no further function call.
         knots = t.copy()
         return _NUMBERS, knots, knots
     time_axis, shown = time_axis_of(t)
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""
-        raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
+        raise ValidationError(f"t has shape {shown.shape}, but {nodes} points per curve need {(nodes,)}{own}")
     return time_axis, shown, time_axis.knots(shown)
 
 
@@ -176,28 +186,28 @@ def onto_ends(
     dtype: np.dtype[Any] = _DOUBLE,
     origin: Any = None,
 ) -> tuple[Doubles, bool]:
-    """Times, where those beyond the first or last knot by rounding are that knot.
+    """Replace times that exceed the first or last knot by rounding by that knot.
 
     The last of ``t0 + (t1 - t0) * np.linspace(0, 1, n)`` is often one unit in the last place after ``t1``. A few units
-    of the larger end are taken as rounding, in the precision in which the times were given.
+    in the last place of the larger end count as rounding, in the precision of `dtype`.
 
     Parameters
     ----------
     x, knots : ndarray
-        Times and knots as the core counts them.
+        Times and knots as numbers of the core.
     batch, per_curve
         As for `TimeAxis.at`.
     dtype : dtype
-        The type in which the times were given.
+        Type of the times of the user.
     origin : array_like, optional
-        What was subtracted of times and knots.
+        Origin that was subtracted from times and knots.
 
     Returns
     -------
     times : ndarray
-        They have the batch axes if the curves have ends of their own and one of them was met.
+        Times, with the batch axes if each curve has its own knots and a time was replaced.
     per_curve : bool
-        Whether they do.
+        Whether the times have the batch axes.
     """
     ends = knots[..., 0], knots[..., -1]
     if (
@@ -208,7 +218,7 @@ def onto_ends(
         return x, per_curve
     own = x.shape[len(batch) :] if per_curve else x.shape
     if per_curve and x.shape[: len(batch)] != batch:
-        # An error that is found elsewhere.
+        # The evaluation raises an error for this shape.
         return x, per_curve
     if knots.ndim > 1:
         first, last = (end.reshape(batch + (1,) * len(own)) for end in ends)
@@ -218,7 +228,7 @@ def onto_ends(
     size = np.maximum(np.abs(first), np.abs(last))
     if shift is not None:
         size = size + np.abs(np.asarray(shift, np.float64))
-    # Of types wider than doubles only what doubles hold is left.
+    # Times in wider types were rounded to double precision.
     kind = dtype.type if dtype.itemsize < 8 else np.float64
     with np.errstate(over="ignore", invalid="ignore"):
         reach = _ROUNDING * np.spacing(size.astype(kind)).astype(np.float64)
@@ -230,7 +240,7 @@ def onto_ends(
 
 
 def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
-    """array − origin, exact for differences below 2**63 whatever the integer types: modulo 2**64."""
+    """Subtract integers modulo 2**64, which is exact for differences below 2**63 and all integer types."""
     modular = array.astype(np.uint64) - np.asarray(origin).astype(np.uint64)
     return modular.view(np.int64) if modular.ndim else modular.astype(np.int64)
 
@@ -244,12 +254,12 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
     exact = [x.astype(fine) for x in (array, origin)]
     if all(np.array_equal(e.astype(x.dtype), x) for e, x in zip(exact, (array, origin), strict=True)):
         difference = exact[0] - exact[1]
-        # The difference itself may be too long for the finer unit.
+        # The difference itself may exceed the range of the finer unit.
         if np.array_equal(exact[1] + difference, exact[0]) and np.all(
             (difference >= 0) == (exact[0] >= exact[1])
         ):
             return _in_seconds(difference)
-    # Times too far apart for their finer unit: whole days, and what is left of the day.
+    # The times are too far apart for the finer unit, so days and times of day are subtracted separately.
     days = [x.astype("datetime64[D]") for x in (array, origin)]
     rest = [_in_seconds(x - d) for x, d in zip((array, origin), days, strict=True)]
     return np.asarray(_in_seconds(days[0] - days[1]) + (rest[0] - rest[1]), order="C")
@@ -267,5 +277,5 @@ def _in_seconds(difference: Any) -> Doubles:
     if unit not in _SECONDS:
         raise ValidationError(f"dates in units of {unit!r} have no fixed length; use days or finer")
     ticks = np.asarray(difference).astype(np.int64).astype(np.float64) * step
-    # Dividing by a power of ten is rounded once; multiplying by 1e-9 would be twice.
+    # Division by a power of ten rounds once. Multiplication by 1e-9, which is itself rounded, would round twice.
     return np.asarray(ticks * _SECONDS[unit] if unit in _MULTIPLES else ticks / _SECONDS[unit], order="C")

@@ -296,7 +296,7 @@ def test_arrays_that_are_smaller_than_their_header_says():
             "entry 'extrapolate': extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic'",
         ),
         ({"extrapolate": "{"}, "entry 'extrapolate' is not JSON"),
-        ({"bc_type": '"foo"'}, "entry 'bc_type': bc_type is 'natural'"),
+        ({"bc_type": '"foo"'}, "entry 'bc_type': bc_type must be 'natural'"),
         ({"bc_type": "5"}, "entry 'bc_type': "),
         ({"bc_type": '[[1, "x"], "natural"]'}, "entry 'bc_type': "),
         ({"report": "5"}, "entry 'report': it must be a list with one report for each of 1 factors"),

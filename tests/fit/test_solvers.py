@@ -361,7 +361,7 @@ def test_unfinished_homotopy_is_reported():
     i = np.arange(8)
     p = ss.geo.from_lonlat(np.degrees(i % 2), np.degrees(0.1 * (i - 3.5)))
     t = np.cumsum([0, 20, 1, 20, 1, 20, 1, 20])
-    with pytest.raises(ss.ConvergenceError, match=r"the homotopy had not come to these points .*method"):
+    with pytest.raises(ss.ConvergenceError, match=r"the homotopy did not reach these points .*method"):
         ss.CubicSpline(t, p, S2, method="homotopy")
 
 

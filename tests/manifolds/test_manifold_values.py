@@ -216,7 +216,7 @@ def test_functions_that_do_not_fit_do_not_converge():
         (("natural", (2, POINTS[-1])), "the end acceleration is not tangent"),
         (((1, 40 * SPACE.log(POINTS[0], POINTS[1])), "natural"), "the start velocity has speed 20, too fast"),
         ("periodic", "needs a closed curve"),
-        ("smooth", "bc_type is 'natural'"),
+        ("smooth", "bc_type must be 'natural'"),
     ],
 )
 def test_invalid_ends_raise(bc, what):

@@ -288,7 +288,7 @@ def test_invalid_files_raise(read, text, match):
     ("call", "match"),
     [
         (lambda f: poses.write_tum(f, [0.0], np.stack([np.eye(4)] * 2)), r"t has shape \(1,\), but there are 2 poses"),
-        (lambda f: poses.write_tum(f, ["a", "b"], np.stack([np.eye(4)] * 2)), r"t\[0\] is 'a', no date"),
+        (lambda f: poses.write_tum(f, ["a", "b"], np.stack([np.eye(4)] * 2)), r"t\[0\] is 'a', not a date"),
         (lambda f: poses.write_tum(f, [True, False], np.stack([np.eye(4)] * 2)), "numbers or datetime64"),
         (lambda f: poses.write_tum(f, [0.0], 2 * np.eye(4)[None]), "off the space"),
         (lambda f: poses.write_kitti(f, np.eye(4)), r"\(n, 4, 4\)"),

@@ -100,7 +100,7 @@ def test_interpolated_points_are_not_reported_as_a_geodesic():
     ("change", "message"),
     [
         ({"t": T[::-1]}, r"t\[1\] is before t\[0\]"),
-        ({"t": T[:-1]}, "40 points a curve need"),
+        ({"t": T[:-1]}, "40 points per curve need"),
         ({"t": np.where(T > 5, np.nan, T)}, "is nan"),
         ({"t": np.zeros(40)}, "have one time only"),
         ({"lam": -1.0}, "lam must be finite and >= 0"),

@@ -134,11 +134,11 @@ TANGENT, ACROSS = [0, 0.5, 0], [0.5, 0, 0]
 @pytest.mark.parametrize(
     "bc_type, match",
     [
-        ("foo", r"bc_type is 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair .*'foo'"),
-        (None, r"bc_type is .*got None"),
-        (3, r"bc_type is .*got 3"),
-        (("natural",), r"bc_type is .*got \('natural',\)"),
-        (("natural",) * 3, r"bc_type is .*got \('natural', 'natural', 'natural'\)"),
+        ("foo", r"bc_type must be 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair .*'foo'"),
+        (None, r"bc_type must be .*got None"),
+        (3, r"bc_type must be .*got 3"),
+        (("natural",), r"bc_type must be .*got \('natural',\)"),
+        (("natural",) * 3, r"bc_type must be .*got \('natural', 'natural', 'natural'\)"),
         (("natural", "foo"), r"the end is 'foo'"),
         (("periodic", "natural"), r"the start is 'periodic'"),
         ((1, TANGENT), r"the start is 1"),

@@ -99,7 +99,7 @@ def test_velocity_and_speed(space):
         ([0, 2, -0.25], r"x\[2\] = -0\.25 is outside the knots"),
         (2 + 2**-47, r"x = 2\.000000000000007 is outside the knots"),
         (1j, r"x must be numbers, not complex128"),
-        ("a", r"x is 'a', no date such as 2021-08-29"),
+        ("a", r"x is 'a', not a date such as 2021-08-29"),
         (None, r"x must be an array of numbers, not of object: it is a NoneType"),
         (np.timedelta64(1, "s"), r"x must be numbers, not timedelta64"),
         (np.datetime64("2024-01-01"), r"the knots are numbers, so x must be numbers, not datetime64"),

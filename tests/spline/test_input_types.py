@@ -114,7 +114,7 @@ AWARE = [moment.replace(tzinfo=UTC) for moment in NAIVE]
         (["2021-08-29", "2021-08-30", "7"], None, r"t\[2\] is '7'"),
         ([NAIVE[0], 3, NAIVE[2]], None, r"t\[1\] is 3, but"),
         *(
-            (["2021-08-29", word, "2021-08-31"], None, r"t\[1\] is '.*', no date such as")
+            (["2021-08-29", word, "2021-08-31"], None, r"t\[1\] is '.*', not a date such as")
             for word in ("now", "today", "NaT", "2021", "2021-02-30", "29.8.2021", "20210829", "")
         ),
     ],

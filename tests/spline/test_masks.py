@@ -116,15 +116,13 @@ def test_errors_name_the_curve_in_the_whole_list():
     bad[2] = (None, (1 + 1e-6) * np.eye(3))
     with pytest.raises(ss.ValidationError, match=r"^curve 2: points\[0\] is off"):
         ss.fit_many(bad, "s:2", where=mask)
-    with pytest.raises(ss.ValidationError, match=r"where must be True or False for every curve, of shape \(3,\)"):
+    with pytest.raises(ss.ValidationError, match=r"where must be a Boolean array of shape \(3,\)"):
         ss.fit_many(bad, "s:2", where=mask[:2])
 
 
 @pytest.mark.parametrize("where", [[True], [1, 0], [True, False, True], True])
 def test_invalid_masks_raise(where):
-    fit_error(
-        r"where must be True or False for every curve, of shape \(2,\)", points=np.stack([np.eye(3)] * 2), where=where
-    )
+    fit_error(r"where must be a Boolean array of shape \(2,\)", points=np.stack([np.eye(3)] * 2), where=where)
 
 
 @pytest.mark.parametrize("part", [0.0, 0.5])

@@ -90,7 +90,7 @@ def test_of_evaluate():
     ("out", "message"),
     [
         (np.empty((4, 3)), r"out has shape \(4, 3\), but the result has \(5, 3\)"),
-        (np.empty((5, 3), int), "out is of int64, which does not hold numbers of float64"),
+        (np.empty((5, 3), int), "out has dtype int64, which cannot hold float64"),
         ([[0.0] * 3] * 5, "out must be a NumPy array, not list"),
         (np.broadcast_to(0.0, (5, 3)), "out is read-only"),
     ],
@@ -101,7 +101,7 @@ def test_invalid_out_arrays_raise(out, message):
 
 
 def test_complex_results_need_complex_arrays():
-    with pytest.raises(ss.ValidationError, match="out is of float64, which does not hold numbers of complex128"):
+    with pytest.raises(ss.ValidationError, match="out has dtype float64, which cannot hold complex128"):
         spline_of("cp:2")(0.0, out=np.empty(3))
 
 

@@ -78,8 +78,8 @@ FLAT, OFF = np.zeros((3, 1)), changed(2, [0, 0, 2])
         ((OFF, FLAT), {}, r"factor 0, Sphere\(2\): points\[2\] is off the space"),
         ((P, FLAT), {"bc_type": ((1, [0, 0, 0]), "natural")}, r"an end vector must be a tuple of 2 arrays"),
         ((P, FLAT), {"bc_type": "foo"}, r"the start is 'foo'"),
-        ((P, FLAT), {"bc_type": ("natural",)}, r"bc_type is 'natural', .* or a pair .*; got \('natural',\)"),
-        ((P, FLAT), {"bc_type": ("natural", (1,))}, r"bc_type is 'natural', .*; the end is \(1,\)"),
+        ((P, FLAT), {"bc_type": ("natural",)}, r"bc_type must be 'natural', .* or a pair .*; got \('natural',\)"),
+        ((P, FLAT), {"bc_type": ("natural", (1,))}, r"bc_type must be 'natural', .*; the end is \(1,\)"),
     ],
 )
 def test_invalid_products_raise(points, options, match):

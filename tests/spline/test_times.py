@@ -129,7 +129,7 @@ def test_the_unit_of_time_does_not_matter(space, h):
     "t, match",
     [
         ([], r"t is empty; a curve needs at least two points"),
-        ([0, 1], r"t has shape \(2,\), but 3 points a curve need \(3,\)"),
+        ([0, 1], r"t has shape \(2,\), but 3 points per curve need \(3,\)"),
         (5.0, r"t has shape \(\), but 3 points"),
         ([[0, 1, 2]], r"t has shape \(1, 3\), but 3 points"),
         ([0, NAN, 2], r"t\[1\] is NaN; times must be finite"),
@@ -138,7 +138,7 @@ def test_the_unit_of_time_does_not_matter(space, h):
         ([0, 2, 1], r"t\[2\] = 1 is before t\[1\] = 2.*np\.argsort\(t\)"),
         ([0, 1, 1], r"t\[2\] = 1 repeats t\[1\] = 1.*different times"),
         ([0, -0.0, 1], r"t\[1\] = -?0 repeats t\[0\] = 0"),
-        (["a", "b", "c"], r"t\[0\] is 'a', no date such as 2021-08-29"),
+        (["a", "b", "c"], r"t\[0\] is 'a', not a date such as 2021-08-29"),
         ([0, 1j, 2], r"t must be numbers or datetime64, not complex128"),
         ([0, None, 2], r"t\[1\] must be an array of numbers, not of object: it is a NoneType; leave it out"),
         (np.array([0, "NaT", 2], "m8[s]"), r"t\[1\] is NaT"),
@@ -154,7 +154,7 @@ def test_invalid_times_raise(t, match):
 
 def test_error_names_the_curve_of_an_invalid_time():
     fit_error(r"t\[1\]\[2\] = 1 is before t\[1\]\[1\] = 2", [[0, 1, 2], [0, 2, 1]], TWO)
-    fit_error(r"t has shape \(3, 3\), but 3 points a curve need \(3,\) or \(2, 3\)", np.ones((3, 3)), TWO)
+    fit_error(r"t has shape \(3, 3\), but 3 points per curve need \(3,\) or \(2, 3\)", np.ones((3, 3)), TWO)
     with pytest.raises(ss.ValidationError, match=r"curve 1: t has shape \(2,\), but 3 points"):
         ss.fit_many([(None, P), ([0, 1], P)], S2)
     with pytest.raises(ss.ValidationError, match=r"t\[1\]\[2\] = 1 is before"):

@@ -1,4 +1,4 @@
-"""Noisy data beside a curve, as plots show them."""
+"""Noisy data near a curve and the credible band of the curve, for plots."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ from .curve import Doubles
 
 
 class UncertaintyBand(NamedTuple):
-    """Noisy data near one curve, and how well they determine it.
+    """Noisy data near one curve, and the credible band of the curve.
 
-    Attributes:
-        x: times of the data, as the core counts them.
-        points: the data, in every factor.
-        radii: of the 95 % band around the curve, at the times that were asked for, in every factor.
-        speed: the standard deviation of the velocity in one direction; None in a product.
+    Attributes
+    ----------
+    x : ndarray
+        Times of the data as numbers of the core.
+    points : list of ndarray
+        The data in each factor.
+    radii : list of ndarray
+        Radii of the 95 % band around the curve at the requested times, in each factor.
+    speed : ndarray or None
+        Standard deviation of the velocity in one direction; None in a product.
     """
 
     x: Doubles
@@ -24,5 +29,5 @@ class UncertaintyBand(NamedTuple):
     speed: Doubles | None
 
     def part(self, number: int) -> Self:
-        """The same in one factor of a product."""
+        """Return the data and the band in one factor of a product."""
         return self._replace(points=[self.points[number]], radii=[self.radii[number]], speed=None)

@@ -1,4 +1,4 @@
-"""Knots and control points of free curves: what is checked before any work."""
+"""Validation of the knots and control points of B-splines and Bézier curves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .fit import Points, validated
 
 
 def control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[NDArray[np.float64], float]:
-    """Control points as doubles, and how far off the space they may be."""
+    """Return control points as floating-point numbers of the core, and their tolerance."""
     array = space._array(value, "control_points")
     doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
     if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
@@ -27,10 +27,17 @@ def control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[NDAr
 
 
 def checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float) -> Array:
-    """The control points, on the space and each within reach of the next."""
+    """Project control points onto the space.
+
+    Raises
+    ------
+    ValidationError
+        If a control point is not on the space.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+    """
     *batch, count = space._lead(doubles)
     try:
-        # A fit that is not carried out: it looks at points in the same way.
         (points,), _ = validated(
             space,
             np.arange(count, dtype=np.float64),
@@ -51,11 +58,11 @@ def checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float) 
 
 
 def checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.float64]:
-    """The knots of a curve with so many control points."""
+    """Return a copy of the knots of a B-spline with `count` control points after validation."""
     array = as_array(knots, "knots")
     if array.ndim != 1 or array.dtype.kind not in "biuf":
         raise ValidationError(
-            f"knots must be a row of real numbers, not {array.dtype} of shape {array.shape}"
+            f"knots must be a one-dimensional array of real numbers, not {array.dtype} of shape {array.shape}"
         )
     needed = count + degree + 1
     if count <= degree:
@@ -71,7 +78,7 @@ def checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.float
     if falls.size:
         raise ValidationError(f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]")
     if not np.isfinite(float(result[-1]) - float(result[0])):
-        raise ValidationError("knots span more than a double can hold")
+        raise ValidationError("knots span more than the floating-point range")
     times, repeats = np.unique(result, return_counts=True)
     if repeats.max() > degree + 1:
         most = np.argmax(repeats)
@@ -80,5 +87,7 @@ def checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.float
             f"{degree + 1} times"
         )
     if not result[degree] < result[count]:
-        raise ValidationError(f"the curve lives between knots[{degree}] and knots[{count}], which are equal")
+        raise ValidationError(
+            f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal"
+        )
     return result

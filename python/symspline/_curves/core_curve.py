@@ -1,4 +1,4 @@
-"""Curves that the compiled core fits and evaluates as they are."""
+"""Curves that the compiled core fits and evaluates directly."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .lift import check_reach, check_start, fiber_factors, is_quotient
 from .out import can_write_into, check_out
 from .solve import Options, Progress, Task, solve_single, validate
 
-# Their matrices have the same last row everywhere, which the core writes of curves that were not found, too.
+# Matrices of these spaces have a constant last row, which the core also writes for curves without a solution.
 _CONSTANT_ROW = (SpecialEuclidean, Similarity, Affine)
 
 
 def _all_nan(space: Space, values: Array) -> Array:
-    """The same values, in place, with NaN in all of a matrix of which there is one."""
+    """Set every matrix that contains a NaN to NaN as a whole, in place."""
     if isinstance(space, _CONSTANT_ROW):
         missing = np.isnan(values[..., 0, 0])
         if missing.any():
@@ -32,11 +32,11 @@ def _all_nan(space: Space, values: Array) -> Array:
 
 
 class CoreCurve(CurveArrays):
-    """Curves in a space that is no product."""
+    """Curves in a space that is not a product."""
 
     points: Array
     velocities: Array
-    # Whether the core computes points in the space itself.
+    # Whether the core computes points in the space itself, and not in a smaller one.
     _compiled: ClassVar[bool] = True
 
     def __init__(self, space: Space, times: Doubles, points: Array, velocities: Array) -> None:
@@ -45,18 +45,20 @@ class CoreCurve(CurveArrays):
 
     @staticmethod
     def suits(space: Space) -> bool:
-        """Whether curves in a space are of this kind, if they are of no other one."""
+        """Whether this class can represent curves in a space."""
         return True
 
-    # The velocities that make the curve C². The core validates such curves on the way.
+    # The velocities of the C² curve. The core validates the points in the same call.
     solve = staticmethod(solve_single)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
         """Validate a task and project its points onto the space. Return the task and the faults of skipped curves.
 
-        Raises:
-            ValidationError: something is wrong with it.
+        Raises
+        ------
+        ValidationError
+            If the task is invalid.
         """
         return validate(task)
 
@@ -127,7 +129,7 @@ class CoreCurve(CurveArrays):
 
     @cached_property
     def _lift_knots(self) -> Doubles:
-        """The factors of the horizontal lift at the knots; kept from the first use on."""
+        """Unitary factors of the horizontal lift at the knots, computed once."""
         return _core.lift_knots(*self._core_curve)
 
     @property
@@ -157,7 +159,7 @@ class CoreCurve(CurveArrays):
         u, w = self.velocities[(*index, first)], self.velocities[(*index, last)]
         with np.errstate(all="ignore"):
             handles = third * u, -third * w
-        # Of curves that were not found they are NaN.
+        # Control points of curves without a solution are NaN.
         inner = [self.space._apply("exp", p=at, v=handle) for at, handle in zip((p, q), handles, strict=True)]
         return np.stack([p, *inner, q], axis=axis + 1)
 
@@ -174,7 +176,7 @@ class CoreCurve(CurveArrays):
         )
 
     def _with(self, times: Doubles, points: Array, velocities: Array) -> Self:
-        """Other curves of this kind in the same space."""
+        """Return other curves of this class in the same space."""
         return type(self)(self.space, times, points, velocities)
 
     def __reduce__(self) -> tuple[Any, ...]:

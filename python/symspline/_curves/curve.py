@@ -1,4 +1,4 @@
-"""What every kind of curve can do."""
+"""Interface of all classes of curves."""
 
 from __future__ import annotations
 
@@ -16,18 +16,23 @@ from .solve import Progress
 Doubles = NDArray[np.float64]
 
 NORMS = ("speed", "bend")
-# What is no point or vector of the space.
+# Quantities that are real numbers or vectors, not points or tangent vectors of the space.
 REAL = (*NORMS, "body velocity", "body acceleration")
 
 
 class CurveArrays(ABC):
-    """Curves of a batch, made of knots, points and velocities, with times as the compiled core counts them.
+    """Curves of a batch: knots, points and velocities. Times are numbers of the compiled core.
 
-    Attributes:
-        space: where they run.
-        times: knots, shape (N+1,) or (..., N+1).
-        points, velocities: shape (..., N+1, *point_shape); in a product tuples of such arrays.
-        quad_rtol: to what relative error integrals of speed and acceleration are worth computing.
+    Attributes
+    ----------
+    space : Space
+        The space of the points.
+    times : ndarray, shape (N+1,) or (..., N+1)
+        Knots.
+    points, velocities : ndarray, shape (..., N+1, *point_shape)
+        Values at the knots; for a product, tuples of such arrays.
+    quad_rtol : float
+        Relative tolerance of integrals along the curve, not below the accuracy of its speed and acceleration.
     """
 
     quad_rtol: float = EXACT
@@ -39,26 +44,39 @@ class CurveArrays(ABC):
     @property
     @abstractmethod
     def batch(self) -> tuple[int, ...]:
-        """The axes of the batch."""
+        """Shape of the batch axes."""
 
     @property
     @abstractmethod
     def parts(self) -> tuple[CurveArrays, ...]:
-        """The curves in the factors of a product; a curve in another space is its only part."""
+        """The curve in each factor of a product; outside products, the curve itself."""
 
     @abstractmethod
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
     ) -> Any:
-        """A quantity at times x: ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, |∇γ'|; of
-        rotations also ``"body velocity"`` and ``"body acceleration"``. ``outside`` the knots ``"raise"``,
-        ``"continue"``, ``"geodesic"`` or ``"periodic"``."""
+        """Evaluate a quantity at times x.
+
+        Parameters
+        ----------
+        x : ndarray
+            Sampling times.
+        quantity : str
+            ``"point"``, ``"velocity"``, ``"acceleration"``, ``"speed"`` or ``"bend"``, which is |∇γ'|. Rotations also
+            have ``"body velocity"`` and ``"body acceleration"``.
+        outside : {"raise", "continue", "geodesic", "periodic"}
+            Extrapolation policy.
+        per_curve : bool
+            Whether the leading axes of x are the batch axes.
+        progress : callable, optional
+            Function to call with the numbers of finished and of all steps.
+        """
 
     @abstractmethod
     def write(
         self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
     ) -> Any:
-        """The same of points or vectors, written into an array that takes them, which is returned."""
+        """Evaluate points or vectors into `out`, and return it."""
 
     @abstractmethod
     def lift(
@@ -70,25 +88,25 @@ class CurveArrays(ABC):
         start: Any,
         progress: Progress | None = None,
     ) -> Any:
-        """The same of the horizontal lift that starts at ``start``, see `symspline.CubicSpline.lift`."""
+        """Evaluate the horizontal lift that starts at `start`; see `symspline.CubicSpline.lift`."""
 
     @abstractmethod
     def transport(self, times: tuple[float, float], outside: str, v: Any) -> Any:
-        """Parallel transport of a tangent vector of each curve from one time to another, see
+        """Transport one tangent vector per curve in parallel from one time to another; see
         `symspline.CubicSpline.transport`."""
 
     @abstractmethod
     def control_points(self) -> Any:
-        """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
+        """Compute the control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
 
     @abstractmethod
     def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
-        """How the curve moves with its data, see `symspline.CubicSpline.jvp`."""
+        """Compute the change of the curve for a change of its data; see `symspline.CubicSpline.jvp`."""
 
     @abstractmethod
     def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
-        """The transpose, see `symspline.CubicSpline.vjp`."""
+        """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
 
     @abstractmethod
     def take_batch(self, index: Any) -> CurveArrays:
-        """One curve, or a slice, along the first axis of the batch."""
+        """Return one curve or a slice of curves along the first batch axis."""

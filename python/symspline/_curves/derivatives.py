@@ -1,4 +1,4 @@
-"""How curves follow their data."""
+"""Sensitivity of curves to their data, in forward and reverse mode."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ from .gradient import Gradient, SampleTimes
 
 
 def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> SampleTimes:
-    """Times of all curves, or with ``per_curve`` of each its own.
+    """Return the sampling times of each curve.
 
-    Raises:
-        ValidationError: a time is outside the knots.
+    Raises
+    ------
+    ValidationError
+        If a time lies outside the knots.
     """
     dtype = x.dtype if x.dtype.kind == "f" else np.dtype(np.float64)
     x, per_curve = onto_ends(cast(x), knots, batch, per_curve, dtype)
@@ -34,13 +36,13 @@ def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool
         curve, index = (int(i) for i in np.argwhere(outside)[0])
         raise ValidationError(
             f"x[{index}] = {own[curve, index]} is outside the knots [{rows[curve, 0]}, {rows[curve, -1]}]; "
-            "derivatives with respect to the data are known between the first and the last knot"
+            "derivatives with respect to the data exist only between the first and the last knot"
         )
     return SampleTimes(np.ascontiguousarray(own), shape, nu)
 
 
 class _Curves(NamedTuple):
-    """What the compiled core needs, curve after curve."""
+    """Arguments of the compiled core, with one row per curve."""
 
     t: NDArray[np.float64]
     points: NDArray[np.float64]
@@ -52,7 +54,7 @@ class _Curves(NamedTuple):
 
 
 def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
-    """How the curve moves, see `symspline.CubicSpline.jvp`."""
+    """Compute the change of the curve for a change of its data; see `symspline.CubicSpline.jvp`."""
     space, times = curve.space, curve.times
     if points is None:
         motion = np.zeros_like(space._as_doubles(curve.points))
@@ -77,7 +79,7 @@ def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, 
 
 
 def vjp(curve: CurveArrays, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient:
-    """The transpose, see `symspline.CubicSpline.vjp`."""
+    """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
     _same_shape(space._numbers(doubles), (*at.shape, *space.point_shape), "cotangent")
@@ -95,7 +97,7 @@ def vjp(curve: CurveArrays, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gr
 
 
 def pair_of(ends: Any) -> tuple[Any, Any]:
-    """Changes of the vectors at the two ends; None where there is none."""
+    """Split a pair of changes of the end vectors; None means no change."""
     if ends is None:
         return None, None
     if not isinstance(ends, (tuple, list)) or len(ends) != 2:
@@ -120,7 +122,7 @@ def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
 
 
 def _per_curve(knots: Array, batch: tuple[int, ...]) -> NDArray[np.float64]:
-    """One row of knots a curve."""
+    """Return one row of knots per curve."""
     nodes = knots.shape[-1]
     rows = np.broadcast_to(knots, (*batch, nodes)).reshape(math.prod(batch), nodes)
     return np.ascontiguousarray(rows, dtype=np.float64)
@@ -132,7 +134,7 @@ def _same_shape(array: Array, shape: tuple[int, ...], name: str) -> None:
 
 
 def _given(bc_type: Any, which: int) -> Array | None:
-    """The vector that was given at an end."""
+    """Return the vector that `bc_type` prescribes at an end, or None."""
     return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
 
 
@@ -142,7 +144,7 @@ def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: 
     if value is None:
         return np.zeros(shape)
     if _given(bc_type, which) is None:
-        raise ValidationError(f"no vector was given at the {name}, so that none can change")
+        raise ValidationError(f"no vector was given at the {name}, so it cannot change")
     doubles = space._doubles(value, f"the change at the {name}")
     at = np.take(curve.points, -which, axis=len(batch))
     vectors = np.broadcast_to(space._numbers(doubles), batch + space.point_shape)
@@ -155,7 +157,7 @@ def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: NDArray[np.float64
         return None
     space = curve.space
     full = space._numbers(gradient.reshape(curve.batch + space._doubles_shape))
-    # A vector that all curves share collects all their gradients.
+    # The gradient with respect to a shared vector is the sum over the curves that share it.
     extra = full.ndim - given.ndim
     summed = full.sum(axis=tuple(range(extra)))
     for axis, size in enumerate(given.shape):

@@ -1,4 +1,4 @@
-"""End conditions: what a user may write, made into what the core solves."""
+"""End conditions: from the argument `bc_type` to the form of the core."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._spaces import Product, Space, factors_of, parts_of
 
-# A kind, and the vectors that it prescribes.
+# The kind of an end condition and its prescribed vectors.
 End = tuple[str, NDArray[np.float64] | None]
 
 _WORDS = {"natural", "clamped", "not-a-knot"}
 _ORDERS = {1: "velocity", 2: "acceleration"}
 _NATURAL: list[End] = [("natural", None), ("natural", None)]
 _HELP = (
-    "bc_type is 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair with one of 'natural', 'clamped', "
+    "bc_type must be 'natural', 'clamped', 'not-a-knot' or 'periodic', or a pair with one of 'natural', 'clamped', "
     "'not-a-knot', (1, velocity), (2, acceleration) for either end"
 )
 
 
 def ends_of(bc_type: Any, space: Space, batch: tuple[int, ...]) -> list[End] | None:
-    """The conditions at both ends, None for a closed curve."""
+    """Convert `bc_type` to the conditions at both ends; None for a closed curve."""
     if isinstance(bc_type, str):
         if bc_type == "periodic":
             return None
@@ -71,14 +71,14 @@ def _end(name: str, word: str | int, vector: Any, space: Space, batch: tuple[int
 
 
 def freeze_bc_type(bc_type: Any) -> Any:
-    """End conditions with copies of their vectors, which the caller may change."""
+    """Copy end conditions, so that later changes of the caller's arrays have no effect."""
     if isinstance(bc_type, str):
         return bc_type
     return tuple(end if isinstance(end, str) else (int(end[0]), _copy(end[1])) for end in bc_type)
 
 
 def _copy(vector: Any) -> Any:
-    """A read-only copy; for a product a tuple of them."""
+    """Return a read-only copy of a vector; for a product, a tuple of copies."""
     if isinstance(vector, tuple):
         return tuple(_copy(part) for part in vector)
     array = np.array(vector)
@@ -88,12 +88,12 @@ def _copy(vector: Any) -> Any:
 
 
 def is_closed(bc_type: Any) -> bool:
-    """Whether the curve goes on at its start where it ends."""
+    """Whether the curve is periodic."""
     return isinstance(bc_type, str) and bc_type == "periodic"
 
 
 def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
-    """Which ends have a given velocity; None for a closed curve."""
+    """Whether each end has a prescribed velocity; None for a closed curve."""
     if is_closed(bc_type):
         return None
     first, last = (bc_type, bc_type) if isinstance(bc_type, str) else bc_type
@@ -102,7 +102,7 @@ def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
 
 
 def take_batch(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:
-    """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
+    """Return the end conditions of one curve or a slice of curves along the first batch axis."""
     if isinstance(bc_type, str):
         return bc_type
     if isinstance(space, Product):
@@ -116,18 +116,18 @@ def take_batch(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> 
         if vector.ndim < batch_axes + len(space.point_shape):
             return end
         if vector.shape[0] == 1:
-            # It broadcast along this axis.
+            # The vector is shared along this axis.
             return (end[0], vector if isinstance(index, slice) else vector[0])
         return (end[0], vector[index])
 
     return tuple(pick(end) for end in bc_type)
 
 
-# ---- in a product, where prescribed vectors are tuples ----
+# ---- products, whose prescribed vectors are tuples ----
 
 
 def ends_in_factors(bc_type: Any, space: Space[Any]) -> list[Any]:
-    """End conditions for each factor; those of a space that is no product are the only ones."""
+    """Return the end conditions of each factor; outside products, a list of one entry."""
     factors = factors_of(space)
     if isinstance(bc_type, str) or len(factors) == 1:
         return [bc_type] * len(factors)
@@ -141,7 +141,7 @@ def ends_in_factors(bc_type: Any, space: Space[Any]) -> list[Any]:
 
 
 def _joined(ends: list[Any]) -> Any:
-    """The inverse of `ends_in_factors`."""
+    """Combine end conditions of the factors. This is the inverse of `ends_in_factors`."""
 
     def both(e: int) -> Any:
         first = ends[0][e]

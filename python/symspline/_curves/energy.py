@@ -1,4 +1,4 @@
-"""How much curves bend."""
+"""Bending energy of curves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .integrals import integrate
 
 
 class Evaluable(Protocol):
-    """What lengths and energies need of a curve: times between which it is smooth, batch axes, and its norms."""
+    """Curve with a length and an energy: it is smooth between `times`, and its norms can be evaluated."""
 
     @property
     def times(self) -> Doubles: ...
@@ -26,8 +26,8 @@ class Evaluable(Protocol):
 
 
 def bending_energy(curve: Evaluable) -> Number:
-    """∫ |∇γ'|² dt, (1); shape of the batch axes."""
-    # In units of the whole time: squares of accelerations would overflow or vanish where times are far from one.
+    """Compute ∫ |∇γ'|² dt, equation (1), for each curve."""
+    # The unit of time is the whole domain: otherwise squares of accelerations can overflow or underflow.
     times = curve.times
     unit = np.broadcast_to(times[..., -1:] - times[..., :1], (*curve.batch, 1))
 
@@ -42,8 +42,10 @@ def bending_energy(curve: Evaluable) -> Number:
 
 
 def alternative_energy(curve: CurveArrays, reports: list[Report]) -> Any:
-    """The least energy of other curves that were found through the points of a product: those with the alternative
-    of one factor, if any has one."""
+    """Return the lowest energy of the alternative curves through the points of a product, or None.
+
+    An alternative curve replaces the solution in one factor by the alternative solution of that factor.
+    """
     if all(report.alternative_energy is None for report in reports):
         return None
     energies: list[Any] = [bending_energy(part) for part in curve.parts]

@@ -1,7 +1,8 @@
-"""From points to curves: the same for one curve, a batch, and many of different lengths, in any space.
+"""Fits of one curve, a batch of curves, and curves of different lengths, in any space.
 
-A space has its kind of curve: plain, in the span of its points, on a manifold that is made of functions, or, for a
-product, one in every factor. A further kind is a class with the methods of `CoreCurve`, and its name in `kind_of`.
+The class of a curve depends on the space: `CoreCurve`, `ReducedCurve` in large spaces, `OnManifold` on a manifold made
+of functions, and `ProductCurve` with one curve per factor. To add a class, derive it from `CoreCurve` and list it in
+`kind_of`.
 """
 
 from __future__ import annotations
@@ -31,34 +32,47 @@ from .reduced import ReducedCurve
 from .solve import Mask, Options, Progress, Solved, Task, solve, without
 
 _T = TypeVar("_T")
-# Options for a fit that is not carried out.
+# Options for a validation, which has no solver.
 _ANY = Options("auto", 0.0, None)
 _NATURAL: list[End] = [("natural", None), ("natural", None)]
 
 
 class Points(NamedTuple):
-    """Points of curves in a space that is no product.
+    """Points of curves in a space that is not a product.
 
-    Attributes:
-        doubles: their numbers, shape (*batch, nodes, *doubles of a point).
-        tol: how far off the space they may be.
+    Attributes
+    ----------
+    numbers : ndarray, shape (*batch, nodes, *numbers of a point)
+        Floating-point numbers of the core.
+    tol : float
+        Tolerance of points off the space.
+    batch : tuple of int
+        Shape of the batch axes.
+    nodes : int
+        Number of points per curve.
     """
 
-    doubles: NDArray[np.float64]
+    numbers: NDArray[np.float64]
     tol: float
     batch: tuple[int, ...]
     nodes: int
 
 
 class FitProblem(NamedTuple):
-    """Curves of equal length to fit.
+    """Curves with equal numbers of points to fit.
 
-    Attributes:
-        times: knots, shape (N+1,), or (..., N+1) with one row per curve.
-        points, ends: in every factor.
-        check: whether points and ends are to be checked.
-        mask: which curves are fitted; the others are NaN. None for all.
-        skip_invalid: whether curves with points off the space are masked instead of an error.
+    Attributes
+    ----------
+    times : ndarray, shape (N+1,) or (..., N+1)
+        Knots, shared or with one row per curve.
+    points, ends : list
+        Points and end conditions in each factor.
+    check : bool
+        Whether to validate points and ends.
+    mask : ndarray of bool or None
+        Curves to fit; masked curves are NaN. None fits all curves.
+    skip_invalid : bool
+        Whether curves with points off the space are masked instead of raising an error.
     """
 
     space: Space[Any]
@@ -72,8 +86,10 @@ class FitProblem(NamedTuple):
 
 
 class ManyProblem(NamedTuple):
-    """Single curves of different lengths to fit, with one entry per curve in ``times`` and ``points``, and otherwise as
-    `FitProblem`."""
+    """Single curves of different lengths to fit.
+
+    The fields are those of `FitProblem`, but `times` and `points` have one entry per curve.
+    """
 
     space: Space[Any]
     times: list[NDArray[np.float64]]
@@ -92,7 +108,7 @@ class Fit(NamedTuple):
     ----------
     curve : CurveArrays
     columns : list of Columns
-        The reports in every factor.
+        The reports in each factor.
     method : str
         The method that was requested.
     faults : list of Fault
@@ -104,7 +120,7 @@ class Fit(NamedTuple):
     faults: list[Fault]
 
     def reports(self) -> list[Report]:
-        """The reports in every factor."""
+        """Return the reports in each factor."""
         times, batch = self.curve.times, self.curve.batch
         return [
             shaped(own, times, batch, part.space.curvature, self.method)
@@ -113,7 +129,7 @@ class Fit(NamedTuple):
 
 
 def kind_of(space: Space) -> type[CoreCurve]:
-    """How curves are made in a space that is no product."""
+    """Return the class of curves in a space that is not a product."""
     known: type[CoreCurve] | None = space.__dict__.get("_curve_kind")
     if known is None:
         known = next((kind for kind in (OnManifold, ReducedCurve) if kind.suits(space)), CoreCurve)
@@ -122,13 +138,15 @@ def kind_of(space: Space) -> type[CoreCurve]:
 
 
 def read(points: Any, space: Space[Any]) -> list[Points]:
-    """Points as a user gives them, in every factor."""
+    """Read points from the user in each factor."""
     if not isinstance(space, Product):
         return [_read(space, points)]
     found = _in_factors(space, _read, parts_of(points, space, "points"))
     if len({(part.batch, part.nodes) for part in found}) > 1:
         described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in found)
-        raise ValidationError(f"points: the factors differ in length, or batch axes differ: {described}")
+        raise ValidationError(
+            f"the factors of points have different lengths, or their batch axes differ: {described}"
+        )
     return found
 
 
@@ -156,7 +174,7 @@ def _read(space: Space, points: Any) -> Points:
 
 
 def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[list[End] | None]:
-    """End conditions in every factor."""
+    """Read end conditions in each factor."""
     if not isinstance(space, Product):
         return [ends_of(bc_type, space, batch)]
     conditions = ends_in_factors(bc_type, space)
@@ -166,10 +184,12 @@ def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[l
 def curve_of(
     space: Space[Any], times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
-    """The curve with points and velocities, which are there for every factor.
+    """Return the curve with given points and velocities in each factor.
 
-    Args:
-        fitted: whether velocities are those of a C² curve, not any.
+    Parameters
+    ----------
+    fitted : bool
+        Whether velocities are those of a C² curve.
     """
     if isinstance(space, Product):
         each = zip(space.factors, arrays, strict=True)
@@ -187,25 +207,25 @@ def _part(
 
 
 def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
-    """The mask that a user gives; None for all curves."""
+    """Read the argument `where`; None means all curves."""
     if where is None:
         return None
     mask = as_array(where, "where")
     if mask.dtype != bool or mask.shape != batch:
         raise ValidationError(
-            f"where must be True or False for every curve, of shape {batch}, not {mask.dtype} of shape {mask.shape}"
+            f"where must be a Boolean array of shape {batch}, not {mask.dtype} of shape {mask.shape}"
         )
     return None if mask.all() else mask
 
 
 def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
-    """Fit curves of equal length."""
+    """Fit curves with equal numbers of points."""
     space, times, points, ends, options, check, mask, skip = problem
     if len(points) == 1 and kind_of(space) is CoreCurve:
-        # The core checks before it solves.
+        # The core validates the points in the same call.
         data = points[0]
         task = Task(
-            space, times, data.doubles, ends[0], data.tol if check else None, None, mask, check and skip
+            space, times, data.numbers, ends[0], data.tol if check else None, None, mask, check and skip
         )
         (found,) = solve((task,), options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
@@ -214,7 +234,7 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         Task(
             factor,
             times,
-            part.doubles,
+            part.numbers,
             end,
             part.tol if check else None,
             mask=mask,
@@ -240,7 +260,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
     for i, (factor, end) in enumerate(zip(factors_of(space), ends, strict=True)):
         parts = [own[i] for own in points]
         tol = max(part.tol for part in parts) if check else None
-        numbers = np.concatenate([part.doubles for part in parts])
+        numbers = np.concatenate([part.numbers for part in parts])
         tasks.append(Task(factor, row, numbers, end, tol, offsets, mask, check and skip))
     solved, faults = _solve(space, tasks, options, progress)
 
@@ -262,9 +282,9 @@ def validated(
     skip_invalid: bool = False,
     mask: Mask | None = None,
 ) -> tuple[list[Array], list[Fault]]:
-    """The points in every factor after validation, projected onto the space, and the faults of skipped curves."""
+    """Validate points and project them onto the space. Return them in each factor, and the faults of skipped curves."""
     tasks = [
-        Task(factor, times, part.doubles, end, part.tol, mask=mask, skip_invalid=skip_invalid)
+        Task(factor, times, part.numbers, end, part.tol, mask=mask, skip_invalid=skip_invalid)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     tasks, faults = _validated(space, tasks, _ANY)
@@ -274,25 +294,35 @@ def validated(
 def hermite_data(
     space: Space[Any], times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
 ) -> list[tuple[Array, Array, Array]]:
-    """Points on the space, tangent velocities, and the longest distance between neighbours of each curve, in every
-    factor.
+    """Validate the data of a Hermite spline.
 
-    Args:
-        velocities: contiguous, in every factor, with how far they may be from tangent.
+    Parameters
+    ----------
+    velocities : list of tuple
+        Contiguous velocities in each factor, with the tolerance of their normal component.
 
-    Raises:
-        ValidationError: points or times are invalid, or a velocity is not tangent.
-        CutLocusError: inner control points of a segment lie at or past each other's cut locus.
+    Returns
+    -------
+    list of tuple
+        In each factor, points on the space, tangent velocities, and the longest distance between neighbours of each
+        curve.
+
+    Raises
+    ------
+    ValidationError
+        If points or times are invalid, or a velocity is not tangent.
+    CutLocusError
+        If inner control points of a segment lie at or past each other's cut locus.
     """
 
     def checked(factor: Space, own: tuple[Points, tuple[Array, float]]) -> tuple[Array, Array, Array]:
         part, (vectors, tangent_tol) = own
         if isinstance(factor, Manifold):
-            task = Task(factor, times, part.doubles, _NATURAL, part.tol)
+            task = Task(factor, times, part.numbers, _NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
         found, tangent, longest = _core.hermite(
-            factor._handle, times, part.doubles, doubles, part.tol, tangent_tol
+            factor._handle, times, part.numbers, doubles, part.tol, tangent_tol
         )
         return factor._numbers(found), factor._numbers(tangent), longest
 
@@ -302,7 +332,7 @@ def hermite_data(
 def _solve(
     space: Space, tasks: list[Task], options: Options, progress: Progress | None
 ) -> tuple[list[Solved], list[Fault]]:
-    """Solve the task of every factor, and return the faults. All factors are validated before the first is solved."""
+    """Validate the tasks of all factors, then solve them. Return the solutions and the faults."""
     if all(kind_of(task.space) is CoreCurve for task in tasks):
         try:
             solved = solve(tasks, options, progress)
@@ -319,7 +349,7 @@ def _solve(
 
 
 def _validated(space: Space, tasks: list[Task], options: Options) -> tuple[list[Task], list[Fault]]:
-    """Tasks whose points are on their spaces; a curve that is skipped in one factor is masked in all."""
+    """Validate tasks and project their points. A curve that is skipped in one factor is masked in all of them."""
     each = _in_factors(space, lambda factor, task: kind_of(factor).validate(task, options), tasks)
     found = {fault.curve: fault for _, faults in reversed(each) for fault in faults}
     faults = [found[curve] for curve in sorted(found)]
@@ -328,8 +358,10 @@ def _validated(space: Space, tasks: list[Task], options: Options) -> tuple[list[
 
 
 def _faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
-    """The faults of invalid curves, and those in the first factor in which curves failed, or else in which there is
-    something to report, in the order of curves."""
+    """Return the faults of invalid curves and those of one factor, in the order of curves.
+
+    This is the first factor in which a curve failed. If there is none, it is the first factor with faults.
+    """
     skipped = {fault.curve: fault for fault in invalid}
     others = []
     for found in solved:
@@ -350,7 +382,7 @@ def _number(fault: Fault) -> int:
 
 
 def _in_factors(space: Space[Any], work: Callable[[Space, Any], _T], values: Sequence[Any]) -> list[_T]:
-    """What work gives in every factor for its value; errors say in which."""
+    """Apply a function to each factor and its value. Errors name the factor."""
     if not isinstance(space, Product):
         return [work(space, values[0])]
     results = []
@@ -363,12 +395,12 @@ def _in_factors(space: Space[Any], work: Callable[[Space, Any], _T], values: Seq
 
 
 def _in_factor(error: ValidationError, number: int, factor: Space) -> ValidationError:
-    """The error with the factor in which it was found."""
+    """Return an error that names its factor."""
     return error._with_message(f"factor {number}, {factor!r}: {error}")
 
 
 def _check_precision(problem: ManyProblem) -> list[Fault]:
-    """Points in double precision may not be as far off as those in single precision beside them."""
+    """Validate curves whose tolerance is stricter than the largest one, which the common call applies to all curves."""
     space, times, points, _, _, _, mask, skip = problem
     faults: dict[int, Fault] = {}
     for i, factor in enumerate(factors_of(space)):
@@ -381,7 +413,7 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
                         Task(
                             factor,
                             np.arange(len(times[number]), dtype=float),
-                            own[i].doubles,
+                            own[i].numbers,
                             _NATURAL,
                             own[i].tol,
                         ),

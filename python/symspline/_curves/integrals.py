@@ -1,4 +1,4 @@
-"""Integrals along curves, to rounding."""
+"""Integrals along curves, accurate up to rounding errors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .._typing import Number
 
 Doubles = NDArray[np.float64]
 
-# Gauss's rule with this many nodes, on an interval and on its halves.
+# Gauss–Legendre rule, applied to an interval and to its halves.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 EXACT = 1e-14
 _PATIENCE = 5
@@ -21,16 +21,17 @@ _PATIENCE = 5
 def integrate(
     times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT
 ) -> Number:
-    """∫ f dt over all segments, adaptively; f takes times of shape batch + (m,), and is exact to ``tol``.
+    """Integrate f over all segments by adaptive bisection, to the relative tolerance `tol`.
 
-    Where f is smooth the error falls fast; speed has kinks where a curve stops and turns, and
-    bisection closes in on them. An error that does not fall for some rounds is rounding, and is left.
+    The function takes times of shape batch + (m,). The speed of a curve has a kink where the curve stops and turns;
+    bisection then converges to the kink. An error that does not decrease for several rounds is a rounding error, and
+    bisection stops.
     """
     times = np.broadcast_to(times, (*batch, times.shape[-1]))
     a, b = times[..., :-1], times[..., 1:]
     if 0 in batch:
         return np.zeros(batch)
-    # What is too large for doubles becomes infinite, and a curve that was not found is NaN.
+    # Values beyond the floating-point range become infinite, and a curve without a solution is NaN.
     with np.errstate(all="ignore"):
         return _refined(a, b, f, batch, tol)
 
@@ -50,7 +51,7 @@ def _refined(
         left = error.sum(axis=-1)
         stalled = stalled + ~(left <= before / 2)
         before = left
-        # Curves of a batch are refined together, interval by interval.
+        # An interval is bisected for all curves of the batch if one of them needs it.
         open_still = (stalled <= _PATIENCE)[..., None] & (error > tol * scale[..., None])
         rough = open_still.reshape(-1, a.shape[-1]).any(axis=0)
         if not rough.any():

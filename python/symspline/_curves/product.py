@@ -1,4 +1,4 @@
-"""Curves in a product: one in every factor, on the same knots."""
+"""Curves in a product space: one curve per factor, with the same knots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Tuple = tuple[Any, ...]
 
 
 class ProductCurve(CurveArrays):
-    """Curves in a product of spaces."""
+    """Curves in a product space."""
 
     space: Product
 
@@ -110,7 +110,7 @@ class ProductCurve(CurveArrays):
 
 
 def share(progress: Progress | None, i: int, count: int) -> Progress | None:
-    """Progress of the i-th of several works of one size, as progress of all."""
+    """Return a function that converts the progress of the i-th of `count` equal tasks to that of all of them."""
     return progress and partial(_advance, progress, i, count)
 
 
@@ -119,7 +119,7 @@ def _advance(progress: Progress, i: int, count: int, finished: int, total: int) 
 
 
 def longest_step(curve: CurveArrays) -> Any:
-    """D of (21): distances of the factors add as in Pythagoras' theorem, step by step."""
+    """Compute D in equation (21), the longest distance between neighbours in the product metric."""
     index = (slice(None),) * len(curve.batch)
     steps = [
         part.space._apply(

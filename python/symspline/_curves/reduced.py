@@ -1,8 +1,8 @@
-"""Curves in the span of their points: high ambient dimension without high cost.
+"""Low-rank reduction: curves in large spaces are computed in the span of their points.
 
-Vectors or subspaces of n dimensions that span only m < n lie in a copy of the space of m dimensions that
-is totally geodesic: geodesics and transvections between them never leave it. One QR decomposition gives
-coordinates there; the curve is fitted and evaluated in them and lifted back.
+Points in n dimensions that span only m < n dimensions lie in a totally geodesic copy of the same space in m
+dimensions: geodesics and transvections between them stay in it. One QR decomposition yields coordinates in the span.
+Curves are fitted and evaluated in these coordinates, and the results are embedded in the large space.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
 from .curve import NORMS, Doubles
 from .gradient import SampleTimes
-from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_some
+from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
 from .subspan import Span, span_of
 
 
 def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span | None]:
-    """A space, and points in it, to compute with; and the span to lift results from, if they lie in one."""
+    """Return the space and the points to compute with, and the span of a low-rank reduction or None."""
     if not ReducedCurve.suits(space):
         return space, points, None
     span = span_of(space, points)
@@ -31,11 +31,12 @@ def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span |
 
 
 class ReducedCurve(CoreCurve):
-    """Curves in a large space, made of plain ones in a small space.
+    """Curves in a large space that are computed in the span of their points.
 
-    Args:
-        fitted: whether velocities are those of a C² curve, which lie in the span of the points and the velocities
-            at the ends.
+    Parameters
+    ----------
+    fitted : bool
+        Whether velocities are those of a C² curve, which lie in the span of the points and the end velocities.
     """
 
     _compiled = False
@@ -53,12 +54,12 @@ class ReducedCurve(CoreCurve):
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
         if task.offsets is None:
-            return solve_some(task, options, progress, _solve)
+            return solve_unmasked(task, options, progress, _solve)
         return one_by_one(task, options, progress, _solve)
 
     @cached_property
     def small(self) -> tuple[Span, CoreCurve]:
-        """The span, and the curves in it; kept from the first use on."""
+        """The span and the curves in it, computed once."""
         vectors = self.velocities
         if self._fitted:
             vectors = np.take(vectors, [0, -1], axis=len(self.batch))
@@ -83,12 +84,12 @@ class ReducedCurve(CoreCurve):
         start: Doubles,
         progress: Progress | None,
     ) -> Array:
-        # The span has the same factors.
+        # Unitary factors of the lift are the same in the span.
         span, small = self.small
         return span.embed_samples(small._lifted(x, quantity, outside, per_curve, start, progress), self.batch)
 
     def transport(self, times: tuple[float, float], outside: str, v: Any) -> Array:
-        # What the vector has outside the span of the curve is carried, too.
+        # The span includes the vector, whose component outside the span of the curve is transported, too.
         knots = len(self.batch)
         rows = np.expand_dims(np.asarray(v, self.space.dtype), knots)
         span = span_of(self.space, self.points, self.velocities, rows)
@@ -106,8 +107,8 @@ class ReducedCurve(CoreCurve):
 
     def _refuse_derivatives(self) -> Never:
         raise ValidationError(
-            f"derivatives with respect to the data are not made in as many dimensions as {self.space} has: "
-            "motions of points leave the span in which the curve is computed"
+            f"derivatives with respect to the data are not available, because the dimension of {self.space} is too "
+            "large: the curve is computed in the span of its points, which motions of the points leave"
         )
 
     def _with(self, times: Doubles, points: Array, velocities: Array) -> Self:
@@ -119,10 +120,10 @@ class ReducedCurve(CoreCurve):
 
 
 def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
-    """Curves of one length."""
+    """Solve a task of curves with equal numbers of points in the span of the points."""
     space = task.space
     points = space._numbers(task.points)
-    # Vectors at the ends as rows of one knot.
+    # End vectors have shape (..., 1, *point_shape), as arrays with one knot.
     axis = -1 - len(space.point_shape)
     vectors = [
         None if value is None else np.expand_dims(space._numbers(value), axis) for _, value in task.ends or []

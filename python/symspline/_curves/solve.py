@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 
 
 class Options(NamedTuple):
-    """How to solve, as `symspline.CubicSpline` takes it."""
+    """Options of the solver, as for `symspline.CubicSpline`."""
 
     method: str
     tol: float
@@ -29,17 +29,26 @@ class Options(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Points to join by curves.
+    """Points to interpolate in a space that is not a product.
 
-    Attributes:
-        space: not a product.
-        times: knots, shape (N+1,), or (..., N+1) with one row per curve; with ``offsets`` all in one row.
-        points: contiguous floating-point numbers, shape (..., N+1, *numbers of a point).
-        ends: conditions at both ends, None for closed curves.
-        tol: how far off the space points may be; None if nothing is to be checked.
-        offsets: where curves of different lengths begin in one long row of points, and where the last ends.
-        mask: which curves are fitted, shape of the batch; the others are NaN. None for all.
-        skip_invalid: whether curves with points off the space are masked instead of an error.
+    Attributes
+    ----------
+    space : Space
+        A space other than a product.
+    times : ndarray, shape (N+1,) or (..., N+1)
+        Knots, shared or with one row per curve. With `offsets`, one row for all curves.
+    points : ndarray, shape (..., N+1, *numbers of a point)
+        Contiguous floating-point numbers.
+    ends : list of End or None
+        Conditions at both ends; None for closed curves.
+    tol : float or None
+        Tolerance of points off the space; None omits all validation.
+    offsets : list of int or None
+        Where each of several curves of different lengths begins in one long row of points, and where the last ends.
+    mask : ndarray of bool or None
+        Curves to fit, of the shape of the batch; masked curves are NaN. None fits all curves.
+    skip_invalid : bool
+        Whether curves with points off the space are masked instead of raising an error.
     """
 
     space: Space
@@ -60,7 +69,7 @@ class Task(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """Points on the space, velocities there, the columns of the report, and faults."""
+    """Points on the space, velocities at the knots, the columns of the report, and faults."""
 
     points: Array
     velocities: Array
@@ -160,7 +169,7 @@ def one_by_one(
     return Solved(points, velocities, columns, faults)
 
 
-def solve_some(
+def solve_unmasked(
     task: Task,
     options: Options,
     progress: Progress | None,

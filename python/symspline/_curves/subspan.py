@@ -1,4 +1,4 @@
-"""Coordinates in the span of some points."""
+"""Coordinates of points in the span of the data."""
 
 from __future__ import annotations
 
@@ -11,26 +11,37 @@ from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Spac
 
 
 class Span(NamedTuple):
-    """A large space, a small one, and an orthonormal basis of the span: shape (..., n, m). In hyperbolic
-    space the basis is of the space-like part; the time-like coordinate stays."""
+    """A large space, the small space of coordinates in a span, and a basis of that span.
+
+    In hyperbolic space, the basis is that of the space-like part. The time-like coordinate does not change.
+
+    Attributes
+    ----------
+    large : Space
+        The large space.
+    space : Space
+        The space of coordinates.
+    basis : ndarray, shape (..., n, m)
+        Orthonormal columns.
+    """
 
     large: Space
     space: Space
     basis: Array
 
     def coordinates(self, x: Array) -> Array:
-        """Coordinates of points or vectors of one space, shape (..., knots, *point_shape)."""
+        """Return coordinates of points or vectors of shape (..., knots, *point_shape)."""
         time, columns, shape = _columns(self.space, x)
         small = np.swapaxes(self.basis.conj(), -1, -2) @ columns
         return _uncolumns(self.space, time, small, shape)
 
     def embed(self, x: Array) -> Array:
-        """Points or vectors with given coordinates."""
+        """Return the points or vectors with given coordinates."""
         time, columns, shape = _columns(self.space, x)
         return _uncolumns(self.space, time, self.basis @ columns, shape)
 
     def embed_samples(self, values: Array, batch: tuple[int, ...]) -> Array:
-        """Points or vectors of shape batch + times + (*point_shape) of the small space, back in the large."""
+        """Embed points or vectors of shape batch + times + (*point_shape)."""
         axes = len(self.space.point_shape)
         times = values.shape[len(batch) : values.ndim - axes]
         flat = values.reshape(*batch, math.prod(times), *self.space.point_shape)
@@ -38,7 +49,7 @@ class Span(NamedTuple):
 
 
 def span_of(space: Space, *arrays: Array) -> Span:
-    """The span of arrays of points or vectors, each of shape batch + (knots, *point_shape)."""
+    """Compute the span of points or vectors, in arrays of shape batch + (knots, *point_shape)."""
     columns = np.concatenate([_columns(space, array)[1] for array in arrays], axis=-1)
     basis = np.linalg.qr(columns)[0]
     return Span(space, _small(space, basis.shape[-1]), basis)
@@ -54,7 +65,7 @@ def _small(space: Space, m: int) -> Space:
 
 
 def _columns(space: Space, x: Array) -> tuple[Array | None, Array, tuple[int, ...]]:
-    """The columns of all knots side by side, shape (..., n, knots · width), and the time-like part."""
+    """Return the time-like part, one matrix of shape (..., n, knots · width) with all columns, and the shape of x."""
     if len(space.point_shape) == 1:
         time, rest = (x[..., :1], x[..., 1:]) if isinstance(space, Hyperbolic) else (None, x)
         return time, np.swapaxes(rest, -1, -2), x.shape

@@ -148,7 +148,7 @@ class Given(NamedTuple):
                     chosen.flat[number] = False
         if chosen.all():
             return self, faults
-        return self._some(space, np.flatnonzero(chosen)), faults
+        return self._take_batch(space, np.flatnonzero(chosen)), faults
 
     def _plain(self, space: Space) -> tuple[Space, Doubles, list[Points], list[list[End] | None]]:
         """Return the data in a form in which only points are checked.
@@ -160,7 +160,7 @@ class Given(NamedTuple):
         ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
         return space, plain, self.data, ends
 
-    def _some(self, space: Space, chosen: NDArray[np.intp]) -> Given:
+    def _take_batch(self, space: Space, chosen: NDArray[np.intp]) -> Given:
         """Return some of the curves, along one batch axis."""
         lead = len(self.batch)
 
@@ -172,7 +172,7 @@ class Given(NamedTuple):
             self.time_axis,
             self.t if self.t.ndim == 1 else rows(self.t),
             self.times if shared else rows(self.times),
-            [part._replace(doubles=rows(part.doubles), batch=(len(chosen),)) for part in self.data],
+            [part._replace(numbers=rows(part.numbers), batch=(len(chosen),)) for part in self.data],
             [own.map(rows) for own in self.precisions],
             [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
             (len(chosen),),
@@ -225,9 +225,9 @@ def _without_missing(part: Points, weights: list[Doubles]) -> Points:
     last = np.maximum.accumulate(np.where(missing, -1, order), axis=-1)
     first = np.argmin(missing, axis=-1)[..., None]
     found = np.where(last < 0, first, last)
-    axes = part.doubles.ndim - found.ndim
-    doubles = np.take_along_axis(part.doubles, found.reshape(*found.shape, *[1] * axes), axis=found.ndim - 1)
-    return part._replace(doubles=np.ascontiguousarray(doubles))
+    axes = part.numbers.ndim - found.ndim
+    doubles = np.take_along_axis(part.numbers, found.reshape(*found.shape, *[1] * axes), axis=found.ndim - 1)
+    return part._replace(numbers=np.ascontiguousarray(doubles))
 
 
 def _enough(times: Doubles, weights: Doubles, batch: tuple[int, ...]) -> NDArray[np.bool_]:

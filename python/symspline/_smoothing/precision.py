@@ -78,10 +78,10 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
             frames_of = (
                 [frame] * len(spaces) if frame is None else _one_a_factor(frame, "frames", len(spaces))
             )
-            points = split(factor, factor._numbers(part.doubles))
+            points = split(factor, factor._numbers(part.numbers))
             for space_of, one, at, rows in zip(spaces, each, frames_of, points, strict=True):
                 doubles = np.ascontiguousarray(space_of._as_doubles(rows))
-                found.append(_in_factor(space_of, one, at, part._replace(doubles=doubles)))
+                found.append(_in_factor(space_of, one, at, part._replace(numbers=doubles)))
             continue
         precision = _in_factor(factor, given, frame, part)
         found += [precision] if len(spaces) == 1 else _in_parts(precision, factor, part)
@@ -107,7 +107,7 @@ def _in_parts(precision: Precision, space: Space, data: Points) -> list[Precisio
     if precision.information is None:
         return [precision] * len(parts)
     lead = (*data.batch, data.nodes)
-    points = space._numbers(data.doubles).reshape(lead + space.point_shape)
+    points = space._numbers(data.numbers).reshape(lead + space.point_shape)
     good = np.isfinite(points).all(axis=(-2, -1))
     into = np.zeros((*lead, space.dim, space.dim))
     into[good] = np.linalg.inv(coordinates_in_parts(space, space.project(points[good])))
@@ -215,7 +215,7 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
             f"frames has shape {given.shape}, but {m} tangent vectors at every point of {space!r} have the shape "
             f"{(*lead, m, *space.point_shape)}"
         )
-    points = space._numbers(data.doubles).reshape(lead + space.point_shape)
+    points = space._numbers(data.numbers).reshape(lead + space.point_shape)
     # Invalid points are reported later.
     used = np.broadcast_to(used, lead) & np.isfinite(points).all(axis=tuple(range(len(lead), points.ndim)))
     vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]

@@ -67,7 +67,7 @@ def _bounds(problem: Problem, matrix: Tridiagonal, x: Doubles, pace: Doubles) ->
     term = matrix.step(first)
     size = _largest(term)
     unit = np.where(size[:, None, None] > 0, _unit(term), _unit(matrix.step(_free(problem, first))))
-    line = problem.some(np.tile(curves, 3))
+    line = problem.take_batch(np.tile(curves, 3))
     samples = np.concatenate([x + k * reach[:, None, None] * unit for k in (1, 2, 3)])
     ahead = c2_residuals(line, line.velocities(samples)).reshape(3, *x.shape)
     third = ahead[2] - 3 * ahead[1] + 3 * ahead[0] - first

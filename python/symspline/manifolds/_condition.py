@@ -38,8 +38,8 @@ class End(NamedTuple):
     vector: Array | None = None
     logs: Array | None = None
 
-    def some(self, chosen: NDArray[np.int64]) -> End:
-        """Of some of the curves."""
+    def take_batch(self, chosen: NDArray[np.int64]) -> End:
+        """Return the condition for some of the curves."""
         return End(
             self.kind,
             None if self.vector is None else self.vector[chosen],
@@ -68,9 +68,9 @@ class Problem(NamedTuple):
     frames: Array
     ends: list[End] | None
 
-    def some(self, chosen: NDArray[np.int64]) -> Problem:
-        """Some of the curves."""
-        ends = self.ends and [end.some(chosen) for end in self.ends]
+    def take_batch(self, chosen: NDArray[np.int64]) -> Problem:
+        """Return the problem of some of the curves."""
+        ends = self.ends and [end.take_batch(chosen) for end in self.ends]
         return self._replace(h=self.h[chosen], p=self.p[chosen], frames=self.frames[chosen], ends=ends)
 
     def velocities(self, coordinates: Doubles) -> Array:

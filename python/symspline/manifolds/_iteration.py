@@ -127,7 +127,7 @@ def iterate(
             break
         if not left.all():
             chosen = chosen[left]
-            part = problem.some(chosen)
+            part = problem.take_batch(chosen)
             matrix = Tridiagonal(part)
         u = part.velocities(np.stack([states[i].x for i in chosen]))
         found = c2_residuals(part, u)

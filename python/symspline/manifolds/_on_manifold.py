@@ -14,7 +14,7 @@ from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
 from .._curves.curve import NORMS, REAL, Doubles
 from .._curves.gradient import SampleTimes
-from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_some
+from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_unmasked
 from .._faults import Fault
 from .._spaces import Array, Euclidean, Space
 from ._checks import validate_on_manifold
@@ -43,7 +43,7 @@ class OnManifold(CoreCurve):
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
         if task.offsets is not None:
             return one_by_one(task, options, progress, fit_of_one_length)
-        return solve_some(task, options, progress, fit_of_one_length)
+        return solve_unmasked(task, options, progress, fit_of_one_length)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
