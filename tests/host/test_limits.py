@@ -101,7 +101,7 @@ def test_hostile_files_do_not_abort():
 @pytest.mark.parametrize(
     ("name", "nodes", "options", "words"),
     [
-        ("spd:100", 20, {"method": "newton"}, "method='quasi-newton' needs far less"),
+        ("spd:100", 20, {"method": "newton"}, "pass method='quasi-newton', which needs far less"),
         ("so:60", 30, {"method": "homotopy"}, "so:60"),
         ("so:60", 2, {}, None),
         ("spd:40", 12, {}, None),

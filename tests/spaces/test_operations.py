@@ -155,7 +155,7 @@ def test_checks_name_the_index(space):
     p = points_on(space, 5, (2,), 0.5)
     bad = each(np.copy, p)
     parts(bad)[0][1, 3] = np.nan
-    with pytest.raises(ss.ValidationError, match=r"point 1,3 .*mend it or leave it out"):
+    with pytest.raises(ss.ValidationError, match=r"point 1,3 .*correct it or remove it"):
         space.check_point(bad)
     if isinstance(space, (ss.Euclidean, ss.GeneralLinear, ss.ComplexGeneralLinear)):
         # Every array is tangent.

@@ -154,8 +154,8 @@ TANGENT, ACROSS = [0, 0.5, 0], [0.5, 0, 0]
         (((1, [0, 1j, 0]), "natural"), r"the start velocity must be an array of real numbers, not of complex128"),
         (((1, None), "natural"), r"the start velocity must be an array of numbers, not of object: it is a NoneType"),
         (("natural", (1, ["a", "b", "c"])), r"the end velocity must be an array of real numbers, not of <U1"),
-        (((1, [0, NAN, 0]), "natural"), r"the start velocity holds NaN; it must be finite"),
-        (("natural", (2, [0, INF, 0])), r"the end acceleration holds inf; it must be finite"),
+        (((1, [0, NAN, 0]), "natural"), r"the start velocity contains NaN; it must be finite"),
+        (("natural", (2, [0, INF, 0])), r"the end acceleration contains inf; it must be finite"),
         (
             ((1, ACROSS), "natural"),
             r"the start velocity is not tangent at its point: a part of 1\.000e0 .*project_tangent",
@@ -172,7 +172,7 @@ def test_invalid_end_conditions_raise(bc_type, match):
     "vectors, match",
     [
         ([TANGENT, ACROSS], r"the start velocity of curve 1 is not tangent"),
-        ([TANGENT, [NAN, 0, 0]], r"the start velocity of curve 1 holds NaN"),
+        ([TANGENT, [NAN, 0, 0]], r"the start velocity of curve 1 contains NaN"),
         (np.zeros((3, 3)), r"does not broadcast to \(2, 3\)"),
         ([[0, 1, 0], [0, 10, 0]], r"too fast for .* of curve 1|of curve 1 .*too fast"),
     ],
@@ -182,10 +182,10 @@ def test_invalid_end_conditions_of_a_batch_raise(vectors, match):
 
 
 def test_curves_that_are_not_closed():
-    match = r"first and last point are 1\.571e0 apart \(allowed: 1e-8\); repeat the first point at the end"
+    match = r"the first and the last point are 1\.571e0 apart \(allowed: 1e-8\); repeat the first point at the end"
     fit_error(match, bc_type="periodic")
     closed = [*P, P[0]]
-    fit_error(r"first and last point of curve 1 are", None, [closed, [*P, P[1]]], bc_type="periodic")
+    fit_error(r"the first and the last point of curve 1 are", None, [closed, [*P, P[1]]], bc_type="periodic")
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "cp:2", "so:3", "hpd:2"])
@@ -193,7 +193,7 @@ def test_end_vectors_that_are_not_finite(name):
     p = points(name)
     v = tangents_at(ss.space(name), p[0])
     v.flat[-1] = NAN
-    with pytest.raises(ss.ValidationError, match=r"the start velocity holds NaN; it must be finite"):
+    with pytest.raises(ss.ValidationError, match=r"the start velocity contains NaN; it must be finite"):
         ss.CubicSpline(None, p, name, bc_type=((1, v), "natural"))
     with pytest.raises(ss.ValidationError, match=r"velocities\[0.* is not finite"):
         ss.evaluate(None, p, np.stack([v] * 4), name, 0.5)

@@ -150,7 +150,7 @@ pub fn memory(space: &Erased, operation: Option<Operation>) -> f64 {
     // Functions of a matrix keep some dozens of its size, with one number for every lane.
     let matrices = if space.point_shape().len() > 1 { 40.0 } else { 8.0 };
     let frame = if operation == Some(Operation::RandomTangent) { space.frame_len() as f64 } else { 0.0 };
-    // Bases of algebras hold a place, a number and a list for each dimension.
+    // Bases of algebras hold a position, a number and a list for each dimension.
     LANES as f64 * (matrices * space.point_len() as f64 + frame) + 5.0 * space.dim() as f64
 }
 
@@ -177,7 +177,7 @@ pub fn project_points(space: &Erased, points: &mut [f64], tol: f64) -> Result<()
         Ok(Some((row, off))) => {
             let x = &points[row * len..(row + 1) * len];
             let finite = x.iter().all(|x| x.is_finite());
-            Err((row, off, if finite { space.complaint(x) } else { "it is not finite".into() }))
+            Err((row, off, if finite { space.violation(x) } else { "it is not finite".into() }))
         }
         _ => Ok(()),
     }

@@ -111,7 +111,7 @@ impl fmt::Display for Reason {
             Reason::NotClosed { distance } => {
                 write!(f, "first and last point of a closed curve are {distance:.3e} apart")
             }
-            Reason::EndNotFinite(which, value) => write!(f, "{which} holds {value}; it must be finite"),
+            Reason::EndNotFinite(which, value) => write!(f, "{which} contains {value}; it must be finite"),
             Reason::EndNotTangent { which, normal } => {
                 write!(f, "{which} is not tangent at its point: its normal component is {normal:.3e}")
             }
@@ -218,7 +218,7 @@ pub fn points(space: &Erased, points: &mut [f64], offsets: &[usize], tol: f64) -
     if let Err((row, distance, condition)) = project_points(space, points, tol) {
         return at(row, Reason::OffSpace { distance, condition });
     }
-    if let Some((row, why)) = space.beyond_doubles(points) {
+    if let Some((row, why)) = space.imprecise_point(points) {
         return at(row, Reason::TooFewDigits(why));
     }
     if space.is_connected() {

@@ -254,7 +254,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
             self.project(noise);
         }
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         let before = self.read(&lanes);
         let p = before.hermitian_part();

@@ -41,8 +41,8 @@ impl Siegel {
     }
 
     /// Tangent vectors at the identity are (A, B; B, −A) with symmetric A and B. For each two of their coordinates the
-    /// places of the one in A and its factor.
-    fn places(&self) -> impl Iterator<Item = (usize, usize, Lane)> {
+    /// positions of the one in A and its factor.
+    fn positions(&self) -> impl Iterator<Item = (usize, usize, Lane)> {
         let n = self.n;
         (0..n).flat_map(move |i| {
             (i..n).map(move |j| (i, j, if i == j { lane(FRAC_1_SQRT_2) } else { lane(0.5) }))
@@ -66,7 +66,7 @@ impl Part for Siegel {
     }
     fn widen<S: Scalar>(&self, x: &[S], wide: &mut [S]) {
         let (n, mut m) = (self.n, Square::zeros(2 * self.n, 2 * self.n));
-        for ((i, j, factor), x) in self.places().zip(x.as_chunks::<2>().0) {
+        for ((i, j, factor), x) in self.positions().zip(x.as_chunks::<2>().0) {
             let [a, b] = x.each(|x| [x * factor]);
             for (i, j) in [(i, j), (j, i)] {
                 m[(i, j)] = a;
@@ -79,7 +79,7 @@ impl Part for Siegel {
     }
     fn narrow<S: Scalar>(&self, wide: &[S], x: &mut [S]) {
         let (n, m) = (self.n, self.whole.algebra().matrix(wide));
-        for ((i, j, factor), x) in self.places().zip(x.as_chunks_mut::<2>().0) {
+        for ((i, j, factor), x) in self.positions().zip(x.as_chunks_mut::<2>().0) {
             // Each stands four times in the matrix, or twice on the diagonals of its blocks.
             let factor = if i == j { factor } else { factor * lane(2.0) };
             *x = [m[(i, j)][0] - m[(n + i, n + j)][0], m[(i, n + j)][0] + m[(j, n + i)][0]]
@@ -111,12 +111,12 @@ impl Part for Siegel {
         of([&across, &beside, &zero, &c]).write(g);
         of([&c_adjoint, &minus, &zero, &back]).write(inverse);
     }
-    fn complaint(&self, p: &[Lane]) -> String {
+    fn violation(&self, p: &[Lane]) -> String {
         let rounding = self.whole.rounding(p).to_array()[0];
         if rounding * f64::EPSILON > 1e-9 {
             return format!(
-                "it is not symplectic, of which doubles do not tell at its condition of {rounding:.1e}: move all points \
-                 by one isometry, such as z - x for a symmetric x"
+                "its condition number of {rounding:.1e} is too large to verify in double precision that it is symplectic; \
+                 move all points by one isometry, such as z - x for a symmetric x"
             );
         }
         let p = self.read(p);

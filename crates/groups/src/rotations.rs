@@ -196,8 +196,8 @@ impl Ambient for Rotations {
     fn random_point(&self, noise: &mut [Lane]) {
         self.general.random_point(noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
-        self.general.complaint(x)
+    fn violation(&self, x: &[f64]) -> String {
+        self.general.violation(x)
     }
 }
 

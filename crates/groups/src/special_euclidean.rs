@@ -222,14 +222,14 @@ impl Ambient for SpecialEuclidean {
         }
         self.last_row(Lane::ONE, noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let n = self.n;
         let last = &x[n * (n + 1)..];
         if last.iter().enumerate().any(|(j, x)| (x - if j == n { 1.0 } else { 0.0 }).abs() > 1e-8) {
             return format!("its last row is {last:?}, not (0, …, 0, 1)");
         }
         let r: Vec<f64> = (0..n * n).map(|c| x[c / n * (n + 1) + c % n]).collect();
-        let why = special_orthogonal(n).map_or(String::new(), |group| group.complaint(&r));
+        let why = special_orthogonal(n).map_or(String::new(), |group| group.violation(&r));
         format!("in its rotation, {why}")
     }
     /// That of the translation, in whatever units it is.

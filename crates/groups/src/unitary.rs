@@ -235,7 +235,7 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         }
         p.write(noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         let p = self.read(&lanes);
         let off = p.adjoint_times(&p).plus_identity(lane(-1.0)).size().to_array()[0];

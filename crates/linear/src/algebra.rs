@@ -7,7 +7,7 @@ use symspline_core::matrix::Matrix;
 use symspline_core::scalar::{Lane, Scalar, lane};
 use symspline_core::space::stretch_series;
 
-/// A basis matrix: the places of its numbers that are not zero, row by row, and the numbers.
+/// A basis matrix: the positions of its numbers that are not zero, row by row, and the numbers.
 type Element = Vec<(usize, f64)>;
 
 /// A Lie algebra of n × n matrices, real for D = 1, complex for D = 2.
@@ -21,7 +21,7 @@ pub struct Algebra<const D: usize> {
 /// Bases by the numbers of an entry, the size and the group.
 type Bases = BTreeMap<(usize, usize, Members), &'static OnceLock<Vec<Element>>>;
 
-/// Places for the bases of all algebras that were asked for. They stay, so that a space can be copied; a basis is made
+/// Positions for the bases of all algebras that were asked for. They stay, so that a space can be copied; a basis is made
 /// when it is first needed, so that a name alone costs nothing.
 static BASES: Mutex<Bases> = Mutex::new(Bases::new());
 

@@ -140,9 +140,9 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
         exp_any_minus_one(&omega).plus_identity(Lane::ONE).write(noise);
         self.project(noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
-        self.members.complaint(&self.read(&lanes))
+        self.members.violation(&self.read(&lanes))
     }
     /// The condition of p: a change of p by its rounding is so much larger seen from p.
     fn rounding(&self, p: &[Lane]) -> Lane {

@@ -150,7 +150,7 @@ impl Part for IndefiniteGrassmannian {
         let o: Vec<Lane> = (0..self.rows()).map(|i| lane(if self.inside(i) { 1.0 } else { -1.0 })).collect();
         g.times(&Matrix::diagonal(&o)).times(&self.inverse(&g)).write(noise);
     }
-    fn complaint(&self, p: &[Lane]) -> String {
+    fn violation(&self, p: &[Lane]) -> String {
         let ([a, b], x) = (self.subspace, self.read(p));
         let off = x.times(&x).plus_identity(lane(-1.0)).size().to_array()[0];
         let why = if off > 1e-8 {

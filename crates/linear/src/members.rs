@@ -147,7 +147,7 @@ impl Members {
     }
 
     /// Says in words and numbers why x, which is finite, is not a point.
-    pub fn complaint<const D: usize>(self, p: &Point<D>) -> String {
+    pub fn violation<const D: usize>(self, p: &Point<D>) -> String {
         let n = p.rows();
         let number = |x: Lane| x.to_array()[0];
         if self.maps() {
@@ -158,7 +158,7 @@ impl Members {
         }
         let (condition, size) = (number(condition(p)), number(p.size()));
         if !(size > 0.0 && size.is_finite()) {
-            return "it is zero, or squares of its numbers are too large or too small for doubles".into();
+            return "it is zero, or the squares of its entries overflow or underflow".into();
         }
         if !(condition < SINGULAR) {
             return format!("it is singular: its condition number is {condition:.1e}");

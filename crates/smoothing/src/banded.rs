@@ -11,13 +11,13 @@ pub fn stride(coupled: usize) -> usize {
     (WIDTH + 1) * coupled
 }
 
-/// Entries on the diagonal and `width` places left of it, row by row; after [`factor`](Banded::factor) those of L and
+/// Entries on the diagonal and `width` positions left of it, row by row; after [`factor`](Banded::factor) those of L and
 /// D with A = L D Lᵀ.
 #[derive(Clone, Default)]
 pub struct Banded {
     /// Rows and columns.
     pub size: usize,
-    /// Places beside the diagonal that are not zero.
+    /// Positions beside the diagonal that are not zero.
     pub width: usize,
     entries: Vec<Lane>,
 }
@@ -33,20 +33,20 @@ impl Banded {
         Banded { size, width, entries: (0..size * (width + 1)).map(entry).collect() }
     }
 
-    fn place(&self, i: usize, j: usize) -> usize {
+    fn position(&self, i: usize, j: usize) -> usize {
         let (row, column) = if i >= j { (i, j) } else { (j, i) };
         row * (self.width + 1) + row - column
     }
 
-    /// A place inside the band.
+    /// A position inside the band.
     pub fn entry(&mut self, i: usize, j: usize) -> &mut Lane {
-        let place = self.place(i, j);
-        &mut self.entries[place]
+        let position = self.position(i, j);
+        &mut self.entries[position]
     }
 
     /// An entry inside the band.
     pub fn at(&self, i: usize, j: usize) -> Lane {
-        self.entries[self.place(i, j)]
+        self.entries[self.position(i, j)]
     }
 
     /// Factors in place; positive definite matrices need no exchange of rows.
@@ -128,8 +128,8 @@ impl Banded {
                 for k in 1..=most {
                     sum -= self.entries[(i + k) * stride + k] * z.at(i + k, j);
                 }
-                let place = z.place(i, j);
-                z.entries[place] = sum;
+                let position = z.position(i, j);
+                z.entries[position] = sum;
             }
         }
         z

@@ -1,12 +1,12 @@
 //! How smooth: λ from the data.
 //!
 //! At a curve with residuals r and accelerations a the smoothing problem in frames is one of numbers, whose solution
-//! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`, or with [`Curved`] energy by the same with
+//! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`, or with [`JacobiOperator`] energy by the same with
 //! `(S + RP)ᵀMa`. Its residuals and degrees of freedom for eight λ at a time cost one banded solve.
 
-use crate::curved::Curved;
 use crate::cyclic::PeriodicCorrection;
-use crate::flat::{Flat, times_mass};
+use crate::jacobi_operator::JacobiOperator;
+use crate::linearized::{LinearProblem, times_mass};
 use crate::misfit::{Factors, Misfit};
 use crate::problem::Criterion;
 use symspline_core::scalar::{LANES, Lane, few, lane};
@@ -14,17 +14,17 @@ use symspline_core::scalar::{LANES, Lane, few, lane};
 /// A curve as the flat problem sees it: coordinates of m numbers, in units of the mean knot spacing.
 pub struct Linear<'a> {
     /// B, Ω and the like.
-    pub flat: &'a Flat,
+    pub linearized: &'a LinearProblem,
     /// Dimension of the space.
     pub m: usize,
     /// Residuals at the data, and their weights.
     pub misfit: &'a Misfit<'a>,
     /// Jacobi's operator, where it is not left out.
-    pub curved: Option<&'a Curved>,
+    pub jacobi: Option<&'a JacobiOperator>,
     /// How a closed curve goes on.
     pub periodic: Option<&'a PeriodicCorrection>,
     /// Accelerations at the knots.
-    pub bends: &'a [f64],
+    pub accelerations: &'a [f64],
     /// The standard deviation of the noise, for [`Criterion::Cp`].
     pub sigma: f64,
     /// BᵀWr.
@@ -36,22 +36,24 @@ pub struct Linear<'a> {
 impl<'a> Linear<'a> {
     /// `curvature` is ρ, the part of the energy's gradient that curvature makes.
     pub fn new(
-        flat: &'a Flat,
+        linearized: &'a LinearProblem,
         m: usize,
         misfit: &'a Misfit<'a>,
-        curved: Option<&'a Curved>,
+        jacobi: Option<&'a JacobiOperator>,
         periodic: Option<&'a PeriodicCorrection>,
-        bends: &'a [f64],
+        accelerations: &'a [f64],
         curvature: &[f64],
         sigma: f64,
     ) -> Self {
-        let mut pull = misfit.pull(flat, m);
+        let mut pull = misfit.pull(linearized, m);
         let mut stiffness = vec![0.0; pull.len()];
-        if let Some(curved) = curved {
-            stiffness = curved.pull(flat, bends);
+        if let Some(jacobi) = jacobi {
+            stiffness = jacobi.pull(linearized, accelerations);
         } else {
-            for (rows, vectors) in [(&flat.bends, bends), (&flat.values, curvature)] {
-                let mass = times_mass(&flat.basis, vectors, m);
+            for (rows, vectors) in
+                [(&linearized.accelerations, accelerations), (&linearized.values, curvature)]
+            {
+                let mass = times_mass(&linearized.basis, vectors, m);
                 for (row, x) in rows.iter().zip(mass.chunks_exact(m)) {
                     row.spread(x, &mut stiffness);
                 }
@@ -61,7 +63,7 @@ impl<'a> Linear<'a> {
             periodic.fold(&mut pull);
             periodic.fold(&mut stiffness);
         }
-        Linear { flat, m, misfit, curved, periodic, bends, sigma, pull, stiffness }
+        Linear { linearized, m, misfit, jacobi, periodic, accelerations, sigma, pull, stiffness }
     }
 
     /// The step of the coefficients for one λ, given the factors of A.
@@ -77,12 +79,12 @@ impl<'a> Linear<'a> {
 
     /// A for eight λ.
     pub fn factored(&self, lam: Lane) -> Factors {
-        self.misfit.factored(self.flat, self.m, self.curved, self.periodic, lam)
+        self.misfit.factored(self.linearized, self.m, self.jacobi, self.periodic, lam)
     }
 
     /// What eight λ come to.
     pub fn look(&self, lam: Lane) -> Look {
-        let (m, flat) = (self.m, self.flat);
+        let (m, linearized) = (self.m, self.linearized);
         let factors = self.factored(lam);
         let mut x: Vec<Lane> = self
             .pull
@@ -94,24 +96,24 @@ impl<'a> Linear<'a> {
         if let Some(periodic) = self.periodic {
             periodic.extend_lanes(&mut x);
         }
-        let freedom = self.misfit.freedom(flat, &factors.inverse_band());
-        let rss = self.misfit.rss(flat, m, &x);
+        let freedom = self.misfit.freedom(linearized, &factors.inverse_band());
+        let rss = self.misfit.rss(linearized, m, &x);
         // (a + Sδ)ᵀM(a + Sδ), with Jacobi's operator (a + (S + RP)δ)ᵀM(a + (S + RP)δ).
         let mut energy = Lane::ZERO;
         let bend = |i: usize, c: usize| {
-            let turned = self.curved.map_or(Lane::ZERO, |curved| curved.of_lanes(flat, i, &x, c));
-            lane(self.bends[i * m + c]) + flat.bends[i].of_lanes(&x, m, c) + turned
+            let turned = self.jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(linearized, i, &x, c));
+            lane(self.accelerations[i * m + c]) + linearized.accelerations[i].of_lanes(&x, m, c) + turned
         };
         for c in 0..m {
             let mut left = bend(0, c);
-            for i in 0..flat.basis.knots() - 1 {
+            for i in 0..linearized.basis.knots() - 1 {
                 let right = bend(i + 1, c);
-                energy += (left * left + left * right + right * right) * lane(flat.basis.h(i) / 3.0);
+                energy += (left * left + left * right + right * right) * lane(linearized.basis.h(i) / 3.0);
                 left = right;
             }
         }
         // What rounding leaves of a matrix may have degrees of freedom that no curve has.
-        let least = lane(0.9 * flat.null().min(flat.free() as f64));
+        let least = lane(0.9 * linearized.null().min(linearized.free() as f64));
         let sound = factors.least_pivot().simd_gt(Lane::ZERO) & freedom.simd_gt(least);
         Look { freedom, rss, energy, sound, log_det: factors.log_det() }
     }
@@ -126,9 +128,10 @@ impl<'a> Linear<'a> {
         const DECADES: f64 = 7.5;
         /// With so few degrees of freedom more than curves without energy have, every larger λ is as good.
         const STRAIGHT: f64 = 0.01;
-        let straight = self.flat.null() + STRAIGHT;
-        let start = self.flat.balance().log10();
-        let (mut from, mut to) = (start + RANGE.0 + 3.0 * self.flat.basis.short().log10(), start + RANGE.1);
+        let straight = self.linearized.null() + STRAIGHT;
+        let start = self.linearized.balance().log10();
+        let (mut from, mut to) =
+            (start + RANGE.0 + 3.0 * self.linearized.basis.short().log10(), start + RANGE.1);
         let bounds = (from, to);
         if let Some(guess) = guess {
             (from, to) = ((guess.log10() - NEAR).max(from), (guess.log10() + NEAR).min(to));
@@ -182,7 +185,7 @@ impl<'a> Linear<'a> {
             }
             Criterion::Cp => per + look.freedom * lane(2.0 * self.sigma * self.sigma),
             Criterion::Reml => {
-                let (count, null) = (self.flat.free() as f64, self.flat.null());
+                let (count, null) = (self.linearized.free() as f64, self.linearized.null());
                 lane(n - null) * (per + lam * look.energy / lane(m)).ln() + look.log_det
                     - lane(count - null) * lam.ln()
             }
@@ -205,13 +208,13 @@ pub struct Look {
     pub sound: Lane,
 }
 
-/// The place of the least score among curves that are no geodesics, or the first geodesic if that is better. Where the
+/// The position of the least score among curves that are no geodesics, or the first geodesic if that is better. Where the
 /// score is least for the roughest curve, which goes through the data, a minimum between the bounds is taken instead:
 /// cross-validation has one where noise is to be seen, however low the score falls beyond it.
 fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
     let end = seen.iter().position(|look| look.2 <= straight).map_or(seen.len(), |first| first + 1);
-    let lowest = |places: &mut dyn Iterator<Item = usize>| {
-        places.filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
+    let lowest = |positions: &mut dyn Iterator<Item = usize>| {
+        positions.filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
     };
     let best = lowest(&mut (0..end))?;
     // Where the curve hardly changes any more, rounding makes minima.
@@ -223,8 +226,8 @@ fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
 }
 
 /// Whether nothing rougher than one of the curves is known.
-fn rough(seen: &[(f64, f64, f64)], place: usize) -> bool {
-    place == 0 || !seen[place - 1].1.is_finite()
+fn rough(seen: &[(f64, f64, f64)], position: usize) -> bool {
+    position == 0 || !seen[position - 1].1.is_finite()
 }
 
 /// Where the parabola through three points is lowest; the middle one is.

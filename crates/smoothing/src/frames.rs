@@ -169,15 +169,15 @@ impl<'a> Frames<'a> {
 }
 
 /// ρ = −[u, [u, a]]: what curvature adds to the gradient of the energy.
-pub fn curvature_terms(space: &Erased, speeds: &[f64], bends: &[f64]) -> Vec<f64> {
+pub fn curvature_terms(space: &Erased, speeds: &[f64], accelerations: &[f64]) -> Vec<f64> {
     let m = space.dim();
-    let count = bends.len() / m;
-    let mut out = vec![0.0; bends.len()];
+    let count = accelerations.len() / m;
+    let mut out = vec![0.0; accelerations.len()];
     let [mut u, mut a, mut rho] = [(); 3].map(|_| vec![Lane::ZERO; m]);
     for (group, out) in out.chunks_mut(LANES * m).enumerate() {
         let at = lanes_of(group, count);
         gather(at.map(|i| &speeds[i * m..][..m]), &mut u);
-        gather(at.map(|i| &bends[i * m..][..m]), &mut a);
+        gather(at.map(|i| &accelerations[i * m..][..m]), &mut a);
         space.triple(&u, &u, &a, &mut rho);
         rho.iter_mut().for_each(|x| *x = -*x);
         scatter(&rho, out);

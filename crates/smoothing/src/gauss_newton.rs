@@ -6,7 +6,7 @@
 //! a block tridiagonal system.
 
 use crate::information::{self, Root};
-use crate::path::{Path, Place};
+use crate::path::{Path, Position};
 use symspline_core::derivative::{Derivative, Matrix, Of, Vector};
 use symspline_core::fit::Ends;
 use symspline_core::monitor::{Monitor, checkpoint};
@@ -17,10 +17,10 @@ use symspline_core::space::{Ambient, Erased, Frame, Origin};
 /// Two Gauss points a segment: exact where the acceleration is linear, as in flat space.
 pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// What is known at the data: places and residuals, which are tangent vectors there.
+/// What is known at the data: positions and residuals, which are tangent vectors there.
 pub struct Pull<'a> {
     /// Where they are.
-    pub places: &'a [Place],
+    pub positions: &'a [Position],
     /// The points of the curve there.
     pub points: &'a [f64],
     /// `log_γ y`.
@@ -36,17 +36,17 @@ pub struct Pull<'a> {
 /// ∫ |∇γ'|² dt, by two points a segment.
 pub fn energy(space: &Erased, path: &Path) -> f64 {
     let len = space.point_len();
-    let places = quadrature(path.t.len() - 1);
-    let (points, bends) = (path.at(space, &places), path.bends(space, &places));
+    let positions = quadrature(path.t.len() - 1);
+    let (points, accelerations) = (path.at(space, &positions), path.accelerations(space, &positions));
     let square = |i: usize| {
-        let [p, a] = [&points, &bends].map(|x| lanes(&x[i * len..][..len]));
+        let [p, a] = [&points, &accelerations].map(|x| lanes(&x[i * len..][..len]));
         space.inner(&p, &a, &a).as_array()[0]
     };
-    let h = |i: usize| path.t[places[i].0 + 1] - path.t[places[i].0];
-    (0..places.len()).map(|i| 0.5 * h(i) * square(i)).sum()
+    let h = |i: usize| path.t[positions[i].0 + 1] - path.t[positions[i].0];
+    (0..positions.len()).map(|i| 0.5 * h(i) * square(i)).sum()
 }
 
-fn quadrature(segments: usize) -> Vec<Place> {
+fn quadrature(segments: usize) -> Vec<Position> {
     (0..segments).flat_map(|i| GAUSS.map(|tau| (i, tau))).collect()
 }
 
@@ -73,10 +73,10 @@ pub fn step(
     let nodes = if closed { n } else { n + 1 };
     let mut system = Tridiagonal::new(nodes, 3 * m);
 
-    let places = quadrature(n);
-    let between = path.at(space, &places);
-    let samples = [(pull.places, pull.points), (&places, &between)];
-    let bends = path.bends(space, &places);
+    let positions = quadrature(n);
+    let between = path.at(space, &positions);
+    let samples = [(pull.positions, pull.points), (&positions, &between)];
+    let accelerations = path.accelerations(space, &positions);
     let mut parts: Vec<(usize, Matrix, Vector)> =
         (0..n).map(|i| (i, Matrix::zeros(4 * m, 4 * m), Vector::zeros(4 * m))).collect();
     parallel::for_each(parts.iter_mut().collect(), threads, monitor, |(segment, square, right)| {
@@ -95,8 +95,8 @@ pub fn step(
             let weighed = rows.map_or(matrix.clone(), |rows| rows * &matrix);
             *square += weighed.tr_mul(&weighed) * weight;
         };
-        let first = pull.places.partition_point(|place| place.0 < *segment);
-        let here = pull.places[first..].iter().take_while(|place| place.0 == *segment).count();
+        let first = pull.positions.partition_point(|position| position.0 < *segment);
+        let here = pull.positions[first..].iter().take_while(|position| position.0 == *segment).count();
         for k in first..first + here {
             let r = &pull.vectors[k * len..][..len];
             let factor = pull.factors.map_or(1.0, |factors| factors[k]);
@@ -113,7 +113,7 @@ pub fn step(
         }
         let h = path.t[*segment + 1] - path.t[*segment];
         for k in 2 * *segment..2 * *segment + 2 {
-            let (matrix, bend) = at(1, k, Of::Acceleration, &bends[k * len..][..len]);
+            let (matrix, bend) = at(1, k, Of::Acceleration, &accelerations[k * len..][..len]);
             add(matrix, None, -bend.column(0), lam * h / 2.0);
         }
     });
@@ -122,8 +122,8 @@ pub fn step(
             for b in 0..2 {
                 let block = square.view((2 * a * m, 2 * b * m), (2 * m, 2 * m));
                 let (row, column) = ((segment + a) % nodes, (segment + b) % nodes);
-                let mut place = system.block(row, column).view_mut((0, 0), (2 * m, 2 * m));
-                place += block;
+                let mut position = system.block(row, column).view_mut((0, 0), (2 * m, 2 * m));
+                position += block;
             }
             let mut rows = system.right[(segment + a) % nodes].rows_mut(0, 2 * m);
             rows += right.rows(2 * a * m, 2 * m);
@@ -134,10 +134,10 @@ pub fn step(
         for (from, list, scale) in [(0, &row.points, unit * unit), (m, &row.u, unit)] {
             for (node, matrix) in list {
                 let block = matrix * scale;
-                let mut place = system.block(i, *node).view_mut((2 * m, from), (m, m));
-                place += &block;
-                let mut place = system.block(*node, i).view_mut((from, 2 * m), (m, m));
-                place += block.transpose();
+                let mut position = system.block(i, *node).view_mut((2 * m, from), (m, m));
+                position += &block;
+                let mut position = system.block(*node, i).view_mut((from, 2 * m), (m, m));
+                position += block.transpose();
             }
         }
     }

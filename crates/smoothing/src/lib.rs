@@ -14,12 +14,13 @@
 mod banded;
 pub mod chi;
 mod choice;
-mod curved;
+mod curve_fit;
 mod cyclic;
-mod flat;
 mod frames;
 mod gauss_newton;
 mod information;
+mod jacobi_operator;
+mod linearized;
 mod loss;
 mod misfit;
 mod path;
@@ -29,9 +30,8 @@ mod residuals;
 mod robust;
 mod smooth;
 mod start;
-mod track;
 mod variance;
 
-pub use problem::{Criterion, Data, Ends, FlatEnd, Loss, Options, Report, Smooth, State, Tier};
+pub use problem::{Criterion, Data, EndCondition, Ends, Loss, Options, Report, Smooth, State, Tier};
 pub use smooth::smooth;
 pub use variance::variance;

@@ -131,7 +131,7 @@ pub fn plausible(space: &Erased, data: &Data) -> [Vec<f64>; 3] {
         let [times, points, weights] = pick(&chosen);
         let found = deviations(space, &times, &points, &weights);
         let limit = FAR * median(&found);
-        // An outlier spoils the geodesics of its neighbours, too: only the worst one in a place goes.
+        // An outlier spoils the geodesics of its neighbours, too: only the worst one of several neighbours goes.
         let worst = |k: usize| {
             let near = &found[k.saturating_sub(1)..(k + 2).min(found.len())];
             found[k] > limit && near.iter().all(|x| *x <= found[k])

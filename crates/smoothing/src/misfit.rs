@@ -2,13 +2,13 @@
 //!
 //! Weights that are numbers weigh all coordinates alike, and A is the same for each of them. Weights that are matrices
 //! couple the coordinates: A is one matrix of all, with the width of a band of blocks. So does the curvature of the
-//! space, where it is not left out: see [`Curved`].
+//! space, where it is not left out: see [`JacobiOperator`].
 
 use crate::banded::{Banded, WIDTH, stride};
-use crate::curved::Curved;
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::flat::{Flat, OVERLAP, Row};
 use crate::information::Seen;
+use crate::jacobi_operator::JacobiOperator;
+use crate::linearized::{LinearProblem, OVERLAP, Row};
 use std::borrow::Cow;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 
@@ -45,8 +45,8 @@ pub struct Factors {
 
 impl<'a> Misfit<'a> {
     /// For weights that are matrices.
-    pub fn matrices(flat: &Flat, m: usize, seen: Seen) -> Self {
-        let gram = coupled_gram(flat, m, &seen.rows);
+    pub fn matrices(linearized: &LinearProblem, m: usize, seen: Seen) -> Self {
+        let gram = coupled_gram(linearized, m, &seen.rows);
         Misfit::Matrices { seen, gram }
     }
 
@@ -62,11 +62,11 @@ impl<'a> Misfit<'a> {
     }
 
     /// Multiplies weights by factors; data with a factor of zero are not counted.
-    pub fn reweigh(&mut self, flat: &Flat, factors: &[f64], m: usize) {
+    pub fn reweigh(&mut self, linearized: &LinearProblem, factors: &[f64], m: usize) {
         match self {
             Misfit::Numbers { weights, gram, .. } => {
                 let own: Vec<f64> = weights.iter().zip(factors).map(|(w, factor)| w * factor).collect();
-                *gram = Cow::Owned(flat.gram_of(&own));
+                *gram = Cow::Owned(linearized.gram_of(&own));
                 *weights = Cow::Owned(own);
             }
             Misfit::Matrices { seen, gram } => {
@@ -79,16 +79,16 @@ impl<'a> Misfit<'a> {
                     .zip(factors)
                     .filter(|(_, factor)| **factor == 0.0)
                     .for_each(|(r, _)| *r = 0);
-                *gram = coupled_gram(flat, m, &seen.rows);
+                *gram = coupled_gram(linearized, m, &seen.rows);
             }
         }
     }
 
     /// BᵀWr.
-    pub fn pull(&self, flat: &Flat, m: usize) -> Vec<f64> {
-        let mut pull = vec![0.0; flat.basis.count() * m];
+    pub fn pull(&self, linearized: &LinearProblem, m: usize) -> Vec<f64> {
+        let mut pull = vec![0.0; linearized.basis.count() * m];
         let mut weighed = vec![0.0; m];
-        for (k, row) in flat.data.iter().enumerate() {
+        for (k, row) in linearized.data.iter().enumerate() {
             match self {
                 Misfit::Numbers { weights, residuals, .. } => {
                     let r = &residuals[k * m..][..m];
@@ -105,21 +105,21 @@ impl<'a> Misfit<'a> {
     /// The holonomy of a closed curve couples the coordinates, too.
     pub fn factored(
         &self,
-        flat: &Flat,
+        linearized: &LinearProblem,
         m: usize,
-        curved: Option<&Curved>,
+        jacobi: Option<&JacobiOperator>,
         periodic: Option<&PeriodicCorrection>,
         lam: Lane,
     ) -> Factors {
-        let count = flat.basis.count();
+        let count = linearized.basis.count();
         // So many numbers are too many: then the matrix, not its right side, leaves the holonomy out.
         let few = m.saturating_pow(3).saturating_mul(count) <= COUPLED;
         let turns = few && periodic.is_some_and(|correction| !correction.is_plain());
         let coupled =
-            if curved.is_some() || turns || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
+            if jacobi.is_some() || turns || matches!(self, Misfit::Matrices { .. }) { m } else { 1 };
         let entry = |at: usize| {
             let stiff =
-                curved.map_or_else(|| of_each(&flat.penalty, coupled, at), |curved| curved.penalty[at]);
+                jacobi.map_or_else(|| of_each(&linearized.penalty, coupled, at), |jacobi| jacobi.penalty[at]);
             lam.mul_add(lane(stiff), lane(self.gram(coupled, at)))
         };
         let banded = Banded::of(count * coupled, stride(coupled) - 1, entry);
@@ -167,8 +167,8 @@ impl<'a> Misfit<'a> {
     }
 
     /// The weighed sum of squares when the coefficients have moved by x.
-    pub fn rss(&self, flat: &Flat, m: usize, x: &[Lane]) -> Lane {
-        (0..flat.data.len()).fold(Lane::ZERO, |sum, k| sum + self.square(&flat.data[k], k, m, x))
+    pub fn rss(&self, linearized: &LinearProblem, m: usize, x: &[Lane]) -> Lane {
+        (0..linearized.data.len()).fold(Lane::ZERO, |sum, k| sum + self.square(&linearized.data[k], k, m, x))
     }
 
     /// The weighed sum of squares as it is.
@@ -183,8 +183,8 @@ impl<'a> Misfit<'a> {
     }
 
     /// tr A⁻¹BᵀWB over the number of coordinates, given the band of A⁻¹: the degrees of freedom of one.
-    pub fn freedom(&self, flat: &Flat, inverse: &Banded) -> Lane {
-        let (stride, coupled) = (inverse.width + 1, inverse.size / flat.basis.count());
+    pub fn freedom(&self, linearized: &LinearProblem, inverse: &Banded) -> Lane {
+        let (stride, coupled) = (inverse.width + 1, inverse.size / linearized.basis.count());
         let mut sum = Lane::ZERO;
         for i in 0..inverse.size {
             for j in i.saturating_sub(inverse.width)..(i + stride).min(inverse.size) {
@@ -203,11 +203,11 @@ fn scale(rows: &mut [f64], factors: &[f64], size: usize) {
 }
 
 /// BᵀNᵀNB for m × m matrices N.
-fn coupled_gram(flat: &Flat, m: usize, rows: &[f64]) -> Vec<f64> {
+fn coupled_gram(linearized: &LinearProblem, m: usize, rows: &[f64]) -> Vec<f64> {
     let stride = stride(m);
-    let mut gram = vec![0.0; flat.basis.count() * m * stride];
+    let mut gram = vec![0.0; linearized.basis.count() * m * stride];
     let mut square = vec![0.0; m * m];
-    for (b, n) in flat.data.iter().zip(rows.chunks_exact(m * m)) {
+    for (b, n) in linearized.data.iter().zip(rows.chunks_exact(m * m)) {
         square.fill(0.0);
         for row in n.chunks_exact(m) {
             for (at, x) in square.iter_mut().enumerate() {

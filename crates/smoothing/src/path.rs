@@ -1,12 +1,12 @@
-//! A curve and data beside it: places, points, accelerations, residuals.
+//! A curve and data beside it: positions, points, accelerations, residuals.
 
 use crate::frames::{Frames, lanes_of};
 use symspline_core::curve::Segment;
 use symspline_core::scalar::{Jet, LANES, Lane, Scalar, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased};
 
-/// A place on a curve: the segment, and how much of it lies before.
-pub type Place = (usize, f64);
+/// A position on a curve: the segment, and how much of it lies before.
+pub type Position = (usize, f64);
 
 /// A natural spline by its knots, points and velocities.
 #[derive(Clone, Copy)]
@@ -19,35 +19,40 @@ pub struct Path<'a> {
     pub velocities: &'a [f64],
 }
 
-/// The places of times between the first and the last knot. What is nearer to a knot than rounding is at it.
-pub fn places(t: &[f64], times: &[f64]) -> Vec<Place> {
+/// The positions of times between the first and the last knot. What is nearer to a knot than rounding is at it.
+pub fn positions(t: &[f64], times: &[f64]) -> Vec<Position> {
     let last = t.len() - 2;
-    let place = |x: &f64| {
+    let position = |x: &f64| {
         let segment = t[1..=last].partition_point(|t| t <= x);
         (segment, (x - t[segment]) / (t[segment + 1] - t[segment]))
     };
-    times.iter().map(place).collect()
+    times.iter().map(position).collect()
 }
 
-/// The nearest knot of a place.
-pub fn nearest((segment, place): Place) -> usize {
-    if place < 0.5 { segment } else { segment + 1 }
+/// The nearest knot of a position.
+pub fn nearest((segment, position): Position) -> usize {
+    if position < 0.5 { segment } else { segment + 1 }
 }
 
-/// The knot that a place is at.
-fn at_knot((segment, place): Place) -> Option<usize> {
-    (place == 0.0 || place == 1.0).then_some(segment + place as usize)
+/// The knot that a position is at.
+fn at_knot((segment, position): Position) -> Option<usize> {
+    (position == 0.0 || position == 1.0).then_some(segment + position as usize)
 }
 
 impl Path<'_> {
-    /// Goes through places eight at a time: `visit` gets the group, and the point with derivatives in units of the
+    /// Goes through positions eight at a time: `visit` gets the group, and the point with derivatives in units of the
     /// segment.
-    fn each<S: Scalar>(&self, space: &Erased, places: &[Place], mut visit: impl FnMut(usize, Lane, &[S])) {
+    fn each<S: Scalar>(
+        &self,
+        space: &Erased,
+        positions: &[Position],
+        mut visit: impl FnMut(usize, Lane, &[S]),
+    ) {
         let len = space.point_len();
         let mut segment = Segment::<S>::new(len);
         let mut gamma = vec![S::constant(Lane::ZERO); len];
-        for group in 0..places.len().div_ceil(LANES) {
-            let at = lanes_of(group, places.len()).map(|i| places[i]);
+        for group in 0..positions.len().div_ceil(LANES) {
+            let at = lanes_of(group, positions.len()).map(|i| positions[i]);
             let h = Lane::new(at.map(|(s, _)| self.t[s + 1] - self.t[s]));
             for e in 0..2 {
                 gather(at.map(|(s, _)| &self.points[(s + e) * len..][..len]), &mut segment.ends[e]);
@@ -55,20 +60,22 @@ impl Path<'_> {
                 segment.handles[e].iter_mut().for_each(|x| *x *= h * lane(1.0 / 3.0));
             }
             segment.prepare(space, len);
-            let tau = Lane::new(at.map(|(_, place)| place));
+            let tau = Lane::new(at.map(|(_, position)| position));
             segment.at(space, len, S::from_parts([tau, Lane::ONE, Lane::ZERO]), &mut gamma);
             visit(group, h, &gamma);
         }
     }
 
-    /// The points at some places.
-    pub fn at(&self, space: &Erased, places: &[Place]) -> Vec<f64> {
+    /// The points at some positions.
+    pub fn at(&self, space: &Erased, positions: &[Position]) -> Vec<f64> {
         let len = space.point_len();
-        if let Some(knots) = places.iter().map(|&place| at_knot(place)).collect::<Option<Vec<usize>>>() {
+        if let Some(knots) =
+            positions.iter().map(|&position| at_knot(position)).collect::<Option<Vec<usize>>>()
+        {
             return knots.iter().flat_map(|i| &self.points[i * len..][..len]).copied().collect();
         }
-        let mut out = vec![0.0; places.len() * len];
-        self.each::<Lane>(space, places, |group, _, gamma| {
+        let mut out = vec![0.0; positions.len() * len];
+        self.each::<Lane>(space, positions, |group, _, gamma| {
             let rows = &mut out[group * LANES * len..];
             let count = rows.len().min(LANES * len);
             scatter(gamma, &mut rows[..count]);
@@ -76,12 +83,12 @@ impl Path<'_> {
         out
     }
 
-    /// The covariant accelerations at some places.
-    pub fn bends(&self, space: &Erased, places: &[Place]) -> Vec<f64> {
+    /// The covariant accelerations at some positions.
+    pub fn accelerations(&self, space: &Erased, positions: &[Position]) -> Vec<f64> {
         let len = space.point_len();
-        let mut out = vec![0.0; places.len() * len];
+        let mut out = vec![0.0; positions.len() * len];
         let [mut p, mut d, mut dd] = [(); 3].map(|_| vec![Lane::ZERO; len]);
-        self.each::<Jet>(space, places, |group, h, gamma| {
+        self.each::<Jet>(space, positions, |group, h, gamma| {
             for (i, g) in gamma.iter().enumerate() {
                 [p[i], d[i], dd[i]] = g.parts();
             }
@@ -94,30 +101,30 @@ impl Path<'_> {
         out
     }
 
-    /// The places of all knots.
-    pub fn knots(&self) -> Vec<Place> {
+    /// The positions of all knots.
+    pub fn knots(&self) -> Vec<Position> {
         let n = self.t.len() - 1;
         (0..=n).map(|i| if i < n { (i, 0.0) } else { (n - 1, 1.0) }).collect()
     }
 
-    /// Vectors at places, where the points are `gammas`, transported to the nearest knots: coordinates in the frames there.
+    /// Vectors at positions, where the points are `gammas`, transported to the nearest knots: coordinates in the frames there.
     pub fn at_knots(
         &self,
         space: &Erased,
         frames: &Frames,
-        places: &[Place],
+        positions: &[Position],
         gammas: &[f64],
         vectors: &[f64],
     ) -> Vec<f64> {
         let len = space.point_len();
-        let nearest = |i: usize| nearest(places[i]);
-        if places.iter().all(|&place| at_knot(place).is_some()) {
+        let nearest = |i: usize| nearest(positions[i]);
+        if positions.iter().all(|&position| at_knot(position).is_some()) {
             return frames.coordinates(vectors, nearest);
         }
         let mut transported = vec![0.0; vectors.len()];
         let [mut p, mut q, mut v, mut way, mut out] = [(); 5].map(|_| vec![Lane::ZERO; len]);
         for (group, transported) in transported.chunks_mut(LANES * len).enumerate() {
-            let at = lanes_of(group, places.len());
+            let at = lanes_of(group, positions.len());
             gather(at.map(|i| &gammas[i * len..][..len]), &mut p);
             gather(at.map(|i| &self.points[nearest(i) * len..][..len]), &mut q);
             gather(at.map(|i| &vectors[i * len..][..len]), &mut v);

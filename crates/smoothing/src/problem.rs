@@ -21,7 +21,7 @@ pub struct Data<'a> {
     pub lam: Option<f64>,
     /// The standard deviation of the noise in a coordinate at weight one, if that is known.
     pub sigma: Option<f64>,
-    /// Velocities at the ends that have [`FlatEnd::Velocity`]: tangent at the first and the last of the points, from where
+    /// Velocities at the ends that have [`EndCondition::Velocity`]: tangent at the first and the last of the points, from where
     /// they are transported in parallel to the ends of the curve.
     pub ends: [&'a [f64]; 2],
 }
@@ -39,7 +39,7 @@ pub enum Tier {
 
 /// What happens at an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FlatEnd {
+pub enum EndCondition {
     /// The second derivative vanishes.
     Natural,
     /// The first derivative is given.
@@ -50,7 +50,7 @@ pub enum FlatEnd {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
     /// A condition at either end.
-    Open([FlatEnd; 2]),
+    Open([EndCondition; 2]),
     /// The last knot is the first again.
     Periodic,
 }
@@ -61,7 +61,7 @@ impl Ends {
         match self {
             Ends::Periodic => FitEnds::Periodic,
             Ends::Open(kinds) => FitEnds::Open(few(|e| match kinds[e] {
-                FlatEnd::Velocity => End::Velocity(&velocities[e]),
+                EndCondition::Velocity => End::Velocity(&velocities[e]),
                 _ => End::Natural,
             })),
         }

@@ -36,7 +36,7 @@ pub struct Progress {
     /// Iterations in a row in which the step hardly shrank.
     pub slow: usize,
     /// Whether curvature is in the matrix of the linearised solver.
-    pub curved: bool,
+    pub with_curvature: bool,
     /// Whether the search for λ came to no end.
     pub unsettled: bool,
     /// Whether the linearised solver was given up.
@@ -62,7 +62,7 @@ impl Progress {
             last: Vec::new(),
             scale: f64::NAN,
             slow: 0,
-            curved: false,
+            with_curvature: false,
             unsettled: false,
             forced: false,
             least: 0.0,
@@ -104,7 +104,7 @@ impl Progress {
         let limit = if self.settled { SLOW } else { HOPELESS };
         let known = self.forced || (self.settled && self.report.exact);
         // With curvature in its matrix the linearised solver contracts.
-        let hopeless = known || (!self.curved && self.report.kappa > limit) || self.slow > 1;
+        let hopeless = known || (!self.with_curvature && self.report.kappa > limit) || self.slow > 1;
         tier == Tier::Newton || (hopeless && self.may_take_gauss_newton(space, tier))
     }
 
@@ -158,17 +158,18 @@ impl Progress {
         // Groups without a metric have no K.
         let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
         self.report.kappa = k * k * square * (lam / self.density).sqrt();
-        self.curved |= self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
+        self.with_curvature |=
+            self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
     }
 
     /// λ, degrees of freedom and noise of the curve as it is.
     ///
     /// `softness` is the slope of a robust loss: λ of its pseudo-data is that of the curve over it.
     pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
-        let Linear { flat, m, misfit, .. } = linear;
+        let Linear { linearized, m, misfit, .. } = linear;
         let (count, rss) = (misfit.count(*m), misfit.rss_now(*m));
-        let unit = flat.basis.spacing.powi(3);
-        let freedom = misfit.freedom(flat, inverse).as_array()[0];
+        let unit = linearized.basis.spacing.powi(3);
+        let freedom = misfit.freedom(linearized, inverse).as_array()[0];
         // Where λ hardly matters, as for a geodesic, its best value wanders.
         self.settled |= self.report.rounds > 1 && (freedom - self.report.freedom).abs() < SETTLED * freedom;
         self.report.freedom = freedom;

@@ -1,10 +1,10 @@
 //! Residuals of the data at a curve.
 
-use crate::flat::Flat;
 use crate::frames::Frames;
 use crate::information::{self, Root};
+use crate::linearized::LinearProblem;
 use crate::misfit::Misfit;
-use crate::path::{Path, Place, pulls};
+use crate::path::{Path, Position, pulls};
 use crate::problem::Data;
 use std::borrow::Cow;
 use symspline_core::space::{Ambient, Erased, Origin};
@@ -31,22 +31,22 @@ impl<'a> Residuals<'a> {
         space: &Erased,
         path: &Path,
         frames: &Frames,
-        places: &[Place],
-        flat: &'a Flat,
+        positions: &[Position],
+        linearized: &'a LinearProblem,
         data: &Data<'a>,
         roots: &[Root],
     ) -> Self {
         let (m, len) = (space.dim(), space.point_len());
-        let gammas = path.at(space, places);
+        let gammas = path.at(space, positions);
         let (vectors, distances) = pulls(space, &gammas, data.points);
-        let at_knots = |vectors: &[f64]| path.at_knots(space, frames, places, &gammas, vectors);
+        let at_knots = |vectors: &[f64]| path.at_knots(space, frames, positions, &gammas, vectors);
         let residuals = at_knots(&vectors);
         if roots.is_empty() {
             let squares = distances.iter().zip(data.weights).map(|(square, w)| square * w).collect();
             let misfit = Misfit::Numbers {
                 weights: Cow::Borrowed(data.weights),
                 residuals,
-                gram: Cow::Borrowed(&flat.gram),
+                gram: Cow::Borrowed(&linearized.gram),
             };
             return Residuals { gammas, vectors, distances, transported: None, squares, misfit };
         }
@@ -56,7 +56,7 @@ impl<'a> Residuals<'a> {
         let seen = information::at_data(space, roots, &columns, &residuals);
         let square = |s: &[f64]| s.iter().map(|x| x * x).sum();
         let squares = seen.residuals.chunks_exact(m).map(square).collect();
-        let misfit = Misfit::matrices(flat, m, seen);
+        let misfit = Misfit::matrices(linearized, m, seen);
         Residuals { gammas, vectors, distances, transported: Some(transported), squares, misfit }
     }
 }

@@ -1,12 +1,12 @@
 //! Many curves at a time: those that are not done go one step on together.
 
+use crate::curve_fit::CurveFit;
 use crate::information;
 use crate::loss;
-use crate::path::{Path, moved, places};
+use crate::path::{Path, moved, positions};
 use crate::problem::{Data, Ends, Loss, Options, Smooth, State};
 use crate::robust::Robust;
 use crate::start::{Level, levels};
-use crate::track::Track;
 use symspline_core::fit::{
     End, Ends as FitEnds, Method, Options as FitOptions, Problem, Report, Status, fit,
 };
@@ -30,7 +30,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     let work: usize = data.iter().map(|d| d.times.len()).sum::<usize>() * space.dim();
     let threads = data.len() > 1 && work > PARALLEL;
     let mut beginnings = beginnings(space, data, options, monitor, threads);
-    let mut tracks: Vec<Option<Track>> = data.iter().map(|_| None).collect();
+    let mut tracks: Vec<Option<CurveFit>> = data.iter().map(|_| None).collect();
     start(space, data, options, monitor, &mut beginnings, &mut tracks);
     while !monitor.cancelled() {
         // Where no spline joins the points to begin with the next beginning is smoother.
@@ -38,7 +38,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
             track.take_if(|track| track.report().state == State::NoCurve && track.report().iterations == 0);
         }
         start(space, data, options, monitor, &mut beginnings, &mut tracks);
-        let mut running: Vec<&mut Track> =
+        let mut running: Vec<&mut CurveFit> =
             tracks.iter_mut().flatten().filter(|track| !track.done()).collect();
         if running.is_empty() {
             break;
@@ -46,14 +46,14 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         let mut fitted =
             fit_tracks(space, &running.iter().map(|t| &**t).collect::<Vec<_>>(), options, &FIT, monitor);
         let again =
-            |(track, found): (&&mut Track, &Option<Vec<f64>>)| found.is_none() && track.steps_are_short();
+            |(track, found): (&&mut CurveFit, &Option<Vec<f64>>)| found.is_none() && track.steps_are_short();
         let again: Vec<bool> = running.iter().zip(&fitted).map(again).collect();
         if again.contains(&true) {
-            let chosen: Vec<&Track> =
+            let chosen: Vec<&CurveFit> =
                 running.iter().zip(&again).filter(|(_, again)| **again).map(|(t, _)| &**t).collect();
             let found = fit_tracks(space, &chosen, options, &LONG_FIT, monitor);
-            let places = fitted.iter_mut().zip(&again).filter(|(_, again)| **again);
-            places.zip(found).for_each(|((place, _), found)| *place = found);
+            let positions = fitted.iter_mut().zip(&again).filter(|(_, again)| **again);
+            positions.zip(found).for_each(|((position, _), found)| *position = found);
         }
         let items: Vec<_> = running.iter_mut().zip(fitted).collect();
         parallel::for_each(items, threads, monitor, |(track, velocities)| match velocities {
@@ -71,18 +71,19 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         track.unwrap_or_else(|| {
             let points = vec![f64::NAN; data.knots.len() * len];
             let plain = Robust::new(Loss::Linear, space.dim(), 0.0, true, true);
-            let mut none = Track::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, plain);
+            let mut none =
+                CurveFit::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, plain);
             none.retreat(space, options);
             none
         })
     });
-    ended.map(Track::finish).collect()
+    ended.map(CurveFit::finish).collect()
 }
 
 /// The velocities of the splines through the points of curves.
 fn fit_tracks(
     space: &Erased,
-    tracks: &[&Track],
+    tracks: &[&CurveFit],
     options: &Options,
     how: &FitOptions,
     monitor: &Monitor,
@@ -176,7 +177,7 @@ fn start<'a>(
     options: &Options,
     monitor: &Monitor,
     beginnings: &mut [Beginning],
-    tracks: &mut [Option<Track<'a>>],
+    tracks: &mut [Option<CurveFit<'a>>],
 ) {
     loop {
         let missing: Vec<usize> = (0..data.len()).filter(|&c| tracks[c].is_none()).collect();
@@ -198,7 +199,7 @@ fn start<'a>(
             }
             let (m, own, sigma) = (space.dim(), data[*c], beginnings[*c].sigma);
             let robust = Robust::new(options.loss, m, sigma, own.sigma.is_some(), own.lam.is_none());
-            tracks[*c] = Some(Track::new(own, m, knots.to_vec(), points, options.ends, robust));
+            tracks[*c] = Some(CurveFit::new(own, m, knots.to_vec(), points, options.ends, robust));
         }
     }
 }
@@ -208,7 +209,7 @@ fn prolonged(space: &Erased, path: &Path, times: &[f64]) -> Vec<f64> {
     let len = space.point_len();
     let last = path.t.len() - 1;
     let inside: Vec<f64> = times.iter().map(|t| t.clamp(path.t[0], path.t[last])).collect();
-    let mut points = path.at(space, &places(path.t, &inside));
+    let mut points = path.at(space, &positions(path.t, &inside));
     let mut beyond = vec![0.0; points.len()];
     for (i, (t, near)) in times.iter().zip(&inside).enumerate() {
         let end = if *t < *near { 0 } else { last };

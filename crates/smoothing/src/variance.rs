@@ -2,9 +2,9 @@
 
 use crate::banded::{Banded, WIDTH};
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::flat::Basis;
-use crate::path::places;
-use crate::problem::{Ends, FlatEnd};
+use crate::linearized::Basis;
+use crate::path::positions;
+use crate::problem::{EndCondition, Ends};
 use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
@@ -35,7 +35,7 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
             Ends::Periodic => knots[0] + (t - knots[0]).rem_euclid(knots[last] - knots[0]),
         };
         let near = t.clamp(knots[0], knots[last]);
-        let (segment, s) = places(knots, &[near])[0];
+        let (segment, s) = positions(knots, &[near])[0];
         let (h, beyond) = (knots[segment + 1] - knots[segment], t - near);
         let mut row = basis.row(segment, s, nu);
         // What the velocities at the two knots do: cubic Hermite functions.
@@ -71,7 +71,7 @@ fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
     const FIXED: f64 = 1e12;
     let last = knots.len() - 1;
     let stiffness = |i: usize| 1.0 / (knots[i + 1] - knots[i]);
-    let given = |end: usize| matches!(ends, Ends::Open(ends) if ends[end] == FlatEnd::Velocity);
+    let given = |end: usize| matches!(ends, Ends::Open(ends) if ends[end] == EndCondition::Velocity);
     let t = Banded::of(last + 1, 1, |at| {
         let (i, beside) = (at / 2, at % 2 == 1);
         let [left, right] = [(i > 0).then(|| stiffness(i - 1)), (i < last).then(|| stiffness(i))];

@@ -137,11 +137,11 @@ impl Model for ComplexHyperbolic {
         x[..2].iter_mut().for_each(|x| *x *= scale);
         off
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let square = x[2..].iter().map(|x| x * x).sum::<f64>() - x[0].hypot(x[1]).powi(2);
         format!("its square -|x0|^2 + |x1|^2 + ... is {square}, not -1 (off by {:.3e})", (square + 1.0).abs())
     }
-    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
+    fn imprecise_point(&self, points: &[f64]) -> Option<(usize, String)> {
         far_out(points, 2 * self.n + 2)
     }
     fn rounding(&self, p: &[Lane]) -> Lane {

@@ -234,7 +234,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         orthonormalize(&mut y);
         y.write(noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         let y = self.read(&lanes);
         let off = y.adjoint_times(&y).plus_identity(lane(-1.0)).size().to_array()[0];

@@ -95,7 +95,7 @@ impl Part for QuaternionicProjective {
         let beta = lane(-4.0) / v.inner(&v);
         v.scaled(beta).times_adjoint(&v).plus_identity(Lane::ONE).write(frame);
     }
-    fn complaint(&self, p: &[Lane]) -> String {
+    fn violation(&self, p: &[Lane]) -> String {
         let y = self.read(p);
         let image = j_times(&y);
         let off = (&image - &y.times(&y.adjoint_times(&image))).size().to_array()[0];

@@ -13,7 +13,7 @@ pub fn in_order<'a>(array: &'a PyReadonlyArrayDyn<f64>) -> PyResult<&'a [f64]> {
     if array.is_c_contiguous() {
         Ok(array.as_slice()?)
     } else {
-        Err(PyTypeError::new_err("an array whose numbers do not lie in the order of its axes"))
+        Err(PyTypeError::new_err("the array must be C-contiguous; pass np.ascontiguousarray(array)"))
     }
 }
 
@@ -31,7 +31,7 @@ pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArr
 
 /// MemoryError unless there is room for about so many numbers, with words for the work that needs them and a remedy. Rust would stop
 /// the process where memory ends.
-pub fn require_room(numbers: f64, work: impl FnOnce() -> (String, &'static str)) -> PyResult<()> {
+pub fn require_memory(numbers: f64, work: impl FnOnce() -> (String, &'static str)) -> PyResult<()> {
     if numbers <= SMALL as f64 {
         return Ok(());
     }
@@ -48,11 +48,11 @@ pub fn require_room(numbers: f64, work: impl FnOnce() -> (String, &'static str))
 }
 
 /// Room for so many numbers, or MemoryError where compiled code would stop the process.
-pub fn room<T>(count: usize) -> PyResult<Vec<T>> {
-    let mut room = Vec::new();
-    room.try_reserve_exact(count).map_err(|_| {
+pub fn reserve<T>(count: usize) -> PyResult<Vec<T>> {
+    let mut vector = Vec::new();
+    vector.try_reserve_exact(count).map_err(|_| {
         let size = count.saturating_mul(size_of::<T>());
-        PyMemoryError::new_err(format!("{size} bytes are needed and not there"))
+        PyMemoryError::new_err(format!("{size} bytes of memory are needed, more than is free"))
     })?;
-    Ok(room)
+    Ok(vector)
 }

@@ -1,6 +1,6 @@
 //! The curves of a call from Python: masks, validation, and projection of their points onto the space.
 
-use crate::arrays::{in_order, room, zeros};
+use crate::arrays::{in_order, reserve, zeros};
 use crate::errors::{Invalid, invalid};
 use crate::space::Handle;
 use crate::validate::Names;
@@ -136,7 +136,7 @@ impl<'a> Curves<'a> {
         points.clear();
         match &self.chosen {
             None => {
-                *points = room(self.points.len())?;
+                *points = reserve(self.points.len())?;
                 points.extend_from_slice(self.points);
             }
             Some(chosen) => {
@@ -300,7 +300,7 @@ pub fn check<'py>(
     skip_invalid: bool,
 ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<Fault>)> {
     let mut curves = Curves::new(handle, &t, &points, &ends, offsets, mask)?;
-    require_room_for_checks(handle, &curves)?;
+    require_memory_for_checks(handle, &curves)?;
     let mut own = Vec::new();
     curves.gather_points(&mut own)?;
     let faults = py
@@ -309,10 +309,10 @@ pub fn check<'py>(
     Ok((curves.points(py, own, points.shape())?, faults))
 }
 
-pub fn require_room_for_checks(handle: &Handle, curves: &Curves) -> PyResult<()> {
+pub fn require_memory_for_checks(handle: &Handle, curves: &Curves) -> PyResult<()> {
     let len = handle.space.get().point_len();
     // Copies of ends, and the reports of curves.
-    drop(room::<f64>(curves.points.len() / len + (curves.offsets.len() - 1) * (64 + 4 * len))?);
+    drop(reserve::<f64>(curves.points.len() / len + (curves.offsets.len() - 1) * (64 + 4 * len))?);
     Ok(())
 }
 

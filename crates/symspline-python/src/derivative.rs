@@ -1,6 +1,6 @@
 //! Derivatives with respect to the data, called from Python.
 
-use crate::arrays::{in_order, room, zeros};
+use crate::arrays::{in_order, reserve, zeros};
 use crate::curves::{EndOf, end};
 use crate::errors::invalid;
 use crate::space::Handle;
@@ -82,10 +82,10 @@ impl Slices<'_> {
 
     /// MemoryError unless there is room for the matrices of the curves that are worked on at once: about fifty
     /// a knot.
-    fn room(&self, dim: usize) -> PyResult<()> {
+    fn reserve(&self, dim: usize) -> PyResult<()> {
         let at_once = parallel::num_threads().min(self.curves).max(1);
         let knots = self.t.len() / self.curves.max(1) * at_once;
-        room::<f64>(knots.saturating_mul(50 * (dim * dim + 8)) + 2 * self.points.len()).map(drop)
+        reserve::<f64>(knots.saturating_mul(50 * (dim * dim + 8)) + 2 * self.points.len()).map(drop)
     }
 
     fn times(&self, c: usize) -> &[f64] {
@@ -115,7 +115,7 @@ pub fn push<'py>(
     let len = handle.space.get().point_len();
     let (points, knots) = (in_order(&points)?, in_order(&knots)?);
     let ends = [in_order(&ends[0])?, in_order(&ends[1])?];
-    slices.room(handle.space.get().dim())?;
+    slices.reserve(handle.space.get().dim())?;
     let out = zeros(py, &[slices.x.len() * len])?;
     let mut write = out.readwrite();
     let result = write.as_slice_mut()?;
@@ -144,7 +144,7 @@ pub fn pull<'py>(
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
     let slices = curves.slices()?;
     let cotangent = in_order(&cotangent)?;
-    slices.room(handle.space.get().dim())?;
+    slices.reserve(handle.space.get().dim())?;
     let mut gradients = vec![Data::default(); slices.curves];
     let items = gradients.iter_mut().enumerate().collect();
     watched(py, None, slices.curves, is_heavy(&handle.space.get()), |monitor| {

@@ -72,7 +72,7 @@ pub fn number(x: f64) -> String {
 }
 
 /// The index of an element of an array with a shape, as it is written in Python.
-pub fn place(element: usize, shape: &[usize]) -> String {
+pub fn format_index(element: usize, shape: &[usize]) -> String {
     let index: Vec<String> = index_of(element, shape).iter().map(usize::to_string).collect();
     index.join(",")
 }

@@ -1,7 +1,7 @@
 //! Evaluation, called from Python.
 
 use crate::arrays::{in_order, zeros};
-use crate::errors::{invalid, number, place};
+use crate::errors::{format_index, invalid, number};
 use crate::space::Handle;
 use crate::validate::of_curve;
 use crate::watch::{Progress, is_heavy, watched};
@@ -132,7 +132,7 @@ pub fn transport<'py>(
 }
 
 /// What is computed where.
-struct Asked<'a> {
+struct Evaluation<'a> {
     curves: &'a Curves<'a>,
     times: &'a Times<'a>,
     quantity: Quantity,
@@ -157,7 +157,7 @@ fn sampled<'py>(
     quantity: &str,
     progress: Option<Py<PyAny>>,
     out: Option<Bound<'py, PyArrayDyn<f64>>>,
-    compute: impl FnOnce(&Erased, &Asked, &Monitor, &mut [f64]) + Send,
+    compute: impl FnOnce(&Erased, &Evaluation, &Monitor, &mut [f64]) + Send,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let quantity = quantity_named(quantity)?;
     let (policy, strict) = policy_named(outside)?;
@@ -186,9 +186,9 @@ fn sampled<'py>(
         return Err(invalid(format!("out has shape {:?}, but the result has {shape:?}", write.shape())));
     }
     let result = write.as_slice_mut()?;
-    let asked = Asked { curves: &curves, times: &times, quantity, outside: policy };
+    let evaluation = Evaluation { curves: &curves, times: &times, quantity, outside: policy };
     watched(py, Progress::whole(progress), samples, is_heavy(&space), |monitor| {
-        compute(&space, &asked, monitor, result)
+        compute(&space, &evaluation, monitor, result)
     })?;
     drop(write);
     Ok(out)
@@ -268,7 +268,7 @@ fn check_times(
         let name = if shape.is_empty() {
             "x".to_string()
         } else {
-            format!("x[{}]", place(if own_times { c * count + i } else { i }, shape))
+            format!("x[{}]", format_index(if own_times { c * count + i } else { i }, shape))
         };
         let found = number(row[i]);
         if !row[i].is_finite() {

@@ -1,7 +1,7 @@
 //! Fitting, called from Python.
 
-use crate::arrays::{require_room, room, zeros};
-use crate::curves::{Array, Curves, EndOf, Fault, require_room_for_checks};
+use crate::arrays::{require_memory, reserve, zeros};
+use crate::curves::{Array, Curves, EndOf, Fault, require_memory_for_checks};
 use crate::errors::{in_factor, invalid};
 use crate::space::Handle;
 use crate::watch::{Progress, is_heavy, watched};
@@ -41,10 +41,10 @@ pub fn fit<'py>(
     let mut tasks = Vec::with_capacity(count);
     for (i, (handle, points, ends, point_tol)) in factors.iter().enumerate() {
         let curves = Curves::new(handle, &t, points, ends, offsets.clone(), mask.clone())?;
-        require_room_for_checks(handle, &curves)?;
-        require_room(memory(&curves.space, curves.longest(), options.method), || {
+        require_memory_for_checks(handle, &curves)?;
+        require_memory(memory(&curves.space, curves.longest(), options.method), || {
             let least = match options.method {
-                Method::Newton | Method::Homotopy => "; method='quasi-newton' needs far less",
+                Method::Newton | Method::Homotopy => "; pass method='quasi-newton', which needs far less",
                 _ => "",
             };
             (
@@ -111,7 +111,7 @@ impl Task<'_> {
                 solve(&space, &problem, options, monitor, u)
             })?,
             Some(_) => {
-                let mut own_velocities = room(points.len())?;
+                let mut own_velocities = reserve(points.len())?;
                 own_velocities.resize(points.len(), 0.0);
                 let found = watched(py, progress, nodes, is_heavy(&space), |monitor| {
                     solve(&space, &problem, options, monitor, &mut own_velocities)

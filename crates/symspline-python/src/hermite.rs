@@ -1,7 +1,7 @@
 //! Validation of curves with given velocities, called from Python.
 
-use crate::arrays::{in_order, room};
-use crate::curves::{Array, Curves, require_room_for_checks};
+use crate::arrays::{in_order, reserve};
+use crate::curves::{Array, Curves, require_memory_for_checks};
 use crate::errors::{CutLocusError, Invalid};
 use crate::space::Handle;
 use crate::validate;
@@ -27,12 +27,12 @@ pub fn hermite<'py>(
     let natural = || ("natural".to_owned(), None);
     let ends = Some([natural(), natural()]);
     let mut curves = Curves::new(handle, &t, &points, &ends, None, None)?;
-    require_room_for_checks(handle, &curves)?;
+    require_memory_for_checks(handle, &curves)?;
     let (space, len) = (curves.space, curves.space.point_len());
     let mut own = Vec::new();
     curves.gather_points(&mut own)?;
     let given = in_order(&velocities)?;
-    let mut tangent = room(given.len())?;
+    let mut tangent = reserve(given.len())?;
     tangent.resize(given.len(), 0.0);
     let t = in_order(&t)?;
     let found = watched(py, None, own.len() / len, is_heavy(&space), |monitor| {
@@ -45,8 +45,8 @@ pub fn hermite<'py>(
             let node = row % nodes;
             let of = validate::of_curve(row / nodes, &curves.batch);
             let message = format!(
-                "velocities[{node}]{of} is not tangent at its point: a part of {part:.3e} of it points off the space \
-                 (allowed: {tangent_tol:.0e}); use space.project_tangent(p, v)"
+                "velocities[{node}]{of} is not tangent at its point: its normal component is {part:.3e} (allowed: \
+                 {tangent_tol:.0e}); use space.project_tangent(p, v)"
             );
             return Err(Handles::Invalid(Invalid::new(row / nodes, Some(node), message)));
         }
@@ -87,8 +87,8 @@ pub fn hermite<'py>(
             let after = i + 1;
             CutLocusError::new_err(format!(
                 "segment {i}{of}, between t[{i}] and t[{after}]: its inner control points lie at or past each other's cut \
-                 locus: angle {angle}, limit {limit}; the geodesic between them is not unique; velocities are too large \
-                 for its time"
+                 locus: angle {angle}, limit {limit}; the geodesic between them is not unique. Reduce the velocities \
+                 at its ends, or allow the segment more time"
             ))
         }
     })?;

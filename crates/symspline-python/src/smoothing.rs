@@ -1,6 +1,6 @@
 //! Smoothing, called from Python.
 
-use crate::arrays::{in_order, room, zeros};
+use crate::arrays::{in_order, reserve, zeros};
 use crate::curves::EndOf;
 use crate::errors::invalid;
 use crate::space::Handle;
@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline::smoothing::{
-    Criterion, Data, Ends, FlatEnd, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
+    Criterion, Data, EndCondition, Ends, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
     variance as variance_at,
 };
 use symspline::space::{Ambient, Origin};
@@ -89,7 +89,7 @@ pub fn smooth<'py>(
     let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
-    drop(room::<f64>(curves * count * (8 * len + 64))?);
+    drop(reserve::<f64>(curves * count * (8 * len + 64))?);
     // Data without weight are left out, and copies of a row, as loggers write them, are one of their weight: they would
     // say that there is no noise.
     let rows: Vec<[Vec<f64>; 4]> = (0..curves)
@@ -166,11 +166,11 @@ fn same(p: &[f64], q: &[f64]) -> bool {
     p.iter().zip(q).all(|(p, q)| (p - q).abs() <= COPY * size)
 }
 
-fn kind((name, _): &EndOf) -> PyResult<FlatEnd> {
+fn kind((name, _): &EndOf) -> PyResult<EndCondition> {
     match name.as_str() {
-        "natural" => Ok(FlatEnd::Natural),
-        "velocity" => Ok(FlatEnd::Velocity),
-        _ => Err(invalid(format!("a smooth curve cannot have the end condition {name:?}"))),
+        "natural" => Ok(EndCondition::Natural),
+        "velocity" => Ok(EndCondition::Velocity),
+        _ => Err(invalid(format!("a smoothing spline cannot have the end condition {name:?}"))),
     }
 }
 
@@ -244,7 +244,7 @@ pub fn smoothing_variance<'py>(
     let ends = match fixed {
         None => Ends::Periodic,
         Some(fixed) => {
-            Ends::Open(fixed.map(|fixed| if fixed { FlatEnd::Velocity } else { FlatEnd::Natural }))
+            Ends::Open(fixed.map(|fixed| if fixed { EndCondition::Velocity } else { EndCondition::Natural }))
         }
     };
     let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);

@@ -1,7 +1,7 @@
 //! The compiled side of a space.
 
-use crate::arrays::{in_order, require_room, room, zeros};
-use crate::errors::{CutLocusError, invalid, place};
+use crate::arrays::{in_order, require_memory, reserve, zeros};
+use crate::errors::{CutLocusError, format_index, invalid};
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -96,7 +96,7 @@ impl Handle {
         let t = t.as_ref().map_or(Ok(&[][..]), in_order)?;
         let len = self.space.get().point_len();
         let rows = slices[0].len() / len;
-        require_room(memory(&self.space.get(), Some(operation)), || {
+        require_memory(memory(&self.space.get(), Some(operation)), || {
             (format!("this operation on {}", self.described()), "")
         })?;
         let out = zeros(py, &[rows * operation.row_len(len)])?;
@@ -109,7 +109,7 @@ impl Handle {
         done.map_err(|(row, angle)| {
             if angle.is_nan() {
                 return invalid(format!(
-                    "pair {row} holds a number that is not finite, or no point of the space"
+                    "pair {row} contains a number that is not finite, or an array that is not a point of the space"
                 ));
             }
             let limit = self.space.get().cut_angle();
@@ -130,14 +130,15 @@ impl Handle {
         tol: f64,
     ) -> PyResult<()> {
         let points = in_order(&points)?;
-        require_room(memory(&self.space.get(), None), || {
+        require_memory(memory(&self.space.get(), None), || {
             (format!("checking points of {}", self.described()), "")
         })?;
-        let mut copy = room(points.len())?;
+        let mut copy = reserve(points.len())?;
         copy.extend_from_slice(points);
         let done = py.detach(|| project_points(&self.space.get(), &mut copy, tol));
         done.map_err(|(row, off, why)| {
-            let which = if shape.is_empty() { "it".into() } else { format!("point {}", place(row, &shape)) };
+            let which =
+                if shape.is_empty() { "it".into() } else { format!("point {}", format_index(row, &shape)) };
             invalid(off_space(&which, off, tol, &why))
         })
     }
@@ -149,10 +150,10 @@ impl Handle {
         points: PyReadonlyArrayDyn<'py, f64>,
         vectors: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        require_room(memory(&self.space.get(), None), || {
+        require_memory(memory(&self.space.get(), None), || {
             (format!("checking vectors on {}", self.described()), "")
         })?;
-        drop(room::<f64>(2 * points.shape()[0])?);
+        drop(reserve::<f64>(2 * points.shape()[0])?);
         let defects = tangent_defects(&self.space.get(), in_order(&points)?, in_order(&vectors)?);
         let shape = [points.shape()[0]];
         PyArray1::from_vec(py, defects).reshape(shape).map(|a| a.to_dyn().clone())
@@ -163,7 +164,7 @@ impl Handle {
 pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> String {
     if !off.is_finite() {
         // Nor has `space.project` an answer.
-        return format!("{which} is off the space: {why}. No point is close to it; mend it or leave it out");
+        return format!("{which} is off the space: {why}. No point is close to it; correct it or remove it");
     }
     format!(
         "{which} is off the space by {off:.3e}: {why}. Points within {tol:.0e} are projected; use space.project(x) \

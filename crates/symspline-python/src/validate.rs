@@ -1,6 +1,6 @@
 //! Messages for invalid curves, with the names that arguments have in Python.
 
-use crate::errors::{Invalid, number, place};
+use crate::errors::{Invalid, format_index, number};
 use crate::space::off_space;
 use symspline::validate::{Invalid as Fault, Reason};
 
@@ -17,7 +17,7 @@ pub struct Names<'a> {
 
 /// Words for a curve of a batch; empty for a single curve.
 pub fn of_curve(curve: usize, batch: &[usize]) -> String {
-    if batch.is_empty() { String::new() } else { format!(" of curve {}", place(curve, batch)) }
+    if batch.is_empty() { String::new() } else { format!(" of curve {}", format_index(curve, batch)) }
 }
 
 impl Names<'_> {
@@ -33,7 +33,7 @@ impl Names<'_> {
         let knots = if self.shared || self.batch.is_empty() {
             String::new()
         } else {
-            format!("[{}]", place(curve, self.batch))
+            format!("[{}]", format_index(curve, self.batch))
         };
         match reason {
             Reason::TimeNotFinite(time) => {
@@ -52,7 +52,7 @@ impl Names<'_> {
                     "t{knots}[{node}] = {time} {what} t{knots}[{earlier}] = {before}; times must increase: {hint}"
                 )
             }
-            Reason::TimesTooFarApart => format!("t{knots} spans more than a double can hold"),
+            Reason::TimesTooFarApart => format!("t{knots} spans more than the largest floating-point number"),
             Reason::OffSpace { distance, condition } => {
                 off_space(&format!("points[{node}]{of}"), *distance, tol, condition)
             }
@@ -64,15 +64,15 @@ impl Names<'_> {
                 )
             }
             Reason::NotClosed { distance } => format!(
-                "bc_type='periodic' needs a closed curve, but first and last point{of} are {distance:.3e} apart \
-                 (allowed: {tol:.0e}); repeat the first point at the end"
+                "bc_type='periodic' needs a closed curve, but the first and the last point{of} are {distance:.3e} \
+                 apart (allowed: {tol:.0e}); repeat the first point at the end"
             ),
             Reason::EndNotFinite(which, value) => {
-                format!("{which}{of} holds {}; it must be finite", number(*value))
+                format!("{which}{of} contains {}; it must be finite", number(*value))
             }
             Reason::EndNotTangent { which, normal } => format!(
-                "{which}{of} is not tangent at its point: a part of {normal:.3e} of it points off the space (allowed: \
-                 {tol:.0e}); use space.project_tangent(p, v)"
+                "{which}{of} is not tangent at its point: its normal component is {normal:.3e} (allowed: {tol:.0e}); \
+                 use space.project_tangent(p, v)"
             ),
             Reason::EndTooFast { which, speed, segment, angle, limit } => format!(
                 "{which}{of} has speed {speed:.6}, too fast for its segment of length {}: its control handle would \

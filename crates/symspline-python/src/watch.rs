@@ -90,8 +90,8 @@ pub fn watched<T: Send>(
     }
     let result = result.map_err(|panic| {
         let what = panic.downcast_ref::<String>().map(String::as_str);
-        let what = what.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no reason was given");
-        PyRuntimeError::new_err(format!("this is an error in symspline, please report it: {what}"))
+        let what = what.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        PyRuntimeError::new_err(format!("this is an error in symspline; please report it: {what}"))
     })?;
     if let Some(progress) = progress {
         progress.report(py, total, total)?;

@@ -113,7 +113,7 @@ impl Model for Torus {
         }
         off
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let norms: Vec<f64> = x.chunks_exact(2).map(|x| x[0].hypot(x[1])).collect();
         format!("its rows have the norms {norms:?}, not 1")
     }

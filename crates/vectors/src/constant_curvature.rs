@@ -48,8 +48,8 @@ const fn sign<const L: bool>(i: usize) -> f64 {
     if L && i == 0 { -1.0 } else { 1.0 }
 }
 
-/// The place in a point of the i-th coordinate at the origin.
-const fn place<const L: bool>(i: usize) -> usize {
+/// The position in a point of the i-th coordinate at the origin.
+const fn position<const L: bool>(i: usize) -> usize {
     if L && i == 0 { 0 } else { i + 1 }
 }
 
@@ -204,7 +204,7 @@ pub fn lift<const K: i32, const L: bool>(p: &[Lane], frame: &mut [Lane]) {
     // E x = x − ⟨q,x⟩ (o+q)/(κ + ⟨o,q⟩), the transvection from o to q, for x at o.
     let denominator = kappa::<K>() * (Lane::ONE + side * p[o]);
     for (j, row) in frame.chunks_exact_mut(n).enumerate() {
-        let axis = place::<L>(j);
+        let axis = position::<L>(j);
         let factor = if negative::<K, L>(axis) { p[axis] } else { -p[axis] } / denominator;
         for i in 0..n {
             row[i] = factor * p[i];

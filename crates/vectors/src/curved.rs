@@ -119,18 +119,18 @@ impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
     fn random_point(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         if L {
-            lorentzian::complaint::<K>(x)
+            lorentzian::violation::<K>(x)
         } else if K > 0 {
-            sphere::complaint(x)
+            sphere::violation(x)
         } else {
-            hyperbolic::complaint(x)
+            hyperbolic::violation(x)
         }
     }
-    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
+    fn imprecise_point(&self, points: &[f64]) -> Option<(usize, String)> {
         if L {
-            lorentzian::beyond_doubles(points, self.point_len())
+            lorentzian::imprecise_point(points, self.point_len())
         } else if K > 0 {
             None
         } else {

@@ -68,7 +68,7 @@ impl Ambient for Euclidean {
         self.project(v)
     }
     fn random_point(&self, _noise: &mut [Lane]) {}
-    fn complaint(&self, _x: &[f64]) -> String {
+    fn violation(&self, _x: &[f64]) -> String {
         "any finite numbers are a point".into()
     }
     fn rounding(&self, p: &[Lane]) -> Lane {

@@ -22,7 +22,7 @@ pub fn project_tangent<const K: i32, const L: bool>(p: &[Lane], v: &mut [Lane]) 
     off / (size + ROUNDING_SIZE)
 }
 
-pub fn complaint(x: &[f64]) -> String {
+pub fn violation(x: &[f64]) -> String {
     let square = x[1..].iter().map(|x| x * x).sum::<f64>() - x[0] * x[0];
     if x[0] <= 0.0 {
         format!("its time-like coordinate, the first, is {}, not positive", x[0])

@@ -27,7 +27,7 @@ pub fn project<const K: i32>(x: &mut [Lane]) -> Lane {
     off
 }
 
-pub fn complaint<const K: i32>(x: &[f64]) -> String {
+pub fn violation<const K: i32>(x: &[f64]) -> String {
     let mut x = x.to_vec();
     let (round, open) = round::<K, _>(&mut x);
     let [round, open] = [round, open].map(|x| x.iter().map(|x| x * x).sum::<f64>());
@@ -40,11 +40,11 @@ pub fn complaint<const K: i32>(x: &[f64]) -> String {
 const FARTHEST: f64 = (1_u64 << 43) as f64;
 
 /// The first point so far out that too few digits are left, and that in words.
-pub fn beyond_doubles(points: &[f64], len: usize) -> Option<(usize, String)> {
+pub fn imprecise_point(points: &[f64], len: usize) -> Option<(usize, String)> {
     let square = |p: &[f64]| p.iter().map(|x| x * x).sum::<f64>();
     let row = points.chunks_exact(len).position(|p| !(square(p) <= FARTHEST))?;
     let why = format!(
-        "has the sum of squares {:.1e}, and rounding errors, 2.2e-16 times that, leave too few digits (largest: \
+        "has the sum of squares {:.1e}, and rounding errors, 2.2e-16 times that, leave too few significant digits (largest: \
          {FARTHEST:.1e}); move all points by one isometry, space.transvection, to where their numbers are small",
         square(&points[row * len..(row + 1) * len])
     );

@@ -20,7 +20,7 @@ pub fn project_tangent(p: &[Lane], v: &mut [Lane]) -> Lane {
     off / (size + ROUNDING_SIZE)
 }
 
-pub fn complaint(x: &[f64]) -> String {
+pub fn violation(x: &[f64]) -> String {
     let norm = x.iter().map(|x| x * x).sum::<f64>().sqrt();
     if norm == 0.0 {
         "it is the zero vector, which has no direction".into()

@@ -92,8 +92,8 @@ def _check_ends(task: Task, points: Array, tol: float, wanted: NDArray[np.int64]
         bad = np.flatnonzero(~(defect <= tol))
         if bad.size:
             raise ValidationError(
-                f"the {name} {kind}{of_curve(wanted[bad[0]], task.batch)} is not tangent at its point: a part of "
-                f"{defect[bad[0]]:.3e} of it points off the space (allowed: {tol:.0e}); use space.project_tangent(p, v)"
+                f"the {name} {kind}{of_curve(wanted[bad[0]], task.batch)} is not tangent at its point: its normal "
+                f"component is {defect[bad[0]]:.3e} (allowed: {tol:.0e}); use space.project_tangent(p, v)"
             )
         if kind == "velocity":
             speed = space.operations.norm(*rows)

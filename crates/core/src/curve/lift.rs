@@ -29,14 +29,14 @@ const TAIL: f64 = 2e-13;
 const DEEPEST: usize = 6;
 
 /// A stretch of a segment, and the Legendre coefficients of g there, k × k complex numbers each.
-struct Piece {
+struct Interval {
     from: f64,
     length: f64,
     coefficients: Vec<f64>,
 }
 
 /// A segment of a curve on all lanes.
-struct Track<'a> {
+struct LiftedSegment<'a> {
     space: &'a Erased<'a>,
     segment: Segment<Dual>,
     gamma: Vec<Dual>,
@@ -44,11 +44,11 @@ struct Track<'a> {
     len: usize,
 }
 
-impl<'a> Track<'a> {
+impl<'a> LiftedSegment<'a> {
     fn new(space: &'a Erased<'a>) -> Self {
         let len = space.point_len();
         let gamma = vec![Dual { v: Lane::ZERO, d: Lane::ZERO }; len];
-        Track { space, segment: Segment::new(len), gamma, k: space.fiber_rank(), len }
+        LiftedSegment { space, segment: Segment::new(len), gamma, k: space.fiber_rank(), len }
     }
 
     /// Reads a segment of a curve.
@@ -61,7 +61,7 @@ impl<'a> Track<'a> {
         self.segment.at(self.space, self.len, Dual { v: t, d: Lane::ONE }, &mut self.gamma);
     }
 
-    /// A at eight places.
+    /// A at eight positions.
     fn vertical(&mut self, t: [f64; LANES]) -> [Factor; LANES] {
         self.at(Lane::new(t));
         let y: Vec<Lane> = self.gamma.iter().map(|x| x.v).collect();
@@ -81,22 +81,22 @@ impl<'a> Track<'a> {
         matrix(self.space, self.k, self.len, entry)
     }
 
-    /// Follows g from one place of the segment to another, piece by piece; g is that at the first place and becomes
+    /// Follows g from one position of the segment to another, interval by interval; g is that at the first position and becomes
     /// that at the second.
-    fn follow(&mut self, from: f64, to: f64, depth: usize, g: &mut Factor, pieces: &mut Vec<Piece>) {
+    fn follow(&mut self, from: f64, to: f64, depth: usize, g: &mut Factor, intervals: &mut Vec<Interval>) {
         let length = to - from;
         let t = nodes().map(|s| from + s * length);
         let a: Vec<Factor> = t.as_chunks::<LANES>().0.iter().flat_map(|t| self.vertical(*t)).collect();
         let found = solve(length, &a);
         if depth < DEEPEST && tail(&found) > TAIL {
             let middle = from + 0.5 * length;
-            self.follow(from, middle, depth + 1, g, pieces);
-            self.follow(middle, to, depth + 1, g, pieces);
+            self.follow(from, middle, depth + 1, g, intervals);
+            self.follow(middle, to, depth + 1, g, intervals);
             return;
         }
         let found: Vec<Factor> = found.iter().map(|c| c * &*g).collect();
         *g = unitary(end(&found));
-        pieces.push(Piece { from, length, coefficients: found.iter().flat_map(numbers).collect() });
+        intervals.push(Interval { from, length, coefficients: found.iter().flat_map(numbers).collect() });
     }
 
     /// From the representative of the first point of a segment to that of the second.
@@ -153,11 +153,11 @@ pub fn lift_knots(space: &Erased, curves: &Curves, monitor: &Monitor, out: &mut 
     let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(SEGMENTS * size).enumerate().collect();
     let parallel = blocks.len() > 1;
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
-        let mut track = Track::new(space);
+        let mut segment = LiftedSegment::new(space);
         for (i, out) in out.chunks_mut(size).enumerate() {
             let at = block * SEGMENTS + i;
             let (curve, i) = (at / nodes, at % nodes);
-            let g = if i == 0 { Factor::identity(k, k) } else { track.across(curves, curve, i - 1) };
+            let g = if i == 0 { Factor::identity(k, k) } else { segment.across(curves, curve, i - 1) };
             out.copy_from_slice(&numbers(&g));
             monitor.advance(1);
         }
@@ -171,7 +171,7 @@ pub fn lift_knots(space: &Erased, curves: &Curves, monitor: &Monitor, out: &mut 
     }
 }
 
-/// Where a sample is: its segment, the place there, how often time went round, and whether the curve is straight.
+/// Where a sample is: its segment, the position there, how often time went round, and whether the curve is straight.
 struct Sample {
     row: usize,
     segment: usize,
@@ -201,27 +201,28 @@ pub fn lift(
     parallel::for_each(blocks, parallel, monitor, |(block, out)| {
         let first = block * BLOCK;
         let mut samples: Vec<Sample> =
-            (0..out.len() / len).map(|row| place(curves, times, outside, first, row)).collect();
+            (0..out.len() / len).map(|row| position(curves, times, outside, first, row)).collect();
         samples.sort_by_key(|s| (s.segment, s.turns));
-        let mut track = Track::new(space);
+        let mut segment = LiftedSegment::new(space);
         let mut turned = Turned { k, complex: space.is_complex(), entries: vec![[0.0; 2]; k * k] };
         for group in samples.chunk_by(|a, b| a.segment == b.segment && a.turns == b.turns) {
             let (curve, i) = (group[0].segment / curves.nodes, group[0].segment % curves.nodes);
             let right = turn(space, curves, [knots, start], curve, group[0].turns);
             let [here, next] = [i, i + 1]
                 .map(|i| factor(k, &knots[(curve * curves.nodes + i) * 2 * k * k..][..2 * k * k]) * &right);
-            track.enter(curves, curve, i);
-            let pieces = [pieces(&mut track, group, &here, 1.0), pieces(&mut track, group, &here, -1.0)];
+            segment.enter(curves, curve, i);
+            let intervals =
+                [intervals(&mut segment, group, &here, 1.0), intervals(&mut segment, group, &here, -1.0)];
             for s in group {
                 let row = &mut out[s.row * len..][..len];
                 if s.straight {
                     // A ray from an end point is horizontal itself.
                     turned.set(&numbers(if s.t < 0.5 { &here } else { &next }), &[1.0]);
                 } else {
-                    let ahead = &pieces[usize::from(s.t < 0.0)];
+                    let ahead = &intervals[usize::from(s.t < 0.0)];
                     let size = s.t.abs();
                     let at = ahead.partition_point(|p| (p.from + p.length).abs() < size).min(ahead.len() - 1);
-                    let Piece { from, length, coefficients } = &ahead[at];
+                    let Interval { from, length, coefficients } = &ahead[at];
                     turned.set(coefficients, &legendre((s.t - from) / length));
                 }
                 turned.apply(row);
@@ -230,19 +231,19 @@ pub fn lift(
     });
 }
 
-/// Pieces of a segment ahead of its first point (`way` = 1) or behind, as far as there are samples.
-fn pieces(track: &mut Track, samples: &[Sample], here: &Factor, way: f64) -> Vec<Piece> {
+/// Intervals of a segment ahead of its first point (`way` = 1) or behind, as far as there are samples.
+fn intervals(segment: &mut LiftedSegment, samples: &[Sample], here: &Factor, way: f64) -> Vec<Interval> {
     let (mut g, mut out) = (here.clone(), Vec::new());
     let most = samples.iter().filter(|s| !s.straight).map(|s| way * s.t).fold(-1.0, f64::max);
     let mut from = 0.0;
     while from < most || (from == 0.0 && way > 0.0) {
-        track.follow(way * from, way * (from + 1.0), 0, &mut g, &mut out);
+        segment.follow(way * from, way * (from + 1.0), 0, &mut g, &mut out);
         from += 1.0;
     }
     out
 }
 
-fn place(curves: &Curves, times: &Times, outside: Outside, first: usize, row: usize) -> Sample {
+fn position(curves: &Curves, times: &Times, outside: Outside, first: usize, row: usize) -> Sample {
     let at = first + row;
     let (curve, i) = (at / times.count, at % times.count);
     let x = if times.x.len() == times.count { times.x[i] } else { times.x[at] };

@@ -39,7 +39,7 @@ struct Carrier<'a> {
     segment: Segment<Dual>,
     gamma: Vec<Dual>,
     /// Where the vector is, and the vector.
-    place: Vec<Lane>,
+    position: Vec<Lane>,
     vector: Vec<Lane>,
 }
 
@@ -48,12 +48,12 @@ impl<'a> Carrier<'a> {
         let len = space.point_len();
         let lanes = || vec![Lane::ZERO; len];
         let gamma = vec![Dual { v: Lane::ZERO, d: Lane::ZERO }; len];
-        Carrier { space, segment: Segment::new(len), gamma, place: lanes(), vector: lanes() }
+        Carrier { space, segment: Segment::new(len), gamma, position: lanes(), vector: lanes() }
     }
 
-    /// Points and velocities at eight places of the segment.
+    /// Points and velocities at eight positions of the segment.
     fn at(&mut self, t: Lane) -> [Vec<Lane>; 2] {
-        self.segment.at(self.space, self.place.len(), Dual { v: t, d: Lane::ONE }, &mut self.gamma);
+        self.segment.at(self.space, self.position.len(), Dual { v: t, d: Lane::ONE }, &mut self.gamma);
         let y: Vec<Lane> = self.gamma.iter().map(|x| x.v).collect();
         let mut d: Vec<Lane> = self.gamma.iter().map(|x| x.d).collect();
         self.space.velocity(&y, &mut d);
@@ -63,17 +63,17 @@ impl<'a> Carrier<'a> {
     /// Brings the vector along the geodesic to another point.
     fn move_to(&mut self, q: &[Lane]) {
         let mut way = vec![Lane::ZERO; q.len()];
-        self.space.log(&self.place, q, &mut way);
+        self.space.log(&self.position, q, &mut way);
         let x = self.vector.clone();
-        self.space.parallel_transport(&self.place, q, &way, &x, &mut self.vector);
-        self.place.copy_from_slice(q);
+        self.space.parallel_transport(&self.position, q, &way, &x, &mut self.vector);
+        self.position.copy_from_slice(q);
     }
 
-    /// Carries the vector along the segment from its place a to its place b.
+    /// Carries the vector along the segment from its position a to its position b.
     fn along(&mut self, a: f64, b: f64, depth: usize) {
         let space = self.space;
-        let (dim, len) = (space.dim(), self.place.len());
-        let q = self.place.clone();
+        let (dim, len) = (space.dim(), self.position.len());
+        let q = self.position.clone();
         let mut frame = vec![Lane::ZERO; space.frame_len()];
         space.lift(&q, &mut frame);
         let steepness = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
@@ -169,7 +169,7 @@ pub fn transport(
         };
         enter(&mut carrier, first);
         let [y, _] = carrier.at(lane(a));
-        carrier.place.copy_from_slice(&y);
+        carrier.position.copy_from_slice(&y);
         carrier.vector.iter_mut().zip(&*vector).for_each(|(x, v)| *x = lane(*v));
         let way = (last - first).signum();
         let (near, far) = if way < 0 { (1.0, 0.0) } else { (0.0, 1.0) };
@@ -195,7 +195,7 @@ pub fn transport(
     });
 }
 
-/// The segment of a time, counted on through the turns of a closed curve, and the place in it.
+/// The segment of a time, counted on through the turns of a closed curve, and the position in it.
 fn locate(t: &[f64], x: f64, outside: Outside) -> (i64, f64) {
     let (found, _) = inside(x, t, outside);
     let turns = ((x - found) / (t[t.len() - 1] - t[0])).round() as i64;

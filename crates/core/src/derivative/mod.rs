@@ -62,8 +62,8 @@ impl Motion<'_> {
     /// closed curve is the first again, in its frame.
     pub fn at(&self, tau: f64, of: Of) -> Matrix {
         let m = self.derivative.space.dim();
-        let place = Place { segment: self.segment, tau };
-        let (columns, _) = self.derivative.columns(&self.bezier, &place, of);
+        let position = Position { segment: self.segment, tau };
+        let (columns, _) = self.derivative.columns(&self.bezier, &position, of);
         let Segment { h, functions, .. } = &self.derivative.system.segments[self.segment];
         let mut out = Matrix::zeros(columns.nrows(), 4 * m);
         for (e, f) in functions.iter().enumerate() {
@@ -90,7 +90,7 @@ impl Motion<'_> {
 }
 
 /// Where a time falls.
-struct Place {
+struct Position {
     segment: usize,
     tau: f64,
 }
@@ -122,9 +122,9 @@ impl<'a> Derivative<'a> {
         self.t.len() - 1
     }
 
-    fn place(&self, x: f64) -> Place {
+    fn position(&self, x: f64) -> Position {
         let segment = self.t[1..self.segments()].partition_point(|&t| t <= x);
-        Place { segment, tau: (x - self.t[segment]) / (self.t[segment + 1] - self.t[segment]) }
+        Position { segment, tau: (x - self.t[segment]) / (self.t[segment + 1] - self.t[segment]) }
     }
 
     fn bezier(&self, segment: usize) -> Bezier {
@@ -132,7 +132,7 @@ impl<'a> Derivative<'a> {
     }
 
     /// The columns by which a sample follows the four control points, τ and (behind a factor) h.
-    fn columns(&self, bezier: &Bezier, &Place { segment, tau }: &Place, of: Of) -> (Matrix, Vector) {
+    fn columns(&self, bezier: &Bezier, &Position { segment, tau }: &Position, of: Of) -> (Matrix, Vector) {
         let (space, inverse) = (self.space, 1.0 / self.system.segments[segment].h);
         // Behind the control points the last column is the derivative in τ.
         let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
@@ -158,9 +158,9 @@ impl<'a> Derivative<'a> {
         self.close(&mut u);
         let m = self.space.dim();
         for (&x, out) in x.iter().zip(out.chunks_mut(self.space.point_len())) {
-            let place = self.place(x);
-            let (columns, by_h) = self.kept(&place, of);
-            let Place { segment: i, tau } = place;
+            let position = self.position(x);
+            let (columns, by_h) = self.kept(&position, of);
+            let Position { segment: i, tau } = position;
             let segment = &self.system.segments[i];
             let (dh, dt) = (change.lengths[i], change.knots[i]);
             let mut z = Vector::zeros(4 * m + 1);
@@ -190,9 +190,9 @@ impl<'a> Derivative<'a> {
         };
         let mut u = zero();
         for (&x, cotangent) in x.iter().zip(cotangent.chunks(len)) {
-            let place = self.place(x);
-            let (columns, by_h) = self.kept(&place, of);
-            let Place { segment: i, tau } = place;
+            let position = self.position(x);
+            let (columns, by_h) = self.kept(&position, of);
+            let Position { segment: i, tau } = position;
             let segment = &self.system.segments[i];
             let cotangent = Vector::from_column_slice(cotangent);
             let z = columns.tr_mul(&cotangent);
@@ -215,10 +215,10 @@ impl<'a> Derivative<'a> {
     }
 
     /// The same for a segment that is asked for again and again.
-    fn kept(&mut self, place: &Place, of: Of) -> (Matrix, Vector) {
-        let bezier = self.beziers.remove(&place.segment).unwrap_or_else(|| self.bezier(place.segment));
-        let found = self.columns(&bezier, place, of);
-        self.beziers.insert(place.segment, bezier);
+    fn kept(&mut self, position: &Position, of: Of) -> (Matrix, Vector) {
+        let bezier = self.beziers.remove(&position.segment).unwrap_or_else(|| self.bezier(position.segment));
+        let found = self.columns(&bezier, position, of);
+        self.beziers.insert(position.segment, bezier);
         found
     }
 

@@ -22,7 +22,7 @@ enum Start {
     Zero,
 }
 
-/// Solves by the method asked for: `whole` curves, or pieces of longer ones.
+/// Solves by the method asked for: `whole` curves, or sections of longer ones.
 pub fn run(
     space: &Erased,
     chain: &mut Chain,
@@ -41,7 +41,7 @@ pub fn run(
         Method::Auto => {
             let costs = Costs::of(space, chain, ends);
             let (mut outcome, first) = in_turn(space, chain, ends, options, &costs, idle, work, monitor);
-            // Pieces of one curve must not choose apart.
+            // Sections of one curve must not choose apart.
             if whole {
                 minimum_energy::select(
                     space,

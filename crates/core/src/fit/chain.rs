@@ -4,7 +4,7 @@
 //! every node is the origin, the polygon is its chords dᵢ (coordinates of `log_{pᵢ}(pᵢ₊₁)`), velocities
 //! are coordinate vectors, and transport between neighbours is the identity.
 //!
-//! Eight chains of one length lie side by side in the lanes: curves of a batch, or pieces of a
+//! Eight chains of one length lie side by side in the lanes: curves of a batch, or sections of a
 //! long curve.
 
 use crate::scalar::{LANES, Lane};

@@ -12,26 +12,26 @@ const TWO: Lane = lane(2.0);
 const THIRD: Lane = lane(1.0 / 3.0);
 
 /// One of the ends of a chain of n segments: its node and the neighbour, the segment between them, and the next one.
-pub(super) struct Place {
+pub(super) struct ChainEnd {
     pub node: usize,
     pub next: usize,
     pub near: usize,
     pub far: usize,
 }
 
-impl Place {
+impl ChainEnd {
     pub fn of(which: usize, n: usize) -> Self {
         if which == 0 {
-            Place { node: 0, next: 1, near: 0, far: 1.min(n - 1) }
+            ChainEnd { node: 0, next: 1, near: 0, far: 1.min(n - 1) }
         } else {
-            Place { node: n, next: n - 1, near: n - 1, far: n.max(2) - 2 }
+            ChainEnd { node: n, next: n - 1, near: n - 1, far: n.max(2) - 2 }
         }
     }
 }
 
 /// Diagonal and off-diagonal of an end row of T, lane by lane.
 pub fn row(chain: &Chain, which: usize, kinds: &[EndKind; LANES]) -> (Lane, Lane) {
-    let Place { near, far, .. } = Place::of(which, chain.n);
+    let ChainEnd { near, far, .. } = ChainEnd::of(which, chain.n);
     let (h0, h1) = (chain.h[near], chain.h[far]);
     let velocity = of_kind(kinds, EndKind::Velocity);
     let knot = of_kind(kinds, EndKind::NotAKnot);
@@ -54,7 +54,7 @@ pub fn residual<S: Scalar>(
 ) -> Lane {
     let (n, m) = (chain.n, chain.m);
     let NodeVectors { a, b, .. } = work;
-    let Place { node, next, near, far } = Place::of(which, n);
+    let ChainEnd { node, next, near, far } = ChainEnd::of(which, n);
     let (h0, h1) = (chain.h[near], chain.h[far]);
     let sign = if which == 0 { ONE } else { -ONE };
     let u = &all_u[node * m..(node + 1) * m];
@@ -156,7 +156,7 @@ pub fn few_points(space: &Erased, chain: &mut Chain, ends: ChainEnds) -> ChainEn
         return ends;
     }
     for which in (0..2).filter(|&e| knots[e]) {
-        let Place { near, far, .. } = Place::of(which, n);
+        let ChainEnd { near, far, .. } = ChainEnd::of(which, n);
         let weights = NotAKnot::of(chain.h[near], chain.h[far], n, true);
         let chord = |i: usize| &chain.chord[i * m..(i + 1) * m];
         let mut value = vec![Lane::ZERO; m];

@@ -9,7 +9,7 @@ use super::chain::Chain;
 use super::condition::residual;
 use super::convergence::Convergence;
 use super::end_kind::{ChainEnds, EndKind, of_kind};
-use super::ends::{NotAKnot, Place};
+use super::ends::{ChainEnd, NotAKnot};
 use super::node::NodeVectors;
 use super::problem::Solver;
 use super::solve::{Limits, Outcome, Workspace};
@@ -94,7 +94,7 @@ fn end_velocity(
     vectors: &mut NodeVectors<Lane>,
 ) -> Vec<Lane> {
     let (m, keep) = (chain.m, space.chord_len());
-    let Place { node, next, near, far } = Place::of(which, chain.n);
+    let ChainEnd { node, next, near, far } = ChainEnd::of(which, chain.n);
     let (h, u) = (chain.h[near], chain.velocities());
     let (own, neighbour) = (&u[node * m..(node + 1) * m], &u[next * m..(next + 1) * m]);
     let given = &chain.end_values[which];

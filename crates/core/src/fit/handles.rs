@@ -117,7 +117,7 @@ pub fn noisy_handles(
             scatter(&q, &mut rows);
             let length = (space.inner(&p, u, u).sqrt() * third).abs().to_array();
             for (l, q) in rows.chunks_exact(len).enumerate().filter(|(l, _)| far.to_bitmask() >> l & 1 == 1) {
-                if space.beyond_doubles(q).is_some() {
+                if space.imprecise_point(q).is_some() {
                     found[l].get_or_insert(Status::LongHandle { index: i, angle: length[l] });
                 }
             }

@@ -42,7 +42,7 @@ pub fn follow(
     // Where each lane is, how far it goes next, and the last two curves with their λ.
     let (mut at, mut ahead) = (Lane::ZERO, lane(FIRST));
     let mut curves = [vec![Lane::ZERO; best.len()], vec![Lane::ZERO; best.len()]];
-    let mut places = [Lane::ZERO; 2];
+    let mut positions = [Lane::ZERO; 2];
     let mut lost = Lane::ZERO;
     let mut used = Lane::ZERO;
     loop {
@@ -53,7 +53,7 @@ pub fn follow(
         }
         let goal = (at + ahead).min(Lane::ONE);
         scale(space, chain, &chords, &values, goal);
-        chain.update(space, |_, u| predict(u, &curves, places, goal));
+        chain.update(space, |_, u| predict(u, &curves, positions, goal));
         let within = within(used, CORRECTIONS, LOOSE);
         let found = solve(space, chain, ends, Solver::Homotopy, within, done, work, monitor);
         used += done.select(Lane::ZERO, Lane::new(found.iterations.map(|n| n as f64)));
@@ -63,7 +63,7 @@ pub fn follow(
             curves[0][i] = reached.select(curves[1][i], curves[0][i]);
             curves[1][i] = reached.select(*u, curves[1][i]);
         }
-        places = [reached.select(places[1], places[0]), reached.select(goal, places[1])];
+        positions = [reached.select(positions[1], positions[0]), reached.select(goal, positions[1])];
         at = reached.select(goal, at);
         ahead = reached.select(ahead * lane(1.5), failed.select(ahead * lane(0.4), ahead));
         lost |= ahead.simd_lt(lane(LEAST)) & !done;
@@ -104,16 +104,16 @@ fn scale(space: &Erased, chain: &mut Chain, chords: &[Lane], values: &[Vec<Lane>
 }
 
 /// The secant through the last two curves, u/λ being nearly constant.
-fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], places: [Lane; 2], goal: Lane) {
+fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], positions: [Lane; 2], goal: Lane) {
     let slope = |i: usize| {
-        let started = places[i].simd_gt(Lane::ZERO);
-        started.select(Lane::ONE / places[i], Lane::ZERO)
+        let started = positions[i].simd_gt(Lane::ZERO);
+        started.select(Lane::ONE / positions[i], Lane::ZERO)
     };
     let (before, now) = (slope(0), slope(1));
     // u/λ is extrapolated in λ; with one curve it is kept.
-    let twice = places[0].simd_gt(Lane::ZERO);
-    let gap = twice.select(places[1] - places[0], Lane::ONE);
-    let weight = twice.select((goal - places[1]) / gap, Lane::ZERO);
+    let twice = positions[0].simd_gt(Lane::ZERO);
+    let gap = twice.select(positions[1] - positions[0], Lane::ONE);
+    let weight = twice.select((goal - positions[1]) / gap, Lane::ZERO);
     for (i, u) in u.iter_mut().enumerate() {
         let (b, n) = (curves[0][i] * before, curves[1][i] * now);
         *u = goal * (n + weight * (n - b));
@@ -125,18 +125,18 @@ mod tests {
     use super::*;
 
     /// What is predicted for λ = `goal` from the curves at two λ, 0 where there is none yet.
-    fn predicted(curve: impl Fn(f64) -> f64, places: [f64; 2], goal: f64) -> f64 {
+    fn predicted(curve: impl Fn(f64) -> f64, positions: [f64; 2], goal: f64) -> f64 {
         let mut u = [lane(0.0)];
-        predict(&mut u, &places.map(|at| vec![lane(curve(at))]), places.map(lane), lane(goal));
+        predict(&mut u, &positions.map(|at| vec![lane(curve(at))]), positions.map(lane), lane(goal));
         u[0].to_array()[0]
     }
 
     #[test]
     fn the_secant_of_velocities_over_lambda_is_followed() {
         let quadratic = |at: f64| at * (3.0 - 2.0 * at);
-        for (places, goal) in [([0.25, 0.625], 1.0), ([0.25, 0.3], 0.31), ([0.5, 0.75], 1.0)] {
-            let found = predicted(quadratic, places, goal);
-            assert!((found - quadratic(goal)).abs() < 1e-14, "{places:?}, {goal}: {found}");
+        for (positions, goal) in [([0.25, 0.625], 1.0), ([0.25, 0.3], 0.31), ([0.5, 0.75], 1.0)] {
+            let found = predicted(quadratic, positions, goal);
+            assert!((found - quadratic(goal)).abs() < 1e-14, "{positions:?}, {goal}: {found}");
         }
         // One curve is a line through zero, and none is zero.
         assert!((predicted(quadratic, [0.0, 0.25], 0.625) - 2.5 * quadratic(0.25)).abs() < 1e-15);

@@ -1,12 +1,12 @@
-//! Eight curves, or pieces of curves, side by side in the lanes.
+//! Eight curves, or sections of curves, side by side in the lanes.
 
 use super::auto;
 use super::chain::{Chain, Run};
 use super::end_kind::{ChainEnds, EndKind, of_kind};
 use super::ends::few_points;
 use super::handles::noisy_handles;
-use super::piece::Piece;
 use super::problem::{Ends, Options, Problem, Report, Status};
+use super::section::Section;
 use super::solve::Workspace;
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, dot, few, lane, mask_from, scatter};
@@ -23,13 +23,13 @@ thread_local! {
     static THREAD: RefCell<Thread> = RefCell::default();
 }
 
-/// Fits up to eight pieces of one length.
+/// Fits up to eight sections of one length.
 pub fn fit_lanes(
     space: &Erased,
     problem: &Problem,
     options: &Options,
     monitor: &Monitor,
-    group: &mut [Piece],
+    group: &mut [Section],
 ) {
     // Taken out and put back, because Python may call in again while we ask it whether to go on.
     let mut memory = THREAD.take();
@@ -42,21 +42,21 @@ fn fit_in(
     problem: &Problem,
     options: &Options,
     monitor: &Monitor,
-    group: &mut [Piece],
+    group: &mut [Section],
     Thread { chain, work }: &mut Thread,
 ) {
     let nodes = group[0].nodes;
-    // Lanes that are left over repeat the first piece.
-    let piece = |l: usize| &group[if l < group.len() { l } else { 0 }];
-    let runs: [Run; LANES] = few(|l| piece(l).run(problem, space.point_len()));
+    // Lanes that are left over repeat the first section.
+    let section = |l: usize| &group[if l < group.len() { l } else { 0 }];
+    let runs: [Run; LANES] = few(|l| section(l).run(problem, space.point_len()));
     let is_end = |l: usize| {
-        let (p, last) = (piece(l), problem.segments(piece(l).curve));
+        let (p, last) = (section(l), problem.segments(section(l).curve));
         [p.first == 0, p.first + nodes == last + 1]
     };
     let whole = |l: usize| is_end(l) == [true, true];
     let (ends, values) = match problem.ends {
         Ends::Periodic if whole(0) => (ChainEnds::Periodic, [None, None]),
-        // Pieces of a closed curve, all of whose ends are artificial.
+        // Sections of a closed curve, all of whose ends are artificial.
         Ends::Periodic => (ChainEnds::Open([[EndKind::Acceleration; LANES]; 2]), [None, None]),
         Ends::Open(ends) => {
             let mut kinds = [[EndKind::Acceleration; LANES]; 2];
@@ -72,7 +72,7 @@ fn fit_in(
     let rows: [Option<[&[f64]; LANES]>; 2] = few(|e| {
         values[e].map(|(v, len)| {
             few(|l| {
-                let c = piece(l).curve;
+                let c = section(l).curve;
                 if is_end(l)[e] { &v[c * len..(c + 1) * len] } else { &zeros[..] }
             })
         })
@@ -81,8 +81,8 @@ fn fit_in(
     let ends = few_points(space, chain, ends);
     let (cut, almost_cut) = (chain.cut, chain.almost_cut);
     let idle = mask_from(|l| cut[l].is_some());
-    let pieces_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
-    let options = Options { tol: pieces_tol, ..*options };
+    let sections_tol = if whole(0) { options.tol } else { options.tol / 4.0 };
+    let options = Options { tol: sections_tol, ..*options };
     let outcome = auto::run(space, chain, &ends, &options, idle, whole(0), work, monitor);
     let alternative = (outcome.alternative * chain.unit_of_energy()).to_array();
     let (residual, rate) = (outcome.residual.to_array(), outcome.rate.to_array());
@@ -123,7 +123,7 @@ fn fit_in(
     write_velocities(space, chain, &runs, group);
 }
 
-fn write_velocities(space: &Erased, chain: &mut Chain, runs: &[Run; LANES], group: &mut [Piece]) {
+fn write_velocities(space: &Erased, chain: &mut Chain, runs: &[Run; LANES], group: &mut [Section]) {
     let len = space.point_len();
     let mut rows = vec![0.0; LANES * len];
     chain.roll_up(space, runs, |i, u| {

@@ -34,11 +34,11 @@ mod line_search;
 mod minimum_energy;
 mod newton;
 pub(crate) mod node;
-mod piece;
-mod pieces;
 mod problem;
 mod quasi_newton;
 mod rounded;
+mod section;
+mod sections;
 mod solve;
 mod tridiagonal;
 mod trust_region;
@@ -56,9 +56,9 @@ pub use problem::{End, Ends, Method, Options, Problem, Report, Solver, SolverSet
 use crate::monitor::Monitor;
 use crate::scalar::LANES;
 use crate::space::{Ambient, Erased, Frame, Origin};
-use pieces::{OVERLAP, fit_cut};
+use sections::{OVERLAP, fit_cut};
 
-/// Curves with more segments than this are cut into pieces.
+/// Curves with more segments than this are cut into sections.
 const LONG: usize = 512;
 
 /// About how many numbers of eight bytes the fit of eight curves takes at a time.
@@ -98,7 +98,7 @@ pub fn fit(
         if report.status.is_fault() {
             own.fill(f64::NAN);
         } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
-            // Pieces agree to the tolerance; first and last velocity are one.
+            // Sections agree to the tolerance; first and last velocity are one.
             let transported = problem.across_closure(space, curve, &own[..len]);
             own[problem.segments(curve) * len..].copy_from_slice(&transported);
         }

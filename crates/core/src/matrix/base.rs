@@ -21,7 +21,7 @@ pub trait Storage: Copy + Send + Sync + 'static {
     fn size(shape: Self::Shape) -> (usize, usize);
     /// Equal entries.
     fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
-    /// Entries from their places, row by row. Writes each once, where `filled` and a loop write twice.
+    /// Entries from their positions, row by row. Writes each once, where `filled` and a loop write twice.
     fn collected<T: Copy>(shape: Self::Shape, spare: T, f: impl FnMut(usize) -> T) -> Self::Of<T>;
     /// Functions of matrices of any size.
     fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
@@ -123,7 +123,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         m
     }
 
-    /// From a function of the place of an entry, counted row by row.
+    /// From a function of the position of an entry, counted row by row.
     #[inline(always)]
     pub(super) fn collected(shape: A::Shape, f: impl FnMut(usize) -> Entry<S, D>) -> Self {
         Matrix { shape, data: A::collected(shape, [S::constant(Lane::ZERO); D], f) }

@@ -126,7 +126,7 @@ mod tests {
         // Small ones need no roots; the largest turns by 2.94 and needs Schur's form. t A has the derivatives A and 0.
         for size in [0.01, 0.3, 1.0, 1.2] {
             // Near a turn by π rounding grows with each derivative, by the square of the room that is left.
-            let room = (std::f64::consts::PI - 2.45 * size).min(1.0);
+            let slack = (std::f64::consts::PI - 2.45 * size).min(1.0);
             let a = [[0.3, -2.5], [2.4, 0.1]].map(|row| row.map(|x| x * size));
             let t = Jet::from_parts([Lane::ONE, Lane::ONE, Lane::ZERO]);
             let ta = Matrix::<Jet, 1>::from_fn(2, 2, |i, j| [t * lane(a[i][j])]);
@@ -135,7 +135,7 @@ mod tests {
                 for j in 0..2 {
                     let found = log[(i, j)][0].parts().map(|x| x.to_array()[0]);
                     for (order, expected) in [a[i][j], a[i][j], 0.0].into_iter().enumerate() {
-                        let allowed = 1e-13 * size / room.powi(2 * order as i32);
+                        let allowed = 1e-13 * size / slack.powi(2 * order as i32);
                         assert!((found[order] - expected).abs() < allowed, "{} at {size}", found[order]);
                     }
                 }

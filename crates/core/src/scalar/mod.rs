@@ -1,7 +1,7 @@
 //! The numbers a formula is written over.
 //!
 //! Every formula is written once, generic over [`Scalar`]: a [`Lane`] is eight doubles side by side
-//! (eight samples, curves or pieces of a curve), a [`Jet`] carries two derivatives in t along, a
+//! (eight samples, curves or sections of a curve), a [`Jet`] carries two derivatives in t along, a
 //! [`Dual`] one derivative in any direction. A lone number is padded into a lane, so that one curve
 //! and a batch of curves give bit-identical results.
 

@@ -155,8 +155,8 @@ table! {
         fn project(&self, x: &mut [Lane]) -> Lane;
         fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane;
         fn random_point(&self, noise: &mut [Lane]);
-        fn complaint(&self, x: &[f64]) -> String;
-        fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)>;
+        fn violation(&self, x: &[f64]) -> String;
+        fn imprecise_point(&self, points: &[f64]) -> Option<(usize, String)>;
         fn rounding(&self, p: &[Lane]) -> Lane;
     }
     Frame {

@@ -11,7 +11,7 @@ pub fn far_out(points: &[f64], len: usize) -> Option<(usize, String)> {
     // |p|² = cosh² r + sinh² r
     let distance = |square: f64| 0.5 * square.acosh();
     let why = format!(
-        "lies at distance {:.1} from (1, 0, …), where rounding errors, ε|p|², leave too few digits (farthest: {:.1}); \
+        "lies at distance {:.1} from (1, 0, …), where rounding errors, ε|p|², leave too few significant digits (farthest: {:.1}); \
          move all points by one isometry, space.transvection, so that their middle is (1, 0, …)",
         distance(square(&points[row * len..(row + 1) * len])),
         distance(FARTHEST)

@@ -84,10 +84,10 @@ pub trait Model: Copy + Send + Sync {
     fn random_point(&self, noise: &mut [Lane]) {
         self.project(noise);
     }
-    /// See [`Ambient::complaint`].
-    fn complaint(&self, x: &[f64]) -> String;
-    /// See [`Ambient::beyond_doubles`].
-    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
+    /// See [`Ambient::violation`].
+    fn violation(&self, x: &[f64]) -> String;
+    /// See [`Ambient::imprecise_point`].
+    fn imprecise_point(&self, _points: &[f64]) -> Option<(usize, String)> {
         None
     }
     /// See [`Ambient::rounding`].
@@ -179,11 +179,11 @@ impl<M: Model> Ambient for M {
     fn random_point(&self, noise: &mut [Lane]) {
         Model::random_point(self, noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
-        Model::complaint(self, x)
+    fn violation(&self, x: &[f64]) -> String {
+        Model::violation(self, x)
     }
-    fn beyond_doubles(&self, points: &[f64]) -> Option<(usize, String)> {
-        Model::beyond_doubles(self, points)
+    fn imprecise_point(&self, points: &[f64]) -> Option<(usize, String)> {
+        Model::imprecise_point(self, points)
     }
     fn rounding(&self, p: &[Lane]) -> Lane {
         Model::rounding(self, p)

@@ -38,7 +38,7 @@ pub trait Part: Copy + Send + Sync {
         self.whole().random_point(noise);
     }
     /// Describes why a point of the whole is not in the part.
-    fn complaint(&self, p: &[Lane]) -> String;
+    fn violation(&self, p: &[Lane]) -> String;
 }
 
 /// A part as a space.
@@ -161,12 +161,12 @@ impl<P: Part> Ambient for Within<P> {
         self.0.random_point(noise);
         self.nearest(noise);
     }
-    fn complaint(&self, x: &[f64]) -> String {
+    fn violation(&self, x: &[f64]) -> String {
         let mut p: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         if self.0.whole().project(&mut p).simd_le(OFF).all() {
-            self.0.complaint(&p)
+            self.0.violation(&p)
         } else {
-            self.0.whole().complaint(x)
+            self.0.whole().violation(x)
         }
     }
     fn rounding(&self, p: &[Lane]) -> Lane {

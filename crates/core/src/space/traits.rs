@@ -96,9 +96,9 @@ pub trait Ambient: Copy + Send + Sync {
     /// Turns independent standard normal numbers into a random point.
     fn random_point(&self, noise: &mut [Lane]);
     /// Describes why x, which is finite, is not a point.
-    fn complaint(&self, x: &[f64]) -> String;
+    fn violation(&self, x: &[f64]) -> String;
     /// The first point that floating-point numbers represent with too few significant digits, and a description of it.
-    fn beyond_doubles(&self, _points: &[f64]) -> Option<(usize, String)> {
+    fn imprecise_point(&self, _points: &[f64]) -> Option<(usize, String)> {
         None
     }
     /// How far apart neighbouring floating-point points are at p, in units of a rounding error; 1 or more.

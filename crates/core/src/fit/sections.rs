@@ -1,26 +1,26 @@
-//! Long curves in pieces, on all cores.
+//! Long curves in sections, on all cores.
 //!
-//! A long curve is cut into overlapping pieces with artificial natural ends: what happens at a knot fades like
-//! 0.27 a node on equal knots, and ½ at worst on any, so that a piece is exact to rounding a few dozen nodes from
-//! its ends. That neighbouring pieces agree is checked; where they do not, the overlap grows.
+//! A long curve is cut into overlapping sections with artificial natural ends: what happens at a knot fades like
+//! 0.27 a node on equal knots, and ½ at worst on any, so that a section is exact to rounding a few dozen nodes from
+//! its ends. That neighbouring sections agree is checked; where they do not, the overlap grows.
 
 use super::certificate::{contraction_bound, equally_spaced, guaranteed_sweeps, invariant_radius};
 use super::lanes::fit_lanes;
-use super::piece::Piece;
 use super::problem::{End, Ends, Options, Problem, Report, Status};
+use super::section::Section;
 use crate::monitor::Monitor;
 use crate::parallel;
 use crate::scalar::LANES;
 use crate::space::{Ambient, Erased, Origin};
 
-/// Nodes of a piece without its overlap, at most.
+/// Nodes of a section without its overlap, at most.
 const CORE: usize = 480;
 /// Nodes of overlap on either side, at first.
 pub const OVERLAP: usize = 32;
 /// Nodes times dimensions from which threads pay: about a fifth of a millisecond's work.
 const PARALLEL: usize = 8192;
 
-/// Fits some curves, whole or in pieces with a given overlap; returns those whose pieces do not agree.
+/// Fits some curves, whole or in sections with a given overlap; returns those whose sections do not agree.
 pub fn fit_cut(
     space: &Erased,
     problem: &Problem,
@@ -32,7 +32,7 @@ pub fn fit_cut(
     reports: &mut [Report],
 ) -> Vec<usize> {
     let len = space.point_len();
-    let mut pieces = Vec::with_capacity(curves.len());
+    let mut sections = Vec::with_capacity(curves.len());
     let mut rest = velocities;
     let mut taken = 0;
     for &curve in curves {
@@ -40,12 +40,12 @@ pub fn fit_cut(
         let (mut mine, behind) = rest.split_at_mut((to - taken) * len);
         mine = &mut mine[(from - taken) * len..];
         (rest, taken) = (behind, to);
-        cut(problem, curve, overlap, len, mine, &mut pieces);
+        cut(problem, curve, overlap, len, mine, &mut sections);
     }
-    // Lanes hold chains of one length; sorting is stable, so that pieces of a curve stay in order.
-    pieces.sort_by_key(|p| p.nodes);
-    let mut groups: Vec<&mut [Piece]> = Vec::with_capacity(pieces.len() / LANES + 1);
-    for same in pieces.chunk_by_mut(|a, b| a.nodes == b.nodes) {
+    // Lanes hold chains of one length; sorting is stable, so that sections of a curve stay in order.
+    sections.sort_by_key(|p| p.nodes);
+    let mut groups: Vec<&mut [Section]> = Vec::with_capacity(sections.len() / LANES + 1);
+    for same in sections.chunk_by_mut(|a, b| a.nodes == b.nodes) {
         groups.extend(same.chunks_mut(LANES));
     }
     let work: usize = groups.iter().map(|g| g[0].nodes * space.dim()).sum();
@@ -56,23 +56,23 @@ pub fn fit_cut(
             monitor.advance(group.iter().map(|p| p.core.len()).sum());
         }
     });
-    merge(space, problem, options, len, &pieces, reports)
+    merge(space, problem, options, len, &sections, reports)
 }
 
-/// Cuts a curve into pieces of one length with so many nodes of overlap on either side, or takes it whole.
+/// Cuts a curve into sections of one length with so many nodes of overlap on either side, or takes it whole.
 fn cut<'a>(
     problem: &Problem,
     curve: usize,
     overlap: Option<usize>,
     len: usize,
     mut velocities: &'a mut [f64],
-    pieces: &mut Vec<Piece<'a>>,
+    sections: &mut Vec<Section<'a>>,
 ) {
     let nodes = problem.segments(curve) + 1;
     let count = LANES * nodes.div_ceil(LANES * CORE);
     let core = nodes.div_ceil(count);
     let closed = matches!(problem.ends, Ends::Periodic);
-    // Pieces that are no shorter than the curve are the curve.
+    // Sections that are no shorter than the curve are the curve.
     let overlap = overlap.filter(|overlap| core + 2 * overlap < nodes);
     let (core, length) = overlap.map_or((nodes, nodes), |overlap| (core, core + 2 * overlap));
     let mut from = 0;
@@ -80,7 +80,7 @@ fn cut<'a>(
         let to = (from + core).min(nodes);
         let (mine, behind) = velocities.split_at_mut((to - from) * len);
         velocities = behind;
-        // A piece of an open curve is moved inside it, one of a closed curve goes round.
+        // A section of an open curve is moved inside it, one of a closed curve goes round.
         let (first, start) = match overlap {
             None => (0, 0),
             Some(overlap) if closed => ((from + nodes - 1 - overlap) % (nodes - 1), overlap),
@@ -89,7 +89,7 @@ fn cut<'a>(
                 (first, from - first)
             }
         };
-        pieces.push(Piece {
+        sections.push(Section {
             curve,
             first,
             nodes: length,
@@ -104,17 +104,17 @@ fn cut<'a>(
     }
 }
 
-/// Puts the reports of the pieces of each curve together; returns the curves whose pieces differ.
+/// Puts the reports of the sections of each curve together; returns the curves whose sections differ.
 fn merge(
     space: &Erased,
     problem: &Problem,
     options: &Options,
     len: usize,
-    pieces: &[Piece],
+    sections: &[Section],
     reports: &mut [Report],
 ) -> Vec<usize> {
     let mut differing = Vec::new();
-    for same in pieces.chunk_by(|a, b| a.curve == b.curve) {
+    for same in sections.chunk_by(|a, b| a.curve == b.curve) {
         let curve = same[0].curve;
         let mut report = same[0].report;
         let mut largest = 0.0_f64;

@@ -5,7 +5,7 @@ use super::problem::{Problem, Report};
 use std::ops::Range;
 
 /// Part of a curve: nodes `first..first + nodes`, of which `core` (counted from `first`) are its own.
-pub struct Piece<'a> {
+pub struct Section<'a> {
     /// Which curve.
     pub curve: usize,
     /// The first node.
@@ -18,7 +18,7 @@ pub struct Piece<'a> {
     pub velocities: &'a mut [f64],
     /// How it went.
     pub report: Report,
-    /// The velocity just behind the core, which belongs to the next piece: they must agree.
+    /// The velocity just behind the core, which belongs to the next section: they must agree.
     pub next_velocity: Vec<f64>,
     /// The largest number in the velocities of the core.
     pub largest: f64,
@@ -26,7 +26,7 @@ pub struct Piece<'a> {
     pub end_handle: f64,
 }
 
-impl Piece<'_> {
+impl Section<'_> {
     /// Its nodes, for points of `len` numbers.
     pub fn run<'a>(&self, problem: &Problem<'a>, len: usize) -> Run<'a> {
         let (from, to) = (problem.offsets[self.curve], problem.offsets[self.curve + 1]);

@@ -5,7 +5,7 @@
 //! spacing.
 
 use crate::banded::{Banded, WIDTH};
-use crate::problem::{Ends, FlatEnd};
+use crate::problem::{EndCondition, Ends};
 use symspline_core::scalar::{Lane, lane};
 
 const BAND: usize = WIDTH + 1;
@@ -100,7 +100,7 @@ impl Basis {
 
     /// Whether the second derivative vanishes at an end.
     pub fn is_natural(&self, end: usize) -> bool {
-        matches!(self.ends, Ends::Open(ends) if ends[end] == FlatEnd::Natural)
+        matches!(self.ends, Ends::Open(ends) if ends[end] == EndCondition::Natural)
     }
 
     /// Length of a segment, divided by the mean.
@@ -126,10 +126,10 @@ impl Basis {
         self.tau[i.saturating_sub(3).min(last)]
     }
 
-    /// Value (`nu` = 0) or derivative of a spline at a place between 0 and 1 of a segment.
-    pub fn row(&self, segment: usize, place: f64, nu: usize) -> Row {
+    /// Value (`nu` = 0) or derivative of a spline at a position between 0 and 1 of a segment.
+    pub fn row(&self, segment: usize, position: f64, nu: usize) -> Row {
         let t = |k: usize| self.extended(segment + k);
-        let x = t(3) + place * (t(4) - t(3));
+        let x = t(3) + position * (t(4) - t(3));
         // B-splines of growing degree that do not vanish on the segment: the j-th begins at t(3 − degree + j).
         let mut b = [1.0, 0.0, 0.0, 0.0];
         for degree in 1..=3 - nu {
@@ -230,7 +230,7 @@ fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
 }
 
 /// The smoothing problem of numbers.
-pub struct Flat {
+pub struct LinearProblem {
     /// The splines.
     pub basis: Basis,
     /// B: values at the data.
@@ -238,28 +238,29 @@ pub struct Flat {
     /// P: values at the knots.
     pub values: Vec<Row>,
     /// S: second derivatives at the knots.
-    pub bends: Vec<Row>,
+    pub accelerations: Vec<Row>,
     /// BᵀWB for weights that are numbers, as the entries (i, i − d) at i · 4 + d.
     pub gram: Vec<f64>,
     /// Ω, likewise.
     pub penalty: Vec<f64>,
 }
 
-impl Flat {
-    /// For data that lie at places of segments, with their weights.
-    pub fn new(basis: Basis, places: &[(usize, f64)], weights: &[f64]) -> Self {
+impl LinearProblem {
+    /// For data that lie at positions of segments, with their weights.
+    pub fn new(basis: Basis, positions: &[(usize, f64)], weights: &[f64]) -> Self {
         let count = basis.count();
-        let data: Vec<Row> = places.iter().map(|&(segment, place)| basis.row(segment, place, 0)).collect();
-        let (values, bends) = (basis.at_knots(0), basis.at_knots(2));
+        let data: Vec<Row> =
+            positions.iter().map(|&(segment, position)| basis.row(segment, position, 0)).collect();
+        let (values, accelerations) = (basis.at_knots(0), basis.at_knots(2));
         let hats = (0..basis.knots() - 1).flat_map(|i| {
-            let (s, sixth) = (&bends, basis.h(i) / 6.0);
+            let (s, sixth) = (&accelerations, basis.h(i) / 6.0);
             let (l, r) = (s[i], s[i + 1]);
             [(l, l, 2.0 * sixth), (r, r, 2.0 * sixth), (l, r, sixth), (r, l, sixth)]
         });
         let penalty = gram(count, hats);
-        let mut flat = Flat { data, values, bends, gram: Vec::new(), penalty, basis };
-        flat.gram = flat.gram_of(weights);
-        flat
+        let mut linearized = LinearProblem { data, values, accelerations, gram: Vec::new(), penalty, basis };
+        linearized.gram = linearized.gram_of(weights);
+        linearized
     }
 
     /// BᵀWB for other weights.
@@ -293,20 +294,20 @@ mod tests {
     const KNOTS: [f64; 6] = [0.0, 0.5, 2.0, 2.25, 4.0, 5.0];
 
     /// The spline with some coefficients, at a time.
-    fn value(basis: &Basis, c: &[f64], segment: usize, place: f64, nu: usize) -> f64 {
+    fn value(basis: &Basis, c: &[f64], segment: usize, position: f64, nu: usize) -> f64 {
         let mut out = [0.0];
-        basis.row(segment, place, nu).apply(c, &mut out);
+        basis.row(segment, position, nu).apply(c, &mut out);
         out[0]
     }
 
     #[test]
     fn is_a_natural_cubic_spline() {
         for count in 2..=6 {
-            let basis = Basis::new(&KNOTS[..count], Ends::Open([FlatEnd::Natural; 2]));
+            let basis = Basis::new(&KNOTS[..count], Ends::Open([EndCondition::Natural; 2]));
             let c: Vec<f64> = (0..count).map(|i| (3.0 * i as f64).cos()).collect();
             let last = count - 2;
-            for (segment, place) in [(0, 0.0), (last, 1.0)] {
-                assert!(value(&basis, &c, segment, place, 2).abs() < 1e-13);
+            for (segment, position) in [(0, 0.0), (last, 1.0)] {
+                assert!(value(&basis, &c, segment, position, 2).abs() < 1e-13);
             }
             for i in 0..last {
                 for nu in 0..3 {
@@ -328,7 +329,7 @@ mod tests {
 
     #[test]
     fn reproduces_straight_lines() {
-        for ends in [FlatEnd::Natural, FlatEnd::Velocity] {
+        for ends in [EndCondition::Natural, EndCondition::Velocity] {
             let basis = Basis::new(&KNOTS, Ends::Open([ends; 2]));
             for segment in 0..5 {
                 let ones = value(&basis, &[1.0; 6], segment, 0.3, 0);
@@ -339,21 +340,25 @@ mod tests {
 
     #[test]
     fn energy_is_that_of_the_second_derivative() {
-        let basis = Basis::new(&KNOTS, Ends::Open([FlatEnd::Natural; 2]));
-        let flat = Flat::new(basis, &[(0, 0.0)], &[0.0]);
+        let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::Natural; 2]));
+        let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0]);
         let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
-        let mut bends = vec![0.0; 6];
-        flat.bends.iter().zip(&mut bends).for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));
-        let mass = times_mass(&flat.basis, &bends, 1);
-        let energy: f64 = bends.iter().zip(&mass).map(|(a, b)| a * b).sum();
+        let mut accelerations = vec![0.0; 6];
+        linearized
+            .accelerations
+            .iter()
+            .zip(&mut accelerations)
+            .for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));
+        let mass = times_mass(&linearized.basis, &accelerations, 1);
+        let energy: f64 = accelerations.iter().zip(&mass).map(|(a, b)| a * b).sum();
         let form: f64 = (0..6)
             .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
-            .map(|(i, d)| flat.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
+            .map(|(i, d)| linearized.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
             .sum();
         let simpson: f64 = (0..5)
             .map(|s| {
-                let [a, b, d] = [0.0, 0.5, 1.0].map(|p| value(&flat.basis, &c, s, p, 2).powi(2));
-                flat.basis.h(s) * (a + 4.0 * b + d) / 6.0
+                let [a, b, d] = [0.0, 0.5, 1.0].map(|p| value(&linearized.basis, &c, s, p, 2).powi(2));
+                linearized.basis.h(s) * (a + 4.0 * b + d) / 6.0
             })
             .sum();
         assert!((energy / simpson - 1.0).abs() < 1e-13 && (form / simpson - 1.0).abs() < 1e-13);

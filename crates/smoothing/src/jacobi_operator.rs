@@ -3,13 +3,13 @@
 //! long distances: of a great circle it takes `ξ'' + ξ` for `ξ''`, and a wave around it, which costs nothing, for bent.
 
 use crate::banded::stride;
-use crate::flat::{Flat, times_mass};
 use crate::frames::curvature_terms;
+use crate::linearized::{LinearProblem, times_mass};
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Erased, Origin};
 
 /// Jacobi's operator along a curve, in coordinates of frames.
-pub struct Curved {
+pub struct JacobiOperator {
     m: usize,
     /// R at every knot, m × m numbers row by row.
     turns: Vec<f64>,
@@ -17,11 +17,11 @@ pub struct Curved {
     pub penalty: Vec<f64>,
 }
 
-impl Curved {
+impl JacobiOperator {
     /// For velocities at the knots, in units of the mean knot spacing.
-    pub fn new(space: &Erased, flat: &Flat, speeds: &[f64]) -> Self {
+    pub fn new(space: &Erased, linearized: &LinearProblem, speeds: &[f64]) -> Self {
         let m = space.dim();
-        let knots = flat.basis.knots();
+        let knots = linearized.basis.knots();
         let mut turns = vec![0.0; knots * m * m];
         for column in 0..m {
             let unit: Vec<f64> = (0..knots * m).map(|i| f64::from(i % m == column)).collect();
@@ -32,19 +32,20 @@ impl Curved {
         }
         // Natural ends have no acceleration, and so none to change.
         for (end, knot) in [(0, 0), (1, knots - 1)] {
-            if flat.basis.is_natural(end) {
+            if linearized.basis.is_natural(end) {
                 turns[knot * m * m..][..m * m].fill(0.0);
             }
         }
-        let mut curved = Curved { m, turns, penalty: vec![0.0; flat.basis.count() * m * stride(m)] };
+        let mut jacobi =
+            JacobiOperator { m, turns, penalty: vec![0.0; linearized.basis.count() * m * stride(m)] };
         for i in 0..knots - 1 {
-            let sixth = flat.basis.h(i) / 6.0;
+            let sixth = linearized.basis.h(i) / 6.0;
             for (left, right, factor) in [(i, i, 2.0), (i + 1, i + 1, 2.0), (i, i + 1, 1.0), (i + 1, i, 1.0)]
             {
-                curved.add(flat, left, right, factor * sixth);
+                jacobi.add(linearized, left, right, factor * sixth);
             }
         }
-        curved
+        jacobi
     }
 
     fn turn(&self, knot: usize) -> &[f64] {
@@ -53,7 +54,7 @@ impl Curved {
 
     /// Adds `factor · (row of one knot)ᵀ(row of another)`: with s and v of the rows of S and P the blocks
     /// `s s' + s v' R' + v s' Rᵀ + v v' RᵀR'`.
-    fn add(&mut self, flat: &Flat, left: usize, right: usize, factor: f64) {
+    fn add(&mut self, linearized: &LinearProblem, left: usize, right: usize, factor: f64) {
         let (m, stride) = (self.m, stride(self.m));
         let (r, other) = (self.turn(left), self.turn(right));
         let mut square = vec![0.0; m * m];
@@ -66,7 +67,7 @@ impl Curved {
         }
         let (transposed, other): (Vec<f64>, Vec<f64>) =
             ((0..m * m).map(|at| r[at % m * m + at / m]).collect(), other.to_vec());
-        let rows = |knot: usize| [(&flat.bends[knot], false), (&flat.values[knot], true)];
+        let rows = |knot: usize| [(&linearized.accelerations[knot], false), (&linearized.values[knot], true)];
         for (x, turns) in rows(left) {
             for (y, turns_too) in rows(right) {
                 for (p, f) in x.factors.iter().enumerate() {
@@ -97,24 +98,25 @@ impl Curved {
     }
 
     /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a.
-    pub fn pull(&self, flat: &Flat, bends: &[f64]) -> Vec<f64> {
+    pub fn pull(&self, linearized: &LinearProblem, accelerations: &[f64]) -> Vec<f64> {
         let m = self.m;
-        let mass = times_mass(&flat.basis, bends, m);
-        let mut out = vec![0.0; flat.basis.count() * m];
+        let mass = times_mass(&linearized.basis, accelerations, m);
+        let mut out = vec![0.0; linearized.basis.count() * m];
         for (knot, x) in mass.chunks_exact(m).enumerate() {
             let turn = self.turn(knot);
             let turned: Vec<f64> =
                 (0..m).map(|c| (0..m).map(|row| turn[row * m + c] * x[row]).sum()).collect();
-            flat.bends[knot].spread(x, &mut out);
-            flat.values[knot].spread(&turned, &mut out);
+            linearized.accelerations[knot].spread(x, &mut out);
+            linearized.values[knot].spread(&turned, &mut out);
         }
         out
     }
 
     /// RPx: what curvature adds to coordinate c of the acceleration at a knot when coefficients move by x.
-    pub fn of_lanes(&self, flat: &Flat, knot: usize, x: &[Lane], c: usize) -> Lane {
+    pub fn of_lanes(&self, linearized: &LinearProblem, knot: usize, x: &[Lane], c: usize) -> Lane {
         let turns = &self.turns[(knot * self.m + c) * self.m..][..self.m];
-        let of = |(column, turn): (usize, &f64)| flat.values[knot].of_lanes(x, self.m, column) * lane(*turn);
+        let of =
+            |(column, turn): (usize, &f64)| linearized.values[knot].of_lanes(x, self.m, column) * lane(*turn);
         turns.iter().enumerate().fold(Lane::ZERO, |sum, each| sum + of(each))
     }
 }

@@ -2,13 +2,13 @@
 
 use crate::banded::Banded;
 use crate::choice::Linear;
-use crate::curved::Curved;
 use crate::cyclic::PeriodicCorrection;
-use crate::flat::{Basis, Flat, OVERLAP};
 use crate::frames::{Frames, curvature_terms};
 use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
-use crate::path::{Path, Place, moved, places};
+use crate::jacobi_operator::JacobiOperator;
+use crate::linearized::{Basis, LinearProblem, OVERLAP};
+use crate::path::{Path, Position, moved, positions};
 use crate::problem::{Data, Ends, Options, Report, Smooth, State};
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
@@ -34,14 +34,14 @@ const LIGHT: usize = 10;
 const ROUNDING: f64 = 1e-12;
 
 /// A curve, its data, and how far it has come.
-pub struct Track<'a> {
+pub struct CurveFit<'a> {
     data: Data<'a>,
     /// Knots.
     pub knots: Vec<f64>,
-    places: Vec<Place>,
+    positions: Vec<Position>,
     /// Roots of weights that are matrices.
     roots: Vec<Root>,
-    flat: Flat,
+    linearized: LinearProblem,
     ends: Ends,
     robust: Robust,
     /// Points at the knots to begin with.
@@ -63,7 +63,7 @@ pub struct Track<'a> {
     progress: Progress,
 }
 
-impl<'a> Track<'a> {
+impl<'a> CurveFit<'a> {
     /// A curve with given knots through first points.
     pub fn new(
         data: Data<'a>,
@@ -73,12 +73,12 @@ impl<'a> Track<'a> {
         ends: Ends,
         robust: Robust,
     ) -> Self {
-        let places = places(&knots, data.times);
+        let positions = positions(&knots, data.times);
         let basis = Basis::new(&knots, ends);
         let unit = basis.spacing.powi(3);
-        let flat = Flat::new(basis, &places, data.weights);
+        let linearized = LinearProblem::new(basis, &positions, data.weights);
         let lam = data.lam;
-        let balance = flat.balance();
+        let balance = linearized.balance();
         // From here on curves are geodesics; with larger λ rounding would make A forget the data.
         let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
         let roots = information::roots(data.information, m);
@@ -89,11 +89,11 @@ impl<'a> Track<'a> {
         let count = weights.len();
         let light = *weights.select_nth_unstable_by(count / LIGHT, f64::total_cmp).1;
         let density = light * count as f64 / (knots.len() - 1) as f64;
-        Track {
+        CurveFit {
             roots,
             data,
-            places,
-            flat,
+            positions,
+            linearized,
             ends,
             robust,
             velocities: vec![0.0; points.len()],
@@ -115,7 +115,7 @@ impl<'a> Track<'a> {
         let report = self.report();
         let inverse = match &self.inverse {
             Some(inverse) => rows_of(inverse),
-            None => vec![f64::NAN; self.flat.basis.count() * 4],
+            None => vec![f64::NAN; self.linearized.basis.count() * 4],
         };
         Smooth { knots: self.knots, points: self.points, velocities: self.velocities, inverse, report }
     }
@@ -189,12 +189,13 @@ impl<'a> Track<'a> {
     /// One step from the spline through the points, or the end; on all cores if no other curve is worked on.
     pub fn advance(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) {
         let velocities = self.end_velocities(space);
-        let (data, flat) = (&self.data, &self.flat);
-        let (m, spacing) = (space.dim(), flat.basis.spacing);
+        let (data, linearized) = (&self.data, &self.linearized);
+        let (m, spacing) = (space.dim(), linearized.basis.spacing);
         self.progress.report.iterations += 1;
         let path = Path { t: &self.knots, points: &self.points, velocities: &self.velocities };
         let frames = Frames::new(space, &self.points);
-        let mut residuals = Residuals::new(space, &path, &frames, &self.places, flat, data, &self.roots);
+        let mut residuals =
+            Residuals::new(space, &path, &frames, &self.positions, linearized, data, &self.roots);
         let factors = self.robust.factors(&residuals.squares);
         if self.progress.settled && self.progress.report.exact {
             let objective = self.value(space, &residuals);
@@ -207,27 +208,27 @@ impl<'a> Track<'a> {
         self.retreats = 0;
         let whole = factors.as_ref().map(|factors| {
             let whole = residuals.misfit.clone();
-            residuals.misfit.reweigh(flat, factors, m);
+            residuals.misfit.reweigh(linearized, factors, m);
             whole
         });
         let misfit = &residuals.misfit;
-        let mut bends = frames.coordinates(&path.bends(space, &path.knots()), |i| i);
+        let mut accelerations = frames.coordinates(&path.accelerations(space, &path.knots()), |i| i);
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
-        bends.iter_mut().for_each(|x| *x *= spacing * spacing);
+        accelerations.iter_mut().for_each(|x| *x *= spacing * spacing);
         speeds.iter_mut().for_each(|x| *x *= spacing);
-        let curvature = curvature_terms(space, &speeds, &bends);
+        let curvature = curvature_terms(space, &speeds, &accelerations);
         let sigma = data.sigma.unwrap_or(f64::NAN);
         let closed = self.ends == Ends::Periodic;
         let periodic = closed.then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: frames.round() });
-        let seen_with = |misfit, curved| {
-            Linear::new(flat, m, misfit, curved, periodic.as_ref(), &bends, &curvature, sigma)
+        let seen_with = |misfit, jacobi| {
+            Linear::new(linearized, m, misfit, jacobi, periodic.as_ref(), &accelerations, &curvature, sigma)
         };
-        let (curved, later);
-        curved = self.progress.curved.then(|| Curved::new(space, flat, &speeds));
-        let mut linear = seen_with(misfit, curved.as_ref());
+        let (jacobi, later);
+        jacobi = self.progress.with_curvature.then(|| JacobiOperator::new(space, linearized, &speeds));
+        let mut linear = seen_with(misfit, jacobi.as_ref());
         let mut lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
-        if self.progress.curved && linear.curved.is_none() {
-            later = Curved::new(space, flat, &speeds);
+        if self.progress.with_curvature && linear.jacobi.is_none() {
+            later = JacobiOperator::new(space, linearized, &speeds);
             linear = seen_with(misfit, Some(&later));
             lam = self.progress.weigh(space, &linear, &speeds, &self.robust, options.criterion);
         }
@@ -257,12 +258,15 @@ impl<'a> Track<'a> {
             (frames.coordinates(&ambient, |i| i), Some(ambient))
         } else {
             let change = linear.step(lam, &system);
-            let mut step = vec![0.0; flat.values.len() * m];
-            flat.values.iter().zip(step.chunks_exact_mut(m)).for_each(|(row, x)| row.apply(&change, x));
+            let mut step = vec![0.0; linearized.values.len() * m];
+            linearized.values.iter().zip(step.chunks_exact_mut(m)).for_each(|(row, x)| row.apply(&change, x));
             (step, None)
         };
-        let deviations: Vec<f64> =
-            flat.values.iter().map(|row| (row.square(&inverse).as_array()[0] * m as f64).sqrt()).collect();
+        let deviations: Vec<f64> = linearized
+            .values
+            .iter()
+            .map(|row| (row.square(&inverse).as_array()[0] * m as f64).sqrt())
+            .collect();
         let reach = speeds.chunks_exact(m).map(length).sum::<f64>();
         let tol = self.robust.tol(options.tol);
         let small = self.progress.judge(&step, &deviations, reach, tol, self.robust.reweighs());
@@ -277,7 +281,7 @@ impl<'a> Track<'a> {
                 // Degrees of freedom and deviations of the M-estimator are those of its pseudo-data (Cox 1983).
                 let (factors, softness) = self.robust.pseudo(&residuals.squares);
                 whole.soften(&factors, m);
-                let linear = seen_with(&whole, linear.curved);
+                let linear = seen_with(&whole, linear.jacobi);
                 let system = linear.factored(lane(lam / softness));
                 let band = system.inverse_band();
                 self.inverse = Some(system.mean(&band));
@@ -322,7 +326,7 @@ impl<'a> Track<'a> {
 
     /// J of the curve as it is.
     fn value(&self, space: &Erased, residuals: &Residuals) -> f64 {
-        let lam = self.progress.lam.unwrap_or(0.0) * self.flat.basis.spacing.powi(3);
+        let lam = self.progress.lam.unwrap_or(0.0) * self.linearized.basis.spacing.powi(3);
         let terms = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
         terms.sum::<f64>() + lam * gauss_newton::energy(space, &self.path())
     }
@@ -343,7 +347,7 @@ impl<'a> Track<'a> {
         alone: bool,
     ) -> Vec<f64> {
         let pull = Pull {
-            places: &self.places,
+            positions: &self.positions,
             points: &residuals.gammas,
             vectors: &residuals.vectors,
             factors,
