@@ -136,6 +136,14 @@ def test_links_to_files_lead_somewhere():
             assert (page.parent / link).exists(), f"{page.name}: {link}"
 
 
+def test_files_of_the_contributing_page_exist():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w./-]+\.(?:rs|py|toml|rst|md))`", text)
+    folders = (ROOT, ROOT / "python/symspline", ROOT / "crates/core/src", ROOT / "crates/vectors/src")
+    assert "fit/condition.rs" in named
+    assert [name for name in named if not any((folder / name).exists() for folder in folders)] == []
+
+
 def test_dead_links_are_found(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "a.html").write_text(
