@@ -85,8 +85,8 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
     let mut p = home.clone();
     let mut moving = Moving::at(space, &p);
     for knot in 1..=607 {
-        // Around one point: a walk in a space without end would leave the range of doubles, and in a space with an
-        // indefinite metric no geodesic may lead home.
+        // Around one point: a walk in an unbounded space would leave the range of floating-point numbers, and in a
+        // space with an indefinite metric no geodesic may lead back.
         p = exp(space, &home, &draw.vector(space, &home, 0.1));
         space.project(&mut p);
         moving.step(&p);
@@ -95,8 +95,8 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
             space.reorthonormalize(&mut moving.frame, &moving.p);
         }
     }
-    // An error of the frame goes eightfold into a jump of the acceleration. Frames of motions and of invertible
-    // matrices grow on the way.
+    // An error of the frame is amplified eightfold in the jump of the acceleration. Frames of motions and of
+    // invertible matrices grow along the polygon.
     let grown = if space.curvature().is_nan() {
         lane(40.0) * norm(&moving.frame) * norm(&moving.frame)
     } else {

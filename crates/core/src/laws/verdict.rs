@@ -1,8 +1,8 @@
-//! What a law found.
+//! The violation of a law.
 
 use crate::scalar::Lane;
 
-/// What a law found wrong.
+/// The violation that a law found.
 pub type Verdict = Result<(), String>;
 
 /// The largest lane of `found`, where it is more than `allowed`.
