@@ -22,8 +22,8 @@ fn rows() -> impl Iterator<Item = (&'static str, f64, [f64; 3])> {
     })
 }
 
-/// A few units in the last place of the function's size near x; zeros of cos and sin are as exact
-/// as their argument is: √x carries half a unit.
+/// A few units in the last place of the function's size near x. Zeros of cos and sin are as accurate as their
+/// argument, and √x has an error of half a unit.
 fn allowed(name: &str, x: f64, value: f64) -> f64 {
     let oscillation = match name {
         "c" if x > 0.0 => 1.0 + x.sqrt(),
@@ -31,7 +31,7 @@ fn allowed(name: &str, x: f64, value: f64) -> f64 {
         "k" | "j" if x > 2.0 => 4.0 * (1.0 + x.sqrt()) / x,
         _ => 0.0,
     };
-    // exp(√−x) inherits √−x times the rounding of its argument.
+    // exp(√−x) inherits √−x times the rounding error of its argument.
     let growth = if x < -2.0 && name != "arc" { (-x).sqrt() } else { 1.0 };
     6.0 * f64::EPSILON * (value.abs() * growth.max(1.0) + oscillation)
 }

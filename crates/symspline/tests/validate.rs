@@ -1,4 +1,4 @@
-//! Every fault of the input is found, with its curve and node.
+//! Every fault of the input is reported with its curve and node.
 
 use symspline::fit::{End, Ends, Problem};
 use symspline::space::Erased;
