@@ -18,7 +18,7 @@ struct Pool {
 static POOL: AtomicPtr<Pool> = AtomicPtr::new(std::ptr::null_mut());
 static THREADS: AtomicUsize = AtomicUsize::new(0);
 
-/// Limits the number of threads; 0 stands for all cores.
+/// Limits the number of threads; 0 means all cores.
 pub fn set_num_threads(n: usize) {
     THREADS.store(n, Ordering::Relaxed);
 }
@@ -129,7 +129,7 @@ mod tests {
     use std::sync::mpsc;
 
     #[test]
-    fn two_items_are_worked_on_at_once() {
+    fn two_items_run_concurrently() {
         set_num_threads(2);
         let quiet = |_| true;
         let both = (Mutex::new(0), Condvar::new());
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_of_a_thread_comes_to_the_caller_at_once() {
+    fn a_panic_of_a_thread_reaches_the_caller_at_once() {
         set_num_threads(2);
         let (send, receive) = mpsc::channel();
         std::thread::spawn(move || {

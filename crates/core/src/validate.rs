@@ -21,7 +21,7 @@ pub struct Invalid {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// Knots, points, offsets or end vectors have lengths that do not belong together.
+    /// Knots, points, offsets or end vectors have inconsistent lengths.
     Lengths(&'static str),
     /// A time is not finite.
     TimeNotFinite(f64),
@@ -36,7 +36,7 @@ pub enum Reason {
     TimesTooFarApart,
     /// A point is off the space.
     OffSpace {
-        /// How far, relative to the size of the point; not finite where there is no point of the space close to it.
+        /// The distance, relative to the size of the point; not finite if no point of the space is close to it.
         distance: f64,
         /// The condition that the point violates.
         condition: String,

@@ -176,7 +176,7 @@ fn cycles_are_found() {
 }
 
 #[test]
-fn what_is_no_cycle_is_not_found() {
+fn acyclic_modules_pass() {
     let siblings =
         [("", "pub use a::b::T;"), ("a", "mod b;\nmod c;\npub use b::T;"), ("a::b", "use super::c::U;")];
     let rest =

@@ -18,7 +18,7 @@ pub enum Members {
     Symplectic,
     /// XᵀηX = η with η = diag(−1, 1, …, 1), of determinant one and keeping the direction of time.
     Lorentz,
-    /// O(p, q): XᵀηX = η with η = diag(−1, …, −1, 1, …, 1) and so many negative numbers.
+    /// O(p, q): XᵀηX = η with η = diag(−1, …, −1, 1, …, 1), which has this number of negative entries.
     PseudoOrthogonal(usize),
 }
 

@@ -46,7 +46,7 @@ mod tests {
     use super::quantile;
 
     #[test]
-    fn quantiles_are_those_of_tables() {
+    fn quantiles_match_tables() {
         // Abramowitz & Stegun, table 26.8; two degrees of freedom are −2 ln(1 − p).
         let known = [
             (1, 0.95, 3.841_458_820_694_124),

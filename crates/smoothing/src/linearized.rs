@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn energy_is_that_of_the_second_derivative() {
+    fn energy_matches_the_second_derivative() {
         let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::Natural; 2]));
         let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0]);
         let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();

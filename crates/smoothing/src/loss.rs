@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slopes_are_those_of_the_loss() {
+    fn slopes_match_the_loss() {
         // ψ is half the gradient of ρ(|r|²), ψ' its divergence over m.
         let (corner, h) = (0.7, 1e-4);
         for loss in [Loss::Linear, Loss::Huber, Loss::Cauchy] {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_that_of_the_data() {
+    fn the_noise_level_matches_the_data() {
         use symspline_core::space::Kernels;
         let plane = symspline_vectors::Euclidean::new(1).unwrap();
         let space = Erased(&plane as &dyn Kernels);

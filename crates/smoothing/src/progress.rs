@@ -184,7 +184,7 @@ impl Progress {
         self.scale = (rss / (*m as f64 * left.max(1.0))).sqrt();
     }
 
-    /// Whether a step is small beside the standard deviations of the points.
+    /// Whether a step is small compared with the standard deviations of the points.
     pub fn judge(&mut self, step: &[f64], deviations: &[f64], reach: f64, tol: f64, reweighs: bool) -> bool {
         /// Steps below this fraction of the path that no longer shrink are rounding errors.
         const FLOOR: f64 = 1e-8;

@@ -77,7 +77,7 @@ impl<S: Scalar, const D: usize, A: Storage> Rotation<S, D, A> {
         Rotation { s, k, versed }
     }
 
-    /// E(±Δ) of a point or vector, by what it is along X and along Δ.
+    /// E(±Δ) of a point or vector, from its components along X and along Δ.
     ///
     /// `E_X(Δ)Z = Z + X((c−1)X*Z − sΔ*Z) + Δ(sX*Z + kΔ*Z)`: the two factors behind X and Δ.
     fn act(&self, along_x: &Matrix<S, D, A>, along_delta: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {

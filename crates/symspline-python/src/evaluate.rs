@@ -212,7 +212,7 @@ fn quantity_named(name: &str) -> PyResult<Quantity> {
         "velocity" => Quantity::Velocity,
         "acceleration" => Quantity::Acceleration,
         "speed" => Quantity::Speed,
-        "bend" => Quantity::Bend,
+        "bend" => Quantity::AccelerationNorm,
         "body velocity" => Quantity::BodyVelocity,
         "body acceleration" => Quantity::BodyAcceleration,
         _ => return Err(invalid(format!("unknown quantity {name:?}"))),

@@ -20,7 +20,7 @@
 //!
 //! let sphere = Sphere::new(3).unwrap();
 //! let space = Erased(&sphere);
-//! let go_on = |_| true; // is asked from time to time, and may stop the work
+//! let go_on = |_| true; // is called from time to time; false stops the work
 //!
 //! // w, x, y, z at three times. Neighbours must have the same sign, w w' + … > 0.
 //! let t = [0.0, 1.0, 2.5];

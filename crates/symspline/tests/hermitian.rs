@@ -125,7 +125,7 @@ fn skew_exponentials_are_unitary_and_double() {
 }
 
 #[test]
-fn trig_is_that_of_the_eigenvalues() {
+fn trig_matches_the_eigenvalues() {
     let mut noise = Noise(4);
     for values in [vec![0.0, 1e-12], vec![0.05, 0.09, 2.4], vec![2.6, 9.0, 0.1, 1e-3], vec![400.0]] {
         let g = noise.with_eigenvalues::<1>(&values);
@@ -155,7 +155,7 @@ fn trig_is_that_of_the_eigenvalues() {
 }
 
 #[test]
-fn arc_is_that_of_the_eigenvalues() {
+fn arc_matches_the_eigenvalues() {
     let mut noise = Noise(5);
     for values in [
         vec![0.0, 1e-15],
@@ -234,7 +234,7 @@ fn a_step_squares_the_distance_to_orthonormal_columns() {
 }
 
 #[test]
-fn singular_values_keep_their_digits_in_graded_matrices() {
+fn singular_values_are_accurate_in_graded_matrices() {
     let mut noise = Noise(6);
     for n in [2, 3, 6] {
         let mut q = noise.matrix::<1>(n);

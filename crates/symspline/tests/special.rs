@@ -95,7 +95,7 @@ fn a_lane_does_not_depend_on_its_neighbours() {
 }
 
 #[test]
-fn the_defect_is_that_of_the_arc() {
+fn the_remainder_of_the_arc_matches_the_arc() {
     // θ/sin θ = 1 + y e, with derivatives e + y e' and 2e' + y e''.
     for y in [1e-9, 1e-3, 0.0074, 0.0076, 0.05, 0.089, 0.091, 0.2, 0.29, 0.31, 0.4, 0.5, 0.59, 0.61, 0.8, 1.0]
     {

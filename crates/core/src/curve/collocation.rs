@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn matrices_that_do_not_commute() {
+    fn noncommuting_matrices_are_integrated() {
         // Rotating coordinates: g = R(t) exp(−t(B + J)) for A(t) = R B R⁻¹ where R' = J R.
         let (h, b, j) =
             (0.5, [[0.0, 0.3], [0.9, 0.0]], DMatrix::from_row_slice(2, 2, &[0.0, -1.0, 1.0, 0.0]));

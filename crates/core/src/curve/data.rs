@@ -34,7 +34,7 @@ pub enum Quantity {
     /// |γ'|
     Speed,
     /// |∇γ'|
-    Bend,
+    AccelerationNorm,
     /// γ' in the body frame, for spaces that define it (`Covered::body`): angular velocity.
     BodyVelocity,
     /// ∇γ' in the body frame: angular acceleration.
@@ -71,7 +71,7 @@ impl Curves<'_> {
 impl Quantity {
     /// Whether the result is a length.
     pub fn is_length(self) -> bool {
-        matches!(self, Quantity::Speed | Quantity::Bend)
+        matches!(self, Quantity::Speed | Quantity::AccelerationNorm)
     }
 
     /// Whether the result is a vector in the body frame.
@@ -84,7 +84,7 @@ impl Quantity {
         match self {
             Quantity::Point => 0,
             Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity => 1,
-            Quantity::Acceleration | Quantity::Bend | Quantity::BodyAcceleration => 2,
+            Quantity::Acceleration | Quantity::AccelerationNorm | Quantity::BodyAcceleration => 2,
         }
     }
 }

@@ -34,7 +34,7 @@ const DEEPEST: usize = 12;
 const ITERATIONS: usize = 40;
 
 /// A vector that is transported along segments of a curve.
-struct Carrier<'a> {
+struct Transport<'a> {
     space: &'a Erased<'a>,
     segment: Segment<Dual>,
     gamma: Vec<Dual>,
@@ -43,12 +43,12 @@ struct Carrier<'a> {
     vector: Vec<Lane>,
 }
 
-impl<'a> Carrier<'a> {
+impl<'a> Transport<'a> {
     fn new(space: &'a Erased<'a>) -> Self {
         let len = space.point_len();
         let lanes = || vec![Lane::ZERO; len];
         let gamma = vec![Dual { v: Lane::ZERO, d: Lane::ZERO }; len];
-        Carrier { space, segment: Segment::new(len), gamma, position: lanes(), vector: lanes() }
+        Transport { space, segment: Segment::new(len), gamma, position: lanes(), vector: lanes() }
     }
 
     /// Points and velocities at eight positions of the segment.
@@ -160,17 +160,17 @@ pub fn transport(
     let rows: Vec<(usize, &mut [f64])> = vectors.chunks_mut(len).enumerate().collect();
     let parallel = rows.len() > 1;
     parallel::for_each(rows, parallel, monitor, |(curve, vector)| {
-        let mut carrier = Carrier::new(space);
+        let mut transport = Transport::new(space);
         let segments = curves.nodes as i64 - 1;
         let [(first, a), (last, b)] = [from, to].map(|x| locate(curves.knots(curve), x, outside));
-        let enter = |carrier: &mut Carrier, segment: i64| {
-            carrier.segment.read(curves, curve, segment.rem_euclid(segments) as usize, len);
-            carrier.segment.prepare(space, len);
+        let enter = |transport: &mut Transport, segment: i64| {
+            transport.segment.read(curves, curve, segment.rem_euclid(segments) as usize, len);
+            transport.segment.prepare(space, len);
         };
-        enter(&mut carrier, first);
-        let [y, _] = carrier.at(lane(a));
-        carrier.position.copy_from_slice(&y);
-        carrier.vector.iter_mut().zip(&*vector).for_each(|(x, v)| *x = lane(*v));
+        enter(&mut transport, first);
+        let [y, _] = transport.at(lane(a));
+        transport.position.copy_from_slice(&y);
+        transport.vector.iter_mut().zip(&*vector).for_each(|(x, v)| *x = lane(*v));
         let way = (last - first).signum();
         let (near, far) = if way < 0 { (1.0, 0.0) } else { (0.0, 1.0) };
         let mut segment = first;
@@ -178,19 +178,19 @@ pub fn transport(
             let begin = if segment == first { a } else { near };
             let stop = if segment == last { b } else { far };
             if segment != first {
-                enter(&mut carrier, segment);
-                let [y, _] = carrier.at(lane(begin));
-                carrier.move_to(&y);
+                enter(&mut transport, segment);
+                let [y, _] = transport.at(lane(begin));
+                transport.move_to(&y);
             }
             if begin != stop {
-                carrier.along(begin, stop, 0);
+                transport.along(begin, stop, 0);
             }
             if segment == last {
                 break;
             }
             segment += way;
         }
-        vector.iter_mut().zip(&carrier.vector).for_each(|(v, x)| *v = x.to_array()[0]);
+        vector.iter_mut().zip(&transport.vector).for_each(|(v, x)| *v = x.to_array()[0]);
         monitor.advance(1);
     });
 }

@@ -1,4 +1,4 @@
-//! Which solver runs: the one asked for, or one after the other until one converges.
+//! The choice of solvers: the requested one, or several in turn until one converges.
 
 use super::budget::{self, Costs, NEWTON, left};
 use super::chain::Chain;

@@ -3,8 +3,8 @@
 use crate::monitor::checkpoint;
 use crate::scalar::Lane;
 
-/// Blocks of m × m numbers, row by row: those left of, on and right of the diagonal. In a cyclic system
-/// the first row's left block belongs to the last node, and the last row's right block to the first.
+/// Blocks of m × m numbers, row by row: left of, on and right of the diagonal. In a cyclic system the first row's
+/// left block belongs to the last node, and the last row's right block to the first.
 #[derive(Default)]
 pub struct Blocks {
     /// The blocks of all rows.

@@ -88,7 +88,7 @@ mod tests {
     use super::{contraction_bound, guaranteed_sweeps, invariant_radius};
 
     #[test]
-    fn the_largest_step_is_that_of_the_literature() {
+    fn the_largest_step_matches_the_literature() {
         // The two roots meet at KD = 0.2610895, KV = 0.4420886 (from d/dV of (38), at 40 digits).
         let v = invariant_radius(0.261_089, 1.0, 0.0).expect("below the largest step");
         assert!((v - 0.442).abs() < 2e-3);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn the_contraction_is_that_of_the_derivation() {
+    fn the_contraction_matches_the_derivation() {
         let alpha = |d: f64| contraction_bound(d, 1.0, invariant_radius(d, 1.0, 0.0).unwrap());
         for (d, expected) in [(0.1, 0.533), (0.2, 0.665), (0.25, 0.857)] {
             assert!((alpha(d).unwrap() - expected).abs() < 1e-3);

@@ -42,7 +42,7 @@ pub enum End<'a> {
 
 impl<'a> End<'a> {
     /// Whether Theorem 3.1 covers such ends.
-    pub fn is_of_the_theorem(&self) -> bool {
+    pub fn is_covered_by_the_theorem(&self) -> bool {
         matches!(self, End::Natural | End::Velocity(_))
     }
 

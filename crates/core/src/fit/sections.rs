@@ -155,7 +155,8 @@ fn merge(
         let around = |index| index % problem.segments(curve);
         report.status = report.status.counted(around);
         report.almost_cut = report.almost_cut.map(|(index, angle)| (around(index), angle));
-        let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
+        let known =
+            matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_covered_by_the_theorem));
         if known && equally_spaced(problem.knots(curve)) {
             let handle = same.iter().map(|p| p.end_handle).fold(0.0, f64::max);
             let curvature = space.curvature();

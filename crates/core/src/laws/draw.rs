@@ -17,7 +17,7 @@ impl Draw {
     /// Starts from a seed.
     pub fn new(seed: u64) -> Self {
         let mut draw = Draw(seed ^ 0x9e37_79b9_7f4a_7c15);
-        // The first numbers of neighbouring seeds are alike.
+        // The first numbers of adjacent seeds are similar.
         for _ in 0..8 {
             draw.uniform();
         }
@@ -85,7 +85,7 @@ impl Draw {
         let back = log(space, &q, p).0;
         let mut near = exp(space, &q, &back);
         space.project(&mut near);
-        // Without what rounding did on the way, which leads far out where there is no end.
+        // Rounding errors of the transport are removed, which are large far out in unbounded spaces.
         let other = exp(space, &near, &log(space, &near, p).0);
         if is_other(&other, p) { other } else { p.to_vec() }
     }
@@ -143,8 +143,8 @@ pub fn norm(a: &[Lane]) -> Lane {
     dot(a, a).sqrt()
 }
 
-/// A number of rounding errors at the points p and q, and over a way of coordinates x: what the space says
-/// of itself.
+/// The number of rounding errors to allow at the points p and q, and over coordinates x, according to the space's own
+/// condition and rounding.
 pub fn rounding(space: &Erased, count: f64, points: &[&[Lane]], x: &[Lane]) -> Lane {
     let at = points.iter().fold(Lane::ONE, |most, p| most.max(space.rounding(p)));
     lane(count * f64::EPSILON) * at * space.condition(x)

@@ -60,9 +60,9 @@ fn rotate_rows<const D: usize>(a: &mut Matrix<Lane, D>, (p, q): (usize, usize), 
 
 /// Diagonalises one or two commuting Hermitian matrices in place, by one unitary V: `A = V Λ V*`.
 ///
-/// With two matrices, real and imaginary part of a normal one, every rotation is that of the
-/// combination which is farthest from diagonal (Bunse-Gerstner, Byers & Mehrmann 1993): eigenvalues
-/// that coincide in one are told apart by the other.
+/// With two matrices, the real and imaginary part of a normal one, every rotation is that of the combination which is
+/// farthest from diagonal (Bunse-Gerstner, Byers & Mehrmann 1993): eigenvalues that coincide in one matrix are
+/// separated by the other.
 pub fn diagonalize<const D: usize, const M: usize, A: Storage>(
     a: &mut [Matrix<Lane, D, A>; M],
 ) -> Matrix<Lane, D, A> {

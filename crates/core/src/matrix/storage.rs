@@ -1,4 +1,4 @@
-//! Storage on the stack: of few entries, or of a size that the compiler knows.
+//! Storage on the stack: of few entries, or of constant size.
 
 use super::base::Storage;
 use crate::scalar::few;

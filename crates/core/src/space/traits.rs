@@ -21,7 +21,7 @@ pub trait Ambient: Copy + Send + Sync {
     fn point_shape(&self) -> Vec<usize> {
         vec![self.point_len()]
     }
-    /// Whether the numbers of a point are complex, real and imaginary part side by side.
+    /// Whether the numbers of a point are complex, stored as pairs of real and imaginary part.
     fn is_complex(&self) -> bool {
         false
     }
