@@ -1,6 +1,6 @@
 """Makes the table of ``paper.md``: every item of the paper, its function, its tests and its page.
 
-``python docs/paper_table.py`` writes the table anew. `problems` checks that all that it names exists.
+``python docs/paper_table.py`` writes the table anew. `problems` checks that everything that it names exists.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import NamedTuple
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
 PAGE = DOCS / "paper.md"
+SOURCES = ROOT / "crates/core/src"
 BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
 
 
@@ -28,6 +29,8 @@ class Row(NamedTuple):
     tests: str
     # Pages of the documentation, below `docs`, with the anchor of a heading; "gallery/…" are examples.
     pages: str
+    # Rust files below `SOURCES`, each with the function of the equation.
+    source: str = ""
 
 
 LEMMAS = "tests/spaces/test_lemmas.py::"
@@ -48,6 +51,7 @@ ROWS = [
         "tests/spline/test_lengths.py::test_length_and_energy_by_quadrature "
         "tests/docs/test_comparisons.py::test_spline_is_close_to_the_cubic_and_bends_more",
         "comparisons.md#how-close-to-riemannian-cubics",
+        source="fit/energy.rs::bending",
     ),
     Row(
         "Introduction, parallelism",
@@ -122,6 +126,7 @@ ROWS = [
         "Space.geodesic",
         f"{LAWS}test_geodesic_divides_the_distance",
         "notation.md",
+        source="space/traits.rs::geodesic",
     ),
     Row(
         "(8)",
@@ -129,6 +134,7 @@ ROWS = [
         "BezierCurve CubicSpline.control_points",
         "tests/free/test_free_curves.py::test_a_cubic_is_a_segment_of_the_spline",
         "gallery/de_casteljau.rst",
+        source="curve/bezier.rs::at",
     ),
     Row(
         "(10)",
@@ -137,10 +143,32 @@ ROWS = [
         f"{LEMMAS}test_equations_6_and_10_geodesics_are_orbits "
         f"{LAWS}test_transvection_is_the_product_of_two_symmetries",
         "notation.md",
+        source="space/traits.rs::transvect",
     ),
-    Row("(11)", "logarithm", "Space.log", f"{LAWS}test_exp_and_log_are_inverse", "notation.md"),
-    Row("(12)", "C¹ condition", "CubicSpline.control_points", C2, "gallery/c2_condition.rst"),
-    Row("(13)", "C² condition", "Report.residual", C2, "gallery/c2_condition.rst"),
+    Row(
+        "(11)",
+        "logarithm",
+        "Space.log",
+        f"{LAWS}test_exp_and_log_are_inverse",
+        "notation.md",
+        source="space/traits.rs::log",
+    ),
+    Row(
+        "(12)",
+        "C¹ condition",
+        "CubicSpline.control_points",
+        C2,
+        "gallery/c2_condition.rst",
+        source="curve/bezier.rs::read",
+    ),
+    Row(
+        "(13)",
+        "C² condition",
+        "Report.residual",
+        C2,
+        "gallery/c2_condition.rst",
+        source="fit/condition.rs::sweep",
+    ),
     Row("Theorem 2.2", "(12) and (13) make the curve C²", "CubicSpline", C2, "theorem.md"),
     Row(
         "Remark 2.3, (14), (15)",
@@ -155,6 +183,7 @@ ROWS = [
         "CubicSpline",
         "tests/fit/test_solvers.py::test_every_iterate_is_that_of_the_paper",
         "solvers.md",
+        source="space/traits.rs::inner_handles fit/fixed_point.rs::solve",
     ),
     Row(
         "(19)",
@@ -162,6 +191,7 @@ ROWS = [
         "CubicSpline",
         "tests/spline/test_ends.py::test_end_vectors_are_kept",
         "guide/ends.md",
+        source="fit/fixed_point.rs::end_velocity fit/ends.rs::residual",
     ),
     Row(
         "(20)",
@@ -169,8 +199,16 @@ ROWS = [
         "CubicSpline",
         "tests/spline/test_ends.py::test_every_pair_of_end_conditions",
         "guide/ends.md",
+        source="fit/fixed_point.rs::end_velocity fit/ends.rs::residual",
     ),
-    Row("(21)", "D", "Report.max_step", f"{CERTIFICATE}test_radius_is_the_smallest_of_38", REGION),
+    Row(
+        "(21)",
+        "D",
+        "Report.max_step",
+        f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
+        REGION,
+        source="fit/unroll.rs::walk_sized",
+    ),
     Row(
         "(22)",
         "K",
@@ -178,6 +216,7 @@ ROWS = [
         f"{LEMMAS}test_equation_22_curvature_bounds_double_brackets "
         "tests/spaces/test_curvature.py::test_curvature_is_the_largest_triple_product",
         "notation.md",
+        source="space/traits.rs::curvature",
     ),
     Row(
         "Algorithm 1",
@@ -186,6 +225,7 @@ ROWS = [
         "tests/fit/test_solvers.py::test_every_iterate_is_that_of_the_paper "
         "tests/fit/test_solvers.py::test_fixed_point_is_linear_with_a_rate_of_one_half",
         "solvers.md",
+        source="fit/fixed_point.rs::solve",
     ),
     Row(
         "Theorem 3.1",
@@ -193,6 +233,7 @@ ROWS = [
         "Report.invariant_radius Report.contraction_bound",
         f"{CERTIFICATE}test_algorithm_1_stays_within",
         "convergence.md",
+        source="fit/certificate.rs::invariant_radius fit/certificate.rs::contraction_bound",
     ),
     Row(
         "Section 4.1, (23)",
@@ -268,6 +309,7 @@ ROWS = [
         "tests/fit/test_solvers.py::test_newton_takes_one_step_in_flat_space "
         "tests/fit/test_solvers.py::test_newton_converges_quadratically",
         "solvers.md",
+        source="fit/solve.rs::solve",
     ),
     Row(
         "(26)",
@@ -275,6 +317,7 @@ ROWS = [
         "Space.transport",
         f"{LEMMAS}test_equation_26_connection_is_consistent_and_equivariant",
         "notation.md",
+        source="space/traits.rs::parallel_transport",
     ),
     Row(
         "Lemma A.1",
@@ -345,6 +388,7 @@ ROWS = [
         "Report.invariant_radius",
         f"{CERTIFICATE}test_radius_is_the_smallest_of_38",
         REGION,
+        source="fit/certificate.rs::invariant_radius",
     ),
     Row(
         "Proposition C.1",
@@ -453,6 +497,13 @@ def has_test(name: str) -> bool:
     return function in names if function else any(found.startswith("test_") for found in names)
 
 
+def has_source(name: str) -> bool:
+    """Whether a Rust file has a function of a name."""
+    file, _, function = name.partition("::")
+    path = SOURCES / file
+    return path.is_file() and bool(re.search(rf"\bfn {function}\b", path.read_text(encoding="utf-8")))
+
+
 def anchors(text: str) -> set[str]:
     """The anchors of the headings of a Markdown page, as MyST and GitHub make them."""
     headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S), re.M)
@@ -470,7 +521,7 @@ def has_page(name: str) -> bool:
 
 
 def problems() -> list[str]:
-    """Every function, test and page of the table that does not exist."""
+    """Every function, test, page and source of the table that does not exist."""
     missing = []
     for row in ROWS:
         missing += [
@@ -478,6 +529,7 @@ def problems() -> list[str]:
         ]
         missing += [name for name in row.tests.split() if not has_test(name)]
         missing += [name for name in row.pages.split() if not has_page(name)]
+        missing += [name for name in row.source.split() if not has_source(name)]
     return sorted(set(missing))
 
 
@@ -489,12 +541,14 @@ def _linked(page: str) -> str:
 
 def table() -> str:
     """The table in Markdown."""
-    lines = ["| item | what | function | test | page |", "|---|---|---|---|---|"]
+    lines = ["| item | what | function | test | page | source |", "|---|---|---|---|---|---|"]
     for row in ROWS:
         functions = ", ".join(f"`{name}`" for name in row.functions.split())
         tests = ", ".join(f"`{name.removeprefix('tests/')}`" for name in row.tests.split())
         pages = ", ".join(map(_linked, row.pages.split()))
-        lines.append(f"| {row.item} | {row.what} | {functions} | {tests} | {pages} |")
+        source = ", ".join(f"`{name}`" for name in row.source.split())
+        cells = (row.item, row.what, functions, tests, pages, source)
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -16,6 +16,7 @@
     shapes       affine shapes of landmarks, morphs and their pictures
     xarray_dask  curves in xarray objects, in blocks of dask, on workers that die
     host         threads, memory, interruptions, arrays of other libraries
+    typing       annotations, as type checkers read them
     docs, bench  the code of the documentation and of the benchmarks runs
     examples     the recipes run
     fuzz         random input; `make fuzz` runs it at length
@@ -37,6 +38,9 @@ import numpy as np
 import pytest
 
 import symspline as ss
+
+# Type checkers read these files. They are not run.
+collect_ignore = ["typing/right.py", "typing/wrong.py"]
 
 # What a shell starts in the background ignores Ctrl-C, and so would all that tests start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

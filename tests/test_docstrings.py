@@ -1,9 +1,16 @@
-"""Docstrings of all public objects are complete and in numpydoc format, by the validator of numpydoc."""
+"""Docstrings of all public objects are complete and in numpydoc format, by the validator of numpydoc.
 
+Names in backticks that lead to a module exist, in private docstrings too.
+"""
+
+import ast
 import dataclasses
 import importlib
+import importlib.util
 import inspect
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from numpydoc.docscrape import FunctionDoc
@@ -36,6 +43,7 @@ TITLES = {
 IGNORED = {"ES01", "SA01"}
 # Objects whose docstrings have not been revised yet. The goal is none.
 PENDING = ("symspline.num_threads",)
+ROOT = Path(symspline.__file__).parent
 
 
 def fields_of(cls):
@@ -107,3 +115,49 @@ def test_docstrings_are_complete(name):
         if not full.startswith(PENDING):
             found += problems(full, thing)
     assert not found, "\n".join(found)
+
+
+# ---- names of modules ----
+
+
+def names_in(path):
+    """Names in single backticks that lead to a module: dotted names, and in `__init__.py` also plain names."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            text = ast.get_docstring(node) or ""
+            yield from re.findall(r"(?<![`:])`([a-z_]\w*(?:\.\w+)+)`(?!`)", text)
+            if isinstance(node, ast.Module) and path.name == "__init__.py":
+                yield from re.findall(r"(?<![`:])`(\w+)`(?!`)", text)
+
+
+def exists(name):
+    """Whether a dotted name can be imported, as a module, an attribute of one, or a field of a class."""
+    module, *rest = name.split(".")
+    try:
+        thing = importlib.import_module(module)
+    except ImportError:
+        return False
+    for part in rest:
+        module = f"{module}.{part}"
+        if not hasattr(thing, part):
+            if inspect.ismodule(thing) and importlib.util.find_spec(module):
+                thing = importlib.import_module(module)
+                continue
+            return inspect.isclass(thing) and part in fields_of(thing)
+        thing = getattr(thing, part)
+    return True
+
+
+def unknown_names(path):
+    """Names of a file that exist neither from its folder, nor from the package, nor from anywhere else."""
+    folder = ".".join(["symspline", *path.relative_to(ROOT).parts[:-1]])
+    for name in names_in(path):
+        if not any(map(exists, (f"{folder}.{name}", f"symspline.{name}", name))):
+            yield f"{path.relative_to(ROOT)}: {name}"
+
+
+def test_names_of_modules_exist():
+    paths = sorted(ROOT.rglob("*.py"))
+    assert {"_input.times_of", "core_curve", "jax.vmap"} <= {name for path in paths for name in names_in(path)}
+    assert [name for path in paths for name in unknown_names(path)] == []
+    assert exists("symspline._input.times_of") and not exists("symspline.handed.times_of")

@@ -102,12 +102,6 @@ RETIRED = [
     ),
 ]
 
-# Ordinary uses: a file and a phrase that may occur there.
-ALLOWED = [
-    ("python/symspline/_smoothing/data.py", "clock : timeaxis"),
-    ("python/symspline/_smoothing/data.py", "weighing : list of precision"),
-]
-
 
 def prose(text):
     """A page without code, links, comments and table rules."""
@@ -150,15 +144,8 @@ def test_retired_words_do_not_return(retired):
     assert re.search(retired.pattern, prose(retired.example)), "the pattern does not match its own example"
     found = []
     for file, text in texts().items():
-        for name, phrase in ALLOWED:
-            if name == file:
-                text = text.replace(phrase, "")
         found += [
             f"{file}: …{text[max(match.start() - 40, 0) : match.end() + 40]}…"
             for match in re.finditer(retired.pattern, text)
         ]
     assert not found, f"write {retired.standard!r}:\n" + "\n".join(found)
-
-
-def test_every_allowed_phrase_occurs():
-    assert not [(name, phrase) for name, phrase in ALLOWED if phrase not in texts().get(name, "")]

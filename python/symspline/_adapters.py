@@ -9,7 +9,7 @@ import numpy as np
 from ._arrays import cast
 from ._cubic import CubicSpline
 from ._curves.curve import CurveArrays
-from ._curves.derivatives import places
+from ._curves.derivatives import sample_times
 from ._curves.ends import split_ends
 from ._spaces import Array, Space
 from ._time import onto_ends
@@ -55,19 +55,19 @@ class Movable(NamedTuple):
     curve: CurveArrays
     bc_type: Any
 
-    def push(self, x: Array, dx: Any, points: Any, t: Any, ends: Any) -> Array:
+    def jvp(self, x: Array, dx: Any, points: Any, t: Any, ends: Any) -> Array:
         """How the curve at times x moves, with these times and with its data."""
-        at = places(self.curve.times, self.curve.batch, x, False, 0)
-        moved: Array = self.curve.push(at, self.bc_type, points, t, ends)
+        at = sample_times(self.curve.times, self.curve.batch, x, False, 0)
+        moved: Array = self.curve.jvp(at, self.bc_type, points, t, ends)
         if dx is None:
             return moved
         moved += self._velocity(x) * dx.reshape(dx.shape + (1,) * len(self.curve.space.point_shape))
         return moved
 
-    def pull(self, x: Array, cotangent: Array) -> tuple[Array, Array, Array, tuple[Any, Any]]:
+    def vjp(self, x: Array, cotangent: Array) -> tuple[Array, Array, Array, tuple[Any, Any]]:
         """The transpose: gradients with respect to x, t, points and the vectors at the ends."""
-        at = places(self.curve.times, self.curve.batch, x, False, 0)
-        gradient = self.curve.pull(at, self.bc_type, cotangent)
+        at = sample_times(self.curve.times, self.curve.batch, x, False, 0)
+        gradient = self.curve.vjp(at, self.bc_type, cotangent)
         axes = tuple(range(-len(self.curve.space.point_shape), 0))
         along = np.sum((np.conj(cotangent) * self._velocity(x)).real, axis=axes)
         return along.reshape(-1, *x.shape).sum(axis=0), gradient.t, gradient.points, gradient.ends

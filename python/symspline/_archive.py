@@ -233,7 +233,7 @@ def entry(name: str) -> Iterator[None]:
 
 
 def segments_state(
-    format: str, space: Space[Any], t: Array, clock: TimeAxis, extrapolate: Any, curve: CurveArrays
+    format: str, space: Space[Any], t: Array, time_axis: TimeAxis, extrapolate: Any, curve: CurveArrays
 ) -> dict[str, Any]:
     """Return the entries of curves of cubic segments, of any class."""
     parts = {
@@ -242,7 +242,7 @@ def segments_state(
         for name in ("points", "velocities")
     }
     head = {"format": format, "version": VERSION, "space": space, "extrapolate": extrapolate}
-    return head | times_state("t", t, clock) | parts
+    return head | times_state("t", t, time_axis) | parts
 
 
 def read_segments(
@@ -262,23 +262,23 @@ def read_segments(
     space = read_space(state)
     with entry("extrapolate"):
         extrapolate = checked_extrapolate(state["extrapolate"])
-    clock, knots = read_times(state, "t")
+    time_axis, knots = read_times(state, "t")
     if counted is not None:
-        if counted.dates != clock.dates:
+        if counted.dates != time_axis.dates:
             raise ValidationError("the times of the knots and of the data are of different kinds")
-        clock = counted
-    times = clock.knots(knots)
+        time_axis = counted
+    times = time_axis.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("entry 't': the knots do not increase")
     arrays = [
         _read_nodes(factor, state, suffix_of(space, i), times) for i, factor in enumerate(factors_of(space))
     ]
-    return clock, knots, curve_of(space, times, arrays, fitted), extrapolate
+    return time_axis, knots, curve_of(space, times, arrays, fitted), extrapolate
 
 
 def read_fitted(state: Entries, counted: TimeAxis | None = None) -> tuple[Any, ...]:
     """Return the arguments of `CubicSpline._fill`: the same with end conditions and reports."""
-    clock, knots, curve, extrapolate = read_segments(state, counted)
+    time_axis, knots, curve, extrapolate = read_segments(state, counted)
     space = curve.space
     with entry("bc_type"):
         bc_type = freeze_bc_type(_read_bc_type(state["bc_type"], space))
@@ -289,7 +289,7 @@ def read_fitted(state: Entries, counted: TimeAxis | None = None) -> tuple[Any, .
             raise ValidationError(f"it must be a list with one report for each of {len(curve.parts)} factors")
         reports = [read_report(Report, own, curve.batch) for own in plain]
     check_curves(state, curve, [report.converged for report in reports])
-    return clock, knots, curve, bc_type, extrapolate, reports
+    return time_axis, knots, curve, bc_type, extrapolate, reports
 
 
 def suffix_of(space: Space, i: int) -> str:
@@ -303,16 +303,16 @@ def read_space(state: Entries) -> Space:
         return space_named(state["space"])
 
 
-def times_state(name: str, t: NDArray[Any], clock: TimeAxis) -> dict[str, Any]:
+def times_state(name: str, t: NDArray[Any], time_axis: TimeAxis) -> dict[str, Any]:
     """Return times as numbers, and their unit.
 
     Examples of units are "ns", "10m" for dates that count in tens of minutes, "ns UTC" for dates with a time zone, and
     "duration".
     """
-    if not clock.dates:
-        return {name: t, f"{name}_unit": "duration" if clock.durations else ""}
+    if not time_axis.dates:
+        return {name: t, f"{name}_unit": "duration" if time_axis.durations else ""}
     unit, step = np.datetime_data(t.dtype)
-    words = [unit if step == 1 else f"{step}{unit}", clock.zone or ""]
+    words = [unit if step == 1 else f"{step}{unit}", time_axis.zone or ""]
     return {name: t.astype(np.int64), f"{name}_unit": " ".join(words).strip()}
 
 
@@ -326,8 +326,8 @@ def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
     times = state[name]
     with entry(name):
         if kind is None:
-            clock, shown = time_axis_of(Moments(times, zone or None))
-            return (TimeAxis(durations=True) if unit else clock), shown
+            time_axis, shown = time_axis_of(Moments(times, zone or None))
+            return (TimeAxis(durations=True) if unit else time_axis), shown
         if times.dtype.kind not in "iu":
             raise ValidationError(f"dates are counted in whole numbers, not in {times.dtype}")
         return time_axis_of(Moments(times.astype(kind), zone or None))

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import ValidationError
-from ._input import refuse_objects, unwrapped
+from ._input import refuse_objects, to_numpy
 
 
 def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
     """The value as an array; ragged nested lists, masked numbers and objects are an error of the caller's."""
     if type(value) is np.ndarray and value.dtype.kind != "O":
         return value
-    value = unwrapped(value, name)
+    value = to_numpy(value, name)
     masked = _first_masked(value)
     if masked is not None:
         raise ValidationError(

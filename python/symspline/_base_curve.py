@@ -21,7 +21,7 @@ from ._curves.band import UncertaintyBand
 from ._curves.curve import CurveArrays, Doubles
 from ._curves.solve import Progress
 from ._input import times_of
-from ._options import check_progress, checked_extrapolate, outside, quantity_of
+from ._options import check_progress, checked_extrapolate, extrapolation_mode, quantity_of
 from ._spaces import Array, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
 from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Time, TimesLike
@@ -61,17 +61,17 @@ class SegmentedCurve(Curve[P]):
     def _unconverged(self) -> int:
         """Number of curves that failed."""
 
-    _clock: TimeAxis
+    _time_axis: TimeAxis
     _t: Array
     _curve: CurveArrays
     _extrapolate: Extrapolate
     # Extrapolation policy, by its name in the core.
-    _outside: str
+    _extrapolation_mode: str
     # End conditions, which determine whether curves are closed.
     _bc_type: BCType
 
     @abstractmethod
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
         """Return the curves that an index selects from the batch."""
 
     # ---- the curve ----
@@ -245,7 +245,7 @@ class SegmentedCurve(Curve[P]):
         quantity, where = quantity_of(nu), self._where(extrapolate)
         values: P = call_at_times(
             self._curve,
-            self._clock,
+            self._time_axis,
             x,
             per_curve,
             where,
@@ -303,10 +303,10 @@ class SegmentedCurve(Curve[P]):
         pair = (
             times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
         )
-        times, own = self._clock.at(pair, self._batch, False, self._times)
-        where = "periodic" if self._outside == "periodic" else "raise"
+        times, own = self._time_axis.at(pair, self._batch, False, self._times)
+        where = "periodic" if self._extrapolation_mode == "periodic" else "raise"
         try:
-            at = evaluated(self._curve, self._clock, pair, "point", where, False, None)
+            at = evaluated(self._curve, self._time_axis, pair, "point", where, False, None)
         except ValidationError as error:
             what = str(error).partition("; pass extrapolate")[0]
             raise ValidationError(
@@ -396,13 +396,15 @@ class SegmentedCurve(Curve[P]):
         out: Any = None,
     ) -> Any:
         return evaluated(
-            self._curve, self._clock, x, quantity, self._where(extrapolate), per_curve, progress, out
+            self._curve, self._time_axis, x, quantity, self._where(extrapolate), per_curve, progress, out
         )
 
     def _where(self, extrapolate: Any) -> str:
         """Return the core's name of the extrapolation policy."""
         return (
-            self._outside if extrapolate is None else outside(checked_extrapolate(extrapolate), self._bc_type)
+            self._extrapolation_mode
+            if extrapolate is None
+            else extrapolation_mode(checked_extrapolate(extrapolate), self._bc_type)
         )
 
     # ---- data ----
@@ -454,11 +456,11 @@ class SegmentedCurve(Curve[P]):
 
     def _picked(self, index: Any) -> Self:
         t = self._t[index] if self._times.ndim > 1 else self._t
-        return self._with(self._clock.picked(index), t, self._curve.picked(index), index)
+        return self._with(self._time_axis.take_batch(index), t, self._curve.take_batch(index), index)
 
     def _state(self) -> dict[str, Any]:
         return _archive.segments_state(
-            self._format, self.space, self._t, self._clock, self._extrapolate, self._curve
+            self._format, self.space, self._t, self._time_axis, self._extrapolate, self._curve
         )
 
     # ---- comparison, text and plots ----
@@ -553,7 +555,7 @@ def check_curve(spline: Any, name: str = "spline") -> None:
 
 def evaluated(
     curve: CurveArrays,
-    clock: TimeAxis,
+    time_axis: TimeAxis,
     x: TimesLike,
     quantity: str,
     outside: str,
@@ -568,12 +570,12 @@ def evaluated(
             return curve.evaluate(x, quantity, outside, per_curve, progress)
         return curve.write(out, x, quantity, outside, per_curve, progress)
 
-    return call_at_times(curve, clock, x, per_curve, outside, call)
+    return call_at_times(curve, time_axis, x, per_curve, outside, call)
 
 
 def call_at_times(
     curve: CurveArrays,
-    clock: TimeAxis,
+    time_axis: TimeAxis,
     x: TimesLike,
     per_curve: bool,
     outside: str,
@@ -589,13 +591,13 @@ def call_at_times(
         Function of the curve, times as the core counts them, `per_curve`, and a policy of the core.
     """
     per_curve = checked_flag(per_curve, "per_curve")
-    if clock.plain and type(x) is float:
+    if time_axis.plain and type(x) is float:
         # Single times are frequent, and the general conversion would cost more than the evaluation.
         times, knots = np.array(x), curve.times
         if knots.ndim > 1 or not knots[0] <= x <= knots[-1]:
             times, per_curve = onto_ends(times, knots, curve.batch, per_curve)
     else:
-        times, per_curve = clock.at(x, curve.batch, per_curve, curve.times)
+        times, per_curve = time_axis.at(x, curve.batch, per_curve, curve.times)
     beyond = None
     if outside == "nan":
         times, per_curve, beyond = _inside(curve, times, per_curve)
@@ -603,7 +605,7 @@ def call_at_times(
     try:
         values = call(curve, times, per_curve, outside)
     except ValidationError as error:
-        raise clock.explain(error) from None
+        raise time_axis.explain(error) from None
     if beyond is not None:
         index = beyond if per_curve else (slice(None),) * len(curve.batch) + (beyond,)
         for own in values if isinstance(values, tuple) else (values,):

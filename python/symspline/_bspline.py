@@ -239,7 +239,7 @@ class ControlledCurve:
         The distinct knots of the domain, between which the curve is smooth.
     """
 
-    exact = EXACT
+    quad_rtol = EXACT
 
     def __init__(
         self, space: Space[Any], knots: NDArray[np.float64], control_points: Any, degree: int

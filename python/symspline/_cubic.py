@@ -12,15 +12,15 @@ from ._archive import Entries, read_fitted
 from ._base_curve import SegmentedCurve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
-from ._curves.derivatives import places
-from ._curves.ends import ends_in_factors, freeze_bc_type, picked
+from ._curves.derivatives import sample_times
+from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
 from ._curves.energy import alternative_energy
 from ._curves.fit import Fit, FitProblem, curve_of, fit, mask_of, read, read_ends
-from ._curves.gradient import Gradient, Places
+from ._curves.gradient import Gradient, SampleTimes
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
-from ._options import fit_options, order_of, outside, with_atol
+from ._options import extrapolation_mode, fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space
@@ -165,7 +165,7 @@ class CubicSpline(SegmentedCurve[P]):
         if atol is not None:
             data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
-        clock, shown_times, times = knots_of(t, batch, nodes)
+        time_axis, shown_times, times = knots_of(t, batch, nodes)
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
         problem = FitProblem(
@@ -181,28 +181,28 @@ class CubicSpline(SegmentedCurve[P]):
         try:
             found = fit(problem, progress)
         except ValidationError as error:
-            raise clock.explain(error) from None
-        self._fill(clock, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
+            raise time_axis.explain(error) from None
+        self._fill(time_axis, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
         if found.faults:
             raise_or_warn(found.faults, on_failure, self)
         warn_of_representatives(space, [data], [found.curve], [found.columns])
 
     def _fill(
         self,
-        clock: TimeAxis,
+        time_axis: TimeAxis,
         t: Array,
         curve: CurveArrays,
         bc_type: BCType,
         extrapolate: Extrapolate,
         reports: list[Report] | Fit,
     ) -> None:
-        self._clock, self._t, self._curve = clock, t, curve
+        self._time_axis, self._t, self._curve = time_axis, t, curve
         self._bc_type, self._extrapolate = bc_type, extrapolate
         if isinstance(reports, Fit):
             self._fit = reports
         else:
             self._reports = reports
-        self._outside = outside(extrapolate, bc_type)
+        self._extrapolation_mode = extrapolation_mode(extrapolate, bc_type)
 
     @classmethod
     def _of(cls, *parts: Any) -> Self:
@@ -275,7 +275,7 @@ class CubicSpline(SegmentedCurve[P]):
         >>> spline.jvp(0.5, points=[[0.0], [1.0], [0.0]])
         array([0.6875])
         """
-        moved: P = self._solved().push(self._places(x, nu), self._bc_type, points, t, ends)
+        moved: P = self._solved().jvp(self._sample_times(x, nu), self._bc_type, points, t, ends)
         return moved
 
     def vjp(self, x: TimesLike, cotangent: ArrayLike, *, nu: int = 0) -> Gradient[P]:
@@ -316,7 +316,7 @@ class CubicSpline(SegmentedCurve[P]):
         >>> spline.vjp(0.5, [1.0]).points.round(12).tolist()
         [[0.40625], [0.6875], [-0.09375]]
         """
-        gradient: Gradient[P] = self._solved().pull(self._places(x, nu), self._bc_type, cotangent)
+        gradient: Gradient[P] = self._solved().vjp(self._sample_times(x, nu), self._bc_type, cotangent)
         return gradient
 
     def _solved(self) -> CurveArrays:
@@ -334,13 +334,13 @@ class CubicSpline(SegmentedCurve[P]):
             found.append((part.points, velocities))
         return curve_of(self.space, self._times, found)
 
-    def _places(self, x: TimesLike, nu: int) -> Places:
+    def _sample_times(self, x: TimesLike, nu: int) -> SampleTimes:
         nu, curve = order_of(nu), self._curve
-        times, per_curve = self._clock.at(x, curve.batch, False, curve.times)
+        times, per_curve = self._time_axis.at(x, curve.batch, False, curve.times)
         try:
-            return places(curve.times, curve.batch, times, per_curve, nu)
+            return sample_times(curve.times, curve.batch, times, per_curve, nu)
         except ValidationError as error:
-            raise self._clock.explain(error) from None
+            raise self._time_axis.explain(error) from None
 
     # ---- data and report ----
 
@@ -375,18 +375,18 @@ class CubicSpline(SegmentedCurve[P]):
             return (self,)
         each = zip(self._curve.parts, ends_in_factors(self._bc_type, self.space), self._reports, strict=True)
         return tuple(
-            CubicSpline._of(self._clock, self._t, curve, ends, self._extrapolate, [report])
+            CubicSpline._of(self._time_axis, self._t, curve, ends, self._extrapolate, [report])
             for curve, ends, report in each
         )
 
     # ---- batches ----
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return CubicSpline._of(
-            clock,
+            time_axis,
             t,
             curve,
-            picked(self._bc_type, index, len(self._batch), self.space),
+            take_batch(self._bc_type, index, len(self._batch), self.space),
             self._extrapolate,
             [report.map(lambda column: column[index]) for report in self._reports],
         )

@@ -31,7 +31,7 @@ class Curve(ABC, Generic[P]):
     >>> [isinstance(curve, ss.Curve) for curve in curves]
     [True, True]
     >>> [curve.length().round(4).item() for curve in curves]
-    [3.1923, 2.2214]
+    [3.2601, 2.4139]
     """
 
     # Name of the format in files and pickles.
@@ -114,7 +114,7 @@ class Curve(ABC, Generic[P]):
         """
         curve = self._curve
         return integrate(
-            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.exact
+            curve.times, lambda x: curve.evaluate(x, "speed", "continue", True), curve.batch, curve.quad_rtol
         )
 
     def bending_energy(self) -> Number:

@@ -14,11 +14,18 @@ from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves import fit as fitting
 from ._curves.curve import CurveArrays
-from ._curves.ends import freeze_bc_type, picked
+from ._curves.ends import freeze_bc_type, take_batch
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._input import in_library, library_of
-from ._options import check_progress, checked_extrapolate, fit_options, outside, quantity_of, with_atol
+from ._options import (
+    check_progress,
+    checked_extrapolate,
+    extrapolation_mode,
+    fit_options,
+    quantity_of,
+    with_atol,
+)
 from ._report import Report
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of, point_tol
@@ -188,9 +195,9 @@ def evaluate(
     libraries = points, velocities, x
     if not per_curve:
         t, points, velocities = _nodes_around(t, points, velocities, space, x)
-    clock, curve = given(t, points, velocities, space)
-    where = outside(checked_extrapolate(extrapolate), "natural")
-    values = evaluated(curve, clock, x, quantity_of(nu), where, per_curve, progress, out)
+    time_axis, curve = given(t, points, velocities, space)
+    where = extrapolation_mode(checked_extrapolate(extrapolate), "natural")
+    values = evaluated(curve, time_axis, x, quantity_of(nu), where, per_curve, progress, out)
     return values if out is not None else in_library(library_of(*libraries), values)
 
 
@@ -240,13 +247,13 @@ def given(
         for each in zip(factors_of(space), (part.doubles for part in data), own, strict=True)
     ]
     batch, nodes = data[0].batch, data[0].nodes
-    clock, _, times = knots_of(t, batch, nodes)
+    time_axis, _, times = knots_of(t, batch, nodes)
     try:
         on_space, _ = fitting.validated(space, times, data, fitting.read_ends("natural", space, batch))
     except ValidationError as error:
-        raise clock.explain(error) from None
+        raise time_axis.explain(error) from None
     arrays = list(zip(on_space, read, strict=True))
-    return clock, fitting.curve_of(space, times, arrays, fitted=False)
+    return time_axis, fitting.curve_of(space, times, arrays, fitted=False)
 
 
 def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
@@ -328,7 +335,7 @@ def fit_many(
     pairs: list[tuple[TimesLike | None, Any]] = list(curves)
     for number, curve in enumerate(pairs):
         if not isinstance(curve, (tuple, list)) or len(curve) != 2:
-            raise ValidationError(f"curve {number} must be a pair (t, points), not {short_repr(curve)}")
+            raise ValidationError(f"curves[{number}] must be a pair (t, points), not {short_repr(curve)}")
     if not pairs:
         return []
     mask = fitting.mask_of(where, (len(pairs),))
@@ -350,8 +357,8 @@ def fit_many(
     fits, faults = fitting.fit_many(problem, progress)
     ends_kept = freeze_bc_type(bc_type)
     fitted: list[CubicSpline[P]] = [
-        CubicSpline._of(clock, t, found.curve, picked(ends_kept, i, 1, space), extrapolate, found)
-        for i, ((clock, t, _), found) in enumerate(zip(knots, fits, strict=True))
+        CubicSpline._of(time_axis, t, found.curve, take_batch(ends_kept, i, 1, space), extrapolate, found)
+        for i, ((time_axis, t, _), found) in enumerate(zip(knots, fits, strict=True))
     ]
     if faults:
         raise_or_warn(faults, on_failure, fitted)

@@ -12,7 +12,7 @@ from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
 from ._functional import velocities_of
-from ._options import checked_extrapolate, outside, with_atol
+from ._options import checked_extrapolate, extrapolation_mode, with_atol
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, factors_of, parts_of
 from ._spaces import space as space_named
@@ -115,18 +115,18 @@ class HermiteSpline(SegmentedCurve[P]):
             velocities_of(factor, part.doubles, own)
             for factor, part, own in zip(factors_of(space), data, given, strict=True)
         ]
-        clock, shown_times, times = knots_of(t, batch, nodes)
+        time_axis, shown_times, times = knots_of(t, batch, nodes)
         try:
             found = hermite_data(space, times, data, vectors)
         except ValidationError as error:
-            raise clock.explain(error) from None
+            raise time_axis.explain(error) from None
         curve = curve_of(space, times, [own[:2] for own in found], fitted=False)
-        self._fill(clock, shown_times, curve, extrapolate)
+        self._fill(time_axis, shown_times, curve, extrapolate)
         warn_of_representatives(space, [data], [curve], [[own[2] for own in found]])
 
-    def _fill(self, clock: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
-        self._clock, self._t, self._curve, self._extrapolate = clock, t, curve, extrapolate
-        self._outside = outside(extrapolate, self._bc_type)
+    def _fill(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
+        self._time_axis, self._t, self._curve, self._extrapolate = time_axis, t, curve, extrapolate
+        self._extrapolation_mode = extrapolation_mode(extrapolate, self._bc_type)
 
     @classmethod
     def _of(cls, *parts: Any) -> Self:
@@ -137,14 +137,14 @@ class HermiteSpline(SegmentedCurve[P]):
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
-        clock, knots, curve, extrapolate = read_segments(state, fitted=False)
+        time_axis, knots, curve, extrapolate = read_segments(state, fitted=False)
         check_curves(state, curve, [True] * len(curve.parts))
-        return cls._of(clock, knots, curve, extrapolate)
+        return cls._of(time_axis, knots, curve, extrapolate)
 
     def __repr__(self) -> str:
         batch = self._curve.batch
         curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
         return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
-        return HermiteSpline._of(clock, t, curve, self._extrapolate)
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
+        return HermiteSpline._of(time_axis, t, curve, self._extrapolate)

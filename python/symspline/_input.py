@@ -31,7 +31,7 @@ ISO_DATE = re.compile(
 UTC_ZONE, NO_ZONE = "UTC", "none"
 
 
-def unwrapped(value: Any, name: str) -> Any:
+def to_numpy(value: Any, name: str) -> Any:
     """A value in which tensors, quantum objects and columns of tables are arrays, also within lists.
 
     Raises:
@@ -43,7 +43,7 @@ def unwrapped(value: Any, name: str) -> Any:
     if isinstance(value, (list, tuple)):
         if set(map(type, value)) <= _SIMPLE:
             return value
-        return [unwrapped(part, f"{name}[{i}]") for i, part in enumerate(value)]
+        return [to_numpy(part, f"{name}[{i}]") for i, part in enumerate(value)]
     refuse_blocks(value, name)
     if hasattr(value, "requires_grad") and hasattr(value, "detach"):
         return _tensor(value, name)

@@ -62,7 +62,7 @@ def checked_extrapolate(extrapolate: Any) -> Any:
     return extrapolate
 
 
-def outside(policy: Any, bc_type: Any) -> str:
+def extrapolation_mode(policy: Any, bc_type: Any) -> str:
     """Return the core's name of an extrapolation policy. Closed curves repeat unless another policy is given."""
     return "periodic" if policy is None and is_closed(bc_type) else _OUTSIDE[policy]
 

@@ -81,18 +81,18 @@ class Segments:
         number |p|².
         """
         last = None if closed else -1
-        places = self.at(self.t)
-        end, start = places[:last, 1], _next(places)[:last]
+        points = self.at(self.t)
+        end, start = points[:last, 1], _next(points)[:last]
         if nu == 0:
-            flat = places.reshape(*places.shape[:2], -1)
+            flat = points.reshape(*points.shape[:2], -1)
             return Jumps(self.space.distance(end, start), float(np.linalg.norm(flat, axis=-1).max()))
         vectors = self.at(self.t, nu)
-        carried = vectors[:last, 1]
+        transported = vectors[:last, 1]
         # A manifold made of functions without `transport` has one representative per point.
         if not isinstance(self.space, Manifold) or self.space.functions.transport is not None:
-            carried = self.space.transport(end, start, carried)
-        size = self.space.norm(start, carried - _next(vectors)[:last])
-        return Jumps(size, float(self.space.norm(places, vectors).max()))
+            transported = self.space.transport(end, start, transported)
+        size = self.space.norm(start, transported - _next(vectors)[:last])
+        return Jumps(size, float(self.space.norm(points, vectors).max()))
 
 
 def segments_of(spline: CubicSpline) -> Segments:

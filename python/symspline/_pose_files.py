@@ -125,7 +125,7 @@ def _bad_line(lines: list[Line], name: str, form: str) -> str | None:
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
-    """Write poses as lines of ``time x y z qx qy qz qw``, from which `read_tum` restores every number.
+    r"""Write poses as lines of ``time x y z qx qy qz qw``, from which `read_tum` restores every number.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
 
 
 def write_kitti(file: Any, poses: Any) -> None:
-    """Write poses as lines with the twelve numbers of [R | x].
+    r"""Write poses as lines with the twelve numbers of [R | x].
 
     KITTI stores times in a separate file.
 

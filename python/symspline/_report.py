@@ -318,7 +318,9 @@ def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
     """Return the longest time between neighbouring knots, shape of the batch axes."""
-    longest = np.maximum.reduce(times[..., 1:] - times[..., :-1], axis=-1)
+    # Times that were not checked may be infinite.
+    with np.errstate(all="ignore"):
+        longest = np.maximum.reduce(times[..., 1:] - times[..., :-1], axis=-1)
     return np.broadcast_to(longest, batch).copy() if batch else float(longest)
 
 

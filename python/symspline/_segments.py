@@ -160,8 +160,8 @@ def fit_segments(
     """
     space = space_named(space)
     check_smooth(smooth, duplicates, options)
-    weighing = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
-    used = _used(weighing, points, space) if smooth else None
+    weight_options = {key: options.pop(key, None) for key in ("weights", "frames")} if smooth else {}
+    used = _used(weight_options, points, space) if smooth else None
     curves, rows, steps, gap = cut(t, points, space, max_gap, min_points, duplicates, used)
     if not curves:
         raise ValidationError(
@@ -171,7 +171,7 @@ def fit_segments(
     if not smooth:
         return fit_many(curves, space, **options)
     own = [
-        (*curve, {key: _of_rows(value, kept) for key, value in weighing.items()})
+        (*curve, {key: _of_rows(value, kept) for key, value in weight_options.items()})
         for curve, kept in zip(curves, rows, strict=True)
     ]
     return smooth_many(own, space, **options)
@@ -194,9 +194,9 @@ def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
         )
 
 
-def _used(weighing: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
+def _used(weight_options: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
     """Return which points have a nonzero weight."""
-    found = read_precision(**weighing, space=space, data=read(points, space))
+    found = read_precision(**weight_options, space=space, data=read(points, space))
     used: NDArray[np.bool_] = np.any([own.weights > 0 for own in found], axis=0)
     return used
 
@@ -252,10 +252,10 @@ def cut(
             f"points has batch axes {data[0].batch}, but a recording must be a single curve"
         )
     given, zone = times_of(t, "t")
-    clock, times = time_axis_of(Moments(given, zone))
+    time_axis, times = time_axis_of(Moments(given, zone))
     if times.shape != (data[0].nodes,):
         raise ValidationError(f"t has shape {times.shape}, but there are {data[0].nodes} points")
-    seconds = clock.knots(times)
+    seconds = time_axis.knots(times)
     all_count = used is not None and duplicates == "raise"
     _check_order(times, seconds, "first" if all_count else duplicates)
     arrays = [
@@ -273,9 +273,9 @@ def cut(
         starts = np.flatnonzero(new)
         arrays = [_at_once(f, a, starts, duplicates) for f, a in zip(factors_of(space), arrays, strict=True)]
         rows, moments, seconds, new = rows[new], moments[new], seconds[new], new[new]
-    gap = _seconds(max_gap, clock.dates)
+    gap = _seconds(max_gap, time_axis.dates)
     cuts = np.flatnonzero(np.diff(seconds) > gap) + 1
-    pieces = [
+    segments = [
         slice(a, b)
         for a, b in zip([0, *cuts], [*cuts, len(seconds)], strict=True)
         if np.count_nonzero(new[a:b]) >= least
@@ -285,9 +285,9 @@ def cut(
             Moments(moments[own], zone),
             tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own],
         )
-        for own in pieces
+        for own in segments
     ]
-    return Cut(curves, [rows[own] for own in pieces], np.diff(seconds), gap)
+    return Cut(curves, [rows[own] for own in segments], np.diff(seconds), gap)
 
 
 def _seconds(max_gap: Any, dates: bool) -> float:

@@ -33,7 +33,7 @@ class Moments(NamedTuple):
 
     Attributes:
         times: as NumPy has them.
-        zone: what was known of their zone, see `handed.times_of`.
+        zone: what was known of their zone, see `_input.times_of`.
     """
 
     times: Any
@@ -46,7 +46,7 @@ class TimeAxis:
 
     Numbers are taken as they are. Dates become seconds, and integers too large for a double
     differences, since the first knot of each curve: ``origin``, of shape batch + (1,) where curves
-    have their own knots. Durations are seconds. ``zone`` is that of dates, see `handed.times_of`.
+    have their own knots. Durations are seconds. ``zone`` is that of dates, see `_input.times_of`.
     """
 
     origin: Any = None
@@ -103,8 +103,8 @@ class TimeAxis:
             return times, per_curve
         return onto_ends(times, knots, batch, per_curve, array.dtype, 0.0 if self.dates else self.origin)
 
-    def picked(self, index: Any) -> TimeAxis:
-        """The clock of part of a batch."""
+    def take_batch(self, index: Any) -> TimeAxis:
+        """The time axis of some curves of a batch."""
         return replace(self, origin=self.origin[index][()]) if np.ndim(self.origin) else self
 
     def _doubles(self, array: NDArray[Any], origin: Any, name: str) -> Doubles:
@@ -129,7 +129,7 @@ _NUMBERS = TimeAxis()
 
 
 def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
-    """The clock for some knots, and the knots as `CubicSpline.t` shows them."""
+    """The time axis for some knots, and the knots as `CubicSpline.t` shows them."""
     given: Any
     given, zone = knots if isinstance(knots, Moments) else times_of(knots, "t")
     array = as_array(given, "t")
@@ -153,7 +153,7 @@ def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
 def knots_of(
     t: TimesLike | None, batch: tuple[int, ...], nodes: int
 ) -> tuple[TimeAxis, NDArray[Any], Doubles]:
-    """The clock of curves with so many knots each, the knots as shown, and as the core counts them."""
+    """The time axis of curves with so many knots each, the knots as shown, and as the core counts them."""
     if t is None:
         knots = np.arange(nodes, dtype=np.float64)
         return TimeAxis(), knots, knots
@@ -161,11 +161,11 @@ def knots_of(
         # What most programs pass.
         knots = t.copy()
         return _NUMBERS, knots, knots
-    clock, shown = time_axis_of(t)
+    time_axis, shown = time_axis_of(t)
     if shown.shape != (nodes,) and shown.shape != (*batch, nodes):
         own = f" or {(*batch, nodes)}" if batch else ""
         raise ValidationError(f"t has shape {shown.shape}, but {nodes} points a curve need {(nodes,)}{own}")
-    return clock, shown, clock.knots(shown)
+    return time_axis, shown, time_axis.knots(shown)
 
 
 def onto_ends(

@@ -282,7 +282,7 @@ class _Motion:
 
     def __init__(self, spline: Spline, x: TimesLike, extrapolate: Any, per_curve: bool) -> None:
         self._attitude, self._position = attitude(spline), _position(spline)
-        self._clock, self._x = spline._clock, x
+        self._time_axis, self._x = spline._time_axis, x
         self._where, self._per_curve = spline._where(extrapolate), per_curve
 
     @cached_property
@@ -321,7 +321,9 @@ class _Motion:
         return values[..., :3, 3] if self._position.space == _SE3 else values
 
     def _at(self, curve: CurveArrays, quantity: str) -> Array:
-        values: Array = evaluated(curve, self._clock, self._x, quantity, self._where, self._per_curve, None)
+        values: Array = evaluated(
+            curve, self._time_axis, self._x, quantity, self._where, self._per_curve, None
+        )
         return values
 
 

@@ -254,13 +254,13 @@ def quaternion(
     where = spline._where(extrapolate)
     ends = curve.points[..., 0, :], curve.points[..., -1, :]
     if where == "periodic" and np.any(_dot(*ends) < 0):
-        times, per_curve = spline._clock.at(x, curve.batch, per_curve, curve.times)
+        times, per_curve = spline._time_axis.at(x, curve.batch, per_curve, curve.times)
         times, turns = _wrapped(curve, times, per_curve)
         q = curve.evaluate(times, "point", "raise", True)
         flipped = (_dot(*ends) < 0).reshape(curve.batch + (1,) * (turns.ndim - len(curve.batch)))
         q = np.where((flipped & (turns % 2 == 1))[..., None], -q, q)
     else:
-        q = evaluated(curve, spline._clock, x, "point", where, per_curve, None)
+        q = evaluated(curve, spline._time_axis, x, "point", where, per_curve, None)
     return q if first else np.roll(q, -1, axis=-1)
 
 
@@ -330,7 +330,7 @@ def check_frame(frame: Any) -> None:
 
 def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
-    values: Array = evaluated(curve, spline._clock, x, quantity, where, per_curve, None)
+    values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve, None)
     return values
 
 

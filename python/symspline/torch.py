@@ -86,10 +86,10 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not available")
     if isinstance(space, Product):
-        pieces = zip(
+        each = zip(
             parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
         )
-        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in pieces)
+        return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in each)
     kinds, vectors = split(bc_type)
     points = torch.as_tensor(points)
     x, t = torch.as_tensor(x), torch.as_tensor(t)
@@ -113,7 +113,7 @@ class _Curve(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *cotangents: Any) -> Any:
         cotangent = cotangents[0].detach().resolve_conj().numpy()
-        along, t, points, ends = ctx.movable.pull(ctx.x, cotangent)
+        along, t, points, ends = ctx.movable.vjp(ctx.x, cotangent)
         return *(_tensor(a, like) for a, like in zip((along, t, points, *ends), ctx.like, strict=True)), None
 
     @staticmethod
@@ -121,7 +121,7 @@ class _Curve(torch.autograd.Function):
         dx, dt, points, *ends = (
             None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5]
         )
-        moved = ctx.movable.push(ctx.x, dx, points, dt, ends)
+        moved = ctx.movable.jvp(ctx.x, dx, points, dt, ends)
         return torch.as_tensor(moved).to(ctx.like[2][0])
 
 

@@ -38,7 +38,7 @@ def assert_transpose(spline, change, x, rng, orders=(0, 1, 2)):
         cotangent = rng.normal(size=spline(x).shape)
         if spline.space.dtype.kind == "c":
             cotangent = cotangent + 1j * rng.normal(size=cotangent.shape)
-        gradient = spline.vjp(x, cotangent, nu)
+        gradient = spline.vjp(x, cotangent, nu=nu)
         pairs = [(cotangent, spline.jvp(x, *change, nu=nu)), (gradient.points, vectors), (gradient.t, knots)]
         pairs += [(g, e) for g, e in zip(gradient.ends, ends, strict=True) if e is not None]
         left, *right = [np.vdot(a, b).real for a, b in pairs]

@@ -57,6 +57,8 @@ def test_the_page_has_the_table():
             "tests/docs/test_paper.py::test_the_page",
         ),
         (paper_table.has_test, "tests/docs/test_paper.py", "tests/docs/test_papers.py"),
+        (paper_table.has_source, "fit/condition.rs::sweep", "fit/condition.rs::sweeps"),
+        (paper_table.has_source, "fit/condition.rs::sweep", "fit/conditions.rs::sweep"),
         (paper_table.has_page, "paper.md", "papers.md"),
         (paper_table.has_page, "notation.md#the-package-of-the-paper", "notation.md#the-package"),
         (paper_table.has_page, "gallery/affine_shapes.rst", "gallery/shapes.rst"),

@@ -208,7 +208,9 @@ def test_points_that_are_not_finite_raise(name, value):
         with pytest.raises(ss.ValidationError, match=r"x\[2\] cannot be projected"):
             space.project(bad)
         if name in ("sphere:2", "euclidean:3", "hyperbolic:2"):
-            match = r"points\[2\] is off the space.*(NaN|inf|not finite).*No point is close to it; correct it or remove it"
+            match = (
+                r"points\[2\] is off the space.*(NaN|inf|not finite).*No point is close to it; correct it or remove it"
+            )
             fit_error(match, None, bad, name)
 
 

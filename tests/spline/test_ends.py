@@ -158,9 +158,9 @@ TANGENT, ACROSS = [0, 0.5, 0], [0.5, 0, 0]
         (("natural", (2, [0, INF, 0])), r"the end acceleration contains inf; it must be finite"),
         (
             ((1, ACROSS), "natural"),
-            r"the start velocity is not tangent at its point: a part of 1\.000e0 .*project_tangent",
+            r"the start velocity is not tangent at its point: its normal component is 1\.000e0 .*project_tangent",
         ),
-        (("natural", (2, [0, 1, 1])), r"the end acceleration is not tangent .*a part of 7\.071e-1"),
+        (("natural", (2, [0, 1, 1])), r"the end acceleration is not tangent .*its normal component is 7\.071e-1"),
     ],
     ids=str,
 )
@@ -208,7 +208,7 @@ def test_end_vectors_that_are_not_tangent(case):
         flat = (ss.Euclidean, ss.GeneralLinear, ss.ComplexGeneralLinear)
         assert isinstance(space, flat) or p[0].size == 1
         return
-    match = r"the start velocity is not tangent at its point: a part of .*project_tangent"
+    match = r"the start velocity is not tangent at its point: its normal component is .*project_tangent"
     with pytest.raises(ss.ValidationError, match=match):
         ss.CubicSpline(None, p, space, bc_type=((1, v), "natural"))
 

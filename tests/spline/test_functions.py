@@ -118,3 +118,9 @@ def test_curves_that_are_not_pairs_raise(curve):
         ss.fit_many([(None, P), curve], S2)
     with pytest.raises(ss.ValidationError, match=r"curves must be pairs \(t, points\), not 5"):
         ss.fit_many(5, S2)
+
+
+def test_invalid_times_raise_whatever_the_precision_of_other_curves():
+    good = (None, np.array([[-0.3], [0.5]], np.float32))
+    with pytest.raises(ss.ValidationError, match=r"t\[1\]\[1\] is inf"):
+        ss.fit_many([good, ([0.0, np.inf, np.inf], [[0.2], [0.3], [0.4]])], "r:1", on_failure="warn")

@@ -195,7 +195,9 @@ def test_control_points_beyond_reach_raise(batch, curve):
     # The second segment's inner points are (1, 0, 0) and its antipode.
     velocities[(*(n - 1 for n in batch), 2, 0)] = 1.5 * np.pi
     points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], velocities.shape)
-    with pytest.raises(ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"):
+    with pytest.raises(
+        ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"
+    ):
         ss.HermiteSpline(None, points, velocities, S2)
 
 

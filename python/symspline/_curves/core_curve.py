@@ -13,9 +13,9 @@ from .._faults import Fault
 from .._spaces import Affine, Array, Similarity, Space, SpecialEuclidean
 from . import derivatives
 from .curve import REAL, CurveArrays, Doubles
-from .gradient import Gradient, Places
-from .lift import check_reach, check_start, factors, is_quotient
-from .out import check_out, is_room
+from .gradient import Gradient, SampleTimes
+from .lift import check_reach, check_start, fiber_factors, is_quotient
+from .out import can_write_into, check_out
 from .solve import Options, Progress, Task, solve_single, validate
 
 # Their matrices have the same last row everywhere, which the core writes of curves that were not found, too.
@@ -81,7 +81,7 @@ class CoreCurve(CurveArrays):
         self._check_times(x, per_curve)
         space = self.space
         check_out(out, (x.shape if per_curve else self.batch + x.shape) + space.point_shape, space.dtype)
-        if self._compiled and is_room(out, space.dtype, x):
+        if self._compiled and can_write_into(out, space.dtype, x):
             _core.evaluate(
                 *self._core_curve, x, quantity, outside, per_curve, progress, space._as_doubles(out)
             )
@@ -108,7 +108,9 @@ class CoreCurve(CurveArrays):
         self._check_times(x, per_curve)
         if outside == "continue":
             check_reach(self.times, x)
-        return self._lifted(x, quantity, outside, per_curve, factors(self.space, first, start), progress)
+        return self._lifted(
+            x, quantity, outside, per_curve, fiber_factors(self.space, first, start), progress
+        )
 
     def _lifted(
         self,
@@ -154,18 +156,18 @@ class CoreCurve(CurveArrays):
         p, q = self.points[(*index, first)], self.points[(*index, last)]
         u, w = self.velocities[(*index, first)], self.velocities[(*index, last)]
         with np.errstate(all="ignore"):
-            legs = third * u, -third * w
+            handles = third * u, -third * w
         # Of curves that were not found they are NaN.
-        inner = [self.space._apply("exp", p=at, v=leg) for at, leg in zip((p, q), legs, strict=True)]
+        inner = [self.space._apply("exp", p=at, v=handle) for at, handle in zip((p, q), handles, strict=True)]
         return np.stack([p, *inner, q], axis=axis + 1)
 
-    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
-        return derivatives.push(self, at, bc_type, points, t, ends)
+    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
+        return derivatives.jvp(self, at, bc_type, points, t, ends)
 
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
-        return derivatives.pull(self, at, bc_type, cotangent)
+    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient:
+        return derivatives.vjp(self, at, bc_type, cotangent)
 
-    def picked(self, index: Any) -> Self:
+    def take_batch(self, index: Any) -> Self:
         times = np.ascontiguousarray(self.times[index]) if self.times.ndim > 1 else self.times
         return self._with(
             times, np.ascontiguousarray(self.points[index]), np.ascontiguousarray(self.velocities[index])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._spaces import Space
-from .gradient import Gradient, Places
+from .gradient import Gradient, SampleTimes
 from .integrals import EXACT
 from .solve import Progress
 
@@ -27,10 +27,10 @@ class CurveArrays(ABC):
         space: where they run.
         times: knots, shape (N+1,) or (..., N+1).
         points, velocities: shape (..., N+1, *point_shape); in a product tuples of such arrays.
-        exact: to what relative error integrals of speed and acceleration are worth computing.
+        quad_rtol: to what relative error integrals of speed and acceleration are worth computing.
     """
 
-    exact: float = EXACT
+    quad_rtol: float = EXACT
     space: Space[Any]
     times: Doubles
     points: Any
@@ -82,13 +82,13 @@ class CurveArrays(ABC):
         """Control points of the Bézier segments, shape (..., N, 4, *point_shape)."""
 
     @abstractmethod
-    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
+    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Any:
         """How the curve moves with its data, see `symspline.CubicSpline.jvp`."""
 
     @abstractmethod
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient[Any]:
+    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         """The transpose, see `symspline.CubicSpline.vjp`."""
 
     @abstractmethod
-    def picked(self, index: Any) -> CurveArrays:
+    def take_batch(self, index: Any) -> CurveArrays:
         """One curve, or a slice, along the first axis of the batch."""

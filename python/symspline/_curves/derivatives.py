@@ -15,10 +15,10 @@ from .._spaces import Array
 from .._time import onto_ends
 from .curve import CurveArrays
 from .ends import End, ends_of
-from .gradient import Gradient, Places
+from .gradient import Gradient, SampleTimes
 
 
-def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> Places:
+def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> SampleTimes:
     """Times of all curves, or with ``per_curve`` of each its own.
 
     Raises:
@@ -36,7 +36,7 @@ def places(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: 
             f"x[{index}] = {own[curve, index]} is outside the knots [{rows[curve, 0]}, {rows[curve, -1]}]; "
             "derivatives with respect to the data are known between the first and the last knot"
         )
-    return Places(np.ascontiguousarray(own), shape, nu)
+    return SampleTimes(np.ascontiguousarray(own), shape, nu)
 
 
 class _Curves(NamedTuple):
@@ -51,7 +51,7 @@ class _Curves(NamedTuple):
     nu: int
 
 
-def push(curve: CurveArrays, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
+def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
     """How the curve moves, see `symspline.CubicSpline.jvp`."""
     space, times = curve.space, curve.times
     if points is None:
@@ -76,7 +76,7 @@ def push(curve: CurveArrays, at: Places, bc_type: Any, points: Any, t: Any, ends
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 
-def pull(curve: CurveArrays, at: Places, bc_type: Any, cotangent: Any) -> Gradient:
+def vjp(curve: CurveArrays, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient:
     """The transpose, see `symspline.CubicSpline.vjp`."""
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
@@ -103,7 +103,7 @@ def pair_of(ends: Any) -> tuple[Any, Any]:
     return ends[0], ends[1]
 
 
-def _curves(curve: CurveArrays, at: Places, bc_type: Any) -> _Curves:
+def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
     space, batch = curve.space, curve.batch
     points, velocities = (
         space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities)

@@ -101,13 +101,13 @@ def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
     return fixed[0], fixed[1]
 
 
-def picked(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:
+def take_batch(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:
     """The end conditions of part of a batch: prescribed vectors may have the batch axes."""
     if isinstance(bc_type, str):
         return bc_type
     if isinstance(space, Product):
         each = zip(ends_in_factors(bc_type, space), space.factors, strict=True)
-        return _joined([picked(ends, index, batch_axes, factor) for ends, factor in each])
+        return _joined([take_batch(ends, index, batch_axes, factor) for ends, factor in each])
 
     def pick(end: Any) -> Any:
         if isinstance(end, str):

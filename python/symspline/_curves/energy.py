@@ -20,7 +20,7 @@ class Evaluable(Protocol):
     @property
     def batch(self) -> tuple[int, ...]: ...
     @property
-    def exact(self) -> float: ...
+    def quad_rtol(self) -> float: ...
 
     def evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool) -> Any: ...
 
@@ -36,7 +36,9 @@ def bending_energy(curve: Evaluable) -> Number:
         return bend * bend / unit
 
     with np.errstate(all="ignore"):
-        return integrate(times, power, curve.batch, curve.exact) / unit[..., 0] / unit[..., 0] / unit[..., 0]
+        return (
+            integrate(times, power, curve.batch, curve.quad_rtol) / unit[..., 0] / unit[..., 0] / unit[..., 0]
+        )
 
 
 def alternative_energy(curve: CurveArrays, reports: list[Report]) -> Any:

@@ -374,10 +374,18 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
     for i, factor in enumerate(factors_of(space)):
         most = max(own[i].tol for own in points)
         for number, own in enumerate(points):
+            # Invalid times are an error in any case, which is raised later.
             if own[i].tol < most and (mask is None or mask[number]):
                 try:
                     kind_of(factor).validate(
-                        Task(factor, times[number], own[i].doubles, _NATURAL, own[i].tol), _ANY
+                        Task(
+                            factor,
+                            np.arange(len(times[number]), dtype=float),
+                            own[i].doubles,
+                            _NATURAL,
+                            own[i].tol,
+                        ),
+                        _ANY,
                     )
                 except ValidationError as error:
                     if not skip:

@@ -45,7 +45,7 @@ class Gradient(Generic[P]):
     ends: tuple[P | None, P | None]
 
 
-class Places(NamedTuple):
+class SampleTimes(NamedTuple):
     """Times on the curves of a batch at which derivatives are computed.
 
     Attributes

@@ -21,7 +21,7 @@ def is_quotient(space: Space) -> bool:
     return space._handle.fibre() > 0
 
 
-def factors(space: Space, first: Array, start: Any) -> Doubles:
+def fiber_factors(space: Space, first: Array, start: Any) -> Doubles:
     """The unitary k × k matrices from the first points of curves, shape batch + (*point_shape), to the representatives
     to start at; shape (curves, k, k, 2)."""
     k, n = space._handle.fibre(), space.point_shape[0]

@@ -22,7 +22,7 @@ def check_out(out: Any, shape: tuple[int, ...], dtype: Any) -> None:
         raise ValidationError("out is read-only")
 
 
-def is_room(out: Array, dtype: Any, read: Array) -> bool:
+def can_write_into(out: Array, dtype: Any, read: Array) -> bool:
     """Whether the core may write into an array while it reads another."""
     apart = not np.may_share_memory(out, read)
     return apart and out.dtype == dtype and out.flags.c_contiguous and out.flags.aligned

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from .._spaces import Product, parts_of, together
+from .._spaces import Product, parts_of, product_norm
 from .core_curve import CoreCurve
 from .curve import NORMS, CurveArrays, Doubles
 from .derivatives import pair_of
 from .ends import ends_in_factors
-from .gradient import Gradient, Places
+from .gradient import Gradient, SampleTimes
 from .solve import Progress
 
 Tuple = tuple[Any, ...]
@@ -29,8 +29,8 @@ class ProductCurve(CurveArrays):
         self.velocities: Tuple = tuple([part.velocities for part in parts])
 
     @property
-    def exact(self) -> float:  # type: ignore[override]
-        return max(part.exact for part in self._parts)
+    def quad_rtol(self) -> float:  # type: ignore[override]
+        return max(part.quad_rtol for part in self._parts)
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -48,7 +48,7 @@ class ProductCurve(CurveArrays):
             part.evaluate(x, quantity, outside, per_curve, share(progress, i, count))
             for i, part in enumerate(self._parts)
         )
-        return np.asarray(together(values)) if quantity in NORMS else values
+        return np.asarray(product_norm(values)) if quantity in NORMS else values
 
     def write(
         self, out: Any, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None
@@ -82,7 +82,7 @@ class ProductCurve(CurveArrays):
     def control_points(self) -> Tuple:
         return tuple(part.control_points() for part in self._parts)
 
-    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Tuple:
+    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Tuple:
         count = len(self._parts)
         moved = (None,) * count if points is None else parts_of(points, self.space, "points")
         vectors = [
@@ -90,20 +90,20 @@ class ProductCurve(CurveArrays):
             for end in pair_of(ends)
         ]
         conditions = ends_in_factors(bc_type, self.space)
-        pieces = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
-        return tuple(part.push(at, bc, p, t, pair) for part, bc, p, pair in pieces)
+        each = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
+        return tuple(part.jvp(at, bc, p, t, pair) for part, bc, p, pair in each)
 
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Gradient[Any]:
+    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient[Any]:
         cotangents = parts_of(cotangent, self.space, "cotangent")
-        pieces = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
-        parts = [part.pull(at, bc, c) for part, bc, c in pieces]
+        each = zip(self._parts, ends_in_factors(bc_type, self.space), cotangents, strict=True)
+        parts = [part.vjp(at, bc, c) for part, bc, c in each]
         first, last = (None if parts[0].ends[e] is None else tuple(g.ends[e] for g in parts) for e in (0, 1))
         t = np.sum([g.t for g in parts], axis=0)
         points: Any = tuple(g.points for g in parts)
         return Gradient(points, t, (first, last))
 
-    def picked(self, index: Any) -> ProductCurve:
-        return ProductCurve(self.space, tuple(part.picked(index) for part in self._parts))
+    def take_batch(self, index: Any) -> ProductCurve:
+        return ProductCurve(self.space, tuple(part.take_batch(index) for part in self._parts))
 
     def __reduce__(self) -> Tuple:
         return ProductCurve, (self.space, self._parts)
@@ -127,5 +127,5 @@ def longest_step(curve: CurveArrays) -> Any:
         )
         for part in curve.parts
     ]
-    longest = np.max(together(tuple(steps)), axis=-1)
+    longest = np.max(product_norm(tuple(steps)), axis=-1)
     return float(longest) if np.ndim(longest) == 0 else longest

@@ -17,7 +17,7 @@ from .._spaces import Array, Space
 from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
 from .curve import NORMS, Doubles
-from .gradient import Places
+from .gradient import SampleTimes
 from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_some
 from .subspan import Span, span_of
 
@@ -98,10 +98,10 @@ class ReducedCurve(CoreCurve):
         found = small.transport(times, outside, np.squeeze(span.coordinates(rows), knots))
         return np.squeeze(span.embed(np.expand_dims(found, knots)), knots)
 
-    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
+    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
         self._refuse_derivatives()
 
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Never:
+    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Never:
         self._refuse_derivatives()
 
     def _refuse_derivatives(self) -> Never:

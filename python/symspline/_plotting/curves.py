@@ -234,7 +234,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
         index = tuple(map(int, np.unravel_index(i, batch)))
         data = spline._curve
         for k in index:
-            data = data.picked(k)
+            data = data.take_batch(k)
         x = _samples(data.times)
         noise = spline._noise_beside(index, x)
         alone = len(drawn) == 1

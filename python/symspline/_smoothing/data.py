@@ -33,7 +33,7 @@ class SmoothingData(NamedTuple):
 
     Attributes
     ----------
-    clock : TimeAxis
+    time_axis : TimeAxis
         Conversion of times.
     t : ndarray, shape (N,) or (..., N)
         Times as the user sees them.
@@ -41,23 +41,23 @@ class SmoothingData(NamedTuple):
         The same times as the core counts them.
     points : list of ndarray
         Points on the space in every factor. Data of weight zero are replaced by others; masked curves are NaN.
-    weighing : list of Precision
+    precisions : list of Precision
         Weights in every space in which data are smoothed.
     batch : tuple of int
         Batch axes.
     """
 
-    clock: TimeAxis
+    time_axis: TimeAxis
     t: Array
     times: Doubles
     points: list[Array]
-    weighing: list[Precision]
+    precisions: list[Precision]
     batch: tuple[int, ...]
 
     @property
     def used(self) -> NDArray[np.bool_]:
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
-        return reduce(np.logical_or, [own.weights > 0 for own in self.weighing])
+        return reduce(np.logical_or, [own.weights > 0 for own in self.precisions])
 
 
 class Knots(NamedTuple):
@@ -92,10 +92,10 @@ def read_noisy(
     """
     data = with_atol(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
-    clock, shown_times, times = _times_of(t, batch, count)
-    weighing = read_precision(weights, frames, space, data)
+    time_axis, shown_times, times = _times_of(t, batch, count)
+    precisions = read_precision(weights, frames, space, data)
     if weights is not None:
-        each = zip(data, grouped(space, weighing), strict=True)
+        each = zip(data, grouped(space, precisions), strict=True)
         data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
     ends = read_ends(bc_type, space, batch)
     for kind, _ in (end for own in ends for end in own or []):
@@ -104,7 +104,7 @@ def read_noisy(
                 f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
-    return Given(clock, shown_times, times, data, weighing, ends, batch, None)
+    return Given(time_axis, shown_times, times, data, precisions, ends, batch, None)
 
 
 class Given(NamedTuple):
@@ -120,16 +120,18 @@ class Given(NamedTuple):
         Indices of these curves in the batch of the user; None for all curves.
     """
 
-    clock: TimeAxis
+    time_axis: TimeAxis
     t: Array
     times: Doubles
     data: list[Points]
-    weighing: list[Precision]
+    precisions: list[Precision]
     ends: list[list[End] | None]
     batch: tuple[int, ...]
     chosen: NDArray[np.intp] | None
 
-    def sound(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
+    def valid_only(
+        self, space: Space, mask: NDArray[np.bool_] | None, strict: bool
+    ) -> tuple[Given, list[Fault]]:
         """Return the valid curves of the mask, and the faults of the others.
 
         Unless `strict`, curves with invalid or too few points are masked.
@@ -139,9 +141,9 @@ class Given(NamedTuple):
         if self.batch and not strict:
             _, faults = validated(*self._plain(space), skip_invalid=True, mask=chosen)
             chosen.flat[[fault.curve for fault in faults]] = False
-            for weighing in self.weighing:
-                for number in np.flatnonzero(chosen & ~_enough(self.times, weighing.weights, self.batch)):
-                    too_few = _too_few(weighing.weights, self.batch, int(number))
+            for precision in self.precisions:
+                for number in np.flatnonzero(chosen & ~_enough(self.times, precision.weights, self.batch)):
+                    too_few = _too_few(precision.weights, self.batch, int(number))
                     faults.append(Fault(int(number), INVALID, too_few))
                     chosen.flat[number] = False
         if chosen.all():
@@ -167,11 +169,11 @@ class Given(NamedTuple):
 
         shared = self.times.ndim == 1
         return Given(
-            self.clock,
+            self.time_axis,
             self.t if self.t.ndim == 1 else rows(self.t),
             self.times if shared else rows(self.times),
             [part._replace(doubles=rows(part.doubles), batch=(len(chosen),)) for part in self.data],
-            [own.map(rows) for own in self.weighing],
+            [own.map(rows) for own in self.precisions],
             [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
             (len(chosen),),
             chosen,
@@ -186,16 +188,16 @@ class Given(NamedTuple):
             If a point is invalid, or a curve has data at fewer than two times.
         """
         on_space, _ = validated(*self._plain(space))
-        for own in self.weighing:
+        for own in self.precisions:
             enough = _enough(self.times, own.weights, self.batch)
             if not np.all(enough):
                 number = int(np.flatnonzero(~enough)[0])
                 raise ValidationError(_too_few(own.weights, self.batch, number))
-        return SmoothingData(self.clock, self.t, self.times, on_space, self.weighing, self.batch)
+        return SmoothingData(self.time_axis, self.t, self.times, on_space, self.precisions, self.batch)
 
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
-    clock, shown_times, times = knots_of(t, batch, count)
+    time_axis, shown_times, times = knots_of(t, batch, count)
     if not np.isfinite(times).all():
         index = np.argwhere(~np.isfinite(times))[0].tolist()
         raise ValidationError(f"t{index} is {times[tuple(index)]}; times must be finite")
@@ -206,7 +208,7 @@ def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[
             f"t{[*curve, i + 1]} is before t{[*curve, i]}. Sort times and points together, for instance with "
             "order = np.argsort(t)."
         )
-    return clock, shown_times, times
+    return time_axis, shown_times, times
 
 
 def _without_missing(part: Points, weights: list[Doubles]) -> Points:
@@ -261,7 +263,7 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
         raise ValidationError(
             f"knots has shape {given.shape}, but must have shape (K,). All curves have the same knots."
         )
-    found, _ = noisy.clock.at(knots, noisy.batch, False)
+    found, _ = noisy.time_axis.at(knots, noisy.batch, False)
     if found.shape[-1:] < (2,):
         raise ValidationError("knots must have at least two entries")
     if not np.all(np.diff(found) > 0):
@@ -270,8 +272,8 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
     ends = np.stack([found[..., 0], found[..., -1]], axis=-1)
     data_ends = np.stack([times[..., 0], times[..., -1]], axis=-1)
     size = np.abs(data_ends).max(axis=-1, keepdims=True)
-    if noisy.clock.origin is not None and not noisy.clock.dates:
-        size = size + np.abs(np.asarray(noisy.clock.origin, np.float64))[..., None]
+    if noisy.time_axis.origin is not None and not noisy.time_axis.dates:
+        size = size + np.abs(np.asarray(noisy.time_axis.origin, np.float64))[..., None]
     # The last knot of linspace may be a few units in the last place before the last datum.
     beside = (ends != data_ends) & (np.abs(ends - data_ends) <= 4 * np.spacing(size))
     if beside.any():
@@ -281,9 +283,9 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
         found[..., [0, -1]] = np.where(beside, data_ends, ends)
     if np.any(found[..., 0] > times[..., 0]) or np.any(found[..., -1] < times[..., -1]):
         raise ValidationError("knots must reach from the first to the last time of the data")
-    if noisy.clock.dates:
+    if noisy.time_axis.dates:
         given = given.astype(np.promote_types(given.dtype, t.dtype))
-    elif noisy.clock.plain:
+    elif noisy.time_axis.plain:
         given = found
     # Curves with an origin of time of their own have one row of knots each.
     return Knots(np.broadcast_to(given, found.shape).copy(), found)
@@ -342,7 +344,7 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
         return knots
     span = float(times[-1] - times[0])
     mean = span / (len(times) - 1)
-    weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.weighing)
+    weight = max(float(np.max(np.mean(own.weights, axis=-1))) for own in noisy.precisions)
     # Units of the mean distance prevent overflow.
     ratio = 1.0 if lam is None else lam / weight / mean / mean / mean
     least = min(mean * (ratio / most) ** (1 / 3), span / 15)
@@ -373,7 +375,7 @@ def in_gaps(knots: Knots, given: Given) -> Knots:
     first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
     whole = step.dtype.kind in "ium"
     shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
-    times, _ = given.clock.at(shown_times, (), False)
+    times, _ = given.time_axis.at(shown_times, (), False)
     inner = np.flatnonzero(j == 0)
     times[inner], times[-1] = knots.times[:-1], knots.times[-1]
     return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots

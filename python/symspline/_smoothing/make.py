@@ -49,7 +49,7 @@ from .data import (
 )
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
 from .report import SmoothingReport
-from .solve import NO_CURVE, Asked, n_knots_for_df, one_a_curve, smoothed
+from .solve import NO_CURVE, SolverOptions, n_knots_for_df, one_per_curve, smoothed
 from .spline import SmoothingSpline
 from .spread import warn_of_spread
 from .warned import warn_of_bounds
@@ -251,22 +251,22 @@ def make_smoothing_spline(
         raise ValidationError(f"gamma must be a number >= 1, not {short_repr(gamma)}")
     if isinstance(tol, bool) or not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
         raise ValidationError(f"tol must be a number > 0, not {short_repr(tol)}")
-    asked = Asked(
+    options = SolverOptions(
         criterion, float(gamma), loss, method, float(tol), whole_number(max_iter, "max_iter", 1), False
     )
     given = read_noisy(t, points, space, weights, frames, bc_type, atol)
     lams = _in_parts(space, lam, "lam", given.batch)
     sigmas = _in_parts(space, sigma, "sigma", given.batch)
-    if loss != "linear" and sigma is None and any(own.is_singular for own in given.weighing):
+    if loss != "linear" and sigma is None and any(own.is_singular for own in given.precisions):
         raise ValidationError(
             f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
             "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
     if given.times.shape[-1] == 2:
         # Two points have no outliers and do not determine the noise level.
-        asked = asked._replace(loss="linear")
+        options = options._replace(loss="linear")
     mask = mask_of(where, given.batch)
-    some_given, faults = given.sound(space, mask, on_failure == "raise")
+    some_given, faults = given.valid_only(space, mask, on_failure == "raise")
     noisy, chosen = some_given.checked(space), some_given.chosen
     if chosen is not None:
         lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
@@ -281,23 +281,23 @@ def make_smoothing_spline(
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
         own = at.of_curves(chosen)
-        each = zip(points_of(noisy, space), noisy.weighing, _chosen(lams, own), sigmas, ends, strict=True)
+        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, own), sigmas, ends, strict=True)
         return [
             smoothed(
                 part,
                 noisy,
                 points_of_part,
-                weighing,
+                precision,
                 own,
                 one_lam,
                 one_sigma,
                 end,
-                asked._replace(raise_lam=raise_lam),
+                options._replace(raise_lam=raise_lam),
                 named,
                 free,
                 progress,
             )
-            for (part, points_of_part), weighing, one_lam, one_sigma, end in each
+            for (part, points_of_part), precision, one_lam, one_sigma, end in each
         ]
 
     if is_closed(bc_type) and every.times.shape[-1] < 4:
@@ -312,18 +312,18 @@ def make_smoothing_spline(
             found, at = run(finer, raise_lam=True), finer
     else:
         found, at = run(every), every
-    carried = [
+    transported = [
         transport_end_velocities(end, part, own, curve_points, noisy)
         for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
     whole = _whole(given, noisy, chosen)
     at_knots = [
-        join(factor, [_at_places(own, given.batch, chosen) for own, _, _ in parts])
+        join(factor, [_in_batch(own, given.batch, chosen) for own, _, _ in parts])
         for factor, parts in zip(factors_of(space), grouped(space, found), strict=True)
     ]
     conditions = [
-        _joined(factor, [_ends_at_places(one, given.batch, chosen) for one in own])
-        for factor, own in zip(factors_of(space), grouped(space, carried), strict=True)
+        _joined(factor, [_ends_in_batch(one, given.batch, chosen) for one in own])
+        for factor, own in zip(factors_of(space), grouped(space, transported), strict=True)
     ]
     parts = [
         Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, given.batch, at.times.shape[-1])
@@ -331,9 +331,9 @@ def make_smoothing_spline(
     ]
     good = None if chosen is None else _flags(given.batch, chosen)
     fitted = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
-    noise = [part.map(lambda column: _at_places(column, given.batch, chosen)) for _, part, _ in found]
+    noise = [part.map(lambda column: _in_batch(column, given.batch, chosen)) for _, part, _ in found]
     spline = SmoothingSpline._of(
-        given.clock,
+        given.time_axis,
         at.t,
         fitted.curve,
         _conditions(bc_type, conditions, space),
@@ -348,8 +348,8 @@ def make_smoothing_spline(
     warn_of_bounds(
         space,
         [part.report for part in noise],
-        [_at_places(np.isnan(own), given.batch, chosen) for own in lams],
-        [np.sum(own.weights > 0, axis=-1) for own in given.weighing],
+        [_in_batch(np.isnan(own), given.batch, chosen) for own in lams],
+        [np.sum(own.weights > 0, axis=-1) for own in given.precisions],
     )
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     data = [
@@ -482,8 +482,8 @@ def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> li
                 f"`{name}` has {len(value)} entries, but there are {len(spaces)} parts to smooth: "
                 f"{', '.join(map(repr, spaces))}. Pass one entry per part."
             )
-        return [one_a_curve(one, name, batch) for one in value]
-    return [one_a_curve(value, name, batch)] * len(spaces)
+        return [one_per_curve(one, name, batch) for one in value]
+    return [one_per_curve(value, name, batch)] * len(spaces)
 
 
 def _names(batch: tuple[int, ...], chosen: Any) -> Callable[[int], tuple[int, str]]:
@@ -502,7 +502,7 @@ def _flags(batch: tuple[int, ...], chosen: Any) -> Any:
     return flags
 
 
-def _at_places(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
+def _in_batch(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
     """Return values of the fitted curves as an array over the whole batch; the others are NaN, False or zero."""
     if chosen is None:
         return column
@@ -513,16 +513,16 @@ def _at_places(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
     return out.reshape(*batch, *rows.shape[1:])
 
 
-def _ends_at_places(ends: list[End] | None, batch: tuple[int, ...], chosen: Any) -> list[End] | None:
-    return ends and [(kind, None if v is None else _at_places(v, batch, chosen)) for kind, v in ends]
+def _ends_in_batch(ends: list[End] | None, batch: tuple[int, ...], chosen: Any) -> list[End] | None:
+    return ends and [(kind, None if v is None else _in_batch(v, batch, chosen)) for kind, v in ends]
 
 
 def _whole(given: Given, noisy: SmoothingData, chosen: Any) -> SmoothingData:
     """Return the data of all curves; points of masked curves are NaN."""
     if chosen is None:
         return noisy
-    points = [_at_places(own, given.batch, chosen) for own in noisy.points]
-    return SmoothingData(given.clock, given.t, given.times, points, given.weighing, given.batch)
+    points = [_in_batch(own, given.batch, chosen) for own in noisy.points]
+    return SmoothingData(given.time_axis, given.t, given.times, points, given.precisions, given.batch)
 
 
 def _with_enough(
@@ -592,13 +592,13 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     return joined
 
 
-def _conditions(bc_type: Any, carried: list[list[End] | None], space: Space) -> Any:
+def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space) -> Any:
     """Return end conditions in the form of the argument `bc_type`."""
     if isinstance(bc_type, str):
         return bc_type
 
     def one(e: int) -> Any:
-        each = [(ends or [])[e] for ends in carried]
+        each = [(ends or [])[e] for ends in transported]
         if each[0][1] is None:
             return "natural"
         vectors = tuple(

@@ -83,8 +83,8 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
                 doubles = np.ascontiguousarray(space_of._as_doubles(rows))
                 found.append(_in_factor(space_of, one, at, part._replace(doubles=doubles)))
             continue
-        weighing = _in_factor(factor, given, frame, part)
-        found += [weighing] if len(spaces) == 1 else _in_parts(weighing, factor, part)
+        precision = _in_factor(factor, given, frame, part)
+        found += [precision] if len(spaces) == 1 else _in_parts(precision, factor, part)
     return found
 
 
@@ -101,17 +101,17 @@ def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Precision
     return _with_matrices(array, frames, space, data)
 
 
-def _in_parts(weighing: Precision, space: Space, data: Points) -> list[Precision]:
+def _in_parts(precision: Precision, space: Space, data: Points) -> list[Precision]:
     """Return the inverse of the marginal covariance of each part of poses, a Schur complement."""
     parts = parts_of_factor(space)
-    if weighing.information is None:
-        return [weighing] * len(parts)
+    if precision.information is None:
+        return [precision] * len(parts)
     lead = (*data.batch, data.nodes)
     points = space._numbers(data.doubles).reshape(lead + space.point_shape)
     good = np.isfinite(points).all(axis=(-2, -1))
     into = np.zeros((*lead, space.dim, space.dim))
     into[good] = np.linalg.inv(coordinates_in_parts(space, space.project(points[good])))
-    whole = np.swapaxes(into, -1, -2) @ weighing.information @ into
+    whole = np.swapaxes(into, -1, -2) @ precision.information @ into
     found, first = [], 0
     for part in parts:
         own = np.arange(space.dim)[first : first + part.dim]
@@ -196,10 +196,10 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
     return Precision(np.trace(matrices, axis1=-2, axis2=-1) / m, np.ascontiguousarray(matrices))
 
 
-def _check(good: Any, complaint: str, name: str = "weights", places: Any = None) -> None:
+def _check(good: Any, complaint: str, name: str = "weights", indices: Any = None) -> None:
     if not np.all(good):
         bad = np.argwhere(~good)[0]
-        raise ValidationError(f"{name}{(bad if places is None else places[bad[0]]).tolist()} {complaint}")
+        raise ValidationError(f"{name}{(bad if indices is None else indices[bad[0]]).tolist()} {complaint}")
 
 
 def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubles:

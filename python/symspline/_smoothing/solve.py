@@ -62,7 +62,7 @@ class Smoothed(NamedTuple):
         )
 
 
-class Asked(NamedTuple):
+class SolverOptions(NamedTuple):
     """Options of the smoothing. The core validates the words."""
 
     criterion: str
@@ -78,12 +78,12 @@ def smoothed(
     space: Space,
     noisy: SmoothingData,
     points: Array,
-    weighing: Precision,
+    precision: Precision,
     knots: Knots,
     lam: Doubles,
     sigma: Doubles,
     ends: list[End] | None,
-    asked: Asked,
+    options: SolverOptions,
     name: Callable[[int], tuple[int, str]],
     between: bool,
     progress: Progress | None,
@@ -95,20 +95,20 @@ def smoothed(
         raise ValidationError(
             f"the dimension of {space!r} is too large for end velocities. Use natural ends."
         )
-    matrices = weighing.information
+    matrices = precision.information
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
     found, band, columns = _core.smooth(
         small._handle,
         np.ascontiguousarray(noisy.times),
         np.ascontiguousarray(small._as_doubles(inside)),
-        weighing.weights,
+        precision.weights,
         matrices,
         np.ascontiguousarray(knots.times),
         lam,
         sigma,
         ends,
-        *asked,
+        *options,
         progress,
     )
     state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact = (
@@ -132,7 +132,7 @@ def smoothed(
     for number, kind in enumerate(np.ravel(state).tolist()):
         if kind:
             there, of = name(number)
-            faults.append(Fault(there, UNCONVERGED, _reason(_STATES[kind], of, number, report, asked)))
+            faults.append(Fault(there, UNCONVERGED, _reason(_STATES[kind], of, number, report, options)))
     return (
         numbers if span is None else span.embed(numbers),
         Smoothed(report, band, band_lam, scale, between),
@@ -140,7 +140,7 @@ def smoothed(
     )
 
 
-def _reason(state: str, of: str, number: int, report: SmoothingReport, asked: Asked) -> str:
+def _reason(state: str, of: str, number: int, report: SmoothingReport, options: SolverOptions) -> str:
     if state == "no curve":
         return (
             f"The smoothing{of} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
@@ -159,10 +159,10 @@ def _reason(state: str, of: str, number: int, report: SmoothingReport, asked: As
             "lam, or another criterion."
         )
     step = np.ravel(report.step)[number]
-    other = "" if asked.method == "newton" else " or pass method='newton'"
+    other = "" if options.method == "newton" else " or pass method='newton'"
     return (
         f"No convergence of the smoothing{of}: the last step is {step:.1e} standard deviations after "
-        f"{np.ravel(report.iterations)[number]} iterations (tol {asked.tol:.1e}). Raise max_iter{other}."
+        f"{np.ravel(report.iterations)[number]} iterations (tol {options.tol:.1e}). Raise max_iter{other}."
     )
 
 
@@ -174,7 +174,7 @@ def n_knots_for_df(df: Any) -> int:
     return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
 
 
-def one_a_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
+def one_per_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
     """Return a number >= 0 per curve; NaN for None."""
     if value is None:
         return np.full(int(np.prod(batch)), np.nan)

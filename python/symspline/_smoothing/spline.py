@@ -90,7 +90,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     def _fill(  # type: ignore[override]
         self,
-        clock: TimeAxis,
+        time_axis: TimeAxis,
         t: Array,
         curve: CurveArrays,
         bc_type: BCType,
@@ -99,7 +99,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         noisy: SmoothingData,
         smoothed: list[Smoothed],
     ) -> None:
-        super()._fill(clock, t, curve, bc_type, extrapolate, reports)
+        super()._fill(time_axis, t, curve, bc_type, extrapolate, reports)
         self._noisy, self._smoothed = noisy, smoothed
 
     def _each(self, values: list[Any]) -> Any:
@@ -156,10 +156,10 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         at = self._curve.evaluate(noisy.times, "point", "raise", noisy.times.ndim > 1)
         found = []
         gammas = at if isinstance(self.space, Product) else (at,)
-        for space, gamma, points, weighing in zip(
-            factors_of(self.space), gammas, noisy.points, grouped(self.space, noisy.weighing), strict=True
+        for space, gamma, points, precisions in zip(
+            factors_of(self.space), gammas, noisy.points, grouped(self.space, noisy.precisions), strict=True
         ):
-            counts = np.any([own.weights > 0 for own in weighing], axis=0)
+            counts = np.any([own.weights > 0 for own in precisions], axis=0)
             used = np.broadcast_to(counts, (*noisy.batch, points.shape[len(noisy.batch)]))
             used = used & np.isfinite(gamma).all(axis=tuple(range(len(noisy.batch) + 1, gamma.ndim)))
             vectors = np.full(points.shape, np.nan, points.dtype)
@@ -224,7 +224,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         True
         """
         nu = order_of(nu, 1)
-        times, per_curve = self._clock.at(x, self._batch, False)
+        times, per_curve = self._time_axis.at(x, self._batch, False)
         if not np.isfinite(times).all():
             raise ValidationError("x must be finite")
         batch = self._batch
@@ -347,15 +347,15 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         good = np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)
         return int(np.size(good) - np.sum(good))
 
-    def _with(self, clock: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
-        part = super()._with(clock, t, curve, index)
+    def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
+        part = super()._with(time_axis, t, curve, index)
         noisy = self._noisy
         own = noisy._replace(
-            clock=clock,
+            time_axis=time_axis,
             t=noisy.t[index] if noisy.t.ndim > 1 else noisy.t,
             times=noisy.times[index] if noisy.times.ndim > 1 else noisy.times,
             points=[points[index] for points in noisy.points],
-            weighing=[own.map(lambda column: column[index]) for own in noisy.weighing],
+            precisions=[own.map(lambda column: column[index]) for own in noisy.precisions],
             batch=curve.batch,
         )
         return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
@@ -364,18 +364,18 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
         """Splines in the factors of a product."""
         noisy = self._noisy
-        weighing = grouped(self.space, noisy.weighing)
+        precisions = grouped(self.space, noisy.precisions)
         found = grouped(self.space, self._smoothed)
         return tuple(
-            self._like(part, noisy._replace(points=[points], weighing=own), noise)
-            for part, points, own, noise in zip(super()._parts, noisy.points, weighing, found, strict=True)
+            self._like(part, noisy._replace(points=[points], precisions=own), noise)
+            for part, points, own, noise in zip(super()._parts, noisy.points, precisions, found, strict=True)
         )
 
     @classmethod
     def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
         parts = (
-            spline._clock,
+            spline._time_axis,
             spline._t,
             spline._curve,
             spline._bc_type,
@@ -389,10 +389,10 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
-        clock, t = read_times(state, "data_t")
-        parts = read_fitted(state, clock)
+        time_axis, t = read_times(state, "data_t")
+        parts = read_fitted(state, time_axis)
         _, _, curve, bc_type, *_ = parts
-        return cls._of(*parts, *read_noise(state, clock, t, curve, is_closed(bc_type)))
+        return cls._of(*parts, *read_noise(state, time_axis, t, curve, is_closed(bc_type)))
 
     def __repr__(self) -> str:
         batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""

@@ -31,17 +31,17 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
     at_curve = [
         x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))
     ]
-    for x, (factor, own), weighing, df in zip(
-        at_curve, points_of(noisy, space), noisy.weighing, dfs, strict=True
+    for x, (factor, own), precision, df in zip(
+        at_curve, points_of(noisy, space), noisy.precisions, dfs, strict=True
     ):
         # Other spaces have no uniform distribution of points, or no largest distance.
         if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
             continue
-        found = _median_distance(factor, x, own[chosen], _counts(weighing.weights)[..., ::every])
+        found = _median_distance(factor, x, own[chosen], _counts(precision.weights)[..., ::every])
         random = factor.random_point(np.random.default_rng(0), (2, _ENOUGH))
         expected = float(np.median(factor._apply("distance", p=random[0], q=random[1])))
         count = np.sum(
-            np.broadcast_to(_counts(weighing.weights), (*noisy.batch, noisy.times.shape[-1])), axis=-1
+            np.broadcast_to(_counts(precision.weights), (*noisy.batch, noisy.times.shape[-1])), axis=-1
         )
         # A curve through all data has no residuals to compare.
         far = np.argwhere((found**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1))

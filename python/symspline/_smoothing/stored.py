@@ -22,24 +22,24 @@ from .solve import Smoothed
 def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> dict[str, Any]:
     """Return the entries of a smoothing spline in addition to those of a `CubicSpline`."""
     state: dict[str, Any] = {
-        **times_state("data_t", noisy.t, noisy.clock),
+        **times_state("data_t", noisy.t, noisy.time_axis),
         "noise": [
             vars(own.report) | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
             for own in smoothed
         ],
     }
-    first, *others = noisy.weighing
+    first, *others = noisy.precisions
     alike = all(np.array_equal(first.weights, own.weights) for own in others)
     if alike:
         state["data_weights"] = first.weights
     state |= {"data" + suffix_of(space, i): points for i, points in enumerate(noisy.points)}
-    for i, (weighing, own) in enumerate(zip(noisy.weighing, smoothed, strict=True)):
+    for i, (precision, own) in enumerate(zip(noisy.precisions, smoothed, strict=True)):
         suffix = _suffix(space, i)
         state["band" + suffix] = own.band
         if not alike:
-            state["data_weights" + suffix] = weighing.weights
-        if weighing.information is not None:
-            state["data_information" + suffix] = weighing.information
+            state["data_weights" + suffix] = precision.weights
+        if precision.information is not None:
+            state["data_information" + suffix] = precision.information
     return state
 
 
@@ -49,7 +49,7 @@ def _suffix(space: Space, i: int) -> str:
 
 
 def read_noise(
-    state: Entries, axis: TimeAxis, t: NDArray[Any], curve: CurveArrays, closed: bool
+    state: Entries, time_axis: TimeAxis, t: NDArray[Any], curve: CurveArrays, closed: bool
 ) -> tuple[SmoothingData, list[Smoothed]]:
     """Return the data of a curve and the results of the smoothing.
 
@@ -57,7 +57,7 @@ def read_noise(
     ----------
     state : Entries
         State of the smoothing spline.
-    axis : TimeAxis
+    time_axis : TimeAxis
         Time axis of the data.
     t : ndarray
         Times of the data, as shown.
@@ -71,7 +71,7 @@ def read_noise(
     ValidationError
         If the entries do not match.
     """
-    space, batch, times = curve.space, curve.batch, axis.knots(t)
+    space, batch, times = curve.space, curve.batch, time_axis.knots(t)
     count, knots = times.shape[-1], curve.times.shape[-1]
     with entry("data_t"):
         if times.shape not in ((count,), (*batch, count)):
@@ -88,7 +88,7 @@ def read_noise(
             # Masked curves are NaN, and so are their data.
             there = np.isfinite(part.points).all(axis=tuple(range(len(batch), part.points.ndim)))
             part.space.check_point(rows[there])
-    weighing, smoothed = [], []
+    precisions, smoothed = [], []
     with entry("noise"):
         for i, (own, numbers) in enumerate(zip(smoothed_spaces(space), state["noise"], strict=True)):
             suffix = _suffix(space, i)
@@ -100,7 +100,7 @@ def read_noise(
                 _check("information matrices", information, shape, batch + shape)
             if not (weights >= 0).all():
                 raise ValidationError("the weights must be numbers >= 0")
-            weighing.append(Precision(weights, information))
+            precisions.append(Precision(weights, information))
             band, numbers = state["band" + suffix], dict(numbers)
             lam, scale = (
                 read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale")
@@ -111,7 +111,7 @@ def read_noise(
             good = np.asarray(report.converged)
             _check("bands", band, (*batch, knots + (2 if closed else 0), 4), finite=good)
             smoothed.append(Smoothed(report, band, lam, scale, between))
-    return SmoothingData(axis, t, times, points, weighing, batch), smoothed
+    return SmoothingData(time_axis, t, times, points, precisions, batch), smoothed
 
 
 def _check(what: str, array: NDArray[Any], *shapes: tuple[int, ...], finite: Any = True) -> None:

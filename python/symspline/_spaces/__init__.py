@@ -14,7 +14,7 @@ from .linear import (
 )
 from .named import space
 from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
-from .product import Product, factors_of, parts_of, together
+from .product import Product, factors_of, parts_of, product_norm
 from .subspaces import (
     ComplexGrassmannian,
     ComplexHyperbolic,
@@ -63,6 +63,6 @@ __all__ = [
     "factors_of",
     "parts_of",
     "point_tol",
+    "product_norm",
     "space",
-    "together",
 ]

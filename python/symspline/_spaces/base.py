@@ -90,7 +90,7 @@ class Space(Generic[P]):
     def __init__(self, *parameters: int) -> None:
         if not hasattr(type(self), "_name"):
             raise TypeError(
-                f"{type(self).__name__} cannot be instantiated. Use one of its subclasses, such as Sphere(2)."
+                f"{type(self).__name__} is abstract and takes no arguments. Use a subclass, such as Sphere(2)."
             )
         for value in parameters:
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:

@@ -128,7 +128,7 @@ class Product(Space[PProduct]):
         return Product, self.factors
 
     def norm(self, p: ArrayLike, v: ArrayLike) -> FloatArray:
-        return together(self._each("norm", p, v))
+        return product_norm(self._each("norm", p, v))
 
     def project(self, x: ArrayLike) -> PProduct:
         return self._each("project", x)
@@ -176,7 +176,7 @@ class Product(Space[PProduct]):
             for factor, part in zip(self.factors, self._split(*inputs.values()), strict=True)
         )
         if operation == "distance":
-            return together(each)
+            return product_norm(each)
         return sum(each) if operation == "inner" else each
 
     def _each(self, method: str, *arguments: Any) -> PProduct:
@@ -214,7 +214,7 @@ def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
     return tuple(value)
 
 
-def together(lengths: Tuple) -> FloatArray:
+def product_norm(lengths: Tuple) -> FloatArray:
     """Combine the lengths in the factors by Pythagoras' theorem."""
     with np.errstate(all="ignore"):
         length: FloatArray = reduce(np.hypot, lengths)

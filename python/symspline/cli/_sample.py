@@ -167,7 +167,7 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
         ((times.dtype.kind == "M") != dates, kinds),
         (mixed, f"{zones}; write both with a zone, or neither"),
     )
-    if spline._outside != "raise":
+    if spline._extrapolation_mode != "raise":
         return
     inside = onto_ends(times, knots, (), False)[0] if times.dtype.kind == knots.dtype.kind == "f" else times
     outside = np.flatnonzero((inside < knots[0]) | (inside > knots[-1]))

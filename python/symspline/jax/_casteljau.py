@@ -83,13 +83,13 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: A
     nu = order_of(nu)
     space = space_named(space)
     if isinstance(space, Product):
-        pieces = zip(
+        each = zip(
             parts_of(points, space, "points"),
             parts_of(velocities, space, "velocities"),
             space.factors,
             strict=True,
         )
-        return tuple(evaluate(t, p, v, factor, x, nu=nu) for p, v, factor in pieces)
+        return tuple(evaluate(t, p, v, factor, x, nu=nu) for p, v, factor in each)
     model = model_of(space)
     points, velocities, t, x = arrays_of(space, points, velocities, t, x)
     batch = points.ndim - 1 - len(space.point_shape)
@@ -172,12 +172,12 @@ def _casteljau(model: Model, t: Any, points: Any, velocities: Any, x: Any) -> An
     """
     h = jnp.diff(t)
     p, q = points[:-1], points[1:]
-    legs = jnp.stack([model.times(h / 3, velocities[:-1]), model.times(-h / 3, velocities[1:])])
-    inner = model.exp(jnp.stack([p, q]), legs)
+    handles = jnp.stack([model.times(h / 3, velocities[:-1]), model.times(-h / 3, velocities[1:])])
+    inner = model.exp(jnp.stack([p, q]), handles)
     starts = jnp.stack([p, inner[0], q])
-    legs = jnp.stack([legs[0], model.log(inner[0], inner[1]), legs[1]])
+    handles = jnp.stack([handles[0], model.log(inner[0], inner[1]), handles[1]])
     i = jnp.clip(jnp.searchsorted(t, x, side="right") - 1, 0, t.shape[0] - 2)
     s = (x - t[i]) / h[i]
-    a, b, c = model.exp(starts[:, i], model.times(jnp.stack([s, s, 1 - s]), legs[:, i]))
+    a, b, c = model.exp(starts[:, i], model.times(jnp.stack([s, s, 1 - s]), handles[:, i]))
     left, right = model.between(jnp.stack([a, b]), jnp.stack([b, c]), s)
     return model.between(left, right, s)

@@ -40,8 +40,8 @@ def defects(given: tuple[bool, bool], u: Any, data: Data) -> Any:
     ahead, back = h * u[:-1] / 3, -h * u[1:] / 3
     left, right = _SPHERE.exp(p[:-1], ahead), _SPHERE.exp(p[1:], back)
     starts = jnp.stack([left, right])
-    legs = _carried(starts, jnp.stack([p[:-1], p[1:]]), _SPHERE.log(starts, starts[::-1]))
-    after, before = (legs - jnp.stack([ahead, back])) / h**2
+    logs = _transported(starts, jnp.stack([p[:-1], p[1:]]), _SPHERE.log(starts, starts[::-1]))
+    after, before = (logs - jnp.stack([ahead, back])) / h**2
     inner = _stretched(back[:-1], after[1:]) - _stretched(ahead[1:], before[:-1])
     start = first - u[0] if given[0] else 3 * after[0]
     end = last - u[-1] if given[1] else -3 * before[-1]
@@ -88,7 +88,7 @@ def _frames(p: Any) -> Any:
     return jax.lax.associative_scan(lambda x, y: y @ x, jnp.concatenate([one[None], turns]))
 
 
-def _carried(a: Any, b: Any, v: Any) -> Any:
+def _transported(a: Any, b: Any, v: Any) -> Any:
     """Transport tangent vectors at a in parallel along geodesics to b."""
     return v - _SPHERE.inner(v, b) / (1 + _SPHERE.inner(a, b)) * (a + b)
 

@@ -17,7 +17,7 @@ from .._spaces import space as space_named
 from .._typing import SolverOptions
 from ..manifolds._manifold import refuse_functions
 from ._embedding import second_fundamental_form
-from ._primitives import Fixed, fit_p, push_p
+from ._primitives import Fixed, fit_p, jvp_p
 
 Array = jax.Array
 
@@ -115,10 +115,10 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):
-        pieces = zip(
+        each = zip(
             parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
         )
-        return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in pieces)
+        return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in each)
     kinds, given = split(bc_type)
     points = jnp.asarray(points)
     points = points.astype(jnp.result_type(points, jnp.complex64 if space.dtype.kind == "c" else jnp.float32))
@@ -154,11 +154,11 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
         moved += ahead * jnp.expand_dims(dx, tuple(range(-len(fixed.space.point_shape), 0)))
     if any(moving):
         # One vector: its transpose is asked for as a whole.
-        pieces = [jnp.ravel(c).astype(value.dtype) for c, m in zip(changes, moving, strict=True) if m]
-        push = partial(push_p.bind, jnp.concatenate(pieces), x, *data, velocities)
-        moved += push(fixed=fixed, lead=0, nu=nu, moving=moving)
+        parts = [jnp.ravel(c).astype(value.dtype) for c, m in zip(changes, moving, strict=True) if m]
+        jvp = partial(jvp_p.bind, jnp.concatenate(parts), x, *data, velocities)
+        moved += jvp(fixed=fixed, lead=0, nu=nu, moving=moving)
         if nu:
             moved += second_fundamental_form(
-                fixed.space, point, value, push(fixed=fixed, lead=0, nu=0, moving=moving)
+                fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving)
             )
     return value, moved

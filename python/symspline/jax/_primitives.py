@@ -20,7 +20,7 @@ from jax.interpreters import ad, batching, mlir
 
 from .._adapters import Kinds, fitted, joined
 from .._curves.curve import CurveArrays
-from .._curves.derivatives import places
+from .._curves.derivatives import sample_times
 from .._curves.fit import curve_of
 from .._spaces import Space
 from ._layout import Layout, Shape
@@ -83,11 +83,11 @@ def _ends(kinds: Kinds, vectors: Any) -> tuple[Any, Any]:
 # ---- its sensitivity to its data ----
 
 
-def _push_shape(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, **_: Any) -> Any:
+def _jvp_shape(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, **_: Any) -> Any:
     return _values(fixed, lead, _layout(fixed, lead, x, data, change.shape[:lead]), x, data[1])
 
 
-def _push(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...]) -> Any:
+def _jvp(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: tuple[bool, ...]) -> Any:
     """The change of γ, or of a derivative of it seen from the moving point, with the data.
 
     Args:
@@ -106,16 +106,16 @@ def _push(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, mov
         else None
         for own, array, core, moves in each
     )
-    found = curve.push(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
+    found = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
     return np.asarray(layout.outward(found), data[1].dtype)
 
 
-def _pull_shape(_: Any, x: Any, *data: Any, lead: int, moving: Any, kept: Shape, **__: Any) -> Any:
+def _vjp_shape(_: Any, x: Any, *data: Any, lead: int, moving: Any, kept: Shape, **__: Any) -> Any:
     sizes = (math.prod(a.shape[lead:]) for a, moves in zip(data, moving, strict=False) if moves)
     return ShapedArray((*kept, sum(sizes)), data[1].dtype)
 
 
-def _pull(
+def _vjp(
     cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape
 ) -> Any:
     """The transpose. JAX pairs complex numbers without conjugation.
@@ -126,7 +126,7 @@ def _pull(
     layout = _layout(fixed, lead, x, data, kept)
     curve, at, bc_type = _moved(fixed, layout, nu, x, data)
     wide = np.broadcast_to(cotangent, (*layout.full, *cotangent.shape[lead:]))
-    found = curve.pull(at, bc_type, np.conj(layout.inward(wide)))
+    found = curve.vjp(at, bc_type, np.conj(layout.inward(wide)))
     parts = (found.t, found.points, *(end for end in found.ends if end is not None))
     rows = [
         layout.gradient(np.conj(part), core, kept, array.shape[lead:]).reshape(*kept, -1)
@@ -153,7 +153,7 @@ def _moved(fixed: Fixed, layout: Layout, nu: int, x: Any, data: Any) -> tuple[Cu
     curve = curve_of(space, knots, [(points, found)])
     batch = points.shape[: points.ndim - core - 1]
     bc_type = joined(fixed.kinds, _ends(fixed.kinds, [layout.data(v, core) for v in vectors]))
-    return curve, places(knots, batch, at, per_curve, nu), bc_type
+    return curve, sample_times(knots, batch, at, per_curve, nu), bc_type
 
 
 def _like(change: Any, array: Any) -> Any:
@@ -186,15 +186,15 @@ def _primitive(name: str, call: Any, shapes: Any, multiple: bool = False) -> Any
 
 
 fit_p = _primitive("symspline_fit", _fit, _fit_shapes, multiple=True)
-push_p = _primitive("symspline_push", _push, _push_shape)
-pull_p = _primitive("symspline_pull", _pull, _pull_shape)
+jvp_p = _primitive("symspline_jvp", _jvp, _jvp_shape)
+vjp_p = _primitive("symspline_vjp", _vjp, _vjp_shape)
 
 
 def _mapped(primitive: Any, arguments: Any, axes: Any, *, lead: int, **fixed: Any) -> Any:
     """The rule of `jax.vmap`: one more axis in front of every argument, of size one where there is none."""
     pairs = list(zip(arguments, axes, strict=True))
     moved = [jnp.expand_dims(a, 0) if i is None else jnp.moveaxis(a, i, 0) for a, i in pairs]
-    if primitive is pull_p:
+    if primitive is vjp_p:
         fixed["kept"] = (next(a.shape[i] for a, i in pairs if i is not None), *fixed["kept"])
     found = primitive.bind(*moved, lead=lead + 1, **fixed)
     if primitive is not fit_p:
@@ -213,14 +213,14 @@ def _second(*_: Any, **__: Any) -> Any:
     )
 
 
-for primitive in (fit_p, push_p, pull_p):
+for primitive in (fit_p, jvp_p, vjp_p):
     batching.primitive_batchers[primitive] = partial(_mapped, primitive)
     ad.primitive_jvps[primitive] = _second
 
 
 def _transpose(cotangent: Any, change: Any, *data: Any, lead: int, **fixed: Any) -> Any:
     kept = change.aval.shape[:lead]
-    return [pull_p.bind(cotangent, *data, lead=lead, kept=kept, **fixed), *(None for _ in data)]
+    return [vjp_p.bind(cotangent, *data, lead=lead, kept=kept, **fixed), *(None for _ in data)]
 
 
-ad.primitive_transposes[push_p] = _transpose
+ad.primitive_transposes[jvp_p] = _transpose

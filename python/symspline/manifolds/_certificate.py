@@ -68,8 +68,8 @@ def _bounds(problem: Problem, matrix: Tridiagonal, x: Doubles, pace: Doubles) ->
     size = _largest(term)
     unit = np.where(size[:, None, None] > 0, _unit(term), _unit(matrix.step(_free(problem, first))))
     line = problem.some(np.tile(curves, 3))
-    places = np.concatenate([x + k * reach[:, None, None] * unit for k in (1, 2, 3)])
-    ahead = c2_residuals(line, line.velocities(places)).reshape(3, *x.shape)
+    samples = np.concatenate([x + k * reach[:, None, None] * unit for k in (1, 2, 3)])
+    ahead = c2_residuals(line, line.velocities(samples)).reshape(3, *x.shape)
     third = ahead[2] - 3 * ahead[1] + 3 * ahead[0] - first
     noise = _NOISE * _most(np.linalg.norm(third, axis=-1) / matrix.weight)[:, None] * matrix.weight
     noise += _inconsistency(problem, u, polygon, dlog)

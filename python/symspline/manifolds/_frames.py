@@ -87,14 +87,14 @@ def frames_along(operations: Operations, p: Array) -> Array:
     shape = (curves, nodes - 1, dim, *space.point_shape)
     here, there = (np.broadcast_to(x[:, :, None], shape) for x in (p[:, :-1], p[:, 1:]))
     if space.functions.transport is None:
-        carried = operations.project_tangent(there, tangents[:, :-1])
+        transported = operations.project_tangent(there, tangents[:, :-1])
     else:
-        carried = operations.transport(here, there, tangents[:, :-1])
+        transported = operations.transport(here, there, tangents[:, :-1])
     at = p[:, 1:].reshape(-1, *space.point_shape)
     maps = products(
         operations,
         at,
-        carried.reshape(-1, dim, *space.point_shape),
+        transported.reshape(-1, dim, *space.point_shape),
         tangents[:, 1:].reshape(-1, dim, *space.point_shape),
     ).reshape(curves, nodes - 1, dim, dim)
     # The rotation nearest to the map between tangent spaces: transport is one, projection nearly.

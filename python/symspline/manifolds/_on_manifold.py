@@ -13,7 +13,7 @@ from .. import _core
 from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
 from .._curves.curve import NORMS, REAL, Doubles
-from .._curves.gradient import Places
+from .._curves.gradient import SampleTimes
 from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_some
 from .._faults import Fault
 from .._spaces import Array, Euclidean, Space
@@ -32,7 +32,7 @@ class OnManifold(CoreCurve):
 
     space: Manifold
     # Derivatives are differences.
-    exact = 1e-9
+    quad_rtol = 1e-9
     _compiled = False
 
     @staticmethod
@@ -55,7 +55,7 @@ class OnManifold(CoreCurve):
         if quantity in REAL and quantity not in NORMS:
             self._refuse(f"{quantity} is that of rotations, not")
         self._check_times(x, per_curve)
-        self._check_places(x, outside, per_curve)
+        self._check_domain(x, outside, per_curve)
         batch, space = self.batch, self.space
         count = math.prod(batch)
         shape = x.shape if per_curve else batch + x.shape
@@ -116,7 +116,7 @@ class OnManifold(CoreCurve):
         rows = [a.reshape(-1, nodes, *shape) for a in (self.points, self.velocities)]
         return control_polygons(self.space.operations, np.diff(self._knots), rows[0], rows[1])
 
-    def _check_places(self, x: Doubles, outside: str, per_curve: bool) -> None:
+    def _check_domain(self, x: Doubles, outside: str, per_curve: bool) -> None:
         """Of a curve in flat space the core checks the same."""
         flat = np.zeros((*self.batch, self.times.shape[-1], 1))
         _core.evaluate(Euclidean(1)._handle, self.times, flat, flat, x, "point", outside, per_curve, None)
@@ -127,10 +127,10 @@ class OnManifold(CoreCurve):
     def transport(self, times: tuple[float, float], outside: str, v: Any) -> Never:
         self._refuse("parallel transport along curves is not made")
 
-    def push(self, at: Places, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
+    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
         self._refuse("derivatives with respect to the data are not made")
 
-    def pull(self, at: Places, bc_type: Any, cotangent: Any) -> Never:
+    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Never:
         self._refuse("derivatives with respect to the data are not made")
 
     def _refuse(self, what: str) -> Never:

@@ -184,21 +184,21 @@ def _generator(a: Array, b: Array) -> Array:
 
 def _units(k: int, m: int) -> Array:
     """A basis of the antisymmetric m × m matrices whose last block is zero: one 1 below the diagonal each."""
-    rows, columns = _places(k, m)
+    rows, columns = _lower_indices(k, m)
     unit = np.zeros((len(rows), m, m))
     number = np.arange(len(rows))
     unit[number, rows, columns], unit[number, columns, rows] = 1.0, -1.0
     return unit
 
 
-def _places(k: int, m: int) -> tuple[Array, Array]:
+def _lower_indices(k: int, m: int) -> tuple[Array, Array]:
     rows, columns = np.tril_indices(m, -1)
     return rows[columns < k], columns[columns < k]
 
 
 def _lower(x: Array, k: int) -> Array:
     """The entries below the diagonal of the first k columns."""
-    rows, columns = _places(k, x.shape[-2])
+    rows, columns = _lower_indices(k, x.shape[-2])
     return x[..., rows, columns]
 
 

@@ -22,7 +22,7 @@ Doubles = NDArray[np.float64]
 
 STAGES = 8
 # For steps of this length, the error of eight stages is a rounding error.
-_LEG = 0.4
+_LONGEST_STEP = 0.4
 # Bytes of the linear systems that are solved at once.
 _BLOCK = 2**26
 
@@ -108,7 +108,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
 
 def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
     """Return the times in the units of the core, the same for all curves."""
-    times, per_curve = spline._clock.at(x, spline._batch, False)
+    times, per_curve = spline._time_axis.at(x, spline._batch, False)
     if per_curve:
         raise ValidationError(
             "the curves have different first knots; compute the propagator of one curve at a time: "
@@ -132,9 +132,9 @@ def _edges(curve: CurveArrays) -> Doubles:
     # By rounding the last of them may lie behind the last knot.
     inner = np.minimum(inner, knots[..., 1:, None])
     speed = curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
-    legs = speed.reshape(inner.shape).max(axis=-1) * lengths
+    arcs = speed.reshape(inner.shape).max(axis=-1) * lengths
     # The same number in all curves, so that they are one array.
-    number = np.maximum(1, np.ceil(legs.reshape(-1, legs.shape[-1]).max(axis=0) / _LEG)).astype(int)
+    number = np.maximum(1, np.ceil(arcs.reshape(-1, arcs.shape[-1]).max(axis=0) / _LONGEST_STEP)).astype(int)
     share = np.concatenate([np.arange(n) / n for n in number])
     starts = np.repeat(knots[..., :-1], number, axis=-1) + np.repeat(lengths, number, axis=-1) * share
     return np.concatenate([starts, knots[..., -1:]], axis=-1)
@@ -152,11 +152,11 @@ def _steps(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
     """Return the propagators over short intervals inside a segment, shape (curves, m, n, n)."""
     n = curve.space.point_shape[0]
     block = max(1, _BLOCK // (start.shape[0] * (STAGES * n) ** 2 * 16))
-    pieces = [
+    steps = [
         _step(curve, start[:, i : i + block], length[:, i : i + block])
         for i in range(0, start.shape[1], block)
     ]
-    return np.concatenate(pieces, axis=1) if pieces else np.zeros((*start.shape, n, n), complex)
+    return np.concatenate(steps, axis=1) if steps else np.zeros((*start.shape, n, n), complex)
 
 
 def _step(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:

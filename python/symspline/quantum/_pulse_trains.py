@@ -86,7 +86,7 @@ def _edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
         raise ValidationError(
             f"edges must be a one-dimensional array of at least two times, not of shape {times.shape}"
         )
-    spacing = np.diff(spline._clock.at(edges, spline._batch, False, spline._times)[0])
+    spacing = np.diff(spline._time_axis.at(edges, spline._batch, False, spline._times)[0])
     refuse(
         ~(spacing > 0),
         "edges",

@@ -60,7 +60,7 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEv
     quantum_space(spline)
     if spline._batch:
         raise ValidationError(f"{spline!r} is a batch, but a QobjEvo needs one curve; use qobjevo(spline[0])")
-    if spline._clock.dates:
+    if spline._time_axis.dates:
         raise ValidationError(
             "the times of this curve are dates, but a QobjEvo needs numbers; fit the curve with times in seconds"
         )
@@ -68,7 +68,7 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEv
         import qutip
     except ImportError:
         raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
-    beyond: Extrapolate = "geodesic" if spline._outside in ("raise", "nan") else None
+    beyond: Extrapolate = "geodesic" if spline._extrapolation_mode in ("raise", "nan") else None
     first, levels = float(spline.t[0]), spline.space.point_shape[0]
     if dims is not None and not (
         isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)

@@ -34,7 +34,7 @@ class Bases:
         """Return X at times x, shape x.shape + (rows, n); at the end of a closed spline, the lifted value."""
         first, last = self.shape.t[0], self.shape.t[-1]
         shape = self.shape
-        own = shape._clock.at(x, (), False, shape._times)[0]
+        own = shape._time_axis.at(x, (), False, shape._times)[0]
         refuse(
             ~((own >= shape._times[0]) & (own <= shape._times[-1])),
             "x",
@@ -52,5 +52,5 @@ class Bases:
 
     def share(self, x: Array) -> Array:
         """Map times to the interval from 0 at the first knot to 1 at the last."""
-        times, knots = self.shape._clock.at(x, (), False, self.shape._times)[0], self.shape._times
+        times, knots = self.shape._time_axis.at(x, (), False, self.shape._times)[0], self.shape._times
         return np.asarray((times - knots[0]) / (knots[-1] - knots[0]))

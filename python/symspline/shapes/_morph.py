@@ -89,11 +89,11 @@ class AffineMorph:
         moved = relative(drawings, base)
         self._bases = Bases(t, orthonormal(moved, "landmarks"), bc_type)
         self._drawings, self._base = drawings, base
-        places = place(drawings, base).copy()
+        positions = place(drawings, base).copy()
         self._affine = (
-            _Constant(self._bases.start.T @ moved[0], places[0])
+            _Constant(self._bases.start.T @ moved[0], positions[0])
             if frame == "first"
-            else _Between(self._bases, moved, places, bc_type)
+            else _Between(self._bases, moved, positions, bc_type)
         )
 
     def __call__(self, x: TimesLike) -> Array:
@@ -201,10 +201,10 @@ class _Between:
     S scales in the basis and R rotates the drawing, so a film of a drawing that only rotates stays rigid.
     """
 
-    def __init__(self, bases: Bases, moved: Array, places: Array, bc_type: Any) -> None:
+    def __init__(self, bases: Bases, moved: Array, positions: Array, bc_type: Any) -> None:
         t, n, closed = bases.shape.t, moved.shape[-1], bases.closed
         if closed:
-            _check_closed(moved, places)
+            _check_closed(moved, positions)
         matrices = np.swapaxes(bases(t), -1, -2) @ moved
         refuse(
             ~(np.linalg.det(matrices) > 0),
@@ -222,14 +222,14 @@ class _Between:
         left, sizes, right = np.linalg.svd(self._twisted(t, 1) @ matrices)
         stretches, turns = left * sizes[:, None] @ np.swapaxes(left, -1, -2), left @ right
         if closed:
-            for values in (stretches, turns, places):
+            for values in (stretches, turns, positions):
                 values[-1] = values[0]
         self._stretches = CubicSpline(t, stretches, SymmetricPositiveDefinite(n), bc_type=bc_type)
         self._turns = CubicSpline(t, turns, self._group, bc_type=bc_type)
-        self._places = CubicSpline(t, places, Euclidean(n), bc_type=bc_type)
+        self._positions = CubicSpline(t, positions, Euclidean(n), bc_type=bc_type)
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        return self._twisted(x, -1) @ self._stretches(x) @ self._turns(x), self._places(x)
+        return self._twisted(x, -1) @ self._stretches(x) @ self._turns(x), self._positions(x)
 
     def _twisted(self, x: Array, sign: int) -> Array:
         """Return exp(±τw) at times x."""
@@ -238,9 +238,9 @@ class _Between:
         )
 
 
-def _check_closed(moved: Array, places: Array) -> None:
-    off = max(np.abs(values[-1] - values[0]).max() for values in (moved, places))
-    if not off <= 1e-8 * max(np.abs(moved[0]).max(), np.abs(places[0]).max()):
+def _check_closed(moved: Array, positions: Array) -> None:
+    off = max(np.abs(values[-1] - values[0]).max() for values in (moved, positions))
+    if not off <= 1e-8 * max(np.abs(moved[0]).max(), np.abs(positions[0]).max()):
         raise ValidationError(
             f"the last drawing of a closed film must equal the first, but differs by {off:.3e}; repeat the first "
             "drawing at the end, or pass frame='first', which requires the same shape only"

@@ -13,7 +13,7 @@ from typing import Any, Unpack
 
 import xarray as xr
 
-from .._options import checked_extrapolate, outside, quantity_of
+from .._options import checked_extrapolate, extrapolation_mode, quantity_of
 from .._spaces import Space
 from .._typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
 from .._version import VERSION
@@ -116,7 +116,7 @@ def fit(
         "curve_dim": dim,
         "point_dims": list(point_dims),
         "bc_type": words if isinstance(words, str) else json.dumps(words),
-        "extrapolate": outside(extrapolate, bc_type),
+        "extrapolate": extrapolation_mode(extrapolate, bc_type),
         "symspline": VERSION,
     }
     return ds
@@ -267,7 +267,7 @@ def resample(
     spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
     times, axes = times_with_names(to, dim, point_dims, curves)
-    policy = outside(checked_extrapolate(options.get("extrapolate")), bc_type)
+    policy = extrapolation_mode(checked_extrapolate(options.get("extrapolate")), bc_type)
     rehearse(times, spec.options["t"], da.sizes[dim], policy)
     first, *rest = spec.inputs
     inputs: Inputs = [(bare(first[0], dim), [KNOTS, *point_dims]), (times, axes), *rest]

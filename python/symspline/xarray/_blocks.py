@@ -135,18 +135,18 @@ def values_at(
     shape = () if quantity == "speed" else space.point_shape
     if not good.any():
         return np.full(batch + x.shape[x.ndim - x_axes :] + shape, np.nan, space.dtype if shape else float)
-    clock, curve = given(t, points, velocities, space)
+    time_axis, curve = given(t, points, velocities, space)
     if lifted:
         found = call_at_times(
             curve,
-            clock,
+            time_axis,
             x,
             per_curve,
             policy,
             lambda curve, x, each, where: curve.lift(x, quantity, where, each, None),
         )
     else:
-        found = evaluated(curve, clock, x, quantity, policy, per_curve, None)
+        found = evaluated(curve, time_axis, x, quantity, policy, per_curve, None)
     if everyone:
         return np.asarray(found)
     values = np.full(batch + found.shape[1:], np.nan, found.dtype)

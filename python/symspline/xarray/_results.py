@@ -9,7 +9,7 @@ import xarray as xr
 
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._options import checked_extrapolate, outside
+from .._options import checked_extrapolate, extrapolation_mode
 from .._spaces import space as space_named
 from ._blocks import apply, values_at
 from ._spec import check_dims, rehearse, times_with_names
@@ -33,7 +33,7 @@ def along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool 
     for array in (points, velocities):
         check_dims(array, space, dim, point_dims)
     if extrapolate is not None:
-        policy = outside(checked_extrapolate(extrapolate), ds.attrs.get("bc_type"))
+        policy = extrapolation_mode(checked_extrapolate(extrapolate), ds.attrs.get("bc_type"))
     times, axes = times_with_names(
         x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)]
     )

@@ -1,4 +1,20 @@
 //! From points to velocities: the spline through given points.
+//!
+//! A fit runs through the modules in this order:
+//!
+//! 1. `fit`, in this file, calls the cutting of long curves, which distributes the work over threads.
+//! 2. `lanes` fits up to eight curves, or parts of curves, of equal length, one in each lane of a SIMD register.
+//! 3. `unroll` transports a frame along the eight polygons and writes their chords into a `chain`.
+//! 4. `auto` dispatches to the solver of the requested method, or runs several solvers in turn.
+//! 5. `minimum_energy` runs further solvers if points are far apart, and keeps the curve with the lowest `energy`.
+//!
+//! The solvers:
+//! - `solve` is the loop that quasi-Newton and Newton share; `line_search` and `convergence` limit its steps.
+//! - `quasi_newton` and `tridiagonal`: steps with the flat-space matrix; `newton` and `blocks`: with the Jacobian.
+//! - `fixed_point` is Algorithm 1, `homotopy` continues from flat space, and `trust_region` minimises the residual.
+//!
+//! All of them evaluate the C² condition (13) in `condition`, whose end rows are in `ends`. `handles` keeps control
+//! handles inside the cut locus; `rounded` and `certificate` examine the result.
 
 mod auto;
 mod blocks;

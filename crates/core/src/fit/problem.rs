@@ -79,7 +79,8 @@ pub enum Method {
     Homotopy,
 }
 
-/// The solvers, in the order in which `auto` runs them.
+/// The solvers, in the order of their numbers in `SOLVERS` of `_report.py`. The report of a long curve names the one
+/// with the largest number among those of its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Solver {
     /// Algorithm 1 of the paper.

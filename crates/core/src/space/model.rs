@@ -26,6 +26,11 @@ pub trait Model: Copy + Send + Sync {
     fn longest_handle(&self) -> f64 {
         self.cut_angle()
     }
+    /// See [`Ambient::injectivity_radius`]; by default the cut angle, which is right if the deciding angle of a vector
+    /// is at most its length and equals it in some direction.
+    fn injectivity_radius(&self) -> f64 {
+        self.cut_angle()
+    }
     /// See [`Origin::dim`].
     fn dim(&self) -> usize;
     /// See [`Origin::curvature`].
@@ -131,6 +136,9 @@ impl<M: Model> Ambient for M {
     }
     fn longest_handle(&self) -> f64 {
         Model::longest_handle(self)
+    }
+    fn injectivity_radius(&self) -> f64 {
+        Model::injectivity_radius(self)
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         self.exp(&constant(p), &scaled(&constant(v), t), out);

@@ -25,8 +25,8 @@ pub trait Ambient: Copy + Send + Sync {
     fn is_complex(&self) -> bool {
         false
     }
-    /// The size k of the unitary factor up to which an array represents a point: the k × k matrices on its right. 0
-    /// if every point has a unique array.
+    /// The rank k of the fibre of arrays that represent the same point: X and Xg are one point for every k × k matrix
+    /// g, unitary on complex spaces and orthogonal on real ones. 0 where a point has one array only.
     fn fiber_rank(&self) -> usize {
         0
     }
