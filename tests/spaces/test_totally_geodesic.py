@@ -272,7 +272,7 @@ def test_special_tensors_have_determinant_one():
         (
             "siegel:1",
             convert.siegel_to_positive_definite(np.array([[[1e5 + 1j]], [[1e5 + 2j]]])),
-            "doubles do not tell at its condition of 1.0e20: move all points by one isometry",
+            "condition number of 1.0e20 is too large to verify .*; move all points by one isometry",
         ),
         # Curves through such points had values that are no numbers.
         (

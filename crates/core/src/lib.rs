@@ -1,4 +1,4 @@
-//! What the spaces of symspline share: numbers, small matrices, the traits of a symmetric space, and the
+//! The common basis of all spaces of symspline: numbers, small matrices, the traits of a symmetric space, and the
 //! fit, evaluation and differentiation of splines on any of them.
 //!
 //! Solvers call a space through its table of operations ([`space::Erased`]), so that they are compiled once. The loops

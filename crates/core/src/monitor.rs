@@ -1,4 +1,4 @@
-//! Long work that can be watched and stopped.
+//! Progress and cancellation of long computations.
 
 use std::cell::RefCell;
 use std::panic::resume_unwind;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, ThreadId};
 
-/// Counts finished units of work, and asks its owner from time to time whether to go on.
+/// Counts finished units of work, and asks its owner from time to time whether to continue.
 pub struct Monitor<'a> {
     cancelled: Arc<AtomicBool>,
     finished: AtomicUsize,
@@ -15,8 +15,8 @@ pub struct Monitor<'a> {
 }
 
 impl<'a> Monitor<'a> {
-    /// `go_on` gets the number of finished units and says whether to continue. It is called often,
-    /// and only on the thread that made the monitor.
+    /// `go_on` receives the number of finished units and returns whether to continue. It is called often, and only on
+    /// the thread that created the monitor.
     pub fn new(go_on: &'a (dyn Fn(usize) -> bool + Sync)) -> Self {
         Monitor {
             cancelled: Arc::default(),
@@ -26,7 +26,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// Whether to stop; on the owner's thread it asks.
+    /// Whether to stop. On the owner's thread this calls `go_on`.
     pub fn poll(&self) -> bool {
         if thread::current().id() == self.owner && !(self.go_on)(self.finished.load(Ordering::Relaxed)) {
             self.cancelled.store(true, Ordering::Relaxed);
@@ -44,8 +44,8 @@ impl<'a> Monitor<'a> {
         self.finished.fetch_add(units, Ordering::Relaxed);
     }
 
-    /// Lets [`checkpoint`] on this thread hear of this monitor for as long as the result lives. It is for threads whose
-    /// owner waits elsewhere: on the owner's own thread nobody would ask meanwhile.
+    /// Connects [`checkpoint`] on this thread to this monitor for the lifetime of the result. It is for threads whose
+    /// owner waits elsewhere; on the owner's own thread nothing would call `go_on` meanwhile.
     pub fn listen(&self) -> Listening {
         Listening(STOP.replace(Some(self.cancelled.clone())))
     }
@@ -55,7 +55,7 @@ thread_local! {
     static STOP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
 }
 
-/// Ends what [`Monitor::listen`] began.
+/// Ends the effect of [`Monitor::listen`].
 pub struct Listening(Option<Arc<AtomicBool>>);
 
 impl Drop for Listening {
@@ -64,11 +64,11 @@ impl Drop for Listening {
     }
 }
 
-/// What unwinds from a [`checkpoint`] of work that was stopped.
+/// The payload with which a cancelled [`checkpoint`] unwinds.
 pub struct Cancelled;
 
-/// To be called within long loops that have no way to return early: products and factorisations of large matrices.
-/// Where the work was stopped it unwinds with [`Cancelled`], without a message.
+/// Must be called within long loops that cannot return early: products and factorisations of large matrices. If the
+/// work was cancelled, it unwinds with [`Cancelled`], without a message.
 pub fn checkpoint() {
     let stop = STOP.with_borrow(|stop| stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed)));
     if stop {

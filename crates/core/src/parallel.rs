@@ -1,4 +1,4 @@
-//! Independent pieces of work on all cores.
+//! Independent items of work on all cores.
 
 use crate::monitor::Monitor;
 use crate::scalar::LANES;
@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex};
 use std::time::Duration;
 
-/// A pool belongs to one process: after a fork its threads are gone, and the child makes its own.
-/// Pools are never freed, since others may be working in them; there is one for every number of
-/// threads that was asked for.
+/// A pool belongs to one process: after a fork its threads do not exist, and the child creates its own pool. Pools
+/// are never freed, since other threads may be using them; there is one for every requested number of threads.
 struct Pool {
     process: u32,
     threads: usize,
@@ -19,7 +18,7 @@ struct Pool {
 static POOL: AtomicPtr<Pool> = AtomicPtr::new(std::ptr::null_mut());
 static THREADS: AtomicUsize = AtomicUsize::new(0);
 
-/// Limits the number of threads; 0 stands for all cores.
+/// Limits the number of threads; 0 means all cores.
 pub fn set_num_threads(n: usize) {
     THREADS.store(n, Ordering::Relaxed);
 }
@@ -33,7 +32,7 @@ pub fn num_threads() -> usize {
 }
 
 fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
-    // What is stored was leaked, and stays.
+    // Stored pools are leaked and therefore remain valid.
     #[allow(unsafe_code)]
     let newest: Option<&'static Pool> = unsafe { POOL.load(Ordering::Acquire).as_ref() };
     let mut next = newest;
@@ -49,16 +48,15 @@ fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
     Some(&made.pool)
 }
 
-/// Rows of `len` numbers that make one item of work: `most` of small ones, and so few of large ones that a
-/// request to stop is soon heard. Whole groups of lanes.
+/// The number of rows of `len` numbers per item of work: at most `most`, and so few for long rows that cancellation
+/// is quick. A multiple of the number of lanes.
 pub fn block(most: usize, len: usize) -> usize {
     (most * 4 / len.max(4)).max(1).next_multiple_of(LANES).min(most)
 }
 
-/// Calls `work` on every item, on all cores if `parallel` says that this pays. Stops early when the
-/// monitor is cancelled.
+/// Calls `work` on every item, on all cores if `parallel` is true. Stops early if the monitor is cancelled.
 pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
-    // The system reads files to say how many cores there are, which takes longer than a small fit.
+    // To determine the number of cores the system reads files, which takes longer than a small fit.
     let cores = if parallel && items.len() > 1 { num_threads() } else { 1 };
     let threads = cores.min(items.len());
     let pool = if cores > 1 { pool(cores) } else { None };
@@ -86,8 +84,8 @@ pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work:
             });
         }
         // When a thread panics the scope passes it on, once all have stopped.
-        // The caller's thread only watches: it is the one that may be asked to stop. It asks without the
-        // lock, because the answer may have to wait for others that wait for these threads.
+        // The caller's thread only monitors, because only this thread may call `go_on`. It does so without the lock,
+        // because the answer may have to wait for threads that wait for the workers.
         let working = || {
             let left = busy.lock().unwrap_or_else(|e| e.into_inner());
             if *left == 0 {
@@ -107,7 +105,7 @@ fn take<T>(queue: &Mutex<std::vec::IntoIter<T>>) -> Option<T> {
     queue.lock().unwrap_or_else(|e| e.into_inner()).next()
 }
 
-/// Says that a thread works no longer, also one that panics: then nothing more is begun.
+/// Signals that a thread has stopped, including by a panic: then no further item is started.
 struct Done<'a, T> {
     queue: &'a Mutex<std::vec::IntoIter<T>>,
     busy: &'a Mutex<usize>,
@@ -131,12 +129,12 @@ mod tests {
     use std::sync::mpsc;
 
     #[test]
-    fn two_items_are_worked_on_at_once() {
+    fn two_items_run_concurrently() {
         set_num_threads(2);
         let quiet = |_| true;
         let both = (Mutex::new(0), Condvar::new());
         let met = AtomicUsize::new(0);
-        // Each waits for the other.
+        // Each item waits for the other.
         for_each(vec![(); 2], true, &Monitor::new(&quiet), |()| {
             *both.0.lock().unwrap() += 1;
             both.1.notify_all();
@@ -148,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_of_a_thread_comes_to_the_caller_at_once() {
+    fn a_panic_of_a_thread_reaches_the_caller_at_once() {
         set_num_threads(2);
         let (send, receive) = mpsc::channel();
         std::thread::spawn(move || {
@@ -165,7 +163,8 @@ mod tests {
             let _ = send.send((failed, begun.load(Ordering::Relaxed)));
         });
         let (failed, begun) = receive.recv_timeout(Duration::from_secs(2)).expect("the call returns");
-        // The others go on while the panic is printed, with a backtrace for some tenths of a second.
+        // The other threads continue while the panic and its backtrace are printed, which takes some tenths of a
+        // second.
         assert!(failed && begun < 1000);
     }
 }

@@ -5,12 +5,12 @@ use crate::parallel;
 use crate::scalar::{LANES, Lane, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 
-/// Rows worked on by one thread at a time, at most.
+/// Maximum number of rows that one thread processes at a time.
 const BLOCK: usize = 4096;
-/// Numbers from which threads pay.
+/// Number of entries from which several threads are faster.
 const PARALLEL: usize = 1 << 16;
 
-/// An operation on rows; the inputs it takes are named behind it.
+/// An operation on rows, with its inputs after the colon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operation {
     /// exp_p(v): p, v
@@ -29,9 +29,9 @@ pub enum Operation {
     Transport,
     /// inner product: p, u, v
     Inner,
-    /// how far apart neighbouring floating-point points are, in rounding errors: p
+    /// the spacing of neighbouring floating-point points, in rounding errors: p
     Rounding,
-    /// a point beside x: x
+    /// the projection of x onto the space: x
     Project,
     /// the tangential part of v at p: p, v
     ProjectTangent,
@@ -56,7 +56,7 @@ impl Operation {
     }
 }
 
-/// A row that could not be worked on: its index and the deciding angle found.
+/// A row on which the operation failed: its index and the deciding angle.
 pub type Fault = (usize, f64);
 
 /// Applies an operation to every row. All inputs have as many rows as the result.
@@ -95,7 +95,7 @@ pub fn apply(
                 Operation::Geodesic => {
                     let t = Lane::new(at.map(|i| t[i]));
                     space.geodesic(a, b, t, &mut result);
-                    // Weights of the end points cancel near the cut locus, where a direction does not.
+                    // The weights of the end points cancel near the cut locus; a direction does not.
                     let far = angle.simd_gt(lane(0.9 * space.cut_angle()));
                     if far.any() {
                         space.ray(a, &log, t, c);
@@ -104,7 +104,7 @@ pub fn apply(
                 }
                 Operation::Distance => result[0] = space.distance(a, b, &log, angle),
                 Operation::CutFraction => {
-                    // The angle that comes with a logarithm is exact near the cut locus only.
+                    // The angle returned by a logarithm is exact only near the cut locus.
                     let exact = angle.simd_lt(limit).select(space.angle_at(a, &log), angle);
                     result[0] = exact / lane(space.cut_angle());
                 }
@@ -145,17 +145,17 @@ pub fn apply(
     faults.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
-/// About how many numbers of eight bytes one group of rows takes in an operation on a space.
+/// The approximate number of eight-byte numbers that one group of rows occupies in an operation on a space.
 pub fn memory(space: &Erased, operation: Option<Operation>) -> f64 {
-    // Functions of a matrix keep some dozens of its size, with one number for every lane.
+    // Functions of a matrix occupy some dozens of its size, with one number for every lane.
     let matrices = if space.point_shape().len() > 1 { 40.0 } else { 8.0 };
     let frame = if operation == Some(Operation::RandomTangent) { space.frame_len() as f64 } else { 0.0 };
-    // Bases of algebras hold a position, a number and a list for each dimension.
+    // Bases of algebras contain a position, a number and a list for each dimension.
     LANES as f64 * (matrices * space.point_len() as f64 + frame) + 5.0 * space.dim() as f64
 }
 
-/// Projects points in place. The first that is farther off than `tol`, or not finite, is an error:
-/// its row, how far it is off, and why it is no point.
+/// Projects points in place. The first point that is farther away than `tol`, or not finite, is an error: its row,
+/// its distance, and the condition that it violates.
 pub fn project_points(space: &Erased, points: &mut [f64], tol: f64) -> Result<(), (usize, f64, String)> {
     let len = space.point_len();
     let first = std::sync::Mutex::new(None);
@@ -183,7 +183,7 @@ pub fn project_points(space: &Erased, points: &mut [f64], tol: f64) -> Result<()
     }
 }
 
-/// Projects some points; stops at the first that is too far off.
+/// Projects some points; stops at the first one that is too far away.
 fn project_block(space: &Erased, points: &mut [f64], tol: f64) -> Result<(), (usize, f64)> {
     let len = space.point_len();
     let mut x = vec![Lane::ZERO; len];
@@ -203,8 +203,8 @@ fn project_block(space: &Erased, points: &mut [f64], tol: f64) -> Result<(), (us
     Ok(())
 }
 
-/// How far vectors are from being tangent at their points, row by row: relative to their size, or to
-/// the rounding of the point if that is all they are.
+/// The normal components of vectors at their points, row by row: relative to their length, or to the rounding of the
+/// point for vectors of that size.
 pub fn tangent_defects(space: &Erased, points: &[f64], vectors: &[f64]) -> Vec<f64> {
     let len = space.point_len();
     let rows = points.len() / len;

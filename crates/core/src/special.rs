@@ -6,8 +6,8 @@
 //! logarithm in y = 1 − cos θ) nothing is singular at 0 and flat, spherical and hyperbolic space
 //! are one formula.
 //!
-//! Small arguments use the Taylor series, others the library functions. Which of the two a lane
-//! gets depends on its own argument only, so that a result never depends on its neighbours.
+//! Small arguments use the Taylor series, others the library functions. The choice for a lane depends on its own
+//! argument only, so that a result never depends on its neighbours.
 
 use crate::scalar::{Lane, Scalar, lane};
 
@@ -15,8 +15,8 @@ use crate::scalar::{Lane, Scalar, lane};
 const TRIG_SERIES: f64 = 2.5;
 /// Below this |x| six terms suffice.
 const TRIG_SHORT: f64 = 0.1;
-/// Up to these |y| [`theta_over_sin`] uses so many terms of its series, and one more for every
-/// derivative. Beyond the last, derivatives lose no more than a digit in the quotients by sin²θ.
+/// The limits of |y| up to which [`theta_over_sin`] uses these numbers of terms of its series, and one more for every
+/// derivative. Beyond the last limit, derivatives lose at most one significant digit in the quotients by sin²θ.
 const ARC_TIERS: [(f64, usize); 3] = [(0.0075, 7), (0.09, 14), (0.3, 22)];
 
 const fn factorial(n: usize) -> f64 {
@@ -57,7 +57,7 @@ pub(crate) const ARC: [f64; 46] = {
     c
 };
 
-/// The polynomial `Σ cᵢ xⁱ` with as many derivatives as S carries.
+/// The polynomial `Σ cᵢ xⁱ` with as many derivatives as S has.
 #[inline(always)]
 fn polynomial<S: Scalar>(c: &[f64], x: Lane) -> [Lane; 3] {
     let mut p = [lane(c[c.len() - 1]), Lane::ZERO, Lane::ZERO];
@@ -75,7 +75,7 @@ fn polynomial<S: Scalar>(c: &[f64], x: Lane) -> [Lane; 3] {
 
 #[inline(always)]
 fn select<S: Scalar>(mask: Lane, a: [Lane; 3], b: [Lane; 3]) -> [Lane; 3] {
-    // The derivatives that S does not carry are never read.
+    // Derivatives that S does not have are never read.
     [
         mask.select(a[0], b[0]),
         if S::ORDER > 0 { mask.select(a[1], b[1]) } else { Lane::ZERO },
@@ -83,7 +83,7 @@ fn select<S: Scalar>(mask: Lane, a: [Lane; 3], b: [Lane; 3]) -> [Lane; 3] {
     ]
 }
 
-/// The entire functions of x = θ² that exponential and transvection consist of.
+/// The entire functions of x = θ² that occur in exponential and transvection.
 #[derive(Clone, Copy, Debug)]
 pub struct Trig<S> {
     /// cos√x
@@ -104,8 +104,8 @@ impl<S: Scalar> Trig<S> {
         let ax = xv.abs();
         let series = ax.simd_le(lane(TRIG_SERIES));
         let (versine, defect) = if ax.simd_le(lane(TRIG_SHORT)).all() {
-            // On this range the two tiers agree to rounding but not bit for bit; every lane that
-            // is short takes the short tier in the mixed case too (see `taylor`).
+            // On this range the two tiers agree up to rounding but are not bit-identical. Every short lane uses the
+            // short tier in mixed cases, too (see `taylor`).
             (polynomial::<S>(&VERSINE[..6 + S::ORDER], xv), polynomial::<S>(&SINC_DEFECT[..6 + S::ORDER], xv))
         } else if series.all() {
             taylor::<S>(xv)
@@ -157,8 +157,8 @@ fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
 
 /// θ/sin θ as a function of y = 1 − cos θ; at y < 0 it is d/sinh d with y = 1 − cosh d.
 ///
-/// `rest` gives 2 − y = 1 + cos θ: near the cut locus, θ = π, the caller may know it to more digits
-/// than y can carry. It is asked for only where it matters.
+/// `rest` gives 2 − y = 1 + cos θ: near the cut locus, θ = π, the caller may know it more accurately than y
+/// represents it. It is called only where it matters.
 #[inline(always)]
 pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
     let yv = y.value();
@@ -168,7 +168,7 @@ pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
     let f = if within[0].all() {
         series(0)
     } else {
-        // From the widest range to the narrowest, so that each lane ends with its own tier.
+        // From the widest range to the narrowest, so that each lane finally has its own tier.
         let mut f = series(1);
         if !within[1].all() {
             f = select::<S>(within[1], f, series(2));

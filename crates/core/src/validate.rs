@@ -21,7 +21,7 @@ pub struct Invalid {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// Knots, points, offsets or end vectors have lengths that do not belong together.
+    /// Knots, points, offsets or end vectors have inconsistent lengths.
     Lengths(&'static str),
     /// A time is not finite.
     TimeNotFinite(f64),
@@ -36,7 +36,7 @@ pub enum Reason {
     TimesTooFarApart,
     /// A point is off the space.
     OffSpace {
-        /// How far, relative to the size of the point; not finite where there is no point of the space close to it.
+        /// The distance, relative to the size of the point; not finite if no point of the space is close to it.
         distance: f64,
         /// The condition that the point violates.
         condition: String,
@@ -140,10 +140,11 @@ fn fault<T>(curve: usize, node: impl Into<Option<usize>>, reason: Reason) -> Res
     Err(Invalid { curve, node: node.into(), reason })
 }
 
-/// Validates a problem and returns its points, projected onto the space. Of a closed curve the last point becomes another
-/// array of the first.
+/// Validates a problem and returns its points, projected onto the space. The last point of a closed curve is replaced
+/// by another array of the first.
 ///
-/// Points may be off the space by `tol`, relative to their size, and end vectors by as much from tangent.
+/// The distance of points from the space, relative to their size, and the normal component of end vectors may be at
+/// most `tol`.
 ///
 /// # Errors
 /// The first fault that is found, in the order of knots, points, closure, ends.
@@ -160,7 +161,7 @@ pub fn validate(space: &Erased, problem: &Problem, tol: f64) -> Result<Vec<f64>,
     Ok(own)
 }
 
-/// Knots, points, offsets and end vectors must belong together.
+/// Knots, points, offsets and end vectors must have consistent lengths.
 fn lengths(space: &Erased, problem: &Problem) -> Result<(), Invalid> {
     let (len, offsets) = (space.point_len(), problem.offsets);
     let wrong = |curve, what| fault(curve, None, Reason::Lengths(what));
@@ -233,8 +234,8 @@ pub fn points(space: &Erased, points: &mut [f64], offsets: &[usize], tol: f64) -
     })
 }
 
-/// Validates that curves are closed. The last array of each becomes one of its first point, without the distance between
-/// them.
+/// Validates that curves are closed. The last array of each curve is replaced by one of its first point, without the
+/// distance between them.
 ///
 /// # Errors
 /// The first curve whose ends are more than `tol` apart.

@@ -1,7 +1,8 @@
-//! No module of any crate of the workspace depends on itself through others.
+//! The modules of every crate of the workspace form no cycle.
 //!
-//! A module is a file. It depends on its children, because it declares them, and on every file that one of its paths
-//! leads to. So a parent may export what its children define, and children must not import from their parent.
+//! A module is a file. It depends on its children, because it declares them, and on every file to which one of its
+//! paths leads. A parent may therefore export definitions of its children, but children must not import from their
+//! parent.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -175,7 +176,7 @@ fn cycles_are_found() {
 }
 
 #[test]
-fn what_is_no_cycle_is_not_found() {
+fn acyclic_modules_pass() {
     let siblings =
         [("", "pub use a::b::T;"), ("a", "mod b;\nmod c;\npub use b::T;"), ("a::b", "use super::c::U;")];
     let rest =

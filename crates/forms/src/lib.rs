@@ -21,7 +21,7 @@ pub static FAMILY: &[Entry] = &[
     Entry { names: &["siegel"], parameters: &["n"], make: |p| table(Siegel::new(p[0]).map(Within)) },
 ];
 
-/// In code of its own where the size is known to the compiler.
+/// Common sizes are constants at compile time.
 fn real(p: &[usize], special: bool) -> Made {
     match p[0] {
         2 => table(PositiveDefinite::<1, Known<2, 4>>::new(2, special)),

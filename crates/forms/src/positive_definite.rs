@@ -1,8 +1,8 @@
 //! Positive definite matrices with the affine-invariant metric tr p⁻¹u p⁻¹v: GL(n) acts by
 //! g·p = g p g*, geodesics are p^½ exp(t p^−½ v p^−½) p^½.
 //!
-//! Points are whitened by a factor L with p = L L*, never by a square root, which loses digits where p
-//! is ill-conditioned: errors are ε times the condition of p.
+//! Points are whitened by a factor L with p = L L*, never by a square root, which is inaccurate if p is
+//! ill-conditioned: errors are ε times the condition number of p.
 
 use std::marker::PhantomData;
 use symspline_core::matrix::{
@@ -16,14 +16,14 @@ use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PositiveDefinite<const D: usize, A = Dynamic> {
     n: usize,
-    /// Of determinant one: a totally geodesic part, SL(n)/SO(n).
+    /// Of determinant one: a totally geodesic subspace, SL(n)/SO(n).
     special: bool,
     storage: PhantomData<A>,
 }
 
-/// Size of L⁻¹(q − p)L⁻* up to which the logarithm works on the difference; beyond, on factors.
+/// The size of L⁻¹(q − p)L⁻* up to which the logarithm uses the difference; beyond it, it uses factors.
 const NEAR: f64 = 0.35;
-/// With ones on the diagonal, the smallest eigenvalue over n of what is no point.
+/// The smallest eigenvalue, divided by n, below which a matrix scaled to a unit diagonal is not a point.
 const SINGULAR: f64 = 1e-13;
 
 impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
@@ -47,7 +47,7 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
         (0..self.n).fold(Lane::ZERO, |sum, j| sum + l[(j, j)][0].ln()) * lane(2.0)
     }
 
-    /// A tangent vector at p without what changes the determinant, where that is one.
+    /// Removes the component of a tangent vector at p that changes the determinant, if that must be one.
     fn tangential(&self, p: &[Lane], v: Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
         if !self.special {
             return v;
@@ -61,7 +61,7 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
         Algebra { n: self.n, skew: false, traceless: self.special, storage: PhantomData }
     }
 
-    /// L e^{tw} L* with p = L L* and v = L w L*, and its derivatives in t, as many as are asked for.
+    /// L e^{tw} L* with p = L L* and v = L w L*, with the derivatives in t that t has.
     fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let p = self.read(p);
         let l = cholesky(&p);
@@ -86,12 +86,12 @@ fn whiten<const D: usize, A: Storage>(l: &Matrix<Lane, D, A>, x: &Matrix<Lane, D
     solve_lower(l, &solve_lower(l, x).adjoint()).hermitian_part()
 }
 
-/// The lanes on which p is positive definite to more than rounding, whatever the units of rows and columns:
-/// with ones on the diagonal, the smallest eigenvalue is well above rounding. What is computed of points loses as many
-/// digits as that has zeros, and below there would be none left.
+/// The lanes on which p is numerically positive definite, independently of the units of rows and columns: after
+/// scaling to a unit diagonal, the smallest eigenvalue is well above rounding. Results lose as many significant
+/// digits as that eigenvalue has leading zeros.
 fn positive_definite<const D: usize, A: Storage>(p: &Matrix<Lane, D, A>) -> Lane {
     let (l, n) = (cholesky(p), p.rows());
-    // Pivots that are no small part of the diagonal tell without eigenvalues.
+    // Pivots that are not small relative to the diagonal decide this without eigenvalues.
     let pivots_above = |part: f64| {
         (0..n).fold(Lane::ZERO.simd_eq(Lane::ZERO), |good, j| {
             let root = l[(j, j)][0];
@@ -160,7 +160,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         f64::INFINITY
     }
     fn longest_handle(&self) -> f64 {
-        // ε e^{2·17} is 1: what comes back from there is noise.
+        // ε e^{2·17} is 1: results beyond this distance are rounding errors.
         17.0
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
@@ -226,7 +226,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
     fn project(&self, x: &mut [Lane]) -> Lane {
         let before = self.read(x);
         let p = before.hermitian_part();
-        // Squares of very large or small entries would overflow or vanish.
+        // Squares of very large or small entries would overflow or underflow.
         let largest = x.iter().fold(Lane::ZERO, |m, x| max_or_nan(m, x.abs()));
         let unit = Lane::ONE / largest.simd_gt(Lane::ZERO).select(largest, Lane::ONE);
         let mut off = (&p - &before).scaled(unit).size() / p.scaled(unit).size();
@@ -277,7 +277,7 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
             format!("it is not positive definite: its smallest eigenvalue is {least:.6e}{rounding}")
         }
     }
-    /// The condition of p: a change of p by its rounding is so much larger seen from p.
+    /// The condition number of p: rounding of p changes it by this factor more, relative to p.
     fn rounding(&self, p: &[Lane]) -> Lane {
         let l = cholesky(&self.read(p));
         let inverse = solve_lower(&l, &Matrix::identity(self.n));
@@ -315,7 +315,7 @@ impl<const D: usize, A: Storage> Frame for PositiveDefinite<D, A> {
         let half = delta.scaled(lane(0.5));
         let g = &g.times(&exp_minus_one(&half)) + &g;
         let inverse = &exp_minus_one(&-half).times(&inverse) + &inverse;
-        // Both are brought back to q: one step of Newton's method for g⁻¹, and for g g* = q.
+        // Both are corrected at q: one step of Newton's method for g⁻¹, and for g g* = q.
         let defect = g.times(&inverse).plus_identity(lane(-1.0));
         let inverse = &inverse - &inverse.times(&defect);
         let off = congruent(&inverse, &q).plus_identity(lane(-1.0)).scaled(lane(0.5));

@@ -1,6 +1,6 @@
-//! Siegel's upper half space Sp(2n, R)/U(n), the symplectic matrices among the positive definite ones of 2n rows:
-//! pJp = J with J = (0, 1; −1, 0), which is what the isometry p ↦ J p⁻¹ Jᵀ leaves where it is (Siegel, Symplectic
-//! geometry, 1943). The complex symmetric X + iY with positive definite Y is (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹).
+//! Siegel's upper half space Sp(2n, R)/U(n), the symplectic matrices among the positive definite ones of 2n rows: pJp
+//! = J with J = (0, 1; −1, 0). These are the fixed points of the isometry p ↦ J p⁻¹ Jᵀ (Siegel, Symplectic geometry,
+//! 1943). The complex symmetric X + iY with positive definite Y is (Y + XY⁻¹X, XY⁻¹; Y⁻¹X, Y⁻¹).
 
 use crate::positive_definite::PositiveDefinite;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -40,8 +40,8 @@ impl Siegel {
         })
     }
 
-    /// Tangent vectors at the identity are (A, B; B, −A) with symmetric A and B. For each two of their coordinates the
-    /// positions of the one in A and its factor.
+    /// Tangent vectors at the identity are (A, B; B, −A) with symmetric A and B. For each pair of coordinates, the
+    /// position of the first one in A and its factor.
     fn positions(&self) -> impl Iterator<Item = (usize, usize, Lane)> {
         let n = self.n;
         (0..n).flat_map(move |i| {
@@ -80,7 +80,7 @@ impl Part for Siegel {
     fn narrow<S: Scalar>(&self, wide: &[S], x: &mut [S]) {
         let (n, m) = (self.n, self.whole.algebra().matrix(wide));
         for ((i, j, factor), x) in self.positions().zip(x.as_chunks_mut::<2>().0) {
-            // Each stands four times in the matrix, or twice on the diagonals of its blocks.
+            // Each occurs four times in the matrix, or twice on the diagonals of its blocks.
             let factor = if i == j { factor } else { factor * lane(2.0) };
             *x = [m[(i, j)][0] - m[(n + i, n + j)][0], m[(i, n + j)][0] + m[(j, n + i)][0]]
                 .each(|x| x * factor);

@@ -30,7 +30,7 @@ fn rotations(p: &[usize]) -> Made {
     if p[0] == 3 { table(Rotations::new()) } else { table(special_orthogonal(p[0])) }
 }
 
-/// U(n) and SU(n), in code of their own where the size is known to the compiler.
+/// U(n) and SU(n); common sizes are constants at compile time.
 fn complex(n: usize, special: bool) -> Made {
     match n {
         2 => table(UnitaryGroup::<2, Known<2, 4>>::new(n, special)),

@@ -7,12 +7,12 @@ use symspline_core::scalar::{Each, Lane, lane, max_or_nan};
 /// 1 − cos θ up to which the logarithm is a power series; θ is 1.37 there.
 pub const SERIES: f64 = 0.8;
 
-/// Where a sum of angles can be 2π the principal logarithm of SU(n) may have a trace.
+/// Where a sum of angles can be 2π, the principal logarithm of SU(n) may have a nonzero trace.
 pub fn su_limit(n: f64) -> f64 {
     SERIES.min(n.sqrt() * (1.0 - (6.0 / n).min(PI).cos()))
 }
 
-/// A matrix as a complex one.
+/// Converts a matrix to a complex one.
 pub fn complex<const D: usize>(n: usize, numbers: &[Lane]) -> Matrix<Lane, 2> {
     Matrix::from_fn(n, n, |i, j| {
         let x = &numbers[(i * n + j) * D..][..D];
@@ -20,7 +20,7 @@ pub fn complex<const D: usize>(n: usize, numbers: &[Lane]) -> Matrix<Lane, 2> {
     })
 }
 
-/// The numbers of a complex matrix that are there for D = 1 (the real ones) or D = 2.
+/// The numbers of a complex matrix that exist for D = 1 (the real ones) or D = 2.
 pub fn numbers<const D: usize>(m: &Matrix<Lane, 2>) -> Vec<Lane> {
     m.entries().iter().flat_map(|x| x[..D].iter().copied()).collect()
 }
@@ -82,7 +82,7 @@ pub fn principal(parts: &[Matrix<Lane, 2>], su: bool, real: bool) -> (Vec<Matrix
 
 /// The real logarithm Σ θ (x yᵀ − y xᵀ) by eigenvectors x + iy of angles θ > 0.
 ///
-/// Near π eigenvectors of ±θ mix by rounding, but not the plane of x and y.
+/// Near π rounding errors mix eigenvectors of ±θ, but do not change the plane of x and y.
 fn rotation_planes(theta: &[Lane], v: &Matrix<Lane, 2>) -> Matrix<Lane, 2> {
     let n = theta.len();
     let mut log = Matrix::zeros(n, n);
@@ -136,7 +136,7 @@ fn turning(angles: &[Lane]) -> [Lane; 2] {
     }
 }
 
-/// Shifts falling angles by turns so that they add up to zero; returns their spread.
+/// Shifts decreasing angles by multiples of 2π so that they add up to zero; returns their spread.
 fn spread_phases(theta: &mut [Lane]) -> Lane {
     let n = theta.len();
     let turns = (theta.iter().fold(Lane::ZERO, |sum, x| sum + *x) / lane(2.0 * PI)).round();

@@ -52,8 +52,8 @@ pub fn rotate<S: Scalar>([w, v @ ..]: Quaternion<S>, x: Vector<S>) -> Vector<S> 
     add(add(x, scale(twice, w)), cross(v, twice))
 }
 
-/// The quaternion of a rotation matrix, given row by row less the identity: small rotations keep their
-/// digits. Of the four rows of 4qqᵀ, all linear in R, the longest is used (Shepperd 1978).
+/// The quaternion of a rotation matrix minus the identity, given row by row, which is accurate for small rotations.
+/// Of the four rows of 4qqᵀ, all linear in R, the longest is used (Shepperd 1978).
 #[inline(always)]
 pub fn of_matrix<S: Scalar>(r: [S; 9]) -> Quaternion<S> {
     let trace = r[0] + r[4] + r[8];

@@ -1,6 +1,5 @@
-//! Rotations of three dimensions, SO(3), by unit quaternions: S³ covers SO(3) twice, and a rotation
-//! vector ω is twice a tangent vector of S³. What is solved and evaluated is the sphere's, with q and −q as one
-//! point.
+//! Rotations of three dimensions, SO(3), by unit quaternions: S³ covers SO(3) twice, and a rotation vector ω is twice
+//! a tangent vector of S³. Curves are solved and evaluated on the sphere, where q and −q represent the same point.
 
 use crate::rigid::{Quaternion, Vector, conjugate, cross, multiply, of_matrix, rotate, to_matrix};
 use crate::unitary::{UnitaryGroup, special_orthogonal};
@@ -10,7 +9,7 @@ use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use symspline_core::special::{Trig, theta_over_sin};
 use symspline_vectors::{Sphere, constant_curvature as cc};
 
-/// SO(3), with its own implementation for speed; it agrees with that of SO(n).
+/// SO(3), with its own implementation for speed; it agrees with SO(n).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rotations {
     general: UnitaryGroup<1>,
@@ -112,10 +111,10 @@ fn defect(p: &[Lane; 9]) -> [Lane; 9] {
     few(|i| if i.is_multiple_of(4) { square[i] - Lane::ONE } else { square[i] })
 }
 
-/// Replaces a matrix by the nearest rotation; returns how far it was. What is near takes the steps of Newton's method
-/// that [`polar`](symspline_core::matrix::polar) takes, and anything else the general implementation.
+/// Replaces a matrix by the nearest rotation; returns the distance. Matrices close to a rotation use the Newton steps
+/// of [`polar`](symspline_core::matrix::polar), others the general implementation.
 pub fn nearest(general: &UnitaryGroup<1>, x: &mut [Lane]) -> Lane {
-    /// Up to here three steps are enough.
+    /// Up to this distance three steps are sufficient.
     const NEAR: Lane = lane(1e-3);
     let p: [Lane; 9] = matrix(x);
     let d = defect(&p);
@@ -205,7 +204,7 @@ impl Frame for Rotations {
     fn frame_len(&self) -> usize {
         4
     }
-    // A frame is the quaternion of g_R, as on the other groups.
+    // A frame is the quaternion of g_R, as for the other groups.
     fn lift(&self, _p: &[Lane], frame: &mut [Lane]) {
         frame.copy_from_slice(&[Lane::ONE, Lane::ZERO, Lane::ZERO, Lane::ZERO]);
     }

@@ -1,9 +1,9 @@
 //! Rigid motions of the plane and of space, SE(2) and SE(3), as homogeneous matrices.
 //!
-//! The group with the connection of Cartan and Schouten: geodesics are g exp(tξ), screw motions, and the
-//! transvection is `E_g(gξ)x = g e^{ξ/2} g⁻¹ x e^{ξ/2}`. No metric belongs to it: lengths are those of
-//! (ω, v) = g⁻¹u and change with the frame that motions are written in. Inside, motions are a
-//! quaternion and a translation; the plane is that of x and y.
+//! The group with the connection of Cartan and Schouten: geodesics are g exp(tξ), screw motions, and the transvection
+//! is `E_g(gξ)x = g e^{ξ/2} g⁻¹ x e^{ξ/2}`. The group has no invariant metric: lengths are those of (ω, v) = g⁻¹u and
+//! depend on the reference frame. The implementation represents motions by a quaternion and a translation; the plane
+//! is that of x and y.
 
 use crate::rigid::{Motion, Twist, bracket, of_matrix, to_matrix};
 use crate::rotations;
@@ -29,7 +29,7 @@ impl SpecialEuclidean {
         }
     }
 
-    /// Entry (i, j) of a homogeneous matrix; in the plane that of the motion of space.
+    /// Entry (i, j) of a homogeneous matrix; for planar motions that of the corresponding motion of space.
     fn entry<S: Scalar>(&self, x: &[S], i: usize, j: usize) -> S {
         let n = self.n;
         if n == 3 || (i < 2 && (j < 2 || j == 3)) {
@@ -181,7 +181,7 @@ impl Ambient for SpecialEuclidean {
         self.vector(gamma, xi, d);
     }
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
-        // γ d/dt(γ⁻¹γ') = γ'' − γ'γ⁻¹γ': the part of −ξ² that is not symmetric is −ω × v.
+        // γ d/dt(γ⁻¹γ') = γ'' − γ'γ⁻¹γ': the component of −ξ² that is not symmetric is −ω × v.
         let [omega, v] = self.twist(gamma, d);
         let [alpha, a] = self.twist(gamma, dd);
         let turn = crate::rigid::cross(omega, v);
@@ -201,7 +201,7 @@ impl Ambient for SpecialEuclidean {
             x[c / n * (n + 1) + c % n] = *r;
         }
         for j in 0..=n {
-            // Also translations that are not finite are far off: 0·∞ is NaN.
+            // Translations that are not finite are far off, too: 0·∞ is NaN.
             if j < n {
                 off += x[j * (n + 1) + n] * Lane::ZERO;
             }
@@ -232,7 +232,7 @@ impl Ambient for SpecialEuclidean {
         let why = special_orthogonal(n).map_or(String::new(), |group| group.violation(&r));
         format!("in its rotation, {why}")
     }
-    /// That of the translation, in whatever units it is.
+    /// The rounding error of the translation, in its units.
     fn rounding(&self, p: &[Lane]) -> Lane {
         let t = self.translation(p);
         dot(&t, &t).sqrt().max(Lane::ONE)
@@ -243,7 +243,7 @@ impl Frame for SpecialEuclidean {
     fn frame_len(&self) -> usize {
         7
     }
-    // A frame at p is g_R of a pair with p = g_L g_R⁻¹, as on the other groups.
+    // A frame at p is g_R of a pair with p = g_L g_R⁻¹, as for the other groups.
     fn lift(&self, _p: &[Lane], frame: &mut [Lane]) {
         frame.fill(Lane::ZERO);
         frame[0] = Lane::ONE;
@@ -312,7 +312,7 @@ impl Origin for SpecialEuclidean {
         let [omega, velocity] = self.unpack(x);
         let start = Matrix::<S, 1>::from_fn(6, 1, |i, _| [if i < 3 { omega[i] } else { velocity[i - 3] }]);
         let read = |m: &Matrix<S, 1>| -> Twist<S> { [0, 3].each(|at| few(|i| m[(at + i, 0)][0])) };
-        // ad is |ω|/2 long, but for its nilpotent part, which the factor covers.
+        // The norm of ad is |ω|/2, except for its nilpotent part, which the factor covers.
         let angle = dot(&half[0], &half[0]).value().sqrt();
         let sum = stretch_series(angle * lane(1.5), &start, |m| {
             let twist = bracket(half, bracket(half, read(m)));

@@ -36,7 +36,7 @@ pub fn special_orthogonal(n: usize) -> Result<UnitaryGroup<1>, String> {
 impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
     /// The group of n × n matrices, or those of determinant one.
     pub fn new(n: usize, special: bool) -> Result<Self, String> {
-        // O(1) is two points.
+        // O(1) consists of two points.
         let least = if special || D == 1 { 2 } else { 1 };
         let name = match (D, special) {
             (1, true) => "SpecialOrthogonal",
@@ -51,7 +51,7 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
         }
     }
 
-    /// Whether this is SU(n), whose logarithms have no trace.
+    /// Whether this is SU(n), whose logarithms have trace zero.
     fn is_su(&self) -> bool {
         D == 2 && self.special
     }
@@ -70,10 +70,10 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
         if self.is_su() { traceless(omega) } else { omega }
     }
 
-    /// The principal logarithm of 1 + E, and the deciding angle or a bound of it below the cut locus.
+    /// The principal logarithm of 1 + E, and the deciding angle or an upper bound of it below the cut locus.
     fn log_one_plus<S: Scalar>(&self, e: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
         let (sine, versine) = (e.skew_part(), -e.hermitian_part());
-        // Where a sum of angles can be 2π the principal logarithm may have a trace.
+        // Where a sum of angles can be 2π, the principal logarithm may have a nonzero trace.
         let n = self.n;
         let limit = if self.is_su() { su_limit(n as f64) } else { SERIES };
         let size = versine.size();
@@ -93,7 +93,7 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
         (log, angle.min(bound))
     }
 
-    /// p e^{tΩ} and its derivatives in t, as many as are asked for.
+    /// p e^{tΩ}, with the derivatives in t that t has.
     fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let p = self.read(p);
         let omega = self.generator(&p, v);
@@ -112,7 +112,7 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
     }
 }
 
-/// Without its part along the identity.
+/// Removes the component along the identity.
 fn traceless<const D: usize, A: Storage>(mut m: Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
     let n = m.rows();
     let mean = (0..n).fold(Lane::ZERO, |sum, i| sum + m[(i, i)][D - 1]) / lane(n as f64);
@@ -154,7 +154,7 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         let mut length = max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt();
         let half_turn = !angle.simd_lt(below(PI));
         if D == 1 && half_turn.any() {
-            // A real logarithm has pairs of eigenvectors, which it finds up to the cut locus only.
+            // A real logarithm uses pairs of eigenvectors, which are determined only up to the cut locus.
             let e = self.read(p).adjoint_times(&(&self.read(q) - &self.read(p)));
             let angles = angles(&complex::<D>(self.n, e.entries().as_flattened()));
             let squares = angles.iter().fold(Lane::ZERO, |sum, x| x.mul_add(*x, sum));

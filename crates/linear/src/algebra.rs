@@ -7,7 +7,7 @@ use symspline_core::matrix::Matrix;
 use symspline_core::scalar::{Lane, Scalar, lane};
 use symspline_core::space::stretch_series;
 
-/// A basis matrix: the positions of its numbers that are not zero, row by row, and the numbers.
+/// A basis matrix: the positions of its nonzero numbers, row by row, and the numbers.
 type Element = Vec<(usize, f64)>;
 
 /// A Lie algebra of n × n matrices, real for D = 1, complex for D = 2.
@@ -18,15 +18,15 @@ pub struct Algebra<const D: usize> {
     basis: &'static OnceLock<Vec<Element>>,
 }
 
-/// Bases by the numbers of an entry, the size and the group.
+/// Bases by the number of components of an entry, the size and the group.
 type Bases = BTreeMap<(usize, usize, Members), &'static OnceLock<Vec<Element>>>;
 
-/// Positions for the bases of all algebras that were asked for. They stay, so that a space can be copied; a basis is made
-/// when it is first needed, so that a name alone costs nothing.
+/// Storage for the bases of all requested algebras. They are never freed, so that a space can be copied. A basis is
+/// computed when it is first needed, so that a name alone costs nothing.
 static BASES: Mutex<Bases> = Mutex::new(Bases::new());
 
 impl<const D: usize> Algebra<D> {
-    /// That of a group of n × n matrices.
+    /// The algebra of a group of n × n matrices.
     pub fn new(n: usize, members: Members) -> Self {
         let mut bases = BASES.lock().unwrap_or_else(PoisonError::into_inner);
         let basis = *bases.entry((D, n, members)).or_insert_with(|| Box::leak(Box::default()));

@@ -1,11 +1,11 @@
 //! Groups of invertible matrices as symmetric spaces with the connection of Cartan and Schouten: G × G acts by
 //! g·p = g_L p g_R⁻¹, the symmetry at p is x ↦ p x⁻¹ p, geodesics are p exp(tΩ).
 //!
-//! A tangent vector at p is v = pΩ; its transvection is `E_p(v)x = p e^{Ω/2} p⁻¹ x e^{Ω/2}`. The logarithm
-//! `log_p(q) = p log(p⁻¹q)` is the principal one: it exists while no eigenvalue of p⁻¹q is a negative number, and the
-//! deciding angle is the largest |arg| of one. No metric belongs to the group: lengths are those of Ω and serve for
-//! reporting only. Curves through points of a closed subgroup stay in it, so that this implementation serves it, too, with
-//! [`Members`] that know what belongs to it.
+//! A tangent vector at p is v = pΩ; its transvection is `E_p(v)x = p e^{Ω/2} p⁻¹ x e^{Ω/2}`. The logarithm `log_p(q)
+//! = p log(p⁻¹q)` is the principal one: it exists if no eigenvalue of p⁻¹q is a negative number, and the deciding
+//! angle is the largest |arg| of an eigenvalue. The group has no invariant metric: lengths are those of Ω, for
+//! reporting only. Curves through points of a closed subgroup stay in it, so that this implementation also serves
+//! subgroups, with [`Members`] to define them.
 
 use crate::algebra::Algebra;
 use crate::members::{Members, condition};
@@ -25,7 +25,7 @@ pub struct GeneralLinear<const D: usize> {
 }
 
 impl<const D: usize> GeneralLinear<D> {
-    /// The group, or a closed subgroup of it, by the n of its name.
+    /// The group, or a closed subgroup of it, for the n of its name.
     pub fn new(n: usize, members: Members) -> Result<Self, String> {
         let n = members.rows(n)?;
         Ok(GeneralLinear { n, members, algebra: Algebra::new(n, members) })
@@ -45,7 +45,7 @@ impl<const D: usize> GeneralLinear<D> {
         log_any_one_plus(&inverse(p).times(&(q - p)))
     }
 
-    /// p e^{tΩ} and its derivatives in t, as many as are asked for.
+    /// p e^{tΩ}, with the derivatives in t that t has.
     fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, Dynamic> {
         let omega = self.generator(p, v);
         let p = self.read(p);
@@ -81,7 +81,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
         PI
     }
     fn injectivity_radius(&self) -> f64 {
-        // Eigenvalues are no longer than the matrix; those of real ones come in pairs.
+        // Eigenvalues are bounded by the norm of the matrix; those of real matrices come in pairs.
         if D == 1 { SQRT_2 * PI } else { PI }
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
@@ -103,7 +103,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
         if self.is_connected() {
             return length;
         }
-        // No curve joins matrices whose determinants have different signs.
+        // Matrices whose determinants have different signs are not joined by a curve.
         let [p, q] = [p, q].map(|x| determinant(&self.read(x))[0].signum());
         (p * q).simd_lt(Lane::ZERO).select(lane(f64::INFINITY), length)
     }
@@ -144,7 +144,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         self.members.violation(&self.read(&lanes))
     }
-    /// The condition of p: a change of p by its rounding is so much larger seen from p.
+    /// The condition number of p: rounding of p changes it by this factor more, relative to p.
     fn rounding(&self, p: &[Lane]) -> Lane {
         condition(&self.read(p)).max(Lane::ONE)
     }
@@ -165,7 +165,7 @@ impl<const D: usize> Frame for GeneralLinear<D> {
         let (omega, angle) = self.log_between(&self.read(p), &self.read(q));
         let [r, back] = self.frame(frame);
         self.algebra.coordinates(&back.times(&omega).times(&r), chord);
-        // Moved by what its coordinates say, it stays in the group.
+        // The frame is moved by its coordinates, so that it stays in the group.
         let r = &r.times(&exp_any_minus_one(&self.algebra.multiple(-0.5, chord))) + &r;
         let (first, second) = frame.split_at_mut(self.point_len());
         r.write(first);
@@ -231,10 +231,10 @@ impl<const D: usize> Origin for GeneralLinear<D> {
     fn angle(&self, v: &[Lane]) -> Lane {
         largest_imaginary(&self.algebra.multiple(1.0, v))
     }
-    /// The square of the condition of e^{d/2}, and what the logarithm near the cut locus makes of errors.
+    /// The square of the condition number of e^{d/2}, times the growth of errors in the logarithm near the cut locus.
     fn condition(&self, chord: &[Lane]) -> Lane {
         let half = exp_any_minus_one(&self.algebra.multiple(0.5, chord)).plus_identity(Lane::ONE);
-        // Angles are at most as large as the part that turns.
+        // Angles are bounded by the skew-symmetric part.
         let turn = self.algebra.multiple(1.0, chord).skew_part().size();
         let angle = if turn.simd_le(Lane::ONE).all() { turn } else { self.angle(chord) };
         let near = angle.simd_gt(lane(1.0)).select(angle / angle.sin().abs(), Lane::ONE);

@@ -1,6 +1,6 @@
-//! Subspaces of R^{p,q} on which the form −x₁² − … − x_p² + … has a given signature (a, b),
-//! O(p,q)/(O(a,b) × O(p−a,q−b)): a subspace is its reflection P, which is 1 on it and −1 on its complement. Reflections
-//! are what inversion leaves where it is in O(p,q), whose geodesics through two of them stay among them
+//! Subspaces of R^{p,q} on which the form −x₁² − … − x_p² + … has a given signature (a, b), O(p,q)/(O(a,b) ×
+//! O(p−a,q−b)). A subspace is represented by its reflection P, which is 1 on it and −1 on its complement. Reflections
+//! are the fixed points of inversion in O(p,q), and geodesics of O(p,q) through two of them consist of reflections
 //! (Loos, Symmetric Spaces I, 1969, chapter II.1).
 
 use crate::general_linear::GeneralLinear;
@@ -21,7 +21,8 @@ pub struct IndefiniteGrassmannian {
 type Square = Matrix<Lane, 1>;
 
 impl IndefiniteGrassmannian {
-    /// Those with so many negative and positive squares in a form with so many; the negative numbers come first.
+    /// Subspaces with given numbers of negative and positive squares, of a form with given numbers; the negative
+    /// numbers come first.
     pub fn new(subspace: [usize; 2], form: [usize; 2]) -> Result<Self, String> {
         let [[a, b], [p, q]] = [subspace, form];
         let sum = |x: [usize; 2]| x[0].checked_add(x[1]);
@@ -44,13 +45,13 @@ impl IndefiniteGrassmannian {
         Matrix::read(self.rows(), self.rows(), x)
     }
 
-    /// Whether an axis lies in the subspace at the origin: the last of either sign do.
+    /// Whether an axis lies in the subspace at the origin, as the last axes of either sign do.
     fn inside(&self, axis: usize) -> bool {
         let ([a, b], [p, q]) = (self.subspace, self.form);
         if axis < p { axis >= p - a } else { axis >= p + q - b }
     }
 
-    /// For every coordinate of the whole, whether it joins the subspace at the origin and its complement.
+    /// For every coordinate of the whole space, whether it joins the subspace at the origin and its complement.
     fn across(&self) -> impl Iterator<Item = bool> {
         let n = self.rows();
         (0..n).flat_map(move |i| (i + 1..n).map(move |j| self.inside(i) != self.inside(j)))
@@ -91,7 +92,7 @@ impl Part for IndefiniteGrassmannian {
         k * (self.rows() - k)
     }
     fn curvature(&self) -> f64 {
-        // Of the metrics that are invariant none is definite.
+        // None of the invariant metrics is definite.
         f64::NAN
     }
     fn injectivity_radius(&self) -> f64 {
@@ -120,7 +121,8 @@ impl Part for IndefiniteGrassmannian {
     fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
         let [r, k] = self.polar(&self.read(p));
         let n = self.rows();
-        // Four eigenvalues that fall from −η: those of the axes in the order of the form, outside before inside.
+        // The four eigenvalues decrease from −η: those of the axes in the order of the form, complement before
+        // subspace.
         let split = Square::from_fn(n, n, |i, j| {
             let apart = if i == j { if i < self.form[0] { 3.0 } else { -3.0 } } else { 0.0 };
             [lane(apart) - k[(i, j)][0]]

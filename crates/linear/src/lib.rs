@@ -1,5 +1,5 @@
-//! GL(n) and what lies in it: groups of invertible matrices, to which no metric belongs, and the subspaces of an indefinite
-//! form as reflections.
+//! GL(n) and its subgroups: groups of invertible matrices, without an invariant metric, and the subspaces of an
+//! indefinite form, represented by reflections.
 
 mod algebra;
 mod general_linear;

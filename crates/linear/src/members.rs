@@ -1,9 +1,9 @@
-//! Which matrices belong to a group: how far one is from it, the nearest that does, and why one does not.
+//! Membership of matrices in a group: the distance, the nearest member, and the condition that is violated.
 
 use symspline_core::matrix::{Matrix, Select, determinant, inverse};
 use symspline_core::scalar::{Lane, lane, max_or_nan};
 
-/// Closed subgroups of GL(n), all of them as matrices.
+/// Closed subgroups of GL(n), and GL(n) itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Members {
     /// Every invertible matrix.
@@ -18,17 +18,17 @@ pub enum Members {
     Symplectic,
     /// XᵀηX = η with η = diag(−1, 1, …, 1), of determinant one and keeping the direction of time.
     Lorentz,
-    /// O(p, q): XᵀηX = η with η = diag(−1, …, −1, 1, …, 1) and so many negative numbers.
+    /// O(p, q): XᵀηX = η with η = diag(−1, …, −1, 1, …, 1), which has this number of negative entries.
     PseudoOrthogonal(usize),
 }
 
-/// Condition from which on a matrix is singular as far as doubles can tell.
+/// The condition number from which a matrix is numerically singular.
 const SINGULAR: f64 = 1e14;
 
 type Point<const D: usize> = Matrix<Lane, D>;
 
 impl Members {
-    /// Rows of the matrices, for the n of the name; or why n is bad.
+    /// The number of rows of the matrices for the n of the name, or why n is invalid.
     pub fn rows(self, n: usize) -> Result<usize, String> {
         let (name, least) = match self {
             Members::All => ("GeneralLinear", 1),
@@ -54,12 +54,12 @@ impl Members {
         matches!(self, Members::Affine | Members::Similarity)
     }
 
-    /// Whether matrices of negative determinant are a second part.
+    /// Whether matrices of negative determinant form a second component.
     pub fn two_parts(self) -> bool {
         matches!(self, Members::All | Members::Affine)
     }
 
-    /// Numbers of η that are negative.
+    /// The number of negative entries of η.
     pub fn negative(self) -> usize {
         match self {
             Members::Lorentz => 1,
@@ -99,19 +99,19 @@ impl Members {
         Some(product.scaled(Lane::ONE / unit).plus_identity(lane(-1.0)))
     }
 
-    /// Replaces a matrix by one of the group beside it; returns how far it was.
+    /// Replaces a matrix by one of the group close to it; returns the distance.
     pub fn project<const D: usize>(self, p: &mut Point<D>) -> Lane {
         let n = p.rows();
         let mut off = Lane::ZERO;
         if self.maps() {
             for j in 0..n {
                 let expected = if j + 1 == n { Lane::ONE } else { Lane::ZERO };
-                // Also shifts that are not finite are far off: 0·∞ is NaN.
+                // Translations that are not finite are far off, too: 0·∞ is NaN.
                 off = max_or_nan(off, (p[(n - 1, j)][0] - expected).abs() + p[(j, n - 1)][0] * Lane::ZERO);
                 p[(n - 1, j)][0] = expected;
             }
         }
-        // A matrix that is singular to rounding is none at all.
+        // A numerically singular matrix is not close to any member.
         let condition = condition(p);
         off = condition.simd_lt(lane(SINGULAR)).select(off, lane(f64::NAN));
         let rounding = lane(4.0 * n as f64 * f64::EPSILON) * condition.max(Lane::ONE);
@@ -146,7 +146,7 @@ impl Members {
         off
     }
 
-    /// Says in words and numbers why x, which is finite, is not a point.
+    /// Describes why x, which is finite, is not a point.
     pub fn violation<const D: usize>(self, p: &Point<D>) -> String {
         let n = p.rows();
         let number = |x: Lane| x.to_array()[0];

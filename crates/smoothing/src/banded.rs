@@ -1,9 +1,9 @@
-//! Symmetric banded matrices, eight side by side.
+//! Symmetric banded matrices, one per SIMD lane.
 
 use symspline_core::monitor::checkpoint;
 use symspline_core::scalar::Lane;
 
-/// Bandwidth of BᵀWB and Ω: entries beside the diagonal.
+/// Bandwidth of BᵀWB and Ω.
 pub const WIDTH: usize = 3;
 
 /// Entries of a row of the band, for coupled coordinates.
@@ -11,19 +11,19 @@ pub fn stride(coupled: usize) -> usize {
     (WIDTH + 1) * coupled
 }
 
-/// Entries on the diagonal and `width` positions left of it, row by row; after [`factor`](Banded::factor) those of L and
-/// D with A = L D Lᵀ.
+/// Entries on the diagonal and `width` entries left of it, row by row; after [`factor`](Banded::factor) those of L
+/// and D with A = L D Lᵀ.
 #[derive(Clone, Default)]
 pub struct Banded {
-    /// Rows and columns.
+    /// The number of rows and columns.
     pub size: usize,
-    /// Positions beside the diagonal that are not zero.
+    /// The bandwidth: the number of subdiagonals.
     pub width: usize,
     entries: Vec<Lane>,
 }
 
 impl Banded {
-    /// All zero.
+    /// The zero matrix.
     pub fn zeros(size: usize, width: usize) -> Self {
         Banded { size, width, entries: vec![Lane::ZERO; size * (width + 1)] }
     }
@@ -38,7 +38,7 @@ impl Banded {
         row * (self.width + 1) + row - column
     }
 
-    /// A position inside the band.
+    /// The index of an entry inside the band.
     pub fn entry(&mut self, i: usize, j: usize) -> &mut Lane {
         let position = self.position(i, j);
         &mut self.entries[position]
@@ -49,14 +49,14 @@ impl Banded {
         self.entries[self.position(i, j)]
     }
 
-    /// Factors in place; positive definite matrices need no exchange of rows.
+    /// Factors the matrix in place; positive definite matrices need no pivoting.
     pub fn factor(&mut self) {
         let (w, stride) = (self.width, self.width + 1);
         let mut scaled = vec![Lane::ZERO; stride];
         for i in 0..self.size {
             checkpoint();
             let most = w.min(i);
-            // L_ij D_j = A_ij − Σ_k L_ik D_k L_jk, from the farthest column on.
+            // L_ij D_j = A_ij − Σ_k L_ik D_k L_jk, from the outermost column inwards.
             for d in (1..=most).rev() {
                 let j = i - d;
                 let mut sum = self.entries[i * stride + d];
@@ -84,12 +84,12 @@ impl Banded {
             .fold(Lane::splat(f64::INFINITY), |least, d| d.simd_lt(least).select(d, least))
     }
 
-    /// Of a factored matrix: ln det A.
+    /// ln det A of a factored matrix.
     pub fn log_det(&self) -> Lane {
         (0..self.size).fold(Lane::ZERO, |sum, i| sum + self.entries[i * (self.width + 1)].ln())
     }
 
-    /// Of a factored matrix: A⁻¹x in place, for rows of several numbers.
+    /// A⁻¹x of a factored matrix, in place, for rows of several numbers.
     pub fn solve(&self, columns: usize, x: &mut [Lane]) {
         let (w, stride) = (self.width, self.width + 1);
         for i in 0..self.size {
@@ -114,8 +114,8 @@ impl Banded {
         }
     }
 
-    /// Of a factored matrix: the entries of A⁻¹ inside the band, by Takahashi's recursion (Erisman & Tinney 1975)
-    /// `Z = D⁻¹L⁻¹ + (1 − Lᵀ)Z`.
+    /// The entries of A⁻¹ inside the band, of a factored matrix, by Takahashi's recursion (Erisman & Tinney 1975) `Z
+    /// = D⁻¹L⁻¹ + (1 − Lᵀ)Z`.
     pub fn inverse_band(&self) -> Banded {
         let (n, w, stride) = (self.size, self.width, self.width + 1);
         let mut z = Banded::zeros(n, w);
@@ -140,7 +140,7 @@ impl Banded {
 mod tests {
     use super::*;
 
-    /// A diagonally dominant matrix, another one on each lane.
+    /// A diagonally dominant matrix, different on each lane.
     fn example(n: usize, w: usize) -> Banded {
         Banded::of(n, w, |at| {
             let (i, d) = (at / (w + 1), at % (w + 1));

@@ -1,6 +1,6 @@
 //! Quantiles of the χ² distribution.
 
-/// The number below which χ² with m degrees of freedom stays with a given probability.
+/// The quantile of the χ² distribution with m degrees of freedom at a given probability.
 pub fn quantile(m: usize, probability: f64) -> f64 {
     if !(probability > 0.0 && probability < 1.0) {
         return if probability == 0.0 { 0.0 } else { f64::INFINITY };
@@ -46,7 +46,7 @@ mod tests {
     use super::quantile;
 
     #[test]
-    fn quantiles_are_those_of_tables() {
+    fn quantiles_match_tables() {
         // Abramowitz & Stegun, table 26.8; two degrees of freedom are −2 ln(1 − p).
         let known = [
             (1, 0.95, 3.841_458_820_694_124),

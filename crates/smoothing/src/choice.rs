@@ -1,8 +1,8 @@
-//! How smooth: λ from the data.
+//! The choice of λ from the data.
 //!
-//! At a curve with residuals r and accelerations a the smoothing problem in frames is one of numbers, whose solution
-//! moves the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`, or with [`JacobiOperator`] energy by the same with
-//! `(S + RP)ᵀMa`. Its residuals and degrees of freedom for eight λ at a time cost one banded solve.
+//! At a curve with residuals r and accelerations a, the smoothing problem in frames is a linear problem. Its solution
+//! changes the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`, or, with the energy of [`JacobiOperator`], by the
+//! same with `(S + RP)ᵀMa`. Residuals and degrees of freedom for eight λ at a time cost one banded solve.
 
 use crate::cyclic::PeriodicCorrection;
 use crate::jacobi_operator::JacobiOperator;
@@ -11,17 +11,17 @@ use crate::misfit::{Factors, Misfit};
 use crate::problem::Criterion;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 
-/// A curve as the flat problem sees it: coordinates of m numbers, in units of the mean knot spacing.
+/// The linearised problem at a curve: coordinates of m numbers, in units of the mean knot spacing.
 pub struct Linear<'a> {
-    /// B, Ω and the like.
+    /// The matrices B, P, S, and Ω.
     pub linearized: &'a LinearProblem,
     /// Dimension of the space.
     pub m: usize,
     /// Residuals at the data, and their weights.
     pub misfit: &'a Misfit<'a>,
-    /// Jacobi's operator, where it is not left out.
+    /// Jacobi's operator, if the curvature of the space is included in the matrix.
     pub jacobi: Option<&'a JacobiOperator>,
-    /// How a closed curve goes on.
+    /// The periodic continuation of a closed curve.
     pub periodic: Option<&'a PeriodicCorrection>,
     /// Accelerations at the knots.
     pub accelerations: &'a [f64],
@@ -34,7 +34,7 @@ pub struct Linear<'a> {
 }
 
 impl<'a> Linear<'a> {
-    /// `curvature` is ρ, the part of the energy's gradient that curvature makes.
+    /// `curvature` is ρ, the part of the energy's gradient that is due to curvature.
     pub fn new(
         linearized: &'a LinearProblem,
         m: usize,
@@ -82,7 +82,7 @@ impl<'a> Linear<'a> {
         self.misfit.factored(self.linearized, self.m, self.jacobi, self.periodic, lam)
     }
 
-    /// What eight λ come to.
+    /// The scores and their components for eight λ.
     pub fn look(&self, lam: Lane) -> Look {
         let (m, linearized) = (self.m, self.linearized);
         let factors = self.factored(lam);
@@ -112,21 +112,22 @@ impl<'a> Linear<'a> {
                 left = right;
             }
         }
-        // What rounding leaves of a matrix may have degrees of freedom that no curve has.
+        // A matrix that is rounding errors only may have impossible degrees of freedom.
         let least = lane(0.9 * linearized.null().min(linearized.free() as f64));
         let sound = factors.least_pivot().simd_gt(Lane::ZERO) & freedom.simd_gt(least);
         Look { freedom, rss, energy, sound, log_det: factors.log_det() }
     }
 
-    /// The λ that a criterion likes best, from a guess or from everywhere, and whether it lies at a bound.
+    /// The λ with the lowest score, near a guess or in the whole range, and whether it lies at a bound.
     pub fn choose(&self, criterion: Criterion, guess: Option<f64>) -> (f64, bool) {
-        /// Decades of λ over the balance of data and energy (on short segments where they are unequal), and how far a
-        /// guess may be off.
+        /// The range of λ in decades above the balance of data and energy (and below it on short segments, if
+        /// segments are unequal), and the range around a guess.
         const RANGE: (f64, f64) = (-9.0, 12.5);
         const NEAR: f64 = 0.6;
-        /// Decades that eight looks are enough for at first.
+        /// The range in decades that the first eight evaluations cover.
         const DECADES: f64 = 7.5;
-        /// With so few degrees of freedom more than curves without energy have, every larger λ is as good.
+        /// If the degrees of freedom exceed those of curves without energy by this little, every larger λ is equally
+        /// good.
         const STRAIGHT: f64 = 0.01;
         let straight = self.linearized.null() + STRAIGHT;
         let start = self.linearized.balance().log10();
@@ -152,7 +153,7 @@ impl<'a> Linear<'a> {
             let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
             let (left, right) = (best.saturating_sub(1), (best + 1).min(seen.len() - 1));
             (from, to) = (seen[left].0, seen[right].0);
-            // At the end of a guess's neighbourhood the search goes on outside it.
+            // At the boundary of the range around a guess, the search continues outside it.
             if best == 0 && from > bounds.0 {
                 (from, to) = ((from - 4.0 * NEAR).max(bounds.0), from);
             } else if best == seen.len() - 1 && to < bounds.1 {
@@ -174,13 +175,13 @@ impl<'a> Linear<'a> {
 
     fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
         let (n, m) = (self.misfit.count(self.m), self.m as f64);
-        // Where no degrees of freedom are left, or rounding leaves no matrix, there is nothing to compare.
+        // Without degrees of freedom, or if rounding errors make the matrix singular, there is no score.
         let known = (lane(n * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.sound;
         let per = look.rss / lane(m);
         let score = match criterion {
             Criterion::Gcv { gamma } => {
                 let left = lane(n) - look.freedom * lane(gamma);
-                // With γ > 1 the denominator passes through zero: rougher curves than that are out of the question.
+                // With γ > 1 the denominator has a zero. Rougher curves than that are excluded.
                 left.simd_gt(Lane::ZERO).select((per / (left * left)).ln(), lane(f64::INFINITY))
             }
             Criterion::Cp => per + look.freedom * lane(2.0 * self.sigma * self.sigma),
@@ -194,30 +195,30 @@ impl<'a> Linear<'a> {
     }
 }
 
-/// What a λ comes to.
+/// The quantities that belong to one λ.
 pub struct Look {
-    /// Degrees of freedom of a coordinate: tr A⁻¹BᵀWB.
+    /// Degrees of freedom per coordinate: tr A⁻¹BᵀWB.
     pub freedom: Lane,
     /// Σ w|r − Bδ|².
     pub rss: Lane,
-    /// ∫ of the squared acceleration.
+    /// The integral of the squared acceleration.
     pub energy: Lane,
     /// ln det A.
     pub log_det: Lane,
-    /// Where A is positive definite, as far as rounding tells.
+    /// Whether A is numerically positive definite.
     pub sound: Lane,
 }
 
-/// The position of the least score among curves that are no geodesics, or the first geodesic if that is better. Where the
-/// score is least for the roughest curve, which goes through the data, a minimum between the bounds is taken instead:
-/// cross-validation has one where noise is to be seen, however low the score falls beyond it.
+/// The index of the lowest score among curves that are not geodesics, or the first geodesic if its score is lower. If
+/// the score is lowest for the roughest curve, which interpolates the data, a local minimum between the bounds is
+/// preferred: cross-validation has one if the data show noise, even if the score decreases beyond it.
 fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
     let end = seen.iter().position(|look| look.2 <= straight).map_or(seen.len(), |first| first + 1);
     let lowest = |positions: &mut dyn Iterator<Item = usize>| {
         positions.filter(|&i| seen[i].1.is_finite()).min_by(|&a, &b| seen[a].1.total_cmp(&seen[b].1))
     };
     let best = lowest(&mut (0..end))?;
-    // Where the curve hardly changes any more, rounding makes minima.
+    // Where the curve hardly changes, rounding errors create local minima.
     let below = |i: usize, j: usize| seen[j].1 - seen[i].1 > 1e-8 * (1.0 + seen[i].1.abs());
     let inside = |i: &usize| !rough(seen, *i) && below(*i, i - 1) && below(*i, i + 1);
     let between =
@@ -225,12 +226,12 @@ fn least(seen: &[(f64, f64, f64)], straight: f64) -> Option<usize> {
     between.or(Some(best))
 }
 
-/// Whether nothing rougher than one of the curves is known.
+/// Whether no rougher curve has a score.
 fn rough(seen: &[(f64, f64, f64)], position: usize) -> bool {
     position == 0 || !seen[position - 1].1.is_finite()
 }
 
-/// Where the parabola through three points is lowest; the middle one is.
+/// The minimum of the parabola through three points, of which the middle one is the lowest.
 fn lowest([(x0, y0), (x1, y1), (x2, y2)]: [(f64, f64); 3]) -> f64 {
     let (a, b) = (x1 - x0, x2 - x1);
     let (down, up) = ((y1 - y0) / a, (y2 - y1) / b);

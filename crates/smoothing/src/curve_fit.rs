@@ -1,4 +1,4 @@
-//! One curve on its way to the smoothing spline.
+//! One curve during the iteration to the smoothing spline.
 
 use crate::banded::Banded;
 use crate::choice::Linear;
@@ -20,51 +20,51 @@ use symspline_core::monitor::Monitor;
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Ambient, Erased, Origin};
 
-/// Steps are taken back and halved at most so often where no spline goes through the points they lead to.
+/// The maximum number of times that a step is taken back and halved because no spline joins the points it leads to.
 const RETREATS: usize = 6;
-/// Steps of the linearised solver that exceed their limit, with a final λ, before it is given up: it does not contract,
-/// and what it comes to in the end, if it does, is a minimum near other curves.
+/// The number of steps of the linearised solver beyond their limit, with a final λ, after which it is abandoned: it
+/// does not contract, and its limit, if any, is a minimum near other curves.
 const ASTRAY: usize = 8;
-/// If no spline joins the points that a chosen λ leads to, λ is multiplied by at least this factor, at most so often.
+/// If no spline joins the points of a chosen λ, λ is multiplied by at least this factor, at most this many times.
 const STIFFER: f64 = 10.0;
 const STIFFENINGS: usize = 4;
-/// The weight that one in so many data does not reach determines the stiffness of a curve with unequal weights.
+/// The quantile of the weights that determines the stiffness of a curve with unequal weights.
 const LIGHT: usize = 10;
-/// J is known to this part of it.
+/// The relative accuracy of J.
 const ROUNDING: f64 = 1e-12;
 
-/// A curve, its data, and how far it has come.
+/// A curve, its data, and the state of its iteration.
 pub struct CurveFit<'a> {
     data: Data<'a>,
     /// Knots.
     pub knots: Vec<f64>,
     positions: Vec<Position>,
-    /// Roots of weights that are matrices.
+    /// Roots of the information matrices.
     roots: Vec<Root>,
     linearized: LinearProblem,
     ends: Ends,
     robust: Robust,
-    /// Points at the knots to begin with.
+    /// Initial points at the knots.
     first: Vec<f64>,
-    /// Points at the knots.
+    /// Present points at the knots.
     pub points: Vec<f64>,
     /// Velocities of the spline through them.
     pub velocities: Vec<f64>,
-    /// Where the last step began, and the step.
+    /// The start of the last step, and the step.
     before: Option<(Vec<f64>, Vec<f64>)>,
     retreats: usize,
     stiffenings: usize,
-    /// Steps of the linearised solver that were too long.
+    /// The number of steps of the linearised solver that were too long.
     strays: usize,
     /// J in full Gauss–Newton, at the last λ.
     objective: f64,
-    /// The band of A⁻¹ at the end.
+    /// The final band of A⁻¹.
     inverse: Option<Banded>,
     progress: Progress,
 }
 
 impl<'a> CurveFit<'a> {
-    /// A curve with given knots through first points.
+    /// A curve with given knots through initial points.
     pub fn new(
         data: Data<'a>,
         m: usize,
@@ -79,7 +79,7 @@ impl<'a> CurveFit<'a> {
         let linearized = LinearProblem::new(basis, &positions, data.weights);
         let lam = data.lam;
         let balance = linearized.balance();
-        // From here on curves are geodesics; with larger λ rounding would make A forget the data.
+        // From this λ on, curves are geodesics; for larger λ the data would vanish in rounding errors of A.
         let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
         let roots = information::roots(data.information, m);
         let mut weights: Vec<f64> = roots.iter().map(|root| root.weight).collect();
@@ -110,7 +110,7 @@ impl<'a> CurveFit<'a> {
         }
     }
 
-    /// The curve as it is.
+    /// The present curve.
     pub fn finish(self) -> Smooth {
         let report = self.report();
         let inverse = match &self.inverse {
@@ -120,12 +120,12 @@ impl<'a> CurveFit<'a> {
         Smooth { knots: self.knots, points: self.points, velocities: self.velocities, inverse, report }
     }
 
-    /// How it goes.
+    /// The report so far.
     pub fn report(&self) -> Report {
         self.progress.report
     }
 
-    /// Velocities at the ends, transported from the first and the last of the data to the ends of the curve.
+    /// Velocities at the ends, transported from the first and the last data point to the ends of the curve.
     pub fn end_velocities(&self, space: &Erased) -> [Vec<f64>; 2] {
         let len = space.point_len();
         std::array::from_fn(|e| {
@@ -151,12 +151,12 @@ impl<'a> CurveFit<'a> {
         self.before.is_some() && self.retreats == 0 && self.progress.report.step < 3.0
     }
 
-    /// Whether nothing is left to do.
+    /// Whether the iteration has ended.
     pub fn done(&self) -> bool {
         self.progress.report.state != State::Running
     }
 
-    /// No spline goes through the points: back by half of the step.
+    /// Halves the last step, because no spline joins the points.
     pub fn retreat(&mut self, space: &Erased, options: &Options) {
         self.retreats += 1;
         let Some((points, step)) = self.before.as_mut().filter(|_| self.retreats <= RETREATS) else {
@@ -168,7 +168,7 @@ impl<'a> CurveFit<'a> {
         self.go(space, &points, &step);
     }
 
-    /// Begins again with a lower bound for λ, if λ is chosen at all.
+    /// Restarts with a lower bound for λ, if λ is to be chosen.
     fn stiffen(&mut self, options: &Options) {
         let allowed = options.raise_lam && self.data.lam.is_none() && self.stiffenings < STIFFENINGS;
         let lam = self.progress.lam.filter(|_| allowed);
@@ -178,7 +178,7 @@ impl<'a> CurveFit<'a> {
         };
         self.stiffenings += 1;
         self.progress.least = STIFFER * lam;
-        // The last stage of a robust fit has its λ from the one before.
+        // The last stage of a robust fit takes λ from the stage before.
         let settled = self.progress.settled && self.robust.reweighs();
         self.progress.restart(if settled { Lam::Times(STIFFER) } else { Lam::Anew });
         self.progress.forced = false;
@@ -186,7 +186,7 @@ impl<'a> CurveFit<'a> {
         self.points = self.first.clone();
     }
 
-    /// One step from the spline through the points, or the end; on all cores if no other curve is worked on.
+    /// One iteration from the spline through the points, or the end; on all cores if no other curve is active.
     pub fn advance(&mut self, space: &Erased, options: &Options, monitor: &Monitor, alone: bool) {
         let velocities = self.end_velocities(space);
         let (data, linearized) = (&self.data, &self.linearized);
@@ -246,7 +246,7 @@ impl<'a> CurveFit<'a> {
             return self.begin_again();
         }
         if exact && !self.progress.report.exact {
-            // The known steps belong to the other solver.
+            // Earlier steps belong to the other solver.
             (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
         }
         self.progress.report.exact = exact;
@@ -291,7 +291,7 @@ impl<'a> CurveFit<'a> {
                 if self.progress.unsettled { State::Unsettled } else { State::Converged };
             return;
         }
-        // Farther than the data are nothing is known.
+        // Beyond this distance the estimate is not valid.
         let farthest = residuals.distances.iter().copied().fold(0.0, f64::max).sqrt() + 0.1 * reach;
         let longest = step.chunks_exact(m).map(length).fold(0.0, larger);
         let further =
@@ -313,7 +313,7 @@ impl<'a> CurveFit<'a> {
         self.before = Some((before, ambient));
     }
 
-    /// Restarts with full Gauss–Newton: it could fail, too, from where the linearised solver went astray.
+    /// Restarts with full Gauss–Newton, which could fail from an iterate where the linearised solver diverged.
     fn begin_again(&mut self) {
         (self.strays, self.before, self.retreats) = (0, None, 0);
         (self.progress.last_step, self.progress.slow, self.objective) = (f64::INFINITY, 0, f64::INFINITY);
@@ -324,7 +324,7 @@ impl<'a> CurveFit<'a> {
         self.points = self.first.clone();
     }
 
-    /// J of the curve as it is.
+    /// J of the present curve.
     fn value(&self, space: &Erased, residuals: &Residuals) -> f64 {
         let lam = self.progress.lam.unwrap_or(0.0) * self.linearized.basis.spacing.powi(3);
         let terms = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
@@ -369,7 +369,7 @@ impl<'a> CurveFit<'a> {
         }
     }
 
-    /// To the next stage of a robust fit.
+    /// Starts the next stage of a robust fit.
     fn go_on(&mut self, squares: &[f64]) {
         let lam = self.robust.next(squares, self.progress.report.freedom);
         self.progress.restart(lam);

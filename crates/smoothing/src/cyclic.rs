@@ -1,8 +1,8 @@
-//! Banded matrices that may close: those of closed curves.
+//! Banded matrices of open and closed curves.
 //!
-//! The coefficients of a closed curve go on behind the last one with the first ones again, turned by the holonomy H of
-//! the curve. A matrix that is banded in the coefficients with `overlap` of them repeated behind the end, A, becomes
-//! EᵀAE, where E repeats and turns them. The first coefficients border the others, which are banded:
+//! The coefficients of a closed curve continue after the last one with the first ones, transformed by the holonomy H
+//! of the curve. A matrix A that is banded in the coefficients with `overlap` of them repeated at the end becomes
+//! EᵀAE, where E repeats and transforms them. The first coefficients border the others, which are banded:
 //!
 //! ```text
 //! EᵀAE = (C Wᵀ; W B),    (EᵀAE)⁻¹ = (S⁻¹, −S⁻¹Vᵀ; −VS⁻¹, B⁻¹ + VS⁻¹Vᵀ),    V = B⁻¹W,    S = C − WᵀV.
@@ -11,33 +11,33 @@
 use crate::banded::Banded;
 use symspline_core::scalar::{Lane, lane};
 
-/// The correction for a closed curve: how its coefficients go on at its start.
+/// The periodic correction of a closed curve: how its coefficients continue at its start.
 #[derive(Clone)]
 pub struct PeriodicCorrection {
-    /// Coefficients that come again behind the last one.
+    /// The number of coefficients that are repeated after the last one.
     pub overlap: usize,
-    /// Coordinates of a coefficient.
+    /// The number of coordinates of a coefficient.
     pub m: usize,
-    /// H, m × m numbers row by row: what a vector at the start is in the frame that comes round to it.
+    /// H, m × m numbers row by row: maps a vector at the start to the frame transported around the curve.
     pub turn: Vec<f64>,
 }
 
 impl PeriodicCorrection {
-    /// Without holonomy.
+    /// A correction without holonomy.
     pub fn plain(overlap: usize, m: usize) -> Self {
         let turn = (0..m * m).map(|at| f64::from(at / m == at % m)).collect();
         PeriodicCorrection { overlap, m, turn }
     }
 
-    /// Whether there is none.
+    /// Whether H is the identity.
     pub fn is_plain(&self) -> bool {
-        /// What rounding makes of frames that come round.
+        /// The size of rounding errors of frames transported around the curve.
         const NONE: f64 = 1e-13;
         let off = |(at, x): (usize, &f64)| (x - f64::from(at / self.m == at % self.m)).abs();
         self.turn.iter().enumerate().map(off).all(|x| x < NONE)
     }
 
-    /// Repeats the first coefficients, of m numbers each, behind the last one: Ex.
+    /// Repeats the first coefficients, of m numbers each, after the last one: Ex.
     pub fn extend(&self, x: &mut Vec<f64>) {
         for k in 0..self.overlap * self.m {
             let (block, row) = (k / self.m, k % self.m);
@@ -67,13 +67,13 @@ impl PeriodicCorrection {
 
 /// A factored matrix.
 pub struct Factored {
-    /// All coefficients, or those that are not bordered.
+    /// The number of coefficients, or of those that do not belong to the border.
     band: Banded,
     border: Option<Border>,
 }
 
 struct Border {
-    /// Numbers in the border.
+    /// The number of entries in the border.
     size: usize,
     /// H.
     turn: Vec<f64>,
@@ -84,7 +84,8 @@ struct Border {
 }
 
 impl Factored {
-    /// Of a matrix in coefficients of `coupled` numbers; a closed curve has a correction of as many.
+    /// Factors a matrix in coefficients of `coupled` numbers. The correction of a closed curve must have as many
+    /// coordinates.
     pub fn new(mut whole: Banded, periodic: Option<&PeriodicCorrection>) -> Self {
         let Some(periodic) = periodic else {
             whole.factor();
@@ -92,11 +93,11 @@ impl Factored {
         };
         let (m, width) = (periodic.m, whole.width);
         let size = periodic.overlap * m;
-        // Coefficients without those that come again; and the bordered ones among them.
+        // The number of coefficients without repetitions, and of those in the border.
         let count = whole.size - size;
         let inner = count - size;
         let near = |i: usize, j: usize| if i.abs_diff(j) <= width { whole.at(i, j) } else { Lane::ZERO };
-        // A[i, behind] H: what comes again, as if it were the first time.
+        // A[i, repeated] H: the contribution of a repeated coefficient to the first one.
         let again = |i: usize, b: usize| {
             let (block, c) = (b / m, b % m);
             (0..m).fold(Lane::ZERO, |sum, row| {
@@ -122,7 +123,7 @@ impl Factored {
         for a in 0..size {
             for b in 0..=a {
                 let (block, c) = (a / m, a % m);
-                // HᵀA[behind, behind]H.
+                // HᵀA[repeated, repeated]H.
                 let twice = (0..m).fold(Lane::ZERO, |sum, row| {
                     sum + again(count + block * m + row, b) * lane(periodic.turn[row * m + c])
                 });
@@ -153,7 +154,7 @@ impl Factored {
         self.border.as_ref().map_or(own, |border| own + border.corner.log_det())
     }
 
-    /// The inverse times x, in place, for rows of several numbers.
+    /// Multiplies rows of several numbers by the inverse, in place.
     pub fn solve(&self, columns: usize, x: &mut [Lane]) {
         let Some(border) = &self.border else { return self.band.solve(columns, x) };
         let [w, v] = &border.sides;
@@ -176,7 +177,7 @@ impl Factored {
         }
     }
 
-    /// The band of the inverse; of a closed curve that of E(EᵀAE)⁻¹Eᵀ.
+    /// The band of the inverse; for a closed curve that of E(EᵀAE)⁻¹Eᵀ.
     pub fn inverse_band(&self) -> Banded {
         let own = self.band.inverse_band();
         let Some(border) = &self.border else { return own };
@@ -259,7 +260,7 @@ mod tests {
                 x[column] = Lane::ONE;
                 factored.solve(1, &mut x);
                 periodic.extend_lanes(&mut x);
-                // EᵀAE times it is the unit vector again.
+                // The product with EᵀAE is the unit vector again.
                 let product: Vec<f64> = (0..long)
                     .map(|i| (0..long).fold(Lane::ZERO, |sum, j| sum + dense(i, j) * x[j]).as_array()[0])
                     .collect();

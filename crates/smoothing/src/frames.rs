@@ -1,13 +1,13 @@
 //! One frame at every knot of a curve, transported along the polygon of its points.
 //!
-//! The polygon is cut into eight runs that go side by side in the lanes; what turns the frame with which a run begins
-//! into the one that comes out of the run before is kept, so that coordinates are those in one frame transported along the
-//! whole polygon.
+//! The polygon is divided into eight runs, one per SIMD lane. At the start of each run, the transformation from its
+//! frame to the frame at the end of the preceding run is stored, so that coordinates refer to one frame transported
+//! along the whole polygon.
 
 use symspline_core::scalar::{LANES, Lane, few, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
-/// Steps after which the rounding errors of a frame are removed.
+/// The number of steps after which rounding errors of a frame are removed.
 const TIDY: usize = 8;
 
 /// Frames along a polygon.
@@ -15,19 +15,19 @@ pub struct Frames<'a> {
     space: &'a Erased<'a>,
     points: &'a [f64],
     frames: Vec<f64>,
-    /// Knots of a run.
+    /// The number of knots of a run.
     run: usize,
-    /// Matrices that bring coordinates in the frames of a run to those in the frame transported from the first knot, and
-    /// back; row by row. The first run has none.
+    /// Matrices that convert coordinates in the frames of a run to those in the frame transported from the first
+    /// knot, and back; row by row. The first run has none.
     turns: Vec<[Vec<f64>; 2]>,
 }
 
 impl<'a> Frames<'a> {
-    /// Along the polygon of some points.
+    /// Transports frames along the polygon of some points.
     pub fn new(space: &'a Erased<'a>, points: &'a [f64]) -> Self {
         let (len, size, m) = (space.point_len(), space.frame_len(), space.dim());
         let count = points.len() / len;
-        // What joins the runs costs about as much as 2m steps.
+        // Joining the runs costs about as much as 2m steps.
         let run = if 2 * m + count / LANES < count { count.div_ceil(LANES).max(4) } else { count };
         let runs = count.div_ceil(run);
         let last = count - 1;
@@ -63,13 +63,13 @@ impl<'a> Frames<'a> {
         found
     }
 
-    /// Compares the frames with which runs end, `frame` at `p`, with those with which the next ones begin.
+    /// Compares the final frames of the runs, `frame` at `p`, with the first frames of the next ones.
     fn join(&mut self, runs: usize, frame: &[Lane], p: &[Lane]) {
         let (space, m, len) = (self.space, self.space.dim(), self.space.point_len());
         let next: [usize; LANES] = few(|l| (l + 1).min(runs - 1) * self.run);
         let mut fresh = vec![Lane::ZERO; frame.len()];
         gather(next.map(|k| &self.frames[k * frame.len()..][..frame.len()]), &mut fresh);
-        // Where frames are not orthonormal the way back is no transpose.
+        // If frames are not orthonormal, the inverse is not the transpose.
         let mut steps = vec![[(); 2].map(|_| vec![0.0; m * m]); runs - 1];
         let (mut x, mut v) = (vec![Lane::ZERO; m], vec![Lane::ZERO; len]);
         for column in 0..m {
@@ -92,8 +92,8 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// What coordinates at the first knot are at the last one, where the polygon has come back to its first point: the
-    /// holonomy, m × m numbers row by row.
+    /// The holonomy of a closed polygon, m × m numbers row by row: maps coordinates at the first knot to coordinates
+    /// at the last one.
     pub fn round(&self) -> Vec<f64> {
         let (m, len) = (self.space.dim(), self.len());
         let last = self.points.len() / len - 1;
@@ -107,7 +107,7 @@ impl<'a> Frames<'a> {
         out
     }
 
-    /// Numbers of a point.
+    /// The number of entries of a point.
     fn len(&self) -> usize {
         self.space.point_len()
     }
@@ -168,7 +168,7 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// ρ = −[u, [u, a]]: what curvature adds to the gradient of the energy.
+/// ρ = −[u, [u, a]]: the contribution of curvature to the gradient of the energy.
 pub fn curvature_terms(space: &Erased, speeds: &[f64], accelerations: &[f64]) -> Vec<f64> {
     let m = space.dim();
     let count = accelerations.len() / m;
@@ -185,7 +185,7 @@ pub fn curvature_terms(space: &Erased, speeds: &[f64], accelerations: &[f64]) ->
     out
 }
 
-/// The members of a group of eight; those that are missing are the last one again.
+/// The members of a group of eight; missing members repeat the last one.
 pub fn lanes_of(group: usize, count: usize) -> [usize; LANES] {
     few(|l| (group * LANES + l).min(count - 1))
 }

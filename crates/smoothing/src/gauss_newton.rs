@@ -1,9 +1,9 @@
 //! Full Gauss–Newton: a step for points and velocities together, under the linearised C² condition.
 //!
-//! With ξ, υ the moves of point and velocity at the knots, N and A those of the curve at the data and of its
+//! With ξ, υ the changes of point and velocity at the knots, N and A those of the curve at the data and of its
 //! acceleration at quadrature points, and C the condition: `min Σ w|r − N(ξ, υ)|² + λ Σ ω|a + A(ξ, υ)|²` subject to
-//! `C(ξ, υ) = 0`. Everything is local to a segment: the unknowns of a knot, with the multiplier of its condition, make
-//! a block tridiagonal system.
+//! `C(ξ, υ) = 0`. Each term depends on one segment only, so the unknowns of the knots, with the multipliers of their
+//! conditions, form a block tridiagonal system.
 
 use crate::information::{self, Root};
 use crate::path::{Path, Position};
@@ -14,12 +14,12 @@ use symspline_core::parallel;
 use symspline_core::scalar::{LANES, Lane, few, lane};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
-/// Two Gauss points a segment: exact where the acceleration is linear, as in flat space.
+/// Two Gauss points per segment: exact where the acceleration is linear, as in flat space.
 pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// What is known at the data: positions and residuals, which are tangent vectors there.
+/// The data relative to the curve: positions and residuals, which are tangent vectors there.
 pub struct Pull<'a> {
-    /// Where they are.
+    /// The positions of the data.
     pub positions: &'a [Position],
     /// The points of the curve there.
     pub points: &'a [f64],
@@ -27,13 +27,13 @@ pub struct Pull<'a> {
     pub vectors: &'a [f64],
     /// Weights.
     pub weights: &'a [f64],
-    /// By what a robust loss multiplies them; None for one.
+    /// The factors of the weights due to a robust loss; None for one.
     pub factors: Option<&'a [f64]>,
-    /// Of weights that are matrices their roots, and the frames of the data transported to the curve.
+    /// Roots of weight matrices, and the frames of the data transported to the curve.
     pub information: Option<(&'a [Root], &'a [f64])>,
 }
 
-/// ∫ |∇γ'|² dt, by two points a segment.
+/// ∫ |∇γ'|² dt, with two points per segment.
 pub fn energy(space: &Erased, path: &Path) -> f64 {
     let len = space.point_len();
     let positions = quadrature(path.t.len() - 1);
@@ -66,9 +66,9 @@ pub fn step(
 ) -> Vec<f64> {
     let (m, len, n) = (space.dim(), space.point_len(), path.t.len() - 1);
     let derivative = Derivative::new(space, path.t, path.points, path.velocities, &ends);
-    // Velocities in units of the mean knot spacing, so that all unknowns are of one size.
+    // Velocities in units of the mean knot spacing, so that all unknowns have a similar size.
     let unit = (path.t[n] - path.t[0]) / n as f64;
-    // The last knot of a closed curve is the first again.
+    // The last knot of a closed curve equals the first.
     let closed = matches!(ends, Ends::Periodic);
     let nodes = if closed { n } else { n + 1 };
     let mut system = Tridiagonal::new(nodes, 3 * m);
@@ -86,7 +86,7 @@ pub fn step(
             let ((_, tau), p) = (samples[kind].0[k], &samples[kind].1[k * len..][..len]);
             in_coordinates(space, &motion.point(tau), &motion.at(tau, of), p, vectors)
         };
-        // With rows N of a weight: |N x|² and its pull on x.
+        // With rows N of a weight: |N x|² and its cotangent with respect to x.
         let mut add = |mut matrix: Matrix, rows: Option<&Matrix>, pull: Vector, weight: f64| {
             for e in 0..2 {
                 matrix.columns_mut((2 * e + 1) * m, m).scale_mut(1.0 / unit);
@@ -153,8 +153,8 @@ pub fn step(
     out
 }
 
-/// The columns of a matrix, tangent at q, and vectors at p in coordinates of one frame: p is the same point, but maybe
-/// another array.
+/// The columns of a matrix, tangent at q, and vectors at p in coordinates of one frame. The arrays p and q represent
+/// the same point.
 fn in_coordinates(
     space: &Erased,
     q: &[f64],
@@ -212,7 +212,7 @@ impl Tridiagonal {
         &mut self.sides[side][row]
     }
 
-    /// By elimination with exchanges inside the blocks.
+    /// Elimination with pivoting inside the blocks.
     fn solve(self) -> Vec<Vector> {
         let Tridiagonal { sides: [lower, diagonal, upper], right } = self;
         let right = right.into_iter().map(|x| Matrix::from_columns(&[x])).collect();
@@ -220,13 +220,13 @@ impl Tridiagonal {
         found.iter().map(|x| x.column(0).into_owned()).collect()
     }
 
-    /// The same of a closed curve: the last node comes at the end.
+    /// The same for a closed curve: the last node is eliminated last.
     fn solve_cyclic(mut self) -> Vec<Vector> {
         let last = self.right.len() - 1;
         let size = self.right[last].len();
         let take = |x: &mut Matrix| std::mem::replace(x, Matrix::zeros(size, size));
         let [lower, diagonal, upper] = &mut self.sides;
-        // How the other nodes see the last one, and it them.
+        // The coupling of the other nodes to the last one, and of the last one to them.
         let (first_sees, before_sees) = (take(&mut lower[0]), take(&mut upper[last - 1]));
         let (sees_before, sees_first, own) =
             (take(&mut lower[last]), take(&mut upper[last]), take(&mut diagonal[last]));

@@ -1,22 +1,22 @@
-//! Weights that are matrices: some directions of a datum are better known than others.
+//! Information matrices as weights: some directions of a datum are more accurate than others.
 //!
-//! With e the coordinates of `log_y γ(t)` in a frame at the datum y, it adds `eᵀWe = |Re|²` to the sum of squares.
-//! Carried along the geodesic to γ(t), e is −r, the coordinates of `log_γ y` there, and if the curve moves by ξ it changes
-//! by `S(r)⁻¹ξ`: ξ is the value of a Jacobi field that vanishes at y (Lemma A.2).
+//! With e the coordinates of `log_y γ(t)` in a frame at the datum y, the datum adds `eᵀWe = |Re|²` to the sum of
+//! squares. Transported along the geodesic to γ(t), e is −r, the coordinates of `log_γ y` there. If the curve moves
+//! by ξ, e changes by `S(r)⁻¹ξ`: ξ is the value of a Jacobi field that vanishes at y (Lemma A.2).
 
 use crate::frames::lanes_of;
 use symspline_core::derivative::{Matrix, Vector};
 use symspline_core::scalar::{LANES, Lane, few, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
-/// Eigenvalues are rounding errors below this part of the largest.
+/// Eigenvalues below this fraction of the largest are rounding errors.
 const SINGULAR: f64 = 1e-10;
 
-/// A matrix W of a datum.
+/// The matrix W of a datum.
 pub struct Root {
     /// R with W = RᵀR.
     pub matrix: Matrix,
-    /// Directions of which something is known.
+    /// The number of directions with information.
     pub rank: usize,
     /// One over the mean variance in these directions.
     pub weight: f64,
@@ -72,20 +72,20 @@ pub fn members(frames: &[f64], j: usize, m: usize, len: usize) -> Vec<f64> {
     frames.chunks_exact(len).skip(j).step_by(m).flatten().copied().collect()
 }
 
-/// What data with weights that are matrices say at a curve, one after another.
+/// Data with information matrices, linearised at a curve, one after another.
 #[derive(Clone)]
 pub struct Seen {
     /// N, m × m numbers row by row: s changes by about −Nξ if the curve moves by ξ.
     pub rows: Vec<f64>,
-    /// s, whose squares are what a datum adds.
+    /// s, whose squares are the contribution of a datum.
     pub residuals: Vec<f64>,
     /// Minus half of the gradient of |s|².
     pub pulls: Vec<f64>,
-    /// Numbers that were seen of each datum.
+    /// The number of observed coordinates of each datum.
     pub ranks: Vec<usize>,
 }
 
-/// At all data with residuals, given the j-th frame vectors of all in `columns[j]`.
+/// For all data with residuals, given the j-th frame vectors of all data in `columns[j]`.
 pub fn at_data(space: &Erased, roots: &[Root], columns: &[Vec<f64>], residuals: &[f64]) -> Seen {
     let m = columns.len();
     let ranks = roots.iter().map(|root| root.rank).collect();
@@ -100,10 +100,11 @@ pub fn at_data(space: &Erased, roots: &[Root], columns: &[Vec<f64>], residuals: 
     all
 }
 
-/// Of a datum with residual r: `N = R`, `s = R r` and the pull `S(r)⁻ᵀRᵀRr`, in the coordinates of its frame. N leaves S
-/// out, so that weights that are multiples of one do what numbers do: S has no say along r.
+/// For a datum with residual r: `N = R`, `s = R r` and the cotangent `S(r)⁻ᵀRᵀRr`, in the coordinates of its frame. N
+/// omits S, so that weights that are multiples of the identity have the same effect as scalars: S is the identity
+/// along r.
 ///
-/// `frame` holds the vectors of that as columns, in the coordinates in which r is given and ξ will be.
+/// The columns of `frame` are the vectors of that frame, in the coordinates of r and ξ.
 pub fn at(space: &Erased, root: &Matrix, frame: &Matrix, r: &Vector) -> (Matrix, Vector, Vector) {
     let m = space.dim();
     let Some(back) = frame.clone().try_inverse() else {
@@ -116,7 +117,7 @@ pub fn at(space: &Erased, root: &Matrix, frame: &Matrix, r: &Vector) -> (Matrix,
     let rows = root * back;
     let residual = &rows * r;
     let pull = rows.tr_mul(&residual);
-    // At the first conjugate point S has no inverse; data lie nearer.
+    // S is singular at the first conjugate point; data must be closer.
     let pull = stretch(space, r).transpose().lu().solve(&pull).unwrap_or(pull);
     (rows, residual, pull)
 }

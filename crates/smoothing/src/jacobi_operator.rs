@@ -1,6 +1,7 @@
-//! Energy with curvature: if a curve moves by ξ its acceleration moves by `ξ'' + Rξ`, `Rξ = −[u, [u, ξ]]` at the velocity
-//! u (Jacobi's operator). The flat problem leaves R out, which says too little of curves that are nearly geodesic over
-//! long distances: of a great circle it takes `ξ'' + ξ` for `ξ''`, and a wave around it, which costs nothing, for bent.
+//! Jacobi's operator in the energy. If a curve moves by ξ, its acceleration changes by `ξ'' + Rξ` with `Rξ = −[u, [u,
+//! ξ]]` at the velocity u. The linearised problem without R is inaccurate for curves that are nearly geodesic over
+//! long distances: on a great circle it replaces `ξ'' + ξ` by `ξ''`, and assigns energy to a wave around it, which
+//! has none.
 
 use crate::banded::stride;
 use crate::frames::curvature_terms;
@@ -13,7 +14,7 @@ pub struct JacobiOperator {
     m: usize,
     /// R at every knot, m × m numbers row by row.
     turns: Vec<f64>,
-    /// (S + RP)ᵀM(S + RP), as the entries (i, i − d) at i · 4m + d, coordinates of a coefficient side by side.
+    /// (S + RP)ᵀM(S + RP), as the entries (i, i − d) at i · 4m + d; coordinates of a coefficient are adjacent.
     pub penalty: Vec<f64>,
 }
 
@@ -30,7 +31,7 @@ impl JacobiOperator {
                 (0..m).for_each(|row| turns[(knot * m + row) * m + column] = x[row]);
             }
         }
-        // Natural ends have no acceleration, and so none to change.
+        // Natural ends have no acceleration that could change.
         for (end, knot) in [(0, 0), (1, knots - 1)] {
             if linearized.basis.is_natural(end) {
                 turns[knot * m * m..][..m * m].fill(0.0);
@@ -112,7 +113,7 @@ impl JacobiOperator {
         out
     }
 
-    /// RPx: what curvature adds to coordinate c of the acceleration at a knot when coefficients move by x.
+    /// RPx: the contribution of curvature to coordinate c of the acceleration at a knot if coefficients change by x.
     pub fn of_lanes(&self, linearized: &LinearProblem, knot: usize, x: &[Lane], c: usize) -> Lane {
         let turns = &self.turns[(knot * self.m + c) * self.m..][..self.m];
         let of =

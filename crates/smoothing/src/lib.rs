@@ -4,12 +4,13 @@
 //! J = Σ w_k d(y_k, γ(t_k))² + λ ∫ |∇γ'|² dt
 //! ```
 //!
-//! for noisy data y, and how smooth it should be. In flat space it is the smoothing spline of Reinsch (1967). The
-//! points of the curve at its knots are the unknowns; every iteration fits the spline through them.
+//! for noisy data y, and the choice of λ. In flat space it is the smoothing spline of Reinsch (1967). The unknowns
+//! are the points of the curve at its knots; every iteration fits the spline through them.
 //!
-//! Two solvers find the minimum. The *linearised* solver treats the curve as one in flat space, in frames along it. Its
-//! contraction is `K²|γ'|²√(λ/w)`. As long as that is small, curvature enters the gradient only, and an iteration costs
-//! little more than the fit; otherwise curvature enters the matrix, too. The other solver is *full Gauss–Newton*.
+//! Two solvers compute the minimum. The *linearised* solver treats the curve as one in flat space, in frames along
+//! it. Its contraction is `K²|γ'|²√(λ/w)`. If that is small, curvature enters the gradient only, and an iteration
+//! costs little more than the fit; otherwise curvature enters the matrix, too. The other solver is *full
+//! Gauss–Newton*.
 
 mod banded;
 pub mod chi;

@@ -1,4 +1,5 @@
-//! Smoothing splines of numbers: natural cubic B-splines, their values at data and knots, and their energy.
+//! The linear smoothing problem of scalar splines: natural cubic B-splines, their values at data and knots, and their
+//! energy.
 //!
 //! A spline with coefficients c has the values Bc at the data, Pc at the knots and second derivatives Sc there; its
 //! energy ∫ x''² is cᵀΩc with Ω = SᵀMS, M being the mass matrix of hat functions. Times are divided by the mean knot
@@ -9,20 +10,20 @@ use crate::problem::{EndCondition, Ends};
 use symspline_core::scalar::{Lane, lane};
 
 const BAND: usize = WIDTH + 1;
-/// Coefficients of a closed curve that come again behind the last one.
+/// The number of coefficients of a closed curve that are repeated after the last one.
 pub const OVERLAP: usize = 3;
 
-/// A row of B, P or S: four neighbouring entries.
+/// A row of B, P or S: four consecutive entries.
 #[derive(Clone, Copy, Default)]
 pub struct Row {
-    /// The first coefficient.
+    /// The index of the first coefficient.
     pub first: usize,
-    /// Its factor and the next ones.
+    /// The factors of this coefficient and of the next ones.
     pub factors: [f64; 4],
 }
 
 impl Row {
-    /// The row times coefficients of `m` numbers each, added to `out`.
+    /// Adds the product of the row with coefficients of `m` numbers each to `out`.
     pub fn apply(&self, c: &[f64], out: &mut [f64]) {
         let m = out.len();
         for (factor, c) in self.factors.iter().zip(c[self.first * m..].chunks_exact(m)) {
@@ -30,7 +31,7 @@ impl Row {
         }
     }
 
-    /// Adds the transposed row times x to coefficients.
+    /// Adds the product of the transposed row with x to coefficients.
     pub fn spread(&self, x: &[f64], c: &mut [f64]) {
         let m = x.len();
         for (factor, c) in self.factors.iter().zip(c[self.first * m..].chunks_exact_mut(m)) {
@@ -38,7 +39,7 @@ impl Row {
         }
     }
 
-    /// A number of the row times coefficients of `m` numbers each.
+    /// One number of the product of the row with coefficients of `m` numbers each.
     pub fn of_lanes(&self, x: &[Lane], m: usize, c: usize) -> Lane {
         let mut sum = Lane::ZERO;
         for (k, factor) in self.factors.iter().enumerate() {
@@ -49,7 +50,7 @@ impl Row {
         sum
     }
 
-    /// row · Z · rowᵀ for a matrix known within its band.
+    /// row · Z · rowᵀ for a matrix of which the band is known.
     pub fn square(&self, z: &Banded) -> Lane {
         let mut sum = Lane::ZERO;
         let count = 4.min(z.size);
@@ -65,18 +66,18 @@ impl Row {
     }
 }
 
-/// The splines on some knots.
+/// The splines on given knots.
 pub struct Basis {
     /// Knots, divided by their mean spacing.
     tau: Vec<f64>,
     /// The mean knot spacing.
     pub spacing: f64,
-    /// What happens at the ends.
+    /// The end conditions.
     pub ends: Ends,
 }
 
 impl Basis {
-    /// On increasing knots, two or more.
+    /// Requires at least two increasing knots.
     pub fn new(knots: &[f64], ends: Ends) -> Self {
         let last = knots.len() - 1;
         let spacing = (knots[last] - knots[0]) / last as f64;
@@ -88,12 +89,13 @@ impl Basis {
         self.tau.len()
     }
 
-    /// Number of coefficients, which is that of knots. Of a closed curve the first [`OVERLAP`] come again at the end.
+    /// Number of coefficients, which equals the number of knots. In a closed curve the first [`OVERLAP`] are repeated
+    /// at the end.
     pub fn count(&self) -> usize {
         self.tau.len() + if self.is_closed() { OVERLAP - 1 } else { 0 }
     }
 
-    /// Whether the last knot is the first again.
+    /// Whether the last knot equals the first.
     pub fn is_closed(&self) -> bool {
         self.ends == Ends::Periodic
     }
@@ -108,15 +110,15 @@ impl Basis {
         self.tau[segment + 1] - self.tau[segment]
     }
 
-    /// A segment than which few are shorter, divided by the mean.
+    /// The length of a short segment (few segments are shorter), divided by the mean.
     pub fn short(&self) -> f64 {
         let mut lengths: Vec<f64> = self.tau.windows(2).map(|t| t[1] - t[0]).collect();
         lengths.sort_by(f64::total_cmp);
         lengths[lengths.len() / 10]
     }
 
-    /// Knots with the first and the last one three times more: the support of the i-th B-spline begins at the i-th.
-    /// Those of a closed curve go on periodically.
+    /// The knots, with three more copies of the first and the last one: the support of the i-th B-spline begins at
+    /// the i-th. The knots of a closed curve continue periodically.
     fn extended(&self, i: usize) -> f64 {
         let last = self.tau.len() - 1;
         if self.is_closed() {
@@ -126,11 +128,11 @@ impl Basis {
         self.tau[i.saturating_sub(3).min(last)]
     }
 
-    /// Value (`nu` = 0) or derivative of a spline at a position between 0 and 1 of a segment.
+    /// Value (`nu` = 0) or derivative of a spline at a position between 0 and 1 in a segment.
     pub fn row(&self, segment: usize, position: f64, nu: usize) -> Row {
         let t = |k: usize| self.extended(segment + k);
         let x = t(3) + position * (t(4) - t(3));
-        // B-splines of growing degree that do not vanish on the segment: the j-th begins at t(3 − degree + j).
+        // B-splines of increasing degree that do not vanish on the segment: the j-th begins at t(3 − degree + j).
         let mut b = [1.0, 0.0, 0.0, 0.0];
         for degree in 1..=3 - nu {
             let mut next = [0.0; 4];
@@ -155,13 +157,13 @@ impl Basis {
         self.folded(segment, b)
     }
 
-    /// Without the outermost coefficients, which the conditions at the ends give.
+    /// Eliminates the outermost coefficients, which the end conditions determine.
     fn folded(&self, segment: usize, factors: [f64; 4]) -> Row {
         let n = self.tau.len() - 1;
         if self.is_closed() {
             return Row { first: segment, factors };
         }
-        // Coefficients from 1 to n + 1 are kept, and counted from zero.
+        // Coefficients 1 to n + 1 are kept, and numbered from zero.
         let first = segment.saturating_sub(1).min((n + 1).saturating_sub(4));
         let mut row = Row { first, factors: [0.0; 4] };
         for (j, factor) in factors.into_iter().enumerate() {
@@ -178,8 +180,8 @@ impl Basis {
         row
     }
 
-    /// What the outermost coefficient is made of: the next one and the one behind that. A given velocity adds a
-    /// constant, which is no part of changes.
+    /// The outermost coefficient as a combination of the next two. A given velocity adds a constant, which does not
+    /// enter changes.
     fn outermost(&self, end: usize) -> [f64; 2] {
         let n = self.tau.len() - 1;
         if !self.is_natural(end) {
@@ -198,7 +200,8 @@ impl Basis {
     }
 }
 
-/// M times vectors at the knots, M being the mass matrix of hats: `∫ a b` of functions that are linear between knots.
+/// The product of M with vectors at the knots, where M is the mass matrix of hat functions: `∫ a b` of functions that
+/// are linear between knots.
 pub fn times_mass(basis: &Basis, a: &[f64], m: usize) -> Vec<f64> {
     let mut out = vec![0.0; a.len()];
     for i in 0..basis.knots() - 1 {
@@ -229,7 +232,7 @@ fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
     out
 }
 
-/// The smoothing problem of numbers.
+/// The linearised smoothing problem: the same linear problem for every coordinate.
 pub struct LinearProblem {
     /// The splines.
     pub basis: Basis,
@@ -239,14 +242,14 @@ pub struct LinearProblem {
     pub values: Vec<Row>,
     /// S: second derivatives at the knots.
     pub accelerations: Vec<Row>,
-    /// BᵀWB for weights that are numbers, as the entries (i, i − d) at i · 4 + d.
+    /// BᵀWB for scalar weights, as the entries (i, i − d) at i · 4 + d.
     pub gram: Vec<f64>,
     /// Ω, likewise.
     pub penalty: Vec<f64>,
 }
 
 impl LinearProblem {
-    /// For data that lie at positions of segments, with their weights.
+    /// The problem for data at positions in segments, with their weights.
     pub fn new(basis: Basis, positions: &[(usize, f64)], weights: &[f64]) -> Self {
         let count = basis.count();
         let data: Vec<Row> =
@@ -268,19 +271,19 @@ impl LinearProblem {
         gram(self.basis.count(), self.data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)))
     }
 
-    /// Degrees of freedom of the curves without energy: straight lines, of which given velocities and closed ends leave
-    /// constants.
+    /// Degrees of freedom of the curves without energy: straight lines. Given velocities and closed ends reduce them
+    /// to constants.
     pub fn null(&self) -> f64 {
         if self.basis.is_natural(0) && self.basis.is_natural(1) { 2.0 } else { 1.0 }
     }
 
-    /// Coefficients without those that come again.
+    /// The number of coefficients without repetitions.
     pub fn free(&self) -> usize {
         self.basis.count() - if self.basis.is_closed() { OVERLAP } else { 0 }
     }
 
-    /// The λ at which data and energy weigh about the same for splines that turn at every knot: the mean weight of a
-    /// coefficient over that of Ω on equal knots.
+    /// The λ at which data and energy have about the same weight for splines that change direction at every knot: the
+    /// mean weight of a coefficient divided by that of Ω on equal knots.
     pub fn balance(&self) -> f64 {
         const EQUAL: f64 = 8.0 / 3.0;
         self.gram.chunks(BAND).map(|row| row[0]).sum::<f64>() / (EQUAL * self.basis.count() as f64)
@@ -293,7 +296,7 @@ mod tests {
 
     const KNOTS: [f64; 6] = [0.0, 0.5, 2.0, 2.25, 4.0, 5.0];
 
-    /// The spline with some coefficients, at a time.
+    /// The value of the spline with given coefficients.
     fn value(basis: &Basis, c: &[f64], segment: usize, position: f64, nu: usize) -> f64 {
         let mut out = [0.0];
         basis.row(segment, position, nu).apply(c, &mut out);
@@ -339,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn energy_is_that_of_the_second_derivative() {
+    fn energy_matches_the_second_derivative() {
         let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::Natural; 2]));
         let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0]);
         let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();

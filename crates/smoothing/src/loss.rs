@@ -1,7 +1,7 @@
-//! How much a residual counts: least squares, Huber, Cauchy.
+//! Loss functions: least squares, Huber, Cauchy.
 //!
-//! A robust fit is one of least squares to pseudo-data (Cox 1983): residuals r become `ψ(r)/ψ̄'`, ψ̄' being the mean
-//! slope of ψ. Cross-validation of pseudo-data keeps its sense; that of data that are weighted anew does not.
+//! A robust fit is a least-squares fit to pseudo-data (Cox 1983): residuals r become `ψ(r)/ψ̄'`, where ψ̄' is the
+//! mean slope of ψ. Cross-validation of pseudo-data remains valid; cross-validation of reweighted data does not.
 
 use crate::chi;
 use crate::frames::lanes_of;
@@ -10,7 +10,7 @@ use symspline_core::scalar::{LANES, Lane, gather};
 use symspline_core::space::{Ambient, Erased, Origin};
 
 impl Loss {
-    /// The residual at which the loss begins to count less, over the standard deviation of a coordinate.
+    /// The residual beyond which the loss grows more slowly, in standard deviations of a coordinate.
     pub fn corner(self, m: usize) -> f64 {
         match self {
             Loss::Linear => f64::INFINITY,
@@ -37,7 +37,7 @@ impl Loss {
         }
     }
 
-    /// ρ of a squared residual, for a corner c.
+    /// ρ of a squared residual, for the corner c.
     pub fn value(self, square: f64, corner: f64) -> f64 {
         let q = square / (corner * corner);
         match self {
@@ -47,31 +47,31 @@ impl Loss {
         }
     }
 
-    /// By which factors ψ(r)/(|r| ψ̄') residuals in m dimensions become those of the pseudo-data, for their weighed
-    /// squares; and ψ̄'.
+    /// The factors ψ(r)/(|r| ψ̄') that convert residuals in m dimensions to those of the pseudo-data, given their
+    /// weighted squares; and ψ̄'.
     pub fn pseudo(self, corner: f64, squares: &[f64], m: usize) -> (Vec<f64>, f64) {
         let slopes: Vec<(f64, f64)> =
             squares.iter().map(|square| self.slopes(square / (corner * corner), m)).collect();
         let mean = slopes.iter().map(|s| s.1).sum::<f64>() / slopes.len() as f64;
-        // Were most data outliers, the slope would say nothing.
+        // If most data were outliers, the mean slope would be meaningless.
         let mean = mean.max(0.05);
         (slopes.iter().map(|(factor, _)| factor / mean).collect(), mean)
     }
 }
 
-/// The standard deviation of the noise in a coordinate, whatever outliers do: from the median squared distance of data
+/// A robust estimate of the standard deviation of the noise in a coordinate, from the median squared distance of data
 /// from the geodesics between their neighbours. NaN for fewer than three data.
 pub fn noise(space: &Erased, data: &Data) -> f64 {
     let [times, points, weights] = [data.times, data.points, data.weights];
-    /// Of rounded data most deviations may vanish; then some part of their mean stands for the median.
+    /// Rounded data may have deviations that are mostly zero; a fraction of the mean then replaces the median.
     const LEAST: f64 = 0.01;
     let found = deviations(space, times, points, weights);
     let mean = found.iter().sum::<f64>() / found.len() as f64;
     (median(&found).max(LEAST * mean) / chi::quantile(space.dim(), 0.5)).sqrt()
 }
 
-/// Squared distances of all data but the first and the last from the geodesic between their neighbours, in units of
-/// what noise of variance one would make of them.
+/// Squared distances of all data except the first and the last from the geodesic between their neighbours, in units
+/// of their expectation for noise of variance one.
 fn deviations(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) -> Vec<f64> {
     let len = space.point_len();
     let inner = times.len().saturating_sub(2);
@@ -100,8 +100,8 @@ fn deviations(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) ->
     squares
 }
 
-/// The same from the weighed squared residuals of a curve with so many degrees of freedom a coordinate. Fewer outliers
-/// spoil it: each is in one residual, but in three of the deviations of neighbours.
+/// The same estimate from the weighted squared residuals of a curve with given degrees of freedom per coordinate. It
+/// is more robust: an outlier affects one residual, but three deviations from neighbours.
 pub fn noise_beside(squares: &[f64], freedom: f64, m: usize) -> f64 {
     let left = (1.0 - freedom / squares.len() as f64).max(0.1);
     (median(squares) / chi::quantile(m, 0.5) / left).sqrt()
@@ -113,9 +113,9 @@ fn median(x: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Data without those that surely are outliers: times, points and weights to begin with.
+/// Data without clear outliers: times, points and weights of the initial curve.
 pub fn plausible(space: &Erased, data: &Data) -> [Vec<f64>; 3] {
-    /// Rounds in which data are left out, and the squared deviation from which they are, in medians.
+    /// The number of rounds that remove data, and the squared deviation beyond which data are removed, in medians.
     const ROUNDS: usize = 4;
     const FAR: f64 = 12.0;
     let len = space.point_len();
@@ -131,7 +131,8 @@ pub fn plausible(space: &Erased, data: &Data) -> [Vec<f64>; 3] {
         let [times, points, weights] = pick(&chosen);
         let found = deviations(space, &times, &points, &weights);
         let limit = FAR * median(&found);
-        // An outlier spoils the geodesics of its neighbours, too: only the worst one of several neighbours goes.
+        // An outlier affects the geodesics of its neighbours, too, so only the worst of several neighbours is
+        // removed.
         let worst = |k: usize| {
             let near = &found[k.saturating_sub(1)..(k + 2).min(found.len())];
             found[k] > limit && near.iter().all(|x| *x <= found[k])
@@ -149,8 +150,8 @@ pub fn plausible(space: &Erased, data: &Data) -> [Vec<f64>; 3] {
     pick(&chosen)
 }
 
-/// Of every few data in a row the one nearest to the others, by its number. Two good ones among five
-/// outvote outliers that do not agree.
+/// The number of the datum nearest to the others in every window of a few consecutive data. Two good data among five
+/// prevail over outliers that do not agree.
 fn medoids(space: &Erased, data: &Data) -> Vec<usize> {
     const WINDOW: usize = 5;
     const STRIDE: usize = 2;
@@ -180,7 +181,7 @@ fn medoids(space: &Erased, data: &Data) -> Vec<usize> {
     }
     chosen.sort_unstable();
     chosen.dedup();
-    // All windows may have chosen one.
+    // All windows may have selected the same datum.
     if chosen.len() < 2 || data.times[chosen[0]] == data.times[chosen[chosen.len() - 1]] {
         chosen = (0..count).collect();
     }
@@ -192,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slopes_are_those_of_the_loss() {
+    fn slopes_match_the_loss() {
         // ψ is half the gradient of ρ(|r|²), ψ' its divergence over m.
         let (corner, h) = (0.7, 1e-4);
         for loss in [Loss::Linear, Loss::Huber, Loss::Cauchy] {
@@ -217,11 +218,11 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_that_of_the_data() {
+    fn the_noise_level_matches_the_data() {
         use symspline_core::space::Kernels;
         let plane = symspline_vectors::Euclidean::new(1).unwrap();
         let space = Erased(&plane as &dyn Kernels);
-        // Normal noise from a hash of its number, about a straight line.
+        // Normal noise from a hash of its index, about a straight line.
         let n = 4001;
         let times: Vec<f64> = (0..n).map(|i| i as f64 + 0.3 * (i as f64).sin()).collect();
         let weights: Vec<f64> = (0..n).map(|i| 1.0 + (i % 3) as f64).collect();

@@ -1,8 +1,8 @@
-//! How far the data are from a curve, weighed, and the problem of numbers that makes of it: A = BᵀWB + λΩ.
+//! The weighted distances of the data from a curve, and the matrix of the linearised problem, A = BᵀWB + λΩ.
 //!
-//! Weights that are numbers weigh all coordinates alike, and A is the same for each of them. Weights that are matrices
-//! couple the coordinates: A is one matrix of all, with the width of a band of blocks. So does the curvature of the
-//! space, where it is not left out: see [`JacobiOperator`].
+//! Scalar weights apply to all coordinates alike, and every coordinate has the same A. Information matrices couple
+//! the coordinates, so that A is one matrix for all of them, with a band of blocks. The curvature of the space
+//! couples them, too, if it is included: see [`JacobiOperator`].
 
 use crate::banded::{Banded, WIDTH, stride};
 use crate::cyclic::{Factored, PeriodicCorrection};
@@ -15,36 +15,36 @@ use symspline_core::scalar::{LANES, Lane, few, lane};
 /// Residuals at a curve, in coordinates of frames along it, and their weights.
 #[derive(Clone)]
 pub enum Misfit<'a> {
-    /// A number each: `w|r|²`.
+    /// Scalar weights: `w|r|²`.
     Numbers {
-        /// Weights w.
+        /// The weights w.
         weights: Cow<'a, [f64]>,
-        /// Residuals r, m numbers each.
+        /// The residuals r, m numbers each.
         residuals: Vec<f64>,
         /// BᵀWB, as the entries (i, i − d) at i · 4 + d.
         gram: Cow<'a, [f64]>,
     },
-    /// A matrix each.
+    /// Information matrices as weights.
     Matrices {
-        /// Residuals.
+        /// The residuals.
         seen: Seen,
-        /// BᵀNᵀNB: the entries (i, i − d) at i · 4m + d, coordinates of a coefficient side by side.
+        /// BᵀNᵀNB: the entries (i, i − d) at i · 4m + d; coordinates of a coefficient are adjacent.
         gram: Vec<f64>,
     },
 }
 
-/// Coefficients times the cube of the dimension up to which coordinates are coupled.
+/// Coordinates are coupled only if the number of coefficients times the cube of the dimension does not exceed this.
 pub const COUPLED: usize = 10_000_000;
 
-/// A, factored, for another λ on each lane.
+/// The factored matrix A, for another λ on each lane.
 pub struct Factors {
     matrix: Factored,
-    /// Coordinates that it has in itself: one, which stands for all, or m.
+    /// The number of coupled coordinates: m, or one if a single matrix serves all of them.
     coupled: usize,
 }
 
 impl<'a> Misfit<'a> {
-    /// For weights that are matrices.
+    /// For information matrices.
     pub fn matrices(linearized: &LinearProblem, m: usize, seen: Seen) -> Self {
         let gram = coupled_gram(linearized, m, &seen.rows);
         Misfit::Matrices { seen, gram }
@@ -61,7 +61,7 @@ impl<'a> Misfit<'a> {
         }
     }
 
-    /// Multiplies weights by factors; data with a factor of zero are not counted.
+    /// Multiplies weights by factors; data with the factor zero are not counted.
     pub fn reweigh(&mut self, linearized: &LinearProblem, factors: &[f64], m: usize) {
         match self {
             Misfit::Numbers { weights, gram, .. } => {
@@ -112,7 +112,8 @@ impl<'a> Misfit<'a> {
         lam: Lane,
     ) -> Factors {
         let count = linearized.basis.count();
-        // So many numbers are too many: then the matrix, not its right side, leaves the holonomy out.
+        // If the coupled matrix would be too large, the holonomy is omitted in the matrix, but not in its right-hand
+        // side.
         let few = m.saturating_pow(3).saturating_mul(count) <= COUPLED;
         let turns = few && periodic.is_some_and(|correction| !correction.is_plain());
         let coupled =
@@ -128,7 +129,7 @@ impl<'a> Misfit<'a> {
         Factors { matrix: Factored::new(banded, periodic), coupled }
     }
 
-    /// An entry of BᵀWB, which is that of every coordinate by itself or that of all.
+    /// An entry of BᵀWB, either for each coordinate separately or for all of them.
     fn gram(&self, coupled: usize, at: usize) -> f64 {
         match self {
             Misfit::Numbers { gram, .. } => of_each(gram, coupled, at),
@@ -136,7 +137,7 @@ impl<'a> Misfit<'a> {
         }
     }
 
-    /// What is left of a datum when the coefficients have moved by x, squared and weighed.
+    /// The weighted square of the residual of a datum after the coefficients have changed by x.
     fn square(&self, row: &Row, k: usize, m: usize, x: &[Lane]) -> Lane {
         let mut sum = Lane::ZERO;
         match self {
@@ -158,7 +159,7 @@ impl<'a> Misfit<'a> {
         sum
     }
 
-    /// The number of data for each coordinate.
+    /// The number of data per coordinate.
     pub fn count(&self, m: usize) -> f64 {
         match self {
             Misfit::Numbers { weights, .. } => weights.iter().filter(|w| **w > 0.0).count() as f64,
@@ -166,12 +167,12 @@ impl<'a> Misfit<'a> {
         }
     }
 
-    /// The weighed sum of squares when the coefficients have moved by x.
+    /// The weighted sum of squares after the coefficients have changed by x.
     pub fn rss(&self, linearized: &LinearProblem, m: usize, x: &[Lane]) -> Lane {
         (0..linearized.data.len()).fold(Lane::ZERO, |sum, k| sum + self.square(&linearized.data[k], k, m, x))
     }
 
-    /// The weighed sum of squares as it is.
+    /// The present weighted sum of squares.
     pub fn rss_now(&self, m: usize) -> f64 {
         let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
         match self {
@@ -182,7 +183,7 @@ impl<'a> Misfit<'a> {
         }
     }
 
-    /// tr A⁻¹BᵀWB over the number of coordinates, given the band of A⁻¹: the degrees of freedom of one.
+    /// tr A⁻¹BᵀWB divided by the number of coordinates, given the band of A⁻¹: the degrees of freedom per coordinate.
     pub fn freedom(&self, linearized: &LinearProblem, inverse: &Banded) -> Lane {
         let (stride, coupled) = (inverse.width + 1, inverse.size / linearized.basis.count());
         let mut sum = Lane::ZERO;
@@ -232,14 +233,14 @@ fn coupled_gram(linearized: &LinearProblem, m: usize, rows: &[f64]) -> Vec<f64> 
     gram
 }
 
-/// The entry `at` of a matrix that is the same for every coordinate, and couples none.
+/// The entry `at` of a matrix that is the same for every coordinate and does not couple them.
 fn of_each(band: &[f64], coupled: usize, at: usize) -> f64 {
     let (i, d) = (at / stride(coupled), at % stride(coupled));
     if d % coupled == 0 { band[i / coupled * (WIDTH + 1) + d / coupled] } else { 0.0 }
 }
 
 impl Factors {
-    /// A⁻¹x in place: coefficients of m numbers.
+    /// A⁻¹x in place, for coefficients of m numbers.
     pub fn solve(&self, m: usize, x: &mut [Lane]) {
         self.matrix.solve(m / self.coupled, x);
     }
@@ -264,12 +265,12 @@ impl Factors {
         (0..right.len()).map(|at| number(at / m, at % m)).collect()
     }
 
-    /// The smallest pivot: not positive where A is not positive definite, as far as rounding tells.
+    /// The smallest pivot. It is not positive if A is not numerically positive definite.
     pub fn least_pivot(&self) -> Lane {
         self.matrix.least_pivot()
     }
 
-    /// ln det A of one coordinate.
+    /// ln det A per coordinate.
     pub fn log_det(&self) -> Lane {
         self.matrix.log_det() * lane(1.0 / self.coupled as f64)
     }
@@ -279,7 +280,7 @@ impl Factors {
         self.matrix.inverse_band()
     }
 
-    /// The band of A⁻¹ of one coordinate: the mean of all.
+    /// The band of A⁻¹ of one coordinate: the mean over all coordinates.
     pub fn mean(&self, inverse: &Banded) -> Banded {
         let m = self.coupled;
         let entry = |at: usize| {

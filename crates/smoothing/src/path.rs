@@ -1,11 +1,11 @@
-//! A curve and data beside it: positions, points, accelerations, residuals.
+//! A curve and data near it: positions, points, accelerations, residuals.
 
 use crate::frames::{Frames, lanes_of};
 use symspline_core::curve::Segment;
 use symspline_core::scalar::{Jet, LANES, Lane, Scalar, gather, lane, scatter};
 use symspline_core::space::{Ambient, Erased};
 
-/// A position on a curve: the segment, and how much of it lies before.
+/// A position on a curve: the segment, and the fraction of it before the position.
 pub type Position = (usize, f64);
 
 /// A natural spline by its knots, points and velocities.
@@ -19,7 +19,8 @@ pub struct Path<'a> {
     pub velocities: &'a [f64],
 }
 
-/// The positions of times between the first and the last knot. What is nearer to a knot than rounding is at it.
+/// The positions of times between the first and the last knot. Times that equal a knot up to rounding are moved to
+/// it.
 pub fn positions(t: &[f64], times: &[f64]) -> Vec<Position> {
     let last = t.len() - 2;
     let position = |x: &f64| {
@@ -34,14 +35,14 @@ pub fn nearest((segment, position): Position) -> usize {
     if position < 0.5 { segment } else { segment + 1 }
 }
 
-/// The knot that a position is at.
+/// The knot at a position, if any.
 fn at_knot((segment, position): Position) -> Option<usize> {
     (position == 0.0 || position == 1.0).then_some(segment + position as usize)
 }
 
 impl Path<'_> {
-    /// Goes through positions eight at a time: `visit` gets the group, and the point with derivatives in units of the
-    /// segment.
+    /// Evaluates positions eight at a time: `visit` receives the group, and the point with derivatives in units of
+    /// the segment.
     fn each<S: Scalar>(
         &self,
         space: &Erased,
@@ -66,7 +67,7 @@ impl Path<'_> {
         }
     }
 
-    /// The points at some positions.
+    /// The points at given positions.
     pub fn at(&self, space: &Erased, positions: &[Position]) -> Vec<f64> {
         let len = space.point_len();
         if let Some(knots) =
@@ -83,7 +84,7 @@ impl Path<'_> {
         out
     }
 
-    /// The covariant accelerations at some positions.
+    /// The covariant accelerations at given positions.
     pub fn accelerations(&self, space: &Erased, positions: &[Position]) -> Vec<f64> {
         let len = space.point_len();
         let mut out = vec![0.0; positions.len() * len];
@@ -107,7 +108,7 @@ impl Path<'_> {
         (0..=n).map(|i| if i < n { (i, 0.0) } else { (n - 1, 1.0) }).collect()
     }
 
-    /// Vectors at positions, where the points are `gammas`, transported to the nearest knots: coordinates in the frames there.
+    /// Vectors at positions with points `gammas`, transported to the nearest knots: coordinates in the frames there.
     pub fn at_knots(
         &self,
         space: &Erased,

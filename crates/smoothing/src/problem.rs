@@ -1,4 +1,4 @@
-//! What is smoothed, how, and what is known afterwards.
+//! The smoothing problem, its options and its report.
 
 use symspline_core::fit::{End, Ends as FitEnds};
 use symspline_core::scalar::few;
@@ -6,30 +6,30 @@ use symspline_core::scalar::few;
 /// Noisy data of one curve.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
-    /// Times, in order; some may be equal.
+    /// Increasing times, possibly with repetitions.
     pub times: &'a [f64],
-    /// A point a time.
+    /// One point per time.
     pub points: &'a [f64],
-    /// A weight a time: one over the variance of its noise, up to a factor.
+    /// One weight per time: one over the variance of its noise, up to a factor.
     pub weights: &'a [f64],
-    /// Weights that are matrices, m × m numbers a time in coordinates of the frame at its point: one over the covariance
-    /// of its noise. The weight is then the mean of the diagonal. Empty where weights are numbers.
+    /// Information matrices, m × m numbers per time in coordinates of the frame at the point: the inverse covariance
+    /// of the noise. The weight is then the mean of the diagonal. Empty for scalar weights.
     pub information: &'a [f64],
-    /// Knots of the curve, increasing, from the first to the last time.
+    /// The increasing knots of the curve, from the first to the last time.
     pub knots: &'a [f64],
-    /// λ, or none if it is to be chosen.
+    /// λ, or None to choose it from the data.
     pub lam: Option<f64>,
-    /// The standard deviation of the noise in a coordinate at weight one, if that is known.
+    /// The standard deviation of the noise in a coordinate at weight one, if it is known.
     pub sigma: Option<f64>,
-    /// Velocities at the ends that have [`EndCondition::Velocity`]: tangent at the first and the last of the points, from where
-    /// they are transported in parallel to the ends of the curve.
+    /// Velocities at the ends that have [`EndCondition::Velocity`]: tangent at the first and at the last data point,
+    /// from where they are transported in parallel to the ends of the curve.
     pub ends: [&'a [f64]; 2],
 }
 
-/// The solver that finds the minimum.
+/// The solver that computes the minimum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tier {
-    /// The linearised solver, and full Gauss–Newton where that converges slowly.
+    /// The linearised solver, or full Gauss–Newton if the linearised solver converges slowly.
     Auto,
     /// The linearised solver only.
     Linearized,
@@ -37,7 +37,7 @@ pub enum Tier {
     Newton,
 }
 
-/// What happens at an end.
+/// An end condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndCondition {
     /// The second derivative vanishes.
@@ -46,17 +46,17 @@ pub enum EndCondition {
     Velocity,
 }
 
-/// What happens at the ends.
+/// The end conditions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
     /// A condition at either end.
     Open([EndCondition; 2]),
-    /// The last knot is the first again.
+    /// The last knot equals the first.
     Periodic,
 }
 
 impl Ends {
-    /// The same for the fit of a spline, with the velocities at its ends.
+    /// The same conditions for the fit of a spline, with the velocities at its ends.
     pub(crate) fn of_fit(self, velocities: &[Vec<f64>; 2]) -> FitEnds<'_> {
         match self {
             Ends::Periodic => FitEnds::Periodic,
@@ -68,17 +68,17 @@ impl Ends {
     }
 }
 
-/// How λ is chosen.
+/// The criterion that chooses λ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Criterion {
-    /// Generalised cross-validation (Craven & Wahba 1979); degrees of freedom count `gamma` times.
+    /// Generalised cross-validation (Craven & Wahba 1979); degrees of freedom are multiplied by `gamma`.
     Gcv {
-        /// 1, or 1.4 against too rough curves (Gu 2013, §3.2).
+        /// 1, or 1.4 for smoother curves (Gu 2013, §3.2).
         gamma: f64,
     },
     /// Restricted maximum likelihood (Wahba 1985).
     Reml,
-    /// Mallows' C_p (1973), for noise of known size.
+    /// Mallows' C_p (1973), for a known noise level.
     Cp,
 }
 
@@ -87,65 +87,65 @@ pub enum Criterion {
 pub enum Loss {
     /// |r|².
     Linear,
-    /// |r|² up to c, and linear beyond.
+    /// |r|² up to c, and linear beyond it.
     Huber,
     /// c² ln(1 + |r|²/c²).
     Cauchy,
 }
 
-/// How to smooth.
+/// The options of smoothing.
 #[derive(Clone, Copy)]
 pub struct Options {
-    /// How λ is chosen where it is not given.
+    /// The criterion that chooses λ if it is not given.
     pub criterion: Criterion,
-    /// How much residuals count.
+    /// The loss function.
     pub loss: Loss,
     /// The solver.
     pub tier: Tier,
-    /// What happens at the ends.
+    /// The end conditions.
     pub ends: Ends,
-    /// The step that ends the search, in standard deviations of the points.
+    /// The iteration ends when a step is below this number of standard deviations of the points.
     pub tol: f64,
-    /// Iterations at most.
+    /// Maximum number of iterations.
     pub max_iter: usize,
-    /// Whether a larger λ than the criterion asks for is tried where no spline joins the points that were reached.
+    /// Whether a larger λ than the criterion chooses is tried if no spline joins the smoothed points.
     pub raise_lam: bool,
 }
 
-/// How a curve ended.
+/// The final state of a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
-    /// Not yet.
+    /// The iteration has not ended.
     #[default]
     Running,
-    /// The step is small beside the standard deviations.
+    /// The last step is small compared with the standard deviations.
     Converged,
-    /// It is not.
+    /// The last step is not small.
     Unconverged,
-    /// λ went on moving.
+    /// λ did not converge.
     Unsettled,
-    /// No spline goes through the points that were reached.
+    /// No spline joins the smoothed points.
     NoCurve,
-    /// The data do not determine the curve: without λ every knot needs some beside it.
+    /// The data do not determine the curve: without a given λ every knot needs data near it.
     Undetermined,
 }
 
-/// What is known about a smoothed curve.
+/// The report of a smoothed curve.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Report {
-    /// How it ended.
+    /// The final state.
     pub state: State,
-    /// Fits of a spline.
+    /// The number of spline fits.
     pub iterations: usize,
-    /// Rounds in which λ was chosen.
+    /// The number of rounds in which λ was chosen.
     pub rounds: usize,
     /// λ.
     pub lam: f64,
-    /// λ of the flat problem of the pseudo-data, see [`Loss`]; the same for least squares.
+    /// λ of the linearised problem of the pseudo-data, see [`Loss`]; the same as `lam` for least squares.
     pub band_lam: f64,
-    /// Whether λ lies at the bound of what is sensible: a geodesic, or the data themselves.
+    /// Whether λ lies at a bound of its range: the curve is a geodesic, or interpolates the data.
     pub at_bound: bool,
-    /// Degrees of freedom of a coordinate.
+    /// Degrees of freedom per coordinate.
     pub freedom: f64,
     /// Estimated standard deviation of the noise in a coordinate, at weight one.
     pub sigma: f64,
@@ -167,9 +167,9 @@ pub struct Smooth {
     pub points: Vec<f64>,
     /// Velocities at the knots.
     pub velocities: Vec<f64>,
-    /// The band of A⁻¹, see [`variance`](crate::variance): four numbers a coefficient. Open curves have as many as knots, closed ones two
-    /// more.
+    /// The band of A⁻¹, see [`variance`](crate::variance): four numbers per coefficient. Open curves have as many
+    /// coefficients as knots, closed curves two more.
     pub inverse: Vec<f64>,
-    /// How it went.
+    /// The report.
     pub report: Report,
 }

@@ -1,4 +1,4 @@
-//! How the search for a curve goes: its λ, its steps, and when it ends.
+//! The state of the iteration for one curve: its λ, its steps, and its end.
 
 use crate::banded::Banded;
 use crate::choice::Linear;
@@ -7,52 +7,52 @@ use crate::problem::{Criterion, Report, Tier};
 use crate::robust::{Lam, ROUGH_ROUNDS, Robust, Stage};
 use symspline_core::space::{Erased, Origin};
 
-/// Contraction of the linearised solver, known or expected, from which it takes curvature into its matrix, or full
-/// Gauss–Newton takes over.
+/// The contraction of the linearised solver, measured or expected, from which it includes curvature in its matrix, or
+/// full Gauss–Newton replaces it.
 const SLOW: f64 = 0.5;
-/// The same while λ and the curve are still rough guesses.
+/// The same limit while λ and the curve are still inaccurate.
 const HOPELESS: f64 = 2.0;
-/// Dimension up to which full Gauss–Newton is chosen automatically.
+/// The largest dimension in which full Gauss–Newton is chosen automatically.
 const LARGE: usize = 64;
-/// λ moves by less than this between rounds when it is settled, in natural logarithms.
+/// λ has converged if it changes by less than this between rounds, in natural logarithms.
 const SETTLED: f64 = 3e-3;
-/// λ that still moves by more after the last round was not found.
+/// λ has not been found if it changes by more than this after the last round.
 const UNSETTLED: f64 = 0.7;
-/// Rounds of choosing λ, at most.
+/// The maximum number of rounds that choose λ.
 const ROUNDS: usize = 12;
 
-/// λ, and how the search goes.
+/// λ and the state of the iteration.
 pub struct Progress {
-    /// λ, with times divided by the mean knot spacing; known once it was given or chosen.
+    /// λ, for times divided by the mean knot spacing, once it is given or chosen.
     pub lam: Option<f64>,
     /// Whether it is final.
     pub settled: bool,
-    /// How long the last step was.
+    /// The length of the last step.
     pub last_step: f64,
-    /// The last step, unless it was lengthened.
+    /// The last step, unless it was extrapolated.
     last: Vec<f64>,
-    /// The size of residuals, by which steps are judged.
+    /// The size of residuals, the scale of steps.
     scale: f64,
-    /// Iterations in a row in which the step hardly shrank.
+    /// The number of consecutive iterations in which the step hardly decreased.
     pub slow: usize,
-    /// Whether curvature is in the matrix of the linearised solver.
+    /// Whether the matrix of the linearised solver includes curvature.
     pub with_curvature: bool,
-    /// Whether the search for λ came to no end.
+    /// Whether the search for λ failed to converge.
     pub unsettled: bool,
-    /// Whether the linearised solver was given up.
+    /// Whether the linearised solver was abandoned.
     pub forced: bool,
-    /// The smallest λ that may be chosen: with smaller ones no spline joined the points.
+    /// The smallest λ that may be chosen, because no spline joined the points of smaller ones.
     pub least: f64,
-    /// Iterations before this stage of the fit.
+    /// The number of iterations before this stage of the fit.
     pub begun: usize,
     density: f64,
-    /// What is known so far.
+    /// The report so far.
     pub report: Report,
 }
 
 impl Progress {
-    /// To a given λ, unless that is too large, or one to be chosen. `density` is the weight of a knot where there is
-    /// little.
+    /// For a given λ, unless it is too large, or for a λ to be chosen. `density` is the weight per knot where data
+    /// are sparse.
     pub fn new(lam: Option<f64>, stiffest: f64, density: f64) -> Self {
         let report = Report { at_bound: lam.is_some_and(|lam| lam > stiffest), ..Report::default() };
         Progress {
@@ -72,9 +72,11 @@ impl Progress {
         }
     }
 
-    /// How far to go along a step if steps shrink slowly in one direction: the limit of their geometric series (Aitken).
+    /// The factor by which a step is extended if steps shrink slowly in one direction: the limit of their geometric
+    /// series (Aitken).
     ///
-    /// Steps of reweighted least squares shrink steadily, if slowly; others that do not shrink are to be given up.
+    /// Steps of reweighted least squares shrink steadily but slowly. Other iterations whose steps do not shrink are
+    /// abandoned.
     pub fn further(&mut self, step: &[f64], reweighs: bool) -> f64 {
         let most = if reweighs { 0.99 } else { 0.9 };
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -87,7 +89,7 @@ impl Progress {
         1.0
     }
 
-    /// Begins with another problem, and perhaps another λ.
+    /// Starts with another problem, and possibly another λ.
     pub fn restart(&mut self, lam: Lam) {
         (self.last_step, self.slow, self.begun) = (f64::INFINITY, 0, self.report.iterations);
         self.last.clear();
@@ -110,11 +112,12 @@ impl Progress {
 
     /// Whether full Gauss–Newton is allowed.
     pub fn may_take_gauss_newton(&self, space: &Erased, tier: Tier) -> bool {
-        // In flat space the linearised solver is full Gauss–Newton, whose blocks have a limit elsewhere.
+        // In flat space the linearised solver equals full Gauss–Newton, whose dense blocks would limit the dimension.
         tier == Tier::Auto && space.curvature() != 0.0 && space.dim() <= LARGE
     }
 
-    /// λ at a curve: a better one, unless it is given or settled, and the expected step of the linearised solver.
+    /// Updates λ at a curve, unless it is given or has converged, and the expected contraction of the linearised
+    /// solver.
     pub fn weigh(
         &mut self,
         space: &Erased,
@@ -139,7 +142,7 @@ impl Progress {
         }
         self.report.rounds += 1;
         let moved = self.lam.map_or(f64::INFINITY, |before| (lam / before).ln().abs());
-        // What goes to and fro meets half way.
+        // If λ oscillates, the mean is used.
         if let Some(before) = self.lam.filter(|_| self.report.rounds > ROUNDS / 2 && !at_bound) {
             lam = (lam * before).sqrt();
         }
@@ -149,41 +152,41 @@ impl Progress {
         self.lam = Some(lam);
     }
 
-    /// The expected contraction of the linearised solver without curvature in its matrix: `K²|γ'|²√(λ/w)`, with the mean
-    /// squared speed and w the weight per time, where there is little.
+    /// The expected contraction of the linearised solver without curvature in its matrix: `K²|γ'|²√(λ/w)`, with the
+    /// mean squared speed and the weight w per time where data are sparse.
     fn expect(&mut self, space: &Erased, speeds: &[f64], lam: f64) {
         let m = space.dim();
         let knots = speeds.len() / m;
         let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
-        // Groups without a metric have no K.
+        // Groups without a metric have no curvature bound K.
         let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
         self.report.kappa = k * k * square * (lam / self.density).sqrt();
         self.with_curvature |=
             self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
     }
 
-    /// λ, degrees of freedom and noise of the curve as it is.
+    /// Records λ, degrees of freedom and noise of the present curve.
     ///
-    /// `softness` is the slope of a robust loss: λ of its pseudo-data is that of the curve over it.
+    /// `softness` is the slope of a robust loss: λ of its pseudo-data is λ of the curve divided by it.
     pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
         let Linear { linearized, m, misfit, .. } = linear;
         let (count, rss) = (misfit.count(*m), misfit.rss_now(*m));
         let unit = linearized.basis.spacing.powi(3);
         let freedom = misfit.freedom(linearized, inverse).as_array()[0];
-        // Where λ hardly matters, as for a geodesic, its best value wanders.
+        // If λ hardly affects the curve, as for a geodesic, its best value fluctuates.
         self.settled |= self.report.rounds > 1 && (freedom - self.report.freedom).abs() < SETTLED * freedom;
         self.report.freedom = freedom;
         self.report.lam = lam * softness * unit;
         self.report.band_lam = lam * unit;
-        // A curve through all data says nothing of noise.
+        // A curve that interpolates the data has no residuals to estimate the noise from.
         let left = count - freedom;
         self.report.sigma = if left > 1e-9 * count { (rss / (*m as f64 * left)).sqrt() } else { f64::NAN };
         self.scale = (rss / (*m as f64 * left.max(1.0))).sqrt();
     }
 
-    /// Whether a step is small beside the standard deviations of the points.
+    /// Whether a step is small compared with the standard deviations of the points.
     pub fn judge(&mut self, step: &[f64], deviations: &[f64], reach: f64, tol: f64, reweighs: bool) -> bool {
-        /// Steps that are this part of the path, and no longer shrink, are rounding.
+        /// Steps below this fraction of the path that no longer shrink are rounding errors.
         const FLOOR: f64 = 1e-8;
         const STILL: f64 = 1e-13;
         let lengths: Vec<f64> = step.chunks_exact(step.len() / deviations.len()).map(length).collect();
@@ -192,13 +195,13 @@ impl Progress {
         let rate = longest / self.last_step;
         if self.last_step.is_finite() {
             self.report.rate = rate;
-            // Steps of new λ or new weights are no contraction; but they do not grow.
+            // Steps after a change of λ or of weights do not measure the contraction, but they must not grow.
             let slow = rate > if self.settled && !reweighs { SLOW } else { 1.0 };
             self.slow = if slow { self.slow + 1 } else { 0 };
         }
         self.last_step = longest;
         self.report.step = relative;
-        // Squares that are too large or too small for doubles say nothing.
+        // Squares that overflow or underflow are not informative.
         let known = self.scale.is_finite() && (longest > 0.0 || step.iter().all(|x| *x == 0.0));
         known && (relative <= tol || longest <= STILL * reach || (longest <= FLOOR * reach && rate > SLOW))
     }

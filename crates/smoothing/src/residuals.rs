@@ -11,22 +11,22 @@ use symspline_core::space::{Ambient, Erased, Origin};
 
 /// The data relative to the curve.
 pub struct Residuals<'a> {
-    /// Points of the curve at their times.
+    /// Points of the curve at the times of the data.
     pub gammas: Vec<f64>,
     /// `log_γ y`.
     pub vectors: Vec<f64>,
-    /// Squares of the distances.
+    /// Squared distances.
     pub distances: Vec<f64>,
-    /// Where weights are matrices: the frames of the data, transported to the curve.
+    /// The frames of the data, transported to the curve, for information matrices.
     pub transported: Option<Vec<f64>>,
-    /// Squares of the distances, weighed.
+    /// Weighted squared distances.
     pub squares: Vec<f64>,
     /// Residuals in the frames of the knots.
     pub misfit: Misfit<'a>,
 }
 
 impl<'a> Residuals<'a> {
-    /// From a curve.
+    /// Computes the residuals at a curve.
     pub fn new(
         space: &Erased,
         path: &Path,

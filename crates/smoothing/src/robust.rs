@@ -1,79 +1,80 @@
 //! The stages of a fit with a robust loss.
 //!
-//! Choosing λ by cross-validation while outliers still shape the curve and the noise level often fails: the level and λ
-//! collapse together. So λ is chosen on data without outliers, and the M-estimator is solved with that λ:
+//! Choosing λ by cross-validation while outliers still influence the curve and the noise level often fails: the level
+//! and λ decrease to zero together. Therefore λ is chosen from data without outliers, and the M-estimator is computed
+//! with that λ:
 //!
 //! 1. *Rough*: iteratively reweighted least squares (Holland & Welsch 1977), the noise level from the median
 //!    deviation of data from their neighbours, λ by cross-validation of the weighted data in the first rounds only.
-//! 2. *Trimmed*: least squares without the data beyond the 99 % quantile of the noise, with λ by the criterion that
-//!    was asked for; repeated with the noise level that results until the same data are left out.
+//! 2. *Trimmed*: least squares without the data beyond the 99 % quantile of the noise, with λ by the requested
+//!    criterion; repeated with the resulting noise level until the selection of data does not change.
 //! 3. *Final*: reweighted least squares with that λ, times the mean weight, and that noise level.
 //!
-//! With a given λ the second stage is only the noise beside the rough curve.
+//! If λ is given, the second stage only estimates the noise from the rough curve.
 
 use crate::chi;
 use crate::loss;
 use crate::problem::{Criterion, Loss};
 
-/// Rounds in which λ is chosen in the first stage.
+/// The number of rounds that choose λ in the first stage.
 pub const ROUGH_ROUNDS: usize = 6;
-/// Iterations of the first stage, at most: it need not converge.
+/// The maximum number of iterations of the first stage, which need not converge.
 const ROUGH_STEPS: usize = 20;
-/// Iterations of the last stage, in multiples of those that were asked for: reweighted least squares converge linearly,
-/// and slowly where a datum is near the corner of Huber's loss.
+/// The maximum number of iterations of the last stage, as a multiple of the requested limit: reweighted least squares
+/// converge linearly, and slowly if a datum is near the corner of Huber's loss.
 const FINAL_STEPS: usize = 20;
-/// Steps, in standard deviations, that end the stages before the last.
+/// The steps, in standard deviations, that end the stages before the last.
 const ROUGH_TOL: f64 = 0.03;
-/// Times that data are left out anew, at most.
+/// The maximum number of times that data are selected again.
 const TRIMS: usize = 4;
-/// Data beyond this quantile of the noise are left out.
+/// Data beyond this quantile of the noise are excluded.
 const KEPT: f64 = 0.99;
 
-/// How far a fit has come.
+/// The stage of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Least squares: all that there is to do.
+    /// Least squares, the only stage of a fit that is not robust.
     Plain,
-    /// The first of a robust fit.
+    /// The first stage of a robust fit.
     Rough,
-    /// The second, for the n-th time.
+    /// The second stage, for the n-th time.
     Trimmed(usize),
-    /// The last.
+    /// The last stage.
     Final,
 }
 
-/// A loss and the noise level that goes with it.
+/// A loss function with its noise level.
 pub struct Robust {
     loss: Loss,
     m: usize,
-    /// Where the fit is.
+    /// The present stage.
     pub stage: Stage,
     /// The standard deviation of the noise in a coordinate.
     sigma: f64,
-    /// Whether it was given.
+    /// Whether the noise level was given.
     known: bool,
-    /// Whether λ is chosen, not given.
+    /// Whether λ is to be chosen.
     chooses: bool,
-    /// Which data the second stage keeps: ones and zeros.
+    /// The data of the second stage: one if included, otherwise zero.
     kept: Vec<f64>,
 }
 
-/// What the next stage does with λ.
+/// How the next stage obtains λ.
 pub enum Lam {
-    /// It stays.
+    /// λ does not change.
     Same,
-    /// It is chosen, from everywhere.
+    /// λ is chosen from its whole range.
     Anew,
-    /// It is chosen near the one that there is.
+    /// λ is chosen near its present value.
     Near,
-    /// It is multiplied by a number.
+    /// λ is multiplied by a number.
     Times(f64),
 }
 
 impl Robust {
     /// For noise of about the standard deviation `sigma`.
     pub fn new(loss: Loss, m: usize, sigma: f64, known: bool, chooses: bool) -> Self {
-        // Where nothing deviates nothing is an outlier.
+        // Without deviations there are no outliers.
         let stage = match loss {
             Loss::Linear => Stage::Plain,
             _ if !(sigma > 0.0) => Stage::Plain,
@@ -83,12 +84,12 @@ impl Robust {
         Robust { loss, m, stage, sigma, known, chooses, kept: Vec::new() }
     }
 
-    /// The residual from which the loss counts less.
+    /// The residual beyond which the loss grows more slowly.
     fn corner(&self) -> f64 {
         self.sigma * self.loss.corner(self.m)
     }
 
-    /// By what the weights of data are multiplied, given their weighed squared distances; None for one.
+    /// The factors of the weights of the data, given their weighted squared distances; None for one.
     pub fn factors(&self, squares: &[f64]) -> Option<Vec<f64>> {
         match self.stage {
             Stage::Plain => None,
@@ -102,7 +103,7 @@ impl Robust {
         squares.iter().map(|square| self.loss.weight(square / (corner * corner))).collect()
     }
 
-    /// What a datum adds to the objective.
+    /// The contribution of a datum to the objective.
     pub fn value(&self, square: f64, datum: usize) -> f64 {
         match self.stage {
             Stage::Plain => square,
@@ -116,7 +117,7 @@ impl Robust {
         self.loss.pseudo(self.corner(), squares, self.m)
     }
 
-    /// How λ is chosen now.
+    /// How λ is chosen in this stage.
     pub fn criterion(&self, asked: Criterion) -> Criterion {
         if self.stage == Stage::Rough { Criterion::Gcv { gamma: 1.4 } } else { asked }
     }
@@ -129,7 +130,7 @@ impl Robust {
         }
     }
 
-    /// Iterations of the stage, at most.
+    /// The maximum number of iterations of the stage.
     pub fn most(&self, asked: usize) -> usize {
         match self.stage {
             Stage::Rough => asked.min(ROUGH_STEPS),
@@ -138,17 +139,17 @@ impl Robust {
         }
     }
 
-    /// Whether steps shrink at a rate that says nothing of the solver, but of the weights.
+    /// Whether the rate of the steps is that of the weights, not of the solver.
     pub fn reweighs(&self) -> bool {
         matches!(self.stage, Stage::Rough | Stage::Final)
     }
 
-    /// Whether there is no other stage.
+    /// Whether this is the last stage.
     pub fn last(&self) -> bool {
         matches!(self.stage, Stage::Plain | Stage::Final)
     }
 
-    /// Goes on from a curve with so many degrees of freedom, given the weighed squared distances of the data.
+    /// Starts the next stage from a curve with given degrees of freedom and weighted squared distances of the data.
     pub fn next(&mut self, squares: &[f64], freedom: f64) -> Lam {
         match self.stage {
             Stage::Plain | Stage::Final => Lam::Same,
@@ -191,8 +192,8 @@ impl Robust {
         squares.iter().map(|square| f64::from(*square <= limit)).collect()
     }
 
-    /// The standard deviation of the noise from the residuals of the data that were kept: normal noise within a
-    /// quantile q has the variance `P(χ²_{m+2} < q)/P(χ²_m < q)`.
+    /// The standard deviation of the noise from the residuals of the included data: normal noise within a quantile q
+    /// has the variance `P(χ²_{m+2} < q)/P(χ²_m < q)`.
     fn beside_kept(&self, squares: &[f64], freedom: f64) -> f64 {
         let kept = &self.kept;
         let sum: f64 = squares.iter().zip(kept).map(|(square, kept)| square * kept).sum();

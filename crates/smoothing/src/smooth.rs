@@ -1,4 +1,4 @@
-//! Many curves at a time: those that are not done go one step on together.
+//! Smoothing of many curves at a time: every iteration advances all curves that have not converged.
 
 use crate::curve_fit::CurveFit;
 use crate::information;
@@ -14,14 +14,15 @@ use symspline_core::monitor::Monitor;
 use symspline_core::parallel;
 use symspline_core::space::{Ambient, Erased, Origin};
 
-/// Where that is not enough for a spline a shorter step is better than a longer search...
+/// The maximum number of iterations of an intermediate fit. If it does not converge, a shorter step is better than
+/// more iterations ...
 const FIT: FitOptions = FitOptions { method: Method::Auto, tol: 1e-12, max_iter: Some(200) };
-/// ... but where the step is already short.
+/// ... unless the step is already short.
 const LONG_FIT: FitOptions = FitOptions { max_iter: None, ..FIT };
-/// The C² residual of a spline that will do on the way.
+/// The C² residual that suffices for an intermediate spline.
 const ENOUGH: f64 = 1e-8;
 const NATURAL: FitEnds<'static> = FitEnds::Open([End::Natural; 2]);
-/// Knots times dimensions from which threads pay.
+/// Knots times dimensions from which several threads are faster.
 const PARALLEL: usize = 4096;
 
 /// Smooths curves; they are independent of each other.
@@ -33,7 +34,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
     let mut tracks: Vec<Option<CurveFit>> = data.iter().map(|_| None).collect();
     start(space, data, options, monitor, &mut beginnings, &mut tracks);
     while !monitor.cancelled() {
-        // Where no spline joins the points to begin with the next beginning is smoother.
+        // If no spline joins the initial points, smoother initial points are tried.
         for track in &mut tracks {
             track.take_if(|track| track.report().state == State::NoCurve && track.report().iterations == 0);
         }
@@ -94,7 +95,7 @@ fn fit_tracks(
     fit_all(space, curves, options.ends.of_fit(&ends), how, monitor)
 }
 
-/// The velocities of the splines through points, where there are such splines.
+/// The velocities of the splines through the points, where such splines exist.
 fn fit_all<'a>(
     space: &Erased,
     curves: impl Iterator<Item = (&'a [f64], &'a [f64])>,
@@ -111,23 +112,24 @@ fn fit_all<'a>(
     }
     let mut velocities = vec![0.0; points.len()];
     let problem = Problem { t: &t, shared: false, points: &points, offsets: &offsets, ends };
-    // Those who watch count curves, not the fits on the way to them.
+    // Progress counts curves, not intermediate fits.
     let silent = |_| !monitor.poll();
     let reports = fit(space, &problem, how, &Monitor::new(&silent), &mut velocities);
     let own = |c: usize| velocities[offsets[c] * len..offsets[c + 1] * len].to_vec();
-    // Knots that nearly coincide leave a residual of rounding that is more than the tolerance, and harmless beside noise.
+    // Knots that nearly coincide leave a residual of rounding errors. It exceeds the tolerance, but is small compared
+    // with noise.
     let fitted = |r: &Report| {
         r.status == Status::Converged || (r.status == Status::Unconverged && r.residual < ENOUGH)
     };
     reports.iter().enumerate().map(|(c, r)| fitted(r).then(|| own(c))).collect()
 }
 
-/// What a curve may begin with.
+/// Initial curves of the iteration.
 #[derive(Default)]
 struct Beginning {
-    /// Means of its data, the best last.
+    /// Means of the data, the best last.
     levels: Vec<Level>,
-    /// For a robust loss: about the standard deviation of the noise.
+    /// For a robust loss: an estimate of the standard deviation of the noise.
     sigma: f64,
 }
 
@@ -143,7 +145,7 @@ fn beginnings(
         let weights = if data.information.is_empty() {
             data.weights.to_vec()
         } else {
-            // Here a point is one, and as good as its directions on average.
+            // A point is one observation here, with the average weight of its directions.
             information::roots(data.information, space.dim()).iter().map(|root| root.weight).collect()
         };
         let data = Data { weights: &weights, ..*data };
@@ -155,7 +157,7 @@ fn beginnings(
         };
         found.levels = match options.ends {
             Ends::Open(_) => levels(space, &times, &points, &weights),
-            // A turn before and one behind, so that the beginning closes.
+            // One period before and one after, so that the initial curve closes.
             Ends::Periodic => {
                 let period = data.knots[data.knots.len() - 1] - data.knots[0];
                 let turns = |x: f64| move |t: &f64| t + x * period;
@@ -169,8 +171,8 @@ fn beginnings(
     all
 }
 
-/// Curves to begin with for those that have none; none where even the geodesic between the first and the last mean does
-/// not exist.
+/// Initial curves for the curves without one; none if even the geodesic between the first and the last mean does not
+/// exist.
 fn start<'a>(
     space: &Erased,
     data: &[Data<'a>],
@@ -204,7 +206,7 @@ fn start<'a>(
     }
 }
 
-/// Points of a curve, which goes on straight beyond its ends.
+/// Points of a curve, continued by geodesics beyond its ends.
 fn prolonged(space: &Erased, path: &Path, times: &[f64]) -> Vec<f64> {
     let len = space.point_len();
     let last = path.t.len() - 1;

@@ -1,8 +1,8 @@
-//! Where the search begins: means of neighbours.
+//! Initial curves: means of neighbouring data.
 //!
-//! A pyramid of weighted means of pairs: noise shrinks from level to level and motion grows. The level whose neighbours
-//! are nearest to each other is taken, and the spline through its points. (From the data themselves the search fails
-//! where noise is large.)
+//! A pyramid of weighted means of pairs: noise decreases from level to level, and distances due to motion increase.
+//! The level whose neighbours are closest to each other provides the points of the initial spline. (The iteration
+//! often fails from the data themselves if the noise is large.)
 
 use crate::frames::lanes_of;
 use symspline_core::scalar::{LANES, Lane, gather, scatter};
@@ -18,7 +18,7 @@ pub struct Level {
     weights: Vec<f64>,
 }
 
-/// The levels for some data, the best first, and then coarser ones. The last has two points.
+/// The levels for given data, the best first, and then coarser ones. The last has two points.
 pub fn levels(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) -> Vec<Level> {
     let mut level = Level { times: times.to_vec(), points: points.to_vec(), weights: weights.to_vec() };
     while level.times.windows(2).any(|t| t[0] == t[1]) {
@@ -40,10 +40,10 @@ pub fn levels(space: &Erased, times: &[f64], points: &[f64], weights: &[f64]) ->
 }
 
 impl Level {
-    /// Joins neighbours that are much nearer in time than others: a spline through noisy points at nearly one time has
-    /// velocities that lead far away.
+    /// Joins neighbours that are much closer in time than others: a spline through noisy points at nearly equal times
+    /// has large velocities.
     fn apart(mut self, space: &Erased) -> Level {
-        /// The least distance, over the mean.
+        /// The smallest distance in time, divided by the mean.
         const NEAR: f64 = 0.1;
         loop {
             let last = self.times.len() - 1;
@@ -56,7 +56,7 @@ impl Level {
         }
     }
 
-    /// Takes the mean of pairs, from the first on, where `join` says so. Data without weight say nothing.
+    /// Replaces pairs by their means, from the first one on, where `join` is true. Data without weight are ignored.
     fn paired(&self, space: &Erased, join: impl Fn(&Level, usize) -> bool) -> Level {
         let len = space.point_len();
         let count = self.times.len();
@@ -67,7 +67,7 @@ impl Level {
             pairs.push((i, if both { i + 1 } else { i }));
             i += if both { 2 } else { 1 };
         }
-        // What an odd number leaves over goes with its neighbour next time.
+        // If the number is odd, the remaining point is joined at the next level.
         let part = |(a, b): (usize, usize)| {
             let (v, w) = (self.weights[a], self.weights[b]);
             if v + w > 0.0 { w / (v + w) } else { 0.5 }
@@ -82,7 +82,7 @@ impl Level {
             let t = Lane::new(at.map(part));
             space.ray(&p, &v, t, &mut mean);
             space.project(&mut mean);
-            // Opposite points have no mean: the first stands for both.
+            // Antipodal points have no mean; the first one is used.
             let near = angle.simd_lt(below(space.cut_angle()));
             mean.iter_mut().zip(&p).for_each(|(x, p)| *x = near.select(*x, *p));
             scatter(&mean, out);

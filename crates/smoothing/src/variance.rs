@@ -9,7 +9,7 @@ use symspline_core::scalar::lane;
 
 const BAND: usize = WIDTH + 1;
 
-/// The rows of the band of A⁻¹ as plain numbers, four a coefficient.
+/// The rows of the band of A⁻¹ as plain numbers, four per coefficient.
 pub fn rows_of(inverse: &Banded) -> Vec<f64> {
     let entry = |at: usize| {
         let (i, d) = (at / BAND, at % BAND);
@@ -18,8 +18,8 @@ pub fn rows_of(inverse: &Banded) -> Vec<f64> {
     (0..inverse.size * BAND).map(entry).collect()
 }
 
-/// The variance of a coordinate at some times, at noise of variance one: of the point (`nu` = 0) or of the velocity
-/// (1). Beyond the ends the curve goes on straight.
+/// The variance of a coordinate at given times, for noise of variance one: of the point (`nu` = 0) or of the velocity
+/// (1). Beyond its ends the curve continues as a geodesic.
 ///
 /// The points at the knots have the covariance PA⁻¹Pᵀ. An integrated Wiener process through given points has velocities
 /// there with the inverse covariance λT, `vᵀTv` being the part of ∫ x''² in them; and between two knots whose points and
@@ -38,7 +38,7 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
         let (segment, s) = positions(knots, &[near])[0];
         let (h, beyond) = (knots[segment + 1] - knots[segment], t - near);
         let mut row = basis.row(segment, s, nu);
-        // What the velocities at the two knots do: cubic Hermite functions.
+        // The contribution of the velocities at the two knots: cubic Hermite functions.
         let mut hermite = match nu {
             0 => [h * s * (1.0 - s) * (1.0 - s), h * s * s * (s - 1.0)],
             _ => [(1.0 - s) * (1.0 - 3.0 * s), s * (3.0 * s - 2.0)],
@@ -65,8 +65,8 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
     times.iter().map(one).collect()
 }
 
-/// The band of T⁻¹, where vᵀTv is the part of ∫ x''² in the velocities at knots: `4(v₀² + v₀v₁ + v₁²)/h` a segment. Given
-/// velocities vary as little as makes no difference.
+/// The band of T⁻¹, where vᵀTv is the contribution of the velocities at knots to ∫ x''²: `4(v₀² + v₀v₁ + v₁²)/h` per
+/// segment. Prescribed velocities get a negligible variance.
 fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
     const FIXED: f64 = 1e12;
     let last = knots.len() - 1;
@@ -81,7 +81,7 @@ fn velocities_given_points(knots: &[f64], ends: Ends) -> Banded {
         let fixed = if (i == 0 && given(0)) || (i == last && given(1)) { FIXED } else { 1.0 };
         lane(4.0 * fixed * (left.unwrap_or(0.0) + right.unwrap_or(0.0)))
     });
-    // The last velocity of a closed curve is the first.
+    // The last velocity of a closed curve equals the first.
     let periodic = (ends == Ends::Periodic).then(|| PeriodicCorrection::plain(1, 1));
     Factored::new(t, periodic.as_ref()).inverse_band()
 }

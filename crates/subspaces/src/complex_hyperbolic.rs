@@ -36,9 +36,9 @@ fn form<S: Scalar>(z: &Vector<S>, w: &Vector<S>) -> Vector<S> {
     flipped.adjoint_times(w)
 }
 
-/// What is orthogonal to p.
+/// The component orthogonal to p.
 fn horizontal<S: Scalar>(p: &Vector<S>, x: &Vector<S>) -> Vector<S> {
-    // Twice, because the first time leaves rounding errors of what is removed.
+    // Twice, because the first projection leaves rounding errors of the removed component.
     let once = x + &p.times(&form(p, x));
     &once + &p.times(&form(p, &once))
 }
@@ -57,7 +57,7 @@ impl Model for ComplexHyperbolic {
         f64::INFINITY
     }
     fn longest_handle(&self) -> f64 {
-        18.0 // ε cosh²(18) ≈ 1: of points this far apart rounding leaves nothing.
+        18.0 // ε cosh²(18) ≈ 1: results for points this far apart are rounding errors.
     }
     fn dim(&self) -> usize {
         2 * self.n
@@ -100,7 +100,7 @@ impl Model for ComplexHyperbolic {
         let f = theta_over_sin(versine, || lane(2.0) - versine.value());
         let log = rest.times_adjoint(&top).times_scalar(f);
         log.write(v);
-        log.size() // any number: there is no cut locus
+        log.size() // Any number is valid, because there is no cut locus.
     }
     fn transvect<S: Scalar>(&self, p: &[S], v: &[S], x: &mut [S]) {
         let (p, v) = (read(p), read(v));
@@ -122,17 +122,17 @@ impl Model for ComplexHyperbolic {
     }
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
         let (p, d) = (read(gamma), read(d));
-        let turn = d.times(&form(&p, &d)).scaled(lane(2.0)); // what the phase of the array does
+        let turn = d.times(&form(&p, &d)).scaled(lane(2.0)); // The effect of the phase of the array.
         horizontal(&p, &(&read(dd) + &turn)).write(dd);
     }
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
         form(&read(u), &read(v))[(0, 0)][0]
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
-        // |x₀| is √(1 + Σ|xᵢ|²) in a point.
+        // In a point |x₀| is √(1 + Σ|xᵢ|²).
         let [size, height] = [dot(&x[..2], &x[..2]), dot(&x[2..], &x[2..]) + Lane::ONE].each(|x| x.sqrt());
         let off = (size - height).abs() / height;
-        // What is a point up to rounding stays as it is.
+        // Points that are accurate to rounding do not change.
         let scale = off.simd_le(lane(4.0 * f64::EPSILON)).select(Lane::ONE, height / size);
         x[..2].iter_mut().for_each(|x| *x *= scale);
         off

@@ -54,13 +54,13 @@ impl<const D: usize> Subspaces<D> {
         self.k.saturating_mul(self.n)
     }
 
-    /// The same with matrices that are stored in another way.
+    /// The same with matrices in another storage.
     pub fn stored<A: Storage>(self) -> Subspaces<D, A> {
         Subspaces { k: self.k, n: self.n, lines: self.lines, storage: PhantomData }
     }
 }
 
-/// Up to this n frames are orthonormalised at every step, larger ones from time to time.
+/// Up to this n, frames are orthonormalised at every step; larger ones after several steps.
 const SMALL: usize = 16;
 
 /// s and k of [`trig`], and c − 1, for a tangent vector.
@@ -77,7 +77,7 @@ impl<S: Scalar, const D: usize, A: Storage> Rotation<S, D, A> {
         Rotation { s, k, versed }
     }
 
-    /// E(±Δ) of a point or vector, by what it is along X and along Δ.
+    /// E(±Δ) of a point or vector, from its components along X and along Δ.
     ///
     /// `E_X(Δ)Z = Z + X((c−1)X*Z − sΔ*Z) + Δ(sX*Z + kΔ*Z)`: the two factors behind X and Δ.
     fn act(&self, along_x: &Matrix<S, D, A>, along_delta: &Matrix<S, D, A>) -> [Matrix<S, D, A>; 2] {
@@ -88,12 +88,12 @@ impl<S: Scalar, const D: usize, A: Storage> Rotation<S, D, A> {
     }
 }
 
-/// What is orthogonal to the columns of Y.
+/// The component orthogonal to the columns of Y.
 fn horizontal<S: Scalar, const D: usize, A: Storage>(
     y: &Matrix<S, D, A>,
     x: &Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
-    // Twice, because the first time leaves rounding errors of what is removed.
+    // Twice, because the first projection leaves rounding errors of the removed component.
     let once = x - &y.times(&y.adjoint_times(x));
     &once - &y.times(&y.adjoint_times(&once))
 }
@@ -107,7 +107,7 @@ impl<const D: usize, A: Storage> Subspaces<D, A> {
         Matrix::read(self.n - self.k, self.k, x)
     }
 
-    /// X c(t²G) + Δ t s(t²G) with G = Δ*Δ, and its derivatives in t, as many as are asked for.
+    /// X c(t²G) + Δ t s(t²G) with G = Δ*Δ, with the derivatives in t that t has.
     fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let (x, delta) = (self.read(p), self.read(v));
         let g = delta.adjoint_times(&delta);
@@ -172,8 +172,8 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         if !length.is_nan().any() {
             return length;
         }
-        // At the cut locus itself the logarithm has no direction, but there are angles. Beside a right one the others
-        // need no digits where they are small.
+        // At the cut locus the logarithm has no direction, but angles exist. Beside a right angle, small angles need
+        // not be accurate.
         let mut cosines = self.read::<Lane>(q).adjoint_times(&self.read(p));
         orthogonalize(&mut cosines, None);
         let squares = (0..self.k).fold(Lane::ZERO, |sum, j| {
@@ -199,7 +199,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
     }
     fn parallel_transport(&self, p: &[Lane], q: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         self.transvect(p, v, x, out);
-        // E_p(v) lives at the representative E p; at q it is E(v)x (E p)*q.
+        // The result of E_p(v) is at the representative E p; at q it is E(v)x (E p)*q.
         let (p, delta) = (self.read(p), self.read(v));
         let Rotation { s, versed, .. } = Rotation::of(&delta.adjoint_times(&delta));
         let there = &(&p + &p.times(&versed)) + &delta.times(&s);
@@ -209,7 +209,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         horizontal(&self.read(gamma), &self.read(d)).write(d);
     }
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
-        // (1 − YY*)(Y'' − 2Y'(Y*Y')), where d is Y' itself: of its horizontal part Y*d is zero.
+        // (1 − YY*)(Y'' − 2Y'(Y*Y')), where d is Y' itself; for its horizontal component Y*d is zero.
         let (y, d) = (self.read(gamma), self.read(d));
         let turn = d.times(&y.adjoint_times(&d)).scaled(lane(2.0));
         horizontal(&y, &(&self.read(dd) - &turn)).write(dd);
@@ -224,7 +224,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         if rounding.all() {
             return off;
         }
-        // The nearest orthonormal columns are of the same span.
+        // The nearest orthonormal columns have the same span.
         let nearest = polar(&y, off);
         symspline_core::matrix::Select::select(rounding, y, nearest).write(x);
         off
@@ -258,8 +258,8 @@ impl<const D: usize, A: Storage> Frame for Subspaces<D, A> {
     fn frame_len(&self) -> usize {
         self.n * self.n * D
     }
-    // A frame at p is a unitary matrix whose first k columns span p. They may be another
-    // representative than p: W = X*p turns one into the other.
+    // A frame at p is a unitary matrix whose first k columns span p. They may be another representative than p; W =
+    // X*p converts one to the other.
     fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
         complete(&Matrix::<Lane, D>::read(self.n, self.k, p)).write(frame);
     }
@@ -409,7 +409,7 @@ fn complete<const D: usize, A: Storage>(y: &Matrix<Lane, D, A>) -> Matrix<Lane, 
         let square = (j..n).flat_map(|i| r[(i, j)]).fold(Lane::ZERO, |sum, x| x.mul_add(x, sum));
         let head = r[(j, j)];
         let size = head.iter().fold(Lane::ZERO, |sum, x| x.mul_add(*x, sum)).sqrt();
-        // x − α e with α = −phase(x₀)|x|, so that nothing cancels.
+        // x − α e with α = −phase(x₀)|x|, which avoids cancellation.
         let none = size.simd_eq(Lane::ZERO);
         let factor = none.select(Lane::ZERO, square.sqrt() / size);
         let mut v = Matrix::<Lane, D, A>::zeros(n, 1);

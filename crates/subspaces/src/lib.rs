@@ -42,7 +42,7 @@ pub static FAMILY: &[Entry] = &[
     },
 ];
 
-/// A few numbers are kept in registers or nearly.
+/// Storage for few numbers, mostly in registers.
 fn real(space: Result<Subspaces<1>, String>) -> Made {
     let space = space?;
     match space.count() {

@@ -9,9 +9,9 @@ const SERIES: f64 = 0.8;
 
 /// The logarithm at X of a subspace Y, given its part `top = X*Y` and the rest, in any coordinates.
 ///
-/// With M = X*Y and Z = (1 − XX*)Y it is `Z M* f`, f = θ/(sin θ cos θ) of the principal angles, which is
-/// a function of `1 − MM* = sin²θ` and blind to the representative Y. Returns the deciding angle, or a
-/// bound of it below the cut locus.
+/// With M = X*Y and Z = (1 − XX*)Y it is `Z M* f`, f = θ/(sin θ cos θ) of the principal angles, which is a function
+/// of `1 − MM* = sin²θ` and does not depend on the representative Y. Returns the deciding angle, or an upper bound of
+/// it below the cut locus.
 pub fn log_from<S: Scalar, const D: usize, A: Storage>(
     top: &Matrix<S, D, A>,
     rest: &Matrix<S, D, A>,
@@ -39,8 +39,8 @@ pub fn log_from<S: Scalar, const D: usize, A: Storage>(
             return value.map(S::constant);
         }
         let with_derivatives = rest.times(&top.adjoint_times(&arc(&versine)));
-        // Of subspaces that stand still derivatives are zero at the cut locus too, where the function's are not
-        // finite.
+        // If the subspaces do not move, derivatives are zero at the cut locus, too, where those of the function are
+        // not finite.
         let moves = |m: &Matrix<S, D, A>| {
             m.entries().as_flattened().iter().fold(Lane::ZERO, |any, x| {
                 let [_, d, dd] = x.parts();
@@ -75,13 +75,13 @@ fn principal<const D: usize, A: Storage>(
     };
     let mut cosines: Vec<Lane> = (0..k).map(|j| length(&v, j)).collect();
     sort_columns(&mut cosines, &mut [&mut v, &mut u]);
-    // The smallest cosines have the least accurate directions; they come last.
+    // The directions of the smallest cosines are the least accurate; they come last.
     orthonormalize(&mut v);
     let mut z = rest.times(&v);
     let mut angle = Lane::ZERO;
     for j in 0..k {
         let sine = length(&z, j);
-        // At the cut locus itself there is no direction.
+        // At the cut locus the logarithm has no direction.
         let sine_or_one = sine.is_nan().select(Lane::ONE, sine);
         let theta = sine_or_one.atan2(cosines[j]);
         angle = max_or_nan(angle, theta);

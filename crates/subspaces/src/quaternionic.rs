@@ -1,6 +1,6 @@
-//! Quaternionic projective space HPⁿ, the lines of n + 1 quaternions among the planes of C²ⁿ⁺²: with
-//! (a + bi, c + di; −c + di, a − bi) for a quaternion, those planes that j takes to themselves, which is what the
-//! isometry Y ↦ jY leaves where it is (Besse, Manifolds all of whose geodesics are closed, 1978, §3).
+//! Quaternionic projective space HPⁿ: the lines of n + 1 quaternions as planes of C²ⁿ⁺². A quaternion corresponds to
+//! (a + bi, c + di; −c + di, a − bi), and the lines to the planes that j maps to themselves, the fixed points of the
+//! isometry Y ↦ jY (Besse, Manifolds all of whose geodesics are closed, 1978, §3).
 
 use crate::grassmannian::Subspaces;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
@@ -52,7 +52,7 @@ impl Part for QuaternionicProjective {
         SQRT_2
     }
     fn injectivity_radius(&self) -> f64 {
-        // Both principal angles are the same.
+        // Both principal angles are equal.
         SQRT_2 * FRAC_PI_2
     }
     fn widen<S: Scalar>(&self, x: &[S], wide: &mut [S]) {
@@ -76,7 +76,7 @@ impl Part for QuaternionicProjective {
         let c = y.adjoint_times(&j_times(&y));
         j_times(&self.read(v)).times_adjoint(&c).write(image);
     }
-    /// Householder's reflection of quaternions that takes the first axis to the line.
+    /// The Householder reflection of quaternions that maps the first axis to the line.
     fn lift(&self, p: &[Lane], frame: &mut [Lane]) {
         let z = self.read(p).some_cols(0, 1);
         let jz = j_times(&z);
@@ -86,7 +86,7 @@ impl Part for QuaternionicProjective {
         let none = size.simd_eq(Lane::ZERO);
         let factor = none.select(Lane::ZERO, Lane::ONE / size);
         for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            // x + |x|·x₀/|x₀|, so that nothing cancels.
+            // x + |x|·x₀/|x₀|, which avoids cancellation.
             v[(i, j)] = head[(i, j)].each(|x| x.mul_add(factor, x));
             if i == j {
                 v[(i, j)][0] += none.select(Lane::ONE, Lane::ZERO);

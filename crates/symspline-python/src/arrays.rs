@@ -1,14 +1,14 @@
-//! New arrays, and memory that may not be there.
+//! New arrays, and MemoryError in place of an abort if memory is exhausted.
 
 use numpy::{PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
-/// Numbers up to which memory is taken to be there.
+/// Memory for this many numbers is assumed to be available.
 const SMALL: usize = 1 << 16;
 
-/// The numbers of an array that lie in the order of its axes. Others would be read in the order of the memory.
+/// The numbers of a C-contiguous array. Other arrays would be read in the order of memory.
 pub fn in_order<'a>(array: &'a PyReadonlyArrayDyn<f64>) -> PyResult<&'a [f64]> {
     if array.is_c_contiguous() {
         Ok(array.as_slice()?)
@@ -17,20 +17,20 @@ pub fn in_order<'a>(array: &'a PyReadonlyArrayDyn<f64>) -> PyResult<&'a [f64]> {
     }
 }
 
-/// Zeros for a result.
+/// A result array of zeros.
 pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     if shape.iter().product::<usize>() <= SMALL {
         return Ok(PyArrayDyn::zeros(py, shape, false));
     }
-    // NumPy itself raises MemoryError, its bindings panic.
+    // NumPy raises MemoryError; its Rust bindings panic.
     static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let make =
         ZEROS.get_or_try_init(py, || Ok::<_, PyErr>(py.import("numpy")?.getattr("zeros")?.unbind()))?;
     Ok(make.bind(py).call1((shape.to_vec(),))?.cast_into()?)
 }
 
-/// MemoryError unless there is room for about so many numbers, with words for the work that needs them and a remedy. Rust would stop
-/// the process where memory ends.
+/// Raises MemoryError unless memory for about this many numbers is available. `work` describes the computation and a
+/// remedy. Rust would abort the process if memory were exhausted.
 pub fn require_memory(numbers: f64, work: impl FnOnce() -> (String, &'static str)) -> PyResult<()> {
     if numbers <= SMALL as f64 {
         return Ok(());
@@ -47,7 +47,7 @@ pub fn require_memory(numbers: f64, work: impl FnOnce() -> (String, &'static str
     )))
 }
 
-/// Room for so many numbers, or MemoryError where compiled code would stop the process.
+/// Reserves memory for this many numbers, or raises MemoryError where Rust would abort the process.
 pub fn reserve<T>(count: usize) -> PyResult<Vec<T>> {
     let mut vector = Vec::new();
     vector.try_reserve_exact(count).map_err(|_| {

@@ -14,8 +14,8 @@ pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A kind, and the vectors that it prescribes: one per curve.
 pub type EndOf<'py> = (String, Option<Array<'py>>);
 
-/// A fault of one curve: its number in the batch, the kind, the node, the value there, its limit, and for invalid points a
-/// message. `_faults.py` puts the other kinds into words.
+/// A fault of one curve: its number in the batch, the kind, the node, the value there, its limit, and for invalid
+/// points a message. `_faults.py` describes the other kinds.
 pub type Fault = (usize, &'static str, Option<usize>, f64, f64, Option<String>);
 
 /// Curves to fit. Points are contiguous, with the numbers of one point last.
@@ -75,7 +75,7 @@ impl<'a> Curves<'a> {
         self.chosen.as_ref().is_none_or(|chosen| chosen.binary_search(&curve).is_ok())
     }
 
-    /// Masks all curves but those in a list, which are to be fitted, and removes their points.
+    /// Masks all curves except those in a list, and removes their points.
     pub fn keep(&mut self, valid: &[usize], points: &mut Vec<f64>) {
         let len = self.space.point_len();
         let (mut kept, mut start) = (Vec::new(), 0);

@@ -80,8 +80,8 @@ impl Slices<'_> {
         Derivative::new(space, own(self.t), own(self.points), own(self.velocities), &ends)
     }
 
-    /// MemoryError unless there is room for the matrices of the curves that are worked on at once: about fifty
-    /// a knot.
+    /// Raises MemoryError unless memory is available for the matrices of the curves that run at the same time: about
+    /// fifty per knot.
     fn reserve(&self, dim: usize) -> PyResult<()> {
         let at_once = parallel::num_threads().min(self.curves).max(1);
         let knots = self.t.len() / self.curves.max(1) * at_once;
@@ -101,7 +101,7 @@ fn each<T: Send>(items: Vec<(usize, T)>, monitor: &Monitor, work: impl Fn(usize,
     });
 }
 
-/// How curves move: tangent vectors, for changes of points, knots and end vectors (empty for none).
+/// Forward mode: tangent vectors of curves for changes of points, knots and end vectors (empty for none).
 #[pyfunction]
 pub fn push<'py>(
     py: Python<'py>,
@@ -134,7 +134,7 @@ pub fn push<'py>(
     Ok(out)
 }
 
-/// Gradients of Σ cotangent · curve: with respect to points, knots and the vectors at the ends.
+/// Reverse mode: gradients of Σ cotangent · curve with respect to points, knots and the vectors at the ends.
 #[pyfunction]
 pub fn pull<'py>(
     py: Python<'py>,

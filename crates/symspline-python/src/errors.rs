@@ -18,7 +18,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
 
 /// An invalid input of a fit, with the curve and the node.
 pub struct Invalid {
-    /// The number of the curve among those that were given, and of its node.
+    /// The numbers of the curve and of its node.
     pub curve: Option<usize>,
     pub node: Option<usize>,
     pub message: String,
@@ -42,7 +42,7 @@ impl Invalid {
     }
 }
 
-/// The same error, with the number of the factor in which it was found. `_curves/fit.py` names the factor.
+/// The same error, with the number of the factor. `_curves/fit.py` names the factor.
 pub fn in_factor(py: Python, error: PyErr, factor: usize, factors: usize) -> PyErr {
     if factors == 1 {
         return error;
@@ -62,7 +62,7 @@ fn index_of(mut element: usize, shape: &[usize]) -> Vec<usize> {
     index
 }
 
-/// A number for a message: never hundreds of digits.
+/// A number for a message, never with hundreds of digits.
 pub fn number(x: f64) -> String {
     if x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite() {
         format!("{x}")
@@ -71,7 +71,7 @@ pub fn number(x: f64) -> String {
     }
 }
 
-/// The index of an element of an array with a shape, as it is written in Python.
+/// The index of an element in an array with a shape, in Python's notation.
 pub fn format_index(element: usize, shape: &[usize]) -> String {
     let index: Vec<String> = index_of(element, shape).iter().map(usize::to_string).collect();
     index.join(",")

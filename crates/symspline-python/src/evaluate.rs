@@ -16,8 +16,8 @@ use symspline::space::{Ambient, Erased};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Evaluates curves: the result is batch axes + axes of one curve's times + axes of a point (or none), in `out` if that
-/// is given.
+/// Evaluates curves. The result has the batch axes, the axes of the times of one curve and the axes of a point (or
+/// none), and is written to `out` if that is given.
 #[pyfunction]
 #[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, progress=None, out=None))]
 pub fn evaluate<'py>(
@@ -48,8 +48,8 @@ pub fn evaluate<'py>(
     )
 }
 
-/// Evaluates the horizontal lift of curves on a quotient space, and its derivatives, like [`evaluate`]. `knots` are
-/// the factors that [`lift_knots`] finds, `start` those of the representatives to start at, (curves, k, k, 2).
+/// Evaluates the horizontal lift of curves on a quotient space, and its derivatives, like [`evaluate`]. `knots`
+/// contains the factors from [`lift_knots`], and `start` those of the initial representatives, (curves, k, k, 2).
 #[pyfunction]
 #[pyo3(signature = (handle, t, points, velocities, x, quantity, outside, per_curve, knots, start, progress=None))]
 pub fn lift<'py>(
@@ -105,7 +105,8 @@ pub fn lift_knots<'py>(
     Ok(out)
 }
 
-/// Carries one tangent vector of every curve in parallel from its point at one time to that at another.
+/// Transports one tangent vector of every curve in parallel along the curve, from its point at one time to that at
+/// another.
 #[pyfunction]
 pub fn transport<'py>(
     py: Python<'py>,
@@ -131,7 +132,7 @@ pub fn transport<'py>(
     Ok(out)
 }
 
-/// What is computed where.
+/// The arguments of an evaluation.
 struct Evaluation<'a> {
     curves: &'a Curves<'a>,
     times: &'a Times<'a>,
@@ -148,7 +149,7 @@ fn curves_of<'a>([t, points, velocities]: [&'a Array; 3]) -> PyResult<Curves<'a>
     })
 }
 
-/// Reads curves and times, and has a quantity computed for every sample.
+/// Reads curves and times, and computes a quantity for every sample.
 fn sampled<'py>(
     py: Python<'py>,
     handle: &Handle,
@@ -194,7 +195,7 @@ fn sampled<'py>(
     Ok(out)
 }
 
-/// What happens outside the knots, and whether it is an error.
+/// The extrapolation policy, and whether times outside the knots are an error.
 fn policy_named(name: &str) -> PyResult<(Outside, bool)> {
     Ok(match name {
         "raise" => (Outside::Continue, true),
@@ -211,14 +212,14 @@ fn quantity_named(name: &str) -> PyResult<Quantity> {
         "velocity" => Quantity::Velocity,
         "acceleration" => Quantity::Acceleration,
         "speed" => Quantity::Speed,
-        "bend" => Quantity::Bend,
+        "bend" => Quantity::AccelerationNorm,
         "body velocity" => Quantity::BodyVelocity,
         "body acceleration" => Quantity::BodyAcceleration,
         _ => return Err(invalid(format!("unknown quantity {name:?}"))),
     })
 }
 
-/// Evaluates B-spline curves at times inside their domain: the result is batch axes + x.shape + axes of a
+/// Evaluates B-spline curves at times inside their domain. The result has the batch axes, x.shape and the axes of a
 /// point (or none).
 #[pyfunction]
 pub fn evaluate_bspline<'py>(
@@ -247,7 +248,7 @@ pub fn evaluate_bspline<'py>(
     Ok(out)
 }
 
-/// Times must be numbers, and inside the knots if `strict`.
+/// Times must be finite, and inside the knots if `strict`.
 fn check_times(
     curves: &Curves,
     times: &Times,

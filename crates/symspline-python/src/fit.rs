@@ -12,8 +12,7 @@ use symspline::space::{Ambient, Erased};
 
 /// Points on the space, velocities, the columns of the report, and faults.
 type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<Fault>);
-/// Curves in one factor of a product: the space, points, ends, and how far off the space points may be; None if nothing
-/// is to be validated.
+/// Curves in one factor of a product: the space, points, ends, and the tolerance of points; None without validation.
 type Factor<'py> = (PyRef<'py, Handle>, Array<'py>, Option<[EndOf<'py>; 2]>, Option<f64>);
 
 /// Fits curves in every factor of a product; a space that is not a product is its only factor. All factors are validated
@@ -165,7 +164,7 @@ fn columns<'py>(py: Python<'py>, reports: &[Option<&Report>]) -> PyResult<Column
         |r| r.solver as i64,
         |r| i64::from(r.skipped.0),
     ];
-    // The error of velocities is known on manifolds made of functions only.
+    // Only manifolds defined by functions have an error estimate of velocities.
     const NUMBERS: [fn(&Report) -> f64; 8] = [
         |r| r.residual,
         |r| r.max_step,

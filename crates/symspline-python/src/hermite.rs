@@ -97,7 +97,7 @@ pub fn hermite<'py>(
     Ok([curves.points(py, own, points.shape())?, velocities, longest])
 }
 
-/// Why there is no curve with given velocities.
+/// Why given velocities do not define a curve.
 enum Handles {
     Invalid(Invalid),
     Far { segment: usize, angle: f64, segments: usize },

@@ -37,7 +37,7 @@ pub extern "C" fn symspline_has_v3() -> bool {
         && has!("movbe")
 }
 
-/// Limits the number of threads; 0 stands for all cores.
+/// Limits the number of threads; 0 means all cores.
 #[pyfunction]
 fn set_num_threads(n: usize) {
     symspline::parallel::set_num_threads(n);

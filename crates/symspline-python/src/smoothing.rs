@@ -22,9 +22,9 @@ type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// Points at the knots, the band of A⁻¹, and the columns of the report.
 type Smoothed<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>);
 
-/// Smooths curves. `t` and `weights` are of all data, (N,) or (..., N); `information`, (..., N, m, m), matrices of which
-/// `weights` are the mean diagonals; `knots` (K,) or (..., K); `lam` and `sigma` one
-/// a curve, NaN where λ is to be chosen.
+/// Smooths curves. `t` and `weights` contain all data, (N,) or (..., N); `information`, (..., N, m, m), contains
+/// matrices whose mean diagonals are `weights`; `knots` is (K,) or (..., K). `lam` and `sigma` have one value per
+/// curve, and NaN requests that λ is chosen.
 #[pyfunction]
 pub fn smooth<'py>(
     py: Python<'py>,
@@ -83,15 +83,15 @@ pub fn smooth<'py>(
     let (n, count) = (points.shape()[lead], knots.shape()[knots.ndim() - 1]);
     let batch = &points.shape()[..lead];
     let curves: usize = batch.iter().product();
-    // Of all curves, or of each.
+    // Shared by all curves, or one row per curve.
     let own = |row: &[f64], size: usize, curve: usize| if row.len() == size { 0 } else { curve * size };
     let (t, p, w, k) = (in_order(&t)?, in_order(&points)?, in_order(&weights)?, in_order(&knots)?);
     let (lam, sigma) = (in_order(&lam)?, in_order(&sigma)?);
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
     drop(reserve::<f64>(curves * count * (8 * len + 64))?);
-    // Data without weight are left out, and copies of a row, as loggers write them, are one of their weight: they would
-    // say that there is no noise.
+    // Data without weight are removed, and copies of a row, as loggers write them, are merged into one of their
+    // weight: they would make the noise appear to be zero.
     let rows: Vec<[Vec<f64>; 4]> = (0..curves)
         .map(|c| {
             let (times, weights) = (&t[own(t, n, c)..][..n], &w[own(w, n, c)..][..n]);
@@ -117,7 +117,8 @@ pub fn smooth<'py>(
                 }
                 before = Some(i);
             }
-            // So would the first point of a closed curve, repeated at its end as splines through points have it.
+            // The first point of a closed curve, repeated at its end as for interpolating splines, would have the
+            // same effect.
             let (last, knots) = (rows[0].len().saturating_sub(1), &k[own(k, count, c)..][..count]);
             if ends.is_none()
                 && last > 0
@@ -159,7 +160,7 @@ pub fn smooth<'py>(
     ))
 }
 
-/// Whether two arrays are copies, maybe written and read again.
+/// Whether two arrays are equal up to the rounding of a text file.
 fn same(p: &[f64], q: &[f64]) -> bool {
     const COPY: f64 = 1e-9;
     let size = p.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -174,7 +175,7 @@ fn kind((name, _): &EndOf) -> PyResult<EndCondition> {
     }
 }
 
-/// One part of all curves in an array.
+/// One component of all curves in an array.
 fn gathered<'py>(
     py: Python<'py>,
     shape: &[usize],
@@ -229,8 +230,8 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
     Ok(all.to_tuple())
 }
 
-/// Variances of a coordinate of one smoothed curve at times, at noise of variance one; see the core. `fixed` are the ends
-/// with a given velocity, None of a closed curve.
+/// Variances of a coordinate of one smoothed curve at given times, for noise of variance one. `fixed` marks the ends
+/// with a given velocity; it is None for a closed curve.
 #[pyfunction]
 pub fn smoothing_variance<'py>(
     py: Python<'py>,

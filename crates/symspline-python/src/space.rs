@@ -1,4 +1,4 @@
-//! The compiled side of a space.
+//! The spaces of the core, as a Python class.
 
 use crate::arrays::{in_order, require_memory, reserve, zeros};
 use crate::errors::{CutLocusError, format_index, invalid};
@@ -9,7 +9,7 @@ use symspline::rows::{Operation, apply, memory, project_points, tangent_defects}
 use symspline::space::{Ambient, Origin};
 use symspline::spaces::{self, AnySpace};
 
-/// A space, as the compiled code sees it.
+/// A space of the core.
 #[pyclass(frozen, module = "symspline._core")]
 pub struct Handle {
     pub space: AnySpace,
@@ -22,7 +22,7 @@ impl Handle {
         format!("{name}:{}", parameters.iter().map(usize::to_string).collect::<Vec<_>>().join(","))
     }
 
-    /// Number of axes of a point's array of doubles.
+    /// The number of axes of the floating-point array of a point.
     pub fn point_axes(&self) -> usize {
         self.space.get().point_shape().len()
     }
@@ -49,7 +49,7 @@ impl Handle {
     fn point_shape(&self) -> Vec<usize> {
         self.space.get().point_shape()
     }
-    /// Whether numbers are complex: pairs of doubles in all arrays of this module.
+    /// Whether numbers are complex: pairs of floating-point numbers in all arrays of this module.
     fn is_complex(&self) -> bool {
         self.space.get().is_complex()
     }
@@ -121,7 +121,7 @@ impl Handle {
         Ok(out)
     }
 
-    /// Raises unless every row is a point within `tol`; `shape` is how the rows were laid out.
+    /// Raises unless every row is a point within `tol`; `shape` is the shape of the rows.
     fn check_points(
         &self,
         py: Python,
@@ -143,7 +143,7 @@ impl Handle {
         })
     }
 
-    /// How far rows are from being tangent, relative to their size.
+    /// The normal components of vectors, relative to their length.
     fn tangent_defects<'py>(
         &self,
         py: Python<'py>,
@@ -160,10 +160,10 @@ impl Handle {
     }
 }
 
-/// What is wrong with a point that is off its space.
+/// The message for a point that is off its space.
 pub fn off_space(which: &str, off: f64, tol: f64, why: &str) -> String {
     if !off.is_finite() {
-        // Nor has `space.project` an answer.
+        // `space.project` fails, too.
         return format!("{which} is off the space: {why}. No point is close to it; correct it or remove it");
     }
     format!(

@@ -4,18 +4,18 @@ use crate::errors::{Invalid, format_index, number};
 use crate::space::off_space;
 use symspline::validate::{Invalid as Fault, Reason};
 
-/// Names of curves in messages: their indices in the batch of the user, of which they may be a part.
+/// The names of curves in messages: their indices in the user's batch, which may contain further curves.
 pub struct Names<'a> {
     pub batch: &'a [usize],
-    /// Their numbers; None for the whole batch.
+    /// The numbers of these curves; None for the whole batch.
     pub chosen: Option<&'a [usize]>,
     /// Whether all curves have the same knots.
     pub shared: bool,
-    /// How far off the space points may be.
+    /// The distance from the space within which points are valid.
     pub tol: f64,
 }
 
-/// Words for a curve of a batch; empty for a single curve.
+/// The phrase for a curve of a batch; empty for a single curve.
 pub fn of_curve(curve: usize, batch: &[usize]) -> String {
     if batch.is_empty() { String::new() } else { format!(" of curve {}", format_index(curve, batch)) }
 }
@@ -80,7 +80,7 @@ impl Names<'_> {
                 number(*segment),
                 speed * limit / angle,
             ),
-            // Arrays from Python have lengths that belong together.
+            // Arrays from Python have consistent lengths.
             reason => format!("{reason}{of}"),
         }
     }

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 use symspline::monitor::Monitor;
 use symspline::space::{Ambient, Erased, Origin};
 
-/// How often Python gets a look.
+/// The interval at which Python handles signals.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// Numbers of a point, and dimensions, from which one step of work may take long.
+/// Numbers of a point, and dimensions, from which one step of the work may take long.
 const HEAVY_POINT: usize = 900;
 const HEAVY_DIM: usize = 48;
 
@@ -22,7 +22,7 @@ pub fn is_heavy(space: &Erased) -> bool {
     (space.point_len() >= HEAVY_POINT || space.dim() >= HEAVY_DIM) && space.point_shape().len() > 1
 }
 
-/// A function of a user that is called with the finished and the total amount of work, of which this is one of several
+/// A user's function that is called with the finished and the total amount of work, of which this is one of several
 /// equal parts.
 pub struct Progress {
     pub call: Py<PyAny>,
@@ -67,7 +67,7 @@ pub fn watched<T: Send>(
         if !heavy {
             return catch_unwind(AssertUnwindSafe(|| work(&monitor)));
         }
-        // One step of such work may take minutes. Another thread does it, and this one asks for signals.
+        // One step of this work may take minutes. It runs in another thread, and this thread handles signals.
         let owner = thread::current();
         let finished = AtomicBool::new(false);
         thread::scope(|scope| {

@@ -3,13 +3,13 @@
 //! The method of Bogfjellmo, Modin and Verdier, *A Numerical Algorithm for C²-splines on Symmetric
 //! Spaces* (2018, SIAM J. Numer. Anal. 56(4)). Equation numbers in these crates are that paper's.
 //!
-//! A curve is three plain arrays: knots t, points p and velocities u = γ'(t). [`fit`] finds the
-//! velocities, [`curve`] evaluates, [`space`] is the geometry, [`spaces`] the list of all spaces.
-//! [`derivative`] computes the sensitivity of a curve to its data, [`smoothing`] finds curves close to noisy points.
+//! A curve consists of three arrays: knots t, points p and velocities u = γ'(t). [`fit`] computes the velocities,
+//! [`curve`] evaluates curves, [`space`] contains the geometry, and [`spaces`] lists all spaces. [`derivative`]
+//! computes the sensitivity of a curve to its data, [`smoothing`] fits curves close to noisy points.
 //!
 //! # A spline through unit quaternions
 //!
-//! Arrays are plain and flat: of each point its numbers, one after the other, point by point.
+//! Arrays are one-dimensional: the numbers of each point are adjacent, point after point.
 //!
 //! ```
 //! use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
@@ -20,7 +20,7 @@
 //!
 //! let sphere = Sphere::new(3).unwrap();
 //! let space = Erased(&sphere);
-//! let go_on = |_| true; // is asked from time to time, and may stop the work
+//! let go_on = |_| true; // is called from time to time; false stops the work
 //!
 //! // w, x, y, z at three times. Neighbours must have the same sign, w w' + … > 0.
 //! let t = [0.0, 1.0, 2.5];
@@ -53,7 +53,7 @@
 //! ```
 //!
 //! Rotations whose quaternions have any sign are points of [`spaces::Rotations`] as matrices.
-//! [`spaces::AnySpace`] makes a space of a name, such as `"so"` with `[3]`.
+//! [`spaces::AnySpace`] creates a space from a name, such as `"so"` with `[3]`.
 //!
 //! [`fit`] does not check its input: pass a problem to [`validate::validate`] first. It describes the first fault, or
 //! returns the points projected onto their space.

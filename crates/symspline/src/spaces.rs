@@ -22,7 +22,7 @@ pub fn all() -> impl Iterator<Item = &'static Entry> {
     .flatten()
 }
 
-/// Numbers in the name of a space are at most this, so that sizes of arrays do not overflow.
+/// The upper limit of numbers in the name of a space, so that sizes of arrays do not overflow.
 const LARGEST: usize = 1 << 24;
 
 /// Any of the spaces.
@@ -56,7 +56,7 @@ impl AnySpace {
         Ok(AnySpace { name: entry.names[0], parameters: parameters.to_vec(), table })
     }
 
-    /// Its operations.
+    /// The operations of the space.
     pub fn get(&self) -> Erased<'_> {
         Erased(&*self.table)
     }

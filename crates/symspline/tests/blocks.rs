@@ -3,7 +3,7 @@
 use symspline::fit::Blocks;
 use symspline::scalar::{Lane, lane};
 
-/// Numbers that look random and are the same in every run.
+/// Pseudo-random numbers, equal in every run.
 fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut x = seed;
     move || {
@@ -12,7 +12,7 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// The largest defect of a random system; its first pivot is zero.
+/// The largest residual of a random system, whose first pivot is zero.
 fn defect(n: usize, m: usize, cyclic: bool) -> f64 {
     let mut next = noise((n * 10 + m) as u64);
     let mut blocks = Blocks::default();
@@ -21,9 +21,10 @@ fn defect(n: usize, m: usize, cyclic: bool) -> f64 {
         for i in 0..n {
             for c in 0..m * m {
                 let exists = cyclic || side == 1 || (side == 0 && i > 0) || (side == 2 && i + 1 < n);
-                // Of two nodes either neighbour is the other: it is the left one.
+                // With two nodes, the other node is both neighbours; it counts as the left one.
                 let again = cyclic && n == 2 && side == 2;
-                // Rows of a diagonal block in falling order of columns: every pivot has to be fetched.
+                // The rows of a diagonal block have decreasing order of columns, so that every pivot requires an
+                // exchange.
                 let large = if side == 1 && c / m + c % m == m - 1 { 8.0 } else { 0.0 };
                 let zero = side == 1 && c / m + c % m != m - 1;
                 let x = if exists && !again { if zero { 0.0 } else { next() + large } } else { 0.0 };
@@ -48,7 +49,7 @@ fn defect(n: usize, m: usize, cyclic: bool) -> f64 {
                     sum += sides[side][(i * m + r) * m + c] * x[j * m + c];
                 }
             }
-            // NaN is no solution.
+            // NaN is not a solution.
             let d = sum.to_array()[0].abs();
             worst = if d <= worst { worst } else { d };
         }

@@ -7,7 +7,7 @@ use symspline::scalar::{Lane, lane};
 use symspline::space::{Ambient, Erased, Frame, Origin};
 use symspline::spaces::AnySpace;
 
-/// Spaces that are curved one way and the other, of vectors and matrices, with one array a point.
+/// Spaces of positive and of negative curvature, of vectors and of matrices, with one array per point.
 const SPACES: &[(&str, &[usize], f64)] = &[
     ("sphere", &[2], 0.9),
     ("so", &[4], 1.2),
@@ -20,7 +20,7 @@ const METHODS: [Method; 5] =
 const KNOTS: [f64; 7] = [0.0, 0.8, 2.0, 2.5, 3.9, 5.0, 6.3];
 const KINDS: [&str; 5] = ["natural", "not-a-knot", "velocity", "acceleration", "periodic"];
 
-/// Numbers that look random and are the same in every run.
+/// Pseudo-random numbers, equal in every run.
 fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut x = seed;
     move || {
@@ -33,7 +33,7 @@ fn numbers(x: &[Lane]) -> Vec<f64> {
     x.iter().map(|x| x.to_array()[0]).collect()
 }
 
-/// A tangent vector at p of some length.
+/// A tangent vector at p of given length.
 fn vector(space: &Erased, p: &[Lane], length: f64, next: &mut impl FnMut() -> f64) -> Vec<Lane> {
     let (mut frame, mut v) = (vec![Lane::ZERO; space.frame_len()], vec![Lane::ZERO; p.len()]);
     let x: Vec<f64> = (0..space.dim()).map(|_| next()).collect();
@@ -44,7 +44,7 @@ fn vector(space: &Erased, p: &[Lane], length: f64, next: &mut impl FnMut() -> f6
     v
 }
 
-/// Points a step apart, each in a direction of its own.
+/// Points at a given distance from each other, in random directions.
 fn walk(space: &Erased, step: f64, next: &mut impl FnMut() -> f64) -> Vec<f64> {
     let mut p: Vec<Lane> = (0..space.point_len()).map(|_| lane(next())).collect();
     space.random_point(&mut p);
@@ -60,7 +60,7 @@ fn walk(space: &Erased, step: f64, next: &mut impl FnMut() -> f64) -> Vec<f64> {
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
-    // NaN is far.
+    // NaN counts as far.
     let largest = |m: f64, d: f64| if d <= m { m } else { d };
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, largest)
 }
@@ -78,7 +78,7 @@ fn fitted_curves_are_c2_splines() {
             let mut next = noise(case as u64);
             let mut points = walk(&space, *step, &mut next);
             if kind == "periodic" {
-                // There and back, so that it is closed.
+                // The points return, so that the curve is closed.
                 for (i, j) in [(4, 2), (5, 1), (6, 0)] {
                     points.copy_within(j * len..(j + 1) * len, i * len);
                 }
@@ -107,7 +107,7 @@ fn fitted_curves_are_c2_splines() {
                 evaluate(&space, &curves, &times, quantity, Outside::Continue, &monitor, &mut out);
                 out
             };
-            // Both sides of every knot inside, so near that what the curve does on the way is rounding.
+            // Both sides of every inner knot, so close to it that the change of the curve is below rounding.
             let inside = &KNOTS[1..KNOTS.len() - 1];
             let beside = |h: f64| inside.iter().map(|t| t + h).collect::<Vec<f64>>();
             let size = values(Quantity::Acceleration, &KNOTS).iter().fold(1.0_f64, |m, x| m.max(x.abs()));

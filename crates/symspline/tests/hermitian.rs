@@ -1,5 +1,5 @@
-//! Functions of Hermitian matrices: inverse of each other over decades of size, the same by series and by
-//! eigenvectors where eigenvalues coincide or nearly do, and with both derivatives.
+//! Functions of Hermitian matrices: exponential and logarithm are inverse over decades of size, and series and
+//! eigenvectors agree where eigenvalues coincide or nearly do, derivatives included.
 
 use symspline::matrix::{
     Matrix, Unary, arc, diagonalize, exp_minus_one, exp_skew_minus_one, function_of, log_one_plus,
@@ -7,7 +7,7 @@ use symspline::matrix::{
 };
 use symspline::scalar::{Dual, Jet, Lane, Scalar, lane};
 
-/// Numbers that look random and are the same in every run.
+/// Pseudo-random numbers, equal in every run.
 struct Noise(u64);
 
 impl Noise {
@@ -67,8 +67,8 @@ fn series_and_eigenvectors_agree<S: Scalar, const D: usize>() {
             let b = noise.with_eigenvalues::<D>(&values);
             let b = noise.with_derivatives::<S, D>(&b);
             let d = difference(&log_one_plus(&b), &log_by_eigenvectors(&b));
-            // Values of ln(1 + x) by its argument 1 + x carry ε; derivatives a digit more where the
-            // quotients take over from the quadratures.
+            // Values of ln(1 + x) for the argument 1 + x have an error of ε; derivatives have ten times that where
+            // quotients replace the quadratures.
             for (d, allowed) in d.iter().zip([2e-15, 2e-14, 4e-13]) {
                 assert!(*d <= allowed, "gap {gap}, {values:?}: {d}");
             }
@@ -91,7 +91,7 @@ fn log_undoes_exp<S: Scalar, const D: usize>() {
             let a = noise.matrix::<D>(n).hermitian_part();
             let a = noise.with_derivatives::<S, D>(&a.scaled(lane(size / n as f64)));
             let d = difference(&log_one_plus(&exp_minus_one(&a)), &a);
-            // Eigenvalues of e^A are known to ε times the largest.
+            // Eigenvalues of e^A are accurate to ε times the largest.
             let condition = (2.0 * size).exp();
             assert!(d[0] <= 4e-15 * condition * size.max(1e-30), "n = {n}, size {size}: {d:?}");
             assert!(d[1] <= 4e-14 * condition && d[2] <= 1e-12 * condition, "n = {n}, size {size}: {d:?}");
@@ -125,7 +125,7 @@ fn skew_exponentials_are_unitary_and_double() {
 }
 
 #[test]
-fn trig_is_that_of_the_eigenvalues() {
+fn trig_matches_the_eigenvalues() {
     let mut noise = Noise(4);
     for values in [vec![0.0, 1e-12], vec![0.05, 0.09, 2.4], vec![2.6, 9.0, 0.1, 1e-3], vec![400.0]] {
         let g = noise.with_eigenvalues::<1>(&values);
@@ -155,7 +155,7 @@ fn trig_is_that_of_the_eigenvalues() {
 }
 
 #[test]
-fn arc_is_that_of_the_eigenvalues() {
+fn arc_matches_the_eigenvalues() {
     let mut noise = Noise(5);
     for values in [
         vec![0.0, 1e-15],
@@ -197,7 +197,7 @@ fn derivatives_of_arc_are_divided_differences() {
     }
 }
 
-/// How far columns are from orthonormal ones.
+/// The distance of columns from orthonormal ones.
 fn defect<const D: usize>(q: &Matrix<Lane, D>) -> Lane {
     q.adjoint_times(q).plus_identity(lane(-1.0)).size()
 }
@@ -234,7 +234,7 @@ fn a_step_squares_the_distance_to_orthonormal_columns() {
 }
 
 #[test]
-fn singular_values_keep_their_digits_in_graded_matrices() {
+fn singular_values_are_accurate_in_graded_matrices() {
     let mut noise = Noise(6);
     for n in [2, 3, 6] {
         let mut q = noise.matrix::<1>(n);

@@ -3,7 +3,7 @@
 use symspline::laws::check;
 use symspline::spaces::{AnySpace, all};
 
-/// A few sizes of every kind: the smallest, one for every path of the code, and one of another shape.
+/// A few sizes of every kind: the smallest, one for every branch of the code, and one of another shape.
 const SIZES: &[(&str, &[&[usize]])] = &[
     ("euclidean", &[&[1], &[3]]),
     ("sphere", &[&[1], &[2], &[3], &[6]]),

@@ -22,8 +22,8 @@ fn rows() -> impl Iterator<Item = (&'static str, f64, [f64; 3])> {
     })
 }
 
-/// A few units in the last place of the function's size near x; zeros of cos and sin are as exact
-/// as their argument is: √x carries half a unit.
+/// A few units in the last place of the function's size near x. Zeros of cos and sin are as accurate as their
+/// argument, and √x has an error of half a unit.
 fn allowed(name: &str, x: f64, value: f64) -> f64 {
     let oscillation = match name {
         "c" if x > 0.0 => 1.0 + x.sqrt(),
@@ -31,7 +31,7 @@ fn allowed(name: &str, x: f64, value: f64) -> f64 {
         "k" | "j" if x > 2.0 => 4.0 * (1.0 + x.sqrt()) / x,
         _ => 0.0,
     };
-    // exp(√−x) inherits √−x times the rounding of its argument.
+    // exp(√−x) inherits √−x times the rounding error of its argument.
     let growth = if x < -2.0 && name != "arc" { (-x).sqrt() } else { 1.0 };
     6.0 * f64::EPSILON * (value.abs() * growth.max(1.0) + oscillation)
 }
@@ -95,7 +95,7 @@ fn a_lane_does_not_depend_on_its_neighbours() {
 }
 
 #[test]
-fn the_defect_is_that_of_the_arc() {
+fn the_remainder_of_the_arc_matches_the_arc() {
     // θ/sin θ = 1 + y e, with derivatives e + y e' and 2e' + y e''.
     for y in [1e-9, 1e-3, 0.0074, 0.0076, 0.05, 0.089, 0.091, 0.2, 0.29, 0.31, 0.4, 0.5, 0.59, 0.61, 0.8, 1.0]
     {

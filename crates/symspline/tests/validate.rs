@@ -1,4 +1,4 @@
-//! Every fault of the input is found, with its curve and node.
+//! Every fault of the input is reported with its curve and node.
 
 use symspline::fit::{End, Ends, Problem};
 use symspline::space::Erased;
@@ -30,7 +30,7 @@ fn valid_points_are_projected() {
 }
 
 #[test]
-fn invalid_times_are_named() {
+fn invalid_times_are_reported() {
     let fault = found(&problem(&[0.0, f64::NAN, 2.0], &POINTS, NATURAL));
     assert!(matches!(fault, Invalid { curve: 0, node: Some(1), reason: Reason::TimeNotFinite(_) }));
     let fault = found(&problem(&[0.0, 2.0, 1.0], &POINTS, NATURAL));
@@ -41,7 +41,7 @@ fn invalid_times_are_named() {
 }
 
 #[test]
-fn invalid_points_are_named() {
+fn invalid_points_are_reported() {
     let mut points = POINTS;
     points[3] = 2.0;
     let fault = found(&problem(&T, &points, NATURAL));
@@ -56,7 +56,7 @@ fn invalid_points_are_named() {
 }
 
 #[test]
-fn points_of_two_components_are_named() {
+fn points_of_two_components_are_reported() {
     let space = AnySpace::new("o", &[2]).expect("it is a space");
     let points = [1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, -1.0];
     let fault =
@@ -79,7 +79,7 @@ fn closed_curves_must_be_closed() {
 }
 
 #[test]
-fn invalid_end_vectors_are_named() {
+fn invalid_end_vectors_are_reported() {
     let reason = |v: &[f64]| found(&problem(&T, &POINTS, [End::Natural, End::Velocity(v)])).reason;
     let start = |v: &[f64]| found(&problem(&T, &POINTS, [End::Acceleration(v), End::Natural])).reason;
     assert!(
@@ -95,7 +95,7 @@ fn invalid_end_vectors_are_named() {
 }
 
 #[test]
-fn lengths_must_belong_together() {
+fn lengths_must_be_consistent() {
     let lengths = |problem: &Problem| {
         assert!(matches!(found(problem).reason, Reason::Lengths(_)), "{:?}", problem.offsets)
     };

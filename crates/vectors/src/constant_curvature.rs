@@ -1,4 +1,4 @@
-//! Sphere, flat and hyperbolic space are one formula with κ = 1, 0, −1.
+//! Spheres, flat and hyperbolic space in one formula with κ = 1, 0, −1.
 //!
 //! Sphere and hyperboloid are {x : ⟨x,x⟩ = κ} for ⟨x,y⟩ = κ x₀y₀ + Σ xᵢyᵢ, and in both
 //! ⟨p,q⟩ = κ cos θ with cos θ read as cosh d at κ = −1. At κ = 0 they become the flat formulas,
@@ -48,7 +48,7 @@ const fn sign<const L: bool>(i: usize) -> f64 {
     if L && i == 0 { -1.0 } else { 1.0 }
 }
 
-/// The position in a point of the i-th coordinate at the origin.
+/// The index of the i-th coordinate at the origin in a point.
 const fn position<const L: bool>(i: usize) -> usize {
     if L && i == 0 { 0 } else { i + 1 }
 }
@@ -140,13 +140,13 @@ fn round<const K: i32, const L: bool>(a: &[Lane], b: &[Lane]) -> Lane {
     if L { product::<K, L, Lane>(a, b) * kappa::<K>() } else { dot(a, b) }
 }
 
-/// Where sin θ is so small that θ/sin θ makes much of rounding errors.
+/// The limit of sin θ below which θ/sin θ amplifies rounding errors.
 #[inline(always)]
 fn near_antipode(rest: Lane) -> Lane {
     rest.simd_lt(lane(0.1))
 }
 
-/// Makes a logarithm near the antipode tangent again, and of length θ.
+/// Makes a logarithm near the antipode tangent, and of length θ.
 #[cold]
 #[inline(never)]
 fn refine<const K: i32, const L: bool>(p: &[Lane], theta: Lane, lanes: Lane, v: &mut [Lane]) {
@@ -183,7 +183,7 @@ pub fn transvect<const K: i32, const L: bool>(p: &[Lane], v: &[Lane], x: &[Lane]
     }
 }
 
-/// Removes from v its part along p; returns the coefficient of that part.
+/// Removes the component of v along p; returns the coefficient of that component.
 #[inline(always)]
 pub fn tangential<const K: i32, const L: bool>(p: &[Lane], v: &mut [Lane]) -> Lane {
     let along = product::<K, L, Lane>(p, v) * kappa::<K>();
@@ -193,9 +193,9 @@ pub fn tangential<const K: i32, const L: bool>(p: &[Lane], v: &mut [Lane]) -> La
     along
 }
 
-// A frame at p is an orthonormal basis of T_pM, one row a vector.
+// A frame at p is an orthonormal basis of T_pM, one vector per row.
 
-/// The basis that a rotation (boost) from the first axis, or its opposite, carries to p.
+/// The basis that a rotation (boost) from the first axis, or its opposite, maps to p.
 #[inline(always)]
 pub fn lift<const K: i32, const L: bool>(p: &[Lane], frame: &mut [Lane]) {
     let n = p.len();
@@ -245,8 +245,8 @@ pub fn step<const K: i32, const L: bool>(
         for i in 0..n {
             row[i] -= factor * (p[i] + q[i]);
         }
-        // One step of Newton's method for 1/|e|: an error of the norm would go into the velocity,
-        // and from there eightfold into a jump of the acceleration.
+        // One step of Newton's method for 1/|e|: an error of the norm would enter the velocity, and be amplified
+        // eightfold in the jump of the acceleration.
         let shorten = lane(-0.5 * sign::<L>(j)).mul_add(product::<K, L, Lane>(row, row), lane(1.5));
         row.iter_mut().for_each(|x| *x *= shorten);
     }
@@ -338,8 +338,8 @@ pub fn prepare<const K: i32, const L: bool>(chord: &[Lane], prepared: &mut [Lane
     prepared.copy_from_slice(&[trig.s, trig.k * kappa::<K>(), square]);
 }
 
-/// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only. With `PAIRS`
-/// x and −x are one point, and the nearer one is meant.
+/// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only. With `PAIRS` x
+/// and −x represent the same point, and the nearer one is used.
 #[inline(always)]
 pub fn inner_handles<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
     d: &[Lane],
@@ -397,7 +397,7 @@ fn handle<const K: i32, S: Scalar>(
     ([to_d, to_a, to_b], height)
 }
 
-/// S(v) x: x shrinks by sin θ/θ across v and stays along it.
+/// S(v) x: the component of x orthogonal to v is multiplied by sin θ/θ; the component along v does not change.
 #[inline(always)]
 pub fn stretch<const K: i32, const L: bool, S: Scalar>(v: &[S], x: &mut [S]) {
     let vv = at_origin::<L, _>(v, v);

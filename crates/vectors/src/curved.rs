@@ -51,7 +51,7 @@ impl AntiDeSitter {
     }
 }
 
-/// In one dimension there is no indefinite metric, and de Sitter space has two parts.
+/// In one dimension there is no indefinite metric, and de Sitter space has two components.
 fn at_least_two<const K: i32>(name: &str, n: usize) -> Result<Curved<K, true>, String> {
     if n < 2 { Err(format!("{name}(n) needs n >= 2, not {n}")) } else { Ok(Curved { n }) }
 }
@@ -59,7 +59,7 @@ fn at_least_two<const K: i32>(name: &str, n: usize) -> Result<Curved<K, true>, S
 impl<const K: i32, const L: bool> Curved<K, L> {
     /// Whether geodesics of some direction return: those with κ⟨v,v⟩ > 0.
     const ROUND: bool = K > 0 || L;
-    /// Whether those of some direction run apart exponentially: those with κ⟨v,v⟩ < 0.
+    /// Whether geodesics in some directions diverge exponentially: those with κ⟨v,v⟩ < 0.
     const OPEN: bool = K < 0 || L;
 }
 
@@ -101,7 +101,7 @@ impl<const K: i32, const L: bool> Ambient for Curved<K, L> {
         cc::tangential::<K, L>(gamma, dd);
     }
     fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
-        // What belongs to an indefinite metric is no measure of size; see `distance`.
+        // An indefinite inner product does not measure size; see `distance`.
         if L { dot(u, v) } else { cc::product::<K, L, Lane>(u, v) }
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
@@ -176,7 +176,7 @@ impl<const K: i32, const L: bool> Origin for Curved<K, L> {
         cc::CHORD_LEN
     }
     fn curvature(&self) -> f64 {
-        // An indefinite metric bounds no bracket; one dimension is flat.
+        // With an indefinite metric, brackets are unbounded; one dimension is flat.
         if L {
             f64::NAN
         } else if self.n == 1 {

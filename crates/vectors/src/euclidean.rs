@@ -61,7 +61,7 @@ impl Ambient for Euclidean {
         dot(u, v)
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
-        // NaN and infinity stay what they are: 0·∞ is NaN.
+        // NaN and infinity do not change: 0·∞ would be NaN.
         x.iter().fold(Lane::ZERO, |sum, x| sum + *x * Lane::ZERO)
     }
     fn project_tangent(&self, _p: &[Lane], v: &mut [Lane]) -> Lane {
@@ -80,7 +80,7 @@ impl Frame for Euclidean {
     fn frame_len(&self) -> usize {
         0
     }
-    // Frames of flat space are all the same and hold nothing.
+    // Frames of flat space are all equal and contain no numbers.
     fn lift(&self, _p: &[Lane], _frame: &mut [Lane]) {}
     #[inline(always)]
     fn step(&self, _frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {

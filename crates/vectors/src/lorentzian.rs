@@ -20,7 +20,7 @@ pub fn project<const K: i32>(x: &mut [Lane]) -> Lane {
     let height2 = Lane::ONE + dot(open, open);
     let (norm, height) = (dot(round, round).sqrt(), height2.sqrt());
     let off = (norm - height).abs() / height;
-    // What is a point up to the rounding of its squares stays as it is.
+    // Points whose squares are accurate to rounding do not change.
     let rounding = lane((2.0 + count as f64 / 8.0) * f64::EPSILON);
     let scale = off.simd_le(rounding).select(Lane::ONE, height / norm);
     round.iter_mut().for_each(|x| *x *= scale);
@@ -36,10 +36,10 @@ pub fn violation<const K: i32>(x: &[f64]) -> String {
     format!("its square {signs} is {square}, not {K} (off by {:.3e})", (square - f64::from(K)).abs())
 }
 
-/// The largest |p|² of a point: rounding errors ε|p|² are 0.2 % there.
+/// The largest |p|² of a point, at which rounding errors ε|p|² are 0.2 %.
 const FARTHEST: f64 = (1_u64 << 43) as f64;
 
-/// The first point so far out that too few digits are left, and that in words.
+/// The first point that is too far out to be accurate, and a description of it.
 pub fn imprecise_point(points: &[f64], len: usize) -> Option<(usize, String)> {
     let square = |p: &[f64]| p.iter().map(|x| x * x).sum::<f64>();
     let row = points.chunks_exact(len).position(|p| !(square(p) <= FARTHEST))?;

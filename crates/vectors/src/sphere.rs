@@ -7,7 +7,7 @@ use symspline_core::space::ROUNDING_SIZE;
 pub fn project(x: &mut [Lane]) -> Lane {
     let norm = dot(x, x).sqrt();
     let off = (norm - Lane::ONE).abs();
-    // What is a unit vector up to the rounding of its norm stays as it is.
+    // Vectors whose norm is one up to rounding do not change.
     let rounding = lane((1.5 + (x.len() - 1) as f64 / 8.0) * f64::EPSILON);
     let scale = off.simd_le(rounding).select(Lane::ONE, Lane::ONE / norm);
     x.iter_mut().for_each(|x| *x *= scale);

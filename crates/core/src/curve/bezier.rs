@@ -14,13 +14,14 @@ pub struct Segment<S> {
     controls: [Vec<Lane>; 2],
     /// `log_{q⁺}(q⁻)`.
     middle: Vec<Lane>,
-    /// Lanes in which that handle is too long for a ray, see [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
+    /// Lanes in which the inner handle is too long for a ray, see
+    /// [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
     long: Lane,
     level: [Vec<S>; 3],
 }
 
 impl<S: Scalar> Segment<S> {
-    /// Memory for points of `len` numbers.
+    /// Reserves memory for points of `len` numbers.
     pub fn new(len: usize) -> Self {
         let lanes = || vec![Lane::ZERO; len];
         let points = || vec![S::constant(Lane::ZERO); len];
@@ -47,14 +48,14 @@ impl<S: Scalar> Segment<S> {
         }
     }
 
-    /// Computes control points and inner handle from ends and outer handles.
+    /// Computes control points and the inner handle from end points and outer handles.
     #[inline(always)]
     pub fn prepare<M: Space>(&mut self, space: &M, len: usize) {
         self.prepare_chosen(space, len, |_, _| {});
     }
 
-    /// The same in a space that covers another one, where `choose` takes one of the points over the second
-    /// control point; see [`Covered::choose`](crate::space::Covered::choose).
+    /// The same in a space that covers another one; `choose` selects one of the points over the second control point,
+    /// see [`Covered::choose`](crate::space::Covered::choose).
     #[inline(always)]
     pub fn prepare_chosen<M: Space>(
         &mut self,
@@ -69,7 +70,7 @@ impl<S: Scalar> Segment<S> {
         space.ray(p1, b, lane(-1.0), q1);
         choose(q0, [q1, p1, b]);
         let angle = space.log(q0, q1, &mut self.middle[..len]);
-        // Most spaces have no such limit, and the compiler knows it.
+        // Most spaces have no such limit, which the compiler can see.
         if space.longest_ray().is_finite() {
             self.long = angle.simd_gt(lane(space.longest_ray()));
         }
@@ -77,8 +78,8 @@ impl<S: Scalar> Segment<S> {
 
     /// γ(t), for t in units of the segment.
     ///
-    /// The first three geodesics start at fixed points with known velocities: the outer ones are
-    /// never put through a logarithm, which keeps handles exact that come near the cut locus.
+    /// The first three geodesics start at fixed points with known velocities. No logarithm of an outer handle is
+    /// computed, so that handles close to the cut locus remain exact.
     #[inline(always)]
     pub fn at<M: Space>(&mut self, space: &M, len: usize, t: S, gamma: &mut [S]) {
         let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
@@ -98,7 +99,7 @@ impl<S: Scalar> Segment<S> {
     }
 }
 
-/// Replaces points on rays from the first control point by ones on geodesics between both.
+/// Replaces points on rays from the first control point by points on the geodesic between both.
 #[cold]
 #[inline(never)]
 fn between<S: Scalar, M: Space>(space: &M, controls: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {

@@ -11,7 +11,7 @@ use crate::space::{Ambient, Erased};
 
 /// A B-spline curve: `knots.len() = control points + degree + 1`, as in SciPy.
 pub struct BSpline<'a> {
-    /// Knots, not falling; may repeat.
+    /// Non-decreasing knots, possibly repeated.
     pub knots: &'a [f64],
     /// Control points, one after another, curve after curve.
     pub control: &'a [f64],
@@ -19,9 +19,9 @@ pub struct BSpline<'a> {
     pub degree: usize,
 }
 
-/// Samples evaluated by one thread at a time, at most.
+/// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 512;
-/// Samples times numbers from which threads pay.
+/// Samples times numbers from which several threads are faster.
 const PARALLEL: usize = 1 << 14;
 
 impl BSpline<'_> {
@@ -30,16 +30,16 @@ impl BSpline<'_> {
         self.knots.len() - self.degree - 1
     }
 
-    /// The knot interval of a time: the last one at the end of the domain.
+    /// The knot interval that contains a time; the last one at the end of the domain.
     fn interval(&self, x: f64) -> usize {
         let last = self.count() - 1;
         let k = self.knots.partition_point(|&t| t <= x).saturating_sub(1).clamp(self.degree, last);
-        // Back over empty intervals at the end.
+        // Skip empty intervals at the end.
         (self.degree..=k).rev().find(|&k| self.knots[k] < self.knots[k + 1]).unwrap_or(k)
     }
 }
 
-/// Evaluates every curve at all times x: points, or vectors, curve by curve and time by time.
+/// Evaluates every curve at all times x: points or vectors, curve by curve and time by time.
 pub fn evaluate_bspline(
     space: &Erased,
     curve: &BSpline,
@@ -67,7 +67,7 @@ pub fn evaluate_bspline(
     });
 }
 
-/// Eight samples, whatever intervals and curves they fall in.
+/// Eight samples in any intervals of any curves.
 fn eight<S: Scalar>(
     space: &Erased,
     curve: &BSpline,

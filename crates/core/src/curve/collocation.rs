@@ -1,15 +1,16 @@
-//! Linear equations g' = −A(t) g by Gauss collocation: a polynomial that solves them all along an interval.
+//! Linear equations g' = −A(t) g by Gauss collocation: a polynomial that approximates the solution along an interval.
 
 use nalgebra::{ComplexField, DMatrix};
 use std::sync::LazyLock;
 
-/// Nodes of an interval. The solution is a polynomial of this degree, of order twice this at the ends.
+/// The number of nodes per interval. The solution is a polynomial of this degree; its order at the ends is twice as
+/// high.
 pub const STAGES: usize = 16;
 
 struct Rule {
     /// Gauss nodes in [0, 1].
     nodes: [f64; STAGES],
-    /// Integrals from 0 to the i-th node of the polynomial that is one at the j-th node and zero at the others.
+    /// Integrals from 0 to the i-th node of the Lagrange polynomial of the j-th node.
     integrals: [[f64; STAGES]; STAGES],
     /// The l-th Legendre coefficient of that polynomial.
     coefficients: [[f64; STAGES]; STAGES],
@@ -59,13 +60,13 @@ pub fn legendre(s: f64) -> [f64; STAGES + 1] {
     p
 }
 
-/// The nodes, as parts of an interval.
+/// The nodes, as fractions of an interval.
 pub fn nodes() -> &'static [f64; STAGES] {
     &RULE.nodes
 }
 
-/// Legendre coefficients over an interval of length h of the matrix g with g' = −A g that is 1 where it begins;
-/// A is given at the nodes. NaN where A is.
+/// Legendre coefficients, over an interval of length h, of the matrix g with g' = −A g and g = 1 at its start. A is
+/// given at the nodes. NaN where A is NaN.
 pub fn solve<T: ComplexField<RealField = f64> + Copy>(h: f64, a: &[DMatrix<T>]) -> Vec<DMatrix<T>> {
     let k = a[0].nrows();
     let one = DMatrix::<T>::identity(k, k);
@@ -107,7 +108,7 @@ pub fn end<T: ComplexField<RealField = f64> + Copy>(coefficients: &[DMatrix<T>])
     coefficients.iter().fold(DMatrix::zeros(k, k), |sum, c| sum + c)
 }
 
-/// How much of the polynomial is in its last coefficients: what it misses is smaller still.
+/// The size of the last coefficients, which bounds the truncation error.
 pub fn tail<T: ComplexField<RealField = f64> + Copy>(coefficients: &[DMatrix<T>]) -> f64 {
     coefficients[STAGES - 1..].iter().flat_map(|c| c.iter()).fold(0.0, |most, x| x.modulus().max(most))
 }
@@ -130,12 +131,12 @@ mod tests {
             assert!((value - Complex::from_polar(1.0, -(t + t * t))).norm() < 5e-16, "{value} at {s}");
         }
         assert!((end(&found)[(0, 0)] - Complex::from_polar(1.0, -(h + h * h))).norm() < 5e-16);
-        // The first that is left out is smaller by the square of the ratio of neighbours.
+        // The first omitted coefficient is smaller by the square of the ratio of neighbours.
         assert!(tail(&found) < 1e-12, "{}", tail(&found));
     }
 
     #[test]
-    fn matrices_that_do_not_commute() {
+    fn noncommuting_matrices_are_integrated() {
         // Rotating coordinates: g = R(t) exp(−t(B + J)) for A(t) = R B R⁻¹ where R' = J R.
         let (h, b, j) =
             (0.5, [[0.0, 0.3], [0.9, 0.0]], DMatrix::from_row_slice(2, 2, &[0.0, -1.0, 1.0, 0.0]));

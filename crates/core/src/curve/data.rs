@@ -1,12 +1,12 @@
-//! What is evaluated: curves, times, quantities, and a block of samples.
+//! The input of an evaluation: curves, times, quantities, and a block of samples.
 
 use super::locate::Locator;
 
 /// Spline curves with equally many knots: the triple (t, p, u).
 pub struct Curves<'a> {
-    /// Knots of each curve, or of one for all.
+    /// Knots, one row per curve or one row for all curves.
     pub t: &'a [f64],
-    /// Number of knots of a curve.
+    /// Number of knots per curve.
     pub nodes: usize,
     /// Points, curve after curve.
     pub points: &'a [f64],
@@ -16,13 +16,13 @@ pub struct Curves<'a> {
 
 /// Times to evaluate at.
 pub struct Times<'a> {
-    /// The times, of each curve or of all.
+    /// The times, one row per curve or one row for all curves.
     pub x: &'a [f64],
-    /// Times of one curve.
+    /// Number of times per curve.
     pub count: usize,
 }
 
-/// What to compute.
+/// The quantity to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// γ
@@ -34,21 +34,21 @@ pub enum Quantity {
     /// |γ'|
     Speed,
     /// |∇γ'|
-    Bend,
-    /// γ' in the frame of the moving body, for spaces that define it (`Covered::body`): angular velocity.
+    AccelerationNorm,
+    /// γ' in the body frame, for spaces that define it (`Covered::body`): angular velocity.
     BodyVelocity,
-    /// ∇γ' in the frame of the moving body: angular acceleration.
+    /// ∇γ' in the body frame: angular acceleration.
     BodyAcceleration,
 }
 
 /// The extrapolation policy for times outside the knots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outside {
-    /// The last Bézier segment goes on.
+    /// The last Bézier segment continues.
     Continue,
-    /// The curve goes on with constant velocity.
+    /// The curve continues with constant velocity.
     Geodesic,
-    /// Time wraps around.
+    /// The curve is periodic.
     Wrap,
 }
 
@@ -69,29 +69,29 @@ impl Curves<'_> {
 }
 
 impl Quantity {
-    /// Whether the result is one number, the length of a vector.
+    /// Whether the result is a length.
     pub fn is_length(self) -> bool {
-        matches!(self, Quantity::Speed | Quantity::Bend)
+        matches!(self, Quantity::Speed | Quantity::AccelerationNorm)
     }
 
-    /// Whether the result is a vector in the frame of the moving body.
+    /// Whether the result is a vector in the body frame.
     pub fn is_of_body(self) -> bool {
         matches!(self, Quantity::BodyVelocity | Quantity::BodyAcceleration)
     }
 
-    /// The number of derivatives of the curve that are needed.
+    /// The number of derivatives of the curve that the quantity requires.
     pub fn order(self) -> usize {
         match self {
             Quantity::Point => 0,
             Quantity::Velocity | Quantity::Speed | Quantity::BodyVelocity => 1,
-            Quantity::Acceleration | Quantity::Bend | Quantity::BodyAcceleration => 2,
+            Quantity::Acceleration | Quantity::AccelerationNorm | Quantity::BodyAcceleration => 2,
         }
     }
 }
 
 /// A block of samples.
 pub struct Job<'a> {
-    /// What is computed.
+    /// The quantity to compute.
     pub quantity: Quantity,
     pub(super) curves: &'a Curves<'a>,
     pub(super) times: &'a Times<'a>,
@@ -99,7 +99,7 @@ pub struct Job<'a> {
     pub(super) locator: Option<&'a Locator<'a>>,
     /// The first sample of the block.
     pub(super) first: usize,
-    /// Samples from one lane to the next: 1, or those of a curve.
+    /// The step in samples from one lane to the next: 1, or the samples of a curve.
     pub(super) apart: usize,
     /// Numbers in a row of the result, and of a point.
     pub(super) size: usize,

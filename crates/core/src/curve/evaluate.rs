@@ -11,15 +11,15 @@ use crate::space::{Ambient, Covered, Erased, Origin, Space};
 use crate::with_size;
 use std::ops::DerefMut;
 
-/// Samples evaluated by one thread at a time, at most.
+/// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 2048;
-/// How much longer a block may be that holds eight curves.
+/// The factor by which a block may be longer if it contains eight curves.
 const TOGETHER: usize = 4;
-/// Samples times numbers from which threads pay.
+/// Samples times numbers from which several threads are faster.
 const PARALLEL: usize = 1 << 16;
 
 impl Quantity {
-    /// Numbers of a result, for a space of points of `len` numbers.
+    /// The number of entries of a result, for a space with points of `len` numbers.
     pub fn len(self, space: &Erased) -> usize {
         match self {
             _ if self.is_length() => 1,
@@ -29,8 +29,8 @@ impl Quantity {
     }
 }
 
-/// Evaluates every curve at its times: `out` holds, curve by curve and time by time, a point or
-/// vector, or what [`Quantity::len`] counts.
+/// Evaluates every curve at its times. `out` receives, curve by curve and time by time, a point, a vector, or the
+/// number of entries given by [`Quantity::len`].
 pub fn evaluate(
     space: &Erased,
     curves: &Curves,
@@ -46,11 +46,11 @@ pub fn evaluate(
     if samples == 0 {
         return;
     }
-    // A table over the knots pays for itself once there are about as many times as knots.
+    // An index of the knots is faster if there are about as many times as knots.
     let shared = curves.t.len() == curves.nodes;
     let locator = shared.then(|| Locator::new(curves.t, samples > 8 && samples >= curves.nodes / 4));
     let length = parallel::block(BLOCK, len);
-    // Eight curves at a time with knots and times in common go from segment to segment together.
+    // Eight curves with common knots and times are evaluated together, segment by segment.
     let together = LANES * times.count;
     let groups = if shared && times.x.len() == times.count && together <= TOGETHER * length {
         samples / together
@@ -73,7 +73,7 @@ pub fn evaluate(
 }
 
 impl Job<'_> {
-    /// Evaluates the block, eight samples at a time, whatever segments they fall in.
+    /// Evaluates the block, eight samples at a time, in any segments.
     pub fn run<M: Space>(&self, space: &M, out: &mut [f64]) {
         match self.quantity.order() {
             0 => self.run_with::<Lane, M>(space, out),
@@ -153,7 +153,7 @@ impl Job<'_> {
         );
     }
 
-    /// Goes through the samples: `enter` reads a segment, `write` evaluates eight samples.
+    /// Iterates over the samples: `enter` reads a segment, `write` evaluates eight samples.
     #[inline(always)]
     fn each<S: Scalar>(
         &self,
@@ -185,7 +185,7 @@ impl Job<'_> {
         }
     }
 
-    /// Points of eight samples, and the vectors there if any are asked for.
+    /// Points of eight samples, and vectors there if the quantity requires them.
     #[inline(always)]
     fn sample<'v, S: Scalar, M: Space>(
         &self,
@@ -241,7 +241,7 @@ impl Job<'_> {
     }
 }
 
-/// Where the results of eight samples go.
+/// The output of eight samples.
 struct Rows<'a> {
     stride: usize,
     out: &'a mut [f64],
@@ -250,7 +250,7 @@ struct Rows<'a> {
 impl Rows<'_> {
     #[inline(always)]
     fn write(self, lanes: &[Lane]) {
-        // The length of a row is often known when this is compiled.
+        // The length of a row is often a constant at compile time.
         if self.stride == lanes.len() {
             scatter(lanes, self.out);
         } else {
@@ -262,12 +262,12 @@ impl Rows<'_> {
 #[inline(always)]
 fn norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
     let square = max_or_nan(space.inner(p, v, v), Lane::ZERO);
-    // What is left of squares that neither overflow nor vanish.
+    // A scaled norm whose squares neither overflow nor underflow.
     let plain = square.simd_ge(lane(1e-280)) & square.simd_le(lane(1e280));
     if plain.all() { square.sqrt() } else { plain.select(square.sqrt(), scaled_norm(space, p, v)) }
 }
 
-/// The same of vectors of any size: of the vector over its largest number.
+/// The norm of a vector of any size, computed from the vector divided by its largest entry.
 #[cold]
 #[inline(never)]
 fn scaled_norm<M: Ambient>(space: &M, p: &[Lane], v: &[Lane]) -> Lane {
@@ -284,7 +284,7 @@ fn two(buffer: &mut [Lane], len: usize) -> [&mut [Lane]; 2] {
     [a, &mut b[..len]]
 }
 
-/// Recursor the lanes outside the knots by the geodesic that leaves the end.
+/// Replaces the lanes outside the knots by the geodesic that continues the curve at its end.
 #[cold]
 fn go_straight<S: Scalar, M: Space>(space: &M, cursor: &SampleCursor, segment: &Segment<S>, gamma: &mut [S]) {
     let Segment { ends: [p0, p1], handles: [a, b], .. } = segment;

@@ -1,8 +1,9 @@
 //! The horizontal lift: continuous representatives of curves on quotient spaces.
 //!
-//! A point of RPⁿ, CPⁿ or Gr(k, n) is an array up to a unitary k × k factor on its right. Evaluation picks one, Y,
-//! that is smooth in a segment and starts at the representative of its first point. The horizontal one is X = Y g
-//! with g' = −A g, where Y A is the vertical part of Y'; at a knot both sides differ by the unitary Y₊*Y₋.
+//! A point of RPⁿ, CPⁿ or Gr(k, n) is an array up to a unitary k × k factor on its right. Evaluation returns a
+//! representative Y that is smooth within a segment and starts at the representative of its first point. The
+//! horizontal lift is X = Y g with g' = −A g, where Y A is the vertical part of Y'. At a knot the representatives of
+//! both sides differ by the unitary matrix Y₊*Y₋.
 
 use super::bezier::Segment;
 use super::collocation::{STAGES, end, legendre, nodes, solve, tail};
@@ -16,19 +17,20 @@ use crate::scalar::{Dual, LANES, Lane};
 use crate::space::{Ambient, Erased};
 use nalgebra::{Complex, DMatrix};
 
-/// A unitary k × k matrix, or nearly.
+/// A k × k matrix that is unitary up to rounding.
 type Factor = DMatrix<Complex<f64>>;
 
-/// Samples worked on by one thread at a time.
+/// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 2048;
-/// Segments whose factors are found by one thread at a time.
+/// Number of segments whose factors one thread computes at a time.
 const SEGMENTS: usize = 64;
-/// What the last two coefficients may be: each is some tenth of the one before, and the polynomial true to rounding.
+/// The limit of the last two coefficients. Coefficients decrease by about a factor of ten, so that the polynomial is
+/// then accurate to rounding.
 const TAIL: f64 = 2e-13;
-/// Halvings of a segment, at most: near the cut locus rounding errors are above that.
+/// The maximum number of halvings of a segment: near the cut locus rounding errors exceed the limit above.
 const DEEPEST: usize = 6;
 
-/// A stretch of a segment, and the Legendre coefficients of g there, k × k complex numbers each.
+/// A subinterval of a segment, and the Legendre coefficients of g there, k × k complex numbers each.
 struct Interval {
     from: f64,
     length: f64,
@@ -81,8 +83,8 @@ impl<'a> LiftedSegment<'a> {
         matrix(self.space, self.k, self.len, entry)
     }
 
-    /// Follows g from one position of the segment to another, interval by interval; g is that at the first position and becomes
-    /// that at the second.
+    /// Continues g from one position of the segment to another through its subintervals; g is its value at the first
+    /// position and is replaced by that at the second.
     fn follow(&mut self, from: f64, to: f64, depth: usize, g: &mut Factor, intervals: &mut Vec<Interval>) {
         let length = to - from;
         let t = nodes().map(|s| from + s * length);
@@ -99,7 +101,7 @@ impl<'a> LiftedSegment<'a> {
         intervals.push(Interval { from, length, coefficients: found.iter().flat_map(numbers).collect() });
     }
 
-    /// From the representative of the first point of a segment to that of the second.
+    /// The factor from the representative of the first point of a segment to that of the second.
     fn across(&mut self, curves: &Curves, curve: usize, i: usize) -> Factor {
         self.enter(curves, curve, i);
         let mut g = Factor::identity(self.k, self.k);
@@ -122,12 +124,12 @@ fn matrix(space: &Erased, k: usize, len: usize, entry: impl Fn(usize) -> f64) ->
     }
 }
 
-/// The unitary g with q g = y for two representatives of a point.
+/// The unitary g with q g = y for two representatives q and y of a point.
 fn matched(q: &Factor, y: &Factor) -> Factor {
     unitary(q.adjoint() * y)
 }
 
-/// The unitary matrix beside one that is so but for rounding errors, and the phase of a number.
+/// Removes rounding errors from a unitary matrix; the result for a number is its phase.
 fn unitary(g: Factor) -> Factor {
     if g.nrows() == 1 {
         let size = g[(0, 0)].norm();
@@ -145,8 +147,8 @@ fn factor(k: usize, numbers: &[f64]) -> Factor {
     Factor::from_fn(k, k, |i, j| Complex::new(numbers[2 * (i * k + j)], numbers[2 * (i * k + j) + 1]))
 }
 
-/// Writes the factors g at the knots, 1 at the first one: k × k complex numbers for every knot of every curve. At
-/// the point p of a knot the lift that starts at the first point as it was given is p g.
+/// Computes the factors g at the knots, 1 at the first one: k × k complex numbers for every knot of every curve. At
+/// the point p of a knot, the lift that starts at the given representative of the first point is p g.
 pub fn lift_knots(space: &Erased, curves: &Curves, monitor: &Monitor, out: &mut [f64]) {
     let (k, nodes) = (space.fiber_rank(), curves.nodes);
     let size = 2 * k * k;
@@ -171,7 +173,8 @@ pub fn lift_knots(space: &Erased, curves: &Curves, monitor: &Monitor, out: &mut 
     }
 }
 
-/// Where a sample is: its segment, the position there, how often time went round, and whether the curve is straight.
+/// The position of a sample: its segment, the parameter there, the number of turns, and whether the curve is a
+/// geodesic.
 struct Sample {
     row: usize,
     segment: usize,
@@ -180,10 +183,10 @@ struct Sample {
     straight: bool,
 }
 
-/// Evaluates the horizontal lift and its derivatives: what [`evaluate`] gives, at other representatives.
+/// Evaluates the horizontal lift and its derivatives: the result of [`evaluate`] at other representatives.
 ///
-/// `knots` is what [`lift_knots`] found, `start` the factor from the first point as it was given to the
-/// representative that the lift starts at, for every curve.
+/// `knots` is the result of [`lift_knots`], and `start`, for every curve, the factor from the given representative of
+/// the first point to the initial point of the lift.
 pub fn lift(
     space: &Erased,
     curves: &Curves,
@@ -216,7 +219,7 @@ pub fn lift(
             for s in group {
                 let row = &mut out[s.row * len..][..len];
                 if s.straight {
-                    // A ray from an end point is horizontal itself.
+                    // A ray from an end point is horizontal.
                     turned.set(&numbers(if s.t < 0.5 { &here } else { &next }), &[1.0]);
                 } else {
                     let ahead = &intervals[usize::from(s.t < 0.0)];
@@ -231,7 +234,7 @@ pub fn lift(
     });
 }
 
-/// Intervals of a segment ahead of its first point (`way` = 1) or behind, as far as there are samples.
+/// Subintervals of a segment after its first point (`way` = 1) or before it, as far as the samples require.
 fn intervals(segment: &mut LiftedSegment, samples: &[Sample], here: &Factor, way: f64) -> Vec<Interval> {
     let (mut g, mut out) = (here.clone(), Vec::new());
     let most = samples.iter().filter(|s| !s.straight).map(|s| way * s.t).fold(-1.0, f64::max);
@@ -256,7 +259,7 @@ fn position(curves: &Curves, times: &Times, outside: Outside, first: usize, row:
     Sample { row, segment: curve * curves.nodes + k, turns, t, straight: beyond != 0.0 }
 }
 
-/// The factor from the representative of the first knot to that of the lift after some turns of a closed curve.
+/// The factor from the representative of the first knot to that of the lift after given turns of a closed curve.
 fn turn(space: &Erased, curves: &Curves, [knots, start]: [&[f64]; 2], curve: usize, turns: i32) -> Factor {
     let (len, k) = (space.point_len(), space.fiber_rank());
     let start = factor(k, &start[curve * 2 * k * k..][..2 * k * k]);

@@ -1,7 +1,7 @@
-//! Which segment a time falls in.
+//! The segment that contains a time.
 
-/// Knots with an index over equal buckets of time, which makes a look-up cost the same for any
-/// number of knots.
+/// Knots with an index over equal buckets of time, which makes the cost of a look-up independent of the number of
+/// knots.
 pub struct Locator<'a> {
     t: &'a [f64],
     buckets: Vec<u32>,
@@ -9,7 +9,7 @@ pub struct Locator<'a> {
 }
 
 impl<'a> Locator<'a> {
-    /// `indexed` pays when there are about as many look-ups as knots.
+    /// `indexed` is faster if there are about as many look-ups as knots.
     pub fn new(t: &'a [f64], indexed: bool) -> Self {
         let n = t.len() - 1;
         let per_time = n as f64 / (t[n] - t[0]);
@@ -27,8 +27,8 @@ impl<'a> Locator<'a> {
         Locator { t, buckets, per_time }
     }
 
-    /// The segment k with `t[k] <= x < t[k+1]`, the first or last one for x outside. `hint` is the
-    /// answer to a question before.
+    /// The segment k with `t[k] <= x < t[k+1]`; the first or last one for x outside the knots. `hint` is an earlier
+    /// result.
     #[inline(always)]
     pub fn find(&self, x: f64, hint: usize) -> usize {
         let (t, last) = (self.t, self.t.len() - 2);
@@ -43,7 +43,7 @@ impl<'a> Locator<'a> {
         } else {
             let bucket = ((x - t[0]) * self.per_time).clamp(0.0, last as f64) as usize;
             let spread = (self.buckets[bucket] as usize, self.buckets[bucket + 1] as usize + 1);
-            // Rounding may have put x one bucket off.
+            // Rounding may select an adjacent bucket.
             if t[spread.0] <= x && x < t[spread.1.min(last + 1)] { spread } else { (0, last + 1) }
         };
         let inner = &t[(from + 1).min(last + 1)..=to.min(last).max(from)];

@@ -1,29 +1,29 @@
-//! Which segments eight samples at a time fall in.
+//! The segments of eight samples at a time.
 
 use super::data::{Job, Outside, Times};
 use super::locate::Locator;
 use crate::scalar::{LANES, Lane, few, lane};
 
-/// Where eight samples fall. It goes along the samples of a block in their order, or along the times of eight curves
-/// at once.
+/// The segments and parameters of eight samples. The cursor iterates over the samples of a block in their order, or
+/// over the times of eight curves at once.
 pub struct SampleCursor<'a> {
     job: &'a Job<'a>,
     /// The next sample: the i-th time of a curve.
     curve: usize,
     i: usize,
-    /// Samples that are left in the block.
+    /// The number of remaining samples in the block.
     left: usize,
     segment: usize,
-    /// Where the data of each lane's segment begin.
+    /// The index of the data of each lane's segment.
     pub at: [usize; LANES],
-    /// Times, first knots and lengths of the segments, and one over those.
+    /// Times, first knots and lengths of the segments, and their reciprocals.
     pub x: Lane,
     pub knot: Lane,
     pub h: Lane,
     pub rate: Lane,
-    /// Times beyond the last (positive) or before the first knot.
+    /// Times after the last knot (positive) or before the first one.
     pub beyond: [f64; LANES],
-    /// First and last knot of the segment, if all lanes are in the same one.
+    /// First and last knot of the segment, if all lanes are in the same segment.
     shared: Option<[Lane; 2]>,
 }
 
@@ -46,8 +46,8 @@ impl<'a> SampleCursor<'a> {
         }
     }
 
-    /// Goes to the next eight samples; lanes that are left over repeat the last one. Returns whether
-    /// they fall in other segments than those before.
+    /// Advances to the next eight samples; unused lanes repeat the last one. Returns whether the segments have
+    /// changed.
     #[inline(always)]
     pub fn advance(&mut self) -> bool {
         if self.job.apart > 1 {
@@ -58,7 +58,7 @@ impl<'a> SampleCursor<'a> {
             && self.left >= LANES
             && self.i + LANES <= count
         {
-            // Dense samples in order stay in a segment for a while.
+            // Consecutive dense samples stay in a segment.
             let row = if x.len() == count { self.i } else { self.curve * count + self.i };
             let next = Lane::new(few(|l| x[row..][..LANES][l]));
             if (next.simd_ge(from) & next.simd_lt(to)).all() {
@@ -70,7 +70,7 @@ impl<'a> SampleCursor<'a> {
         self.search()
     }
 
-    /// The next time of eight curves that have knots and times in common.
+    /// The next time of eight curves with common knots and times.
     fn advance_together(&mut self) -> bool {
         let Job { curves, times, outside, locator, len, .. } = self.job;
         let begins = self.i == 0;
@@ -129,15 +129,15 @@ impl<'a> SampleCursor<'a> {
         self.knot = Lane::new(knots);
         self.h = Lane::new(ends) - self.knot;
         self.rate = Lane::ONE / self.h;
-        // The next sample may be of another curve already.
+        // The next sample may belong to another curve.
         let alike = at == [at[0]; LANES] && self.beyond == [0.0; LANES] && self.i >= LANES;
         self.shared = alike.then(|| [self.knot, Lane::new(ends)]);
         changed
     }
 }
 
-/// A time as it is meant: between the knots where it is wrapped or the curve goes on straight from an end, and how far
-/// it is beyond that.
+/// A time after application of the extrapolation policy: between the knots if it is wrapped or the curve continues as
+/// a geodesic, and the distance beyond the end.
 #[inline(always)]
 pub fn inside(x: f64, t: &[f64], outside: Outside) -> (f64, f64) {
     let (start, end) = (t[0], t[t.len() - 1]);

@@ -1,8 +1,8 @@
 //! Parallel transport along a curve, (26a).
 //!
-//! Near a point q of the curve tangent vectors are seen from q, by transport along geodesics to q. A vector that is
-//! parallel along γ = exp_q(v) turns there by x' = [[v, T w], x] with T = tanh(ad_v/2)/ad_v where w is γ' seen from q:
-//! [v, T w] is minus the part in 𝔥 of e^{−v}(e^v)' with S(v) v' = w (Lemma A.2).
+//! Near a point q of the curve, tangent vectors are represented at q, by transport along geodesics to q. A vector
+//! that is parallel along γ = exp_q(v) rotates there by x' = [[v, T w], x] with T = tanh(ad_v/2)/ad_v, where w is γ'
+//! represented at q: [v, T w] is minus the component in 𝔥 of e^{−v}(e^v)' with S(v) v' = w (Lemma A.2).
 
 use super::bezier::Segment;
 use super::collocation::{STAGES, integrate, nodes};
@@ -26,29 +26,29 @@ const HALF_TANH: [f64; 9] = [
     -929569.0 / 20922789888000.0,
     3202291.0 / 711374856192000.0,
 ];
-/// Size of ad_v up to which these are all of it: (0.4/π)¹⁸ is rounding.
+/// The size of ad_v up to which these coefficients suffice: (0.4/π)¹⁸ is below rounding.
 const NEAR: f64 = 0.4;
-/// Halvings of a segment, at most.
+/// The maximum number of halvings of a segment.
 const DEEPEST: usize = 12;
-/// Iterations, at most; each makes the error smaller by a tenth.
+/// The maximum number of iterations; each reduces the error by a factor of ten.
 const ITERATIONS: usize = 40;
 
 /// A vector that is transported along segments of a curve.
-struct Carrier<'a> {
+struct Transport<'a> {
     space: &'a Erased<'a>,
     segment: Segment<Dual>,
     gamma: Vec<Dual>,
-    /// Where the vector is, and the vector.
+    /// The current point, and the vector there.
     position: Vec<Lane>,
     vector: Vec<Lane>,
 }
 
-impl<'a> Carrier<'a> {
+impl<'a> Transport<'a> {
     fn new(space: &'a Erased<'a>) -> Self {
         let len = space.point_len();
         let lanes = || vec![Lane::ZERO; len];
         let gamma = vec![Dual { v: Lane::ZERO, d: Lane::ZERO }; len];
-        Carrier { space, segment: Segment::new(len), gamma, position: lanes(), vector: lanes() }
+        Transport { space, segment: Segment::new(len), gamma, position: lanes(), vector: lanes() }
     }
 
     /// Points and velocities at eight positions of the segment.
@@ -60,7 +60,7 @@ impl<'a> Carrier<'a> {
         [y, d]
     }
 
-    /// Brings the vector along the geodesic to another point.
+    /// Transports the vector along the geodesic to another point.
     fn move_to(&mut self, q: &[Lane]) {
         let mut way = vec![Lane::ZERO; q.len()];
         self.space.log(&self.position, q, &mut way);
@@ -69,7 +69,7 @@ impl<'a> Carrier<'a> {
         self.position.copy_from_slice(q);
     }
 
-    /// Carries the vector along the segment from its position a to its position b.
+    /// Transports the vector along the segment from its position a to its position b.
     fn along(&mut self, a: f64, b: f64, depth: usize) {
         let space = self.space;
         let (dim, len) = (space.dim(), self.position.len());
@@ -113,7 +113,7 @@ impl<'a> Carrier<'a> {
     }
 }
 
-/// The solution of x' = [[v, u], x] at the end, for v and u at the nodes.
+/// The final value of x' = [[v, u], x], for v and u at the nodes.
 fn parallel_along(space: &Erased, turning: &[[Vec<Lane>; 2]], start: &[Lane]) -> Vec<Lane> {
     let dim = start.len();
     let mut rates = vec![[0.0; STAGES]; dim];
@@ -146,8 +146,8 @@ fn parallel_along(space: &Erased, turning: &[[Vec<Lane>; 2]], start: &[Lane]) ->
     end
 }
 
-/// Carries a tangent vector of every curve, at its point at time `from`, along the curve to time `to`. Closed curves
-/// are gone round with [`Outside::Wrap`].
+/// Transports a tangent vector of every curve, at its point at time `from`, along the curve to time `to`. With
+/// [`Outside::Wrap`] the transport continues around closed curves.
 pub fn transport(
     space: &Erased,
     curves: &Curves,
@@ -160,17 +160,17 @@ pub fn transport(
     let rows: Vec<(usize, &mut [f64])> = vectors.chunks_mut(len).enumerate().collect();
     let parallel = rows.len() > 1;
     parallel::for_each(rows, parallel, monitor, |(curve, vector)| {
-        let mut carrier = Carrier::new(space);
+        let mut transport = Transport::new(space);
         let segments = curves.nodes as i64 - 1;
         let [(first, a), (last, b)] = [from, to].map(|x| locate(curves.knots(curve), x, outside));
-        let enter = |carrier: &mut Carrier, segment: i64| {
-            carrier.segment.read(curves, curve, segment.rem_euclid(segments) as usize, len);
-            carrier.segment.prepare(space, len);
+        let enter = |transport: &mut Transport, segment: i64| {
+            transport.segment.read(curves, curve, segment.rem_euclid(segments) as usize, len);
+            transport.segment.prepare(space, len);
         };
-        enter(&mut carrier, first);
-        let [y, _] = carrier.at(lane(a));
-        carrier.position.copy_from_slice(&y);
-        carrier.vector.iter_mut().zip(&*vector).for_each(|(x, v)| *x = lane(*v));
+        enter(&mut transport, first);
+        let [y, _] = transport.at(lane(a));
+        transport.position.copy_from_slice(&y);
+        transport.vector.iter_mut().zip(&*vector).for_each(|(x, v)| *x = lane(*v));
         let way = (last - first).signum();
         let (near, far) = if way < 0 { (1.0, 0.0) } else { (0.0, 1.0) };
         let mut segment = first;
@@ -178,24 +178,24 @@ pub fn transport(
             let begin = if segment == first { a } else { near };
             let stop = if segment == last { b } else { far };
             if segment != first {
-                enter(&mut carrier, segment);
-                let [y, _] = carrier.at(lane(begin));
-                carrier.move_to(&y);
+                enter(&mut transport, segment);
+                let [y, _] = transport.at(lane(begin));
+                transport.move_to(&y);
             }
             if begin != stop {
-                carrier.along(begin, stop, 0);
+                transport.along(begin, stop, 0);
             }
             if segment == last {
                 break;
             }
             segment += way;
         }
-        vector.iter_mut().zip(&carrier.vector).for_each(|(v, x)| *v = x.to_array()[0]);
+        vector.iter_mut().zip(&transport.vector).for_each(|(v, x)| *v = x.to_array()[0]);
         monitor.advance(1);
     });
 }
 
-/// The segment of a time, counted on through the turns of a closed curve, and the position in it.
+/// The segment of a time, numbered on through the turns of a closed curve, and the position in it.
 fn locate(t: &[f64], x: f64, outside: Outside) -> (i64, f64) {
     let (found, _) = inside(x, t, outside);
     let turns = ((x - found) / (t[t.len() - 1] - t[0])).round() as i64;

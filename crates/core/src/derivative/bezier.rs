@@ -1,4 +1,4 @@
-//! A Bézier segment and how its points follow its control points.
+//! A Bézier segment and the derivatives of its points with respect to its control points.
 
 use super::operators::{Few, Matrix, Vector, columns, unit};
 use super::polygon::Node;
@@ -10,10 +10,10 @@ use smallvec::smallvec;
 /// Four control points, and a frame at each.
 pub struct Bezier {
     points: [Few<Lane>; 4],
-    /// The frames of the knots, transported to q⁺ and q⁻ in parallel: vectors as columns.
+    /// The frames of the knots, transported to q⁺ and q⁻ in parallel, with vectors as columns.
     bases: [Matrix; 4],
-    /// A length by which points move: one, and the length of the handles where space is flat, so that nothing is
-    /// lost beside large numbers.
+    /// The unit of motions of the points: one, or the length of the handles in flat space, which avoids cancellation
+    /// beside large numbers.
     reach: f64,
 }
 
@@ -64,7 +64,7 @@ impl Bezier {
         Self::at(space, self.points.clone(), lane(tau)).iter().map(|x| x.as_array()[0]).collect()
     }
 
-    /// The motions of the k-th control point in eight columns from `first` on.
+    /// Motions of the k-th control point in eight columns from `first` on.
     fn motion(&self, k: usize, row: usize, first: usize) -> Lane {
         let m = self.bases[k].ncols();
         Lane::new(few(|l| {
@@ -87,7 +87,7 @@ impl Bezier {
         })
     }
 
-    /// The same for the velocity ∂γ/∂τ: covariant derivatives.
+    /// The same for the velocity ∂γ/∂τ, with covariant derivatives.
     ///
     /// Along the line (τ + r, ε = sr) of a family of curves the covariant acceleration is
     /// `γ_ττ + 2s γ_τε + s² γ_εε`: a quarter of the difference of s = 1 and s = −1 is the mixed derivative.
@@ -122,8 +122,8 @@ impl Bezier {
         })
     }
 
-    /// The same for the covariant acceleration of ∂γ/∂τ: by central differences of order eight, which an analytic
-    /// function has to twelve digits at this step.
+    /// The same for the covariant acceleration of ∂γ/∂τ: by central differences of order eight, which are accurate to
+    /// twelve significant digits for analytic functions at this step.
     pub fn acceleration(&self, space: &Erased, tau: f64) -> Matrix {
         const STEP: f64 = 0.015;
         const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
@@ -146,7 +146,7 @@ impl Bezier {
                 let weight = lane(sign * WEIGHTS[k] / (STEP * self.reach));
                 out.iter_mut().zip(&back).for_each(|(out, x)| *out += *x * weight);
             }
-            // Time goes its own way, whatever the reach of the points.
+            // The step in time does not depend on the unit of the points.
             let time = unit(count - 1, first).simd_gt(Lane::ZERO);
             out.iter_mut().for_each(|x| *x = time.select(*x * lane(self.reach), *x));
         })

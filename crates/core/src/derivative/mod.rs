@@ -1,7 +1,7 @@
-//! How a spline follows its data: derivatives with respect to points, knots and end vectors.
+//! Sensitivity of a spline to its data: derivatives with respect to points, knots and end vectors.
 //!
-//! The velocities are defined by the C² condition F(u, data) = 0, so that they follow the data like
-//! −F_u⁻¹ F_data (implicit differentiation). Everything is written in frames that move with the points.
+//! The velocities are defined by the C² condition F(u, data) = 0, so that their derivative is −F_u⁻¹ F_data (implicit
+//! differentiation). All quantities are expressed in frames that move with the points.
 
 mod bezier;
 mod operators;
@@ -19,18 +19,18 @@ use std::collections::BTreeMap;
 pub use system::Row;
 use system::{Change, System};
 
-/// What a curve is made of, or small changes of it, or a gradient with respect to it.
+/// The data of a curve, small changes of them, or a gradient with respect to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Data {
     /// Points, or tangent vectors there.
     pub points: Vec<f64>,
     /// Knots.
     pub knots: Vec<f64>,
-    /// The vectors that are prescribed at the ends; empty where there is none.
+    /// The vectors that are prescribed at the ends; empty without one.
     pub ends: [Vec<f64>; 2],
 }
 
-/// What is differentiated.
+/// The quantity to differentiate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Of {
     /// The point γ.
@@ -50,7 +50,7 @@ pub struct Derivative<'a> {
     beziers: BTreeMap<usize, Bezier>,
 }
 
-/// How samples of one segment follow the points and velocities of the two knots beside it.
+/// Derivatives of samples of one segment with respect to points and velocities of its two knots.
 pub struct Motion<'a> {
     derivative: &'a Derivative<'a>,
     bezier: Bezier,
@@ -58,8 +58,8 @@ pub struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Of a sample, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last. The last knot of a
-    /// closed curve is the first again, in its frame.
+    /// The derivatives of a sample, in the frames of the knots: columns for ξ, υ of the first and ξ, υ of the last
+    /// knot. The last knot of a closed curve equals the first, in its frame.
     pub fn at(&self, tau: f64, of: Of) -> Matrix {
         let m = self.derivative.space.dim();
         let position = Position { segment: self.segment, tau };
@@ -83,20 +83,21 @@ impl Motion<'_> {
         out
     }
 
-    /// The point to which such motions belong: of its arrays the one that they are made at.
+    /// The array of the point at which the motions are tangent.
     pub fn point(&self, tau: f64) -> Vec<f64> {
         self.bezier.gamma(self.derivative.space, tau)
     }
 }
 
-/// Where a time falls.
+/// The segment of a time, and the parameter there.
 struct Position {
     segment: usize,
     tau: f64,
 }
 
 impl<'a> Derivative<'a> {
-    /// Of the spline with these knots, points and velocities. Vectors in `ends` are those of this curve.
+    /// The derivative of the spline with these knots, points and velocities. Vectors in `ends` are those of this
+    /// curve.
     pub fn new(space: &'a Erased<'a>, t: &'a [f64], points: &[f64], velocities: &[f64], ends: &Ends) -> Self {
         let closed = matches!(ends, Ends::Periodic);
         let polygon = Polygon::new(space, points, velocities, closed);
@@ -131,10 +132,10 @@ impl<'a> Derivative<'a> {
         Bezier::new(self.space, &self.polygon.nodes[segment..segment + 2], &self.system.segments[segment])
     }
 
-    /// The columns by which a sample follows the four control points, τ and (behind a factor) h.
+    /// The derivatives of a sample: columns for the four control points and τ, and separately a factor for h.
     fn columns(&self, bezier: &Bezier, &Position { segment, tau }: &Position, of: Of) -> (Matrix, Vector) {
         let (space, inverse) = (self.space, 1.0 / self.system.segments[segment].h);
-        // Behind the control points the last column is the derivative in τ.
+        // The last column, after those of the control points, is the derivative in τ.
         let along = |columns: Matrix, factor: f64| columns.column(columns.ncols() - 1) * factor;
         match of {
             Of::Point => (bezier.point(space, tau), Vector::zeros(space.point_len())),
@@ -151,7 +152,8 @@ impl<'a> Derivative<'a> {
         }
     }
 
-    /// How the curve at times x moves with the data; `out` gets one tangent vector a time.
+    /// Forward mode: the motion of the curve at times x for given changes of the data; `out` receives one tangent
+    /// vector per time.
     pub fn push(&mut self, x: &[f64], of: Of, change: &Data, out: &mut [f64]) {
         let change = self.in_frames(change);
         let mut u = self.system.velocities(&change);
@@ -178,7 +180,8 @@ impl<'a> Derivative<'a> {
         }
     }
 
-    /// The gradient of `Σ cotangent · curve` with respect to the data: tangent vectors at the points and ends.
+    /// Reverse mode: the gradient of `Σ cotangent · curve` with respect to the data, tangent vectors at points and
+    /// ends.
     pub fn pull(&mut self, x: &[f64], of: Of, cotangent: &[f64]) -> Data {
         let (n, m, len) = (self.segments(), self.space.dim(), self.space.point_len());
         let zero = || vec![Vector::zeros(m); n + 1];
@@ -214,7 +217,7 @@ impl<'a> Derivative<'a> {
         self.ambient(&gradient)
     }
 
-    /// The same for a segment that is asked for again and again.
+    /// The same, with the Bézier segments stored for repeated use.
     fn kept(&mut self, position: &Position, of: Of) -> (Matrix, Vector) {
         let bezier = self.beziers.remove(&position.segment).unwrap_or_else(|| self.bezier(position.segment));
         let found = self.columns(&bezier, position, of);
@@ -222,7 +225,7 @@ impl<'a> Derivative<'a> {
         found
     }
 
-    /// How samples of a segment follow the two knots beside it.
+    /// The derivatives of samples of a segment with respect to its two knots.
     pub fn motion(&self, segment: usize) -> Motion<'_> {
         Motion { derivative: self, bezier: self.bezier(segment), segment }
     }
@@ -238,7 +241,7 @@ impl<'a> Derivative<'a> {
         v.copy_from_slice(v_at.as_slice());
     }
 
-    /// Changes as the system has them.
+    /// Converts changes to the frames of the linear system.
     fn in_frames(&self, change: &Data) -> Change {
         let (n, len) = (self.segments(), self.space.point_len());
         let at = |i: usize, v: &[f64]| self.polygon.nodes[i].coordinates(self.space, v);
@@ -256,7 +259,7 @@ impl<'a> Derivative<'a> {
         }
     }
 
-    /// The last node of a closed curve moves like the first.
+    /// The last node of a closed curve moves with the first.
     fn close(&self, x: &mut Vec<Vector>) {
         if let Some(holonomy) = &self.polygon.holonomy {
             x.resize(self.segments() + 1, Vector::zeros(self.space.dim()));
@@ -273,7 +276,7 @@ impl<'a> Derivative<'a> {
         }
     }
 
-    /// A gradient as ambient arrays.
+    /// Converts a gradient to ambient arrays.
     fn ambient(&self, gradient: &Change) -> Data {
         let n = self.segments();
         let at = |i: usize, x: &Vector| self.polygon.nodes[i].gradient(self.space, x).as_slice().to_vec();

@@ -1,7 +1,7 @@
 //! Functions of ad on 𝔪 as matrices.
 //!
-//! Everything comes from `S(v) = sinh(ad_v)/ad_v` and the triple product `[a, [b, c]]`, which every space has;
-//! hyperbolic identities give the other even functions of ad_v.
+//! All functions are computed from `S(v) = sinh(ad_v)/ad_v` and the triple product `[a, [b, c]]`, which every space
+//! provides. Hyperbolic identities give the other even functions of ad_v.
 
 use crate::scalar::{Dual, LANES, Lane, Scalar, few, lane};
 use crate::space::{Erased, Origin};
@@ -12,10 +12,10 @@ use smallvec::{SmallVec, smallvec};
 pub type Matrix = DMatrix<f64>;
 /// A vector of any size.
 pub type Vector = DVector<f64>;
-/// A few numbers on the stack: lanes on the heap are aligned, which costs more than the work done here.
+/// A few numbers on the stack: allocating aligned lanes on the heap would cost more than the computation.
 pub type Few<S> = SmallVec<[S; 12]>;
 
-/// The matrix whose columns `f` computes, eight from a first one on.
+/// The matrix whose columns `f` computes, eight at a time, starting from a given first one.
 pub fn columns(rows: usize, count: usize, mut f: impl FnMut(usize, &mut [Lane])) -> Matrix {
     let mut out = Matrix::zeros(rows, count);
     let mut lanes: Few<Lane> = smallvec![Lane::ZERO; rows];
@@ -35,7 +35,7 @@ pub fn unit(row: usize, first: usize) -> Lane {
     Lane::new(few(|l| if row == first + l { 1.0 } else { 0.0 }))
 }
 
-/// A vector on every lane.
+/// Copies a vector to every lane.
 pub fn splat(v: &Vector) -> Few<Lane> {
     v.iter().map(|&x| lane(x)).collect()
 }
@@ -78,7 +78,7 @@ fn ad_squared(space: &Erased, v: &Vector) -> Matrix {
     })
 }
 
-/// Functions of ad_v for one v. They are even.
+/// Even functions of ad_v for one v.
 pub struct Functions {
     /// S = sinh(ad)/ad
     pub stretch: Matrix,

@@ -1,4 +1,4 @@
-//! A curve's knots in frames that move in parallel along its polygon, as the fit has them.
+//! The knots of a curve in frames that are transported along its polygon, as in the fit.
 
 use super::operators::{Few, Matrix, Vector, columns, unit};
 use crate::scalar::{Lane, lane};
@@ -18,7 +18,7 @@ pub struct Polygon {
     pub chords: Vec<Vector>,
     /// Velocities in the frames of the nodes.
     pub u: Vec<Vector>,
-    /// Of a closed curve: from the frame of the first node to that of the last, which is the same point.
+    /// For closed curves: from the frame of the first node to that of the last, which is at the same point.
     pub holonomy: Option<Matrix>,
 }
 
@@ -48,7 +48,7 @@ impl Polygon {
             let (mut here, mut there) = (still.clone(), still.clone());
             columns(m, m, |k, out| {
                 start.tangent(space, k, &mut here);
-                // One point, but maybe another array.
+                // The same point, possibly another array.
                 space.parallel_transport(&start.p, &end.p, &still, &here, &mut there);
                 space.coordinates(&end.frame, &end.p, &there, out);
             })
@@ -72,14 +72,14 @@ impl Node {
         space.tangent(&self.frame, &self.p, &x, out);
     }
 
-    /// The frame's vectors as columns.
+    /// The frame vectors as columns.
     pub fn basis(&self, space: &Erased) -> Matrix {
         columns(space.point_len(), space.dim(), |k, out| self.tangent(space, k, out))
     }
 
     /// The tangent vector g with `Σ g δ = gradient · coordinates(δ)` for all tangent vectors δ: the shortest solution
-    /// of `basisᵀ g = gradient`. By the factors QR of the basis, since its normal equations would square its
-    /// condition.
+    /// of `basisᵀ g = gradient`. It uses a QR factorisation of the basis, because its normal equations would square
+    /// the condition number.
     pub fn gradient(&self, space: &Erased, gradient: &Vector) -> Vector {
         let (q, r) = self.basis(space).qr().unpack();
         let x = r.tr_solve_upper_triangular(gradient);

@@ -6,22 +6,22 @@
 //! E(εξ)E(a) = E(a + ε ad_a coth(ad_a) ξ)(1 − ε tanh(ad_a/2) ξ)     to first order
 //! ```
 //!
-//! (the parts in 𝔪 and 𝔥 of E(−a)ξE(a) = e^{−ad_a} ξ) the handles `w⁺ = log_o(E(−a)E(−εξ)E(d)E(εη)E(−b)·o)` are those of
-//! two moved a and b, turned by an element of the isotropy group.
+//! (the components in 𝔪 and 𝔥 of E(−a)ξE(a) = e^{−ad_a} ξ) the handles `w⁺ = log_o(E(−a)E(−εξ)E(d)E(εη)E(−b)·o)` are
+//! those of changed a and b, rotated by an element of the isotropy group.
 
 use super::operators::{Few, Functions, Matrix, Vector, columns, curvature, splat, unit};
 use crate::scalar::{Dual, Lane, Scalar, lane};
 use crate::space::{Erased, Origin};
 use smallvec::smallvec;
 
-/// One side, `(w⁺ − a)/h²` at the first knot of a segment or `(w⁻ + b)/h²` at the last, and how it changes.
+/// One side, `(w⁺ − a)/h²` at the first knot of a segment or `(w⁻ + b)/h²` at the last, and its derivatives.
 pub struct Side {
     pub value: Vector,
-    /// With the velocities at the two knots.
+    /// With respect to the velocities at the two knots.
     pub u: [Matrix; 2],
-    /// With the points.
+    /// With respect to the points.
     pub points: [Matrix; 2],
-    /// With h.
+    /// With respect to h.
     pub length: Vector,
 }
 
@@ -32,7 +32,7 @@ pub struct Segment {
     pub handles: [Vector; 2],
     /// Functions of ad of the handles.
     pub functions: [Functions; 2],
-    /// Seen from the two knots.
+    /// Expressed at the two knots.
     pub sides: [Side; 2],
 }
 
@@ -48,7 +48,8 @@ impl Segment {
             let own = [&a, &b][which];
             let w = w.rows(which * m, m).into_owned();
             let (at_a, at_b) = (block(which, 0), block(which, 1));
-            // p₀ moves a by ad coth ξ, p₁ moves b by −ad coth η; the nearer one turns the handle.
+            // A motion of p₀ changes a by ad coth ξ, a motion of p₁ changes b by −ad coth η; the nearer one rotates
+            // the handle.
             let mut points = [&at_a * &functions[0].coth, -&at_b * &functions[1].coth];
             let turn = curvature(space, own, &w) * &functions[which].tanh;
             let sign = if which == 0 { 1.0 } else { -1.0 };

@@ -1,4 +1,4 @@
-//! The linearised C² condition of a whole curve: how velocities follow points, knots and end vectors.
+//! The linearised C² condition of a whole curve: the sensitivity of velocities to points, knots and end vectors.
 
 use super::operators::{Functions, Matrix, Vector, curvature, splat, stretch, stretch_slope, unit};
 use super::polygon::Polygon;
@@ -7,13 +7,13 @@ use crate::fit::{Blocks, EndKind, NotAKnot};
 use crate::scalar::{Dual, Lane, lane};
 use crate::space::{Erased, Origin};
 
-/// How the condition at one knot changes: with velocities and points of knots, lengths of segments, and
-/// the vector that is prescribed at an end.
+/// The derivatives of the condition at one knot with respect to velocities and points of knots, lengths of segments,
+/// and the prescribed vector at an end.
 #[derive(Default)]
 pub struct Row {
-    /// With the velocities of knots.
+    /// With respect to the velocities of knots.
     pub u: Vec<(usize, Matrix)>,
-    /// With their points.
+    /// With respect to the points of knots.
     pub points: Vec<(usize, Matrix)>,
     lengths: Vec<(usize, Vector)>,
     end: Option<(usize, Matrix)>,
@@ -22,13 +22,13 @@ pub struct Row {
 /// Small changes, in the frames of the knots.
 #[derive(Clone)]
 pub struct Change {
-    /// Of points.
+    /// Changes of points.
     pub points: Vec<Vector>,
-    /// Of the lengths of segments.
+    /// Changes of the lengths of segments.
     pub lengths: Vec<f64>,
-    /// Of the vectors at the ends.
+    /// Changes of the vectors at the ends.
     pub ends: [Vector; 2],
-    /// Of the times at which segments begin, and the last one ends; at fixed lengths in a gradient.
+    /// Changes of the times at which segments begin and the last one ends. In a gradient, lengths are held fixed.
     pub knots: Vec<f64>,
 }
 
@@ -60,7 +60,7 @@ impl System {
             Some([_, last]) if i == n => system.end(space, polygon, 1, last),
             _ => system.inner(space, polygon, i),
         };
-        // One segment from a point to itself stands still, whatever moves.
+        // One segment from a point to itself is a constant curve for all changes.
         let nodes = if !closed {
             n + 1
         } else if n > 1 {
@@ -72,7 +72,7 @@ impl System {
         system
     }
 
-    /// Brings the last node's side of a closed curve into the frame of the first node.
+    /// Transports the last node's side of a closed curve to the frame of the first node.
     fn close(&mut self, holonomy: &Matrix) {
         let Some(back) = holonomy.clone().try_inverse() else { return };
         let Some(last) = self.segments.last_mut() else { return };
@@ -100,7 +100,7 @@ impl System {
         let (left, right) = (&before.sides[1], &behind.sides[0]);
         let mut row = Row::default();
         let handles = [u * (before.h / 3.0), u * (behind.h / 3.0)];
-        // The holonomy of a closed curve lies between two frames.
+        // The two frames of a closed curve differ by its holonomy.
         let stretched = [
             if i > 0 { before.functions[1].stretch.clone() } else { stretch(space, &handles[0]) },
             behind.functions[0].stretch.clone(),
@@ -136,7 +136,7 @@ impl System {
                 row.end = Some((which, &segment.functions[which].stretch / -6.0));
             }
             EndKind::NotAKnot => {
-                // Differentiated by the lengths of the two segments, one a lane.
+                // Differentiated with respect to the lengths of the two segments, one per lane.
                 let h = |segment: usize, k| Dual { v: lane(self.segments[segment].h), d: unit(k, 0) };
                 let weights = NotAKnot::of(h(near, 0), h(far, 1), n, self.both_not_a_knot);
                 row.not_a_knot(space, polygon, which, [near, far], &weights);
@@ -145,7 +145,7 @@ impl System {
         row
     }
 
-    /// How velocities follow changes.
+    /// The changes of velocities for given changes.
     pub fn velocities(&self, change: &Change) -> Vec<Vector> {
         let right: Vec<Vector> = self
             .rows
@@ -161,7 +161,7 @@ impl System {
         self.solve(right, false)
     }
 
-    /// Adds to a gradient in the changes what a gradient in the velocities makes of it.
+    /// Adds the contribution of a gradient with respect to velocities to a gradient with respect to changes.
     pub fn pull_back(&self, velocities: Vec<Vector>, gradient: &mut Change) {
         let multipliers = self.solve(velocities, true);
         for (row, x) in self.rows.iter().zip(&multipliers) {
@@ -217,10 +217,10 @@ impl Row {
         self.lengths.push((segment, factor * &side.length));
     }
 
-    /// Adds minus the velocity that not-a-knot asks for: `S(x₀) c'(t₀)`, seen from the frame of the end.
+    /// Adds minus the velocity of the not-a-knot condition: `S(x₀) c'(t₀)`, in the frame of the end.
     ///
-    /// The chord d from p₀ to p₁ changes by `−ad coth ξ + S⁻¹η` in the frame of p₀ and by `−S⁻¹ξ + ad coth η` in that of
-    /// p₁, and the frames turn by `tanh(ad_d/2)(ξ + η)` against each other along it.
+    /// The chord d from p₀ to p₁ changes by `−ad coth ξ + S⁻¹η` in the frame of p₀ and by `−S⁻¹ξ + ad coth η` in that
+    /// of p₁, and the frames rotate by `tanh(ad_d/2)(ξ + η)` relative to each other along it.
     fn not_a_knot(
         &mut self,
         space: &Erased,
@@ -234,7 +234,7 @@ impl Row {
         let [u, near_by, far_by] = [weights.u, weights.near, weights.far]
             .map(|w| [w.v.as_array()[0], w.d.as_array()[0], w.d.as_array()[1]]);
         let (first, second) = (Functions::of(space, d0), Functions::of(space, d1));
-        // The end, its neighbour, and the node behind that; all vectors change sign at the right end.
+        // The end, its neighbour, and the next node; all vectors change sign at the right end.
         let [end, next, third] = if which == 0 { [near, near + 1, far + 1] } else { [near + 1, near, far] };
         let sign = if which == 0 { 1.0 } else { -1.0 };
         let c = &polygon.u[next] * u[0] + d0 * near_by[0] + d1 * far_by[0];

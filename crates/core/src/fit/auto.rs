@@ -1,4 +1,4 @@
-//! Which solver runs: the one asked for, or one after the other until one converges.
+//! The choice of solvers: the requested one, or several in turn until one converges.
 
 use super::budget::{self, Costs, NEWTON, left};
 use super::chain::Chain;
@@ -10,9 +10,9 @@ use crate::monitor::Monitor;
 use crate::scalar::{Lane, few, lane};
 use crate::space::Erased;
 
-/// Residuals after which the quasi-Newton iteration hands over.
+/// Residual evaluations after which Newton's method takes over from the quasi-Newton iteration.
 const QUICK: f64 = 120.0;
-/// Steps of Newton's method by itself.
+/// Steps of Newton's method when it runs alone.
 const NEWTON_ALONE: f64 = 100.0;
 
 /// Where Newton's method starts.
@@ -22,7 +22,7 @@ enum Start {
     Zero,
 }
 
-/// Solves by the method asked for: `whole` curves, or sections of longer ones.
+/// Runs the requested solver on whole curves (`whole`) or on sections of longer ones.
 pub fn run(
     space: &Erased,
     chain: &mut Chain,
@@ -41,7 +41,7 @@ pub fn run(
         Method::Auto => {
             let costs = Costs::of(space, chain, ends);
             let (mut outcome, first) = in_turn(space, chain, ends, options, &costs, idle, work, monitor);
-            // Sections of one curve must not choose apart.
+            // All sections of a curve must use the same solver.
             if whole {
                 minimum_energy::select(
                     space,
@@ -76,8 +76,8 @@ pub fn run(
     }
 }
 
-/// Quasi-Newton, then Newton from its iterate, then the homotopy from flat space, each on the lanes that the one
-/// before left. Also returns the work on each lane.
+/// Quasi-Newton, then Newton from its iterate, then the homotopy from flat space. Each solver runs on the lanes where
+/// the one before did not converge. Also returns the work on each lane.
 fn in_turn(
     space: &Erased,
     chain: &mut Chain,
@@ -89,7 +89,7 @@ fn in_turn(
     monitor: &Monitor,
 ) -> (Outcome, Lane) {
     let within = |rest: Lane, most: f64| Limits { tol: lane(options.tol), max_iter: rest.min(lane(most)) };
-    // Where Newton's method costs too much, there is nothing to hand over to.
+    // Where Newton's method costs too much, no solver takes over.
     let most = if costs.can_rescue(NEWTON) { QUICK } else { budget::PATIENT };
     let limits = within(left(options, &Default::default()), most);
     let mut outcome = solve(space, chain, ends, Solver::QuasiNewton, limits, idle, work, monitor);
@@ -97,7 +97,8 @@ fn in_turn(
     let spent = |outcome: &Outcome| {
         Lane::new(few(|l| quick[l] as f64 + (outcome.iterations[l] - quick[l]) as f64 * costs.step))
     };
-    // From where that came to, and from zero: near the cut locus either may lead away.
+    // Newton's method starts from the iterate of the quasi-Newton iteration and then from zero: near the cut locus
+    // either start may diverge.
     for start in [Start::Here, Start::Zero] {
         let rest = left(options, &outcome.iterations);
         let done = outcome.settled(idle) | rest.simd_le(Lane::ZERO);

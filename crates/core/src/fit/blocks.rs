@@ -1,15 +1,15 @@
-//! Block tridiagonal systems, cyclic ones too: the Jacobian of the C² condition.
+//! Block tridiagonal systems, open or cyclic: the Jacobian of the C² condition.
 
 use crate::monitor::checkpoint;
 use crate::scalar::Lane;
 
-/// Blocks of m × m numbers, row by row: those left of, on and right of the diagonal. In a cyclic system
-/// the first row's left block belongs to the last node, and the last row's right block to the first.
+/// Blocks of m × m numbers, row by row: left of, on and right of the diagonal. In a cyclic system the first row's
+/// left block belongs to the last node, and the last row's right block to the first.
 #[derive(Default)]
 pub struct Blocks {
-    /// The blocks of every row.
+    /// The blocks of all rows.
     pub sides: [Vec<Lane>; 3],
-    /// Right sides of the cyclic system: m columns and the given one.
+    /// Right-hand sides of the cyclic system: m columns and the given one.
     columns: Vec<Lane>,
 }
 
@@ -22,7 +22,7 @@ impl Blocks {
         }
     }
 
-    /// `A x`; of a closed curve the first and the last node are neighbours.
+    /// `A x`; in a closed curve the first and the last node are neighbours.
     pub fn times(&self, nodes: usize, m: usize, closed: bool, x: &[Lane], out: &mut [Lane]) {
         out.fill(Lane::ZERO);
         self.each(nodes, m, closed, |at, i, j| out[i] = at.mul_add(x[j], out[i]));
@@ -34,7 +34,7 @@ impl Blocks {
         self.each(nodes, m, closed, |at, i, j| out[j] = at.mul_add(x[i], out[j]));
     }
 
-    /// Hands out every number with its row and column.
+    /// Passes every number with its row and column to a function.
     fn each(&self, nodes: usize, m: usize, closed: bool, mut f: impl FnMut(Lane, usize, usize)) {
         for (side, block) in self.sides.iter().enumerate() {
             for i in 0..nodes {
@@ -50,9 +50,8 @@ impl Blocks {
         }
     }
 
-    /// Solves the block tridiagonal system of the first nodes in place, for several right sides, which
-    /// overwrites the blocks:
-    /// `x` holds m × `columns` numbers a node.
+    /// Solves the block tridiagonal system of the first nodes in place for several right-hand sides, and overwrites
+    /// the blocks. `x` has m × `columns` numbers per node.
     pub fn solve(&mut self, nodes: usize, m: usize, columns: usize, x: &mut [Lane]) {
         let [lower, diagonal, upper] = &mut self.sides;
         let (block, size) = (m * m, m * columns);
@@ -60,7 +59,7 @@ impl Blocks {
         let mut work = vec![Lane::ZERO; m * (m + width)];
         for i in 0..nodes {
             if i > 0 {
-                // Row i less lower · (the row above, solved for its node).
+                // Row i minus lower · (the row above, solved for its node).
                 let (before, here) = x[(i - 1) * size..].split_at_mut(size);
                 subtract_product(&lower[i * block..][..block], before, &mut here[..size], m, columns);
                 let (above, _) = upper[(i - 1) * block..].split_at(block);
@@ -72,7 +71,7 @@ impl Blocks {
                     m,
                 );
             }
-            // [D | U | x], and D⁻¹ times the rest.
+            // [D | U | x], and D⁻¹ times U and x.
             for r in 0..m {
                 let row = &mut work[r * (m + width)..][..m + width];
                 row[..m].copy_from_slice(&diagonal[i * block + r * m..][..m]);
@@ -98,7 +97,7 @@ impl Blocks {
         let last = n - 1;
         let [lower, diagonal, upper] = &self.sides;
         let at = |b: &[Lane], i: usize| b[i * block..][..block].to_vec();
-        // How the other nodes see the last one, and it them.
+        // The coupling of the other nodes to the last one, and of the last one to them.
         let (first_sees, before_sees) = (at(lower, 0), at(upper, last - 1));
         let (sees_before, sees_first, own) = (at(lower, last), at(upper, last), at(diagonal, last));
         let mut sides = std::mem::take(&mut self.columns);
@@ -112,7 +111,7 @@ impl Blocks {
                     if i == 0 {
                         row[c] += first_sees[r * m + c];
                     }
-                    // With two nodes the first and the one before the last are one.
+                    // With two nodes, the first node is also the one before the last.
                     if i == last - 1 && last > 1 {
                         row[c] += before_sees[r * m + c];
                     }

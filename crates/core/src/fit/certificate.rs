@@ -1,25 +1,25 @@
-//! Theorem 3.1 with numbers: a region that Algorithm 1 does not leave, and by how much it contracts there.
+//! Theorem 3.1 in numbers: a region that Algorithm 1 does not leave, and its contraction there.
 //!
 //! `docs/convergence.md` derives both bounds.
 
-/// Spacings whose quotients are this close to one are equal.
+/// Spacings whose quotients differ from one by at most this much are equal.
 const EQUAL: f64 = 1e-9;
 
-/// Whether knots are equally spaced, as the theorem has them.
+/// Whether knots are equally spaced, as the theorem requires.
 pub fn equally_spaced(t: &[f64]) -> bool {
     let h = t[1] - t[0];
     t.windows(2).all(|t| (t[1] - t[0] - h).abs() <= EQUAL * h)
 }
 
-/// The smallest V of (38) that also bounds the given end velocities `v` = h|u|/3, for steps up to D and
-/// the curvature K of (22); `None` where the theorem says nothing.
+/// The smallest V of (38) that also bounds the given end velocities `v` = h|u|/3, for steps up to D and the curvature
+/// K of (22); `None` where the theorem does not apply.
 pub fn invariant_radius(step: f64, curvature: f64, v: f64) -> Option<f64> {
     if curvature == 0.0 {
         // ½ (D + V) ≤ V
         return Some(step.max(v));
     }
     let (d, v) = (curvature * step, curvature * v);
-    // It is at least that of flat space.
+    // The radius is at least that of flat space.
     let smallest = root(d, d, 1.0)?;
     if v <= smallest {
         return Some(smallest / curvature);
@@ -28,8 +28,8 @@ pub fn invariant_radius(step: f64, curvature: f64, v: f64) -> Option<f64> {
     (v <= largest).then_some(v / curvature)
 }
 
-/// A bound α < 1 of the contraction of Algorithm 1 per sweep, in the largest length of a velocity, on the region
-/// ‖v‖ ≤ V for steps up to D and the curvature K of (22); `None` where there is none.
+/// A bound α < 1 of the contraction of Algorithm 1 per sweep, in the largest length of a velocity, on the region ‖v‖
+/// ≤ V for steps up to D and the curvature K of (22); `None` where no bound is known.
 ///
 /// With K = 1 and U = D + 2V ≥ ‖ω‖, (37), the derivatives of φᵢ by its two neighbours are at most
 /// ½ (U/sin U)(sinh V/V) together (Proposition C.3). By Lemma C.5 those by ξᵢ are the two operators
@@ -48,15 +48,16 @@ pub fn contraction_bound(step: f64, curvature: f64, radius: f64) -> Option<f64> 
     Some(0.5 * (neighbours + own)).filter(|&alpha| alpha < 1.0)
 }
 
-/// The sweeps of Algorithm 1 from zero velocities after which all handles are within `tol` times V of those of the
-/// spline, which are at most V: the first k with αᵏ ≤ `tol`, which is taken to be no less than rounding.
+/// The number of sweeps of Algorithm 1, from zero velocities, after which all handles are within `tol` · V of those
+/// of the spline. Handles are at most V long, so this is the first k with αᵏ ≤ `tol`, where `tol` is at least the
+/// rounding error.
 pub fn guaranteed_sweeps(alpha: f64, tol: f64) -> f64 {
     (tol.clamp(f64::EPSILON, 1.0).ln() / alpha.ln()).ceil()
 }
 
-/// A root x = KV of ½ u/sin u (d + x) − x with u = d + 2x, by Newton's method. The function is convex: from
-/// the left (`side` = 1) it comes to the smallest root, from the right (−1) to the largest, and where
-/// its tangent points away there is none.
+/// A root x = KV of ½ u/sin u (d + x) − x with u = d + 2x, by Newton's method. The function is convex: from the left
+/// (`side` = 1) the iteration converges to the smallest root, from the right (−1) to the largest. If its tangent
+/// points away, there is no root.
 fn root(d: f64, mut x: f64, side: f64) -> Option<f64> {
     for _ in 0..200 {
         let u = d + 2.0 * x;
@@ -87,7 +88,7 @@ mod tests {
     use super::{contraction_bound, guaranteed_sweeps, invariant_radius};
 
     #[test]
-    fn the_largest_step_is_that_of_the_literature() {
+    fn the_largest_step_matches_the_literature() {
         // The two roots meet at KD = 0.2610895, KV = 0.4420886 (from d/dV of (38), at 40 digits).
         let v = invariant_radius(0.261_089, 1.0, 0.0).expect("below the largest step");
         assert!((v - 0.442).abs() < 2e-3);
@@ -110,12 +111,12 @@ mod tests {
     }
 
     #[test]
-    fn the_contraction_is_that_of_the_derivation() {
+    fn the_contraction_matches_the_derivation() {
         let alpha = |d: f64| contraction_bound(d, 1.0, invariant_radius(d, 1.0, 0.0).unwrap());
         for (d, expected) in [(0.1, 0.533), (0.2, 0.665), (0.25, 0.857)] {
             assert!((alpha(d).unwrap() - expected).abs() < 1e-3);
         }
-        // The bound reaches 1 a little before the region ends.
+        // The bound reaches 1 slightly before the boundary of the region.
         assert!(alpha(0.26058).is_some() && alpha(0.26059).is_none());
         // In flat space the iteration contracts by one half.
         assert_eq!(contraction_bound(3.0, 0.0, 3.0), Some(0.5));

@@ -4,13 +4,12 @@
 //! every node is the origin, the polygon is its chords dᵢ (coordinates of `log_{pᵢ}(pᵢ₊₁)`), velocities
 //! are coordinate vectors, and transport between neighbours is the identity.
 //!
-//! Eight chains of one length lie side by side in the lanes: curves of a batch, or sections of a
-//! long curve.
+//! Eight chains of equal length occupy the lanes: curves of a batch, or sections of a long curve.
 
 use crate::scalar::{LANES, Lane};
 
-/// What one lane of a chain is made of: a run of nodes of a curve, counted around the curve when
-/// it is closed.
+/// The data of one lane of a chain: a run of nodes of a curve. In a closed curve the numbering continues around the
+/// curve.
 #[derive(Clone, Copy)]
 pub struct Run<'a> {
     /// All knots of the curve.
@@ -22,7 +21,7 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Length of the segment behind the i-th node.
+    /// Length of the segment after the i-th node.
     pub(super) fn h(&self, i: usize) -> f64 {
         let k = (self.first + i) % (self.t.len() - 1);
         self.t[k + 1] - self.t[k]
@@ -37,10 +36,10 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Gets a node and its velocity.
+/// A callback that receives a node and its velocity.
 pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Lane]);
 
-/// A frame on its way along the polygon.
+/// A frame that moves along the polygon.
 #[derive(Default)]
 pub struct Walker {
     pub(super) frame: Vec<Lane>,
@@ -49,7 +48,7 @@ pub struct Walker {
     pub(super) node: usize,
 }
 
-/// Eight unrolled polygons and everything the solvers keep of them. Reused from fit to fit.
+/// Eight unrolled polygons with the data of the solvers. Reused between fits.
 #[derive(Default)]
 pub struct Chain {
     /// Number of segments.
@@ -60,39 +59,40 @@ pub struct Chain {
     pub h: Vec<Lane>,
     /// Chords dᵢ, m numbers each.
     pub chord: Vec<Lane>,
-    /// What `Origin::prepare` keeps of each chord.
+    /// The numbers that `Origin::prepare` computes for each chord.
     pub prepared: Vec<Lane>,
     /// The velocities uᵢ.
     pub(super) u: Vec<Lane>,
-    /// Whether the last node is the first again.
+    /// Whether the last node equals the first.
     pub(super) closed: bool,
     /// The C² residual at each node.
     pub r: Vec<Lane>,
     /// Prescribed end vectors, in the frames of the ends.
     pub end_values: [Vec<Lane>; 2],
-    /// What chords and velocities are multiplied by, see `Ambient::scales`.
+    /// The factor of chords and velocities; see `Ambient::scales`.
     pub(super) scale: Lane,
-    /// What times are multiplied by.
+    /// The factor of times.
     pub(super) clock: Lane,
     /// D of (21): the longest step of each lane.
     pub max_step: Lane,
-    /// The longest chord of each lane. Without an invariant metric coordinates do not keep lengths, and it is not D.
+    /// The longest chord of each lane. Without an invariant metric coordinates do not preserve lengths, and this is
+    /// not D.
     pub longest: Lane,
-    /// The largest deciding angle of a step of each lane, or a bound where it is small.
+    /// The largest deciding angle of a step of each lane, or an upper bound where it is small.
     pub widest: Lane,
     /// The largest |dᵢ|/hᵢ of each lane.
     pub pace: Lane,
-    /// By how much rounding errors may grow in each lane, see `Origin::condition`.
+    /// The growth of rounding errors in each lane; see `Origin::condition`.
     pub condition: Lane,
-    /// Where neighbours lie at or past the cut locus: the first segment and its deciding angle.
+    /// Where neighbours lie at or beyond the cut locus: the first segment and its deciding angle.
     pub cut: [Option<(usize, f64)>; LANES],
-    /// Where they lie almost there.
+    /// Where neighbours lie almost at the cut locus.
     pub almost_cut: [Option<(usize, f64)>; LANES],
     pub(super) walker: Walker,
     /// Frame and point at the first node.
     pub(super) start: (Vec<Lane>, Vec<Lane>),
     pub(super) ambient: Vec<Lane>,
-    /// A vector at the first and at the last node of a closed curve, and zero.
+    /// Zero, and a vector at the first and at the last node of a closed curve.
     pub(super) closure: [Vec<Lane>; 3],
 }
 
@@ -102,7 +102,7 @@ impl Chain {
         (&self.start.0, &self.start.1)
     }
 
-    /// What energies are multiplied by to bring them to the units of knots and points.
+    /// The factor that converts energies to the units of knots and points.
     pub fn unit_of_energy(&self) -> Lane {
         self.clock * self.clock * self.clock / (self.scale * self.scale)
     }
@@ -112,7 +112,7 @@ impl Chain {
         &self.u
     }
 
-    /// The unknowns: the velocities of all nodes, of a closed curve without the last, which is the first again.
+    /// The unknowns: the velocities of all nodes. In a closed curve the last node equals the first and is omitted.
     pub fn unknowns(&self) -> &[Lane] {
         &self.u[..self.count()]
     }
@@ -121,7 +121,7 @@ impl Chain {
         if self.closed { self.n * self.m } else { self.u.len() }
     }
 
-    /// Lets the velocities be read while the rest of the chain changes.
+    /// Makes the velocities readable while the rest of the chain changes.
     pub fn with_velocities<T>(&mut self, work: impl FnOnce(&mut Self, &[Lane]) -> T) -> T {
         let u = std::mem::take(&mut self.u);
         let result = work(self, &u);
@@ -129,7 +129,7 @@ impl Chain {
         result
     }
 
-    /// The length of the longer segment at a node, of which a closed curve has two at its ends, too.
+    /// The length of the longer segment at a node. In a closed curve the end nodes have two segments, too.
     pub fn longer(&self, node: usize) -> Lane {
         let n = self.n;
         let (before, behind) =

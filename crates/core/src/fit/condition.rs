@@ -1,15 +1,16 @@
 //! The C² condition (13) of Theorem 2.2, on any knots.
 //!
-//! Velocities uᵢ rather than control points are the unknowns, so that (12), the C¹ condition, holds by itself. With `v⁺ = hᵢuᵢ/3`, `v⁻ = −hᵢ₋₁uᵢ/3`, `w⁺ = log_{pᵢ}(E(−v⁺)·q⁻ᵢ₊₁)`, `w⁻ = log_{pᵢ}(E(−v⁻)·q⁺ᵢ₋₁)`, the curve is C² at
-//! knot i iff
+//! The unknowns are velocities uᵢ instead of control points, so that (12), the C¹ condition, holds automatically.
+//! With `v⁺ = hᵢuᵢ/3`, `v⁻ = −hᵢ₋₁uᵢ/3`, `w⁺ = log_{pᵢ}(E(−v⁺)·q⁻ᵢ₊₁)`, `w⁻ = log_{pᵢ}(E(−v⁻)·q⁺ᵢ₋₁)`, the curve is
+//! C² at knot i iff
 //!
 //! ```text
 //! S(v⁻)(w⁺ − v⁺)/hᵢ² = S(v⁺)(w⁻ − v⁻)/hᵢ₋₁²,    S(v) = sinh(ad_v)/ad_v,
 //! ```
 //!
-//! because the covariant acceleration beside the knot is `(6/h²) S(v)⁻¹(w − v)` (Popiel & Noakes 2007
-//! with Lemmas A.1–A.3), and S of multiples of one vector commute. On equal spacing S cancels and
-//! this is (13), whose logarithms are the w of (16) and, at all knots together, of (18).
+//! because the covariant acceleration at the knot is `(6/h²) S(v)⁻¹(w − v)` (Popiel & Noakes 2007 with Lemmas
+//! A.1–A.3), and S of multiples of one vector commute. On equal spacing S cancels and this is (13). Its logarithms
+//! are the w of (16) and, at all knots together, of (18).
 
 use super::chain::Chain;
 use super::end_kind::ChainEnds;
@@ -22,7 +23,7 @@ use crate::with_size;
 
 const THIRD: Lane = lane(1.0 / 3.0);
 
-/// Fills `chain.r` with right side minus left side of the C² condition at every node.
+/// Fills `chain.r` with the right-hand side minus the left-hand side of the C² condition at every node.
 pub fn residual(
     space: &Erased,
     chain: &mut Chain,
@@ -38,8 +39,8 @@ pub fn residual(
     })
 }
 
-/// The same for velocities u that may carry derivatives. On lanes whose velocities are zero the logarithms are
-/// the chords, to the last bit.
+/// The same for velocities u that may have derivatives. On lanes with zero velocities the logarithms are
+/// bit-identical to the chords.
 pub fn sweep<S: Scalar, M: Space>(
     space: &M,
     chain: &mut Chain,
@@ -53,7 +54,7 @@ pub fn sweep<S: Scalar, M: Space>(
     with_size!(M::VECTORS, chain.m, m => inside(space, chain, ends, u, r, work, at_rest, m))
 }
 
-/// The same of plain numbers, compiled once.
+/// The same for plain numbers, compiled once.
 pub fn sweep_by_table(
     space: &Erased,
     chain: &mut Chain,
@@ -119,7 +120,7 @@ fn inside<S: Scalar, M: Space>(
             let weight = h_left * h_right / (h_left + h_right);
             result.residual = max_or_nan(result.residual, length2(r) * (weight * weight));
         } else {
-            // An end: keep the side of the only segment; the end condition comes below.
+            // An open end: keep the side of its only segment. The end condition is applied below.
             r.copy_from_slice(if i == 0 { &*right } else { &*left });
             if i == 0 {
                 first_right = h_right;
@@ -151,8 +152,8 @@ fn join<S: Scalar, M: Space>(
     r: &mut [S],
 ) {
     let m = u.len();
-    // Spacing that is equal up to the rounding of the knots needs no S: it would change the
-    // residual by less than rounding.
+    // Spacing that is equal up to the rounding of the knots needs no S, which would change the residual by less than
+    // rounding.
     let equal = (h_left - h_right).abs().simd_le(h_right * lane(4.0 * f64::EPSILON));
     for c in 0..m {
         r[c] = right[c] - left[c];
@@ -167,7 +168,7 @@ fn join<S: Scalar, M: Space>(
     }
 }
 
-/// The residual where a closed curve closes: the left side comes from the last node.
+/// The residual at the first node of a closed curve: the left-hand side comes from the last node.
 fn close<S: Scalar>(
     space: &Erased,
     chain: &mut Chain,

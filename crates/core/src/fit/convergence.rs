@@ -1,50 +1,50 @@
-//! When an iteration has arrived, and its best iterate in case that it does not.
+//! Convergence of an iteration, and its best iterate if it fails.
 
 use super::chain::Chain;
 use super::node::C2Residual;
 use crate::scalar::{LANES, Lane, few, lane, mask_bits};
 use crate::space::Erased;
 
-/// Defects of this many ε times the condition of the chords are rounding: an iteration that stops
-/// improving below has converged.
+/// Residuals below this many ε times the condition of the chords are rounding errors: an iteration that stops
+/// improving below this limit has converged.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
-/// But a residual above this is never called rounding.
+/// Residuals above this limit never count as rounding errors.
 const ROUNDING_MOST: f64 = 1e-9;
-/// Velocities below this part of |d|/h count as rest: residuals are measured against it then.
+/// Velocities below this fraction of |d|/h count as zero: residuals are then relative to |d|/h.
 const STANDSTILL: f64 = 1e-3;
-/// Residuals are brought to this part of the tolerance: the jump of the acceleration at a knot is
-/// about twelve times the residual.
+/// Residuals are reduced to this fraction of the tolerance: the jump of the acceleration at a knot is about twelve
+/// times the residual.
 const AIM: f64 = 1.0 / 40.0;
-/// So many iterations without lowering the residual by 30 % are a standstill.
+/// An iteration stagnates if this many steps do not reduce the residual by 30 %.
 const PATIENCE: f64 = 8.0;
-/// From this iteration on the best iterate is kept, in case that the iteration fails.
+/// From this iteration on, the best iterate is stored in case the iteration fails.
 const EASY: usize = 8;
 
-/// The residuals of eight iterations, and what they say.
+/// The residuals of eight iterations, and the conclusions from them.
 pub struct Convergence {
     tol: Lane,
     aim: Lane,
     floor: Lane,
-    /// Lanes that go on no longer.
+    /// Lanes that have stopped.
     pub done: Lane,
-    /// Lanes that have arrived.
+    /// Lanes that have converged.
     pub converged: Lane,
     /// The C² residual, relative to the largest speed.
     now: Lane,
-    /// The same where a lane ended.
+    /// The residual at which a lane stopped.
     pub residual: Lane,
-    /// The longest outer handle |h u/3| where a lane is.
+    /// The longest outer handle |h u/3| of the current iterate of each lane.
     pub handle: Lane,
     /// Residual evaluations.
     pub iterations: [usize; LANES],
-    /// The second residual, the one to fall below, and how long that has not happened.
+    /// The second residual as a reference, and the number of iterations that have not fallen below it.
     second: Lane,
     mark: Lane,
     waiting: Lane,
 }
 
 impl Convergence {
-    /// At the start; lanes in `idle` take no part.
+    /// The initial state. Lanes in `idle` do not take part.
     pub fn new(chain: &Chain, tol: Lane, idle: Lane) -> Self {
         let infinity = lane(f64::INFINITY);
         let rounding = (chain.condition * lane(ROUNDING)).min(lane(ROUNDING_MOST));
@@ -64,10 +64,10 @@ impl Convergence {
         }
     }
 
-    /// Takes in the next residual.
+    /// Records the next residual.
     pub fn note(&mut self, iteration: usize, C2Residual { residual, speed, handle }: C2Residual, pace: Lane) {
-        // A curve that stands still has neither speed nor residual; one that goes there and back may stand
-        // still at every knot, where rounding is all that there is of its velocities.
+        // A constant curve has neither speed nor residual. A curve that turns back may have zero speed at every knot,
+        // where its velocities are rounding errors only.
         let speed = speed.max(pace * lane(STANDSTILL));
         let now = residual.simd_eq(Lane::ZERO).select(Lane::ZERO, residual / speed);
         self.now = now;
@@ -86,18 +86,18 @@ impl Convergence {
         self.done |= arrived;
     }
 
-    /// There is no further iteration on some lanes.
+    /// Stops some lanes.
     pub fn leave(&mut self, lanes: Lane) {
         self.converged |= self.now.simd_le(self.tol) & lanes & !self.done;
         self.done |= lanes;
     }
 
-    /// There is no further iteration: what is within the tolerance has arrived.
+    /// Stops all lanes; those within the tolerance have converged.
     pub fn end(&mut self) {
         self.converged |= self.now.simd_le(self.tol) & !self.done;
     }
 
-    /// Geometric mean of the contraction, from the second residual on: the first is that of u = 0.
+    /// Geometric mean of the contraction, from the second residual on, since the first is that of u = 0.
     pub fn rate(&self) -> Lane {
         let (first, last) = (self.second.to_array(), self.residual.to_array());
         Lane::new(few(|l| {
@@ -115,13 +115,13 @@ pub struct Best {
 }
 
 impl Best {
-    /// Forgets everything.
+    /// Removes all stored iterates.
     pub fn restart(&mut self) {
         self.u.clear();
         self.residual = lane(f64::INFINITY);
     }
 
-    /// Keeps iterates that are better than what was kept; near the start only if there is no more to come.
+    /// Stores iterates that are better than the stored ones; near the start only if the iteration ends.
     pub fn keep(&mut self, iteration: usize, max_iter: Lane, unknowns: &[Lane], state: &Convergence) {
         let mut better = state.now.simd_lt(self.residual) & !state.done;
         if iteration <= EASY {
@@ -139,7 +139,7 @@ impl Best {
         self.residual = better.select(state.now, self.residual);
     }
 
-    /// Goes back to what was kept on lanes that failed, where that is better.
+    /// Restores the stored iterates on lanes that failed, if they are better.
     pub fn restore(&self, space: &Erased, chain: &mut Chain, idle: Lane, state: &mut Convergence) {
         let failed = !state.converged & !idle;
         let better = failed & !state.residual.simd_le(self.residual) & self.residual.is_finite();

@@ -2,7 +2,7 @@
 
 use crate::scalar::{LANES, Lane, mask_from};
 
-/// A condition at one end of an open curve, as it is solved.
+/// A condition at one end of an open curve, in the form that the solvers use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EndKind {
     /// The velocity is prescribed (the paper's clamped ends, (19)).
@@ -16,14 +16,14 @@ pub enum EndKind {
 /// The ends of eight chains: closed, or the kind at either end of each lane.
 #[derive(Clone, Copy)]
 pub enum ChainEnds {
-    /// The last node is the first one again.
+    /// The last node equals the first.
     Periodic,
     /// First and last node, lane by lane.
     Open([[EndKind; LANES]; 2]),
 }
 
 impl ChainEnds {
-    /// The lanes in which the velocity at a node of n segments is given.
+    /// The lanes in which the velocity at a node is prescribed, for n segments.
     pub fn given(&self, n: usize, node: usize) -> Lane {
         match self {
             ChainEnds::Open(kinds) if node == 0 => of_kind(&kinds[0], EndKind::Velocity),

@@ -100,10 +100,10 @@ pub fn residual<S: Scalar>(
     size
 }
 
-/// The end velocity that not-a-knot asks for: with c the cubic in `T_{p₁}M` through `x₀ = log_{p₁}(p₀)`, 0 and
-/// `x₂ = log_{p₁}(p₂)` that has `c'(t₁) = u₁`, it is `D exp_{p₁}(x₀)[c'(t₀)]`, in the frame at p₀ `S(x₀) c'(t₀)`.
+/// The end velocity of the not-a-knot condition. With c the cubic in `T_{p₁}M` through `x₀ = log_{p₁}(p₀)`, 0 and `x₂
+/// = log_{p₁}(p₂)` with `c'(t₁) = u₁`, it is `D exp_{p₁}(x₀)[c'(t₀)]`, or `S(x₀) c'(t₀)` in the frame at p₀.
 ///
-/// These are the weights of u₁, of the chord at the end and of the next one in c'(t₀). They are the same at the
+/// These are the weights of u₁, of the chord at the end and of the next chord in c'(t₀). They are the same at the
 /// right end, where all vectors change sign.
 pub struct NotAKnot<S> {
     /// Of u₁.
@@ -115,8 +115,8 @@ pub struct NotAKnot<S> {
 }
 
 impl<S: Scalar> NotAKnot<S> {
-    /// For a curve of n segments, the first two of lengths h₀ and h₁. Few points have a rule of their own, which is
-    /// SciPy's: two the geodesic, and three with not-a-knot at `both` ends one parabola.
+    /// For a curve of n segments, the first two of lengths h₀ and h₁. Few points follow the rules of SciPy: two
+    /// points give the geodesic, and three points with not-a-knot at `both` ends give one parabola.
     pub fn of(h0: S, h1: S, n: usize, both: bool) -> Self {
         let (i0, i1, i01) = (reciprocal(h0), reciprocal(h1), reciprocal(h0 + h1));
         let zero = S::constant(Lane::ZERO);
@@ -147,7 +147,7 @@ fn reciprocal<S: Scalar>(x: S) -> S {
     x.compose([i, -(i * i), TWO * i * i * i])
 }
 
-/// Not-a-knot ends of so few points that they give the velocity itself.
+/// Not-a-knot ends of curves with so few points that the condition determines the velocity.
 pub fn few_points(space: &Erased, chain: &mut Chain, ends: ChainEnds) -> ChainEnds {
     let ChainEnds::Open(mut kinds) = ends else { return ends };
     let (n, m) = (chain.n, chain.m);

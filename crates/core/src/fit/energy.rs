@@ -1,4 +1,4 @@
-//! How much a curve bends: ∫ |∇γ'|² dt, the energy (1) that Riemannian cubics minimise.
+//! The bending energy ∫ |∇γ'|² dt of (1), which Riemannian cubics minimise.
 
 use super::chain::Chain;
 use crate::curve::Segment;
@@ -6,8 +6,8 @@ use crate::matrix::GAUSS;
 use crate::scalar::{Jet, Lane, lane};
 use crate::space::{Ambient, Erased, Frame};
 
-/// The energy of each lane, in the units of the chain. Every segment is transported home in parallel to the
-/// first point, which changes no length where there is a metric; elsewhere lengths are those that frames see.
+/// The energy of each lane, in the units of the chain. Every segment is transported in parallel to the first point,
+/// which preserves lengths if the space has a metric. Otherwise lengths are those of coordinates in the frames.
 pub fn bending(space: &Erased, chain: &mut Chain) -> Lane {
     let (n, m, len) = (chain.n, chain.m, space.point_len());
     let mut segment = Segment::<Jet>::new(len);

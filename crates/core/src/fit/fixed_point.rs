@@ -21,8 +21,8 @@ use crate::space::{Erased, Origin};
 const THIRD: Lane = lane(1.0 / 3.0);
 const HALF: Lane = lane(0.5);
 
-/// Iterates on the unknowns of a chain until every lane is done. Lanes in `idle` are left alone. The last iterate is
-/// kept, whether it converged or not.
+/// Iterates on the unknowns of a chain until every lane stops. Lanes in `idle` do not change. The last iterate is
+/// kept even if it did not converge.
 pub fn solve(
     space: &Erased,
     chain: &mut Chain,

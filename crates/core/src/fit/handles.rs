@@ -1,4 +1,5 @@
-//! Whether the handles of a curve's Bézier segments are inside the cut locus, and short enough for doubles.
+//! Whether the handles of a curve's Bézier segments are inside the cut locus, and short enough for floating-point
+//! numbers.
 
 use super::chain::{Chain, Run};
 use super::problem::Status;
@@ -7,8 +8,8 @@ use crate::space::{Ambient, Erased, Origin, below};
 
 const THIRD: Lane = lane(1.0 / 3.0);
 
-/// Scales velocities back whose outer handles would pass the `limit`: beyond the cut locus the C² condition
-/// has spurious solutions. `fixed` are lanes that stay, node by node.
+/// Shortens velocities whose outer handles would exceed the `limit`: beyond the cut locus the C² condition has
+/// spurious solutions. `fixed` contains the lanes that do not change, node by node.
 pub fn shorten(
     space: &Erased,
     chain: &Chain,
@@ -40,7 +41,7 @@ pub fn long_handles(
 ) -> [Option<Status>; LANES] {
     let mut found = [None; LANES];
     let radius = lane(space.injectivity_radius());
-    // The inner handle is no longer than the way around: most curves need no closer look.
+    // The inner handle is at most as long as the path along the other handles, so most curves need no further check.
     let around = chain.longest + longest * lane(2.0);
     if (longest.simd_lt(lane(space.longest_handle())) & around.simd_lt(radius) | !lanes).all() {
         return found;
@@ -90,15 +91,15 @@ pub fn long_handles(
     found
 }
 
-/// The first control point of each lane that lies where doubles have too few digits, as they may where rays make
-/// much of rounding. `longest` is the length of the longest outer handle.
+/// The first control point of each lane that floating-point numbers represent with too few significant digits. This
+/// occurs where rays amplify rounding errors. `longest` is the length of the longest outer handle.
 pub fn noisy_handles(
     space: &Erased,
     chain: &mut Chain,
     runs: &[Run; LANES],
     longest: Lane,
 ) -> [Option<Status>; LANES] {
-    /// Handles up to here stay where their points are.
+    /// Handles up to this length keep control points close to their nodes.
     const SHORT: f64 = 1.5;
     let mut found = [None; LANES];
     let far = !longest.simd_le(lane(SHORT));

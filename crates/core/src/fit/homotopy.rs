@@ -1,8 +1,8 @@
-//! Following the spline from flat space: for points far apart.
+//! A homotopy from the spline in flat space, for points that are far apart.
 //!
-//! With the polygon unrolled into its frames, all its steps are scaled by λ. At λ = 0 the spline is flat, at
-//! λ = 1 it is the one asked for; Newton's method follows it in between. Points that are far apart have
-//! several splines; this one is continued from points that are near.
+//! All steps of the polygon, unrolled into its frames, are scaled by λ. At λ = 0 the spline is that of flat space, at
+//! λ = 1 it is the requested one, and Newton's method follows it in between. Points that are far apart have several
+//! splines; this one is the continuation of the spline through points that are close together.
 
 use super::chain::Chain;
 use super::end_kind::ChainEnds;
@@ -12,15 +12,15 @@ use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, lane, mask_from};
 use crate::space::{Erased, Origin};
 
-/// The first step of λ, and the one at which a lane gives up.
+/// The first step of λ, and the step at which a lane is abandoned.
 const FIRST: f64 = 0.25;
 const LEAST: f64 = 1.0 / 512.0;
-/// Newton steps for one λ; more mean that the step of λ was too long.
+/// Newton steps for one λ. If they do not suffice, the step of λ was too long.
 const CORRECTIONS: usize = 12;
-/// How far a curve on the way is solved.
+/// The tolerance of intermediate curves.
 const LOOSE: f64 = 1e-8;
 
-/// Solves the lanes that are neither `idle` nor settled and adds to their outcome.
+/// Solves the lanes that are neither `idle` nor settled, and updates their outcome.
 pub fn follow(
     space: &Erased,
     chain: &mut Chain,
@@ -32,14 +32,14 @@ pub fn follow(
     outcome: &mut Outcome,
 ) {
     let idle = outcome.settled(idle);
-    // On the way curves need not be exact.
+    // Intermediate curves need not be accurate.
     let within = |used: Lane, most: usize, tol: f64| Limits {
         tol: limits.tol.max(lane(tol)),
         max_iter: (limits.max_iter - used).min(lane(most as f64)),
     };
     let (chords, values) = (chain.chord.clone(), chain.end_values.clone());
     let best = chain.unknowns().to_vec();
-    // Where each lane is, how far it goes next, and the last two curves with their λ.
+    // The current and the next λ of each lane, and the last two curves with their λ.
     let (mut at, mut ahead) = (Lane::ZERO, lane(FIRST));
     let mut curves = [vec![Lane::ZERO; best.len()], vec![Lane::ZERO; best.len()]];
     let mut positions = [Lane::ZERO; 2];
@@ -71,7 +71,7 @@ pub fn follow(
             outcome.iterations[l] += found.iterations[l];
         }
     }
-    // The end of the way to the tolerance asked for, from what was reached.
+    // The last stage, with the requested tolerance, from the last intermediate curve.
     scale(space, chain, &chords, &values, Lane::ONE);
     let arrived = at.simd_ge(Lane::ONE) & limits.max_iter.simd_gt(used) & !idle;
     chain.update(space, |_, u| {
@@ -87,7 +87,7 @@ pub fn follow(
     outcome.take(space, chain, &best, &last, arrived);
 }
 
-/// Sets the polygon and the given end vectors to λ times what they were.
+/// Scales the polygon and the prescribed end vectors by λ.
 fn scale(space: &Erased, chain: &mut Chain, chords: &[Lane], values: &[Vec<Lane>; 2], at: Lane) {
     let (m, keep) = (chain.m, space.chord_len());
     for (d, c) in chain.chord.iter_mut().zip(chords) {
@@ -103,7 +103,7 @@ fn scale(space: &Erased, chain: &mut Chain, chords: &[Lane], values: &[Vec<Lane>
     }
 }
 
-/// The secant through the last two curves, u/λ being nearly constant.
+/// The secant through the last two curves; u/λ is nearly constant.
 fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], positions: [Lane; 2], goal: Lane) {
     let slope = |i: usize| {
         let started = positions[i].simd_gt(Lane::ZERO);
@@ -124,7 +124,7 @@ fn predict(u: &mut [Lane], curves: &[Vec<Lane>; 2], positions: [Lane; 2], goal: 
 mod tests {
     use super::*;
 
-    /// What is predicted for λ = `goal` from the curves at two λ, 0 where there is none yet.
+    /// The prediction for λ = `goal` from the curves at two values of λ; λ is 0 where no curve exists yet.
     fn predicted(curve: impl Fn(f64) -> f64, positions: [f64; 2], goal: f64) -> f64 {
         let mut u = [lane(0.0)];
         predict(&mut u, &positions.map(|at| vec![lane(curve(at))]), positions.map(lane), lane(goal));
@@ -138,7 +138,7 @@ mod tests {
             let found = predicted(quadratic, positions, goal);
             assert!((found - quadratic(goal)).abs() < 1e-14, "{positions:?}, {goal}: {found}");
         }
-        // One curve is a line through zero, and none is zero.
+        // One curve predicts a line through zero, and no curve predicts zero.
         assert!((predicted(quadratic, [0.0, 0.25], 0.625) - 2.5 * quadratic(0.25)).abs() < 1e-15);
         assert_eq!(predicted(quadratic, [0.0, 0.0], 0.25), 0.0);
     }

@@ -1,4 +1,4 @@
-//! Eight curves, or sections of curves, side by side in the lanes.
+//! Eight curves, or sections of curves, in SIMD lanes.
 
 use super::auto;
 use super::chain::{Chain, Run};
@@ -23,7 +23,7 @@ thread_local! {
     static THREAD: RefCell<Thread> = RefCell::default();
 }
 
-/// Fits up to eight sections of one length.
+/// Fits up to eight sections of equal length.
 pub fn fit_lanes(
     space: &Erased,
     problem: &Problem,
@@ -31,7 +31,8 @@ pub fn fit_lanes(
     monitor: &Monitor,
     group: &mut [Section],
 ) {
-    // Taken out and put back, because Python may call in again while we ask it whether to go on.
+    // The memory is taken out and put back, because Python may start another fit when it is asked whether to
+    // continue.
     let mut memory = THREAD.take();
     fit_in(space, problem, options, monitor, group, &mut memory);
     THREAD.set(memory);
@@ -46,7 +47,7 @@ fn fit_in(
     Thread { chain, work }: &mut Thread,
 ) {
     let nodes = group[0].nodes;
-    // Lanes that are left over repeat the first section.
+    // Unused lanes repeat the first section.
     let section = |l: usize| &group[if l < group.len() { l } else { 0 }];
     let runs: [Run; LANES] = few(|l| section(l).run(problem, space.point_len()));
     let is_end = |l: usize| {

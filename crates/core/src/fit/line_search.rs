@@ -1,19 +1,19 @@
-//! How far a step goes: half of one that makes the residual worse is taken back, and half of that again.
+//! A line search: a step that increases the residual is halved until it does not.
 
 use crate::scalar::{Lane, lane, mask_from};
 
-/// By how much a mixed step may let the residual grow before it is taken back.
+/// The factor by which a mixed step may increase the residual.
 const GROWTH_MIXED: f64 = 2.0;
-/// How often a step is halved before it is taken as it is.
+/// The maximum number of halvings of a step; then the step is accepted.
 const MAX_TRIES: f64 = 6.0;
 
-/// Eight line searches.
+/// Eight line searches, one per lane.
 pub struct LineSearch {
     /// The residual that must not be exceeded.
     last: Lane,
-    /// How often the step was taken back.
+    /// The number of halvings.
     tries: Lane,
-    /// That residual's quotient by the one before.
+    /// The quotient of that residual and the one before.
     pub contraction: Lane,
 }
 
@@ -23,9 +23,9 @@ impl LineSearch {
         LineSearch { last: lane(f64::INFINITY), tries: Lane::ZERO, contraction: Lane::ZERO }
     }
 
-    /// The lanes whose last step must be taken back in part; lanes in `mixed` may grow a little.
+    /// The lanes whose last step must be halved. The residual of lanes in `mixed` may grow slightly.
     pub fn judge(&mut self, iteration: usize, residual: Lane, mixed: Lane, done: Lane) -> Lane {
-        // The first two residuals belong to no step that could be judged.
+        // The first two residuals do not belong to a step that could be judged.
         let early = mask_from(|_| iteration <= 2);
         let allowed = self.last * mixed.select(lane(GROWTH_MIXED), Lane::ONE);
         let worse = !residual.simd_le(allowed) & !done & self.tries.simd_lt(lane(MAX_TRIES)) & !early;
@@ -36,7 +36,7 @@ impl LineSearch {
     }
 }
 
-/// Replaces the next step by half of the last one, backwards, where it is to be taken back.
+/// Replaces the next step by minus half of the last one on the lanes that go back.
 pub fn halve(worse: Lane, step: &[Lane], next: &mut [Lane]) {
     for (n, s) in next.iter_mut().zip(step) {
         *n = worse.select(*s * lane(-0.5), *n);

@@ -1,4 +1,4 @@
-//! The minimum-energy solution: where points are far apart, or no curve was found yet, further solvers run, and the
+//! The minimum-energy solution. If points are far apart, or no curve was found yet, further solvers run, and the
 //! solution with the lowest bending energy is kept.
 
 use super::budget::{
@@ -14,19 +14,20 @@ use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, few, lane, mask_from};
 use crate::space::{Ambient, Erased};
 
-/// Points may have several curves where steps go beyond this part of the way to the cut locus, ...
+/// Points may have several curves if steps exceed this fraction of the distance to the cut locus, ...
 const FAR: f64 = 0.55;
-/// ... or beyond this part, where the first solver needed so many iterations. Of 900 sets of points on spheres, SO(3), CPⁿ
-/// and Gr(2, 4) with steps of 0.3 to 0.6, 60 have a curve of less bending energy than the first one that was found: their
-/// steps are 0.44 and their iterations 20 at least. Of 1000 other sets, one with a step of 0.58 had 17.
+/// ... or if they exceed this fraction and the first solver needed this many iterations. Of 900 sets of points on
+/// spheres, SO(3), CPⁿ and Gr(2, 4) with steps of 0.3 to 0.6, 60 have a curve of lower bending energy than the first
+/// one that was found. Their steps are at least 0.44 and their iterations at least 20. Of 1000 other sets, one with a
+/// step of 0.58 needed 17.
 const HALF_WAY: f64 = 0.4;
 const SLOW: usize = 16;
-/// Solutions whose energies differ by no more than this part are the same curve.
+/// Solutions whose relative difference of energies is at most this belong to the same curve.
 const SAME: f64 = 1e-6;
-/// So does, of a curve that is straight, this part of the square of the speed.
+/// So do energies below this fraction of the square of the speed, for a curve that is a geodesic.
 const STRAIGHT: f64 = 1e-12;
 
-/// The solvers that are tried, in turn, and where they start.
+/// The solvers in their order, and their starting points.
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
     Algorithm1,
@@ -59,12 +60,12 @@ impl Way {
         }
     }
 
-    /// Its iterations at most, and at least.
+    /// The maximum and the minimum number of its iterations.
     fn iterations(self, costs: &Costs) -> [f64; 2] {
         match self {
             Way::Algorithm1 => [SWEEPS, FEWEST_SWEEPS],
             Way::QuasiNewton => [PATIENT, FEWEST_SWEEPS],
-            // It ends by itself.
+            // It stops without a limit.
             Way::Homotopy => [f64::INFINITY, FEWEST_STEPS],
             Way::Newton | Way::FromZero | Way::FromAlgorithm1 | Way::FromBest => [costs.steps, FEWEST_STEPS],
         }
@@ -78,7 +79,7 @@ fn far_apart(space: &Erased, chain: &Chain, outcome: &Outcome) -> Lane {
 }
 
 /// Runs further solvers on the lanes whose points are far apart or that are not settled, and keeps the minimum-energy
-/// solution. `first` is the work done on each lane.
+/// solution. `first` is the work spent on each lane.
 pub fn select(
     space: &Erased,
     chain: &mut Chain,
@@ -98,14 +99,14 @@ pub fn select(
     let infinity = lane(f64::INFINITY);
     let energy = |chain: &mut Chain, on: Lane| on.select(bending(space, chain), infinity);
     let mut spent = Lane::ZERO;
-    // Energies are compared only once there is something to compare.
+    // Energies are computed only when there are two solutions to compare.
     let mut least = None;
     let mut second = infinity;
     let quick: [bool; LANES] = few(|l| {
         !costs.can_rescue(NEWTON) || outcome.converged[l] && outcome.solver[l] == Solver::QuasiNewton
     });
     let before_homotopy = outcome.solver;
-    // Where Algorithm 1 ended, on the lanes where it did not converge.
+    // The result of Algorithm 1, on the lanes where it did not converge.
     let (mut sweeps_end, mut swept) = (Vec::new(), Lane::ZERO);
     for way in WAYS {
         if monitor.poll() {
@@ -115,7 +116,7 @@ pub fn select(
         let applies = lanes
             & match way {
                 Way::Homotopy => mask_from(|l| before_homotopy[l] != Solver::Homotopy),
-                // Before, it had to be quick.
+                // The first solver must have converged quickly.
                 Way::QuasiNewton => mask_from(|l| !quick[l]),
                 Way::FromAlgorithm1 => swept,
                 Way::FromBest => !settled,
@@ -136,7 +137,7 @@ pub fn select(
             least = Some(energy(chain, settled & lanes));
         }
         let before = chain.unknowns().to_vec();
-        // Where handles come near the cut locus, which line searches avoid, residuals count several times in the
+        // If handles come close to the cut locus, which line searches avoid, residuals are amplified in the
         // acceleration.
         let sweeps = if way == Way::Algorithm1 { lanes } else { Lane::ZERO };
         // Where Newton's method costs too much, no other solver would find a curve.
@@ -175,7 +176,7 @@ pub fn select(
         }
         let bends = energy(chain, arrived);
         let known = least.unwrap_or(infinity);
-        // Of geodesics energies are rounding errors.
+        // The energies of geodesics are rounding errors.
         let rounding = lane(STRAIGHT) * chain.pace * chain.pace;
         let other = arrived & !(bends - known).abs().simd_le(lane(SAME) * bends + rounding);
         let lower = other & bends.simd_lt(known);
@@ -187,7 +188,7 @@ pub fn select(
             & found.residual.simd_lt(outcome.residual)
             & mask_from(|l| found.fault[l].is_none());
         outcome.adopt(space, chain, &before, &found, lower | nearer, on);
-        // What led to the first curve is what the search for others is measured by.
+        // The work that led to the first curve determines the budget of the search for others.
         let now = outcome.settled(idle) & !settled;
         (first, spent) = (now.select(first + spent, first), now.select(Lane::ZERO, spent));
     }

@@ -58,23 +58,23 @@ use crate::scalar::LANES;
 use crate::space::{Ambient, Erased, Frame, Origin};
 use sections::{OVERLAP, fit_cut};
 
-/// Curves with more segments than this are cut into sections.
+/// Curves with more segments than this are divided into sections.
 const LONG: usize = 512;
 
-/// About how many numbers of eight bytes the fit of eight curves takes at a time.
+/// The approximate number of eight-byte numbers that the fit of eight curves occupies at a time.
 pub fn memory(space: &Erased, nodes: usize, method: Method) -> f64 {
     let (nodes, m) = (nodes.min(LONG) as f64, space.dim() as f64);
-    // Chords, velocities, residuals and steps at every node, and the history of Anderson's mixing.
+    // Chords, velocities, residuals and steps at every node, and the history of Anderson mixing.
     let chain = LANES as f64 * (nodes * (20.0 * m + space.chord_len() as f64) + space.frame_len() as f64);
     let jacobian = match method {
-        // Auto leaves out what does not fit.
+        // `auto` skips solvers whose memory is not available.
         Method::Auto | Method::FixedPoint | Method::QuasiNewton => 0.0,
         Method::Newton | Method::Homotopy => LANES as f64 * (3.0 * nodes + 4.0) * m * m,
     };
     chain + jacobian + crate::rows::memory(space, None)
 }
 
-/// Fits all curves of a problem; velocities get the layout of the points. Curves at fault are NaN.
+/// Fits all curves of a problem. Velocities have the layout of the points; curves that cannot be fitted are NaN.
 pub fn fit(
     space: &Erased,
     problem: &Problem,
@@ -98,7 +98,7 @@ pub fn fit(
         if report.status.is_fault() {
             own.fill(f64::NAN);
         } else if matches!(problem.ends, Ends::Periodic) && problem.segments(curve) > LONG {
-            // Sections agree to the tolerance; first and last velocity are one.
+            // Sections agree up to the tolerance; the first and the last velocity are equal.
             let transported = problem.across_closure(space, curve, &own[..len]);
             own[problem.segments(curve) * len..].copy_from_slice(&transported);
         }

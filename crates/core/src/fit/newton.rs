@@ -1,7 +1,7 @@
 //! Newton's method: the Jacobian of the C² condition by dual numbers, block by block.
 //!
-//! The residual at a node depends on the velocities there and at its two neighbours, so that the Jacobian
-//! is block tridiagonal, cyclic for closed curves. One sweep with dual numbers differentiates by one
+//! The residual at a node depends on the velocities of the node and of its two neighbours. The Jacobian is therefore
+//! block tridiagonal, and cyclic for closed curves. One sweep with dual numbers differentiates with respect to one
 //! coordinate at every third node at once.
 
 use super::blocks::Blocks;
@@ -13,7 +13,7 @@ use crate::monitor::checkpoint;
 use crate::scalar::{Dual, Lane, Scalar};
 use crate::space::Erased;
 
-/// The Jacobian and memory to solve with it.
+/// The Jacobian and the memory of its solver.
 #[derive(Default)]
 pub struct Newton {
     pub(super) blocks: Blocks,
@@ -35,7 +35,7 @@ pub fn solve(chain: &Chain, ends: &ChainEnds, newton: &mut Newton, step: &mut [L
     match ends {
         ChainEnds::Open(_) => newton.blocks.solve(n + 1, m, 1, step),
         ChainEnds::Periodic if n > 1 => newton.blocks.solve_cyclic(n, m, step),
-        // One segment from a point to itself: the curve stands still.
+        // One segment from a point to itself is a constant curve.
         ChainEnds::Periodic => step.fill(Lane::ZERO),
     }
     step.iter_mut().for_each(|x| *x = -*x);
@@ -50,7 +50,8 @@ impl Newton {
         self.blocks.clear(nodes, m);
         let zero = Dual::constant(Lane::ZERO);
         self.r.resize(chain.r.len(), zero);
-        // No node has two neighbours (itself included) of one colour; the last two of a closed curve are special.
+        // A node never has two neighbours (including itself) of the same colour; the last two nodes of a closed curve
+        // are treated separately.
         let color = |i: usize| if closed && i + 2 >= n { 3 + (n - 1 - i) } else { i % 3 };
         for c in 0..if closed { 5 } else { 3 } {
             if !(0..nodes).any(|i| color(i) == c) {
@@ -71,8 +72,8 @@ impl Newton {
                 checkpoint();
                 sweep(space, chain, ends, &self.u, &mut self.r, &mut self.vectors, Lane::ZERO);
                 for i in 0..nodes {
-                    // A row sees the coloured one of its three nodes; of two equal ones (a closed curve of
-                    // three points) the sum goes to either.
+                    // A row depends on the coloured one of its three nodes. If two of them are equal (a closed curve
+                    // of three points), the sum may be assigned to either.
                     for (side, block) in self.blocks.sides.iter_mut().enumerate() {
                         let j = match side {
                             0 if i > 0 => i - 1,

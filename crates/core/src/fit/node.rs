@@ -2,11 +2,12 @@
 
 use crate::scalar::{Lane, Scalar};
 
-/// How far a lane is from C²: the largest residual, and the largest speed to measure it by.
+/// The C² residual of a lane and its scale.
 #[derive(Clone, Copy)]
 pub struct C2Residual {
-    /// Largest residual, divided by 1/hᵢ₋₁ + 1/hᵢ: a velocity. At an end with not-a-knot it is that of the
-    /// velocity there, divided by 1 + h₀/h₁: so much its formula makes of rounding in the other velocities.
+    /// Largest residual, divided by 1/hᵢ₋₁ + 1/hᵢ, which makes it a velocity. At a not-a-knot end it is the residual
+    /// of the velocity there, divided by 1 + h₀/h₁, the factor by which its formula amplifies rounding errors of
+    /// other velocities.
     pub residual: Lane,
     /// Largest |uᵢ|.
     pub speed: Lane,
@@ -14,7 +15,7 @@ pub struct C2Residual {
     pub handle: Lane,
 }
 
-/// Vectors of one node, kept between residuals.
+/// Vectors of one node, reused between residuals.
 pub struct NodeVectors<S> {
     pub(super) a: Vec<S>,
     pub(super) b: Vec<S>,

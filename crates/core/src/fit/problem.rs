@@ -1,18 +1,18 @@
-//! What is fitted, how, and what is known afterwards.
+//! The problem of a fit, its options and its report.
 
 use super::end_kind::EndKind;
 use crate::scalar::{Lane, lane};
 use crate::space::{Ambient, Erased};
 
-/// Points to interpolate: curves one after another.
+/// Points to interpolate, curve after curve.
 pub struct Problem<'a> {
-    /// Knots, increasing: of every curve, or of one for all (see `shared`).
+    /// Increasing knots: one row per curve, or one row for all curves (see `shared`).
     pub t: &'a [f64],
     /// Whether all curves have the same knots.
     pub shared: bool,
     /// Points, on the space.
     pub points: &'a [f64],
-    /// Nodes before each curve, and in the end the number of all.
+    /// The number of nodes before each curve, and finally the number of all nodes.
     pub offsets: &'a [usize],
     /// The end conditions.
     pub ends: Ends<'a>,
@@ -21,7 +21,7 @@ pub struct Problem<'a> {
 /// End conditions.
 #[derive(Clone, Copy)]
 pub enum Ends<'a> {
-    /// Last and first point are the same, and so are velocity and acceleration there.
+    /// The last point equals the first, and so do velocity and acceleration there.
     Periodic,
     /// A condition at either end.
     Open([End<'a>; 2]),
@@ -41,12 +41,12 @@ pub enum End<'a> {
 }
 
 impl<'a> End<'a> {
-    /// Whether Theorem 3.1 is about such ends.
-    pub fn is_of_the_theorem(&self) -> bool {
+    /// Whether Theorem 3.1 covers such ends.
+    pub fn is_covered_by_the_theorem(&self) -> bool {
         matches!(self, End::Natural | End::Velocity(_))
     }
 
-    /// As it is solved.
+    /// The end condition in the form that the solvers use.
     pub fn kind(&self) -> EndKind {
         match self {
             End::Natural | End::Acceleration(_) => EndKind::Acceleration,
@@ -55,7 +55,7 @@ impl<'a> End<'a> {
         }
     }
 
-    /// The vectors that it prescribes.
+    /// The prescribed vectors.
     pub fn values(&self) -> Option<&'a [f64]> {
         match self {
             End::Velocity(v) | End::Acceleration(v) => Some(v),
@@ -67,11 +67,11 @@ impl<'a> End<'a> {
 /// How to solve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The best available.
+    /// Several solvers; the solution with the lowest bending energy is kept.
     Auto,
     /// Algorithm 1 of the paper.
     FixedPoint,
-    /// Transported tridiagonal solves with Anderson mixing.
+    /// Tridiagonal solves on transported vectors, with Anderson mixing.
     QuasiNewton,
     /// Newton's method with the block-tridiagonal Jacobian.
     Newton,
@@ -85,7 +85,7 @@ pub enum Method {
 pub enum Solver {
     /// Algorithm 1 of the paper.
     FixedPoint,
-    /// Transported tridiagonal solves.
+    /// Tridiagonal solves on transported vectors.
     QuasiNewton,
     /// Newton's method.
     Newton,
@@ -100,7 +100,7 @@ pub enum Solver {
 pub struct SolverSet(pub u8);
 
 impl SolverSet {
-    /// The solvers of either set.
+    /// The union of two sets.
     pub fn union(self, other: Self) -> Self {
         SolverSet(self.0 | other.0)
     }
@@ -111,41 +111,41 @@ impl SolverSet {
 pub struct Options {
     /// The method.
     pub method: Method,
-    /// Largest residual that counts as converged.
+    /// The largest residual of a converged fit.
     pub tol: f64,
-    /// Largest number of residual evaluations; `None` for the method's own.
+    /// Largest number of residual evaluations; `None` for the default of the method.
     pub max_iter: Option<usize>,
 }
 
-/// Whether a fit converged, or why there is no curve.
+/// Whether a fit converged, or why it failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Status {
     /// The residual is below the tolerance or at the rounding floor.
     Converged,
     /// The residual is above the tolerance.
     Unconverged,
-    /// Points `index` and `index + 1` lie at or past each other's cut locus.
+    /// Points `index` and `index + 1` lie at or beyond each other's cut locus.
     CutLocus {
         /// Index of the first of the two points.
         index: usize,
         /// Deciding angle between them.
         angle: f64,
     },
-    /// A handle at a point reaches the cut locus, or is too long for doubles.
+    /// A handle at a point reaches the cut locus, or is too long for floating-point numbers.
     LongHandle {
         /// Index of the point.
         index: usize,
         /// Deciding angle of the handle.
         angle: f64,
     },
-    /// The two control points between points `index` and `index + 1` lie at each other's cut locus.
+    /// The two control points between points `index` and `index + 1` lie at or beyond each other's cut locus.
     InnerHandle {
         /// Index of the first of the two points.
         index: usize,
         /// Deciding angle between the control points.
         angle: f64,
     },
-    /// The work was stopped before this curve was done.
+    /// The work was stopped before this curve was finished.
     Stopped,
 }
 
@@ -155,7 +155,7 @@ impl Status {
         matches!(self, Status::CutLocus { .. } | Status::LongHandle { .. } | Status::InnerHandle { .. })
     }
 
-    /// The same with the point at fault counted otherwise.
+    /// The same with another number for the point at fault.
     pub(super) fn counted(mut self, count: impl Fn(usize) -> usize) -> Self {
         if let Status::CutLocus { index, .. }
         | Status::LongHandle { index, .. }
@@ -167,7 +167,7 @@ impl Status {
     }
 }
 
-/// What is known about a fitted curve.
+/// The report of a fitted curve.
 #[derive(Clone, Copy, Debug)]
 pub struct Report {
     /// The status.
@@ -182,20 +182,20 @@ pub struct Report {
     pub rate: f64,
     /// The solver that found the curve.
     pub solver: Solver,
-    /// The smallest V of (38), NaN where Theorem 3.1 says nothing.
+    /// The smallest V of (38), NaN where Theorem 3.1 does not apply.
     pub invariant_radius: f64,
-    /// A bound of the contraction of Algorithm 1 per sweep on that region, NaN where there is none.
+    /// A bound of the contraction of Algorithm 1 per sweep on that region, NaN where no bound is known.
     pub contraction_bound: f64,
-    /// After so many sweeps Algorithm 1 is within the tolerance, NaN where there is no bound.
+    /// The number of sweeps after which Algorithm 1 is within the tolerance, NaN without a bound.
     pub guaranteed_sweeps: f64,
-    /// The least energy ∫ |∇γ'|² dt of other C² curves through the points that were found, NaN where none was.
+    /// The lowest energy ∫ |∇γ'|² dt of other C² curves found through the points, NaN if none was found.
     pub alternative: f64,
-    /// The first point from which the next one lies almost at the cut locus, within 1e-5 of the limit, and the deciding
+    /// The first point whose successor lies almost at the cut locus, within 1e-5 of the limit, and the deciding
     /// angle.
     pub almost_cut: Option<(usize, f64)>,
-    /// Solvers that `auto` left out because they would have cost too much.
+    /// Solvers that `auto` skipped because they would have cost too much.
     pub skipped: SolverSet,
-    /// By how much rounding errors may grow over its chords.
+    /// The growth of rounding errors over the chords of the curve.
     pub(super) condition: f64,
 }
 
@@ -230,7 +230,8 @@ impl<'a> Problem<'a> {
         if self.shared { self.t } else { &self.t[self.offsets[curve]..self.offsets[curve + 1]] }
     }
 
-    /// A velocity at the first point of a closed curve as one at its last, which may be another array.
+    /// Transports a velocity at the first array of a closed curve to its last array, which may be another
+    /// representative.
     pub(super) fn across_closure(&self, space: &Erased, curve: usize, velocity: &[f64]) -> Vec<f64> {
         let len = velocity.len();
         let lanes = |row: &[f64]| -> Vec<Lane> { row.iter().map(|&x| lane(x)).collect() };

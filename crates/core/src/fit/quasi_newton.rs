@@ -1,8 +1,8 @@
-//! Newton's method with the flat-space matrix T in transported frames, and Anderson's mixing.
+//! Newton's method with the matrix T of flat space in transported frames, and Anderson mixing.
 //!
-//! `T δu = 3r` is one tridiagonal solve a sweep. It is exact in flat space; on a curved space the
-//! iteration contracts by a factor that grows with the squared step between points. Where that
-//! factor is not small, Anderson mixing (type II; Walker & Ni 2011) of the last few updates takes over.
+//! `T δu = 3r` is one tridiagonal solve per sweep. It is exact in flat space; on a curved space the iteration
+//! contracts by a factor that grows with the squared step between points. Where that factor is not small, Anderson
+//! mixing (type II; Walker & Ni 2011) of the last few updates accelerates the iteration.
 
 use super::chain::Chain;
 use super::end_kind::ChainEnds;
@@ -10,9 +10,9 @@ use super::tridiagonal::Tridiagonal;
 use crate::scalar::{Lane, lane};
 use crate::space::Erased;
 
-/// How many earlier updates are mixed.
+/// The number of earlier updates that are mixed.
 const DEPTH: usize = 5;
-/// Contraction above which mixing pays for its extra vectors.
+/// The contraction above which mixing is worth its additional vectors.
 const MIX_ABOVE: f64 = 0.15;
 
 /// `step ← T⁻¹ 3r`.
@@ -23,11 +23,11 @@ pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, t: &mut Tridi
     t.solve(space, chain, ends, step);
 }
 
-/// The history of Anderson mixing. A lane takes part from the iteration on at which its own
-/// contraction asks for it; before that its columns are zero, so that lanes stay independent.
+/// The history of Anderson mixing. A lane takes part from the iteration at which its own contraction requires it.
+/// Before that its columns are zero, so that lanes stay independent.
 #[derive(Default)]
 pub struct Anderson {
-    /// Differences of updates, and of iterates plus updates, the youngest first.
+    /// Differences of updates, and of iterates plus updates, newest first.
     columns: Vec<[Vec<Lane>; 2]>,
     used: usize,
     previous: [Vec<Lane>; 2],
@@ -35,14 +35,14 @@ pub struct Anderson {
 }
 
 impl Anderson {
-    /// Forgets everything.
+    /// Removes the history.
     pub fn restart(&mut self) {
         self.used = 0;
         self.active = Lane::ZERO;
         self.previous.iter_mut().for_each(Vec::clear);
     }
 
-    /// Forgets the history of some lanes: their next step is a plain one.
+    /// Removes the history of some lanes, whose next step is not mixed.
     pub fn forget(&mut self, lanes: Lane) {
         for [f, g] in &mut self.columns[..self.used] {
             for x in f.iter_mut().chain(g) {
@@ -52,13 +52,13 @@ impl Anderson {
         self.active = lanes.select(Lane::ZERO, self.active);
     }
 
-    /// The lanes that take part.
+    /// The lanes that take part in mixing.
     pub fn active(&self) -> Lane {
         self.active
     }
 
-    /// Replaces the update f(u) by the mixed one. `contraction` is how the last iteration did; lanes
-    /// in `idle` do not take part now.
+    /// Replaces the update f(u) by the mixed one. `contraction` is that of the last iteration. Lanes in `idle` do not
+    /// take part in this step.
     pub fn mix(&mut self, contraction: Lane, idle: Lane, u: &[Lane], f: &mut [Lane]) {
         let slow = contraction.simd_gt(lane(MIX_ABOVE)) & !idle;
         if self.active.none() && slow.none() {
@@ -67,7 +67,7 @@ impl Anderson {
         if !self.previous[0].is_empty() {
             self.remember(u, f);
         }
-        // A lane that starts now has no difference to remember yet, as if it were alone.
+        // A lane that starts in this iteration has no earlier difference, as if it were alone.
         self.active |= slow;
         let [old_f, old_g] = &mut self.previous;
         old_f.clear();
@@ -79,7 +79,7 @@ impl Anderson {
         }
     }
 
-    /// Takes in the differences to the last iteration as the youngest column.
+    /// Stores the differences from the last iteration as the newest column.
     fn remember(&mut self, u: &[Lane], f: &[Lane]) {
         if self.used == self.columns.len() && self.used < DEPTH {
             self.columns.push(Default::default());
@@ -108,7 +108,7 @@ impl Anderson {
             }
             gamma[i] = dot(&self.columns[i][0], f);
         }
-        // L D Lᵀ; a column that depends on younger ones, or is empty, takes no part.
+        // L D Lᵀ; a column that depends on newer ones, or is empty, is ignored.
         let mut inverse = [Lane::ZERO; DEPTH];
         for i in 0..k {
             let size = gram[i][i];

@@ -1,20 +1,20 @@
-//! Whether rounding leaves of a curve what its velocities say.
+//! Whether rounding errors spoil a curve whose velocities are accurate.
 //!
-//! Where spaces open up exponentially, velocities that are right to the last digit make a curve that is not: a
-//! segment's geodesics multiply rounding errors at its start by the exponential of its length.
+//! On spaces that grow exponentially, velocities that are accurate to the last digit may define an inaccurate curve:
+//! the geodesics of a segment amplify rounding errors at its start by the exponential of its length.
 
 use super::problem::Problem;
 use crate::curve::Segment;
 use crate::scalar::{Dual, LANES, Lane, Scalar, few, gather, max_or_nan};
 use crate::space::{Ambient, Erased};
 
-/// What may be missed for rounding.
+/// The largest error that is accepted as rounding.
 const MOST: f64 = 1e-8;
-/// Up to this condition of the chords, steps of five to seven, curves need no look.
+/// Up to this condition of the chords, steps of five to seven, curves need no check.
 const SMALL: f64 = 1e3;
 
-/// What a curve misses at the ends of its segments, relative to the largest speed at a knot or between neighbours, if
-/// that is no rounding; `condition` is that of its chords.
+/// The error of a curve at the ends of its segments, relative to the largest speed at a knot or between neighbours,
+/// if it exceeds rounding; `condition` is that of the chords.
 pub fn missed(
     space: &Erased,
     problem: &Problem,
@@ -51,14 +51,14 @@ pub fn missed(
         space.velocity(&p, &mut v);
         space.log(&p, &segment.ends[1], &mut apart);
         far = max_or_nan(far, space.inner(&p, &apart, &apart).abs().sqrt() / h);
-        // As a vector at the array that stands for the next point.
+        // The vector at the array that represents the next point.
         let still = vec![Lane::ZERO; len];
         space.parallel_transport(&p, &segment.ends[1], &still, &v, &mut apart);
         rows(velocities, at.map(|i| i + 1), &mut u);
         apart.iter_mut().zip(&u).for_each(|(v, u)| *v -= *u);
         let length = |v: &[Lane]| space.inner(&segment.ends[1], v, v).abs().sqrt();
         off = max_or_nan(off, length(&apart));
-        // At every knot a curve that goes there and back may stand still.
+        // A curve that turns back may have zero speed at every knot.
         space.log(&segment.ends[1], &segment.ends[0], &mut apart);
         speed = max_or_nan(speed, length(&u).max(length(&apart) / h));
     }

@@ -1,8 +1,8 @@
 //! Long curves in sections, on all cores.
 //!
-//! A long curve is cut into overlapping sections with artificial natural ends: what happens at a knot fades like
-//! 0.27 a node on equal knots, and ½ at worst on any, so that a section is exact to rounding a few dozen nodes from
-//! its ends. That neighbouring sections agree is checked; where they do not, the overlap grows.
+//! A long curve is divided into overlapping sections with artificial natural ends. The influence of a knot decays by
+//! a factor of 0.27 per node on equal knots, and of ½ in the worst case, so that a section is accurate to rounding a
+//! few dozen nodes from its ends. Neighbouring sections are compared; if they do not agree, the overlap grows.
 
 use super::certificate::{contraction_bound, equally_spaced, guaranteed_sweeps, invariant_radius};
 use super::lanes::fit_lanes;
@@ -13,14 +13,14 @@ use crate::parallel;
 use crate::scalar::LANES;
 use crate::space::{Ambient, Erased, Origin};
 
-/// Nodes of a section without its overlap, at most.
+/// Maximum number of nodes of a section without its overlap.
 const CORE: usize = 480;
-/// Nodes of overlap on either side, at first.
+/// Initial number of nodes of overlap on either side.
 pub const OVERLAP: usize = 32;
-/// Nodes times dimensions from which threads pay: about a fifth of a millisecond's work.
+/// Nodes times dimensions from which several threads are faster: about a fifth of a millisecond of work.
 const PARALLEL: usize = 8192;
 
-/// Fits some curves, whole or in sections with a given overlap; returns those whose sections do not agree.
+/// Fits some curves, whole or in sections with a given overlap. Returns the curves whose sections do not agree.
 pub fn fit_cut(
     space: &Erased,
     problem: &Problem,
@@ -42,7 +42,7 @@ pub fn fit_cut(
         (rest, taken) = (behind, to);
         cut(problem, curve, overlap, len, mine, &mut sections);
     }
-    // Lanes hold chains of one length; sorting is stable, so that sections of a curve stay in order.
+    // Lanes contain chains of equal length. Sorting is stable, so that the sections of a curve stay in order.
     sections.sort_by_key(|p| p.nodes);
     let mut groups: Vec<&mut [Section]> = Vec::with_capacity(sections.len() / LANES + 1);
     for same in sections.chunk_by_mut(|a, b| a.nodes == b.nodes) {
@@ -51,7 +51,7 @@ pub fn fit_cut(
     let work: usize = groups.iter().map(|g| g[0].nodes * space.dim()).sum();
     parallel::for_each(groups, work > PARALLEL, monitor, |group| {
         fit_lanes(space, problem, options, monitor, group);
-        // Curves that are done again with more overlap were counted before.
+        // Curves that are repeated with more overlap were counted before.
         if overlap.is_none_or(|nodes| nodes == OVERLAP) {
             monitor.advance(group.iter().map(|p| p.core.len()).sum());
         }
@@ -59,7 +59,7 @@ pub fn fit_cut(
     merge(space, problem, options, len, &sections, reports)
 }
 
-/// Cuts a curve into sections of one length with so many nodes of overlap on either side, or takes it whole.
+/// Divides a curve into sections of equal length with this many nodes of overlap on either side, or takes it whole.
 fn cut<'a>(
     problem: &Problem,
     curve: usize,
@@ -72,7 +72,7 @@ fn cut<'a>(
     let count = LANES * nodes.div_ceil(LANES * CORE);
     let core = nodes.div_ceil(count);
     let closed = matches!(problem.ends, Ends::Periodic);
-    // Sections that are no shorter than the curve are the curve.
+    // Sections that are not shorter than the curve are replaced by the curve.
     let overlap = overlap.filter(|overlap| core + 2 * overlap < nodes);
     let (core, length) = overlap.map_or((nodes, nodes), |overlap| (core, core + 2 * overlap));
     let mut from = 0;
@@ -80,7 +80,7 @@ fn cut<'a>(
         let to = (from + core).min(nodes);
         let (mine, behind) = velocities.split_at_mut((to - from) * len);
         velocities = behind;
-        // A section of an open curve is moved inside it, one of a closed curve goes round.
+        // A section of an open curve is shifted inside it; a section of a closed curve continues around it.
         let (first, start) = match overlap {
             None => (0, 0),
             Some(overlap) if closed => ((from + nodes - 1 - overlap) % (nodes - 1), overlap),
@@ -104,7 +104,7 @@ fn cut<'a>(
     }
 }
 
-/// Puts the reports of the sections of each curve together; returns the curves whose sections differ.
+/// Combines the reports of the sections of each curve. Returns the curves whose sections differ.
 fn merge(
     space: &Erased,
     problem: &Problem,
@@ -140,7 +140,7 @@ fn merge(
             }
         }
         if let ([first, .., last], Ends::Periodic) = (same, problem.ends) {
-            // The last knot is the first again.
+            // The last knot equals the first.
             let transported = problem.across_closure(space, curve, &first.velocities[..len]);
             for (a, b) in transported.iter().zip(&last.velocities[last.velocities.len() - len..]) {
                 mismatch = mismatch.max((a - b).abs());
@@ -155,7 +155,8 @@ fn merge(
         let around = |index| index % problem.segments(curve);
         report.status = report.status.counted(around);
         report.almost_cut = report.almost_cut.map(|(index, angle)| (around(index), angle));
-        let known = matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_of_the_theorem));
+        let known =
+            matches!(&problem.ends, Ends::Open(ends) if ends.iter().all(End::is_covered_by_the_theorem));
         if known && equally_spaced(problem.knots(curve)) {
             let handle = same.iter().map(|p| p.end_handle).fold(0.0, f64::max);
             let curvature = space.curvature();

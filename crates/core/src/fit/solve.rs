@@ -1,4 +1,4 @@
-//! The iteration that quasi-Newton and Newton share: residual, convergence lane by lane, step.
+//! The iteration of quasi-Newton and Newton: residual, convergence of each lane, step.
 
 use super::chain::Chain;
 use super::condition::residual;
@@ -15,50 +15,50 @@ use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, few, lane, mask_bits, mask_from};
 use crate::space::{Ambient, Erased};
 
-/// Outer handles are kept within this part of the distance to the cut locus while iterating.
+/// Outer handles stay within this fraction of the distance to the cut locus during the iteration.
 const HANDLE_LIMIT: f64 = 0.95;
 
-/// How far an iteration goes.
+/// The limits of an iteration.
 #[derive(Clone, Copy)]
 pub struct Limits {
-    /// Largest residual that counts as converged.
+    /// The largest residual of a converged lane.
     pub tol: Lane,
     /// Largest number of residual evaluations of each lane.
     pub max_iter: Lane,
 }
 
 impl Limits {
-    /// The lanes that may not go on after so many residual evaluations.
+    /// The lanes that have no evaluations left after this many.
     pub fn reached(&self, iteration: usize) -> Lane {
         self.max_iter.simd_le(lane(iteration as f64))
     }
 }
 
-/// How eight iterations ended.
+/// The outcome of eight iterations.
 #[derive(Clone)]
 pub struct Outcome {
     /// Residual evaluations.
     pub iterations: [usize; LANES],
     /// The C² residual, relative to the largest speed.
     pub residual: Lane,
-    /// Whether the residual is below the tolerance or at the rounding floor, and no handle too long.
+    /// Whether the residual is below the tolerance or at the rounding floor, and all handles are short enough.
     pub converged: [bool; LANES],
-    /// Handles that are too long although the residual is not.
+    /// Handles that are too long although the residual is small enough.
     pub fault: [Option<Status>; LANES],
     /// The longest outer handle |h u/3|.
     pub handle: Lane,
     /// Mean contraction per iteration.
     pub rate: Lane,
-    /// Which solver got there.
+    /// The solver that found the curve.
     pub solver: [Solver; LANES],
-    /// The least energy of other curves that were found, in the units of the chain; NaN where none was.
+    /// The lowest energy of other solutions, in the units of the chain; NaN without one.
     pub alternative: Lane,
     /// Solvers that would have cost too much.
     pub skipped: [SolverSet; LANES],
 }
 
 impl Outcome {
-    /// How an iteration ended, whose last iterate the chain has.
+    /// The outcome of an iteration whose last iterate is in the chain.
     /// Control points are checked on the lanes of `suspect`.
     pub fn of(space: &Erased, chain: &mut Chain, state: &Convergence, solver: Solver, suspect: Lane) -> Self {
         let fault = long_handles(space, chain, state.handle, suspect);
@@ -76,7 +76,7 @@ impl Outcome {
         }
     }
 
-    /// That of a solver that has not begun on the lanes of a mask; on others it is settled.
+    /// The outcome of a solver that has not started on the lanes of a mask; other lanes are settled.
     pub fn afresh(&self, on: Lane) -> Self {
         let on_lane = mask_bits(on);
         Outcome {
@@ -88,7 +88,7 @@ impl Outcome {
         }
     }
 
-    /// That of a solver that has not begun.
+    /// The outcome of a solver that has not started.
     pub fn none(solver: Solver) -> Self {
         Outcome {
             iterations: [0; LANES],
@@ -108,15 +108,14 @@ impl Outcome {
         idle | mask_from(|l| self.converged[l])
     }
 
-    /// Notes a solver that would cost too much on some lanes.
+    /// Records a solver that would cost too much on some lanes.
     pub fn leave_out(&mut self, solver: Solver, lanes: Lane) {
         for (skipped, _) in self.skipped.iter_mut().zip(mask_bits(lanes)).filter(|(_, on)| *on) {
             skipped.0 |= 1 << solver as u8;
         }
     }
 
-    /// Takes over what a further solver found on some lanes, or goes back to what was there where that is
-    /// better.
+    /// Accepts the result of a further solver on some lanes, or restores the earlier one where that is better.
     pub fn take(&mut self, space: &Erased, chain: &mut Chain, before: &[Lane], found: &Outcome, lanes: Lane) {
         let (old, new) = (self.residual.to_array(), found.residual.to_array());
         let lanes = mask_bits(lanes);
@@ -125,8 +124,8 @@ impl Outcome {
         self.adopt(space, chain, before, found, mask_from(|l| better[l]), mask_from(|l| lanes[l]));
     }
 
-    /// Takes over what was found on the lanes of a mask, and goes back to what was there on others. What ran on
-    /// counts as work.
+    /// Accepts the result of a further solver on the lanes of a mask, and restores the earlier one on others. The
+    /// iterations of both count as work.
     pub fn adopt(
         &mut self,
         space: &Erased,
@@ -152,7 +151,7 @@ impl Outcome {
     }
 }
 
-/// Memory of a solve, reused from fit to fit.
+/// Memory of a solver, reused between fits.
 #[derive(Default)]
 pub struct Workspace {
     pub(super) t: Tridiagonal,
@@ -164,8 +163,8 @@ pub struct Workspace {
     best: Best,
 }
 
-/// Iterates on the unknowns of a chain until every lane is done: Newton's method, or with `Solver::QuasiNewton` the
-/// quasi-Newton iteration. Lanes in `idle` are left alone.
+/// Iterates on the unknowns of a chain until every lane stops: Newton's method, or with `Solver::QuasiNewton` the
+/// quasi-Newton iteration. Lanes in `idle` do not change.
 pub fn solve(
     space: &Erased,
     chain: &mut Chain,
@@ -217,7 +216,7 @@ pub fn solve(
         chain.update(space, |chain, u| {
             for ((u, s), n) in u.iter_mut().zip(&mut *step).zip(&*next_step) {
                 *u = done.select(*u, *u + *n);
-                // After going back, what is left of the step is as long as what was taken back.
+                // After a step back, the rest of the step is as long as the part that was taken back.
                 *s = worse.select(-*n, *n);
             }
             if long.any() {

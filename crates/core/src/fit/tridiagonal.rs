@@ -1,4 +1,4 @@
-//! The flat-space Newton matrix T, on transported velocities.
+//! The Newton matrix T of flat space, on transported velocities.
 //!
 //! In the frames transport is the identity and T is a scalar tridiagonal matrix with rows
 //! `1/hᵢ₋₁, 2/hᵢ₋₁ + 2/hᵢ, 1/hᵢ`: the matrix of the classical cubic spline.
@@ -10,8 +10,8 @@ use crate::scalar::{Lane, lane};
 use crate::space::Erased;
 use crate::with_size;
 
-/// T, factored by elimination without pivots (T is diagonally dominant but for not-a-knot rows,
-/// which are safe too: their first pivot is 1/h₀ + 1/h₁).
+/// T, factored by elimination without pivoting. T is diagonally dominant except for not-a-knot rows, which are safe,
+/// too: their first pivot is 1/h₀ + 1/h₁.
 #[derive(Default)]
 pub struct Tridiagonal {
     /// Diagonal, also the divisor of Algorithm 1.
@@ -19,7 +19,7 @@ pub struct Tridiagonal {
     lower: Vec<Lane>,
     upper: Vec<Lane>,
     inverse_pivot: Vec<Lane>,
-    /// For closed curves: the answers α, β to a unit velocity at the first and the last node.
+    /// For closed curves: the solutions α, β for a unit velocity at the first and the last node.
     answers: [Vec<Lane>; 2],
     rhs: Vec<Lane>,
     x: Vec<Lane>,
@@ -116,8 +116,8 @@ impl Tridiagonal {
             let pivot = self.diagonal[0] + self.upper[0] * alpha[1] + self.lower[0] * beta[n - 1];
             let coupling = self.upper[0] * beta[1];
             let inverse = Lane::ONE / pivot;
-            // |2c/A| ≤ 1/7 on any knots, the worst case being two equal segments: twenty rounds
-            // of Richardson's iteration are below rounding.
+            // |2c/A| ≤ 1/7 on any knots, and the worst case has two equal segments. Twenty rounds of Richardson's
+            // iteration therefore reach rounding.
             self.x.clear();
             self.x.extend(self.rhs.iter().map(|&x| x * inverse));
             for _ in 0..20 {
@@ -136,7 +136,7 @@ impl Tridiagonal {
                 }
             }
         } else {
-            // One segment from a point to itself: the curve stands still.
+            // One segment from a point to itself is a constant curve.
             f.fill(Lane::ZERO);
         }
     }

@@ -1,7 +1,7 @@
 //! Least squares of the C² residual in a trust region: Powell's dogleg (1970) with the block tridiagonal Jacobian.
 //!
-//! It gets from zero velocities to a curve where Newton's method is thrown about: every step is one that makes the
-//! residual smaller, in the region where its linear model was seen to hold.
+//! From zero velocities this method reaches a curve where Newton's method diverges: every step reduces the residual,
+//! within the region where its linear model is accurate.
 
 use super::chain::Chain;
 use super::condition::residual;
@@ -16,27 +16,27 @@ use crate::monitor::Monitor;
 use crate::scalar::{Lane, dot, lane};
 use crate::space::{Ambient, Erased};
 
-/// Outer handles are kept within this part of the distance to the cut locus.
+/// Outer handles stay within this fraction of the distance to the cut locus.
 const HANDLE_LIMIT: f64 = 0.999;
-/// Parts of the predicted gain from which on a step is taken, and the region made larger or smaller.
+/// The fractions of the predicted reduction from which a step is accepted, and the region is enlarged or reduced.
 const TAKEN: f64 = 1e-4;
 const POOR: f64 = 0.25;
 const GOOD: f64 = 0.75;
-/// The first region, as a part of the largest distance over time: larger first steps land beyond the cut locus.
+/// The radius of the first region, relative to the largest distance over time. Larger first steps pass the cut locus.
 const FIRST: f64 = 0.1;
-/// A region of this part of the velocities holds no further step.
+/// A region that is smaller than this fraction of the velocities ends the iteration.
 const SMALLEST: f64 = 1e-12;
 
-/// The linear model of the residual where an iteration stands.
+/// The linear model of the residual at the current iterate.
 struct Model {
-    /// Half the gradient of the squared residual, and what the Jacobian makes of it.
+    /// Half the gradient of the squared residual, and the product of the Jacobian with it.
     gradient: Vec<Lane>,
     image2: Lane,
     /// The step of Newton's method.
     newton: Vec<Lane>,
 }
 
-/// Iterates from the unknowns of a chain; lanes in `idle` are left alone.
+/// Iterates from the unknowns of a chain. Lanes in `idle` do not change.
 pub fn solve(
     space: &Erased,
     chain: &mut Chain,
@@ -61,7 +61,7 @@ pub fn solve(
     for iteration in 1.. {
         let found = residual(space, chain, ends, &mut work.vectors);
         let now = weighted2(&chain.r[..count], &weights, chain.m);
-        // The first point is taken as it is.
+        // The first iterate is accepted as it is.
         let part = square.simd_eq(infinity).select(Lane::ONE, (square - now) / gain);
         let taken = part.simd_gt(lane(TAKEN)) & now.simd_lt(infinity) & !state.done;
         let keep = |new: Lane, old: Lane| taken.select(new, old);
@@ -102,14 +102,14 @@ pub fn solve(
     Outcome::of(space, chain, &state, Solver::TrustRegion, converged)
 }
 
-/// What the residual of a node is multiplied by to make it a velocity.
+/// The factor that converts the residual of a node to a velocity.
 fn weights(chain: &Chain, ends: &ChainEnds) -> Vec<Lane> {
     let n = chain.n;
     let joint = |a: usize, b: usize| chain.h[a] * chain.h[b] / (chain.h[a] + chain.h[b]);
     let mut weights: Vec<Lane> = (0..=n).map(|i| joint((i + n - 1) % n, i % n)).collect();
     if let ChainEnds::Open(kinds) = ends {
         for (node, segment, kinds) in [(0, 0, &kinds[0]), (n, n - 1, &kinds[1])] {
-            // There the residual is a velocity, or a third of one.
+            // At this end the residual is a velocity, or a third of one.
             let given = of_kind(kinds, EndKind::Velocity) | of_kind(kinds, EndKind::NotAKnot);
             weights[node] = given.select(lane(3.0), chain.h[segment]);
         }
@@ -121,7 +121,7 @@ fn weighted2(r: &[Lane], weights: &[Lane], m: usize) -> Lane {
     r.chunks_exact(m).zip(weights).fold(Lane::ZERO, |sum, (r, w)| sum + dot(r, r) * *w * *w)
 }
 
-/// Makes the model of the residual in `chain.r` on the lanes of a mask.
+/// Computes the model of the residual in `chain.r` on the lanes of a mask.
 fn linearise(
     space: &Erased,
     chain: &mut Chain,
@@ -150,7 +150,7 @@ fn linearise(
     model.image2 = lanes.select(weighted2(&image, weights, m), model.image2);
 }
 
-/// A step `newton · n − gradient · g`, its length, and by how much it should lower the squared residual.
+/// A step `newton · n − gradient · g`, its length, and the reduction of the squared residual that the model predicts.
 struct Step {
     newton: Lane,
     gradient: Lane,
@@ -161,10 +161,11 @@ struct Step {
 fn dogleg(model: &Model, square: Lane, radius: Lane) -> Step {
     let (g, n) = (&model.gradient[..], &model.newton[..]);
     let (gg, nn, gn) = (dot(g, g), dot(n, n), dot(g, n));
-    // The best point downhill.
+    // The minimum of the model along the gradient.
     let cauchy = gg / model.image2;
     let down = (cauchy * cauchy * gg).sqrt();
-    // On the way from there to Newton's: |c + τ(n − c)| = radius with c = −cauchy · g.
+    // The intersection of the path from there to Newton's step with the boundary: |c + τ(n − c)| = radius with c =
+    // −cauchy · g.
     let cn = -(cauchy * gn);
     let (a, b, c) = (nn - cn * lane(2.0) + down * down, cn - down * down, down * down - radius * radius);
     let tau = (-c) / (b + (b * b - a * c).max(Lane::ZERO).sqrt());

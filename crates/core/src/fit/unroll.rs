@@ -1,4 +1,4 @@
-//! The way along the polygon: unrolls points into a chain, and rolls velocities up again.
+//! Transport along the polygon: unrolls points into a chain, and writes velocities back.
 
 use super::chain::{Chain, Run, Visit, Walker};
 use super::end_kind::{ChainEnds, EndKind, of_kind};
@@ -6,17 +6,17 @@ use crate::scalar::{LANES, Lane, Scalar, dot, few, gather, lane, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 use crate::with_size;
 
-/// After this many steps the rounding errors of a frame are removed, which costs the cube of the
-/// dimension: one step costs its square.
+/// After this many steps the rounding errors of a frame are removed. This costs the cube of the dimension, whereas
+/// one step costs its square.
 fn reorthonormalize_every(dim: usize) -> usize {
     dim.max(8)
 }
 
-/// Nearer to the cut angle than this part of it, what is lost to measuring and rounding decides which way round the
-/// geodesic between two points goes.
+/// Within this fraction of the cut angle, rounding errors of the data determine the direction of the geodesic between
+/// two points.
 const ALMOST: f64 = 1e-5;
 
-/// Whether frames keep lengths along the polygon.
+/// Whether frames preserve lengths along the polygon.
 fn has_metric<M: Origin>(space: &M) -> bool {
     !space.curvature().is_nan()
 }
@@ -32,7 +32,7 @@ impl Walker {
         space.lift(&self.p, &mut self.frame);
     }
 
-    /// One node on; returns the deciding angle of the chord.
+    /// Moves one node on; returns the deciding angle of the chord.
     #[inline(always)]
     fn advance<M: Space>(&mut self, space: &M, runs: &[Run; LANES], len: usize, chord: &mut [Lane]) -> Lane {
         self.node += 1;
@@ -45,7 +45,7 @@ impl Walker {
         angle
     }
 
-    /// The squared length of the chord that led to where it stands, at the point itself.
+    /// The squared length of the chord that led to the current point, computed at the point itself.
     fn measured<M: Space>(&mut self, space: &M, len: usize, chord: &[Lane]) -> Lane {
         // The point before is not needed any more.
         let Walker { frame, p, q: v, .. } = self;
@@ -94,7 +94,7 @@ impl Chain {
         self.read_end(space, 1, ends, values[1]);
     }
 
-    /// Goes along the polygon and keeps its chords.
+    /// Moves along the polygon and stores its chords.
     pub fn walk<M: Space>(&mut self, space: &M, runs: &[Run; LANES]) {
         with_size!(M::VECTORS, space.point_len(), len => self.walk_sized(space, runs, len));
     }
@@ -136,7 +136,7 @@ impl Chain {
         }
     }
 
-    /// The prescribed vector at an end, in the frame there; the walker must stand at that end.
+    /// The prescribed vector at an end, in the frame there. The walker must be at that end.
     fn read_end(&mut self, space: &Erased, end: usize, ends: &ChainEnds, value: Option<[&[f64]; LANES]>) {
         let vector = &mut self.end_values[end];
         vector.resize(self.m, Lane::ZERO);
@@ -145,7 +145,7 @@ impl Chain {
             return;
         };
         gather(rows, &mut self.ambient);
-        // First in units of time: coordinates hold squares.
+        // Units of time are converted first: coordinates contain squares.
         let velocity = of_kind(&kinds[end], EndKind::Velocity);
         for x in &mut self.ambient {
             let once = *x / self.clock;
@@ -156,7 +156,7 @@ impl Chain {
         vector.iter_mut().for_each(|x| *x *= self.scale);
     }
 
-    /// Changes the unknowns. The last velocity of a closed curve is the first, transported around the curve.
+    /// Updates the unknowns. The last velocity of a closed curve is the first, transported around the curve.
     pub fn update(&mut self, space: &Erased, change: impl FnOnce(&Self, &mut [Lane])) {
         let (count, mut u) = (self.count(), std::mem::take(&mut self.u));
         let (unknowns, last) = u.split_at_mut(count);
@@ -168,8 +168,8 @@ impl Chain {
         self.u = u;
     }
 
-    /// Changes coordinates where a closed curve closes: from the frame at its first node to that at its last, or
-    /// back.
+    /// Changes coordinates at the point where a closed curve closes: from the frame at its first node to that at its
+    /// last, or back.
     pub fn across_closure<S: Scalar>(&mut self, space: &Erased, to_last: bool, x: &mut [S]) {
         let (first, last) = ((&self.start.0, &self.start.1), (&self.walker.frame, &self.walker.p));
         let (from, to) = if to_last { (first, last) } else { (last, first) };
@@ -183,7 +183,7 @@ impl Chain {
                 *p = x.parts()[k];
             }
             space.tangent(from.0, from.1, part, here);
-            // One point, but maybe another array.
+            // The same point, possibly another array.
             space.parallel_transport(from.1, to.1, none, here, there);
             space.coordinates(to.0, to.1, there, part);
         }
@@ -192,12 +192,12 @@ impl Chain {
         }
     }
 
-    /// Hands out the velocities as ambient tangent vectors, node by node.
+    /// Passes the velocities to a callback as ambient tangent vectors, node by node.
     pub fn roll_up(&mut self, space: &Erased, runs: &[Run; LANES], mut visit: impl FnMut(usize, &[Lane])) {
         space.0.walk_again(self, runs, &mut visit);
     }
 
-    /// The way along the polygon for [`roll_up`](Self::roll_up).
+    /// Moves along the polygon for [`roll_up`](Self::roll_up).
     pub fn walk_again<M: Space>(&mut self, space: &M, runs: &[Run; LANES], visit: Visit) {
         with_size!(M::VECTORS, space.point_len(), len => self.walk_again_sized(space, runs, len, visit));
     }
@@ -221,15 +221,14 @@ impl Chain {
             ambient.iter_mut().for_each(|x| *x *= self.clock);
             visit(i, ambient);
             if i < self.n {
-                // The chords are known; the residual is no longer needed and takes them.
+                // The chords are known, and the residual is no longer needed, so its memory receives them.
                 self.walker.advance(space, runs, len, &mut self.r[..m]);
             }
         }
     }
 }
 
-/// The power of two that brings the longest chord of each lane to a size near one; 1 for chords that
-/// vanish.
+/// The power of two that scales the longest chord of each lane to a length near one; 1 for chords of length zero.
 fn scale_of(space: &Erased, runs: &[Run; LANES], n: usize) -> Lane {
     let len = space.point_len();
     Lane::new(runs.map(|run| {
@@ -241,8 +240,8 @@ fn scale_of(space: &Erased, runs: &[Run; LANES], n: usize) -> Lane {
     }))
 }
 
-/// The power of two that brings the mean segment of the curve on each lane to a length near one: squares of
-/// times neither overflow nor vanish, and no digit changes.
+/// The power of two that scales the mean segment of the curve on each lane to a length near one. Squares of times
+/// then neither overflow nor underflow, and scaling is exact.
 fn clock_of(runs: &[Run; LANES]) -> Lane {
     Lane::new(runs.map(|Run { t, .. }| {
         let last = t.len() - 1;
@@ -250,7 +249,7 @@ fn clock_of(runs: &[Run; LANES]) -> Lane {
     }))
 }
 
-/// The power of two that brings a number to a size near one; 1 for zero.
+/// The power of two that scales a number to a size near one; 1 for zero.
 fn power_of_two_over(size: f64) -> f64 {
     let exponent = size.log2().round().clamp(-1000.0, 1000.0);
     if size > 0.0 && size.is_finite() { (-exponent).exp2() } else { 1.0 }

@@ -29,8 +29,8 @@ pub fn lie_triple(space: &Erased, draw: &mut Draw) -> Verdict {
 }
 
 pub fn holonomy(space: &Erased, draw: &mut Draw) -> Verdict {
-    // A vector that is transported around a small triangle turns by its area times the curvature; at both ways
-    // round and two sizes, what is left is of the fourth order.
+    // Transport around a small triangle rotates a vector by its area times the curvature. The mean over both
+    // orientations and two sizes leaves an error of fourth order.
     let p = draw.point(space);
     let [a, b, c] = [(); 3].map(|()| draw.unit(space));
     let mut home = vec![Lane::ZERO; space.frame_len()];
@@ -56,7 +56,7 @@ pub fn holonomy(space: &Erased, draw: &mut Draw) -> Verdict {
     };
     let (fine, coarse) = (turn(0.02), turn(0.04));
     let found = scaled(&combined(&scaled(&fine, 4.0), -1.0, &coarse), 1.0 / 3.0);
-    // Seen from the frame that went round, c is turned back: by R(a, b)c = [c, [a, b]].
+    // In the frame after the triangle c is rotated back: by R(a, b)c = [c, [a, b]].
     let expected = triple(space, &c, &a, &b);
     let allowed = lane(3e-6) + rounding(space, 1e5, &[&p], &[]);
     within(norm(&minus(&found, &expected)), allowed, "turn around a triangle")
@@ -67,7 +67,7 @@ pub fn largest_curvature(space: &Erased, draw: &mut Draw) -> Verdict {
     if k.is_nan() {
         return Ok(());
     }
-    // K² = sup |[[a, b], c]| over unit vectors, (22), by turning one of them at a time into the best direction.
+    // K² = sup |[[a, b], c]| over unit vectors, (22), by alternately maximising over one of them.
     let mut best = Lane::ZERO;
     for _ in 0..8 {
         let [mut a, mut b, mut c] = [(); 3].map(|()| draw.unit(space));
@@ -91,7 +91,7 @@ pub fn largest_curvature(space: &Erased, draw: &mut Draw) -> Verdict {
         best = best.max(size);
     }
     let best = best.to_array().into_iter().fold(0.0, f64::max).sqrt();
-    // Zero in flat spaces; in others the climb ends within a millionth.
+    // Zero in flat spaces; in others the iteration ends within a millionth.
     if (best - k).abs() > 1e-5 {
         return Err(format!("it is {best:.9}, and the space says {k:.9}"));
     }

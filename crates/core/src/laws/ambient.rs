@@ -27,7 +27,7 @@ pub fn projection(space: &Erased, draw: &mut Draw) -> Verdict {
         let largest = p.iter().fold(Lane::ONE, |m, x| m.max(x.abs()));
         let mut x: Vec<Lane> = p.iter().zip(&noise).map(|(p, n)| lane(size).mul_add(*n, *p)).collect();
         let off = space.project(&mut x);
-        // Farther off a few steps of Newton's method do not end at a point.
+        // From farther away a few steps of Newton's method do not reach a point.
         let near = off.simd_le(lane(0.05));
         let mut again = x.clone();
         let left = near.select(space.project(&mut again), Lane::ZERO);
@@ -49,7 +49,7 @@ pub fn tangent_projection(space: &Erased, draw: &mut Draw) -> Verdict {
     within(space.project_tangent(&p, &mut again), allowed, "off after the first projection")?;
     within(norm(&minus(&again, &v)), allowed * norm(&v), "change by a second projection")?;
     for scale in [1e-3, 1e3] {
-        // What is off is a part of the vector, whatever the unit, down to the size that counts as rounding.
+        // The normal component is relative to the vector, in any unit, down to the size that counts as rounding.
         let mut w = scaled(&noise, scale);
         let part = space.project_tangent(&p, &mut w);
         within(
@@ -63,7 +63,7 @@ pub fn tangent_projection(space: &Erased, draw: &mut Draw) -> Verdict {
     within(norm(&zero), Lane::ZERO, "projection of zero")
 }
 
-/// Goes a way of coordinates x from a random point, and to another representative of its end.
+/// Moves along coordinates x from a random point, and to another representative of the end point.
 fn way(space: &Erased, draw: &mut Draw, part: f64) -> [Vec<Lane>; 4] {
     let p = draw.point(space);
     let x = draw.coordinates(space, part);
@@ -77,7 +77,7 @@ pub fn exp_and_log(space: &Erased, draw: &mut Draw) -> Verdict {
         let [p, x, v, q] = way(space, draw, part);
         let q = draw.representative(space, &q);
         let (w, angle) = log(space, &p, &q);
-        // Near the cut locus rounding of q turns the direction by so much more.
+        // Near the cut locus, rounding of q rotates the direction by this factor more.
         let near = lane(1.0 / (1.0 - part));
         let allowed = rounding(space, 300.0, &[&p, &q], &x) * near;
         within(
@@ -103,8 +103,8 @@ pub fn tangent(space: &Erased, draw: &mut Draw) -> Verdict {
         let (v, _) = log(space, &p, &q);
         let mut w = v.clone();
         space.velocity(&p, &mut w);
-        // Relative to the vector itself, however short it is, where a point is a class of arrays; elsewhere rounding
-        // puts q beside the space.
+        // Relative to the vector itself, however short it is, if a point is a class of arrays; otherwise rounding
+        // moves q off the space.
         let size = norm(&v) + if is_other(&q, &exact) { Lane::ZERO } else { Lane::ONE };
         let allowed = rounding(space, 30.0, &[&p, &q], &x) * size;
         within(norm(&minus(&v, &w)), allowed, &format!("normal part of log at {part} of the largest step"))?;
@@ -127,7 +127,7 @@ pub fn geodesics(space: &Erased, draw: &mut Draw) -> Verdict {
                 &format!("[p, q]_{t} at {part} of the largest step"),
             )?;
         }
-        // It carries its velocity and has no acceleration, by jets in t.
+        // The geodesic transports its velocity and has no acceleration, by jets in t.
         let t = Jet { v: lane(0.3), d: Lane::ONE, dd: Lane::ZERO };
         let jets = |x: &[Lane]| -> Vec<Jet> {
             x.iter().map(|&v| Jet { v, d: Lane::ZERO, dd: Lane::ZERO }).collect()
@@ -141,7 +141,7 @@ pub fn geodesics(space: &Erased, draw: &mut Draw) -> Verdict {
     Ok(())
 }
 
-/// A curve through a jet at t = 0.3 has the velocity v of its start, transported along, and no acceleration.
+/// A curve through a jet at t = 0.3 has the transported velocity v of its start, and no acceleration.
 fn motion(space: &Erased, gamma: &[Jet], [start, v]: [&[Lane]; 2], allowed: Lane, what: &str) -> Verdict {
     let part = |f: fn(&Jet) -> Lane| -> Vec<Lane> { gamma.iter().map(f).collect() };
     let (p, raw, mut dd) = (part(|x| x.v), part(|x| x.d), part(|x| x.dd));
@@ -190,7 +190,7 @@ pub fn transport(space: &Erased, draw: &mut Draw) -> Verdict {
         };
         let (at, bt) = (transported(&a), transported(&b));
         let allowed = rounding(space, 300.0, &[&p, &q], &x) * lane(1.0 / (1.0 - part));
-        // K is NaN where no metric belongs to the space.
+        // K is NaN if the space has no metric.
         if !space.curvature().is_nan() {
             let change = (space.inner(&p, &a, &b) - space.inner(&q, &at, &bt)).abs();
             within(change, allowed, "inner product of what is transported")?;
@@ -202,7 +202,7 @@ pub fn transport(space: &Erased, draw: &mut Draw) -> Verdict {
             allowed * norm(&at).max(Lane::ONE),
             "normal part of what is transported",
         )?;
-        // A geodesic carries its own velocity: to minus the logarithm of the way back.
+        // A geodesic transports its own velocity: to minus the logarithm of its start.
         let back = log(space, &q, &p).0;
         within(
             length(space, &q, &combined(&transported(&v), 1.0, &back)),
@@ -255,7 +255,7 @@ pub fn turning(space: &Erased, draw: &mut Draw) -> Verdict {
 }
 
 pub fn derivatives(space: &Erased, draw: &mut Draw) -> Verdict {
-    // Also where logarithms are no power series; there the differences are less exact.
+    // The test includes logarithms beyond the power series, where the differences are less accurate.
     derivatives_at(space, draw, 0.3, 1.0)?;
     derivatives_at(space, draw, 0.7, 100.0)
 }

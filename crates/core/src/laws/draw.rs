@@ -1,13 +1,13 @@
-//! Random points, vectors and representatives, the same in every run.
+//! Random points, vectors and representatives, reproducible in every run.
 
 use crate::scalar::{LANES, Lane, dot, lane, max_or_nan};
 use crate::space::{Ambient, Erased, Frame, Origin};
 
-/// Parts of the largest step at which laws are tried.
+/// The fractions of the largest step at which laws are tested.
 pub const STEPS: [f64; 8] = [1e-9, 1e-6, 1e-3, 0.03, 0.2, 0.6, 0.95, 0.999];
-/// The largest step in a space that has no cut locus.
+/// The largest step in a space without cut locus.
 const FAR: f64 = 3.0;
-/// Where directions have small angles, steps may be so much longer than the limit of angles.
+/// In directions with small angles, steps may be longer than the limit of angles by this factor.
 const LONGEST: f64 = 3.0;
 
 /// A source of random data.
@@ -17,7 +17,7 @@ impl Draw {
     /// Starts from a seed.
     pub fn new(seed: u64) -> Self {
         let mut draw = Draw(seed ^ 0x9e37_79b9_7f4a_7c15);
-        // The first numbers of neighbouring seeds are alike.
+        // The first numbers of adjacent seeds are similar.
         for _ in 0..8 {
             draw.uniform();
         }
@@ -53,12 +53,12 @@ impl Draw {
         x.iter().map(|x| *x * scale).collect()
     }
 
-    /// Coordinates whose deciding angle is so large a part of the largest.
+    /// Coordinates whose deciding angle is this fraction of the largest.
     pub fn coordinates(&mut self, space: &Erased, part: f64) -> Vec<Lane> {
         let x = self.unit(space);
         let angle = space.angle(&x);
         let limit = space.cut_angle();
-        // Where directions have no angle (shifts among motions, stretches among matrices) lengths decide.
+        // In directions without an angle (translations of motions, stretches of matrices), lengths are used.
         let scale = if limit.is_finite() {
             let far = lane(part * limit) / angle;
             far.simd_lt(lane(LONGEST * part * limit)).select(far, lane(part))
@@ -68,14 +68,14 @@ impl Draw {
         x.iter().map(|x| *x * scale).collect()
     }
 
-    /// A tangent vector at p whose deciding angle is so large a part of the largest.
+    /// A tangent vector at p whose deciding angle is this fraction of the largest.
     pub fn vector(&mut self, space: &Erased, p: &[Lane], part: f64) -> Vec<Lane> {
         let x = self.coordinates(space, part);
         tangent_at(space, p, &x)
     }
 
-    /// The same point at another representative, if it has any: transported around a triangle. If it has none, the
-    /// same array.
+    /// The same point at another representative, if it has any: transported around a triangle. Otherwise the same
+    /// array.
     pub fn representative(&mut self, space: &Erased, p: &[Lane]) -> Vec<Lane> {
         let mut q = p.to_vec();
         for _ in 0..3 {
@@ -85,7 +85,7 @@ impl Draw {
         let back = log(space, &q, p).0;
         let mut near = exp(space, &q, &back);
         space.project(&mut near);
-        // Without what rounding did on the way, which leads far out where there is no end.
+        // Rounding errors of the transport are removed, which are large far out in unbounded spaces.
         let other = exp(space, &near, &log(space, &near, p).0);
         if is_other(&other, p) { other } else { p.to_vec() }
     }
@@ -117,7 +117,7 @@ pub fn log(space: &Erased, p: &[Lane], q: &[Lane]) -> (Vec<Lane>, Lane) {
     (v, angle)
 }
 
-/// Length of a tangent vector; that of its array where no metric belongs to the space.
+/// Length of a tangent vector; that of its array if the space has no metric.
 pub fn length(space: &Erased, p: &[Lane], v: &[Lane]) -> Lane {
     max_or_nan(space.inner(p, v, v), Lane::ZERO).sqrt()
 }
@@ -143,8 +143,8 @@ pub fn norm(a: &[Lane]) -> Lane {
     dot(a, a).sqrt()
 }
 
-/// A number of rounding errors at the points p and q, and over a way of coordinates x: what the space says
-/// of itself.
+/// The number of rounding errors to allow at the points p and q, and over coordinates x, according to the space's own
+/// condition and rounding.
 pub fn rounding(space: &Erased, count: f64, points: &[&[Lane]], x: &[Lane]) -> Lane {
     let at = points.iter().fold(Lane::ONE, |most, p| most.max(space.rounding(p)));
     lane(count * f64::EPSILON) * at * space.condition(x)

@@ -85,18 +85,18 @@ pub fn long_walk(space: &Erased, draw: &mut Draw) -> Verdict {
     let mut p = home.clone();
     let mut moving = Moving::at(space, &p);
     for knot in 1..=607 {
-        // Around one point: a walk in a space without end would leave the range of doubles, and in a space with an
-        // indefinite metric no geodesic may lead home.
+        // Around one point: a walk in an unbounded space would leave the range of floating-point numbers, and in a
+        // space with an indefinite metric no geodesic may lead back.
         p = exp(space, &home, &draw.vector(space, &home, 0.1));
         space.project(&mut p);
         moving.step(&p);
-        // As often as the fit does.
+        // As often as in the fit.
         if knot % space.dim().max(8) == 0 {
             space.reorthonormalize(&mut moving.frame, &moving.p);
         }
     }
-    // An error of the frame goes eightfold into a jump of the acceleration. Frames of motions and of invertible
-    // matrices grow on the way.
+    // An error of the frame is amplified eightfold in the jump of the acceleration. Frames of motions and of
+    // invertible matrices grow along the polygon.
     let grown = if space.curvature().is_nan() {
         lane(40.0) * norm(&moving.frame) * norm(&moving.frame)
     } else {
@@ -197,11 +197,11 @@ pub fn angle(space: &Erased, draw: &mut Draw) -> Verdict {
 }
 
 pub fn condition(space: &Erased, draw: &mut Draw) -> Verdict {
-    // So far as nothing but the growth of errors hinders.
+    // Accurate up to the growth of errors.
     let far = if space.cut_angle().is_finite() { 0.6 } else { 2.5 };
     for part in [0.1, 0.3, far] {
         let [d, a, b, plus, minus_leg] = segment(space, draw, part);
-        // A few ulps: what rounding does on the way is seen, too.
+        // A few ulps, because rounding during the transport matters, too.
         let change = 16.0 * f64::EPSILON;
         let nudge = |x: &[Lane], draw: &mut Draw| combined(x, change, &draw.unit(space));
         let moved = legs_of(space, &nudge(&d, draw), &nudge(&a, draw), &nudge(&b, draw));

@@ -1,10 +1,9 @@
-//! The laws that every symmetric space obeys, for the tests of a new one: [`check`] runs them all. They are
-//! there with the feature `laws`.
+//! The laws that every symmetric space obeys, for the tests of a new one: [`check`] runs all of them. They require
+//! the feature `laws`.
 //!
-//! They know a space by its operations only. Every law draws its data at random, with eight cases in the lanes,
-//! over decades of step lengths up to just before the cut locus and with random representatives of points; it
-//! returns what it found where that is more than `allowed` rounding errors (times what the space says of its
-//! condition).
+//! They use only the operations of a space. Every law draws its data at random, with eight cases in the lanes, over
+//! decades of step lengths up to just before the cut locus and with random representatives of points. It returns the
+//! error that it found if that exceeds `allowed` rounding errors (times the condition reported by the space).
 
 mod algebra;
 mod ambient;
@@ -25,7 +24,7 @@ pub static LAWS: &[(&str, Law)] = &[
     ("points are projected to themselves", ambient::points),
     ("exp and log are inverse", ambient::exp_and_log),
     ("log is tangent at any representative", ambient::tangent),
-    ("geodesics join their ends and carry their velocity", ambient::geodesics),
+    ("geodesics join their ends and transport their velocity", ambient::geodesics),
     ("a transvection is the product of two symmetries", ambient::transvections),
     ("transport preserves the inner product", ambient::transport),
     ("derivatives are those of the arrays", ambient::derivatives),
@@ -35,7 +34,7 @@ pub static LAWS: &[(&str, Law)] = &[
     ("a frame moves in parallel", frame::parallel),
     ("a frame stays one for 600 knots", frame::long_walk),
     ("handles are the logarithms of the C2 condition", frame::inner_handles),
-    ("duals carry the derivatives of the handles", frame::duals),
+    ("duals contain the derivatives of the handles", frame::duals),
     ("the deciding angle is that of the logarithm", frame::angle),
     ("the condition bounds the growth of errors", frame::condition),
     ("the triple product is a Lie triple", algebra::lie_triple),
@@ -47,7 +46,7 @@ pub static LAWS: &[(&str, Law)] = &[
     ("acceleration does not see how a representative turns", ambient::turning),
 ];
 
-/// Runs all laws; returns what was found wrong.
+/// Runs all laws; returns the violations.
 pub fn check(space: &Erased, seed: u64) -> Vec<String> {
     let run = |(i, (name, law)): (usize, &(&str, Law))| {
         let mut draw = Draw::new(seed.wrapping_mul(1_000_003).wrapping_add(i as u64));

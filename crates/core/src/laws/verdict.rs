@@ -1,11 +1,11 @@
-//! What a law found.
+//! The violation of a law.
 
 use crate::scalar::Lane;
 
-/// What a law found wrong.
+/// The violation that a law found.
 pub type Verdict = Result<(), String>;
 
-/// The largest lane of `found`, where it is more than `allowed`.
+/// The largest lane of `found`, if it exceeds `allowed`.
 pub fn within(found: Lane, allowed: Lane, what: &str) -> Verdict {
     let (found, allowed) = (found.to_array(), allowed.to_array());
     for (f, a) in found.into_iter().zip(allowed) {

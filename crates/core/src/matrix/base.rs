@@ -1,7 +1,7 @@
-//! A matrix: its entries, how they are stored, and what is done entry by entry.
+//! The matrix type: entries, storage, and operations on entries.
 //!
-//! The types that need each other stand here: a matrix has a kind of storage, and storage of any size has a table of
-//! functions of its matrices.
+//! Types that depend on each other are defined here: a matrix has a kind of storage, and storage of any size has a
+//! table of functions of its matrices.
 
 use super::entry::{Entry, conjugate};
 use crate::scalar::{Each, Lane, Scalar, few, lane};
@@ -9,19 +9,19 @@ use std::ops::{Add, Deref, DerefMut, Index, IndexMut, Neg, Sub};
 
 /// Where the entries of a matrix are, and how many.
 pub trait Storage: Copy + Send + Sync + 'static {
-    /// Whether matrices may be of any size: then functions of them are compiled once, see [`Compiled`].
+    /// Whether matrices may be of any size: functions of them are then compiled once, see [`Compiled`].
     const ANY: bool = false;
     /// Rows and columns.
     type Shape: Copy;
     /// A container of entries.
     type Of<T: Copy>: Clone + Deref<Target = [T]> + DerefMut;
-    /// A shape that is asked for.
+    /// A requested shape.
     fn shape(rows: usize, cols: usize) -> Self::Shape;
     /// The numbers of rows and columns.
     fn size(shape: Self::Shape) -> (usize, usize);
     /// Equal entries.
     fn filled<T: Copy>(shape: Self::Shape, x: T) -> Self::Of<T>;
-    /// Entries from their positions, row by row. Writes each once, where `filled` and a loop write twice.
+    /// Entries from their indices, row by row. Writes each entry once, where `filled` and a loop would write twice.
     fn collected<T: Copy>(shape: Self::Shape, spare: T, f: impl FnMut(usize) -> T) -> Self::Of<T>;
     /// Functions of matrices of any size.
     fn compiled<S: Scalar, const D: usize>() -> &'static Compiled<S, D, Self> {
@@ -29,7 +29,7 @@ pub trait Storage: Copy + Send + Sync + 'static {
     }
 }
 
-/// Any size. Up to sixteen entries live on the stack.
+/// Storage of any size. Up to sixteen entries are on the stack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dynamic;
 
@@ -38,7 +38,7 @@ type Functions<S, const D: usize, A> = fn(&Matrix<S, D, A>) -> [Matrix<S, D, A>;
 type Product<S, const D: usize, A> = fn(&Matrix<S, D, A>, &Matrix<S, D, A>) -> Matrix<S, D, A>;
 type Choice<S, const D: usize, A> = fn(Lane, &Matrix<S, D, A>, &Matrix<S, D, A>) -> Matrix<S, D, A>;
 
-/// The functions, by their names; those that end with `_here` are compiled where they are called.
+/// The functions by name; functions whose names end with `_here` are compiled where they are called.
 pub struct Compiled<S: Scalar, const D: usize, A: Storage> {
     pub(super) times: Product<S, D, A>,
     pub(super) adjoint_times: Product<S, D, A>,
@@ -69,7 +69,7 @@ impl<S: Scalar, const D: usize, A: Storage> Clone for Matrix<S, D, A> {
 }
 
 impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
-    /// The same matrix, stored in another way.
+    /// The same matrix in another storage.
     pub fn stored<B: Storage>(&self) -> Matrix<S, D, B> {
         Matrix::from_fn(self.rows(), self.cols(), |i, j| self[(i, j)])
     }
@@ -123,7 +123,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         m
     }
 
-    /// From a function of the position of an entry, counted row by row.
+    /// From a function of the index of an entry, counted row by row.
     #[inline(always)]
     pub(super) fn collected(shape: A::Shape, f: impl FnMut(usize) -> Entry<S, D>) -> Self {
         Matrix { shape, data: A::collected(shape, [S::constant(Lane::ZERO); D], f) }
@@ -230,7 +230,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         self.zip(b, |x, y| x - y)
     }
 
-    /// `x A` with a scalar that may carry derivatives.
+    /// `x A` with a scalar that may have derivatives.
     pub fn times_scalar(&self, x: S) -> Self {
         self.each(|a| a * x)
     }

@@ -5,18 +5,18 @@ use super::entry::{Entry, mul_add};
 use crate::monitor::checkpoint;
 use crate::scalar::{Lane, Scalar, few};
 
-/// From this size on one matrix at a time is faster than Jacobi's method with eight side by side, and
-/// products gain from blocks.
+/// From this size on, one matrix at a time is faster than Jacobi's method on eight SIMD lanes, and products benefit
+/// from blocks.
 pub(super) const LARGE: usize = 11;
 /// Bytes of the first cache that a block of columns may fill.
 const BLOCK: usize = 24 << 10;
 
-/// `A B` by blocks of columns that are copied to lie side by side.
+/// `A B` by blocks of columns that are copied to contiguous memory.
 pub(super) fn times<S: Scalar, const D: usize, A: Storage>(
     a: &Matrix<S, D, A>,
     b: &Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
-    // So many sums as the registers hold.
+    // The number of sums that fit into registers.
     if size_of::<Entry<S, D>>() <= size_of::<Lane>() {
         times_in::<S, D, A, 3, 2>(a, b)
     } else {

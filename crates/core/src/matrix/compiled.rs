@@ -1,8 +1,8 @@
 //! Functions of matrices of any size, compiled once.
 //!
 //! Generic code is compiled again in every crate that calls it. All families of spaces call these functions for their
-//! larger members, where a call through a pointer costs nothing beside them; without this table they were a tenth of the
-//! machine code.
+//! larger members, where the cost of a call through a pointer is negligible. Without this table they were a tenth of
+//! the machine code.
 
 use super::base::{Compiled, Dynamic, Matrix, Storage};
 use super::series;

@@ -1,10 +1,10 @@
-//! What a point may need once: orthonormal columns, determinants, triangular factors.
+//! Operations that a point may require once: orthonormal columns, determinants, triangular factors.
 
 use super::base::{Matrix, Storage};
 use super::entry::{Entry, inner_add, mul_add};
 use crate::scalar::{Each, LANES, Lane, few, lane};
 
-/// Makes the columns orthonormal by Gram and Schmidt, twice, so that they are so to rounding.
+/// Orthonormalises the columns by Gram–Schmidt, twice, to reach rounding accuracy.
 pub fn orthonormalize<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
     let (rows, cols) = (a.rows(), a.cols());
     for j in 0..cols {
@@ -31,8 +31,8 @@ pub fn orthonormalize<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
     }
 }
 
-/// One step of Newton's method (Schulz 1933) for the unitary factor of a nearly unitary matrix, or
-/// one with nearly orthonormal columns: an error e becomes about e².
+/// One step of Newton's method (Schulz 1933) for the unitary factor of a nearly unitary matrix, or of one with nearly
+/// orthonormal columns: an error e becomes about e².
 pub fn reorthonormalize<const D: usize, A: Storage>(a: &mut Matrix<Lane, D, A>) {
     let correction = a.adjoint_times(a).plus_identity(lane(-1.0)).scaled(lane(-0.5));
     *a = &a.times(&correction) + a;

@@ -1,7 +1,7 @@
-//! Jacobi's method: eigenvalues and singular values of small matrices, eight side by side.
+//! Jacobi's method: eigenvalues and singular values of small matrices in SIMD lanes.
 //!
-//! Every lane rotates until it is done and then stays as it is, whatever its neighbours need. Larger
-//! matrices come nearly diagonal from a library, and are finished here.
+//! Every lane rotates until it has converged and then does not change, whatever its neighbours require. Larger
+//! matrices are diagonalised by a library up to rounding, and completed here.
 
 use super::base::{Matrix, Storage};
 use super::blocked::LARGE;
@@ -9,13 +9,13 @@ use super::entry::{Entry, conjugate, inner_add, mul_add};
 use super::large::{eigenvectors, in_basis};
 use crate::scalar::{Each, Lane, few, lane, max_or_nan};
 
-/// Jacobi's method needs five to eight sweeps; what is not done after so many is not finite.
+/// Jacobi's method needs five to eight sweeps; lanes that have not converged after this many are not finite.
 const MAX_SWEEPS: usize = 30;
-/// Off-diagonal entries below this part of the norm are rounding errors.
+/// Off-diagonal entries below this fraction of the norm are rounding errors.
 const NEGLIGIBLE: f64 = 1e-17;
-/// Commuting matrices that were rounded do not commute: below this a pair is as diagonal as it gets.
+/// Commuting matrices do not commute after rounding: pairs below this limit are as diagonal as possible.
 const NEGLIGIBLE_PAIR: f64 = 2.0 * f64::EPSILON;
-/// No sum of cosine and this part of the sine is the same for two angles but by chance.
+/// A sum of the cosine and this multiple of the sine coincides for two angles only by chance.
 const GENERIC: f64 = 0.414_213_562_373_095;
 
 /// The rotation `[[c, −s̄], [s, c]]` whose first column is the eigenvector of `[[α, β], [β̄, −α]]` that
@@ -58,11 +58,11 @@ fn rotate_rows<const D: usize>(a: &mut Matrix<Lane, D>, (p, q): (usize, usize), 
     }
 }
 
-/// Diagonalises commuting Hermitian matrices in place, one or two, by one unitary V: `A = V Λ V*`.
+/// Diagonalises one or two commuting Hermitian matrices in place, by one unitary V: `A = V Λ V*`.
 ///
-/// With two matrices, real and imaginary part of a normal one, every rotation is that of the
-/// combination which is farthest from diagonal (Bunse-Gerstner, Byers & Mehrmann 1993): eigenvalues
-/// that coincide in one are told apart by the other.
+/// With two matrices, the real and imaginary part of a normal one, every rotation is that of the combination which is
+/// farthest from diagonal (Bunse-Gerstner, Byers & Mehrmann 1993): eigenvalues that coincide in one matrix are
+/// separated by the other.
 pub fn diagonalize<const D: usize, const M: usize, A: Storage>(
     a: &mut [Matrix<Lane, D, A>; M],
 ) -> Matrix<Lane, D, A> {
@@ -75,7 +75,7 @@ pub fn diagonalize<const D: usize, const M: usize, A: Storage>(
     Matrix::read(n, n, &v)
 }
 
-/// Compiled once, whatever the matrices are stored in.
+/// Compiled once for all kinds of storage.
 fn diagonalize_numbers(d: usize, n: usize, a: &mut [Vec<Lane>]) -> Vec<Lane> {
     if d == 1 { diagonalize_in::<1>(n, a) } else { diagonalize_in::<2>(n, a) }
 }
@@ -86,7 +86,7 @@ fn diagonalize_in<const D: usize>(n: usize, numbers: &mut [Vec<Lane>]) -> Vec<La
     let pair = a.len() > 1;
     let mut v = Matrix::identity(n);
     if n >= LARGE {
-        // Eigenvalues that coincide in both matrices, or by chance in this sum, are told apart below.
+        // Eigenvalues that coincide in both matrices, or by chance in this sum, are separated below.
         v = eigenvectors(&if pair { &a[0] + &a[1].scaled(lane(GENERIC)) } else { a[0].clone() });
         a.iter_mut().for_each(|a| *a = in_basis(a, &v));
     }
@@ -153,9 +153,9 @@ fn combination<const D: usize>(a: &[Matrix<Lane, D>], p: usize, q: usize) -> (La
     (x * a1 + y * a2, few(|c| x * b1[c] + y * b2[c]))
 }
 
-/// Makes the columns of A orthogonal by rotating them among each other (Hestenes 1958): A becomes
-/// `A V` with unitary V, whose columns have the singular values of A as lengths. Small singular
-/// values are found to full relative accuracy where columns are badly scaled.
+/// Makes the columns of A orthogonal by rotating pairs of them (Hestenes 1958): A becomes `A V` with unitary V, and
+/// its columns have the singular values of A as lengths. Small singular values have full relative accuracy if columns
+/// are badly scaled.
 ///
 /// `v`, if given, is multiplied by V.
 pub fn orthogonalize<const D: usize, A: Storage>(
@@ -172,7 +172,7 @@ pub fn orthogonalize<const D: usize, A: Storage>(
     }
 }
 
-/// Compiled once, whatever the matrices are stored in.
+/// Compiled once for all kinds of storage.
 fn orthogonalise_numbers(d: usize, size: [usize; 2], a: &mut [Lane], v: Option<&mut (usize, Vec<Lane>)>) {
     if d == 1 { orthogonalise_in::<1>(size, a, v) } else { orthogonalise_in::<2>(size, a, v) }
 }
@@ -220,7 +220,7 @@ fn orthogonalise_in<const D: usize>(
     }
 }
 
-/// Sorts the columns of several matrices alike by falling keys, lane by lane.
+/// Sorts the columns of several matrices in the same order by decreasing keys, lane by lane.
 pub fn sort_columns<const D: usize, A: Storage>(keys: &mut [Lane], matrices: &mut [&mut Matrix<Lane, D, A>]) {
     let n = keys.len();
     for pass in 0..n {

@@ -16,12 +16,12 @@ use crate::scalar::{Each, Lane, Scalar, few, lane};
 pub struct Unary {
     /// f, f', f''
     pub f: fn(Lane) -> [Lane; 3],
-    /// Distance from x to the nearest singularity of f, up to a factor.
+    /// Distance from x to the nearest singularity of f, up to a constant factor.
     pub pole_distance: fn(Lane) -> Lane,
 }
 
-/// Arguments closer than this part of their distance from a pole count as close: the quadratures below are exact to
-/// rounding for them, and quotients of others lose little more than a digit.
+/// Arguments closer than this fraction of their distance from a pole count as close: the quadratures below are
+/// accurate to rounding for them, and quotients of other arguments lose little more than one significant digit.
 const CLOSE: f64 = 0.1;
 
 /// Nodes and weights of Gauss and Legendre on [0, 1].
@@ -34,7 +34,7 @@ pub(crate) const GAUSS: [(f64, f64); 5] = [
 ];
 
 impl Unary {
-    /// f[x, y]
+    /// The divided difference f[x, y].
     pub fn first(&self, x: Lane, y: Lane) -> Lane {
         let gap = y - x;
         let close = gap.abs().simd_le(lane(CLOSE) * (self.pole_distance)(x).min((self.pole_distance)(y)));
@@ -49,9 +49,9 @@ impl Unary {
         result
     }
 
-    /// f[x, y, z]
+    /// The divided difference f[x, y, z].
     pub fn second(&self, x: Lane, y: Lane, z: Lane) -> Lane {
-        // Put the two that are farthest apart first and last.
+        // The two arguments that are farthest apart become the first and the last.
         let (xy, yz, zx) = ((y - x).abs(), (z - y).abs(), (x - z).abs());
         let to_xy = xy.simd_gt(zx) & xy.simd_ge(yz);
         let to_yz = yz.simd_gt(zx) & yz.simd_gt(xy);
@@ -139,7 +139,8 @@ fn parts_in<const D: usize>(n: usize, parts: &[Vec<Lane>], f: &Unary) -> Vec<Vec
     found
 }
 
-/// The polar factor of a matrix whose columns are so far `off` orthonormal ones: the nearest such matrix.
+/// The polar factor of a matrix whose columns are orthonormal up to `off`: the nearest matrix with orthonormal
+/// columns.
 pub fn polar<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>, off: Lane) -> Matrix<Lane, D, A> {
     by_size(off, &[1e-3], |tier| {
         let mut u = if tier == 0 {

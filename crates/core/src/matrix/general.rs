@@ -1,7 +1,7 @@
 //! Exponential and logarithm of a matrix that need not be normal.
 //!
-//! The exponential is its series, and squared where its argument had to be halved. The logarithm is that of so many
-//! square roots (Higham 2008, chapters 6 and 11) that the series of `2 artanh(E(2 + E)⁻¹) = log(1 + E)` is short.
+//! The exponential is computed by scaling, series and squaring. The logarithm takes square roots (Higham 2008,
+//! chapters 6 and 11) until the series of `2 artanh(E(2 + E)⁻¹) = log(1 + E)` is short.
 
 use super::base::{Matrix, Storage};
 use super::function::{from_parts, parts_of};
@@ -16,8 +16,8 @@ pub fn exp_any_minus_one<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D,
     exp_by(a, |a, n| Powers::of_any(a, n))
 }
 
-/// Sizes of Z up to which so many terms of the series of artanh leave less than a rounding error, also of its
-/// derivatives.
+/// The sizes of Z up to which these numbers of terms of the series of artanh are accurate to rounding, derivatives
+/// included.
 const LIMITS: [f64; 4] = [0.05, 0.21, 0.42, 0.6];
 const TERMS: [usize; 4] = [7, 13, 24, 39];
 /// `artanh √x/√x`
@@ -30,13 +30,13 @@ const ARTANH: [f64; 42] = {
     }
     c
 };
-/// Square roots halve a logarithm; its size is below 2000 where the numbers are finite.
+/// Square roots halve a logarithm, whose size is below 2000 for finite numbers.
 const ROOTS: usize = 16;
-/// Angles below this part are given as a bound.
+/// Below this angle an upper bound is returned.
 const BOUND: f64 = 1.5;
 
-/// The principal logarithm of 1 + E, and the largest |arg λ| of the eigenvalues of 1 + E, or a bound of it where it
-/// is less than 1.5.
+/// The principal logarithm of 1 + E, and the largest |arg λ| of the eigenvalues of 1 + E, or an upper bound of it if
+/// it is less than 1.5.
 pub fn log_any_one_plus<S: Scalar, const D: usize, A: Storage>(
     e: &Matrix<S, D, A>,
 ) -> (Matrix<S, D, A>, Lane) {
@@ -79,7 +79,8 @@ fn root_minus_one<S: Scalar, const D: usize, A: Storage>(
     mut on: Lane,
 ) -> Matrix<S, D, A> {
     const STEPS: usize = 9;
-    // After a step the eigenvalues λ are (1 + λ)²/4λ: 1 or more for positive ones; a small one has lost digits.
+    // After a step the eigenvalues are (1 + λ)²/4λ: at least 1 for positive λ. Small eigenvalues have lost
+    // significant digits.
     const SMALL: f64 = 0.1;
     let n = e.rows();
     let a = e.clone().plus_identity(Lane::ONE);
@@ -125,7 +126,7 @@ mod tests {
     fn the_logarithm_of_an_exponential_has_its_derivatives() {
         // Small ones need no roots; the largest turns by 2.94 and needs Schur's form. t A has the derivatives A and 0.
         for size in [0.01, 0.3, 1.0, 1.2] {
-            // Near a turn by π rounding grows with each derivative, by the square of the room that is left.
+            // Near a rotation by π rounding errors grow with each derivative, by the square of the distance from π.
             let slack = (std::f64::consts::PI - 2.45 * size).min(1.0);
             let a = [[0.3, -2.5], [2.4, 0.1]].map(|row| row.map(|x| x * size));
             let t = Jet::from_parts([Lane::ONE, Lane::ONE, Lane::ZERO]);

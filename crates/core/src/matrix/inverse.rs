@@ -5,10 +5,10 @@ use super::dense::determinant;
 use super::entry::{inner_add, mul_add};
 use crate::scalar::{Each, Lane, Scalar, few, lane};
 
-/// `A⁻¹`; not finite on lanes where A has none.
+/// `A⁻¹`; not finite on lanes where A is singular.
 pub fn inverse<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     let mut x = of_values(&a.value()).map(S::constant);
-    // Newton's method carries the derivatives: each step doubles how many of them are right.
+    // Newton's method computes the derivatives: each step doubles the number of correct ones.
     for _ in 0..S::ORDER {
         let rest = (-a.times(&x)).plus_identity(Lane::ONE);
         x = &x + &x.times(&rest);
@@ -61,7 +61,7 @@ fn exchange<const D: usize, A: Storage>(m: &mut Matrix<Lane, D, A>, (p, q): (usi
     }
 }
 
-/// `|det A|` to the power −1/n: a matrix times it has a determinant of size one. One where that is no number.
+/// `|det A|` to the power −1/n: the factor that scales the determinant to size one. One if that is not finite.
 pub(super) fn balance<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>) -> Lane {
     let det = determinant(a);
     let size = inner_add(det, det, Lane::ZERO).sqrt();

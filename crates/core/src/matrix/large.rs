@@ -1,4 +1,4 @@
-//! Eigenvectors of larger matrices, one lane after the other by a library.
+//! Eigenvectors of larger matrices, computed by a library one lane after the other.
 
 use super::base::Matrix;
 use super::dense::reorthonormalize;
@@ -6,13 +6,13 @@ use crate::monitor::checkpoint;
 use crate::scalar::{LANES, Lane};
 use nalgebra::{Complex, ComplexField, DMatrix, SymmetricEigen};
 
-/// Unitary V with `V* H V` diagonal but for rounding errors. Lanes that are not finite get the identity.
+/// Unitary V with `V* H V` diagonal up to rounding. Lanes that are not finite receive the identity.
 pub(super) fn eigenvectors<const D: usize>(h: &Matrix<Lane, D>) -> Matrix<Lane, D> {
     let mut v = Matrix::identity(h.rows());
     let numbers = h.entries().as_flattened();
     for l in 0..LANES {
         checkpoint();
-        // Lanes that are left over repeat another one.
+        // Unused lanes repeat another one.
         let same =
             |other: usize| numbers.iter().all(|x| x.as_array()[l].to_bits() == x.as_array()[other].to_bits());
         if let Some(other) = l.checked_sub(1).filter(|&other| same(other)) {
@@ -44,7 +44,7 @@ fn one<T: ComplexField<RealField = f64>, const D: usize>(
     if !h.iter().all(|x| x.clone().is_finite()) {
         return;
     }
-    // Without a limit the library would loop for ever where rounding keeps it from its aim.
+    // Without a limit the library would not terminate if rounding prevents convergence.
     if let Some(e) = SymmetricEigen::try_new(h, f64::EPSILON, 100 * n) {
         for i in 0..n {
             for j in 0..n {

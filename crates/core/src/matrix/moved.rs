@@ -3,11 +3,11 @@
 use super::base::{Matrix, Storage};
 use crate::scalar::{Lane, Scalar};
 
-/// A point on a curve of matrices, and where they are asked for its first and second derivative.
+/// A point on a curve of matrices, and, if required, its first and second derivative.
 pub struct Moved<const D: usize, A: Storage>(pub Matrix<Lane, D, A>, pub Option<[Matrix<Lane, D, A>; 2]>);
 
 impl<const D: usize, A: Storage> Moved<D, A> {
-    /// The point x = p e^{tΩ} of a curve with x' = xΩ, with so many derivatives as are asked for.
+    /// The point x = p e^{tΩ} of a curve with x' = xΩ, with the required number of derivatives.
     pub fn by_generator(x: Matrix<Lane, D, A>, omega: &Matrix<Lane, D, A>, order: usize) -> Self {
         if order == 0 {
             return Moved(x, None);
@@ -17,7 +17,7 @@ impl<const D: usize, A: Storage> Moved<D, A> {
         Moved(x, Some([d, dd]))
     }
 
-    /// Writes the curve at the parameter t, with the derivatives that t carries.
+    /// Writes the curve at the parameter t, with the derivatives that t has.
     pub fn write<S: Scalar>(&self, t: S, out: &mut [S]) {
         let Moved(x, rates) = self;
         let Some([d, dd]) = rates else {

@@ -29,7 +29,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         out
     }
 
-    /// Whether products with it pay for another order of work.
+    /// Whether products with this matrix are faster in another order of loops.
     #[inline(always)]
     fn is_large(&self) -> bool {
         self.rows() * self.cols() >= LARGE * LARGE
@@ -71,7 +71,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         Self::from_fn(self.rows(), b.rows(), |i, j| self.row_product(i, b, j, [S::constant(Lane::ZERO); D]))
     }
 
-    /// `(1 + A)(1 + B) − 1`: products of what is near the identity keep their small digits.
+    /// `(1 + A)(1 + B) − 1`: products of matrices close to the identity without cancellation.
     #[inline(always)]
     pub fn compose(&self, b: &Self) -> Self {
         if A::ANY { (A::compiled().compose)(self, b) } else { self.compose_here(b) }
@@ -94,7 +94,7 @@ impl<S: Scalar, const D: usize, A: Storage> Matrix<S, D, A> {
         })
     }
 
-    /// `A B*` where that is Hermitian: one half of it is computed.
+    /// `A B*` if it is Hermitian: one half of it is computed.
     #[inline(always)]
     pub fn times_adjoint_hermitian(&self, b: &Self) -> Self {
         if A::ANY {

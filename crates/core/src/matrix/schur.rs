@@ -1,4 +1,4 @@
-//! What needs the eigenvalues of a general matrix, one lane after the other by a library.
+//! Functions of the eigenvalues of a general matrix, computed by a library one lane after the other.
 
 use super::base::{Matrix, Storage};
 use crate::scalar::{LANES, Lane, few};
@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, Schur};
 
 type Dense = DMatrix<Complex<f64>>;
 
-/// Unitary Q and upper triangular T with A = QTQ*, or none where the method does not end (or A is not finite).
+/// Unitary Q and upper triangular T with A = QTQ*, or None if the method does not converge (or A is not finite).
 fn schur(a: Dense) -> Option<(Dense, Dense)> {
     if !a.iter().all(|x| x.re.is_finite() && x.im.is_finite()) {
         return None;
@@ -15,7 +15,7 @@ fn schur(a: Dense) -> Option<(Dense, Dense)> {
     Schur::try_new(a, f64::EPSILON, rounds).map(Schur::unpack)
 }
 
-/// One lane of numbers as [`Matrix::read`] takes them.
+/// One lane of numbers in the order of [`Matrix::read`].
 fn dense<const D: usize>(n: usize, numbers: &[Lane], l: usize) -> Dense {
     DMatrix::from_fn(n, n, |i, j| {
         let x = &numbers[(i * n + j) * D..][..D];
@@ -23,7 +23,7 @@ fn dense<const D: usize>(n: usize, numbers: &[Lane], l: usize) -> Dense {
     })
 }
 
-/// The largest value that a function takes on the eigenvalues; NaN where there are none.
+/// The largest value of a function on the eigenvalues; NaN without eigenvalues.
 fn largest<const D: usize, A: Storage>(m: &Matrix<Lane, D, A>, f: impl Fn(Complex<f64>) -> f64) -> Lane {
     let numbers = m.entries().as_flattened();
     let of = |l: usize| {
@@ -43,8 +43,8 @@ pub fn largest_imaginary<const D: usize, A: Storage>(m: &Matrix<Lane, D, A>) -> 
     largest(m, |x| x.im.abs())
 }
 
-/// The principal square root of a matrix and its derivatives, each as plain numbers, on the lanes that are asked
-/// for (Björck & Hammarling 1983). It keeps its digits where eigenvalues come near the negative numbers.
+/// The principal square root of a matrix and its derivatives, each as plain numbers, on the requested lanes (Björck &
+/// Hammarling 1983). It is accurate if eigenvalues are close to the negative numbers.
 pub(super) fn root<const D: usize>(n: usize, parts: &[Vec<Lane>], lanes: [bool; LANES]) -> Vec<Vec<Lane>> {
     let mut found = vec![vec![Lane::splat(f64::NAN); n * n * D]; parts.len()];
     for l in (0..LANES).filter(|&l| lanes[l]) {

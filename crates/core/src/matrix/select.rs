@@ -1,9 +1,9 @@
-//! Picking lane by lane.
+//! Selection lane by lane.
 
 use super::base::{Matrix, Storage};
 use crate::scalar::{Lane, Scalar, lane};
 
-/// What can be picked lane by lane.
+/// Values that can be selected lane by lane.
 pub trait Select {
     /// `a` on the lanes of a mask, `b` on the others.
     fn select(mask: Lane, a: Self, b: Self) -> Self;
@@ -25,9 +25,9 @@ impl<T: Select, const F: usize> Select for [T; F] {
     }
 }
 
-/// Picks by size: lanes up to `limits[i]` get `f(i)`, larger ones `f(limits.len())`.
+/// Selects by size: lanes up to `limits[i]` receive `f(i)`, larger ones `f(limits.len())`.
 ///
-/// What a lane gets depends on its own size only, never on its neighbours'.
+/// The result of a lane depends on its own size only, never on its neighbours.
 pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -> R) -> R {
     let within = |i: usize| size.simd_le(lane(limits[i]));
     let top = (0..limits.len()).find(|&i| within(i).all()).unwrap_or(limits.len());

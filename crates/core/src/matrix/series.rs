@@ -1,9 +1,9 @@
 //! Power series in a matrix, and the functions of Hermitian ones made of them.
 //!
-//! Of a matrix of size three or less the powers reduce to I, H, H² by the theorem of Cayley and
-//! Hamilton, so that a series costs a few multiplications a term; larger ones use the scheme of
-//! Paterson & Stockmeyer (1973). Both carry derivatives along and are smooth where eigenvalues
-//! coincide. Beyond the radius of a series its argument is halved, or eigenvectors are used.
+//! For a matrix of size three or less, the theorem of Cayley and Hamilton reduces powers to I, H, H², so that a
+//! series costs a few multiplications per term. Larger matrices use the scheme of Paterson & Stockmeyer (1973). Both
+//! compute derivatives and are smooth where eigenvalues coincide. Beyond the radius of a series its argument is
+//! halved, or eigenvectors are used.
 
 use super::base::{Matrix, Storage};
 use super::entry::{inner_add, mul_add};
@@ -12,7 +12,7 @@ use super::select::{Select, by_size};
 use crate::scalar::{LANES, Lane, Scalar, few, lane};
 use crate::special::{ARC, SINC, VERSINE, arc_full_range};
 
-/// What the series in one matrix share.
+/// The common data of the series in one matrix.
 pub(super) struct Powers<'a, S: Scalar, const D: usize, A: Storage> {
     h: &'a Matrix<S, D, A>,
     known: Known<S, D, A>,
@@ -35,7 +35,7 @@ enum Known<S: Scalar, const D: usize, A: Storage> {
 }
 
 impl<S: Scalar, const D: usize, A: Storage> Known<S, D, A> {
-    /// Given the product of the entries beside the diagonal.
+    /// Requires the product of the off-diagonal entries.
     #[inline(always)]
     fn two(h: &Matrix<S, D, A>, beside: S) -> Self {
         let (a, d) = (h[(0, 0)][0], h[(1, 1)][0]);
@@ -50,7 +50,7 @@ impl<S: Scalar, const D: usize, A: Storage> Known<S, D, A> {
 
     #[inline(always)]
     fn many(h: &Matrix<S, D, A>, terms: usize) -> Self {
-        // Paterson & Stockmeyer's best number of powers.
+        // The best number of powers for Paterson & Stockmeyer.
         let block = (terms as f64).sqrt().round() as usize;
         let mut powers = vec![h.clone()];
         while powers.len() < block {
@@ -61,7 +61,7 @@ impl<S: Scalar, const D: usize, A: Storage> Known<S, D, A> {
 }
 
 impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
-    /// Of a Hermitian matrix, for several series of so many terms in all.
+    /// For a Hermitian matrix, and several series with this number of terms in total.
     #[inline(always)]
     fn of(h: &'a Matrix<S, D, A>, terms: usize) -> Self {
         let known = match h.rows() {
@@ -76,7 +76,7 @@ impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
         Powers { h, known }
     }
 
-    /// Of any matrix. The theorem needs complex numbers where its entries are.
+    /// For any matrix. The theorem requires complex numbers if the entries are complex.
     pub(super) fn of_any(h: &'a Matrix<S, D, A>, terms: usize) -> Self {
         let known = match h.rows() {
             1 if D == 1 => Known::Itself,
@@ -136,7 +136,7 @@ fn invariants<S: Scalar, const D: usize, A: Storage>(
     [e1, minus_e2, det[0]]
 }
 
-/// The coefficients of 1, H and H² that a series comes down to.
+/// The coefficients of 1, H and H² to which a series reduces.
 fn reduce<S: Scalar>([e1, minus_e2, e3]: [S; 3], c: &[f64]) -> [S; 3] {
     let zero = S::constant(Lane::ZERO);
     c.iter()
@@ -176,17 +176,17 @@ fn paterson_stockmeyer<S: Scalar, const D: usize, A: Storage>(
     sum
 }
 
-/// Terms that leave less than a rounding error, one more for every derivative.
+/// The numbers of terms with errors below rounding, and one more for every derivative.
 pub(super) fn terms<S: Scalar>(c: &[f64], n: usize) -> &[f64] {
     &c[..(n + S::ORDER).min(c.len())]
 }
 
-/// How often sizes must be divided by `base` to come below a limit, lane by lane, and by what in all.
+/// How often sizes must be divided by `base` to fall below a limit, lane by lane, and the total divisor.
 #[cold]
 pub(super) fn reductions(size: Lane, limit: f64, base: f64) -> (Lane, Lane) {
     let (mut times, mut divisor) = ([0.0; LANES], [1.0; LANES]);
     for (l, size) in size.to_array().into_iter().enumerate() {
-        // Infinity and NaN stay what they are; more than 2⁶⁴ is no length of a geodesic.
+        // Infinity and NaN do not change; lengths of geodesics are below 2⁶⁴.
         while size / divisor[l] > limit && divisor[l] < 1e19 {
             (times[l], divisor[l]) = (times[l] + 1.0, divisor[l] * base);
         }
@@ -194,7 +194,7 @@ pub(super) fn reductions(size: Lane, limit: f64, base: f64) -> (Lane, Lane) {
     (Lane::new(times), Lane::new(divisor))
 }
 
-/// Applies `step` so many times, lane by lane.
+/// Applies `step` this many times, lane by lane.
 pub(super) fn repeat<R: Select + Clone>(mut x: R, times: Lane, step: impl Fn(&R) -> R) -> R {
     let mut done = Lane::ZERO;
     loop {
@@ -371,7 +371,7 @@ fn log_full_range<S: Scalar, const D: usize, A: Storage>(b: &Matrix<S, D, A>) ->
     function_of(b, &Unary { f, pole_distance: |x: Lane| (x + Lane::ONE).abs() })
 }
 
-/// `θ/sin θ` as a function of the Hermitian `Y = 1 − cos θ`; `rest` is `2 − Y`, known to more digits.
+/// `θ/sin θ` as a function of the Hermitian `Y = 1 − cos θ`; `rest` is `2 − Y`, more accurately.
 #[inline(always)]
 pub fn arc<S: Scalar, const D: usize, A: Storage>(y: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     if A::ANY { (A::compiled().arc)(y) } else { arc_here(y) }

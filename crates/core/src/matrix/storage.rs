@@ -1,4 +1,4 @@
-//! Storage on the stack: of few entries, or of a size that the compiler knows.
+//! Storage on the stack: of few entries, or of constant size.
 
 use super::base::Storage;
 use crate::scalar::few;
@@ -34,7 +34,7 @@ impl<const CAPACITY: usize> Storage for Small<CAPACITY> {
     }
 }
 
-/// N × N matrices of NN = N² entries, a size known to the compiler.
+/// N × N matrices with NN = N² entries, of constant size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Known<const N: usize, const NN: usize>;
 

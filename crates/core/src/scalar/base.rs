@@ -1,4 +1,4 @@
-//! The operations that formulas use, for any kind of number.
+//! The operations of formulas, for any kind of number.
 
 use super::few::few;
 use super::types::{LANES, Lane, Row, RowMut};
@@ -16,22 +16,22 @@ pub trait Scalar:
     + Sub<Lane, Output = Self>
     + Mul<Lane, Output = Self>
 {
-    /// How many derivatives are carried: 0, 1 or 2.
+    /// The number of derivatives: 0, 1 or 2.
     const ORDER: usize;
 
-    /// A number that does not depend on anything.
+    /// A constant, whose derivatives are zero.
     fn constant(x: Lane) -> Self;
 
     /// The number without its derivatives.
     fn value(self) -> Lane;
 
-    /// Value, first and second derivative; those that are not carried are zero.
+    /// Value, first and second derivative; those that the type does not have are zero.
     fn parts(self) -> [Lane; 3];
 
-    /// From value and derivatives; those that are not carried are dropped.
+    /// From value and derivatives; those that the type does not have are dropped.
     fn from_parts(parts: [Lane; 3]) -> Self;
 
-    /// `self · b + c`, rounded once where the processor can.
+    /// `self · b + c`, rounded once if the processor supports it.
     fn fma(self, b: Self, c: Self) -> Self;
 
     /// `self · b + c` with a constant factor `b`.
@@ -39,8 +39,8 @@ pub trait Scalar:
 
     /// `f(self)`, given f, f' and f'' at `self.value()`. Only the first `ORDER + 1` are used.
     ///
-    /// Composing once is faster than pushing derivatives through every step of f, and stays finite
-    /// where a step (a square root, an arctangent) would not be differentiable.
+    /// One composition is faster than propagating derivatives through every step of f, and stays finite where a step
+    /// (a square root, an arctangent) is not differentiable.
     fn compose(self, f: [Lane; 3]) -> Self;
 
     /// `a` on the lanes of a mask, `b` on the others.
@@ -49,7 +49,7 @@ pub trait Scalar:
     /// Numbers of this kind as numbers of any kind.
     fn row(x: &[Self]) -> Row<'_>;
 
-    /// The same, to be written.
+    /// The same for a mutable slice.
     fn row_mut(x: &mut [Self]) -> RowMut<'_>;
 }
 
@@ -123,10 +123,10 @@ pub fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     sum
 }
 
-/// Lane by lane the larger of the two, and NaN where either is NaN (`max` would drop it).
+/// The larger of the two in each lane, and NaN where either is NaN (`max` would ignore it).
 #[inline(always)]
 pub fn max_or_nan(a: Lane, b: Lane) -> Lane {
-    // `!(b <= a)` is true for b > a and for NaN; a NaN in `a` stays since nothing compares below it.
+    // `!(b <= a)` is true for b > a and for NaN. A NaN in `a` remains, since comparisons with it are false.
     let keep = b.simd_le(a) | a.is_nan();
     keep.select(a, b)
 }

@@ -1,5 +1,5 @@
-//! A few numbers, as plain loops: `array::from_fn` and `array::map`, with all that they call, were a third of the
-//! code that the compiler was given.
+//! Arrays of a few numbers by plain loops: `array::from_fn` and `array::map`, with everything that they call, were a
+//! third of the code to compile.
 
 /// An array of the values of a function.
 #[inline(always)]

@@ -1,9 +1,9 @@
-//! The numbers a formula is written over.
+//! The number types of formulas.
 //!
-//! Every formula is written once, generic over [`Scalar`]: a [`Lane`] is eight doubles side by side
-//! (eight samples, curves or sections of a curve), a [`Jet`] carries two derivatives in t along, a
-//! [`Dual`] one derivative in any direction. A lone number is padded into a lane, so that one curve
-//! and a batch of curves give bit-identical results.
+//! Every formula is written once, generic over [`Scalar`]. A [`Lane`] consists of eight floating-point numbers (eight
+//! samples, curves or sections of a curve) in SIMD lanes, a [`Jet`] has two derivatives in t, and a [`Dual`] one
+//! derivative in any direction. A single number is padded to a lane, so that one curve and a batch of curves give
+//! bit-identical results.
 
 mod base;
 mod dual;
@@ -17,9 +17,9 @@ pub use few::{Each, few};
 pub use rows::{gather, scatter, scatter_apart};
 pub use types::{Dual, Jet, LANES, Lane, Row, RowMut};
 
-/// Runs an expression with a size of a space as a constant where it is a common small one: inlined into
-/// it, loops over coordinates unroll and small vectors stay in registers. That pays for spaces of
-/// vectors ([`Space::VECTORS`](crate::space::Space::VECTORS)), and would only multiply the code of others.
+/// Runs an expression with the size of a space as a constant if it is a common small one: loops over coordinates are
+/// then unrolled, and small vectors stay in registers. That is faster for spaces of vectors
+/// ([`Space::VECTORS`](crate::space::Space::VECTORS)), and would only duplicate the code of others.
 #[macro_export]
 macro_rules! with_size {
     ($pays:expr, $size:expr, $m:ident => $body:expr) => {

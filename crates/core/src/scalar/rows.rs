@@ -1,17 +1,17 @@
-//! Eight rows of numbers in memory, and the same numbers side by side in lanes.
+//! Conversion between eight rows of numbers in memory and SIMD lanes.
 
 use super::few::few;
 use super::types::{LANES, Lane};
 use wide::bytemuck::cast;
 use wide::f64x4;
 
-/// Reads one row of numbers from each of eight arrays: `out[c]` gets column c.
+/// Reads one row of numbers from each of eight arrays: `out[c]` receives column c.
 #[inline(always)]
 pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
     let len = out.len();
     let rows = rows.map(|row| &row[..len]);
     let mut c = 0;
-    // Four columns at a time are a transposition in registers.
+    // Four columns at a time are transposed in registers.
     while c + 4 <= len {
         let row = |l: usize| f64x4::new([rows[l][c], rows[l][c + 1], rows[l][c + 2], rows[l][c + 3]]);
         let low = f64x4::transpose([row(0), row(1), row(2), row(3)]);
@@ -27,13 +27,13 @@ pub fn gather(rows: [&[f64]; LANES], out: &mut [Lane]) {
     }
 }
 
-/// Writes lanes as consecutive rows; `out` may hold fewer than eight.
+/// Writes lanes as consecutive rows; `out` may contain fewer than eight.
 #[inline(always)]
 pub fn scatter(lanes: &[Lane], out: &mut [f64]) {
     scatter_apart(lanes, lanes.len(), out);
 }
 
-/// The same as rows that begin `stride` numbers after each other.
+/// The same with a distance of `stride` numbers between the starts of rows.
 #[inline(always)]
 pub fn scatter_apart(lanes: &[Lane], stride: usize, out: &mut [f64]) {
     let len = lanes.len();

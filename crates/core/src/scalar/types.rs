@@ -1,10 +1,9 @@
-//! The kinds of numbers, and slices of any one of them: how a formula that is generic over its numbers passes
-//! through a table of functions.
+//! The kinds of numbers, and slices of any of them, with which generic formulas pass through a table of functions.
 
-/// Eight doubles side by side.
+/// Eight floating-point numbers in SIMD lanes.
 pub type Lane = wide::f64x8;
 
-/// How many doubles a [`Lane`] holds.
+/// The number of floating-point numbers in a [`Lane`].
 pub const LANES: usize = 8;
 
 /// A number `v + d ε` with `ε² = 0`.
@@ -38,7 +37,7 @@ pub enum Row<'a> {
     Jet(&'a [Jet]),
 }
 
-/// The same, to be written.
+/// The same for mutable slices.
 pub enum RowMut<'a> {
     /// Plain numbers.
     Lane(&'a mut [Lane]),

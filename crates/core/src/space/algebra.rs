@@ -12,11 +12,11 @@ use std::marker::PhantomData;
 pub struct Algebra<const D: usize, A> {
     /// Rows and columns.
     pub n: usize,
-    /// Skew-Hermitian rather than Hermitian.
+    /// Whether matrices are skew-Hermitian instead of Hermitian.
     pub skew: bool,
-    /// Without the multiples of the identity.
+    /// Whether multiples of the identity are excluded.
     pub traceless: bool,
-    /// How matrices are stored.
+    /// The storage of the matrices.
     pub storage: PhantomData<A>,
 }
 
@@ -73,7 +73,7 @@ impl<const D: usize, A: Storage> Algebra<D, A> {
         self.multiple(1.0, x)
     }
 
-    /// `scale` times the matrix with given coordinates: ±½ of it acts in the transvections.
+    /// `scale` times the matrix with given coordinates; the transvections use `scale` = ±½.
     pub fn multiple<S: Scalar>(&self, scale: f64, x: &[S]) -> Matrix<S, D, A> {
         let n = self.n;
         let mut m = Matrix::zeros(n, n);
@@ -140,7 +140,7 @@ pub fn stretch_series<S: Scalar, const D: usize, A: Storage>(
     x: &Matrix<S, D, A>,
     twice: impl Fn(&Matrix<S, D, A>) -> Matrix<S, D, A>,
 ) -> Matrix<S, D, A> {
-    // The first term that is left out is below 1e-16.
+    // The first omitted term is below 1e-16.
     const TIERS: [f64; 5] = [0.1, 0.5, 1.5, 3.5, 8.0];
     const TERMS: [usize; 6] = [4, 7, 10, 15, 23, 40];
     by_size(size, &TIERS, |tier| {

@@ -7,10 +7,10 @@ use crate::fit::end_kind::ChainEnds;
 use crate::fit::node::{C2Residual, NodeVectors};
 use crate::scalar::{LANES, Lane, Row, RowMut, Scalar};
 
-/// The formulas of a [`Space`], and the loops over knots and samples that are made of them.
+/// The formulas of a [`Space`], and the loops over knots and samples that use them.
 ///
-/// A space with cheap formulas has loops compiled for it alone; for others one copy calls the formulas through this
-/// table.
+/// A space with cheap formulas has loops compiled for it alone; for other spaces one copy calls the formulas through
+/// this table.
 pub trait Kernels: Geometry {
     /// See `Chain::walk`.
     fn walk(&self, chain: &mut Chain, runs: &[Run; LANES]);
@@ -30,11 +30,11 @@ pub trait Kernels: Geometry {
     fn samples(&self, job: &Job, out: &mut [f64]);
 }
 
-/// A space known by its table of operations only.
+/// A space that is represented by its table of operations.
 #[derive(Clone, Copy)]
 pub struct Erased<'a>(pub &'a dyn Kernels);
 
-/// Makes three things of a list of methods: the table, the table of every space, and the space of every table.
+/// Generates three things from a list of methods: the table, the table of every space, and the space of every table.
 macro_rules! table {
     ($($part:ident { $(fn $name:ident(&self $(, $arg:ident: $kind:ty)*) $(-> $result:ty)?;)* })*) => {
         /// The formulas of a [`Space`].
@@ -180,7 +180,7 @@ table! {
     }
 }
 
-/// The table was called with kinds of numbers that no formula takes.
+/// The table was called with numbers of different kinds.
 #[cold]
 fn mixed() -> ! {
     unreachable!("numbers of one kind, with no more derivatives than the solvers ask for")

@@ -1,10 +1,10 @@
-//! Hyperbolic spaces: how far out doubles have digits.
+//! Hyperbolic spaces: the distance up to which floating-point numbers are accurate.
 
-/// The largest |p|² of a point, at a distance of 15.25 from (1, 0, …): beyond, rounding errors ε|p|² are above
-/// 0.2 %, and twice as far there are no points any more.
+/// The largest |p|² of a point, at a distance of 15.25 from (1, 0, …). Beyond it rounding errors ε|p|² exceed 0.2 %,
+/// and at twice the distance no array is a point.
 const FARTHEST: f64 = (1_u64 << 43) as f64;
 
-/// The first point of hyperbolic space, real or complex, so far out that too few digits are left, and that in words.
+/// The first point of real or complex hyperbolic space that is too far out to be accurate, and a description of it.
 pub fn far_out(points: &[f64], len: usize) -> Option<(usize, String)> {
     let square = |p: &[f64]| p.iter().map(|x| x * x).sum::<f64>();
     let row = points.chunks_exact(len).position(|p| !(square(p) <= FARTHEST))?;

@@ -1,13 +1,13 @@
 //! The traits of a symmetric space: the paper's §2.1–2.4, in three parts.
 //!
-//! * [`Ambient`]: arrays as users have them: exponential, logarithm, geodesic, transvection. A user calls these, and
-//!   they evaluate a curve.
+//! * [`Ambient`]: arrays as users have them: exponential, logarithm, geodesic, transvection. Users call these
+//!   functions, and they evaluate a curve.
 //! * [`Frame`]: a *moving frame*, an element g of the group with g·o = p, transported in parallel from point to point.
 //!   In frames every tangent vector is a coordinate vector of 𝔪 = T_oM and parallel transport is the identity.
 //! * [`Origin`]: the origin o, in coordinates of 𝔪. The C² condition is solved there.
 //!
-//! A [`Space`] implements all three. Solvers see it as [`Erased`], through a table of function pointers in two layers:
-//! [`Geometry`] has the formulas, [`Kernels`] adds the loops over knots and samples that are made of them.
+//! A [`Space`] implements all three. Solvers use it as [`Erased`], through a table of function pointers in two
+//! layers: [`Geometry`] contains the formulas, [`Kernels`] adds the loops over knots and samples that use them.
 
 mod algebra;
 mod erased;

@@ -1,16 +1,16 @@
-//! A space from few formulas: the first implementation of a new one.
+//! A space from few formulas: the simplest implementation of a new space.
 
 use super::traits::{Ambient, Frame, Origin, ROUNDING_SIZE, Space, make_tangent};
 use crate::scalar::{Lane, Scalar, lane, max_or_nan};
 
-/// A space whose exponential, logarithm and transvection are known at any point and for any numbers. All three
+/// A space whose exponential, logarithm and transvection are implemented at any point and for any numbers. All three
 /// traits follow: geodesics are exponentials of logarithms, a frame is a basis moved by transvections, and
-/// [`inner_handles`](Origin::inner_handles) is its own definition, in arrays at the origin.
+/// [`inner_handles`](Origin::inner_handles) is computed by its definition, in arrays at the origin.
 ///
-/// The results are right, and several times slower than specific formulas for each operation. For speed, implement
-/// the traits instead; the laws compare their formulas with the definitions used here.
+/// The results are correct, but several times slower than with specific formulas for each operation. For speed,
+/// implement the traits instead; the laws compare their formulas with the definitions used here.
 pub trait Model: Copy + Send + Sync {
-    /// See [`Ambient::point_shape`]; of complex numbers, counted as one each.
+    /// See [`Ambient::point_shape`]; a complex number counts as one entry.
     fn point_shape(&self) -> Vec<usize>;
     /// See [`Ambient::is_complex`].
     fn is_complex(&self) -> bool {
@@ -38,7 +38,7 @@ pub trait Model: Copy + Send + Sync {
 
     /// The array of the origin.
     fn origin(&self, o: &mut [Lane]);
-    /// The tangent vector at the origin with given coordinates. Other numbers of its array are zero already.
+    /// The tangent vector at the origin with given coordinates. The other entries of its array are already zero.
     fn vector<S: Scalar>(&self, x: &[S], v: &mut [S]);
     /// Coordinates of a tangent vector at the origin.
     fn coordinates<S: Scalar>(&self, v: &[S], x: &mut [S]);
@@ -55,8 +55,8 @@ pub trait Model: Copy + Send + Sync {
     fn log<S: Scalar>(&self, p: &[S], q: &[S], v: &mut [S]) -> Lane;
     /// The transvection `E_p(v)` of (10) applied to points or tangent vectors, one array after the other, in place.
     fn transvect<S: Scalar>(&self, p: &[S], v: &[S], x: &mut [S]);
-    /// Carries tangent vectors at the origin to p by any isometry that takes the origin there, in place. By default
-    /// the geodesic from the origin does, which a space without cut locus has everywhere.
+    /// Maps tangent vectors at the origin to p by any isometry that maps the origin to p, in place. By default it is
+    /// the transvection along the geodesic from the origin, which exists everywhere in a space without cut locus.
     fn section(&self, p: &[Lane], x: &mut [Lane]) {
         assert!(self.cut_angle().is_infinite(), "a space with a cut locus needs a section of its own");
         let (mut o, mut v) = (vec![Lane::ZERO; p.len()], vec![Lane::ZERO; p.len()]);
@@ -64,7 +64,7 @@ pub trait Model: Copy + Send + Sync {
         self.log(&o, p, &mut v);
         parallel_transport(self, &o, p, &v, x);
     }
-    /// Turns tangent vectors at a point into those at another array of the same point, q, in place.
+    /// Converts tangent vectors at a point, in place, to those at another array q of the same point.
     fn turn(&self, _p: &[Lane], _q: &[Lane], _x: &mut [Lane]) {}
     /// See [`Ambient::velocity`].
     fn velocity(&self, gamma: &[Lane], d: &mut [Lane]);
@@ -96,7 +96,7 @@ pub trait Model: Copy + Send + Sync {
     }
 }
 
-/// Numbers that do not move.
+/// Numbers without derivatives.
 fn constant<S: Scalar>(x: &[Lane]) -> Vec<S> {
     x.iter().map(|x| S::constant(*x)).collect()
 }
@@ -105,7 +105,7 @@ fn zeros<S: Scalar>(len: usize) -> Vec<S> {
     vec![S::constant(Lane::ZERO); len]
 }
 
-/// Every number times a factor.
+/// Multiplies every number by a factor.
 fn scaled<S: Scalar>(x: &[S], scale: S) -> Vec<S> {
     x.iter().map(|x| *x * scale).collect()
 }
@@ -173,7 +173,7 @@ impl<M: Model> Ambient for M {
     }
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         let [off, size] = make_tangent(self, p, v);
-        // Rounding of v may be as much.
+        // The rounding error of v may be as large.
         off / (size * Model::rounding(self, p) + ROUNDING_SIZE)
     }
     fn random_point(&self, noise: &mut [Lane]) {
@@ -190,7 +190,7 @@ impl<M: Model> Ambient for M {
     }
 }
 
-// A frame is the images of the basis vectors at the origin, one array after the other.
+// A frame consists of the images of the basis vectors at the origin, one array after the other.
 impl<M: Model> Frame for M {
     fn frame_len(&self) -> usize {
         Model::dim(self) * self.point_len()
@@ -213,8 +213,8 @@ impl<M: Model> Frame for M {
         for e in frame.chunks_exact_mut(p.len()) {
             Model::velocity(self, q, e);
         }
-        // One step of Newton's method for orthonormal vectors: an error of their lengths would go into the
-        // velocity, and from there eightfold into a jump of the acceleration.
+        // One step of Newton's method for orthonormal vectors: an error of their lengths would enter the velocity,
+        // and be amplified eightfold in the jump of the acceleration.
         let before = frame.to_vec();
         for (i, e) in frame.chunks_exact_mut(p.len()).enumerate() {
             for (j, f) in before.chunks_exact(p.len()).enumerate() {

@@ -1,16 +1,16 @@
-//! A totally geodesic part of a space: the fixed points of an isometry of order two, or a component of them.
+//! A totally geodesic subspace: the fixed points of an isometry of order two, or a component of them.
 //!
-//! Geodesics between points of the part stay there, so all formulas are those of the whole. An implementation of a part
-//! gives its points and coordinates.
+//! Geodesics between points of the subspace stay in it, so that all formulas are those of the whole space. An
+//! implementation provides the points and coordinates of the subspace.
 
 use super::traits::{Ambient, Frame, Origin, Space};
 use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
 /// The fixed points of an isometry of order two, the mirror.
 pub trait Part: Copy + Send + Sync {
-    /// The space that it is a part of.
+    /// The whole space.
     type Whole: Space;
-    /// The space that it is a part of.
+    /// The whole space.
     fn whole(&self) -> Self::Whole;
     /// See [`Origin::dim`].
     fn dim(&self) -> usize;
@@ -18,18 +18,18 @@ pub trait Part: Copy + Send + Sync {
     fn curvature(&self) -> f64;
     /// See [`Ambient::injectivity_radius`].
     fn injectivity_radius(&self) -> f64;
-    /// Coordinates in the whole of a vector with coordinates x in the part; keeps lengths.
+    /// Coordinates in the whole space of a vector with coordinates x in the subspace; preserves lengths.
     fn widen<S: Scalar>(&self, x: &[S], wide: &mut [S]);
-    /// Coordinates in the part of the nearest vector there.
+    /// Coordinates of the projection of a vector onto the subspace.
     fn narrow<S: Scalar>(&self, wide: &[S], x: &mut [S]);
     /// The image of a point.
     fn mirror(&self, p: &[Lane], image: &mut [Lane]);
-    /// The image of a tangent vector at a point of the part, at the same representative.
+    /// The image of a tangent vector at a point of the subspace, at the same representative.
     fn mirror_vector(&self, p: &[Lane], v: &[Lane], image: &mut [Lane]);
-    /// A frame of the whole at a point of the part that takes the part at the origin to the part.
+    /// A frame of the whole space at a point of the subspace that maps the subspace at the origin to the subspace.
     fn lift(&self, p: &[Lane], frame: &mut [Lane]);
-    /// In which lanes a point that the mirror leaves where it is belongs to the part; with several components, it may
-    /// be a point of another one.
+    /// The lanes in which a fixed point of the isometry belongs to the subspace. If there are several components, it
+    /// may belong to another one.
     fn contains(&self, _p: &[Lane]) -> Lane {
         Lane::ZERO.simd_eq(Lane::ZERO)
     }
@@ -37,15 +37,15 @@ pub trait Part: Copy + Send + Sync {
     fn random_point(&self, noise: &mut [Lane]) {
         self.whole().random_point(noise);
     }
-    /// Describes why a point of the whole is not in the part.
+    /// Describes why a point of the whole space is not in the subspace.
     fn violation(&self, p: &[Lane]) -> String;
 }
 
-/// A part as a space.
+/// A totally geodesic subspace as a space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Within<P>(pub P);
 
-/// How far a point may be off the whole that is off the part.
+/// The distance from the whole space that a point off the subspace may have.
 const OFF: Lane = lane(1e-8);
 
 impl<P: Part> Within<P> {
@@ -59,13 +59,13 @@ impl<P: Part> Within<P> {
         wide
     }
 
-    /// What is rounding of an array of size one at p.
+    /// The size of rounding errors of an array of size one at p.
     fn rounding_at(&self, p: &[Lane]) -> Lane {
         lane(4.0 * p.len() as f64 * f64::EPSILON) * self.0.whole().rounding(p)
     }
 
-    /// Replaces a vector by the half of itself and its image, which is what is along the part. What is so up to
-    /// rounding stays as it is.
+    /// Replaces a vector by the mean of itself and its image, its projection onto the subspace. Vectors that equal it
+    /// up to rounding do not change.
     fn along(&self, p: &[Lane], v: &mut [Lane]) {
         let mut image = v.to_vec();
         self.0.mirror_vector(p, v, &mut image);
@@ -76,14 +76,15 @@ impl<P: Part> Within<P> {
         v.iter_mut().zip(&image).for_each(|(v, image)| *v = keep.select(*v, lane(0.5) * (*v + *image)));
     }
 
-    /// Replaces a point of the whole by the nearest of the part, half way to its image; returns how far that was.
+    /// Replaces a point of the whole space by the nearest one of the subspace, half way to its image; returns the
+    /// distance.
     fn nearest(&self, x: &mut [Lane]) -> Lane {
         let whole = self.0.whole();
         let (mut image, mut way, mut middle) = (x.to_vec(), x.to_vec(), x.to_vec());
         self.0.mirror(x, &mut image);
         let off = whole.log(x, &image, &mut way) * lane(0.5);
         whole.ray(x, &way, lane(0.5), &mut middle);
-        // What is a point up to rounding stays as it is.
+        // Points that equal their projection up to rounding do not change.
         let keep = off.simd_le(self.rounding_at(x));
         x.iter_mut().zip(&middle).for_each(|(x, middle)| *x = keep.select(*x, *middle));
         off
@@ -119,10 +120,10 @@ impl<P: Part> Ambient for Within<P> {
         let whole = self.0.whole();
         let angle = whole.log(p, q, out);
         let square = whole.inner(p, out, out);
-        // Points are off the part by rounding errors, which are much beside a short way.
+        // Points are off the subspace by rounding errors, which are large compared with a short step.
         self.along(p, out);
         if self.cut_angle().is_finite() {
-            // Almost at the cut locus rounding turns the vector, but the length is right.
+            // Almost at the cut locus rounding errors rotate the vector, but its length is accurate.
             let grown = square / whole.inner(p, out, out);
             let factor = grown.simd_lt(lane(1.01)).select(grown.sqrt(), Lane::ONE);
             out.iter_mut().for_each(|x| *x *= factor);

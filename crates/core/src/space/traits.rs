@@ -4,24 +4,24 @@ use super::algebra::stretch_series;
 use crate::matrix::Matrix;
 use crate::scalar::{Lane, Scalar, dot, lane, max_or_nan};
 
-/// Vectors of this size and smaller, at points of size one, may be rounding errors as to direction: a
-/// residual is measured against it where a vector is smaller still.
+/// The directions of vectors up to this size, at points of size one, may be rounding errors. Residuals of smaller
+/// vectors are relative to this size.
 pub const ROUNDING_SIZE: Lane = Lane::splat(1e-7);
 
 /// Points and tangent vectors as ambient arrays of [`point_len`](Ambient::point_len) numbers (a complex number
 /// is two).
 ///
-/// The *deciding angle* of two points decides whether the geodesic between them is unique: then it is below
-/// [`cut_angle`](Ambient::cut_angle). It must be exact only near there; below, any upper bound will do. NaN in points
-/// must result in NaN. The result of a lane must not depend on its neighbours.
+/// The *deciding angle* of two points determines whether the geodesic between them is unique: it must be below
+/// [`cut_angle`](Ambient::cut_angle). It must be exact only near that angle; below it, any upper bound is sufficient.
+/// NaN in points must result in NaN. The result of a lane must not depend on its neighbours.
 pub trait Ambient: Copy + Send + Sync {
-    /// Numbers in the array of a point.
+    /// The number of entries in the array of a point.
     fn point_len(&self) -> usize;
     /// Shape of the array of a point.
     fn point_shape(&self) -> Vec<usize> {
         vec![self.point_len()]
     }
-    /// Whether the numbers of a point are complex, real and imaginary part side by side.
+    /// Whether the numbers of a point are complex, stored as pairs of real and imaginary part.
     fn is_complex(&self) -> bool {
         false
     }
@@ -34,29 +34,29 @@ pub trait Ambient: Copy + Send + Sync {
     fn is_connected(&self) -> bool {
         true
     }
-    /// Which of the two components of a space that is not connected a point belongs to.
+    /// The component of a disconnected space that contains a point.
     fn component(&self, _p: &[f64]) -> bool {
         true
     }
-    /// Whether multiplying all points by a number multiplies the curve by it. Then data of any size
-    /// are brought to size one first, so that squares neither overflow nor vanish.
+    /// Whether scaling all points scales the curve. Data of any size are then scaled to size one first, so that
+    /// squares neither overflow nor underflow.
     fn scales(&self) -> bool {
         false
     }
-    /// The deciding angle at which the cut locus is met; infinite where there is none.
+    /// The deciding angle of the cut locus; infinite without a cut locus.
     fn cut_angle(&self) -> f64;
     /// The deciding angle that a handle must not reach.
     fn longest_handle(&self) -> f64 {
         self.cut_angle()
     }
-    /// Distance below which the logarithm is defined in every direction; differs from the cut angle where length and
+    /// The distance below which the logarithm exists in every direction. It differs from the cut angle if length and
     /// angle differ.
     fn injectivity_radius(&self) -> f64 {
         self.cut_angle()
     }
 
-    /// Length from which a [`ray`](Ambient::ray) makes so much of rounding errors at its start that a geodesic
-    /// between its ends is better.
+    /// The length from which a [`ray`](Ambient::ray) amplifies rounding errors at its start so much that a geodesic
+    /// between its end points is more accurate.
     fn longest_ray(&self) -> f64 {
         f64::INFINITY
     }
@@ -65,7 +65,7 @@ pub trait Ambient: Copy + Send + Sync {
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]);
     /// `log_p(q)`, (11); returns the deciding angle.
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
-    /// Distance, given `log_p(q)` and the deciding angle; defined past the cut locus too.
+    /// Distance, given `log_p(q)` and the deciding angle; also defined beyond the cut locus.
     fn distance(&self, p: &[Lane], _q: &[Lane], log: &[Lane], _angle: Lane) -> Lane {
         max_or_nan(self.inner(p, log, log), Lane::ZERO).sqrt()
     }
@@ -85,15 +85,15 @@ pub trait Ambient: Copy + Send + Sync {
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]);
     /// Inner product of two tangent vectors at p.
     fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane;
-    /// Replaces x by a point of the space beside it; returns how far it was, relative to its size.
+    /// Replaces x by a point of the space close to it; returns the distance, relative to its size.
     fn project(&self, x: &mut [Lane]) -> Lane;
-    /// Replaces v by its tangential part at p; returns how far it was, relative to its size (or to
+    /// Replaces v by its tangential component at p; returns the size of the normal component, relative to v (or to
     /// [`ROUNDING_SIZE`]).
     fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
         let [off, size] = make_tangent(self, p, v);
         off / (size + ROUNDING_SIZE)
     }
-    /// Turns independent standard normal numbers into a random point.
+    /// Maps independent standard normal numbers to a random point.
     fn random_point(&self, noise: &mut [Lane]);
     /// Describes why x, which is finite, is not a point.
     fn violation(&self, x: &[f64]) -> String;
@@ -101,13 +101,13 @@ pub trait Ambient: Copy + Send + Sync {
     fn imprecise_point(&self, _points: &[f64]) -> Option<(usize, String)> {
         None
     }
-    /// How far apart neighbouring floating-point points are at p, in units of a rounding error; 1 or more.
+    /// The spacing of neighbouring floating-point points at p, in units of a rounding error; 1 or more.
     fn rounding(&self, _p: &[Lane]) -> Lane {
         Lane::ONE
     }
 }
 
-/// A moving frame: an element of the group that moves the origin to a point.
+/// A moving frame: an element of the group that maps the origin to a point.
 pub trait Frame: Ambient + Origin {
     /// Numbers in a frame.
     fn frame_len(&self) -> usize;
@@ -116,7 +116,7 @@ pub trait Frame: Ambient + Origin {
     /// Moves a frame at p along the geodesic to q, in parallel; `chord` becomes the coordinates of
     /// `log_p(q)`. Returns the deciding angle.
     fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane;
-    /// Removes the rounding errors that a frame at p has gathered, where `step` leaves any.
+    /// Removes the accumulated rounding errors of a frame at p, if `step` leaves any.
     fn reorthonormalize(&self, _frame: &mut [Lane], _p: &[Lane]) {}
     /// Coordinates of a tangent vector at p.
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]);
@@ -129,19 +129,19 @@ pub trait Frame: Ambient + Origin {
 pub trait Origin {
     /// Dimension of the space.
     fn dim(&self) -> usize;
-    /// Numbers that [`prepare`](Origin::prepare) keeps of a chord.
+    /// The number of entries that [`prepare`](Origin::prepare) computes for a chord.
     fn chord_len(&self) -> usize {
         0
     }
     /// K of (22).
     fn curvature(&self) -> f64;
 
-    /// Computes once for a chord what every call of [`inner_handles`](Origin::inner_handles) needs of it.
+    /// Precomputes, once per chord, what every call of [`inner_handles`](Origin::inner_handles) requires of it.
     fn prepare(&self, _chord: &[Lane], _prepared: &mut [Lane]) {}
     /// With `M = E(−a) E(d) E(−b)` for the chord d: `w⁺ = log_o(M·o)` and `w⁻ = log_o(M⁻¹·o)`.
     ///
-    /// These are the two logarithms of the C² condition (13), w of (16), seen from either end of a
-    /// segment whose end velocities are `3a` and `3b`.
+    /// These are the two logarithms of the C² condition (13), w of (16), at either end of a segment whose end
+    /// velocities are `3a` and `3b`.
     fn inner_handles<S: Scalar>(
         &self,
         chord: &[Lane],
@@ -151,10 +151,10 @@ pub trait Origin {
         w_plus: &mut [S],
         w_minus: &mut [S],
     );
-    /// `[a, [b, c]]`: the only algebra that 𝔪 has (its brackets lie outside). `ad_v²x` is `[v, [v, x]]`, the
-    /// curvature R(a, b)c is `[c, [a, b]]`.
+    /// `[a, [b, c]]`, the triple product of 𝔪 (brackets of two elements lie outside 𝔪). `ad_v²x` is `[v, [v, x]]`,
+    /// and the curvature R(a, b)c is `[c, [a, b]]`.
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]);
-    /// `S(v) x` with `S(v) = sinh(ad_v)/ad_v` of Lemma A.2; by its series unless a space knows better.
+    /// `S(v) x` with `S(v) = sinh(ad_v)/ad_v` of Lemma A.2; by default from its series.
     fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
         let values: Vec<Lane> = v.iter().map(|v| v.value()).collect();
         // By (22) ad_v is at most K|v|.
@@ -171,7 +171,7 @@ pub trait Origin {
     fn angle(&self, v: &[Lane]) -> Lane {
         dot(v, v).sqrt()
     }
-    /// By how much rounding errors may grow in [`inner_handles`](Origin::inner_handles) over a chord.
+    /// The growth of rounding errors in [`inner_handles`](Origin::inner_handles) over a chord.
     fn condition(&self, _chord: &[Lane]) -> Lane {
         Lane::ONE
     }
@@ -179,10 +179,10 @@ pub trait Origin {
 
 /// A symmetric space.
 pub trait Space: Frame {
-    /// Whether its operations are so cheap that a call through a table would cost. Then the loops over knots and
-    /// samples are compiled for this space alone.
+    /// Whether operations are so cheap that the cost of a call through a table would matter. The loops over knots and
+    /// samples are then compiled for this space alone.
     const HOT: bool = false;
-    /// Whether points are vectors of a few numbers, for which code of known sizes pays.
+    /// Whether points are vectors of a few numbers, for which code of constant size is faster.
     const VECTORS: bool = false;
 
     /// The deciding angle of `exp_p(v)`.
@@ -192,7 +192,7 @@ pub trait Space: Frame {
         self.coordinates(&frame, p, v, &mut x);
         self.angle(&x)
     }
-    /// Passes the space to the evaluation of curves: as it is, or as covered by another space.
+    /// Passes the space to the evaluation of curves, either directly or as covered by another space.
     fn evaluate_with<E: Evaluation>(&self, evaluation: E) {
         evaluation.direct(self);
     }
@@ -206,26 +206,26 @@ pub trait Evaluation {
     fn covered<C: Covered>(self, space: &C);
 }
 
-/// A space that is evaluated in another one that covers it locally.
+/// A space whose curves are evaluated in another space that covers it locally.
 pub trait Covered: Space {
     /// The covering space.
     type Cover: Space;
     /// The covering space.
     fn cover(&self) -> Self::Cover;
-    /// Brings a segment of a curve into the cover: its end points and tangent vectors there.
+    /// Lifts a segment of a curve to the cover: its end points and tangent vectors there.
     fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]);
-    /// Of the points of the cover over a control point q takes the one nearest to the other control point, and with
-    /// it the end y of the segment and the tangent vector w there.
+    /// Selects, of the points of the cover over a control point q, the one nearest to the other control point, and
+    /// with it the end point y of the segment and the tangent vector w there.
     fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
-    /// A tangent vector w at y of the cover as the moving body has it, in the first numbers of `out`: the element ω
-    /// of the Lie algebra with p' = pω.
+    /// A tangent vector w at y of the cover in the body frame, in the first numbers of `out`: the element ω of the
+    /// Lie algebra with p' = pω.
     fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane];
-    /// Brings a point of the cover and, if given, a tangent vector there back: writes the point, or the
+    /// Projects a point of the cover and, if given, a tangent vector there to the space: writes the point or the
     /// vector.
     fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);
 }
 
-/// Replaces v by its tangential part at p; returns how far it was, and its size, as arrays.
+/// Replaces v by its tangential component at p; returns the size of the normal component, and of v, as arrays.
 pub(super) fn make_tangent<M: Ambient>(space: &M, p: &[Lane], v: &mut [Lane]) -> [Lane; 2] {
     let before = v.to_vec();
     space.velocity(p, v);
@@ -233,7 +233,7 @@ pub(super) fn make_tangent<M: Ambient>(space: &M, p: &[Lane], v: &mut [Lane]) ->
     [off2.sqrt(), dot(&before, &before).sqrt()]
 }
 
-/// `angle` less what angles lose to rounding: what is within of the cut locus is on it.
+/// `angle` less the rounding error of angles: angles within that of the cut locus count as on it.
 pub fn below(angle: f64) -> Lane {
     lane(angle * (1.0 - 4.0 * f64::EPSILON))
 }
