@@ -26,6 +26,8 @@ Doubles = NDArray[np.float64]
 
 # Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12
+# The cube of the time between the first and the last datum must not overflow.
+_LONGEST = 1e100
 
 
 class SmoothingData(NamedTuple):
@@ -208,6 +210,8 @@ def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[
             f"t{[*curve, i + 1]} is before t{[*curve, i]}. Sort times and points together, for instance with "
             "order = np.argsort(t)."
         )
+    if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
+        raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")
     return time_axis, shown_times, times
 
 

@@ -1,7 +1,7 @@
 //! Block tridiagonal systems, open and cyclic, against their residual.
 
-use symspline::fit::Blocks;
-use symspline::scalar::{Lane, lane};
+use symspline_engine::fit::Blocks;
+use symspline_engine::scalar::{Lane, lane};
 
 /// Pseudo-random numbers, equal in every run.
 fn noise(seed: u64) -> impl FnMut() -> f64 {

@@ -3,23 +3,36 @@
 use std::sync::Arc;
 use symspline_core::space::{Entry, Erased, Kernels};
 
+#[cfg(feature = "forms")]
 pub use symspline_forms::{PositiveDefinite, Siegel};
-pub use symspline_groups::{Rotations, SpecialEuclidean, UnitaryGroup, orthogonal, special_orthogonal};
+#[cfg(feature = "groups")]
+pub use symspline_groups::{Rotations, SpecialEuclidean, matrix_of_quaternion, quaternion_of_matrix};
+#[cfg(feature = "unitary")]
+pub use symspline_groups::{UnitaryGroup, orthogonal, special_orthogonal};
+#[cfg(feature = "linear")]
 pub use symspline_linear::{GeneralLinear, IndefiniteGrassmannian, Members};
+#[cfg(feature = "subspaces")]
 pub use symspline_subspaces::{ComplexHyperbolic, QuaternionicProjective, Subspaces};
+#[cfg(feature = "vectors")]
 pub use symspline_vectors::{AntiDeSitter, Curved, DeSitter, Euclidean, Hyperbolic, Sphere};
+
+/// The families of spaces that were compiled.
+const FAMILIES: &[&[Entry]] = &[
+    #[cfg(feature = "vectors")]
+    symspline_vectors::FAMILY,
+    #[cfg(feature = "subspaces")]
+    symspline_subspaces::FAMILY,
+    #[cfg(feature = "groups")]
+    symspline_groups::FAMILY,
+    #[cfg(feature = "forms")]
+    symspline_forms::FAMILY,
+    #[cfg(feature = "linear")]
+    symspline_linear::FAMILY,
+];
 
 /// Every kind of space.
 pub fn all() -> impl Iterator<Item = &'static Entry> {
-    [
-        symspline_vectors::FAMILY,
-        symspline_subspaces::FAMILY,
-        symspline_groups::FAMILY,
-        symspline_forms::FAMILY,
-        symspline_linear::FAMILY,
-    ]
-    .into_iter()
-    .flatten()
+    FAMILIES.iter().copied().flatten()
 }
 
 /// The upper limit of numbers in the name of a space, so that sizes of arrays do not overflow.
@@ -59,6 +72,11 @@ impl AnySpace {
     /// The operations of the space.
     pub fn get(&self) -> Erased<'_> {
         Erased(&*self.table)
+    }
+
+    /// The same, for an owner.
+    pub fn table(&self) -> Arc<dyn Kernels> {
+        self.table.clone()
     }
 
     /// The canonical name and the parameters.

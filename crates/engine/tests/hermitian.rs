@@ -1,11 +1,11 @@
 //! Functions of Hermitian matrices: exponential and logarithm are inverse over decades of size, and series and
 //! eigenvectors agree where eigenvalues coincide or nearly do, derivatives included.
 
-use symspline::matrix::{
+use symspline_engine::matrix::{
     Matrix, Unary, arc, diagonalize, exp_minus_one, exp_skew_minus_one, function_of, log_one_plus,
     orthogonalize, orthonormalize, reorthonormalize, trig,
 };
-use symspline::scalar::{Dual, Jet, Lane, Scalar, lane};
+use symspline_engine::scalar::{Dual, Jet, Lane, Scalar, lane};
 
 /// Pseudo-random numbers, equal in every run.
 struct Noise(u64);

@@ -1,7 +1,7 @@
 //! The special functions against values of 40 digits (`reference/make_special.py`).
 
-use symspline::scalar::{Jet, Lane, lane};
-use symspline::special::{Trig, arc_defect, slerp, theta_over_sin};
+use symspline_engine::scalar::{Jet, Lane, lane};
+use symspline_engine::special::{Trig, arc_defect, slerp, theta_over_sin};
 
 const REFERENCE: &str = include_str!("reference/special.csv");
 

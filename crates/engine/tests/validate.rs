@@ -1,9 +1,9 @@
 //! Every fault of the input is reported with its curve and node.
 
-use symspline::fit::{End, Ends, Problem};
-use symspline::space::Erased;
-use symspline::spaces::{AnySpace, Sphere};
-use symspline::validate::{Invalid, Reason, validate};
+use symspline_engine::fit::{End, Ends, Problem};
+use symspline_engine::space::Erased;
+use symspline_engine::spaces::{AnySpace, Sphere};
+use symspline_engine::validate::{Invalid, Reason, validate};
 
 const T: [f64; 3] = [0.0, 1.0, 2.5];
 const POINTS: [f64; 9] = [1.0, 0.0, 0.0, 0.8, 0.6, 0.0, 0.6, 0.64, 0.48];

@@ -1,11 +1,11 @@
 //! Fitted curves are C² splines: on curved spaces, by every solver, with every end.
 
-use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
-use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
-use symspline::monitor::Monitor;
-use symspline::scalar::{Lane, lane};
-use symspline::space::{Ambient, Erased, Frame, Origin};
-use symspline::spaces::AnySpace;
+use symspline_engine::curve::{Curves, Outside, Quantity, Times, evaluate};
+use symspline_engine::fit::{End, Ends, Method, Options, Problem, Status, fit};
+use symspline_engine::monitor::Monitor;
+use symspline_engine::scalar::{Lane, lane};
+use symspline_engine::space::{Ambient, Erased, Frame, Origin};
+use symspline_engine::spaces::AnySpace;
 
 /// Spaces of positive and of negative curvature, of vectors and of matrices, with one array per point.
 const SPACES: &[(&str, &[usize], f64)] = &[

@@ -3,9 +3,9 @@
 
 // ---- the page begins ----
 use std::f64::consts::PI;
-use symspline::scalar::{Lane, Scalar, dot, lane, max_or_nan};
-use symspline::space::Model;
-use symspline::special::Trig;
+use symspline_engine::scalar::{Lane, Scalar, dot, lane, max_or_nan};
+use symspline_engine::space::Model;
+use symspline_engine::special::Trig;
 
 /// Tⁿ = S¹ × … × S¹: n unit vectors of R².
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,13 +138,13 @@ impl Model for Torus {
 }
 // ---- the page ends ----
 
-use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
-use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
-use symspline::laws::check;
-use symspline::monitor::Monitor;
-use symspline::rows::{Fault, Operation, apply, project_points};
-use symspline::space::Erased;
-use symspline::spaces::Euclidean;
+use symspline_engine::curve::{Curves, Outside, Quantity, Times, evaluate};
+use symspline_engine::fit::{End, Ends, Method, Options, Problem, Status, fit};
+use symspline_engine::laws::check;
+use symspline_engine::monitor::Monitor;
+use symspline_engine::rows::{Fault, Operation, apply, project_points};
+use symspline_engine::space::Erased;
+use symspline_engine::spaces::Euclidean;
 
 #[test]
 fn it_obeys_every_law() {

@@ -1,7 +1,7 @@
 //! Every space obeys every law.
 
-use symspline::laws::check;
-use symspline::spaces::{AnySpace, all};
+use symspline_engine::laws::check;
+use symspline_engine::spaces::{AnySpace, all};
 
 /// A few sizes of every kind: the smallest, one for every branch of the code, and one of another shape.
 const SIZES: &[(&str, &[&[usize]])] = &[
