@@ -6,7 +6,6 @@ from curves import (
     KNOTS,
     S2,
     THREE,
-    every_common,
     every_kind,
     found,
     pick,
@@ -34,13 +33,6 @@ def test_a_batch_is_a_sequence(space):
     assert same_curve(spline[2][1], ss.CubicSpline(KNOTS, pick(p, (2, 1)), space, bc_type=spline[2][1].bc_type))
 
 
-def test_a_batch_ends():
-    batch = ss.CubicSpline(None, [THREE] * 4, S2)
-    for index in (4, -5):
-        with pytest.raises(IndexError):
-            batch[index]
-
-
 def test_own_times_are_picked_with_the_curve():
     t = np.array([[0.0, 1, 2], [5, 7, 8]])
     spline = ss.CubicSpline(t, [THREE, THREE], S2)
@@ -59,6 +51,9 @@ def test_single_curve_is_not_a_sequence():
     for index in ("0", 0.0, (0, 1), None):
         with pytest.raises(TypeError, match="integer or a slice"):
             batch[index]
+    for index in (2, -3):
+        with pytest.raises(IndexError, match="there are 2 curves"):
+            batch[index]
 
 
 @pytest.mark.parametrize("shape", [(2, 3), (3,), (1, 3)], ids=str)
@@ -73,21 +68,6 @@ def test_a_slice_may_be_empty():
     none = ss.CubicSpline(None, [THREE, THREE], S2)[2:]
     assert len(none) == 0 and none(0.5).shape == (0, 3) and "0 curves" in repr(none)
     assert str(none.report).startswith("no curves") and none.length().shape == (0,)
-
-
-@every_common
-@pytest.mark.parametrize("outside", ["geodesic", True])
-def test_many_curves_at_the_same_times_are_each_the_curve_alone(space, outside):
-    """Eight curves at a time go through their segments together; 19 leave three that do not."""
-    spline = ss.CubicSpline([0, 1, 2.5, 3, 5], points_on(space, 5, (19,), step=0.4), space)
-    x = np.random.default_rng(0).uniform(-0.5, 5.5, 40)
-    for times in (x, np.sort(x)):
-        for nu in range(3):
-            values = spline(times, nu=nu, extrapolate=outside)
-            for k in (0, 7, 8, 18):
-                assert same(pick(values, k), spline[k](times, nu=nu, extrapolate=outside))
-        speed = spline.speed(times, extrapolate=outside)
-        assert same(speed[13], spline[13].speed(times, extrapolate=outside))
 
 
 @pytest.mark.parametrize("name", ["s:2", "so:3", "cp:2", "gr:2,400", "s:2 x r:1"])

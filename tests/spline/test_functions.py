@@ -23,14 +23,6 @@ from refused import NAN, P
 import symspline as ss
 
 
-@every_common
-def test_evaluate_per_curve(space):
-    spline = ss.CubicSpline(None, points_on(space, 5, (2,)), space)
-    x = np.array([[0.5, 1], [2, 3.5]])
-    found = ss.evaluate(None, spline.points, spline.velocities, space, x, per_curve=True)
-    assert same(found, spline(x, per_curve=True))
-
-
 def test_evaluate_over_dates():
     spline = ss.CubicSpline(np.datetime64("2024-01-01T00", "h") + np.array([0, 1, 3]), THREE, S2)
     x = spline.t[0] + np.timedelta64(90, "m")
@@ -56,10 +48,6 @@ def test_fit_many_of_closed_curves_and_of_dates():
     closed = [(None, [*THREE, THREE[0]]), (np.datetime64("2024-01-01") + np.arange(4), [*THREE, THREE[0]])]
     for spline, (t, p) in zip(ss.fit_many(closed, S2, bc_type="periodic"), closed, strict=True):
         assert same_curve(spline, ss.CubicSpline(t, p, S2, bc_type="periodic"))
-
-
-def test_fit_many_of_an_empty_list():
-    assert ss.fit_many([], S2) == []
 
 
 @every_kind

@@ -201,16 +201,6 @@ def test_control_points_beyond_reach_raise(batch, curve):
         ss.HermiteSpline(None, points, velocities, S2)
 
 
-def test_only_batches_are_sequences():
-    found = curve(S2)
-    for use in (len, lambda s: s[0]):
-        with pytest.raises(TypeError, match="one curve"):
-            use(found)
-    with pytest.raises(TypeError, match="integer or a slice"):
-        curve(S2, (2,))["a"]
-    assert found
-
-
 def test_velocities_become_tangent_to_rounding():
     """They may be off by what rounded files are."""
     p = points_on(S2)

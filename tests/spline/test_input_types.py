@@ -157,16 +157,6 @@ def test_time_zones_are_kept(zone, kind):
                     curve(x)
 
 
-def test_many_curves_in_a_file_are_of_one_kind_of_time(tmp_path):
-    aware = [moment.replace(tzinfo=BERLIN) for moment in NAIVE]
-    one, other = (ss.CubicSpline(t, P, S2) for t in (aware, NAIVE))
-    with pytest.raises(ss.ValidationError, match=r"differ in .*unit.* times of one type"):
-        ss.save({"one": one, "other": other}, tmp_path / "c.npz")
-    ss.save({"one": one}, tmp_path / "c.npz")
-    with pytest.raises(ss.ValidationError, match="x has no time zone"):
-        ss.load(tmp_path / "c.npz")["one"](NAIVE[1])
-
-
 def test_max_gap_accepts_durations():
     t = [timedelta(0), timedelta(seconds=1), timedelta(seconds=3)]
     (piece,) = ss.fit_segments(t, P, S2, max_gap=5)

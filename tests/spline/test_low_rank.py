@@ -1,6 +1,5 @@
 """Curves of high ambient dimension, which are computed in the span of their points."""
 
-import pickle
 import sys
 
 import numpy as np
@@ -70,17 +69,6 @@ def data(space, rng, kind="natural", n=N):
     p = (closed_walk if kind == "periodic" else walk)(space, 0.5, n, rng)
     t = np.cumsum(rng.uniform(0.7, 1.3, len(p)))
     return t, p, end_conditions(kind, *(0.6 * unit_tangent(space, p[i], rng) for i in (0, -1)))
-
-
-@every_space
-@loop_over("method", ["auto", "fixed-point", "newton"])
-def test_solvers(name, method, rng):
-    embed = Embedded(name, rng)
-    t, p, _ = data(embed.small, rng)
-    here, there = (ss.CubicSpline(t, *x, method=method) for x in ((embed(p), embed.space), (p, embed.small)))
-    embed.check(here, there)
-    assert here.report.method == there.report.method and here.report.curvature == embed.space.curvature
-    assert np.isclose(here.report.max_step, there.report.max_step, rtol=1e-12)
 
 
 @every_space
@@ -194,16 +182,6 @@ def test_error_names_the_invalid_curve(rng):
         ss.CubicSpline(None, np.stack([good, far]), space)
     with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
         ss.fit_many([(None, good), (None, good * [[1.0], [2], [1], [1], [1]])], space)
-
-
-@every_large
-def test_copies(space, rng):
-    spline = ss.CubicSpline(None, walk(space, 0.4, 6, rng), space, extrapolate="geodesic")
-    x = [-1.0, 0.3, 2.0, 7.0]
-    before = [spline(x, nu) for nu in range(3)]
-    made = pickle.loads(pickle.dumps(spline))
-    assert made == spline and made.report == spline.report
-    assert all(np.array_equal(made(x, nu), y) for nu, y in enumerate(before))
 
 
 def test_products_have_large_factors(rng):

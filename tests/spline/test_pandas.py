@@ -21,19 +21,6 @@ def test_times_with_a_zone_become_utc(times):
         spline(pd.Timestamp("2026-01-01 00:00"))
 
 
-def test_two_zones_are_one_time():
-    spline = ss.CubicSpline(BERLIN, np.eye(3), "sphere:2")
-    there = BERLIN.tz_convert("America/New_York")
-    assert np.array_equal(spline(there), spline(BERLIN)) and np.array_equal(spline(BERLIN), np.eye(3))
-    # The same hours of the clock are six hours later.
-    with pytest.raises(ss.ValidationError, match="outside the knots"):
-        spline(BERLIN.tz_localize(None).tz_localize("America/New_York"))
-    (piece,) = ss.fit_segments(BERLIN, np.eye(3), "sphere:2", max_gap=7200)
-    assert np.array_equal(piece(there), np.eye(3))
-    with pytest.raises(ss.ValidationError, match="x has no time zone"):
-        piece(BERLIN.tz_localize(None))
-
-
 @pytest.mark.parametrize(
     "times, expected",
     [

@@ -42,12 +42,6 @@ def test_a_flipped_sample_warns_once_with_advice():
     assert warning.category is UserWarning
 
 
-def test_a_little_more_than_half_a_turn_warns():
-    q = np.array([[1, 0, 0, 0], [np.cos(1.572), np.sin(1.572), 0, 0]])
-    with pytest.warns(UserWarning, match="inner product -0.0012"):
-        ss.CubicSpline(None, q, "sphere:3")
-
-
 def test_warning_names_the_curve():
     good, bad, late = motion(), flipped(3), flipped(9)
     for call, curve in (
@@ -77,17 +71,6 @@ def test_other_motions_do_not_warn():
     q[3] = -q[2]
     with pytest.raises(ss.CutLocusError):
         silent(lambda: ss.CubicSpline(None, q, S3))
-
-
-def test_warning_conditions():
-    # One sample with the other sign makes two and a half turns of half a one.
-    def turned(space, points):
-        return ss.CubicSpline(None, points, space).length()
-
-    assert turned("rp:3", flipped(4)) == pytest.approx(np.pi / 2, rel=1e-12)
-    with pytest.warns(UserWarning):
-        spline = ss.CubicSpline(None, flipped(4), "sphere:3", method="newton")
-    assert spline.length() > 5
 
 
 def test_noisy_quaternions_and_those_with_velocities():

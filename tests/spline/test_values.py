@@ -12,9 +12,9 @@ from curves import (
     S2,
     THREE,
     every_batch,
+    every_common,
     every_kind,
     found,
-    pair_of_curves,
     points_on,
     same,
     same_curve,
@@ -87,18 +87,10 @@ def test_splines_compare():
         hash(spline)
 
 
-@every_kind
+@every_common
 @every_batch
 def test_curves_print(space, batch):
     line = repr(ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space))
     assert line.startswith("<CubicSpline") and repr(space) in line and "6 points, natural" in line
     assert "\n" not in line
     assert not batch or " x ".join(map(str, batch)) in line
-
-
-@pytest.mark.parametrize("space", ["sphere:2", "sphere:2 x r:3"])
-def test_parts_of_a_batch_are_splines(space):
-    batch = pair_of_curves(ss.space(space))
-    for spline in (batch[1], batch[:1]):
-        assert type(spline) is ss.CubicSpline and type(spline.report) is ss.Report
-    assert pickle.loads(pickle.dumps(batch[1])).report == batch[1].report == batch.report.map(lambda c: c[1])
