@@ -78,17 +78,6 @@ def test_flat_derivatives_match_scipy():
                 np.testing.assert_allclose(found, expected(x, nu), atol=1e-14)
 
 
-def test_flat_knot_derivatives_match_scipy():
-    scipy = pytest.importorskip("scipy.interpolate")
-    rng, x = np.random.default_rng(13), np.linspace(0.1, 3.9, 9)
-    t, y, change = np.array([0.0, 0.7, 2.0, 2.5, 4.0]), rng.normal(size=5), rng.normal(size=5)
-    for bc in ("natural", "clamped", "not-a-knot"):
-        low, high = (scipy.CubicSpline(t + e * change, y, bc_type=bc) for e in (-1e-5, 1e-5))
-        found = ss.CubicSpline(t, y[:, None], "r:1", bc_type=bc).jvp(x, t=change)[:, 0]
-        # Central differences of second order.
-        np.testing.assert_allclose(found, (high(x) - low(x)) / 2e-5, atol=1e-8)
-
-
 @grouped("case, end", {name: pairs for name, pairs in EACH.items() if not pairs[0][0].few})
 def test_derivatives_are_finite_at_coinciding_points(case, end):
     space, t, points, bc = data(case, end)

@@ -35,18 +35,6 @@ def test_batches(case, batch, rng):
         assert np.shape(curve.speed(x)) == (*batch, *np.shape(x))
 
 
-def test_many_threads_change_nothing(rng):
-    space = ss.Sphere(3)
-    points = space.random_point(rng, (40, 6))
-    curve, x = ss.BSpline(clamped([1.0, 2.0], 3), points, 3, space), np.linspace(0, 3, 999)
-    try:
-        ss.set_num_threads(1)
-        alone = curve(x, nu=1)
-    finally:
-        ss.set_num_threads(0)
-    assert np.array_equal(curve(x, nu=1), alone)
-
-
 @pytest.mark.parametrize("name", ["sphere:2", "u:2", "cp:1", "so:3"])
 def test_input_of_any_type_and_layout(name, rng):
     space = ss.space(name)
@@ -65,12 +53,6 @@ def test_input_of_any_type_and_layout(name, rng):
     for array in (curve.knots, curve.control_points):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
-
-
-def test_real_control_points_of_a_complex_space(rng):
-    points = walk(ss.SpecialOrthogonal(2), 0.4, 4, rng)
-    curve = ss.BezierCurve(points, "u:2")
-    assert curve == ss.BezierCurve(points + 0j, "u:2") and curve(0.3).dtype == np.complex128
 
 
 @pytest.mark.parametrize("name", ["sphere:2", "u:2", "gr:2,5"])
@@ -264,9 +246,3 @@ def test_times_outside(x, match):
     for call in (curve, curve.speed):
         with pytest.raises(ss.ValidationError, match=match):
             call(x)
-
-
-@pytest.mark.parametrize("nu", [3, -1, 1.5, "1", None, [1]])
-def test_missing_derivatives_raise(nu):
-    with pytest.raises(ss.ValidationError, match=r"nu must be 0, 1 or 2, not "):
-        ss.BezierCurve(P, "sphere:2")(0.5, nu=nu)

@@ -76,22 +76,6 @@ def test_curves_that_stand_still_have_derivatives(name):
         np.testing.assert_allclose(second, np.dot([-1, 16, -30, 16, -1], values) / (12 * h * h), atol=1e-5)
 
 
-def test_derivatives_of_third_order_in_time():
-    """Of a geodesic on a sphere, and of a resting one."""
-    p = jnp.array([[1.0, 0, 0], [0.0, 1, 0]])
-    u = jnp.array([[0, 1.0, 0], [-1.0, 0, 0]]) * np.pi / 2
-
-    @jax.jit
-    def third(points, u):
-        curve = lambda x: evaluate(jnp.arange(2.0), points, u, "sphere:2", x)  # noqa: E731
-        return jax.jacfwd(jax.jacfwd(jax.jacfwd(curve)))(0.4)
-
-    angle = 0.2 * np.pi
-    expected = (np.pi / 2) ** 3 * np.array([np.sin(angle), -np.cos(angle), 0])
-    np.testing.assert_allclose(third(p, u), expected, atol=1e-12)
-    np.testing.assert_allclose(third(p[jnp.array([0, 0])], 0 * u), np.zeros(3), atol=1e-15)
-
-
 def test_the_core_has_the_same_gradient():
     """With respect to points and velocities, by finite differences of `symspline.evaluate`."""
     space = ss.space("spd:2")

@@ -4,7 +4,6 @@ import mpmath
 import numpy as np
 import pytest
 from cases import EPS, LINEAR
-from curves import points_on
 from scipy.linalg import expm, logm
 
 import symspline as ss
@@ -13,7 +12,6 @@ SEED = 8
 
 NAMES = ["gl:2", "gl:3", "cgl:2", "aff:2", "sim:3", "sl:3", "sp:4", "so:1,3"]
 every = pytest.mark.parametrize("name", NAMES)
-KNOTS = np.array([0.0, 0.7, 2.0, 2.4, 3.9, 5.0])
 
 
 def defect(name, p):
@@ -86,58 +84,6 @@ def test_determinants_of_opposite_signs():
         ss.GeneralLinear(2).distance(p[0], p[2])
     # Both may be negative.
     ss.CubicSpline(None, np.array(p)[:2] @ np.diag([1.0, -1.0]), "gl:2")
-
-
-@every
-def test_curves_stay_in_a_closed_subgroup(name):
-    space = ss.space(name)
-    p = points_on(space, 6, step=0.7)
-    whole = ss.space(("cgl" if np.iscomplexobj(p) else "gl") + f":{p.shape[-1]}")
-    x = np.linspace(KNOTS[0], KNOTS[-1], 101)
-    for bc_type in ("natural", "not-a-knot", "clamped"):
-        own, free = (ss.CubicSpline(KNOTS, p, s, bc_type=bc_type, tol=1e-14) for s in (space, whole))
-        for spline in (own, free):
-            values = spline(x)
-            assert defect(name, values) <= 1e-14 * max(1.0, np.abs(values).max() ** 2)
-        for nu in range(3):
-            scale = np.abs(own(x, nu)).max()
-            # Acceleration: eight times the jump that the solver's tolerance leaves.
-            np.testing.assert_allclose(free(x, nu), own(x, nu), rtol=0, atol=1e-12 * max(1.0, scale))
-
-
-@every
-def test_curves_do_not_depend_on_bases_of_either_side(name, rng):
-    space = ss.space(name)
-    p = points_on(space, 6, step=0.6)
-    g, h = space.random_point(rng), space.random_point(rng)
-    x = np.linspace(KNOTS[0], KNOTS[-1], 51)
-    spline = ss.CubicSpline(KNOTS, p, space, tol=1e-14)
-    moved = ss.CubicSpline(KNOTS, g @ p @ h, space, tol=1e-14)
-    for nu in range(3):
-        expected = g @ spline(x, nu) @ h
-        room = 2e-13 * np.linalg.cond(g) * np.linalg.cond(h) * max(1.0, np.abs(expected).max())
-        np.testing.assert_allclose(moved(x, nu), expected, rtol=0, atol=room)
-    # x ↦ x⁻¹ is a symmetry too.
-    back = ss.CubicSpline(KNOTS, np.linalg.inv(p), space, tol=1e-14)
-    np.testing.assert_allclose(back(x), np.linalg.inv(spline(x)), rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize(("small", "large"), [("se:3", "gl:4"), ("se:2", "aff:2"), ("so:3", "gl:3"), ("u:2", "cgl:2")])
-def test_spaces_that_lie_in_it(small, large):
-    p = points_on(ss.space(small), 6, step=0.7)
-    x = np.linspace(KNOTS[0], KNOTS[-1], 101)
-    a, b = (ss.CubicSpline(KNOTS, p, name, bc_type="not-a-knot", tol=1e-14) for name in (small, large))
-    for nu in range(3):
-        np.testing.assert_allclose(b(x, nu), a(x, nu), rtol=0, atol=2e-13 * np.abs(a(x, nu)).max())
-
-
-def test_positive_numbers_are_a_line():
-    # GL(1) is (0, ∞), on which the curve is the classical one of the logarithms.
-    y = np.array([0.0, 1.0, -0.5, 2.0, 0.3, 0.0])
-    spline = ss.CubicSpline(KNOTS, np.exp(y)[:, None, None], "gl:1", bc_type="not-a-knot")
-    x = np.linspace(0, 5, 41)
-    flat = ss.CubicSpline(KNOTS, y[:, None], "r:1", bc_type="not-a-knot")
-    np.testing.assert_allclose(np.log(spline(x)[:, 0, 0]), flat(x)[:, 0], rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(

@@ -79,18 +79,6 @@ def test_geodesics_broadcast_their_times(space):
     assert found(grid) == shaped(space, (5, 7))
 
 
-@every_space
-def test_operations_fit_together(space):
-    near = points_on(space, 5, step=0.5)
-    p, q = pick(near, slice(None, -1)), pick(near, slice(1, None))
-    v = space.log(p, q)
-    assert off(space, space.exp(p, v), q) < 20 * EPS
-    assert np.allclose(space.norm(p, v), space.distance(p, q), rtol=1e-13)
-    assert np.allclose(space.inner(p, v, v), space.norm(p, v) ** 2, rtol=1e-14)
-    assert off(space, space.transvection(p, v, p), q) < 20 * EPS
-    assert largest_difference(space.transport(p, q, v), each(np.negative, space.log(q, p))) < 40 * EPS
-
-
 # ---- random points and tangents ----
 
 
