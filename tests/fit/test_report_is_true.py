@@ -232,23 +232,15 @@ def test_times_may_have_any_unit(unit, ends):
 
 
 @pytest.mark.parametrize("unit", [1e-200, 1e-90, 1.0, 1e90, 1e200])
-def test_length_is_a_double_where_it_can_be(unit):
+def test_length_and_energy_are_floating_point_numbers_where_they_can_be(unit):
     for s in (1e-200, 1.0, 1e200):
-        if not 1e-300 < s / unit < 1e300:
-            # Velocities are no doubles.
-            continue
-        spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
-        assert spline.length() == pytest.approx(10 * s, rel=0.1, abs=0)
-        straight = ss.CubicSpline(np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
-        assert straight.length() == pytest.approx(10 * s, rel=1e-14, abs=0)
-
-
-@pytest.mark.parametrize("unit", [1e-90, 1e-40, 1.0, 1e40, 1e90])
-def test_bending_energy_is_a_double_where_it_can_be(unit):
-    spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, np.eye(3), "sphere:2")
-    assert spline.bending_energy() * unit**3 == pytest.approx(
-        ss.CubicSpline([0, 1, 3.0], np.eye(3), "sphere:2").bending_energy(), rel=1e-12
-    )
+        # Otherwise velocities are not.
+        if 1e-300 < s / unit < 1e300:
+            straight = ss.CubicSpline(np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
+            assert straight.length() == pytest.approx(10 * s, rel=1e-14, abs=0)
+    if 1e-100 < unit < 1e100:
+        one, spline = (ss.CubicSpline(np.array([0, 1, 3.0]) * h, np.eye(3), "sphere:2") for h in (1.0, unit))
+        assert spline.bending_energy() * unit**3 == pytest.approx(one.bending_energy(), rel=1e-12)
 
 
 # ---- far out in hyperbolic space ----
@@ -313,23 +305,3 @@ def test_the_longest_step_without_an_invariant_metric(name):
     # Of an indefinite metric it is the size of the logarithm at the later point.
     longest = space.distance(p[1:], p[:-1]).max()
     assert ss.CubicSpline(None, p, space).report.max_step == pytest.approx(longest, rel=1e-11)
-
-
-@pytest.mark.parametrize("unit", [1.0, 1e3])
-@pytest.mark.parametrize("name", ["se:2", "se:3", "aff:3", "gl:4"])
-def test_long_ways_are_not_far_apart(name, unit):
-    """It is angles that come near the cut locus, whatever the unit of length."""
-    n, rng = (3 if name == "se:2" else 4), np.random.default_rng(3)
-    space = ss.SpecialEuclidean(n - 1)
-    p = [np.eye(n)]
-    for _ in range(11):
-        v = unit * rng.standard_normal(n - 1)
-        p.append(space.exp(p[-1], space.project_tangent(p[-1], p[-1] @ _twist(n, 0.2, v))))
-    found = [ss.CubicSpline(None, p, name, method=method).report for method in ("auto", "quasi-newton")]
-    assert found[0].method == "quasi-newton" and found[0].iterations == found[1].iterations
-
-
-def _twist(n, turn, velocity):
-    xi = np.zeros((n, n))
-    xi[0, 1], xi[1, 0], xi[:-1, -1] = -turn, turn, velocity
-    return xi

@@ -3,34 +3,15 @@
 import numpy as np
 import pytest
 from curves import (
-    KNOTS,
     S2,
     THREE,
-    every_kind,
     found,
-    pick,
-    points_on,
     same,
     same_curve,
     shaped,
-    with_ends,
 )
 
 import symspline as ss
-
-
-@every_kind
-def test_a_batch_is_a_sequence(space):
-    p = points_on(space, batch=(3, 2), step=0.5)
-    bc_type = with_ends(space, p)
-    spline = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type)
-    assert len(spline) == 3 and [len(one) for one in spline] == [2] * 3
-    for index in (0, -1, np.int64(2), slice(1, None), slice(0, 2), slice(None, None, -2)):
-        own = tuple((order, pick(v, index)) for order, v in bc_type)
-        one = ss.CubicSpline(KNOTS, pick(p, index), space, bc_type=own)
-        assert same_curve(spline[index], one)
-        assert all(same(a[1], b[1]) for a, b in zip(spline[index].bc_type, one.bc_type, strict=True))
-    assert same_curve(spline[2][1], ss.CubicSpline(KNOTS, pick(p, (2, 1)), space, bc_type=spline[2][1].bc_type))
 
 
 def test_own_times_are_picked_with_the_curve():
@@ -40,20 +21,6 @@ def test_own_times_are_picked_with_the_curve():
     assert same(spline[1](6.5), spline([[1.0], [6.5]], per_curve=True)[1, 0])
     dates = ss.CubicSpline(t.astype("M8[s]"), [THREE, THREE], S2)
     assert same(dates[1](np.datetime64(7, "s")), dates[1].points[1])
-
-
-def test_single_curve_is_not_a_sequence():
-    spline = ss.CubicSpline(None, THREE, S2)
-    for use in (len, iter, lambda s: s[0]):
-        with pytest.raises(TypeError, match="batch"):
-            use(spline)
-    batch = ss.CubicSpline(None, [THREE] * 2, S2)
-    for index in ("0", 0.0, (0, 1), None):
-        with pytest.raises(TypeError, match="integer or a slice"):
-            batch[index]
-    for index in (2, -3):
-        with pytest.raises(IndexError, match="there are 2 curves"):
-            batch[index]
 
 
 @pytest.mark.parametrize("shape", [(2, 3), (3,), (1, 3)], ids=str)

@@ -5,7 +5,6 @@ import pytest
 from cases import EPS, QUADRICS, loop_over
 from curves import (
     KNOTS,
-    S2,
     at_node,
     bezier,
     each,
@@ -21,7 +20,6 @@ from curves import (
 )
 
 import symspline as ss
-from symspline import rotations
 
 OUTSIDE = [-0.5, 4.75]
 
@@ -66,20 +64,6 @@ def test_out_holds_nan_outside():
     out = np.zeros((2, 3))
     assert spline("sphere:2")([1.0, 6.0], extrapolate=False, out=out) is out
     assert np.isfinite(out[0]).all() and np.isnan(out[1]).all()
-
-
-@every_common
-@loop_over("policy", [None, False, True, "geodesic", "periodic"])
-def test_policies_differ_only_outside(space, policy):
-    spline, x = ss.CubicSpline(KNOTS, points_on(space, 6), space), np.linspace(0, 4.5, 31)
-    for nu in range(3):
-        assert same(spline(x, nu=nu, extrapolate=policy), spline(x, nu=nu))
-
-
-def test_dates_extrapolate_too():
-    t = np.datetime64("2024-01-01") + np.arange(4)
-    spline = ss.CubicSpline(t, points_on(S2, 4), S2, extrapolate="periodic")
-    assert largest_difference(spline(t[1] + 3), spline(t[1])) < 4 * EPS
 
 
 @every_kind
@@ -167,13 +151,6 @@ def test_other_entries_take_false():
     assert np.isnan(dated(np.datetime64("2025-01-01"))).all()
 
 
-def test_rotations_of_scipy_refuse_nan():
-    turning = spline("so:3", extrapolate=False)
-    with pytest.raises(ss.ValidationError, match=r"index \[1\] is NaN"):
-        rotations.rotation(turning, [1.0, 9.0])
-    assert np.isnan(rotations.angular_velocity(turning, 9.0)).all()
-
-
 @loop_over("wrong", [0, 1, "nan", "linear", 2.0, [True]])
 def test_unknown_policies_raise(wrong):
     for call in (lambda: spline("r:2", extrapolate=wrong), lambda: spline("r:2")(0.5, extrapolate=wrong)):
@@ -187,8 +164,3 @@ def test_false_holds_on_a_manifold_made_of_functions():
     vectors = space.random_tangent(rng, np.broadcast_to(first, (len(T), 4, 2)))
     curve = ss.CubicSpline(T, space.exp(first, 0.2 * vectors), space, extrapolate=False)
     assert np.isnan(curve(X)[..., 0, 0]).tolist() == BEYOND.tolist()
-
-
-def test_files_keep_the_policy(tmp_path):
-    spline("sphere:2", extrapolate=False).save(tmp_path / "a.npz")
-    assert ss.load(tmp_path / "a.npz").extrapolate is False

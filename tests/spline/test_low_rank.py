@@ -93,21 +93,6 @@ def test_curves(name, kind, rng):
 
 
 @every_space
-def test_batches(name, rng):
-    embed = Embedded(name, rng)
-    p = np.stack([[walk(embed.small, 0.5, N, rng) for _ in range(3)] for _ in range(2)])
-    t = np.cumsum(rng.uniform(0.7, 1.3, (2, 3, N)), axis=-1)
-    v = 0.5 * embed.small.random_tangent(rng, p[:, :, 0]) / np.sqrt(embed.small.dim)
-    bc_type = ((1, v), "natural")
-    for own in (True, False):
-        times, x = (t, t[..., :1] + rng.uniform(0, 3.5, (2, 3, 4))) if own else (t[0, 0], t[0, 0, :3] + 0.1)
-        there = ss.CubicSpline(times, p, embed.small, bc_type=bc_type)
-        here = ss.CubicSpline(times, embed(p), embed.space, bc_type=embed.ends(bc_type))
-        embed.check(here, there)
-        embed.agree(*([c(x, nu, per_curve=own) for nu in (0, 1)] for c in (here, there)), 10)
-
-
-@every_space
 def test_velocities_outside_the_span_of_the_points(name, rng):
     embed = Embedded(name, rng)
     t, p, _ = data(embed.small, rng)
@@ -182,14 +167,6 @@ def test_error_names_the_invalid_curve(rng):
         ss.CubicSpline(None, np.stack([good, far]), space)
     with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
         ss.fit_many([(None, good), (None, good * [[1.0], [2], [1], [1], [1]])], space)
-
-
-def test_products_have_large_factors(rng):
-    space = ss.space("sphere:299 x so:3")
-    p = tuple(walk(factor, 0.4, 6, rng) for factor in space.factors)
-    spline = ss.CubicSpline(None, p, space)
-    alone = ss.CubicSpline(None, p[0], "sphere:299")
-    assert np.array_equal(spline(2.5)[0], alone(2.5))
 
 
 # ---- random tangent vectors ----

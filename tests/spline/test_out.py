@@ -44,20 +44,6 @@ def test_out_takes_the_result(name, batch, nu):
     assert same(values, out)
 
 
-@pytest.mark.parametrize("x", [1.5, [], [[2.0]]])
-def test_any_shape(x):
-    spline = spline_of("sphere:2")
-    out = like(spline(x))
-    assert spline(x, out=out) is out and same(spline(x), out)
-
-
-def test_own_times():
-    spline = spline_of("so:3", (2,))
-    x = np.linspace(0, 4, 14).reshape(2, 7)
-    out = np.empty((2, 7, 3, 3))
-    assert same(spline(x, per_curve=True), spline(x, per_curve=True, out=out)) and same(spline(x, per_curve=True), out)
-
-
 def test_gaps_in_memory_and_other_types():
     spline, x = spline_of("so:3"), np.linspace(0, 4, 9)
     values = spline(x)
