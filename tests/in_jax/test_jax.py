@@ -59,20 +59,6 @@ def test_complex_points_have_gradients(name):
     check_grads(function, (np.zeros(2),), order=1, modes=["fwd", "rev"], atol=1e-6, rtol=1e-6)
 
 
-def test_jit_vmap_and_jacobians_agree():
-    points = points_of("sphere:2")
-
-    def function(points):
-        return curve(X, T, points, "sphere:2")
-
-    forward, backward = jax.jacfwd(function)(points), jax.jacrev(function)(points)
-    np.testing.assert_allclose(forward, backward, atol=1e-12)
-    np.testing.assert_array_equal(jax.jit(function)(points), function(points))
-    np.testing.assert_allclose(jax.jit(jax.jacrev(function))(points), backward, atol=1e-14)
-    many = np.stack([points, points_of("sphere:2", 1)])
-    np.testing.assert_array_equal(jax.vmap(function)(many), curve(X, T, many, "sphere:2"))
-
-
 def test_products_and_batches():
     factors = ("sphere:3", "r:3")
     points = tuple(points_of(name) for name in factors)

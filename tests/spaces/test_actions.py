@@ -135,14 +135,6 @@ def test_products_act_by_factors(rng):
     assert np.allclose(space.distance(space.act(g, p), moved), space.distance(p, x), atol=1e-14)
 
 
-def test_scipy_rotations_act_on_rotations():
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_rotvec([0.1, 0.2, 0.3])
-    moved = ss.SpecialOrthogonal(3).act((turn, np.eye(3)), np.eye(3))
-    assert np.abs(moved - turn.as_matrix()).max() <= 2 * EPS
-
-
 def test_single_precision_elements_have_its_tolerance():
     g = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]], np.float32)
     assert ss.Sphere(1).act(g, [1.0, 0.0]) == pytest.approx([np.cos(0.3), np.sin(0.3)], abs=1e-7)

@@ -343,7 +343,9 @@ def test_rotations_have_two_quaternions(rng):
 
 
 def gauges(space, n, rng):
-    """Random signs, phases, orthogonal or unitary matrices, that multiply a point from the right."""
+    """Random signs, phases, unit quaternions, orthogonal or unitary matrices, which multiply points from the right."""
+    if isinstance(space, ss.QuaternionicProjective):
+        return ss.SpecialUnitary(2).random_point(rng, n)
     if len(space.point_shape) == 1:
         noise = rng.standard_normal((n, 1)) + (1j * rng.standard_normal((n, 1)) if space.dtype.kind == "c" else 0)
         return noise / np.abs(noise)
@@ -352,7 +354,7 @@ def gauges(space, n, rng):
     return np.linalg.qr(noise).Q
 
 
-@pytest.mark.parametrize("name", ["rp:3", "cp:3", "gr:2,5", "cgr:2,4", "gr:4,5", "cgr:1,2"])
+@pytest.mark.parametrize("name", ["rp:3", "cp:3", "hp:2", "gr:2,5", "cgr:2,4", "gr:4,5", "cgr:1,2"])
 @loop_over("ends", ["natural", "not-a-knot", "periodic", "velocity", "acceleration"])
 @loop_over("method", ["fixed-point", "quasi-newton"])
 def test_representatives_do_not_matter(name, ends, method, rng):

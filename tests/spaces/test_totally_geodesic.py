@@ -137,21 +137,6 @@ def hopf(q):
     return np.concatenate([2 * product, height], axis=-1)
 
 
-def test_quaternionic_projective_space_is_blind_to_units():
-    # A unit quaternion on the right of a vector, here j, is another basis of the plane.
-    p = points_on(ss.QuaternionicProjective(2), 6, step=0.4)
-    q = convert.subspace_to_quaternions(p)
-    turned_q = np.stack([-q[..., 2], -q[..., 3], q[..., 0], q[..., 1]], axis=-1)
-    other = convert.quaternions_to_subspace(turned_q)
-    assert np.abs(other - p).max() > 0.1
-    projectors = [
-        convert.basis_to_projector(ss.CubicSpline(KNOTS, x, "hp:2")(X))
-        for x in (p, convert.quaternions_to_subspace(q), other)
-    ]
-    np.testing.assert_allclose(projectors[1], projectors[0], rtol=0, atol=1e-14)
-    np.testing.assert_allclose(projectors[2], projectors[0], rtol=0, atol=1e-14)
-
-
 def test_distances_of_parts():
     rng = np.random.default_rng(6)
     q = rng.standard_normal((2, 3, 4))
@@ -182,14 +167,6 @@ def test_vectors_that_leave_a_part_are_refused():
         ss.CubicSpline(None, q, "hp:1", bc_type=((1, v), "natural"))
     v[3, 1] = 1.0
     assert ss.CubicSpline(None, q, "hp:1", bc_type=((1, v), "natural")).report.converged
-
-
-def test_special_tensors_have_determinant_one():
-    p = points_on(ss.space("sspd:3"), 6, step=0.6)
-    curve = ss.CubicSpline(KNOTS, p, "sspd:3")
-    assert np.abs(np.linalg.det(curve(X)) - 1).max() <= 1e-14 * np.abs(p).max() ** 3
-    with pytest.raises(ss.ValidationError, match=r"points\[1\].*its determinant is 2.0+e0, not 1"):
-        ss.CubicSpline(None, [np.eye(2), np.diag([2.0, 1.0])], "sspd:2")
 
 
 @pytest.mark.parametrize(

@@ -16,16 +16,45 @@ ERRORS = {"cut locus": ss.CutLocusError, "no convergence": ss.ConvergenceError}
 
 
 every_failure = pytest.mark.parametrize("kind", ERRORS)
+FLAT = points_on(ss.Euclidean(1), 20, (3,))
+# Fits of three curves of which the middle one may fail.
+FITS = {
+    "class": lambda p, **options: ss.CubicSpline(None, p, S2, **options),
+    "product": lambda p, **options: ss.CubicSpline(None, (FLAT, p), "r:1 x sphere:2", **options),
+    "arrays": lambda p, **options: ss.fit(None, p, S2, **options)[1],
+    "lists": lambda p, **options: ss.fit_many([(None, q) for q in p], S2, **options),
+}
+
+
+def converged(found):
+    """Whether each of three curves has converged."""
+    if isinstance(found, list):
+        return [bool(curve.report.converged) for curve in found]
+    return (found.report if isinstance(found, ss.CubicSpline) else found).converged.tolist()
 
 
 @every_failure
-def test_on_failure_raise_is_the_default(kind):
+@pytest.mark.parametrize("how", FITS)
+def test_every_fit_obeys_on_failure(kind, how):
     p, options = failing(kind)
     for on_failure in ({}, {"on_failure": "raise"}):
         with pytest.raises(ERRORS[kind], match="of curve 1") as caught:
-            ss.CubicSpline(None, p, S2, **options, **on_failure)
-        assert caught.value.curve == (1,) and caught.value.spline.report.converged.tolist() == [True, False, True]
-    # Of one curve it is that curve.
+            FITS[how](p, **options, **on_failure)
+        for error in (caught.value, pickle.loads(pickle.dumps(caught.value))):
+            assert type(error) is ERRORS[kind] and str(error) == str(caught.value)
+            assert converged(error.spline) == [True, False, True] and error.curve == (1,)
+        assert pickle.loads(pickle.dumps(caught.value)).spline == caught.value.spline
+    with pytest.warns(ss.ConvergenceWarning, match="of curve 1") as caught:
+        assert converged(FITS[how](p, on_failure="warn", **options)) == [True, False, True]
+    assert [warning.filename for warning in caught] == [__file__]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert converged(FITS[how](p, on_failure="ignore", **options)) == [True, False, True]
+
+
+@every_failure
+def test_the_error_of_a_single_curve_has_the_curve(kind):
+    p, options = failing(kind)
     with pytest.raises(ERRORS[kind]) as caught:
         ss.CubicSpline(None, p[1], S2, **options)
     assert caught.value.curve == () and caught.value.spline.report.converged is False
@@ -33,23 +62,11 @@ def test_on_failure_raise_is_the_default(kind):
 
 
 @every_failure
-def test_on_failure_warn(kind):
-    p, options = failing(kind)
-    with pytest.warns(ss.ConvergenceWarning, match="of curve 1") as caught:
-        spline = ss.CubicSpline(None, p, S2, on_failure="warn", **options)
-        ss.fit(None, p, S2, on_failure="warn", **options)
-        ss.fit_many([(None, q) for q in p], S2, on_failure="warn", **options)
-    assert [warning.filename for warning in caught] == [__file__] * 3
-    assert spline.report.converged.tolist() == [True, False, True]
-
-
-@every_failure
 def test_a_bad_curve_never_spoils_the_others(kind):
     p, options = failing(kind)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        spline = ss.CubicSpline(None, p, S2, on_failure="ignore", **options)
-    assert spline.report.converged.tolist() == [True, False, True]
+    spline = ss.CubicSpline(None, p, S2, on_failure="ignore", **options)
+    many = ss.fit_many([(None, p[0]), (None, p[1]), (None, p[2][:7])], S2, on_failure="ignore", **options)
+    assert same_curve(many[2], ss.CubicSpline(None, p[2][:7], S2, **options))
     x = np.linspace(0, 19, 50)
     for i in (0, 2):
         alone = ss.CubicSpline(None, p[i], S2, **options)
@@ -69,45 +86,6 @@ def test_an_unconverged_curve_keeps_its_best_iterate():
             for n in range(1, 40)
         ]
         assert (np.diff(residuals) <= 0).all()
-
-
-@every_failure
-def test_failures_in_a_product(kind):
-    p, options = failing(kind)
-    flat = points_on(ss.Euclidean(1), 20, (3,))
-    space = ss.Product("r:1", S2)
-    with pytest.raises(ERRORS[kind], match="of curve 1") as caught:
-        ss.CubicSpline(None, (flat, p), space, **options)
-    spline = caught.value.spline
-    assert spline.report.converged.tolist() == [True, False, True]
-    assert same_curve(spline[2], ss.CubicSpline(None, (flat[2], p[2]), space, **options))
-    with pytest.warns(ss.ConvergenceWarning):
-        ss.CubicSpline(None, (flat, p), space, on_failure="warn", **options)
-    ss.CubicSpline(None, (flat, p), space, on_failure="ignore", **options)
-
-
-@every_failure
-def test_failures_in_fit_and_fit_many(kind):
-    p, options = failing(kind)
-    with pytest.raises(ERRORS[kind]) as caught:
-        ss.fit(None, p, S2, **options)
-    assert caught.value.spline.report.converged.tolist() == [True, False, True]
-    curves = [(None, p[0]), (None, p[1]), (None, p[2][:7])]
-    with pytest.raises(ERRORS[kind], match="of curve 1") as caught:
-        ss.fit_many(curves, S2, **options)
-    splines = caught.value.spline
-    assert [s.report.converged for s in splines] == [True, False, True]
-    assert same_curve(splines[2], ss.CubicSpline(None, p[2][:7], S2, **options))
-
-
-@every_failure
-def test_exceptions_pickle(kind):
-    p, options = failing(kind)
-    with pytest.raises(ERRORS[kind]) as caught:
-        ss.CubicSpline(None, p, S2, **options)
-    made = pickle.loads(pickle.dumps(caught.value))
-    assert type(made) is ERRORS[kind] and str(made) == str(caught.value)
-    assert made.spline == caught.value.spline
 
 
 def test_kinds_of_errors():

@@ -74,21 +74,6 @@ def test_hermite_spline_has_the_given_points_and_velocities(space):
     assert largest_difference(found.points, p) < 1e-14
 
 
-def test_rotations_with_measured_rates():
-    rng = np.random.default_rng(3)
-    r = points_on(ss.SpecialOrthogonal(3), 6, step=0.4)
-    rates = rng.standard_normal((6, 3))
-    for frame in ("body", "world"):
-        v = ss.rotations.velocities(r, rates, frame)
-        spline = ss.HermiteSpline(KNOTS, r, v, "so:3")
-        assert np.abs(ss.rotations.angular_velocity(spline, KNOTS, frame) - rates).max() < 1e-13
-    x = rng.standard_normal((6, 3))
-    pose = ss.HermiteSpline(KNOTS, (r, x), (v, 2 * x), "so:3 x r:3")
-    assert np.abs(ss.poses.linear_velocity(pose, KNOTS) - 2 * x).max() < 1e-13
-    q = ss.rotations.quaternion(pose, np.linspace(0, 4.5, 2001), scalar_first=True)
-    assert ((q[1:] * q[:-1]).sum(-1) > 0.99).all()
-
-
 # ---- the interface ----
 
 

@@ -3,25 +3,21 @@
 import numpy as np
 import pytest
 from cases import loop_over
-from curves import same
+from curves import points_on, same
 
 import symspline as ss
 
 SPACES = ["sphere:2", "so:3", "cp:2", "spd:2", "se:3", "euclidean:1", "sphere:300", "so:3 x r:3", "stiefel:2,4"]
 
 
-def spline_of(space, batch=()):
-    space = ss.Stiefel(2, 4) if space.startswith("stiefel") else ss.space(space)
-    rng = np.random.default_rng(5)
-    factors = space.factors if isinstance(space, ss.Product) else (space,)
-    points = []
-    for factor in factors:
-        p = factor.random_point(rng, (*batch, 1))
-        v = factor.random_tangent(rng, np.repeat(p, 5, axis=len(batch)))
-        points.append(
-            factor.exp(p, 0.3 * v / np.maximum(1, factor.norm(p, v))[(..., *(None,) * len(factor.point_shape))])
-        )
-    return ss.CubicSpline(None, tuple(points) if isinstance(space, ss.Product) else points[0], space)
+def spline_of(name, batch=()):
+    if not name.startswith("stiefel"):
+        space = ss.space(name)
+        return ss.CubicSpline(None, points_on(space, 5, batch, step=0.3), space)
+    space, rng = ss.Stiefel(2, 4), np.random.default_rng(5)
+    first = space.random_point(rng)
+    steps = space.random_tangent(rng, np.broadcast_to(first, (*batch, 5, *first.shape)))
+    return ss.CubicSpline(None, space.exp(first, 0.1 * steps), space)
 
 
 def like(values, dtype=None):
