@@ -23,7 +23,6 @@ from scipy.interpolate import CubicSpline as FlatSpline
 import symspline as ss
 
 SEED = 20180308
-
 every_smooth = pytest.mark.parametrize("case", [c for c in CASES if c.smooth and not c.few], ids=lambda case: case.name)
 
 

@@ -211,11 +211,7 @@ def test_points_too_far_are_an_error_with_advice():
 
 
 EASY, HARD, HARDEST = zigzag(0.5, 8), zigzag(2.8, 8), zigzag(2.3, 8, 0.3)
-
-
 ANTIPODES = np.concatenate([EASY[:4], -EASY[3:4], EASY[5:]])
-
-
 IMPOSSIBLE = zigzag(1.0, 8)
 """With the times `UNEVEN`."""
 

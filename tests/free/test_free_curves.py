@@ -21,7 +21,6 @@ from scipy.interpolate import BSpline as FlatBSpline
 import symspline as ss
 
 SEED = 2007
-
 every_degree = loop_over("degree", range(1, 6))
 
 

@@ -28,7 +28,6 @@ STEPS = [
     "5e-324", "9" * 400, "1" + "0" * 30 + "ns", "1e-999999999", "1e99999999999999999999", ".5s", "1e20", "1e17s",
 ]  # fmt: skip
 SPACES = ["sphere:2", "r:1", "r:2", "r:3", "sphere:1", "h:1", "cp:1", "spd:2", "so:2", "r:1 x sphere:2", "u:1", "se:2"]
-
 numbers = st.sampled_from([*CELLS[:10], "0.6", "0.8", "2", "3", "178.5", "-89.9"])
 cells = st.one_of(numbers, st.sampled_from(CELLS), st.text(max_size=4))
 

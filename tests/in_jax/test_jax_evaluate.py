@@ -10,7 +10,6 @@ import symspline as ss
 from symspline.jax import evaluate
 
 QUICK = True
-
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
 X = np.concatenate([np.linspace(0, 4.1, 12), [1.0, 2.2]])
 SPACES = ["r:2", "sphere:2", "h:2", "so:2", "so:3", "se:2", "se:3", "cp:2", "gr:2,5", "cgr:2,4", "spd:3", "hpd:2"]

@@ -10,7 +10,6 @@ import symspline as ss
 from symspline.jax import curve, evaluate, fit
 
 QUICK = True
-
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1, 5.0])
 
 

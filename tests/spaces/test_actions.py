@@ -8,7 +8,6 @@ from lie import Lie
 import symspline as ss
 
 SEED = 1703
-
 one_per_family = pytest.mark.parametrize("case", [c for c in CASES if c.interface], ids=lambda case: case.name)
 
 

@@ -30,34 +30,6 @@ def triple(space, p, a, b, c):
     return lie.at(bracket(bracket(a, b), c), p)
 
 
-def around_a_parallelogram(space, p, a, b, c, size):
-    """c after parallel transport around a small parallelogram, first along a."""
-    q, sides = p, [size * a, size * b]
-    for step in (0, 1, 0, 1):
-        r = space.exp(q, sides[step])
-        *sides, c = (space.transport(q, r, v) for v in (*sides, c))
-        # The way back.
-        sides[step] = -sides[step]
-        q = r
-    return space.transport(q, p, c)
-
-
-@every
-def test_the_triple_product_is_curvature(name, rng):
-    """Holonomy of a small parallelogram, from `transport` alone: R(a, b)c is its limit."""
-    space = ss.space(name)
-    p = base_point(space, rng)
-    a, b, c = (unit_tangent(space, p, rng) for _ in range(3))
-
-    def holonomy(h):
-        # The mean over both directions has an error of h², which extrapolation makes h⁴.
-        there, back = (around_a_parallelogram(space, p, s * a, s * b, c, h) for s in (1, -1))
-        return ((there - c) + (back - c)) / (2 * h**2)
-
-    limit = (4 * holonomy(0.01) - holonomy(0.02)) / 3
-    assert space.norm(p, limit - triple(space, p, a, b, c)) <= 1e-5
-
-
 def orthonormal_basis(space, p, rng):
     basis = []
     while len(basis) < space.dim:

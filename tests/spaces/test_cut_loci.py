@@ -154,7 +154,6 @@ REACH = {
     "se:3": (pose, np.pi),
 }
 
-
 LIMIT = {np.pi: r"3\.14159\d*", np.pi / 2: r"1\.57079\d*", 2 * np.pi: r"6\.28318\d*"}
 
 

@@ -10,7 +10,6 @@ from scipy.linalg import expm
 import symspline as ss
 
 SEED = 8
-
 QUADRICS = ["ds:2", "ds:3", "ads:2", "ads:3"]
 NAMES = [*QUADRICS, "igr:0,1,1,2", "igr:1,0,2,1", "igr:1,1,2,2"]
 quadrics = pytest.mark.parametrize("name", QUADRICS)

@@ -30,8 +30,6 @@ FLAT = ("euclidean:3",)
 DIFFERENCES, ROUNDING = 1e-8, 1e-13
 # Multiples of 1/K: decades, and up to near π, where the bounds with sin end.
 SIZES = [1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.1]
-
-
 STEEPEST = {}
 """Directions of the largest curvature that were found, by space and point: most tests begin with the same point."""
 

@@ -9,7 +9,6 @@ from scipy.linalg import expm, logm
 import symspline as ss
 
 SEED = 8
-
 NAMES = ["gl:2", "gl:3", "cgl:2", "aff:2", "sim:3", "sl:3", "sp:4", "so:1,3"]
 every = pytest.mark.parametrize("name", NAMES)
 

@@ -9,8 +9,6 @@ from refused import INF, NAN, TWO, P, changed, fails, fit_error, points, spoiled
 import symspline as ss
 
 PROJECT = r".*Points within 1e-8 are projected; use space\.project\(x\)"
-
-
 MATRICES = ["so:2", "so:3", "so:5", "o:3", "u:2", "u:5", "su:2", "su:3"]
 FRAMES = ["gr:2,5", "gr:3,8", "cgr:2,4"]
 LINES = ["rp:2", "rp:7", "cp:1", "cp:7", "gr:1,3", "cgr:1,2"]
@@ -39,7 +37,7 @@ def singular(x):
     return np.diag([1.0] * (len(x) - 1) + [0.0])
 
 
-def farther(factor):
+def scaled(factor):
     return lambda x: factor * x
 
 
@@ -61,17 +59,17 @@ def stretched(x):
 NOT_SYMMETRIC = r"off the space by .*it is not {}: the skew part is \d\.\d+e-\d of it" + PROJECT
 NOT_POSITIVE = "off the space: it is not positive definite: its smallest eigenvalue is "
 OFF = [
-    (MATRICES + FRAMES, farther(1.01), r"off the space by .*columns are not orthonormal: \|x.x - 1\| = \d\.\d{3}e-2.*"),
-    (FRAMES, farther(1.01), r"np\.linalg\.qr gives an orthonormal basis" + PROJECT),
-    (MATRICES + FRAMES, farther(0), r"off the space.* 1\.\d+e0"),
-    (LINES, farther(1.01), r"off .* norm is 1\.0\d*, not 1 \(off by 1\.000e-2\)" + PROJECT),
-    (LINES, farther(0), "off the space.*it is the zero vector"),
+    (MATRICES + FRAMES, scaled(1.01), r"off the space by .*columns are not orthonormal: \|x.x - 1\| = \d\.\d{3}e-2.*"),
+    (FRAMES, scaled(1.01), r"np\.linalg\.qr gives an orthonormal basis" + PROJECT),
+    (MATRICES + FRAMES, scaled(0), r"off the space.* 1\.\d+e0"),
+    (LINES, scaled(1.01), r"off .* norm is 1\.0\d*, not 1 \(off by 1\.000e-2\)" + PROJECT),
+    (LINES, scaled(0), "off the space.*it is the zero vector"),
     (["so:3", "so:5", *POSES], reflect, "determinant is -1: it is a reflection, not a rotation .swap two columns"),
     (SYMMETRIC, skew, NOT_SYMMETRIC.format("symmetric")),
     (HERMITIAN, skew, NOT_SYMMETRIC.format("Hermitian")),
     (["hpd:1", "hpd:2"], lambda x: x + 0.1j * np.eye(len(x)), "off .*not Hermitian"),
     (DEFINITE, negative, NOT_POSITIVE + r"-2\.5000\d*e-1"),
-    (DEFINITE, farther(0), NOT_POSITIVE + "-?0"),
+    (DEFINITE, scaled(0), NOT_POSITIVE + "-?0"),
     (DEFINITE, singular, NOT_POSITIVE + "-?0"),
     (POSES, last_row(0), r"off the space by .*its last row is \[.*\], not \(0, …, 0, 1\)"),
     (POSES, last_row(-1), r"off the space by .*its last row is \[.*\], not \(0, …, 0, 1\)"),

@@ -7,7 +7,6 @@ from cases import CURVED, closed_walk, loop_over, unit_tangent, walk
 import symspline as ss
 
 SEED = 2
-
 S2 = ss.Sphere(2)
 # Where the smallest and the largest V of (38) meet.
 LARGEST_KD, LARGEST_KV = 0.2610895, 0.4420886

@@ -13,8 +13,6 @@ import symspline as ss
 
 C, H = np.cosh(1), np.sinh(1)
 ERRORS = {"cut locus": ss.CutLocusError, "no convergence": ss.ConvergenceError}
-
-
 every_failure = pytest.mark.parametrize("kind", ERRORS)
 FLAT = points_on(ss.Euclidean(1), 20, (3,))
 # Fits of three curves of which the middle one may fail.

@@ -9,7 +9,6 @@ from rounding import rounding
 import symspline as ss
 
 SEED = 11
-
 NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "hp:2", "ch:2"]
 KNOTS = np.array([0.0, 0.4, 1.9, 2.3, 3.6, 4.0, 5.1])
 

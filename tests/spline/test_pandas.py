@@ -6,7 +6,6 @@ import pytest
 import symspline as ss
 
 pd = pytest.importorskip("pandas")
-
 HOURS = np.array(["2025-12-31T23", "2026-01-01T00", "2026-01-01T01"], "datetime64[us]")
 BERLIN = pd.date_range("2026-01-01", periods=3, freq="h", tz="Europe/Berlin")
 

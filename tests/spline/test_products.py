@@ -56,8 +56,6 @@ def test_another_curve_of_a_product_is_another_curve_of_a_factor(batch):
 
 
 PRODUCT = "sphere:2 x r:1"
-
-
 FLAT, OFF = np.zeros((3, 1)), changed(2, [0, 0, 2])
 
 

@@ -217,12 +217,8 @@ def intervals(count=2000):
 
 
 START, END, LAST = intervals()
-
-
 BEYOND = np.flatnonzero(LAST > END)
 UNIT = np.spacing(np.maximum(abs(START), abs(END)))
-
-
 FRAME = np.eye(4, 2)
 
 
@@ -239,7 +235,6 @@ def curve(i, points=THREE, space=S2):
 
 
 QUBIT = [[1, 0], [0.8, 0.6j], [0.6, 0.8]]
-
 
 LOOKUPS = {
     "call": lambda i, x: curve(i)(x),

@@ -10,7 +10,6 @@ from rounding import rounding
 import symspline as ss
 
 SEED = 4
-
 NAMES = ["sphere:2", "sphere:3", "h:3", "so:3", "o:3", "so:4", "u:3", "su:3", "cp:1", "cp:2", "rp:2", "gr:2,5"]
 NAMES += ["cgr:2,4", "se:2", "se:3", "spd:3", "hpd:2", "ch:2", "r:3", "so:2", "gr:3,5"]
 KNOTS = np.array([0.0, 0.4, 1.9, 2.3, 3.6, 4.0])
