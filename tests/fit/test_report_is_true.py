@@ -288,6 +288,17 @@ def test_rounding_of_long_steps_is_reported(name):
     assert 5 <= converged <= 25
 
 
+@pytest.mark.parametrize(("name", "step"), [("hyperbolic:2", 11.0), ("spd:3", 14.0)])
+def test_very_far_points_converge_to_their_rounding(name, step):
+    """Rounding in a residual grows with the length of chords. It is not a failure until the curve shows it."""
+    space = ss.space(name)
+    origin = np.eye(*(3,) * 2) if name == "spd:3" else np.array([1.0, 0, 0])
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        p = [space.exp(origin, step / 2 * unit_tangent(space, origin, rng)) for _ in range(5)]
+        assert ss.CubicSpline(None, np.array(p), space).report.converged
+
+
 WITHOUT_METRIC = [
     *("gl:2", "gl:3", "cgl:2", "aff:2", "sim:3", "sl:3", "sp:4", "so:1,3", "se:2", "se:3"),
     *("ds:3", "ads:4", "igr:1,1,2,2"),

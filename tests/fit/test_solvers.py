@@ -190,14 +190,6 @@ def test_far_points_converge_or_are_reported(name, part, at_least):
     assert good.mean() >= at_least
 
 
-@pytest.mark.parametrize("name", FAR)
-@pytest.mark.parametrize("part", [0.3, 0.5, 0.7])
-def test_auto_converges_wherever_fixed_point_does(name, part):
-    space, p = far_curves(name, part, 10)
-    auto, fixed = (fit(p, space, method=method).report.converged for method in ("auto", "fixed-point"))
-    assert (auto | ~fixed).all()
-
-
 def test_points_too_far_are_an_error_with_advice():
     advice = "too close for the distance .* between their points: merge the two samples, smooth the data"
     with pytest.raises(ss.ConvergenceError, match=f"longest step 1.0.*{advice}") as error:
@@ -226,10 +218,12 @@ def assert_is_its_curves(p, t, **options):
 
 
 def test_a_batch_of_easy_and_hard_curves_and_one_that_has_no_spline():
-    p, t = np.array([EASY, HARDEST, ANTIPODES, HARD, zigzag(0.3, 8)]), np.arange(8.0)
-    assert_is_its_curves(p, np.broadcast_to(t, (len(p), 8)))
+    p, t = np.array([EASY, HARDEST, ANTIPODES, HARD, IMPOSSIBLE]), np.tile(np.arange(8.0), (5, 1))
+    t[4] = UNEVEN
+    assert_is_its_curves(p, t)
+    p = p[:4]
     batch = fit(p, S2)
-    assert batch.report.converged.tolist() == [True, True, False, True, True]
+    assert batch.report.converged.tolist() == [True, True, False, True]
     assert np.isnan(batch.velocities[2]).all() and np.isfinite(np.delete(batch.velocities, 2, 0)).all()
     # The last solver that any curve needed.
     assert batch.report.method == "homotopy" and fit(HARD, S2).report.method == "fixed-point"
@@ -238,11 +232,6 @@ def test_a_batch_of_easy_and_hard_curves_and_one_that_has_no_spline():
     assert error.value.spline == batch
     with pytest.warns(ss.ConvergenceWarning, match="of curve 2"):
         ss.CubicSpline(None, p, S2, on_failure="warn")
-
-
-def test_a_batch_with_a_curve_that_does_not_converge():
-    p = np.array([EASY, HARDEST, IMPOSSIBLE, HARD])
-    assert_is_its_curves(p, np.array([UNEVEN if i == 2 else np.arange(8.0) for i in range(len(p))]))
 
 
 @pytest.mark.parametrize("tol", [1e-12, 0.0])

@@ -126,19 +126,6 @@ def test_overflowing_control_polygons_raise(name, p, v, length, part):
     assert fit(part).report.converged and np.isfinite(fit(part)(0.5)).all()
 
 
-@pytest.mark.parametrize("where", [None, [True, True, True, False]])
-def test_bad_points_of_one_of_many_curves(where):
-    good = points_on(S2)
-    curves = [(None, good), (None, good[:4] * 1.5), (None, good[:3]), (None, good)]
-    with pytest.raises(ss.ValidationError, match=r"points\[0\] of curve 1"):
-        ss.fit_many(curves, S2, where=where)
-    with pytest.warns(ss.ConvergenceWarning, match=r"points\[0\] of curve 1 is off"):
-        found = ss.fit_many(curves, S2, where=where, on_failure="warn")
-    assert [s.report.converged for s in found] == [True, False, True, where is None]
-    assert np.isnan(found[1].velocities).all()
-    assert same_curve(found[2], ss.CubicSpline(None, good[:3], S2))
-
-
 # ---- neighbours almost at the cut locus ----
 
 

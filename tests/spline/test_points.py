@@ -55,7 +55,7 @@ def test_single_precision(space):
 
 
 @every_kind
-@loop_over("layout", ["lists", "Fortran", "strided", "backwards", "big-endian", "read-only"])
+@loop_over("layout", ["lists", "Fortran", "strided", "backwards", "big-endian", "read-only", "misaligned"])
 def test_any_layout(space, layout):
     def laid(array):
         if layout == "lists":
@@ -70,6 +70,11 @@ def test_any_layout(space, layout):
             array = array.copy()
             array.flags.writeable = False
             return array
+        if layout == "misaligned":
+            # Contiguous, but beginning between two numbers.
+            moved = np.zeros(array.nbytes + 1, np.uint8)[1:].view(array.dtype).reshape(array.shape)
+            moved[...] = array
+            return moved
         wide = np.full((*array.shape, 2), 7, array.dtype)
         wide[..., 0] = array
         return wide[..., 0]
@@ -79,6 +84,8 @@ def test_any_layout(space, layout):
     assert same_curve(ss.CubicSpline(laid(KNOTS), each(laid, p), space), spline)
     x = np.array([0.5, 2.0])
     assert same(spline(laid(x)), spline(x))
+    assert same(space.log(each(laid, p), p), space.log(p, p))
+    assert same(ss.evaluate(KNOTS, p, each(laid, spline.velocities), space, x), spline(x))
 
 
 @every_kind
@@ -96,6 +103,33 @@ def test_splines_copy_their_input(space):
 
 
 # ---- what is no array of points ----
+
+
+MASKED = np.ma.array(P, mask=[[0, 0, 0], [0, 0, 1], [1, 0, 0]])
+TIMES = np.ma.array([0.0, 1.0, 2.0], mask=[0, 1, 0])
+
+
+@pytest.mark.parametrize(
+    "call, what",
+    [
+        (lambda: ss.CubicSpline(None, MASKED, S2), r"points\[1, 2\] is masked"),
+        (lambda: ss.CubicSpline(None, list(MASKED), S2), r"points\[1, 2\] is masked"),
+        (lambda: ss.CubicSpline(TIMES, P, S2), r"t\[1\] is masked"),
+        (lambda: ss.CubicSpline(None, P, S2)(TIMES), r"x\[1\] is masked"),
+        (lambda: ss.fit_many([(TIMES, P)], S2), r"curve 0: t\[1\] is masked"),
+        (lambda: ss.BezierCurve(MASKED, S2), r"control_points\[1, 2\] is masked"),
+        (lambda: S2.distance(np.ma.masked, P), r"p is masked"),
+    ],
+)
+def test_masked_numbers_are_refused(call, what):
+    with pytest.raises(ss.ValidationError, match=what):
+        call()
+
+
+def test_masked_arrays_without_masked_numbers_are_taken():
+    points = np.ma.array(P)
+    spline = ss.CubicSpline(np.ma.array([0.0, 1.0, 2.0], mask=False), points, S2)
+    assert spline == ss.CubicSpline(None, list(points), S2) == ss.CubicSpline(None, P, S2)
 
 
 @pytest.mark.parametrize(
