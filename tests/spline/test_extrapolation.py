@@ -98,22 +98,17 @@ def spline(name, **options):
 
 
 @pytest.mark.parametrize("name", SPACES)
-@pytest.mark.parametrize("nu", [0, 1, 2])
-def test_false_gives_nan_outside_and_the_curve_inside(name, nu):
-    curve = spline(name, extrapolate=False)
-    inside = spline(name)(X[~BEYOND], nu)
-    for values, expected in zip(parts(curve(X, nu)), parts(inside), strict=True):
-        assert np.isnan(values[BEYOND]).all()
-        np.testing.assert_array_equal(values[~BEYOND], expected)
-    assert all(np.isnan(value).all() for value in parts(curve(-1.0, nu)))
-
-
-@pytest.mark.parametrize("name", SPACES)
-def test_false_holds_for_speed_and_lift(name):
-    curve = spline(name, extrapolate=False)
-    assert np.isnan(curve.speed(9.0)) and np.isfinite(curve.speed(5.0))
-    np.testing.assert_array_equal(np.isnan(curve.speed(X)), BEYOND)
-    assert all(np.isnan(own[BEYOND]).all() and np.isfinite(own[~BEYOND]).all() for own in parts(curve.lift(X)))
+def test_false_gives_nan_outside_and_the_curve_inside(name):
+    curve, inside = spline(name, extrapolate=False), spline(name)
+    for evaluated in (
+        *(lambda c, x, nu=nu: c(x, nu) for nu in range(3)),
+        lambda c, x: c.lift(x),
+        lambda c, x: c.speed(x),
+    ):
+        for values, expected in zip(parts(evaluated(curve, X)), parts(evaluated(inside, X[~BEYOND])), strict=True):
+            assert np.isnan(values[BEYOND]).all()
+            np.testing.assert_array_equal(values[~BEYOND], expected)
+        assert all(np.isnan(value).all() for value in parts(evaluated(curve, -1.0)))
     assert np.isfinite(curve.length()) and np.isfinite(curve.bending_energy())
 
 
