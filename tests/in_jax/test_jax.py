@@ -28,7 +28,10 @@ def test_gradients_pass_the_checks_of_jax(name, bc_type):
     def function(x, t, points):
         return curve(x, t, points, name, bc_type=bc_type)
 
-    check_grads(function, (X, T, points_of(name)), order=1, modes=["fwd", "rev"], atol=1e-6, rtol=1e-6)
+    data = X, T, points_of(name)
+    check_grads(function, data, order=1, modes=["fwd", "rev"], atol=1e-6, rtol=1e-6)
+    np.testing.assert_array_equal(jax.jit(function)(*data), function(*data))
+    np.testing.assert_allclose(jax.jit(jax.jacrev(function, 2))(*data), jax.jacfwd(function, 2)(*data), atol=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -132,9 +132,6 @@ def test_transport_preserves_the_invariant_form(name, rng):
     assert np.linalg.eigvalsh(gram).min() < -0.9 and (np.linalg.eigvalsh(gram).max() > 0.9)
 
 
-# ---- spaces in each other ----
-
-
 # ---- steps of every kind ----
 
 KINDS = {"space-like": (0.3, 1.0), "time-like": (1.0, 0.3), "nearly null": (1.0, 1.0 + 1e-9)}

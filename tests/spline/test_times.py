@@ -103,9 +103,6 @@ def test_dates_in_different_units_far_apart():
     assert same(spline(np.datetime64("2000-01-01", "ns")), spline(np.datetime64("2000-01-01", "D")))
 
 
-# ---- units ----
-
-
 # ---- bad times ----
 
 
