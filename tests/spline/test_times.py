@@ -1,5 +1,6 @@
 """Times of knots: numbers, dates, integers beyond 2⁵³, and invalid times."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,21 @@ def test_error_names_the_curve_of_an_invalid_time():
         ss.fit_many([(None, P), ([0, 1], P)], S2)
     with pytest.raises(ss.ValidationError, match=r"t\[1\]\[2\] = 1 is before"):
         ss.fit_many([(None, P), ([0, 2, 1], P)], S2)
+
+
+UP = np.arange(12.0)
+BAD_KNOTS = [np.roll(UP, 5), UP[::-1], 0 * UP, NAN * UP, np.r_[UP[1:], INF]]
+
+
+@loop_over("t", BAD_KNOTS)
+@loop_over("policy", [None, True, "geodesic", "periodic"])
+def test_knots_that_are_not_checked_never_panic(t, policy):
+    p, x = np.repeat(np.eye(3), 4, axis=0), np.linspace(-1, 13, 40)
+    for nu in range(3):
+        with suppress(ss.ValidationError):
+            ss.CubicSpline(t, p, S2, check=False, on_failure="ignore")(x, nu, extrapolate=policy)
+        with pytest.raises(ss.ValidationError):
+            ss.evaluate(t, p, 0 * p, S2, x, nu=nu, extrapolate=policy)
 
 
 # ---- times that are too close ----
