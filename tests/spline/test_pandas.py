@@ -1,4 +1,4 @@
-"""Columns and indices of pandas itself as times and points; test_input_types has stand-ins."""
+"""Columns and indices of pandas as times and points."""
 
 import numpy as np
 import pytest
