@@ -70,6 +70,9 @@ class Preserving(Space[P]):
     # Indices of the entries −1 of the diagonal matrix J; the other entries are 1.
     _negative: tuple[int, ...] = ()
 
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
     def _signs(self) -> NDArray[np.float64]:
         signs = np.ones(self.point_shape[0])
         signs[list(self._negative)] = -1.0
@@ -100,6 +103,9 @@ class Preserving(Space[P]):
 class Congruent(Space[P]):
     """Positive definite matrices: g acts as x ↦ g x g*."""
 
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
     def _reflected(self, p: Array, x: Array) -> Any:
         # p x⁻¹ p by Cholesky factors, which remains accurate for matrices with entries of very different size.
         y = np.linalg.solve(np.linalg.cholesky(x), p)
@@ -126,6 +132,9 @@ class Group(Space[P]):
 
     # Whether x⁻¹ = x*.
     _unitary = False
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
 
     def _inverse_times(self, x: Array, y: Array) -> Any:
         return adjoint(x) @ y if self._unitary else np.linalg.solve(x, y)
