@@ -28,8 +28,7 @@ from ._disk import path_of, replacing
 from ._input import NO_ZONE, UTC_ZONE
 from ._options import checked_extrapolate
 from ._report import Report
-from ._spaces import Array, Product, Space, factors_of
-from ._spaces import space as space_named
+from ._spaces import Array, Product, Space, factors_of, space_named
 from ._time import Moments, TimeAxis, time_axis_of
 from ._version import VERSION as LIBRARY
 from .manifolds._manifold import refuse_functions

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -21,7 +21,7 @@ from ._curves.band import UncertaintyBand
 from ._curves.curve import CurveArrays, Doubles
 from ._curves.solve import Progress
 from ._input import times_of
-from ._options import check_progress, checked_extrapolate, extrapolation_mode, quantity_of
+from ._options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
 from ._spaces import Array, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
 from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Time, TimesLike
@@ -82,49 +82,32 @@ class SegmentedCurve(Curve[P]):
         x: TimesLike,
         nu: int = 0,
         *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
         dtype: None = None,
-        progress: Progress | None = None,
         out: None = None,
+        **options: Unpack[EvaluationOptions],
     ) -> P: ...
-
     @overload
     def __call__(
-        self,
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        progress: Progress | None = None,
-        out: Out,
+        self, x: TimesLike, nu: int = 0, *, out: Out, **options: Unpack[EvaluationOptions]
     ) -> Out: ...
-
     @overload
     def __call__(
         self: Curve[AnyArrays],
         x: TimesLike,
         nu: int = 0,
         *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
         dtype: DTypeLike,
-        progress: Progress | None = None,
+        **options: Unpack[EvaluationOptions],
     ) -> AnyArrays: ...
-
     @overload
     def __call__(
         self: Curve[AnyArray],
         x: TimesLike,
         nu: int = 0,
         *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
         dtype: DTypeLike,
-        progress: Progress | None = None,
+        **options: Unpack[EvaluationOptions],
     ) -> AnyArray: ...
-
     def __call__(
         self,
         x: TimesLike,

@@ -17,8 +17,7 @@ from ._curves.curve import NORMS
 from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
 from ._options import quantity_of
-from ._spaces import Product, Space
-from ._spaces import space as space_named
+from ._spaces import Product, Space, space_named
 from ._time import onto_ends
 from ._typing import FloatArray, P
 from .manifolds._manifold import refuse_functions

@@ -23,8 +23,7 @@ from ._errors import raise_or_warn
 from ._options import extrapolation_mode, fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space
-from ._spaces import space as space_named
+from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, TimesLike
 

@@ -19,6 +19,7 @@ from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._input import in_library, library_of
 from ._options import (
+    EvaluationOptions,
     check_progress,
     checked_extrapolate,
     extrapolation_mode,
@@ -28,8 +29,7 @@ from ._options import (
 )
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of, point_tol
-from ._spaces import space as space_named
+from ._spaces import Array, Space, factors_of, parts_of, point_tol, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import (
     AnyArray,
@@ -104,10 +104,8 @@ def evaluate(
     x: TimesLike,
     *,
     nu: int = 0,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
-    progress: Progress | None = None,
     out: None = None,
+    **options: Unpack[EvaluationOptions],
 ) -> P: ...
 
 
@@ -120,10 +118,8 @@ def evaluate(
     x: TimesLike,
     *,
     nu: int = 0,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
-    progress: Progress | None = None,
     out: Out,
+    **options: Unpack[EvaluationOptions],
 ) -> Out: ...
 
 

@@ -14,8 +14,7 @@ from ._curves.fit import curve_of, hermite_data, read
 from ._functional import velocities_of
 from ._options import checked_extrapolate, extrapolation_mode, with_atol
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of
-from ._spaces import space as space_named
+from ._spaces import Array, Space, factors_of, parts_of, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import BCType, Extrapolate, P, PointsLike, TimesLike
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -10,7 +10,8 @@ from ._arrays import checked_atol, checked_flag, short_repr, whole_number
 from ._core import ValidationError
 from ._curves.ends import is_closed
 from ._curves.fit import Points
-from ._curves.solve import Options
+from ._curves.solve import Options, Progress
+from ._typing import Extrapolate
 
 _QUANTITIES = ("point", "velocity", "acceleration")
 _RAISE = "raise"
@@ -22,6 +23,14 @@ _EXTRAPOLATION_MODES = {
     "geodesic": "geodesic",
     "periodic": "periodic",
 }
+
+
+class EvaluationOptions(TypedDict, total=False):
+    """The keywords of an evaluation that do not affect the type of its result."""
+
+    extrapolate: Extrapolate
+    per_curve: bool
+    progress: Progress | None
 
 
 def quantity_of(nu: Any) -> str:

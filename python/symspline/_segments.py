@@ -17,8 +17,7 @@ from ._input import times_of
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
-from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of
-from ._spaces import space as space_named
+from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of, space_named
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 

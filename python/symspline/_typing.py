@@ -112,8 +112,10 @@ class FitOptions(SolverOptions, total=False):
 
 
 class LsqOptions(TypedDict, total=False):
-    """The keywords of `make_smoothing_spline` that `make_lsq_spline` passes on."""
+    """The keywords of `make_lsq_spline`."""
 
+    weights: Numbers | None
+    loss: Loss
     frames: Numbers | None
     sigma: Numbers | None
     bc_type: SmoothingBCType
@@ -130,11 +132,9 @@ class LsqOptions(TypedDict, total=False):
 class ChoiceOptions(LsqOptions, total=False):
     """The keywords of `make_smoothing_spline`."""
 
-    weights: Numbers | None
     knots: TimesLike | None
     criterion: Criterion
     gamma: float
-    loss: Loss
 
 
 class SmoothingOptions(ChoiceOptions, total=False):

@@ -21,8 +21,7 @@ from ._arrays import short_repr, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
 from ._functional import evaluate
-from ._spaces import Array, Product, Space
-from ._spaces import space as space_named
+from ._spaces import Array, Product, Space, space_named
 from .manifolds import Manifold
 
 __all__ = ["Conformance", "check"]

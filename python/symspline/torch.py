@@ -9,8 +9,7 @@ import torch
 
 from ._adapters import fitted, movable, split
 from ._curves.ends import ends_in_factors
-from ._spaces import Product, Space, parts_of
-from ._spaces import space as space_named
+from ._spaces import Product, Space, parts_of, space_named
 from ._typing import SolverOptions
 from .manifolds._manifold import refuse_functions
 

@@ -16,8 +16,7 @@ from .._curves.solve import Options, Progress
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_points, warn_of_signs
-from .._spaces import Product, Space, SpecialEuclidean, factors_of
-from .._spaces import space as space_named
+from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
 from .._typing import (
     ChoiceOptions,
     Criterion,
@@ -367,9 +366,6 @@ def make_lsq_spline(  # type: ignore[overload-overlap]
     points: PointsLike,
     knots: TimesLike,
     space: Product[PProduct],
-    *,
-    weights: Numbers | None = None,
-    loss: Loss = "linear",
     **options: Unpack[LsqOptions],
 ) -> SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]: ...
 
@@ -380,9 +376,6 @@ def make_lsq_spline(
     points: PointsLike,
     knots: TimesLike,
     space: SpecialEuclidean,
-    *,
-    weights: Numbers | None = None,
-    loss: Loss = "linear",
     **options: Unpack[LsqOptions],
 ) -> SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]: ...
 
@@ -393,9 +386,6 @@ def make_lsq_spline(
     points: PointsLike,
     knots: TimesLike,
     space: Space[P] | str,
-    *,
-    weights: Numbers | None = None,
-    loss: Loss = "linear",
     **options: Unpack[LsqOptions],
 ) -> SmoothingSpline[P]: ...
 
@@ -408,7 +398,7 @@ def make_lsq_spline(
     *,
     weights: Numbers | None = None,
     loss: Loss = "linear",
-    **options: Unpack[LsqOptions],
+    **options: Any,
 ) -> SmoothingSpline[Any, Any]:
     """Fit a C² curve with given knots to noisy points by least squares.
 

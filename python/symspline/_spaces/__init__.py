@@ -1,6 +1,6 @@
 """The spaces: points, tangent vectors and their geometry."""
 
-from .base import Array, Space
+from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Space, point_tol
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
 from .linear import (
@@ -12,9 +12,8 @@ from .linear import (
     SpecialLinear,
     Symplectic,
 )
-from .named import space
 from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
-from .product import Product, factors_of, parts_of, product_norm
+from .product import Product, factors_of, parts_of, product_norm, space, space_named
 from .subspaces import (
     ComplexGrassmannian,
     ComplexHyperbolic,
@@ -23,7 +22,6 @@ from .subspaces import (
     QuaternionicProjective,
     RealProjective,
 )
-from .tolerance import POINT_TOL, POINT_TOL_FLOAT32, point_tol
 from .vectors import Euclidean, Hyperbolic, Sphere
 
 __all__ = [
@@ -65,4 +63,5 @@ __all__ = [
     "point_tol",
     "product_norm",
     "space",
+    "space_named",
 ]

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
 from .._typing import P
-from .base import Array, Space
-from .tolerance import point_tol
+from .base import Array, Space, point_tol
 
 
 def adjoint(x: Array) -> Array:

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import as_array, cast, short_repr, whole_number
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
-from .tolerance import point_tol
 
 Array = AnyArray
 
@@ -38,6 +37,13 @@ COMPLEX_TWINS = {
     "spd": "HermitianPositiveDefinite",
     "sphere": "ComplexProjective",
 }
+# Tolerances for the distance of points from the manifold.
+POINT_TOL, POINT_TOL_FLOAT32 = 1e-8, 1e-4
+
+
+def point_tol(dtype: np.dtype[Any]) -> float:
+    """Return the largest distance from the manifold of points with this type of numbers."""
+    return POINT_TOL_FLOAT32 if dtype in (np.float32, np.float16, np.complex64) else POINT_TOL
 
 
 class Space(Generic[P]):

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._core import ValidationError
 from .._typing import ComplexArray, FloatArray, P
 from .actions import Preserving, largest, require
-from .base import LARGE, Array, Space
-from .tolerance import point_tol
+from .base import LARGE, Array, Space, point_tol
 
 # Tolerance for recognising density matrices. It only selects the text of an error message, since rows of density
 # matrices are not unit vectors.

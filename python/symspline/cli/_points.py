@@ -15,8 +15,7 @@ from .._cubic import CubicSpline
 from .._lonlat import compass, from_lonlat, to_lonlat
 from .._pose_files import join, rotations_in_rows
 from .._smoothing import SmoothingSpline
-from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of
-from .._spaces import space as space_named
+from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of, space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
 from ._errors import Problem, for_command_line
 from ._tables import IM, RE, Place

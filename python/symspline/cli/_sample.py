@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._smoothing import SmoothingSpline
-from .._spaces import space as space_named
+from .._spaces import space_named
 from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves

@@ -9,8 +9,7 @@ import jax.numpy as jnp
 
 from .._core import ValidationError
 from .._options import order_of
-from .._spaces import Product, Space, parts_of
-from .._spaces import space as space_named
+from .._spaces import Product, Space, parts_of, space_named
 from ._embedding import second_fundamental_form
 from ._models import Model
 from ._registry import QUOTIENTS, model_of

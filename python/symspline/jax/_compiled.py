@@ -12,8 +12,7 @@ from jax.custom_derivatives import SymbolicZero
 from .._adapters import split
 from .._curves.ends import ends_in_factors
 from .._options import order_of
-from .._spaces import Product, Space, parts_of
-from .._spaces import space as space_named
+from .._spaces import Product, Space, parts_of, space_named
 from .._typing import SolverOptions
 from ..manifolds._manifold import refuse_functions
 from ._embedding import second_fundamental_form

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 from .._adapters import split
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Space, SpecialOrthogonal, Sphere
-from .._spaces import space as space_named
+from .._spaces import Space, SpecialOrthogonal, Sphere, space_named
 from ._casteljau import arrays_of
 from ._chain import Data, defects, step_of, weights
 from ._models import Curved, Model

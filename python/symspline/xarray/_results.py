@@ -10,7 +10,7 @@ import xarray as xr
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._options import checked_extrapolate, extrapolation_mode
-from .._spaces import space as space_named
+from .._spaces import space_named
 from ._blocks import apply, values_at
 from ._spec import check_dims, rehearse, times_with_names
 

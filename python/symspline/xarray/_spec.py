@@ -13,8 +13,7 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
-from .._spaces import Array, Euclidean, Product, Space
-from .._spaces import space as space_named
+from .._spaces import Array, Euclidean, Product, Space, space_named
 from ._blocks import Inputs, values_at
 
 # A curve of numbers that stands still raises for every invalid option.
