@@ -301,7 +301,7 @@ class SegmentedCurve(Curve[P]):
         ):
             first = np.take(points, 0, axis=len(self._batch))
             # Curves that failed are NaN, and their vectors are not checked.
-            good = np.isfinite(first).all(axis=tuple(range(-len(part.space.point_shape), 0)))
+            good = part.space._where_finite(first)
             given = part.space._array(one, "v")
             part.space._doubles(given, "v")
             try:

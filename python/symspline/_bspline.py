@@ -9,15 +9,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._archive import VERSION, Entries, Stored, entry, read_array, read_space
-from ._arrays import as_array, cast, whole_number
-from ._core import ValidationError
+from ._arrays import as_array, cast, refuse, whole_number
+from ._core import CutLocusError, ValidationError
 from ._curve import Curve
-from ._curves.control import checked_knots, checked_points, control_array
 from ._curves.curve import NORMS
+from ._curves.ends import ends_of
+from ._curves.fit import Points, validated
 from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
+from ._faults import of_index
 from ._options import quantity_of
-from ._spaces import Product, Space, space_named
+from ._spaces import Array, Product, Space, point_tol, space_named
 from ._time import onto_ends
 from ._typing import FloatArray, P
 from .manifolds._manifold import refuse_functions
@@ -79,9 +81,9 @@ class BSpline(Curve[P]):
     ) -> None:
         space = _factor(space)
         degree = whole_number(degree, "degree", 1)
-        doubles, tol = control_array(control_points, space, 2)
-        knots = checked_knots(knots, space._lead(doubles)[-1], degree)
-        self._curve = ControlledCurve(space, knots, checked_points(space, doubles, tol), degree)
+        doubles, tol = _control_array(control_points, space, 2)
+        knots = _checked_knots(knots, space._lead(doubles)[-1], degree)
+        self._curve = ControlledCurve(space, knots, _checked_points(space, doubles, tol), degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """Evaluate the curve or its derivatives.
@@ -142,11 +144,8 @@ class BSpline(Curve[P]):
         start, end = self.domain
         times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
         outside = ~((times >= start) & (times <= end))
-        if outside.any():
-            index = np.argwhere(outside)[0].tolist()
-            time = times[tuple(index)]
-            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(time) else "not finite"
-            raise ValidationError(f"x{index or ''} = {time} is {where}")
+        where = f"outside the domain [{start}, {end}] of the curve"
+        refuse(outside, "x", lambda i: f"= {times[i]} is {where if np.isfinite(times[i]) else 'not finite'}")
         return times
 
     @property
@@ -202,11 +201,11 @@ class BSpline(Curve[P]):
         if isinstance(state, Stored):
             with entry("control_points"):
                 # They keep the values that they had after projection.
-                checked_points(space, *control_array(control, space, 2))
+                _checked_points(space, *_control_array(control, space, 2))
             with entry("degree"):
                 degree = whole_number(degree, "degree", 1)
             with entry("knots"):
-                knots = checked_knots(
+                knots = _checked_knots(
                     knots, space._lead(space._doubles(control, "control_points"))[-1], degree
                 )
         return cls._of(space, knots, control, degree)
@@ -320,7 +319,7 @@ class BezierCurve(BSpline[P]):
 
     def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
         space = _factor(space)
-        count = space._lead(control_array(control_points, space, 2)[0])[-1]
+        count = space._lead(_control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
 
     @classmethod
@@ -343,3 +342,82 @@ def _factor(space: Space[P] | str) -> Space[P]:
         )
     refuse_functions(space, "B-spline and Bézier curves are not made")
     return space
+
+
+def _control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[NDArray[np.float64], float]:
+    """Return control points as floating-point numbers of the core, and their tolerance."""
+    array = space._array(value, "control_points")
+    doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
+    if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
+        shape = ", ".join(map(str, space.point_shape))
+        raise ValidationError(
+            f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= {least}"
+        )
+    return doubles, point_tol(array.dtype)
+
+
+def _checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float) -> Array:
+    """Project control points onto the space.
+
+    Raises
+    ------
+    ValidationError
+        If a control point is not on the space.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+    """
+    *batch, count = space._lead(doubles)
+    try:
+        (points,), _ = validated(
+            space,
+            np.arange(count, dtype=np.float64),
+            [Points(doubles, tol, tuple(batch), count)],
+            [ends_of("natural", space, tuple(batch))],
+        )
+    except ValidationError as error:
+        raise ValidationError(str(error).replace("points[", "control_points[")) from None
+    p, q = space._neighbours(points)
+    try:
+        space._apply("log", p=p, q=q)
+    except CutLocusError as error:
+        row, _, why = str(error).removeprefix("pair ").partition(": the points ")
+        *curve, i = map(int, np.unravel_index(int(row), (*batch, count - 1)))
+        raise CutLocusError(
+            f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}"
+        ) from None
+    return points
+
+
+def _checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.float64]:
+    """Return a copy of the knots of a B-spline with `count` control points after validation."""
+    array = as_array(knots, "knots")
+    if array.ndim != 1 or array.dtype.kind not in "biuf":
+        raise ValidationError(
+            f"knots must be a one-dimensional array of real numbers, not {array.dtype} of shape {array.shape}"
+        )
+    needed = count + degree + 1
+    if count <= degree:
+        raise ValidationError(f"degree {degree} needs at least {degree + 1} control points, got {count}")
+    if array.size != needed:
+        raise ValidationError(
+            f"{count} control points of degree {degree} need {needed} knots, got {array.size}"
+        )
+    result = cast(array.copy())
+    refuse(~np.isfinite(result), "knots", lambda _: "is not finite")
+    falls = np.flatnonzero(result[1:] < result[:-1])
+    if falls.size:
+        raise ValidationError(f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]")
+    if not np.isfinite(float(result[-1]) - float(result[0])):
+        raise ValidationError("knots span more than the floating-point range")
+    times, repeats = np.unique(result, return_counts=True)
+    if repeats.max() > degree + 1:
+        most = np.argmax(repeats)
+        raise ValidationError(
+            f"knots repeat {times[most]} {repeats[most]} times; with degree {degree} a knot may repeat at most "
+            f"{degree + 1} times"
+        )
+    if not result[degree] < result[count]:
+        raise ValidationError(
+            f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal"
+        )
+    return result

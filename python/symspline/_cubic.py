@@ -11,12 +11,11 @@ from numpy.typing import ArrayLike
 from ._archive import Entries, read_fitted
 from ._base_curve import SegmentedCurve
 from ._core import ValidationError
-from ._curves.curve import CurveArrays
+from ._curves.curve import CurveArrays, Gradient, SampleTimes
 from ._curves.derivatives import sample_times
 from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
 from ._curves.energy import alternative_energy
-from ._curves.fit import Fit, FitProblem, curve_of, fit, mask_of, read, read_ends
-from ._curves.gradient import Gradient, SampleTimes
+from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
@@ -167,16 +166,8 @@ class CubicSpline(SegmentedCurve[P]):
         time_axis, shown_times, times = knots_of(t, batch, nodes)
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
-        problem = FitProblem(
-            space,
-            times,
-            data,
-            ends,
-            options,
-            bool(check),
-            None if where is None else mask_of(where, batch),
-            skip_invalid,
-        )
+        mask = None if where is None else mask_of(where, batch)
+        problem = Problem(space, times, data, ends, options, bool(check), mask, skip_invalid)
         try:
             found = fit(problem, progress)
         except ValidationError as error:

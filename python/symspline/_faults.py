@@ -65,7 +65,12 @@ CoreFault = tuple[int, str, int | None, float, float, str | None]
 
 def of_curve(number: int, batch: Sequence[int]) -> str:
     """Return " of curve ..." for a curve of a batch, or an empty text for a single curve."""
-    return f" of curve {','.join(map(str, np.unravel_index(number, batch)))}" if batch else ""
+    return of_index(np.unravel_index(number, batch)) if batch else ""
+
+
+def of_index(index: Sequence[Any]) -> str:
+    """Return " of curve ..." for an index in a batch, or an empty text for the index ()."""
+    return f" of curve {','.join(map(str, index))}" if index else ""
 
 
 def unconverged(number: int, columns: Columns, tol: float, more_advice: str = "") -> Fault:

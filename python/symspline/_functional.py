@@ -8,7 +8,7 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import short_repr
+from ._arrays import refuse, short_repr
 from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -264,9 +264,7 @@ def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, 
         raise ValidationError(
             f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}"
         )
-    if not np.isfinite(numbers).all():
-        index = np.argwhere(~np.isfinite(numbers))[0].tolist()
-        raise ValidationError(f"velocities{index} is not finite")
+    refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
     return numbers, point_tol(array.dtype)
 
 
@@ -347,7 +345,7 @@ def fit_many(
             raise ValidationError(str(error))._of_curve(number) from None
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
-    problem = fitting.ManyProblem(
+    problem = fitting.Problem(
         space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
     fits, faults = fitting.fit_many(problem, progress)

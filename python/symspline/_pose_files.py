@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, short_repr
+from ._arrays import as_array, brief, refuse, short_repr
 from ._core import ValidationError
 from ._disk import path_of, replacing
 from ._input import times_of
 from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal
 from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert._reading import length, off_one, refuse
+from .convert._reading import length, off_one
 
 Doubles = NDArray[np.float64]
 

@@ -185,12 +185,10 @@ def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
     ndarray, shape (..., N)
         NaN where a point is not finite or the fraction is unknown.
     """
-    axes = len(space.point_shape)
-    lead = (slice(None),) * (points.ndim - axes - 1)
-    finite = np.asarray(np.isfinite(points).all(axis=tuple(range(-axes, 0))))
+    finite = space._where_finite(points)
     good = finite[..., :-1] & finite[..., 1:]
     result = np.full(good.shape, np.nan)
-    p, q = points[(*lead, slice(None, -1))][good], points[(*lead, slice(1, None))][good]
+    p, q = (x[good] for x in space._neighbours(points))
     if not len(p):
         return result
     if isinstance(space, Manifold):

@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, Unpack, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, short_repr, whole_number
+from ._arrays import as_array, checked_number, refuse, short_repr, whole_number
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read
@@ -293,20 +293,15 @@ def _seconds(max_gap: Any, dates: bool) -> float:
     """Return the longest gap as the core counts times."""
     if dates and isinstance(max_gap, (np.timedelta64, timedelta)):
         max_gap = np.timedelta64(max_gap) / np.timedelta64(1, "s")
-    if isinstance(max_gap, (bool, np.timedelta64)) or not isinstance(
-        max_gap, (int, float, np.integer, np.floating)
-    ):
-        kind = "a number of seconds or a timedelta64" if dates else "a number"
-        raise ValidationError(f"max_gap must be {kind}, not {short_repr(max_gap)}")
+    unit = " of seconds or a timedelta64" if dates else ""
+    checked_number(max_gap, f"max_gap must be a number{unit}", lambda x: not isinstance(x, np.timedelta64))
     if not max_gap > 0:
         raise ValidationError(f"max_gap must be more than 0, not {max_gap}")
     return float(max_gap)
 
 
 def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(seconds))
-    if len(bad):
-        raise ValidationError(f"t[{bad[0]}] = {times[bad[0]]} is not finite")
+    refuse(~np.isfinite(seconds), "t", lambda i: f"= {times[i]} is not finite")
     steps = np.diff(seconds)
     falls = np.flatnonzero(steps < 0)
     if len(falls):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, cast
+from ._arrays import as_array, cast, refuse
 from ._core import ValidationError
 from ._input import NO_ZONE, UTC_ZONE, times_of
 from ._typing import TimesLike
@@ -246,9 +246,7 @@ def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
 
 
 def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
-    if np.isnat(array).any():
-        index = np.argwhere(np.isnat(array))[0].tolist()
-        raise ValidationError(f"{name}{index or ''} is NaT (not a time)")
+    refuse(np.isnat(array), name, lambda _: "is NaT (not a time)")
     origin = np.asarray(origin)
     fine = np.promote_types(array.dtype, origin.dtype)
     exact = [x.astype(fine) for x in (array, origin)]
@@ -266,9 +264,7 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
 
 
 def _durations(array: NDArray[Any], name: str) -> Doubles:
-    if np.isnat(array).any():
-        index = np.argwhere(np.isnat(array))[0].tolist()
-        raise ValidationError(f"{name}{index or ''} is NaT (not a time)")
+    refuse(np.isnat(array), name, lambda _: "is NaT (not a time)")
     return _in_seconds(array)
 
 

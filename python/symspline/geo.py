@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._arrays import short_repr
+from ._arrays import checked_number, short_repr
 from ._base_curve import check_curve
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
@@ -70,9 +70,9 @@ def sog(spline: CubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS) -> F
     np.float64(18.532488)
     """
     _check_globe(spline)
-    if isinstance(radius, bool) or not isinstance(radius, (int, float, np.number)) or not 0 < radius < np.inf:
-        raise ValidationError(f"radius must be a number above 0, not {short_repr(radius)}")
-    return radius * spline.speed(x)
+    return checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf) * spline.speed(
+        x
+    )
 
 
 def cog(spline: CubicSpline, x: TimesLike) -> FloatArray:

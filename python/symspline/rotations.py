@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import short_repr
+from ._arrays import refuse, short_repr
 from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -33,7 +33,7 @@ from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
-from .convert._reading import length, real_numbers, refuse
+from .convert._reading import length, real_numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

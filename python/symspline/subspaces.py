@@ -20,14 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, short_repr, whole_number
+from ._arrays import as_array, refuse, short_repr, whole_number
 from ._base_curve import check_curve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._input import times_of
 from ._spaces import ComplexGrassmannian, Grassmannian
 from ._typing import TimesLike
-from .convert._reading import Array, adjoint, numbers, refuse
+from .convert._reading import Array, adjoint, numbers
 
 # Singular values closer than this, in units of the largest, are equal but for rounding.
 _EQUAL = 1e-12

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import short_repr, whole_number
+from ._arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
 from ._functional import evaluate
@@ -81,12 +81,6 @@ class Conformance:
             )
 
 
-def _check_number(name: str, value: Any) -> None:
-    number = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
-    if not number or not 0 < value < np.inf:
-        raise ValidationError(f"{name} must be a number above 0, not {short_repr(value)}")
-
-
 def check(
     space: Space[Any] | str,
     *,
@@ -144,9 +138,9 @@ def check(
     space = space_named(space)
     if isinstance(space, Product):
         raise ValidationError("a product cannot be checked; check each factor")
-    _check_number("tol", tol)
-    if length is not None:
-        _check_number("length", length)
+    for name, number in (("tol", tol), ("length", length)):
+        if number is not None:
+            checked_number(number, f"{name} must be a number above 0", lambda x: 0 < x < np.inf)
     rng = np.random.default_rng(whole_number(seed, "seed", 0))
     if point is None:
         base = space.random_point(rng)

@@ -13,9 +13,8 @@ from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
 from .._spaces import Array
 from .._time import onto_ends
-from .curve import CurveArrays
+from .curve import CurveArrays, Gradient, SampleTimes
 from .ends import End, ends_of
-from .gradient import Gradient, SampleTimes
 
 
 def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> SampleTimes:
@@ -110,15 +109,8 @@ def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
     points, velocities = (
         space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities)
     )
-    return _Curves(
-        _per_curve(curve.times, batch),
-        points,
-        velocities,
-        ends_of(bc_type, space, batch),
-        at.x,
-        math.prod(batch),
-        at.nu,
-    )
+    knots, ends = _per_curve(curve.times, batch), ends_of(bc_type, space, batch)
+    return _Curves(knots, points, velocities, ends, at.x, math.prod(batch), at.nu)
 
 
 def _per_curve(knots: Array, batch: tuple[int, ...]) -> NDArray[np.float64]:

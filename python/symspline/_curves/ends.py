@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,11 @@ def _end(name: str, word: str | int, vector: Any, space: Space, batch: tuple[int
         raise ValidationError(
             f"the {name} {kind} has shape {np.shape(vector)}, which does not broadcast to {batch + space.point_shape}"
         ) from None
+
+
+def map_ends(ends: list[End] | None, function: Callable[[Any], Any]) -> list[End] | None:
+    """Apply a function to the vectors of end conditions."""
+    return ends and [(kind, None if vector is None else function(vector)) for kind, vector in ends]
 
 
 def freeze_bc_type(bc_type: Any) -> Any:

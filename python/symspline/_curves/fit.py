@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ from .reduced import ReducedCurve
 from .solve import Mask, Options, Progress, Solved, Task, solve, without
 
 _T = TypeVar("_T")
+_Times = TypeVar("_Times")
+_Data = TypeVar("_Data")
 # Options for a validation, which has no solver.
 _ANY = Options("auto", 0.0, None)
 _NATURAL: list[End] = [("natural", None), ("natural", None)]
@@ -58,15 +60,17 @@ class Points(NamedTuple):
     nodes: int
 
 
-class FitProblem(NamedTuple):
-    """Curves with equal numbers of points to fit.
+class Problem(NamedTuple, Generic[_Times, _Data]):
+    """Curves to fit: with equal numbers of points, or single curves of different lengths.
 
     Attributes
     ----------
-    times : ndarray, shape (N+1,) or (..., N+1)
-        Knots, shared or with one row per curve.
-    points, ends : list
-        Points and end conditions in each factor.
+    times : ndarray, shape (N+1,) or (..., N+1), or list of ndarray
+        Knots, shared or with one row per curve; for curves of different lengths, one array per curve.
+    points : list of Points, or list of lists of them
+        Points in each factor; for curves of different lengths, one such list per curve.
+    ends : list
+        End conditions in each factor.
     check : bool
         Whether to validate points and ends.
     mask : ndarray of bool or None
@@ -76,8 +80,8 @@ class FitProblem(NamedTuple):
     """
 
     space: Space[Any]
-    times: NDArray[np.float64]
-    points: list[Points]
+    times: _Times
+    points: _Data
     ends: list[list[End] | None]
     options: Options
     check: bool = True
@@ -85,20 +89,8 @@ class FitProblem(NamedTuple):
     skip_invalid: bool = False
 
 
-class ManyProblem(NamedTuple):
-    """Single curves of different lengths to fit.
-
-    The fields are those of `FitProblem`, but `times` and `points` have one entry per curve.
-    """
-
-    space: Space[Any]
-    times: list[NDArray[np.float64]]
-    points: list[list[Points]]
-    ends: list[list[End] | None]
-    options: Options
-    check: bool = True
-    mask: Mask | None = None
-    skip_invalid: bool = False
+FitProblem = Problem[NDArray[np.float64], list[Points]]
+ManyProblem = Problem[list[NDArray[np.float64]], list[list[Points]]]
 
 
 class Fit(NamedTuple):
@@ -191,19 +183,9 @@ def curve_of(
     fitted : bool
         Whether velocities are those of a C² curve.
     """
-    if isinstance(space, Product):
-        each = zip(space.factors, arrays, strict=True)
-        return ProductCurve(space, tuple([_part(factor, times, *pair, fitted) for factor, pair in each]))
-    return _part(space, times, *arrays[0], fitted)
-
-
-def _part(
-    space: Space, times: NDArray[np.float64], points: Array, velocities: Array, fitted: bool
-) -> CoreCurve:
-    kind = kind_of(space)
-    if kind is ReducedCurve:
-        return ReducedCurve(space, times, points, velocities, fitted)
-    return kind(space, times, points, velocities)
+    factors = factors_of(space)
+    parts = [kind_of(f)(f, times, *pair, fitted) for f, pair in zip(factors, arrays, strict=True)]
+    return ProductCurve(space, tuple(parts)) if isinstance(space, Product) else parts[0]
 
 
 def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
@@ -224,22 +206,13 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
     if len(points) == 1 and kind_of(space) is CoreCurve:
         # The core validates the points in the same call.
         data = points[0]
-        task = Task(
-            space, times, data.numbers, ends[0], data.tol if check else None, None, mask, check and skip
-        )
+        tol = data.tol if check else None
+        task = Task(space, times, data.numbers, ends[0], tol, None, mask, check and skip)
         (found,) = solve((task,), options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
     tasks = [
-        Task(
-            factor,
-            times,
-            part.numbers,
-            end,
-            part.tol if check else None,
-            mask=mask,
-            skip_invalid=check and skip,
-        )
+        Task(factor, times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     solved, faults = _solve(space, tasks, options, progress)
@@ -406,21 +379,15 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
     for i, factor in enumerate(factors_of(space)):
         most = max(own[i].tol for own in points)
         for number, own in enumerate(points):
+            if own[i].tol >= most or (mask is not None and not mask[number]):
+                continue
             # Invalid times are an error in any case, which is raised later.
-            if own[i].tol < most and (mask is None or mask[number]):
-                try:
-                    kind_of(factor).validate(
-                        Task(
-                            factor,
-                            np.arange(len(times[number]), dtype=float),
-                            own[i].numbers,
-                            _NATURAL,
-                            own[i].tol,
-                        ),
-                        _ANY,
-                    )
-                except ValidationError as error:
-                    if not skip:
-                        raise error._of_curve(number) from None
-                    faults.setdefault(number, Fault(number, INVALID, f"curve {number}: {error}"))
+            knots = np.arange(len(times[number]), dtype=float)
+            task = Task(factor, knots, own[i].numbers, _NATURAL, own[i].tol)
+            try:
+                kind_of(factor).validate(task, _ANY)
+            except ValidationError as error:
+                if not skip:
+                    raise error._of_curve(number) from None
+                faults.setdefault(number, Fault(number, INVALID, f"curve {number}: {error}"))
     return list(faults.values())

@@ -9,10 +9,9 @@ import numpy as np
 
 from .._spaces import Product, parts_of, product_norm
 from .core_curve import CoreCurve
-from .curve import NORMS, CurveArrays, Doubles
+from .curve import NORMS, CurveArrays, Doubles, Gradient, SampleTimes
 from .derivatives import pair_of
 from .ends import ends_in_factors
-from .gradient import Gradient, SampleTimes
 from .solve import Progress
 
 Tuple = tuple[Any, ...]
@@ -120,12 +119,7 @@ def _advance(progress: Progress, i: int, count: int, finished: int, total: int) 
 
 def longest_step(curve: CurveArrays) -> Any:
     """Compute D in equation (21), the longest distance between neighbours in the product metric."""
-    index = (slice(None),) * len(curve.batch)
-    steps = [
-        part.space._apply(
-            "distance", p=part.points[(*index, slice(None, -1))], q=part.points[(*index, slice(1, None))]
-        )
-        for part in curve.parts
-    ]
+    pairs = ((part.space, *part.space._neighbours(part.points)) for part in curve.parts)
+    steps = [space._apply("distance", p=p, q=q) for space, p, q in pairs]
     longest = np.max(product_norm(tuple(steps)), axis=-1)
     return float(longest) if np.ndim(longest) == 0 else longest

@@ -7,19 +7,92 @@ Curves are fitted and evaluated in these coordinates, and the results are embedd
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
-from typing import Any, Never, Self
+from typing import Any, NamedTuple, Never
 
 import numpy as np
 
 from .._core import ValidationError
-from .._spaces import Array, Space
+from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
-from .curve import NORMS, Doubles
-from .gradient import SampleTimes
+from .curve import NORMS, Doubles, SampleTimes
+from .ends import map_ends
 from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
-from .subspan import Span, span_of
+
+
+class Span(NamedTuple):
+    """A large space, the small space of coordinates in a span, and a basis of that span.
+
+    In hyperbolic space, the basis is that of the space-like part. The time-like coordinate does not change.
+
+    Attributes
+    ----------
+    large : Space
+        The large space.
+    space : Space
+        The space of coordinates.
+    basis : ndarray, shape (..., n, m)
+        Orthonormal columns.
+    """
+
+    large: Space
+    space: Space
+    basis: Array
+
+    def coordinates(self, x: Array) -> Array:
+        """Return coordinates of points or vectors of shape (..., knots, *point_shape)."""
+        time, columns, shape = _columns(self.space, x)
+        small = np.swapaxes(self.basis.conj(), -1, -2) @ columns
+        return _uncolumns(self.space, time, small, shape)
+
+    def embed(self, x: Array) -> Array:
+        """Return the points or vectors with given coordinates."""
+        time, columns, shape = _columns(self.space, x)
+        return _uncolumns(self.space, time, self.basis @ columns, shape)
+
+    def embed_samples(self, values: Array, batch: tuple[int, ...]) -> Array:
+        """Embed points or vectors of shape batch + times + (*point_shape)."""
+        axes = len(self.space.point_shape)
+        times = values.shape[len(batch) : values.ndim - axes]
+        flat = values.reshape(*batch, math.prod(times), *self.space.point_shape)
+        return self.embed(flat).reshape(*batch, *times, *self.large.point_shape)
+
+
+def span_of(space: Space, *arrays: Array) -> Span:
+    """Compute the span of points or vectors, in arrays of shape batch + (knots, *point_shape)."""
+    columns = np.concatenate([_columns(space, array)[1] for array in arrays], axis=-1)
+    basis = np.linalg.qr(columns)[0]
+    return Span(space, _small(space, basis.shape[-1]), basis)
+
+
+def _small(space: Space, m: int) -> Space:
+    if isinstance(space, (Grassmannian, ComplexGrassmannian)):
+        return type(space)(space.point_shape[1], m)
+    if isinstance(space, Hyperbolic):
+        return Hyperbolic(m)
+    small: Space = type(space)(m - 1)
+    return small
+
+
+def _columns(space: Space, x: Array) -> tuple[Array | None, Array, tuple[int, ...]]:
+    """Return the time-like part, one matrix of shape (..., n, knots · width) with all columns, and the shape of x."""
+    if len(space.point_shape) == 1:
+        time, rest = (x[..., :1], x[..., 1:]) if isinstance(space, Hyperbolic) else (None, x)
+        return time, np.swapaxes(rest, -1, -2), x.shape
+    moved = np.moveaxis(x, -3, -2)
+    *lead, knots, width = moved.shape
+    return None, moved.reshape(*lead, knots * width), x.shape
+
+
+def _uncolumns(space: Space, time: Array | None, columns: Array, shape: tuple[int, ...]) -> Array:
+    if len(space.point_shape) == 1:
+        rows = np.swapaxes(columns, -1, -2)
+        return np.ascontiguousarray(rows if time is None else np.concatenate([time, rows], axis=-1))
+    knots, width = shape[-3], shape[-1]
+    stacked = columns.reshape(*columns.shape[:-1], knots, width)
+    return np.ascontiguousarray(np.moveaxis(stacked, -2, -3))
 
 
 def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span | None]:
@@ -31,21 +104,9 @@ def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span |
 
 
 class ReducedCurve(CoreCurve):
-    """Curves in a large space that are computed in the span of their points.
-
-    Parameters
-    ----------
-    fitted : bool
-        Whether velocities are those of a C² curve, which lie in the span of the points and the end velocities.
-    """
+    """Curves in a large space that are computed in the span of their points."""
 
     _compiled = False
-
-    def __init__(
-        self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True
-    ) -> None:
-        super().__init__(space, times, points, velocities)
-        self._fitted = fitted
 
     @staticmethod
     def suits(space: Space) -> bool:
@@ -111,13 +172,6 @@ class ReducedCurve(CoreCurve):
             "large: the curve is computed in the span of its points, which motions of the points leave"
         )
 
-    def _with(self, times: Doubles, points: Array, velocities: Array) -> Self:
-        return type(self)(self.space, times, points, velocities, self._fitted)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        kind, arguments = super().__reduce__()
-        return kind, (*arguments, self._fitted)
-
 
 def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
     """Solve a task of curves with equal numbers of points in the span of the points."""
@@ -125,14 +179,9 @@ def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
     points = space._numbers(task.points)
     # End vectors have shape (..., 1, *point_shape), as arrays with one knot.
     axis = -1 - len(space.point_shape)
-    vectors = [
-        None if value is None else np.expand_dims(space._numbers(value), axis) for _, value in task.ends or []
-    ]
-    span = span_of(space, points, *(vector for vector in vectors if vector is not None))
-    ends = task.ends and [
-        (kind, None if vector is None else span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
-        for (kind, _), vector in zip(task.ends, vectors, strict=True)
-    ]
+    vectors = map_ends(task.ends, lambda value: np.expand_dims(space._numbers(value), axis))
+    span = span_of(space, points, *(vector for _, vector in vectors or [] if vector is not None))
+    ends = map_ends(vectors, lambda vector: span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
     small = task._replace(
         space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -14,7 +15,7 @@ from .. import _core
 from .._faults import Fault, from_core
 from .._report import Columns
 from .._spaces import Array, Space
-from .ends import End
+from .ends import End, map_ends
 
 Progress = Callable[[int, int], object]
 Mask = NDArray[np.bool_]
@@ -158,9 +159,7 @@ def one_by_one(
         if task.mask is not None and not task.mask[i]:
             points[start:stop] = np.nan
             continue
-        ends = task.ends and [
-            (kind, None if value is None else value[i : i + 1]) for kind, value in task.ends
-        ]
+        ends = map_ends(task.ends, operator.itemgetter(slice(i, i + 1)))
         one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
         found = solve_one(one, options, progress and partial(_advance, progress, start, offsets[-1]))
         velocities[start:stop] = found.velocities[0]
@@ -196,7 +195,7 @@ def solve_unmasked(
     some = task._replace(
         times=rows(task.times, 1) if task.times.ndim > 1 else task.times,
         points=rows(task.points, 1 + axes),
-        ends=task.ends and [(kind, None if v is None else rows(v, axes)) for kind, v in task.ends],
+        ends=map_ends(task.ends, lambda vectors: rows(vectors, axes)),
         mask=None,
     )
     found = solve_all(some, options, progress)

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import as_array, short_repr
+from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
-from .._curves.ends import End
+from .._curves.ends import End, map_ends
 from .._curves.fit import Points, read, read_ends, validated
 from .._faults import INVALID, Fault
 from .._input import times_of
@@ -174,7 +174,7 @@ class Given(NamedTuple):
             self.times if shared else rows(self.times),
             [part._replace(numbers=rows(part.numbers), batch=(len(chosen),)) for part in self.data],
             [own.map(rows) for own in self.precisions],
-            [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
+            [map_ends(own, rows) for own in self.ends],
             (len(chosen),),
             chosen,
         )
@@ -193,14 +193,16 @@ class Given(NamedTuple):
             if not np.all(enough):
                 number = int(np.flatnonzero(~enough)[0])
                 raise ValidationError(_too_few(own.weights, self.batch, number))
-        return SmoothingData(self.time_axis, self.t, self.times, on_space, self.precisions, self.batch)
+        return self.masked(on_space)
+
+    def masked(self, points: list[Array]) -> SmoothingData:
+        """Return the data with these points, which are NaN for masked curves."""
+        return SmoothingData(self.time_axis, self.t, self.times, points, self.precisions, self.batch)
 
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
     time_axis, shown_times, times = knots_of(t, batch, count)
-    if not np.isfinite(times).all():
-        index = np.argwhere(~np.isfinite(times))[0].tolist()
-        raise ValidationError(f"t{index} is {times[tuple(index)]}; times must be finite")
+    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}; times must be finite")
     back = np.argwhere(np.diff(times) < 0)
     if len(back):
         *curve, i = back[0].tolist()

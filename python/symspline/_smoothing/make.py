@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import short_repr, whole_number
+from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
-from .._curves.ends import End, freeze_bc_type, is_closed
-from .._curves.fit import FitProblem, Points, fit, mask_of
+from .._curves.ends import End, freeze_bc_type, is_closed, map_ends
+from .._curves.fit import Points, Problem, fit, mask_of
 from .._curves.solve import Options, Progress
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
@@ -35,7 +36,6 @@ from .._typing import (
 )
 from ..manifolds._manifold import refuse_functions
 from .data import (
-    Given,
     Knots,
     SmoothingData,
     has_all_times,
@@ -50,8 +50,7 @@ from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces
 from .report import SmoothingReport
 from .solve import NO_CURVE, SolverOptions, n_knots_for_df, one_per_curve, smoothed
 from .spline import SmoothingSpline
-from .spread import warn_of_spread
-from .warned import warn_of_bounds
+from .warned import warn_of_bounds, warn_of_spread
 
 _FIT = Options("auto", 1e-12, None)
 # If there are more knots than the first number, the fit begins with the second number of knots.
@@ -246,13 +245,10 @@ def make_smoothing_spline(
     for name, word in (("criterion", criterion), ("loss", loss), ("method", method)):
         if not isinstance(word, str):
             raise ValidationError(f"{name} must be a word, not {short_repr(word)}")
-    if isinstance(gamma, bool) or not (isinstance(gamma, (int, float, np.number)) and 1 <= gamma < np.inf):
-        raise ValidationError(f"gamma must be a number >= 1, not {short_repr(gamma)}")
-    if isinstance(tol, bool) or not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
-        raise ValidationError(f"tol must be a number > 0, not {short_repr(tol)}")
-    options = SolverOptions(
-        criterion, float(gamma), loss, method, float(tol), whole_number(max_iter, "max_iter", 1), False
-    )
+    gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
+    tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
+    most = whole_number(max_iter, "max_iter", 1)
+    options = SolverOptions(criterion, gamma, loss, method, tol, most, False)
     given = read_noisy(t, points, space, weights, frames, bc_type, atol)
     lams = _in_parts(space, lam, "lam", given.batch)
     sigmas = _in_parts(space, sigma, "sigma", given.batch)
@@ -274,30 +270,14 @@ def make_smoothing_spline(
         for factor, of_factor in zip(factors_of(space), some_given.ends, strict=True)
         for own in split_ends(factor, of_factor)
     ]
-    named = _names(given.batch, chosen)
     every = knots_for(given, knots)
     free = knots is None or has_all_times(every, noisy)
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
-        own = at.of_curves(chosen)
-        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, own), sigmas, ends, strict=True)
-        return [
-            smoothed(
-                part,
-                noisy,
-                points_of_part,
-                precision,
-                own,
-                one_lam,
-                one_sigma,
-                end,
-                options._replace(raise_lam=raise_lam),
-                named,
-                free,
-                progress,
-            )
-            for (part, points_of_part), precision, one_lam, one_sigma, end in each
-        ]
+        at = at.of_curves(chosen)
+        shared = noisy, at, options._replace(raise_lam=raise_lam), free, progress
+        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, at), sigmas, ends, strict=True)
+        return [smoothed(part, own, p, lam, sigma, end, *shared) for (part, own), p, lam, sigma, end in each]
 
     if is_closed(bc_type) and every.times.shape[-1] < 4:
         raise ValidationError(
@@ -315,39 +295,33 @@ def make_smoothing_spline(
         transport_end_velocities(end, part, own, curve_points, noisy)
         for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
-    whole = _whole(given, noisy, chosen)
-    at_knots = [
-        join(factor, [_in_batch(own, given.batch, chosen) for own, _, _ in parts])
-        for factor, parts in zip(factors_of(space), grouped(space, found), strict=True)
-    ]
-    conditions = [
-        _joined(factor, [_ends_in_batch(one, given.batch, chosen) for one in own])
-        for factor, own in zip(factors_of(space), grouped(space, transported), strict=True)
-    ]
-    parts = [
-        Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, given.batch, at.times.shape[-1])
-        for factor, own in zip(factors_of(space), at_knots, strict=True)
-    ]
-    good = None if chosen is None else _flags(given.batch, chosen)
-    fitted = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
-    noise = [part.map(lambda column: _in_batch(column, given.batch, chosen)) for _, part, _ in found]
+    in_batch = partial(_in_batch, given.batch, chosen)
+    whole = noisy if chosen is None else given.masked([in_batch(own) for own in noisy.points])
+    parts, conditions = [], []
+    for factor, of_points, of_ends in zip(
+        factors_of(space), grouped(space, found), grouped(space, transported), strict=True
+    ):
+        rows = join(factor, [in_batch(own) for own, _, _ in of_points])
+        doubles = np.ascontiguousarray(factor._as_doubles(rows))
+        parts.append(Points(doubles, 0.0, given.batch, at.times.shape[-1]))
+        conditions.append(_joined(factor, [map_ends(one, in_batch) for one in of_ends]))
+    good = None if chosen is None else in_batch(np.ones(len(chosen), bool))
+    fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
+    noise = [part.map(in_batch) for _, part, _ in found]
+    kept = _conditions(bc_type, conditions, space)
     spline = SmoothingSpline._of(
-        given.time_axis,
-        at.t,
-        fitted.curve,
-        _conditions(bc_type, conditions, space),
-        policy,
-        fitted.reports(),
-        whole,
-        noise,
+        given.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise
     )
-    faults += next((own for _, _, own in found if own), [])
+    faults += [
+        fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
+        for fault in next((own for _, _, own in found if own), [])
+    ]
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
     warn_of_bounds(
         space,
         [part.report for part in noise],
-        [_in_batch(np.isnan(own), given.batch, chosen) for own in lams],
+        [in_batch(np.isnan(own)) for own in lams],
         [np.sum(own.weights > 0, axis=-1) for own in given.precisions],
     )
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
@@ -476,23 +450,7 @@ def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> li
     return [one_per_curve(value, name, batch)] * len(spaces)
 
 
-def _names(batch: tuple[int, ...], chosen: Any) -> Callable[[int], tuple[int, str]]:
-    """Return a function from the number of a fitted curve to its number in the batch and its name in messages."""
-
-    def name(number: int) -> tuple[int, str]:
-        there = number if chosen is None else int(chosen[number])
-        return there, f" of curve {','.join(map(str, np.unravel_index(there, batch)))}" if batch else ""
-
-    return name
-
-
-def _flags(batch: tuple[int, ...], chosen: Any) -> Any:
-    flags = np.zeros(batch, bool)
-    flags.flat[chosen] = True
-    return flags
-
-
-def _in_batch(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
+def _in_batch(batch: tuple[int, ...], chosen: Any, column: Any) -> Any:
     """Return values of the fitted curves as an array over the whole batch; the others are NaN, False or zero."""
     if chosen is None:
         return column
@@ -501,18 +459,6 @@ def _in_batch(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
     out = np.full((int(np.prod(batch)), *rows.shape[1:]), nothing, rows.dtype)
     out[chosen] = rows
     return out.reshape(*batch, *rows.shape[1:])
-
-
-def _ends_in_batch(ends: list[End] | None, batch: tuple[int, ...], chosen: Any) -> list[End] | None:
-    return ends and [(kind, None if v is None else _in_batch(v, batch, chosen)) for kind, v in ends]
-
-
-def _whole(given: Given, noisy: SmoothingData, chosen: Any) -> SmoothingData:
-    """Return the data of all curves; points of masked curves are NaN."""
-    if chosen is None:
-        return noisy
-    points = [_in_batch(own, given.batch, chosen) for own in noisy.points]
-    return SmoothingData(given.time_axis, given.t, given.times, points, given.precisions, given.batch)
 
 
 def _with_enough(
@@ -558,7 +504,7 @@ def transport_end_velocities(
     for (kind, vector), index in zip(ends or [], (0, -1), strict=ends is not None):
         if vector is not None:
             y, x = (np.take(rows, index, axis=axis) for rows in (data, points))
-            good = np.isfinite(x).all(axis=tuple(range(axis, x.ndim)))
+            good = space._where_finite(x)
             moved = np.array(space._numbers(vector))
             moved[good] = space._apply("transport", p=y[good], q=x[good], v=moved[good])
             vector = np.ascontiguousarray(space._as_doubles(moved))
@@ -570,15 +516,12 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     """Combine the end conditions of the parts of a factor."""
     if ends[0] is None or len(ends) == 1:
         return ends[0]
-    parts: tuple[Space, ...] = parts_of_factor(space)
     joined: list[End] = []
     for each in zip(*[own or [] for own in ends], strict=True):
-        vectors = [vector for _, vector in each]
-        if any(vector is None for vector in vectors):
-            joined.append((each[0][0], None))
-            continue
-        rows = [part._numbers(vector) for part, vector in zip(parts, vectors, strict=True)]
-        joined.append((each[0][0], np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0)))))
+        pairs = zip(parts_of_factor(space), each, strict=True)
+        rows = [part._numbers(vector) for part, (_, vector) in pairs if vector is not None]
+        vector = np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0))) if rows else None
+        joined.append((each[0][0], vector))
     return joined
 
 
@@ -591,11 +534,8 @@ def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space)
         each = [(ends or [])[e] for ends in transported]
         if each[0][1] is None:
             return "natural"
-        vectors = tuple(
-            factor._numbers(vector)
-            for factor, (_, vector) in zip(factors_of(space), each, strict=True)
-            if vector is not None
-        )
+        pairs = zip(factors_of(space), each, strict=True)
+        vectors = tuple(factor._numbers(vector) for factor, (_, vector) in pairs if vector is not None)
         return (1, vectors if isinstance(space, Product) else vectors[0])
 
     return freeze_bc_type((one(0), one(1)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .._report import BOOL, FLOAT, INT, mapped_columns, same_report
 from .._typing import Number
 
-METHODS = ("linearized", "newton")
+METHODS: tuple[Literal["linearized", "newton"], ...] = ("linearized", "newton")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._archive import Entries, read_fitted, read_times
-from .._arrays import short_repr
+from .._arrays import checked_number
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.band import UncertaintyBand
@@ -161,7 +161,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         ):
             counts = np.any([own.weights > 0 for own in precisions], axis=0)
             used = np.broadcast_to(counts, (*noisy.batch, points.shape[len(noisy.batch)]))
-            used = used & np.isfinite(gamma).all(axis=tuple(range(len(noisy.batch) + 1, gamma.ndim)))
+            used = used & space._where_finite(gamma)
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
             found.append(vectors)
@@ -306,9 +306,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         >>> (s.band(0.5) / s.std(0.5)).round(2)
         np.float64(1.96)
         """
-        number = isinstance(level, (int, float, np.integer, np.floating)) and not isinstance(level, bool)
-        if not number or not 0 < level < 1:
-            raise ValidationError(f"level must lie between 0 and 1, not {short_repr(level)}")
+        level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
         whole: SmoothingSpline[Any, Any] = self
         spreads = whole.std(x)
         each = spreads if is_several(self.space) else (spreads,)

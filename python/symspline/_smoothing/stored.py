@@ -86,8 +86,7 @@ def read_noise(
             raise ValidationError(f"entry 'data': the data have shape {rows.shape}")
         if isinstance(state, Stored):
             # Masked curves are NaN, and so are their data.
-            there = np.isfinite(part.points).all(axis=tuple(range(len(batch), part.points.ndim)))
-            part.space.check_point(rows[there])
+            part.space.check_point(rows[part.space._where_finite(part.points).all(axis=-1)])
     precisions, smoothed = [], []
     with entry("noise"):
         for i, (own, numbers) in enumerate(zip(smoothed_spaces(space), state["noise"], strict=True)):

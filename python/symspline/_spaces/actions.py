@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, short_repr
+from .._arrays import as_array, cast, refuse, short_repr
 from .._core import ValidationError
 from .._typing import P
 from .base import Array, Space, point_tol
@@ -31,22 +31,21 @@ def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Ar
             f"g has shape {array.shape}, but the group of {space!r} consists of {size} × {size} matrices. "
             f"Pass an array of shape (..., {size}, {size})."
         )
-    if not np.isfinite(array).all():
-        index = np.argwhere(~np.isfinite(array).all(axis=(-2, -1)))[0].tolist()
-        raise ValidationError(f"g{index or ''} has entries that are not finite. Pass finite numbers.")
+    infinite = ~np.isfinite(array).all(axis=(-2, -1))
+    refuse(infinite, "g", lambda _: "has entries that are not finite. Pass finite numbers.")
     return cast(array, np.dtype(dtype)), point_tol(array.dtype)
 
 
 def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
     """Raise ValidationError for the first matrix whose deviation exceeds the limit."""
-    bad = np.argwhere(~(np.isfinite(defects) & (defects <= allowed)))
-    if len(bad):
-        index = bad[0].tolist()
-        limit = np.broadcast_to(allowed, defects.shape)[tuple(index)]
-        raise ValidationError(
-            f"g{index or ''} is not in the group of {space!r}: {what} is {defects[tuple(index)]:.3e} "
-            f"(allowed: {limit:.0e}). {remedy}"
-        )
+    limits = np.broadcast_to(allowed, defects.shape)
+    refuse(
+        ~(np.isfinite(defects) & (defects <= limits)),
+        "g",
+        lambda i: (
+            f"is not in the group of {space!r}: {what} is {defects[i]:.3e} (allowed: {limits[i]:.0e}). {remedy}"
+        ),
+    )
 
 
 def largest(x: Array) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, short_repr, whole_number
+from .._arrays import as_array, cast, refuse, short_repr, whole_number
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
 
@@ -632,12 +632,9 @@ class Space(Generic[P]):
         array([0.6, 0. , 0.8])
         """
         result: Any = self._apply("project", x=x)
-        good = np.isfinite(result) & np.isfinite(cast(self._array(x, "x"), self.dtype))
-        if not good.all():
-            bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
-            raise ValidationError(
-                f"x{bad or ''} cannot be projected: it is not finite, or no point of {self!r} is close to it"
-            )
+        good = self._where_finite(result) & self._where_finite(cast(self._array(x, "x"), self.dtype))
+        why = f"cannot be projected: it is not finite, or no point of {self!r} is close to it"
+        refuse(~good, "x", lambda _: why)
         try:
             self.check_point(result)
         except ValidationError as error:
@@ -906,6 +903,15 @@ class Space(Generic[P]):
 
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
+
+    def _neighbours(self, points: Array) -> tuple[Array, Array]:
+        """Return the starts and the ends of the segments between points along the last of the leading axes."""
+        index = (slice(None),) * (points.ndim - len(self._point_shape) - 1)
+        return points[(*index, slice(-1))], points[(*index, slice(1, None))]
+
+    def _where_finite(self, points: Array) -> NDArray[np.bool_]:
+        """Return which points or vectors are finite."""
+        return np.asarray(np.isfinite(points).all(axis=self._point_axes(points)))
 
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
         """Return points as contiguous floating-point numbers of the core.

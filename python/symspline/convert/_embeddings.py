@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import Array, adjoint, largest, numbers, real_numbers, refuse, square_matrices
+from ._reading import Array, adjoint, largest, numbers, real_numbers, square_matrices
 
 
 def siegel_to_positive_definite(z: ArrayLike) -> Array:

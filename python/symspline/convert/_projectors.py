@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
 from ._reading import (
     Array,
@@ -14,7 +15,6 @@ from ._reading import (
     length,
     numbers,
     off_one,
-    refuse,
     square_matrices,
     unit_vectors,
     unmoved_by_underflow,

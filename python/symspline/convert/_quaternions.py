@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import checked_atol
+from .._arrays import checked_atol, refuse
 from .._core import ValidationError
 from .._quaternions import Rows, quaternion_rows, rotation_rows
-from ._reading import Array, length, off_one, real_numbers, refuse, unit_vectors, unmoved_by_underflow
+from ._reading import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
 
 
 @unmoved_by_underflow

@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast
+from .._arrays import as_array, cast, refuse
 from .._core import ValidationError
 from .._spaces import point_tol
 
@@ -87,14 +87,6 @@ def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
         lambda i: f"is not {what}: its length is {lengths[i]}, not 1; divide it by its length",
     )
     return x / lengths[..., None]
-
-
-def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
-    """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
-    found = np.argwhere(bad)
-    if len(found):
-        index = tuple(found[0].tolist())
-        raise ValidationError(f"{name}{list(index) or ''} {say(index)}")
 
 
 def length(x: Array) -> Array:

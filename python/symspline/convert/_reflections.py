@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import Array, largest, real_numbers, refuse, unmoved_by_underflow
+from ._reading import Array, largest, real_numbers, unmoved_by_underflow
 
 
 def _signs(n: int, negative: int) -> Array:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import short_repr, whole_number
+from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array, Space, factors_of
 from ._differences import dlog_by_differences
@@ -316,14 +317,8 @@ def _shape(value: Any) -> tuple[int, ...]:
 
 
 def _radius(value: Any) -> float:
-    if value is None:
-        return float(np.inf)
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not number or not value > 0:
-        raise ValidationError(
-            f"injectivity_radius must be a positive number, or None for no limit, not {short_repr(value)}"
-        )
-    return float(value)
+    requirement = "injectivity_radius must be a positive number, or None for no limit"
+    return math.inf if value is None else checked_number(value, requirement, lambda x: x > 0)
 
 
 def refuse_functions(space: Space[Any], what: str, named: bool = False) -> None:

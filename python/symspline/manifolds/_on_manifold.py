@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
-from .._curves.curve import NORMS, REAL, Doubles
-from .._curves.gradient import SampleTimes
+from .._curves.curve import NORMS, REAL, Doubles, SampleTimes
 from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_unmasked
 from .._faults import Fault
 from .._spaces import Array, Euclidean, Space

@@ -7,15 +7,16 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import refuse
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.core_curve import CoreCurve
 from .._curves.curve import CurveArrays
-from .._curves.subspan import span_of
+from .._curves.reduced import span_of
 from .._spaces import ComplexGrassmannian, ComplexProjective
 from .._time import onto_ends
 from .._typing import TimesLike
-from ..convert._reading import Array, adjoint, refuse
+from ..convert._reading import Array, adjoint
 from ._generators import generator, quantum_space
 
 Doubles = NDArray[np.float64]

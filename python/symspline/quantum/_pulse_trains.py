@@ -7,12 +7,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, short_repr
+from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
 from .._typing import TimesLike
-from ..convert._reading import Array, adjoint, largest, refuse, square_matrices
+from ..convert._reading import Array, adjoint, largest, square_matrices
 from ._generators import generator, hamiltonian, quantum_space
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import refuse
 from .._cubic import CubicSpline
 from .._spaces import Grassmannian
 from .._typing import TimesLike
-from ..convert._reading import refuse
 from ._landmarks import Array
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import short_repr
+from .._arrays import refuse, short_repr
 from .._core import ValidationError
-from ..convert._reading import numbers, off_one, refuse
+from ..convert._reading import numbers, off_one
 
 Array = NDArray[np.float64]
 

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, read_only, short_repr
+from .._arrays import as_array, read_only, refuse, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
 from .._spaces import Euclidean, SpecialOrthogonal, SymmetricPositiveDefinite
 from .._typing import AnyArray, BCWords, File, TimesLike
-from ..convert._reading import refuse
 from ._bases import Bases
 from ._landmarks import Array, orthonormal, place, placed, read, relative
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, brief, short_repr
+from .._arrays import as_array, brief, refuse, short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._typing import TensorOrder
@@ -220,10 +220,7 @@ def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.
             )
         mask = voxels
     values = as_array(mask, "mask")
-    bad = np.argwhere(~(values >= 0))
-    if len(bad):
-        place = tuple(map(int, bad[0]))
-        raise ValidationError(f"mask[{', '.join(map(str, place))}] is {values[place]}; it must be 0 or more")
+    refuse(~(values >= 0), "mask", lambda i: f"is {values[i]}; it must be 0 or more")
     inside: NDArray[np.bool_] = values.astype(bool)
     if inside.shape != numbers.shape[:3]:
         raise ValidationError(f"the mask has shape {inside.shape}, but the volume {numbers.shape[:3]}")

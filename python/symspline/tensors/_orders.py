@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, short_repr
+from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
 from .._spaces import point_tol
 from .._typing import TensorOrder
-from ..convert._reading import largest, refuse
+from ..convert._reading import largest
 
 Array = NDArray[Any]
 
