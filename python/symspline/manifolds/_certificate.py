@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from .._spaces import Array
 from ._condition import ControlPolygon, Problem, c2_residuals, c2_residuals_of, control_polygons
 from ._differences import dlog_by_differences
+from ._iteration import Tridiagonal
 from ._operations import Operations
-from ._tridiagonal import Tridiagonal
 
 Doubles = NDArray[np.float64]
 
@@ -99,8 +99,7 @@ def _largest(x: Doubles) -> Doubles:
 
 
 def _most(x: Doubles) -> Doubles:
-    result: Doubles = x.max(axis=1)
-    return result
+    return np.asarray(x.max(axis=1))
 
 
 def _unit(x: Doubles) -> Doubles:

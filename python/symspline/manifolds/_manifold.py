@@ -168,8 +168,7 @@ class Manifold(Space):
     def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
         """Return `dlog` of rows at q = exp(p, v)."""
         if self.functions.dlog is not None:
-            result: Array = self.functions.dlog(p, q, w)
-            return result
+            return np.asarray(self.functions.dlog(p, q, w))
         return dlog_by_differences(self.operations, p, v, q, w, self._radius)
 
     def frame(self, p: ArrayLike) -> Array:

@@ -94,15 +94,7 @@ class Stiefel(Manifold):
         return self._parameters
 
     # Unlike other manifolds, it has a name.
-
-    def __str__(self) -> str:
-        return Space.__str__(self)
-
-    def __repr__(self) -> str:
-        return Space.__repr__(self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Space.__reduce__(self)
+    __str__, __repr__, __reduce__ = Space.__str__, Space.__repr__, Space.__reduce__
 
     def _exp(self, p: Array, v: Array) -> Array:
         frame, a, b = self._reduced(p, v)
@@ -185,9 +177,7 @@ def _project(x: Array) -> Array:
 def _generator(a: Array, b: Array) -> Array:
     """((a, −bᵀ), (b, 0))."""
     zero = np.zeros((*b.shape[:-1], b.shape[-2]))
-    return np.concatenate(
-        [np.concatenate([a, -_transposed(b)], axis=-1), np.concatenate([b, zero], axis=-1)], axis=-2
-    )
+    return np.asarray(np.block([[a, -_transposed(b)], [b, zero]]))
 
 
 def _units(k: int, m: int) -> Array:
