@@ -185,14 +185,8 @@ class BSpline(Curve[P]):
         return self
 
     def _state(self) -> dict[str, Any]:
-        return {
-            "format": self._format,
-            "version": VERSION,
-            "space": self.space,
-            "knots": self.knots,
-            "control_points": self.control_points,
-            "degree": self.degree,
-        }
+        head = {"format": self._format, "version": VERSION, "space": self.space}
+        return head | {"knots": self.knots, "control_points": self.control_points, "degree": self.degree}
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:

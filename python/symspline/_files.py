@@ -142,14 +142,13 @@ def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
 
 def _layout(state: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parts of a state that all curves of a file must share."""
-    return {
-        key: value
-        if key in _SHARED
-        else (value.dtype, value.shape[1:])
-        if isinstance(value, np.ndarray)
-        else ()
-        for key, value in state.items()
-    }
+
+    def shared(key: str, value: Any) -> Any:
+        if key in _SHARED:
+            return value
+        return (value.dtype, value.shape[1:]) if isinstance(value, np.ndarray) else ()
+
+    return {key: shared(key, value) for key, value in state.items()}
 
 
 def _restored(state: Stored) -> Any:

@@ -155,7 +155,7 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     """
     r, x = split(_checked(poses))
     write_tum_rows(
-        file, _seconds(t, len(x)), np.concatenate([x, _quaternions(r, scalar_first=False)], axis=1)
+        file, _seconds(t, len(x)), np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1)
     )
 
 
@@ -346,7 +346,7 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
         refuse(np.abs(times.astype(np.float64)) > _LAST, "t", lambda i: f"is {times[i]}, after the year 2262")
         times = np.rint(1e9 * times.astype(np.float64)).astype(np.int64)
     ns = times.astype("datetime64[ns]").astype(np.int64).tolist()
-    values = np.concatenate([x, _quaternions(r, scalar_first=True)], axis=1).tolist()
+    values = np.concatenate([x, matrix_to_quaternion(r, scalar_first=True)], axis=1).tolist()
     _write(file, ([time, *row] for time, row in zip(ns, values, strict=True)), ",", _EUROC)
 
 
@@ -427,10 +427,6 @@ def _checked(poses: Any) -> Array:
     if g.ndim != 3:
         raise ValidationError(f"a file holds poses of shape (n, 4, 4), not {g.shape}")
     return g
-
-
-def _quaternions(r: Array, scalar_first: bool) -> Array:
-    return matrix_to_quaternion(r, scalar_first=scalar_first)
 
 
 def _moments(t: ArrayLike, count: int) -> Array:
@@ -515,13 +511,10 @@ def _lines(file: Any, name: str = "file") -> list[Line]:
         try:
             with opener(path, "rt", encoding="utf-8-sig") as opened:
                 text = opened.read()
-        except (UnicodeDecodeError, EOFError, zlib.error) as error:
-            what = (
-                "not text in UTF-8"
-                if isinstance(error, UnicodeDecodeError)
-                else "damaged: it cannot be decompressed"
-            )
-            raise ValidationError(f"{_name(file)} is {what}") from None
+        except UnicodeDecodeError:
+            raise ValidationError(f"{_name(file)} is not text in UTF-8") from None
+        except (EOFError, zlib.error):
+            raise ValidationError(f"{_name(file)} is damaged: it cannot be decompressed") from None
     lines = (Line(number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
     return [line for line in lines if line.text and not line.text.startswith("#")]
 

@@ -140,20 +140,15 @@ class Report:
         else:
             state = f"{np.count_nonzero(converged)} of {converged.size} curves converged"
             many = "at most " if converged.size > 1 else ""
-        return (
+        text = (
             f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
             f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}"
-            f"{self._certificate()}{self._accuracy()}"
         )
-
-    def _certificate(self) -> str:
-        radius = self.invariant_radius
-        if radius is None or np.isnan(radius).any():
-            return ""
-        return f", control handles stay below {np.max(radius):.3g} (Theorem 3.1)"
-
-    def _accuracy(self) -> str:
-        return "" if self.velocity_error is None else f", velocities within {_worst(self.velocity_error):.1e}"
+        if self.invariant_radius is not None and not np.isnan(self.invariant_radius).any():
+            text += f", control handles stay below {np.max(self.invariant_radius):.3g} (Theorem 3.1)"
+        if self.velocity_error is not None:
+            text += f", velocities within {_worst(self.velocity_error):.1e}"
+        return text
 
     def __eq__(self, other: object) -> bool:
         return same_report(self, other) if isinstance(other, Report) else NotImplemented
@@ -245,11 +240,10 @@ class Columns(NamedTuple):
 
     def row(self, name: str) -> NDArray[Any]:
         """Return the values of a field, one per curve, as a writable view."""
-        integer = name in INTEGERS
-        values: NDArray[Any] = (
-            self.integers[INTEGERS.index(name)] if integer else self.numbers[NUMBERS.index(name)]
+        is_integer = name in INTEGERS
+        return np.asarray(
+            self.integers[INTEGERS.index(name)] if is_integer else self.numbers[NUMBERS.index(name)]
         )
-        return values
 
     def part(self, curves: Any) -> Columns:
         """Return the columns of some curves."""

@@ -14,6 +14,7 @@ from ._core import CutLocusError
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points
 from ._errors import warn
+from ._faults import of_index
 from ._report import MAX_STEP, Columns, FarPointsWarning
 from ._spaces import Array, Space, Sphere, Unitary, factors_of
 from .manifolds import Manifold
@@ -91,8 +92,7 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     found = [
         (number, index, part.numbers)
         for number, parts in enumerate(curves)
-        if parts is not None
-        for part, factor in zip(parts, factors_of(space), strict=True)
+        for part, factor in zip(parts or (), factors_of(space), strict=parts is not None)
         if _has_quaternions(factor)
         for index in _opposite(part.numbers)
     ]
@@ -101,14 +101,12 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     number, index, points = found[0]
     *batch, i = index.tolist()
     curve = [number] * (len(curves) > 1) + batch
-    of = f" of curve {','.join(map(str, curve))}" if curve else ""
-    more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
+    of, more = of_index(curve), f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
     warn(
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
-        f"round. "
-        f"{IN_PYTHON}",
+        f"round. {IN_PYTHON}",
         UserWarning,
         tuple(curve),
         i,
@@ -156,7 +154,7 @@ def warn_of_far_points(
     if not found:
         return
     place, count, steps, space = found[0]
-    of = f" of curve {','.join(map(str, place))}" if place else ""
+    of = of_index(place)
     others = len({place for place, *_ in found}) - 1
     more = f" (and of {others} more curves)" if others else ""
     warn(

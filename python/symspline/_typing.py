@@ -102,6 +102,12 @@ class SolverOptions(TypedDict, total=False):
     atol: float | None
 
 
+class CurveOptions(SolverOptions, total=False):
+    """The keywords of the functions for automatic differentiation that do not affect the type of the result."""
+
+    bc_type: Any
+
+
 class FitOptions(SolverOptions, total=False):
     """The keywords of `CubicSpline`."""
 

@@ -368,19 +368,15 @@ def _lift(curve: CurveArrays) -> CurveArrays:
     turn. The signs at the knots follow from the quaternions of the control points.
     """
     if curve not in _LIFTS:
-        _LIFTS[curve] = _lifted(curve)
+        q = matrix_to_quaternion(curve.points, scalar_first=True)
+        # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
+        rate = quaternion_velocity(q, _vee(curve.points, curve.velocities))
+        control = _above(curve, q, rate).control_points()
+        changes = np.where(_dot(control[..., 1, :], control[..., 2, :]) < 0, -1.0, 1.0)
+        signs = np.ones((*q.shape[:-1], 1))
+        np.cumprod(changes, axis=-1, out=signs[..., 1:, 0])
+        _LIFTS[curve] = _above(curve, signs * q, signs * rate)
     return _LIFTS[curve]
-
-
-def _lifted(curve: CurveArrays) -> CurveArrays:
-    q = matrix_to_quaternion(curve.points, scalar_first=True)
-    # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
-    rate = _velocity_above(q, curve)
-    control = _above(curve, q, rate).control_points()
-    changes = np.where(_dot(control[..., 1, :], control[..., 2, :]) < 0, -1.0, 1.0)
-    signs = np.ones((*q.shape[:-1], 1))
-    np.cumprod(changes, axis=-1, out=signs[..., 1:, 0])
-    return _above(curve, signs * q, signs * rate)
 
 
 def _above(curve: CurveArrays, q: Array, velocities: Array) -> CurveArrays:
@@ -388,11 +384,6 @@ def _above(curve: CurveArrays, q: Array, velocities: Array) -> CurveArrays:
     # The core reads memory in order.
     pair = np.ascontiguousarray(q), np.ascontiguousarray(velocities)
     return curve_of(_S3, curve.times, [pair], fitted=False)
-
-
-def _velocity_above(q: Array, curve: CurveArrays) -> Array:
-    """Return ½ q (0, ω), scalar first, for the velocities R ω̂ of a curve at the quaternions q of its points R."""
-    return quaternion_velocity(q, _vee(curve.points, curve.velocities))
 
 
 def quaternion_velocity(q: Array, omega: Array) -> Array:

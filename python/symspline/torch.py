@@ -10,31 +10,19 @@ import torch
 from ._adapters import fitted, movable, split
 from ._curves.ends import ends_in_factors
 from ._spaces import Product, Space, parts_of, space_named
-from ._typing import SolverOptions
+from ._typing import CurveOptions, SolverOptions
 from .manifolds._manifold import refuse_functions
 
 
 @overload
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space | str,
-    *,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[CurveOptions]
 ) -> torch.Tensor: ...
 
 
 @overload
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Product,
-    *,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]
 ) -> tuple[torch.Tensor, ...]: ...
 
 

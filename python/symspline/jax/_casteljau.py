@@ -10,9 +10,8 @@ import jax.numpy as jnp
 from .._core import ValidationError
 from .._options import order_of
 from .._spaces import Product, Space, parts_of, space_named
-from ._embedding import second_fundamental_form
 from ._models import Model
-from ._registry import QUOTIENTS, model_of
+from ._registry import QUOTIENTS, model_of, second_fundamental_form
 from ._spectral import adjoint
 
 

@@ -13,37 +13,23 @@ from .._adapters import split
 from .._curves.ends import ends_in_factors
 from .._options import order_of
 from .._spaces import Product, Space, parts_of, space_named
-from .._typing import SolverOptions
+from .._typing import CurveOptions, SolverOptions
 from ..manifolds._manifold import refuse_functions
-from ._embedding import second_fundamental_form
 from ._primitives import Fixed, fit_p, jvp_p
+from ._registry import second_fundamental_form
 
 Array = jax.Array
 
 
 @overload
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space | str,
-    *,
-    nu: int = 0,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Space | str, *, nu: int = 0, **options: Unpack[CurveOptions]
 ) -> Array: ...
 
 
 @overload
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Product,
-    *,
-    nu: int = 0,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Product, *, nu: int = 0, **options: Unpack[CurveOptions]
 ) -> tuple[Array, ...]: ...
 
 
