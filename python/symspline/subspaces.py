@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, refuse, short_repr, whole_number
+from ._arrays import as_array, checked_number, refuse, whole_number
 from ._base_curve import check_curve
 from ._core import ValidationError
 from ._cubic import CubicSpline
@@ -164,8 +164,7 @@ def reduced_operator(
 
 def _rank(sizes: Array, energy: Any) -> int:
     """Return the smallest rank with which every subspace contains the given fraction of the sum of squares."""
-    if isinstance(energy, bool) or not isinstance(energy, (int, float, np.floating)) or not 0 < energy <= 1:
-        raise ValidationError(f"energy must be a fraction above 0 and at most 1, not {short_repr(energy)}")
+    energy = checked_number(energy, "energy must be a fraction above 0 and at most 1", lambda x: 0 < x <= 1)
     squares = (sizes / np.maximum(sizes[..., :1], np.finfo(float).tiny)) ** 2
     # What is left beyond rank 1, 2, …, without cancellation.
     left = np.cumsum(squares[..., ::-1], axis=-1)[..., ::-1]

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
-from ._functional import evaluate
+from ._pairs import segments_of
 from ._spaces import Array, Product, Space, space_named
 from .manifolds import Manifold
 
@@ -215,11 +215,7 @@ def _operations(found: Conformance, s: _Sample) -> None:
         s.tol,
     )
     onward = -space.log(half, s.p)
-    found._add("geodesics go on as geodesics", _apart(s, space.exp(half, onward), s.q), s.tol)
-
-
-def _apart(s: _Sample, x: Array, y: Array) -> Array:
-    return np.asarray(s.space.distance(x, y))
+    found._add("geodesics go on as geodesics", s.space.distance(space.exp(half, onward), s.q), s.tol)
 
 
 def _metric(found: Conformance, s: _Sample) -> None:
@@ -275,7 +271,7 @@ def _smoothness(found: Conformance, s: _Sample) -> None:
     for t in (np.arange(len(p), dtype=float), np.cumsum(s.rng.uniform(0.7, 1.3, len(p)))):
         for ends in ("natural", "not-a-knot"):
             spline = CubicSpline(t, p, space, bc_type=ends)
-            offs.append(_apart(s, spline(t), p).max())
+            offs.append(s.space.distance(spline(t), p).max())
             jumps.append(_jumps(s, spline))
     value, velocity, acceleration = np.max(jumps, axis=0)
     found._add("splines interpolate", offs, s.tol)
@@ -289,25 +285,22 @@ def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
 
     Each segment is evaluated by itself. The last two jumps are relative to the quantity.
     """
-    space, p, u = s.space, spline.points, spline.velocities
-    h = np.diff(spline.t)
-    knots = np.stack([0 * h, h], axis=1)
-    points, velocities = (np.stack([x[:-1], x[1:]], axis=1) for x in (p, u))
+    segments = segments_of(spline)
 
     def sides(nu: int) -> tuple[Array, Array]:
-        values = evaluate(knots, points, velocities, space, knots, nu=nu, per_curve=True)
+        values = segments.at(segments.t, nu)
         return values[:-1, 1], values[1:, 0]
 
     def jump(nu: int) -> float:
         left, right = sides(nu)
         if s.size(before - behind).max() > 1e-6:
             # One point may have several arrays.
-            left = space.transport(before, behind, left)
+            left = s.space.transport(before, behind, left)
         # A straight walk has no acceleration.
         return float(s.size(left - right).max() / max(s.size(left).max(), s.size(right).max(), s.longest))
 
     before, behind = sides(0)
-    return float(_apart(s, before, behind).max()), jump(1), jump(2)
+    return float(s.space.distance(before, behind).max()), jump(1), jump(2)
 
 
 def _order(found: Conformance, s: _Sample) -> None:

@@ -17,7 +17,7 @@ from .._core import ValidationError
 from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
-from .curve import NORMS, Doubles, SampleTimes
+from .curve import NORMS, CurveArrays, Doubles, SampleTimes
 from .ends import map_ends
 from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
 
@@ -46,6 +46,11 @@ class Span(NamedTuple):
         time, columns, shape = _columns(self.space, x)
         small = np.swapaxes(self.basis.conj(), -1, -2) @ columns
         return _uncolumns(self.space, time, small, shape)
+
+    def inside(self, curve: CurveArrays) -> CoreCurve:
+        """Return a curve in the small space."""
+        points, velocities = self.coordinates(curve.points), self.coordinates(curve.velocities)
+        return CoreCurve(self.space, curve.times, points, velocities)
 
     def embed(self, x: Array) -> Array:
         """Return the points or vectors with given coordinates."""
@@ -125,9 +130,7 @@ class ReducedCurve(CoreCurve):
         if self._fitted:
             vectors = np.take(vectors, [0, -1], axis=len(self.batch))
         span = span_of(self.space, self.points, vectors)
-        return span, CoreCurve(
-            span.space, self.times, span.coordinates(self.points), span.coordinates(self.velocities)
-        )
+        return span, span.inside(self)
 
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
@@ -154,10 +157,7 @@ class ReducedCurve(CoreCurve):
         knots = len(self.batch)
         rows = np.expand_dims(np.asarray(v, self.space.dtype), knots)
         span = span_of(self.space, self.points, self.velocities, rows)
-        small = CoreCurve(
-            span.space, self.times, span.coordinates(self.points), span.coordinates(self.velocities)
-        )
-        found = small.transport(times, outside, np.squeeze(span.coordinates(rows), knots))
+        found = span.inside(self).transport(times, outside, np.squeeze(span.coordinates(rows), knots))
         return np.squeeze(span.embed(np.expand_dims(found, knots)), knots)
 
     def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:

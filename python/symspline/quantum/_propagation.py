@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from .._arrays import refuse
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.core_curve import CoreCurve
 from .._curves.curve import CurveArrays
 from .._curves.reduced import span_of
 from .._spaces import ComplexGrassmannian, ComplexProjective
@@ -101,10 +100,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
     if (curve.times.shape[-1] + 2) * width >= curve.space.point_shape[0]:
         return curve, None
     span = span_of(curve.space, curve.points, np.take(curve.velocities, [0, -1], axis=len(curve.batch)))
-    small = CoreCurve(
-        span.space, curve.times, span.coordinates(curve.points), span.coordinates(curve.velocities)
-    )
-    return small, span.basis
+    return span.inside(curve), span.basis
 
 
 def _times(spline: CubicSpline, x: TimesLike) -> Doubles:

@@ -69,12 +69,7 @@ def pulses(
     if kind == "midpoint":
         h = hamiltonian(spline, times[:-1] + (times[1:] - times[:-1]) / 2)
     else:
-        points = spline(times)
-        axis = len(spline._batch)
-        first, last = (
-            np.take(points, range(len(times) - 1), axis),
-            np.take(points, range(1, len(times)), axis),
-        )
+        first, last = space._neighbours(spline(times))
         h = generator(space, first, space.log(first, last)) / spacing[..., None, None]
     return h if basis is None else _coefficients(h, basis)
 
