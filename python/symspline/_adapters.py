@@ -30,9 +30,7 @@ def joined(kinds: Kinds, vectors: tuple[Any, Any]) -> Any:
     """The inverse of `split`."""
     if isinstance(kinds, str):
         return kinds
-    return tuple(
-        kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True)
-    )
+    return tuple(kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True))
 
 
 def fitted(

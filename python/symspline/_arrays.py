@@ -39,9 +39,7 @@ def _first_masked(value: Any) -> tuple[int, ...] | None:
     if isinstance(value, np.ma.MaskedArray):
         found = np.argwhere(np.ma.getmaskarray(value))
         return tuple(found[0].tolist()) if len(found) else None
-    if isinstance(value, (list, tuple)) and any(
-        issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))
-    ):
+    if isinstance(value, (list, tuple)) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
         for i, row in enumerate(value):
             index = _first_masked(row)
             if index is not None:

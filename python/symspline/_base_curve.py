@@ -78,35 +78,17 @@ class SegmentedCurve(Curve[P]):
 
     @overload
     def __call__(
-        self,
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        dtype: None = None,
-        out: None = None,
-        **options: Unpack[EvaluationOptions],
+        self, x: TimesLike, nu: int = 0, *, dtype: None = None, out: None = None, **options: Unpack[EvaluationOptions]
     ) -> P: ...
     @overload
-    def __call__(
-        self, x: TimesLike, nu: int = 0, *, out: Out, **options: Unpack[EvaluationOptions]
-    ) -> Out: ...
+    def __call__(self, x: TimesLike, nu: int = 0, *, out: Out, **options: Unpack[EvaluationOptions]) -> Out: ...
     @overload
     def __call__(
-        self: Curve[AnyArrays],
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        dtype: DTypeLike,
-        **options: Unpack[EvaluationOptions],
+        self: Curve[AnyArrays], x: TimesLike, nu: int = 0, *, dtype: DTypeLike, **options: Unpack[EvaluationOptions]
     ) -> AnyArrays: ...
     @overload
     def __call__(
-        self: Curve[AnyArray],
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        dtype: DTypeLike,
-        **options: Unpack[EvaluationOptions],
+        self: Curve[AnyArray], x: TimesLike, nu: int = 0, *, dtype: DTypeLike, **options: Unpack[EvaluationOptions]
     ) -> AnyArray: ...
     def __call__(
         self,
@@ -157,9 +139,7 @@ class SegmentedCurve(Curve[P]):
             check_progress(progress)
         single = dtype is not None and is_single(dtype)
         if out is not None and dtype is not None:
-            raise ValidationError(
-                "dtype and out are both given. Pass one of them; the result has the type of out."
-            )
+            raise ValidationError("dtype and out are both given. Pass one of them; the result has the type of out.")
         values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress, out)
         return in_single(values) if single else values
 
@@ -283,9 +263,7 @@ class SegmentedCurve(Curve[P]):
         ends = [as_array(times_of(x, name)[0], name) for name, x in (("x0", x0), ("x1", x1))]
         if any(end.ndim for end in ends):
             raise ValidationError("x0 and x1 must be single times, the start and the end of the transport")
-        pair = (
-            times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
-        )
+        pair = times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
         times, own = self._time_axis.at(pair, self._batch, False, self._times)
         where = "periodic" if self._extrapolation_mode == "periodic" else "raise"
         try:
@@ -307,9 +285,7 @@ class SegmentedCurve(Curve[P]):
             try:
                 given = np.broadcast_to(given, first.shape)
             except ValueError:
-                raise ValidationError(
-                    f"v has shape {given.shape}, which does not broadcast to {first.shape}"
-                ) from None
+                raise ValidationError(f"v has shape {given.shape}, which does not broadcast to {first.shape}") from None
             part.space.check_tangent(first[good], given[good])
             vectors.append(given)
         if own:
@@ -327,12 +303,7 @@ class SegmentedCurve(Curve[P]):
         return result
 
     def speed(
-        self,
-        x: TimesLike,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        dtype: DTypeLike | None = None,
+        self, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False, dtype: DTypeLike | None = None
     ) -> FloatArray:
         """Compute the speed of the curve.
 
@@ -378,9 +349,7 @@ class SegmentedCurve(Curve[P]):
         progress: Progress | None = None,
         out: Any = None,
     ) -> Any:
-        return evaluated(
-            self._curve, self._time_axis, x, quantity, self._where(extrapolate), per_curve, progress, out
-        )
+        return evaluated(self._curve, self._time_axis, x, quantity, self._where(extrapolate), per_curve, progress, out)
 
     def _where(self, extrapolate: Any) -> str:
         """Return the core's name of the extrapolation policy."""
@@ -596,9 +565,7 @@ def call_at_times(
     return values
 
 
-def _inside(
-    curve: CurveArrays, times: Doubles, per_curve: bool
-) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
+def _inside(curve: CurveArrays, times: Doubles, per_curve: bool) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
     """Replace times outside the knots by the first knot, and return which times these are, if any."""
     first, last = curve.times[..., 0], curve.times[..., -1]
     if curve.times.ndim > 1:

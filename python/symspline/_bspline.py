@@ -76,9 +76,7 @@ class BSpline(Curve[P]):
     _format = "symspline-bspline"
     _curve: ControlledCurve
 
-    def __init__(
-        self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str
-    ) -> None:
+    def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
         space = _factor(space)
         degree = whole_number(degree, "degree", 1)
         doubles, tol = _control_array(control_points, space, 2)
@@ -199,9 +197,7 @@ class BSpline(Curve[P]):
             with entry("degree"):
                 degree = whole_number(degree, "degree", 1)
             with entry("knots"):
-                knots = _checked_knots(
-                    knots, space._lead(space._doubles(control, "control_points"))[-1], degree
-                )
+                knots = _checked_knots(knots, space._lead(space._doubles(control, "control_points"))[-1], degree)
         return cls._of(space, knots, control, degree)
 
     def __eq__(self, other: object) -> bool:
@@ -217,9 +213,7 @@ class BSpline(Curve[P]):
     def __repr__(self) -> str:
         count = self._curve.control_points.shape[-1 - len(self.space.point_shape)]
         curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
-        return (
-            f"<{type(self).__name__} on {self.space!r}: {curves}{count} control points, degree {self.degree}>"
-        )
+        return f"<{type(self).__name__} on {self.space!r}: {curves}{count} control points, degree {self.degree}>"
 
 
 class ControlledCurve:
@@ -233,9 +227,7 @@ class ControlledCurve:
 
     quad_rtol = EXACT
 
-    def __init__(
-        self, space: Space[Any], knots: NDArray[np.float64], control_points: Any, degree: int
-    ) -> None:
+    def __init__(self, space: Space[Any], knots: NDArray[np.float64], control_points: Any, degree: int) -> None:
         self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
         self.times = np.unique(knots[degree : knots.size - degree])
         control_points.flags.writeable = knots.flags.writeable = False
@@ -245,21 +237,15 @@ class ControlledCurve:
         shape: tuple[int, ...] = self.control_points.shape
         return shape[: len(shape) - len(self.space.point_shape) - 1]
 
-    def evaluate(
-        self, x: NDArray[np.float64], quantity: str, outside: str = "raise", per_curve: bool = False
-    ) -> Any:
+    def evaluate(self, x: NDArray[np.float64], quantity: str, outside: str = "raise", per_curve: bool = False) -> Any:
         """A quantity at times in the domain; with ``per_curve`` x has the batch axes, along which it is constant."""
         if per_curve:
             x = np.ascontiguousarray(x[(0,) * len(self.batch)])
         space, control, span = reduced(self.space, self.control_points)
-        values = _core.evaluate_bspline(
-            space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity
-        )
+        values = _core.evaluate_bspline(space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity)
         if quantity in NORMS:
             return values
-        return (
-            space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
-        )
+        return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
 
 
 class BezierCurve(BSpline[P]):
@@ -321,9 +307,7 @@ class BezierCurve(BSpline[P]):
         curve = super()._from_state(state)
         count = curve.degree + 1
         if curve.knots.tolist() != [0.0] * count + [1.0] * count:
-            raise ValidationError(
-                "entry 'knots' must be zeros and ones, as many of either as there are points"
-            )
+            raise ValidationError("entry 'knots' must be zeros and ones, as many of either as there are points")
         return curve
 
 
@@ -376,9 +360,7 @@ def _checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float)
     except CutLocusError as error:
         row, _, why = str(error).removeprefix("pair ").partition(": the points ")
         *curve, i = map(int, np.unravel_index(int(row), (*batch, count - 1)))
-        raise CutLocusError(
-            f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}"
-        ) from None
+        raise CutLocusError(f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}") from None
     return points
 
 
@@ -393,9 +375,7 @@ def _checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.floa
     if count <= degree:
         raise ValidationError(f"degree {degree} needs at least {degree + 1} control points, got {count}")
     if array.size != needed:
-        raise ValidationError(
-            f"{count} control points of degree {degree} need {needed} knots, got {array.size}"
-        )
+        raise ValidationError(f"{count} control points of degree {degree} need {needed} knots, got {array.size}")
     result = cast(array.copy())
     refuse(~np.isfinite(result), "knots", lambda _: "is not finite")
     falls = np.flatnonzero(result[1:] < result[:-1])
@@ -411,7 +391,5 @@ def _checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.floa
             f"{degree + 1} times"
         )
     if not result[degree] < result[count]:
-        raise ValidationError(
-            f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal"
-        )
+        raise ValidationError(f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal")
     return result

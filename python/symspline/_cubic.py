@@ -384,10 +384,7 @@ class CubicSpline(SegmentedCurve[P]):
     # ---- files, pickles and text ----
 
     def _state(self) -> dict[str, Any]:
-        return super()._state() | {
-            "bc_type": self._bc_type,
-            "report": [vars(report) for report in self._reports],
-        }
+        return super()._state() | {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:

@@ -48,9 +48,7 @@ def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -
             raise TypeError(f"{name} must be open {mode}; pass its name, or open it so")
         return None
     if not isinstance(file, (str, os.PathLike)):
-        raise TypeError(
-            f"{name} must be a path or an open file with a method {method}, not {short_repr(file)}"
-        )
+        raise TypeError(f"{name} must be a path or an open file with a method {method}, not {short_repr(file)}")
     path = os.fspath(file)
     if not isinstance(path, str):
         raise TypeError(f"{name} must be a path of text, not {short_repr(path)}")
@@ -59,13 +57,9 @@ def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -
     try:
         os.fsencode(path)
     except UnicodeEncodeError:
-        raise ValidationError(
-            f"{name} = {short_repr(path)} is not the name of a file: it is not Unicode"
-        ) from None
+        raise ValidationError(f"{name} = {short_repr(path)} is not the name of a file: it is not Unicode") from None
     if "\0" in path:
-        raise ValidationError(
-            f"{name} = {short_repr(path)} is not the name of a file: it holds a null character"
-        )
+        raise ValidationError(f"{name} = {short_repr(path)} is not the name of a file: it holds a null character")
     return Path(path)
 
 

@@ -197,9 +197,7 @@ def evaluate(
     return values if out is not None else in_library(library_of(*libraries), values)
 
 
-def _nodes_around(
-    t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any
-) -> tuple[Any, Any, Any]:
+def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any) -> tuple[Any, Any, Any]:
     """Return the knots, points and velocities of the segments in which times lie.
 
     All nodes are returned if they are not plain arrays or too few for a gain. Each segment is determined by its two
@@ -232,15 +230,12 @@ def _nodes_around(
     return t[start:stop], arrays[0], arrays[1]
 
 
-def given(
-    t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]
-) -> tuple[TimeAxis, CurveArrays]:
+def given(t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
     own = parts_of(velocities, space, "velocities")
     read = [
-        velocities_of(*each)[0]
-        for each in zip(factors_of(space), (part.numbers for part in data), own, strict=True)
+        velocities_of(*each)[0] for each in zip(factors_of(space), (part.numbers for part in data), own, strict=True)
     ]
     batch, nodes = data[0].batch, data[0].nodes
     time_axis, _, times = knots_of(t, batch, nodes)
@@ -261,9 +256,7 @@ def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, 
     doubles = space._doubles(array, "velocities")
     numbers = space._numbers(doubles).view()
     if doubles.shape != points.shape:
-        raise ValidationError(
-            f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}"
-        )
+        raise ValidationError(f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}")
     refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
     return numbers, point_tol(array.dtype)
 

@@ -65,8 +65,7 @@ def checked_extrapolate(extrapolate: Any) -> Any:
     known = isinstance(extrapolate, str) and extrapolate in _EXTRAPOLATION_MODES
     if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
-            "extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not "
-            f"{short_repr(extrapolate)}"
+            f"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
         )
     return extrapolate
 
@@ -83,13 +82,7 @@ def check_progress(progress: Any) -> None:
 
 
 def fit_options(
-    method: str,
-    tol: float,
-    max_iter: int | None,
-    extrapolate: Any,
-    on_failure: Any,
-    check: Any,
-    progress: Any,
+    method: str, tol: float, max_iter: int | None, extrapolate: Any, on_failure: Any, check: Any, progress: Any
 ) -> Options:
     """Return the options of the solver, after validation of all options of a fit.
 

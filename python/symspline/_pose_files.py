@@ -154,9 +154,7 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     '0.5 0.0 0.0 0.0 0.0 0.0 0.0 1.0\n'
     """
     r, x = split(_checked(poses))
-    write_tum_rows(
-        file, _seconds(t, len(x)), np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1)
-    )
+    write_tum_rows(file, _seconds(t, len(x)), np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1))
 
 
 def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
@@ -502,9 +500,7 @@ def _lines(file: Any, name: str = "file") -> list[Line]:
     if path is None:
         text = file.read()
         if not isinstance(text, str):
-            raise TypeError(
-                f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so"
-            )
+            raise TypeError(f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so")
         text = text.removeprefix("\ufeff")
     else:
         opener: Any = gzip.open if path.suffix == ".gz" else open

@@ -197,9 +197,7 @@ def same_report(ours: Any, theirs: Any) -> bool:
     """Whether two reports of one class are equal, with NaN equal to NaN."""
     each = ((getattr(ours, own.name), getattr(theirs, own.name)) for own in fields(ours))
     return all(
-        bool(a == b)
-        if a is None or b is None or isinstance(a, (str, tuple))
-        else np.array_equal(a, b, equal_nan=True)
+        bool(a == b) if a is None or b is None or isinstance(a, (str, tuple)) else np.array_equal(a, b, equal_nan=True)
         for a, b in each
     )
 
@@ -241,9 +239,7 @@ class Columns(NamedTuple):
     def row(self, name: str) -> NDArray[Any]:
         """Return the values of a field, one per curve, as a writable view."""
         is_integer = name in INTEGERS
-        return np.asarray(
-            self.integers[INTEGERS.index(name)] if is_integer else self.numbers[NUMBERS.index(name)]
-        )
+        return np.asarray(self.integers[INTEGERS.index(name)] if is_integer else self.numbers[NUMBERS.index(name)])
 
     def part(self, curves: Any) -> Columns:
         """Return the columns of some curves."""
@@ -264,9 +260,7 @@ class Columns(NamedTuple):
         return Columns(*(np.concatenate(tables, axis=1) for tables in zip(*each, strict=True)))
 
 
-def combined(
-    reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None
-) -> Report:
+def combined(reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None) -> Report:
     """Combine the reports of the factors into the report of a product.
 
     Most fields are the worst of the factors; the arguments are fields of the whole product.

@@ -121,9 +121,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 # ---- long steps ----
 
 
-def warn_of_far_points(
-    curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]
-) -> None:
+def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]) -> None:
     """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
     Parameters

@@ -247,9 +247,7 @@ def cut(
         raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {short_repr(duplicates)}")
     data = read(points, space)
     if data[0].batch:
-        raise ValidationError(
-            f"points has batch axes {data[0].batch}, but a recording must be a single curve"
-        )
+        raise ValidationError(f"points has batch axes {data[0].batch}, but a recording must be a single curve")
     given, zone = times_of(t, "t")
     time_axis, times = time_axis_of(Moments(given, zone))
     if times.shape != (data[0].nodes,):
@@ -280,10 +278,7 @@ def cut(
         if np.count_nonzero(new[a:b]) >= least
     ]
     curves = [
-        (
-            Moments(moments[own], zone),
-            tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own],
-        )
+        (Moments(moments[own], zone), tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own])
         for own in segments
     ]
     return Cut(curves, [rows[own] for own in segments], np.diff(seconds), gap)

@@ -29,16 +29,9 @@ if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
     # The type of a point.
-    P = TypeVar(
-        "P",
-        bound=NDArray[Any] | tuple[NDArray[Any], ...],
-        covariant=True,
-        default=NDArray[Any],
-    )
+    P = TypeVar("P", bound=NDArray[Any] | tuple[NDArray[Any], ...], covariant=True, default=NDArray[Any])
     # The type of a point of a product.
-    PProduct = TypeVar(
-        "PProduct", bound=tuple[NDArray[Any], ...], covariant=True, default=tuple[NDArray[Any], ...]
-    )
+    PProduct = TypeVar("PProduct", bound=tuple[NDArray[Any], ...], covariant=True, default=tuple[NDArray[Any], ...])
     # Arrays that results are written into.
     Out = TypeVar("Out", bound=NDArray[Any] | tuple[NDArray[Any], ...])
 else:

@@ -68,9 +68,7 @@ _LIFTS: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
 # ---- along a curve ----
 
 
-def rotation(
-    spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
-) -> Rotation:
+def rotation(spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False) -> Rotation:
     """Evaluate a curve as a SciPy ``Rotation``.
 
     Parameters
@@ -104,9 +102,7 @@ def rotation(
     try:
         from scipy.spatial.transform import Rotation
     except ImportError:
-        raise ImportError(
-            "rotation returns a SciPy Rotation; install SciPy with: pip install scipy"
-        ) from None
+        raise ImportError("rotation returns a SciPy Rotation; install SciPy with: pip install scipy") from None
     matrices = _at(spline, x, "point", extrapolate, per_curve)
     missing = np.argwhere(np.isnan(matrices[..., 0, 0]))
     if len(missing):
@@ -119,12 +115,7 @@ def rotation(
 
 
 def angular_velocity(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "body",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "body", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the angular velocity of a curve.
 
@@ -167,12 +158,7 @@ def angular_velocity(
 
 
 def angular_acceleration(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "body",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "body", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the angular acceleration of a curve, which is continuous.
 
@@ -334,9 +320,7 @@ def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve
     return values
 
 
-def _rate(
-    spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
-) -> Array:
+def _rate(spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
     check_frame(frame)
     body = _at(spline, x, f"body {quantity}", extrapolate, per_curve)
@@ -431,9 +415,7 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     return matrix_to_quaternion(_given(rotations), scalar_first=scalar_first)
 
 
-def from_quaternions(
-    quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
-) -> Array:
+def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None) -> Array:
     """Convert unit quaternions to rotations; q and −q give the same rotation.
 
     Parameters

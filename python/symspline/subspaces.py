@@ -74,9 +74,7 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
     snapshots, _ = numbers(x, "x", 2)
     n, m = snapshots.shape[-2:]
     if (rank is None) == (energy is None):
-        raise ValidationError(
-            "pass either rank, the dimension of the subspaces, or energy, the fraction they contain"
-        )
+        raise ValidationError("pass either rank, the dimension of the subspaces, or energy, the fraction they contain")
     if not snapshots.size:
         raise ValidationError(f"x has shape {snapshots.shape}, but must contain at least one snapshot")
     left, sizes, _ = np.linalg.svd(snapshots, full_matrices=False)
@@ -151,9 +149,7 @@ def reduced_operator(
     flat = bases.reshape(-1, n, k)
     if callable(operator) and not hasattr(operator, "shape"):
         made = map(operator, parameters.ravel())
-        moved = np.stack(
-            [_check_operator(a, n) @ basis for a, basis in zip(made, flat, strict=True)] or [flat[:0]]
-        )
+        moved = np.stack([_check_operator(a, n) @ basis for a, basis in zip(made, flat, strict=True)] or [flat[:0]])
     else:
         # All columns at once.
         columns = operator @ np.moveaxis(flat, 0, 1).reshape(n, -1)
@@ -176,7 +172,5 @@ def _rank(sizes: Array, energy: Any) -> int:
 def _check_operator(operator: Any, n: int) -> Any:
     shape = np.shape(operator) if not hasattr(operator, "shape") else operator.shape
     if tuple(shape) != (n, n):
-        raise ValidationError(
-            f"the operator has shape {tuple(shape)}, but bases of {n} numbers need {(n, n)}"
-        )
+        raise ValidationError(f"the operator has shape {tuple(shape)}, but bases of {n} numbers need {(n, n)}")
     return operator if hasattr(operator, "shape") else np.asarray(operator)

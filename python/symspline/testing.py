@@ -66,10 +66,7 @@ class Conformance:
     allowed: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        lines = [
-            f"  {law:34} {value:.1e} (allowed {self.allowed[law]:.0e})"
-            for law, value in self.deviations.items()
-        ]
+        lines = [f"  {law:34} {value:.1e} (allowed {self.allowed[law]:.0e})" for law, value in self.deviations.items()]
         return "\n".join([f"{self.space!r} obeys", *lines])
 
     def _add(self, law: str, deviation: Any, allowed: float) -> None:
@@ -168,9 +165,7 @@ def check(
 class _Sample:
     """Random points, and steps of many lengths from them."""
 
-    def __init__(
-        self, space: Space, base: Array, longest: float, tol: float, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, space: Space, base: Array, longest: float, tol: float, rng: np.random.Generator) -> None:
         self.space, self.base, self.longest, self.tol, self.rng = space, base, longest, tol, rng
         around = self.tangents(np.broadcast_to(base, (_COUNT, *base.shape)))
         points = space.exp(base, longest * around)
@@ -204,15 +199,11 @@ def _operations(found: Conformance, s: _Sample) -> None:
     space.check_point(s.q)
     noise = s.rng.standard_normal(s.p.shape).astype(space.dtype)
     tangent = space.project_tangent(s.p, noise)
-    found._add(
-        "project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol
-    )
+    found._add("project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol)
     found._add("log is tangent", s.size(space.project_tangent(s.p, logs) - logs), s.tol)
     half = space.exp(s.p, s.v / 2)
     found._add(
-        "geodesics run at constant speed",
-        s.size(2 * space.log(s.p, half) - logs) / np.maximum(1.0, s.lengths),
-        s.tol,
+        "geodesics run at constant speed", s.size(2 * space.log(s.p, half) - logs) / np.maximum(1.0, s.lengths), s.tol
     )
     onward = -space.log(half, s.p)
     found._add("geodesics go on as geodesics", s.space.distance(space.exp(half, onward), s.q), s.tol)

@@ -15,25 +15,15 @@ from .manifolds._manifold import refuse_functions
 
 
 @overload
-def curve(
-    x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[CurveOptions]
-) -> torch.Tensor: ...
+def curve(x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[CurveOptions]) -> torch.Tensor: ...
 
 
 @overload
-def curve(
-    x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]
-) -> tuple[torch.Tensor, ...]: ...
+def curve(x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]) -> tuple[torch.Tensor, ...]: ...
 
 
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space[Any] | str,
-    *,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural", **options: Unpack[SolverOptions]
 ) -> Any:
     """Evaluate a spline through points, with derivatives in PyTorch.
 
@@ -73,9 +63,7 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not available")
     if isinstance(space, Product):
-        each = zip(
-            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
-        )
+        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
         return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in each)
     kinds, vectors = split(bc_type)
     points = torch.as_tensor(points)
@@ -105,9 +93,7 @@ class _Curve(torch.autograd.Function):
 
     @staticmethod
     def jvp(ctx: Any, *changes: Any) -> Any:
-        dx, dt, points, *ends = (
-            None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5]
-        )
+        dx, dt, points, *ends = (None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5])
         moved = ctx.movable.jvp(ctx.x, dx, points, dt, ends)
         return torch.as_tensor(moved).to(ctx.like[2][0])
 

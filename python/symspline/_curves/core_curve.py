@@ -58,9 +58,7 @@ class CoreCurve(CurveArrays):
     # Whether the core computes points in the space itself, and not in a smaller one.
     _compiled: ClassVar[bool] = True
 
-    def __init__(
-        self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True
-    ) -> None:
+    def __init__(self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True) -> None:
         self.space, self.times, self.points, self.velocities = space, times, points, velocities
         # Whether velocities are those of a C² curve, which lie in the span of the points and the end velocities.
         self._fitted = fitted
@@ -107,22 +105,14 @@ class CoreCurve(CurveArrays):
         space = self.space
         _check_out(out, (x.shape if per_curve else self.batch + x.shape) + space.point_shape, space.dtype)
         if self._compiled and _can_write_into(out, space.dtype, x):
-            _core.evaluate(
-                *self._core_curve, x, quantity, outside, per_curve, progress, space._as_doubles(out)
-            )
+            _core.evaluate(*self._core_curve, x, quantity, outside, per_curve, progress, space._as_doubles(out))
             _all_nan(space, out)
         else:
             np.copyto(out, self.evaluate(x, quantity, outside, per_curve, progress), casting="same_kind")
         return out
 
     def lift(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Any,
-        progress: Progress | None = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Any, progress: Progress | None = None
     ) -> Array:
         first = np.take(self.points, 0, axis=len(self.batch))
         if not is_quotient(self.space):
@@ -133,18 +123,10 @@ class CoreCurve(CurveArrays):
         self._check_times(x, per_curve)
         if outside == "continue":
             check_reach(self.times, x)
-        return self._lifted(
-            x, quantity, outside, per_curve, fiber_factors(self.space, first, start), progress
-        )
+        return self._lifted(x, quantity, outside, per_curve, fiber_factors(self.space, first, start), progress)
 
     def _lifted(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Doubles,
-        progress: Progress | None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Doubles, progress: Progress | None
     ) -> Array:
         curve, knots = self._core_curve, self._lift_knots
         values = _core.lift(*curve, x, quantity, outside, per_curve, knots, start, progress)

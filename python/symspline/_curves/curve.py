@@ -133,13 +133,7 @@ class CurveArrays(ABC):
 
     @abstractmethod
     def lift(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Any,
-        progress: Progress | None = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Any, progress: Progress | None = None
     ) -> Any:
         """Evaluate the horizontal lift that starts at `start`; see `symspline.CubicSpline.lift`."""
 

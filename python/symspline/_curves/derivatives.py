@@ -82,9 +82,7 @@ def vjp(curve: CurveArrays, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gr
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
     _same_shape(space._numbers(doubles), (*at.shape, *space.point_shape), "cotangent")
-    points, knots, *ends = _core.pull(
-        space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles)
-    )
+    points, knots, *ends = _core.pull(space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles))
     knots = knots.reshape(*batch, nodes)
     if curve.times.ndim == 1:
         knots = knots.reshape(-1, nodes).sum(axis=0)
@@ -106,9 +104,7 @@ def pair_of(ends: Any) -> tuple[Any, Any]:
 
 def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
     space, batch = curve.space, curve.batch
-    points, velocities = (
-        space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities)
-    )
+    points, velocities = (space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities))
     knots, ends = _per_curve(curve.times, batch), ends_of(bc_type, space, batch)
     return _Curves(knots, points, velocities, ends, at.x, math.prod(batch), at.nu)
 

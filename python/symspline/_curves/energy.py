@@ -36,9 +36,7 @@ def bending_energy(curve: Evaluable) -> Number:
         return bend * bend / unit
 
     with np.errstate(all="ignore"):
-        return (
-            integrate(times, power, curve.batch, curve.quad_rtol) / unit[..., 0] / unit[..., 0] / unit[..., 0]
-        )
+        return integrate(times, power, curve.batch, curve.quad_rtol) / unit[..., 0] / unit[..., 0] / unit[..., 0]
 
 
 def alternative_energy(curve: CurveArrays, reports: list[Report]) -> Any:

@@ -136,9 +136,7 @@ def read(points: Any, space: Space[Any]) -> list[Points]:
     found = _in_factors(space, _read, parts_of(points, space, "points"))
     if len({(part.batch, part.nodes) for part in found}) > 1:
         described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in found)
-        raise ValidationError(
-            f"the factors of points have different lengths, or their batch axes differ: {described}"
-        )
+        raise ValidationError(f"the factors of points have different lengths, or their batch axes differ: {described}")
     return found
 
 
@@ -194,9 +192,7 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
         return None
     mask = as_array(where, "where")
     if mask.dtype != bool or mask.shape != batch:
-        raise ValidationError(
-            f"where must be a Boolean array of shape {batch}, not {mask.dtype} of shape {mask.shape}"
-        )
+        raise ValidationError(f"where must be a Boolean array of shape {batch}, not {mask.dtype} of shape {mask.shape}")
     return None if mask.all() else mask
 
 
@@ -294,9 +290,7 @@ def hermite_data(
             task = Task(factor, times, part.numbers, _NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
-        found, tangent, longest = _core.hermite(
-            factor._handle, times, part.numbers, doubles, part.tol, tangent_tol
-        )
+        found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, doubles, part.tol, tangent_tol)
         return factor._numbers(found), factor._numbers(tangent), longest
 
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
@@ -314,10 +308,7 @@ def _solve(
             raise (error if number is None else _in_factor(error, number, tasks[number].space)) from None
         return solved, _faults_of(solved, [])
     tasks, invalid = _validated(space, tasks, options)
-    solved = [
-        kind_of(task.space).solve(task, options, share(progress, i, len(tasks)))
-        for i, task in enumerate(tasks)
-    ]
+    solved = [kind_of(task.space).solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
     return solved, _faults_of(solved, invalid)
 
 

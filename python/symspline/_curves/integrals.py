@@ -18,9 +18,7 @@ EXACT = 1e-14
 _PATIENCE = 5
 
 
-def integrate(
-    times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT
-) -> Number:
+def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT) -> Number:
     """Integrate f over all segments by adaptive bisection, to the relative tolerance `tol`.
 
     The function takes times of shape batch + (m,). The speed of a curve has a kink where the curve stops and turns;
@@ -36,9 +34,7 @@ def integrate(
         return _refined(a, b, f, batch, tol)
 
 
-def _refined(
-    a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float
-) -> Number:
+def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float) -> Number:
     total = np.zeros(batch)
     whole = _rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)

@@ -59,13 +59,7 @@ class ProductCurve(CurveArrays):
         )
 
     def lift(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Any,
-        progress: Progress | None = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Any, progress: Progress | None = None
     ) -> Tuple:
         count = len(self._parts)
         starts = (None,) * count if start is None else parts_of(start, self.space, "start")
@@ -85,8 +79,7 @@ class ProductCurve(CurveArrays):
         count = len(self._parts)
         moved = (None,) * count if points is None else parts_of(points, self.space, "points")
         vectors = [
-            (None,) * count if end is None else parts_of(end, self.space, "an end vector")
-            for end in pair_of(ends)
+            (None,) * count if end is None else parts_of(end, self.space, "an end vector") for end in pair_of(ends)
         ]
         conditions = ends_in_factors(bc_type, self.space)
         each = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)

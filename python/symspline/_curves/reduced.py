@@ -140,13 +140,7 @@ class ReducedCurve(CoreCurve):
         return values if quantity in NORMS else span.embed_samples(values, self.batch)
 
     def _lifted(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Doubles,
-        progress: Progress | None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Doubles, progress: Progress | None
     ) -> Array:
         # Unitary factors of the lift are the same in the span.
         span, small = self.small
@@ -182,8 +176,6 @@ def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
     vectors = map_ends(task.ends, lambda value: np.expand_dims(space._numbers(value), axis))
     span = span_of(space, points, *(vector for _, vector in vectors or [] if vector is not None))
     ends = map_ends(vectors, lambda vector: span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
-    small = task._replace(
-        space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends
-    )
+    small = task._replace(space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends)
     found = solve_single(small, options, progress)
     return found._replace(points=points, velocities=span.embed(found.velocities))

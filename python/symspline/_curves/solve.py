@@ -82,9 +82,7 @@ def solve(tasks: Sequence[Task], options: Options, progress: Progress | None = N
     """Validate and solve the tasks of all factors, which share knots and masks, in one call of the core."""
     _, times, _, _, _, offsets, mask, skip = tasks[0]
     factors = [(task.space._handle, task.points, task.ends, task.tol) for task in tasks]
-    each = _core.fit(
-        factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress
-    )
+    each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
     solved = []
     for task, (points, velocities, tables, raw) in zip(tasks, each, strict=True):
         space, columns = task.space, Columns(*tables)
@@ -122,14 +120,7 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     if tol is None:
         return task._replace(points=points.copy()), []
     found, raw = _core.validate(
-        space._handle,
-        times,
-        points,
-        ends,
-        tol,
-        offsets,
-        None if mask is None else mask.ravel().tolist(),
-        skip,
+        space._handle, times, points, ends, tol, offsets, None if mask is None else mask.ravel().tolist(), skip
     )
     faults = [from_core(one, Columns.empty(0), 0.0, False) for one in raw]
     return task._replace(points=found, tol=None, mask=without(mask, faults, task.batch)), faults

@@ -153,10 +153,7 @@ class Curve:
                 data = np.unique(np.abs(given[:, None] - even).argmin(axis=0))
                 even = given[data]
             bold = np.unique(self._nearest(even))
-        groups = {
-            "between": (self.times[between], self.points[between]),
-            "bold": (self.times[bold], self.points[bold]),
-        }
+        groups = {"between": (self.times[between], self.points[between]), "bold": (self.times[bold], self.points[bold])}
         if self.noise is not None:
             groups["data"] = self.on_axis(given[data]), self.given[data]
         return groups
@@ -221,9 +218,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
     if not everything:
         raise ValidationError("there is nothing to plot: the batch has no curves")
     if not good.size:
-        raise ValidationError(
-            "there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)"
-        )
+        raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
     drawn = good[evenly(len(good), MOST)]
     few = drawn[evenly(len(drawn), FEW)]
     start = spline.t.min() if spline.t.dtype.kind == "M" else None
@@ -246,9 +241,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
 def _finite(data: Data) -> NDArray[np.bool_]:
     """Return whether each curve is finite, in a flat array."""
     start = np.broadcast_to(data.times, (*data.batch, data.times.shape[-1]))[..., :1]
-    finite: NDArray[np.bool_] = np.isfinite(
-        data.evaluate(np.ascontiguousarray(start), "speed", "raise", True)
-    )
+    finite: NDArray[np.bool_] = np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))
     return finite.ravel()
 
 

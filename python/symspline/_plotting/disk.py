@@ -67,9 +67,7 @@ def _middle(points: Array) -> tuple[Array, float]:
     """
     points = points[:: 1 + len(points) // 2000]
     middle = centre_of(_PLANE, points)
-    around_origin, around_middle = (
-        float(_PLANE.distance(centre, points).max()) for centre in (_ORIGIN, middle)
-    )
+    around_origin, around_middle = (float(_PLANE.distance(centre, points).max()) for centre in (_ORIGIN, middle))
     return (middle, around_middle) if around_middle < 0.8 * around_origin else (_ORIGIN, around_origin)
 
 

@@ -75,13 +75,7 @@ class Knots(NamedTuple):
 
 
 def read_noisy(
-    t: TimesLike | None,
-    points: Any,
-    space: Space,
-    weights: Any,
-    frames: Any,
-    bc_type: Any,
-    atol: float | None,
+    t: TimesLike | None, points: Any, space: Space, weights: Any, frames: Any, bc_type: Any, atol: float | None
 ) -> Given:
     """Return the data as a user passes them, after all checks except those of points.
 
@@ -129,9 +123,7 @@ class Given(NamedTuple):
     batch: tuple[int, ...]
     chosen: NDArray[np.intp] | None
 
-    def valid_only(
-        self, space: Space, mask: NDArray[np.bool_] | None, strict: bool
-    ) -> tuple[Given, list[Fault]]:
+    def valid_only(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
         """Return the valid curves of the mask, and the faults of the others.
 
         Unless `strict`, curves with invalid or too few points are masked.
@@ -218,9 +210,7 @@ def _without_missing(part: Points, weights: list[Doubles]) -> Points:
 
     Points without such a predecessor become the first point that has a weight.
     """
-    missing = reduce(
-        np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights]
-    )
+    missing = reduce(np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights])
     if not missing.any():
         return part
     order = np.arange(part.nodes)
@@ -257,9 +247,7 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
     if knots is None:
         return _different(t, times)
     if isinstance(knots, (str, bool)):
-        raise ValidationError(
-            f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}"
-        )
+        raise ValidationError(f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}")
     given = as_array(times_of(knots, "knots")[0], "knots")
     if given.ndim != 1:
         raise ValidationError(
@@ -300,9 +288,7 @@ def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
         used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
     if knots.times.ndim == 1 and noisy.times.ndim == 1:
         return bool(np.isin(noisy.times[used], knots.times).all())
-    return bool(
-        np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)])
-    )
+    return bool(np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)]))
 
 
 def _different(t: Array, times: Doubles) -> Knots:

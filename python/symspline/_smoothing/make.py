@@ -309,9 +309,7 @@ def make_smoothing_spline(
     fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
     noise = [part.map(in_batch) for _, part, _ in found]
     kept = _conditions(bc_type, conditions, space)
-    spline = SmoothingSpline._of(
-        given.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise
-    )
+    spline = SmoothingSpline._of(given.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
     faults += [
         fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
         for fault in next((own for _, _, own in found if own), [])
@@ -336,31 +334,19 @@ def make_smoothing_spline(
 
 @overload
 def make_lsq_spline(  # type: ignore[overload-overlap]
-    t: TimesLike | None,
-    points: PointsLike,
-    knots: TimesLike,
-    space: Product[PProduct],
-    **options: Unpack[LsqOptions],
+    t: TimesLike | None, points: PointsLike, knots: TimesLike, space: Product[PProduct], **options: Unpack[LsqOptions]
 ) -> SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]: ...
 
 
 @overload
 def make_lsq_spline(
-    t: TimesLike | None,
-    points: PointsLike,
-    knots: TimesLike,
-    space: SpecialEuclidean,
-    **options: Unpack[LsqOptions],
+    t: TimesLike | None, points: PointsLike, knots: TimesLike, space: SpecialEuclidean, **options: Unpack[LsqOptions]
 ) -> SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]: ...
 
 
 @overload
 def make_lsq_spline(
-    t: TimesLike | None,
-    points: PointsLike,
-    knots: TimesLike,
-    space: Space[P] | str,
-    **options: Unpack[LsqOptions],
+    t: TimesLike | None, points: PointsLike, knots: TimesLike, space: Space[P] | str, **options: Unpack[LsqOptions]
 ) -> SmoothingSpline[P]: ...
 
 

@@ -53,11 +53,7 @@ class Smoothed(NamedTuple):
     def map(self, function: Any) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
         return Smoothed(
-            self.report.map(function),
-            function(self.band),
-            function(self.band_lam),
-            function(self.sigma),
-            self.between,
+            self.report.map(function), function(self.band), function(self.band_lam), function(self.sigma), self.between
         )
 
 
@@ -90,9 +86,7 @@ def smoothed(
     small, inside, span = reduced(space, points)
     batch = noisy.batch
     if span is not None and any(vector is not None for _, vector in ends or []):
-        raise ValidationError(
-            f"the dimension of {space!r} is too large for end velocities. Use natural ends."
-        )
+        raise ValidationError(f"the dimension of {space!r} is too large for end velocities. Use natural ends.")
     matrices = precision.information
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
@@ -113,9 +107,7 @@ def smoothed(
         column.reshape(batch) if batch else column[0].item()
         for column in (*columns, np.where(np.isnan(sigma), columns[6], sigma))
     )
-    report = SmoothingReport(
-        METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise
-    )
+    report = SmoothingReport(METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise)
     numbers = small._numbers(found)
     faults = [
         Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options))

@@ -30,9 +30,7 @@ if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
     # The report: one, or on products and for poses one for each part.
-    R = TypeVar(
-        "R", bound=SmoothingReport | tuple[SmoothingReport, ...], covariant=True, default=SmoothingReport
-    )
+    R = TypeVar("R", bound=SmoothingReport | tuple[SmoothingReport, ...], covariant=True, default=SmoothingReport)
 
     class noise_property:
         """A property with the type of a number for one report, and of a tuple of them for several."""
@@ -257,9 +255,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return spread
 
     @overload
-    def band(
-        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95
-    ) -> FloatArray: ...
+    def band(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95) -> FloatArray: ...
 
     @overload
     def band(
@@ -311,10 +307,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         spreads = whole.std(x)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
-            [
-                _radius(part, level) * spread
-                for part, spread in zip(smoothed_spaces(self.space), each, strict=True)
-            ]
+            [_radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
         )
 
     # ---- plots ----
@@ -372,14 +365,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     @classmethod
     def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
-        parts = (
-            spline._time_axis,
-            spline._t,
-            spline._curve,
-            spline._bc_type,
-            spline._extrapolate,
-            spline._reports,
-        )
+        parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
         return cls._of(*parts, noisy, smoothed)
 
     def _state(self) -> dict[str, Any]:

@@ -101,9 +101,7 @@ def read_noise(
                 raise ValidationError("the weights must be numbers >= 0")
             precisions.append(Precision(weights, information))
             band, numbers = state["band" + suffix], dict(numbers)
-            lam, scale = (
-                read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale")
-            )
+            lam, scale = (read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale"))
             between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.

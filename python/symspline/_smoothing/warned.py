@@ -49,9 +49,7 @@ def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: 
         of = of_index(index)
         of += f" in factor {number}, {spaces[number]!r}" if is_several(space) else ""
         of += f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
-        message = _message(
-            of, float(np.asarray(report.df)[index]), bool(rough[index]), report.is_stiff(index)
-        )
+        message = _message(of, float(np.asarray(report.df)[index]), bool(rough[index]), report.is_stiff(index))
         warn(message, SmoothingWarning, index)
         return
 
@@ -90,12 +88,8 @@ def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: 
     at = np.ascontiguousarray(noisy.times[..., ::every])
     chosen = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
     parts = zip(factors_of(space), curve.parts, strict=True)
-    at_curve = [
-        x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))
-    ]
-    for x, (factor, own), precision, df in zip(
-        at_curve, points_of(noisy, space), noisy.precisions, dfs, strict=True
-    ):
+    at_curve = [x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))]
+    for x, (factor, own), precision, df in zip(at_curve, points_of(noisy, space), noisy.precisions, dfs, strict=True):
         # Other spaces have no uniform distribution of points, or no largest distance.
         if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
             continue

@@ -42,9 +42,7 @@ def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what:
     refuse(
         ~(np.isfinite(defects) & (defects <= limits)),
         "g",
-        lambda i: (
-            f"is not in the group of {space!r}: {what} is {defects[i]:.3e} (allowed: {limits[i]:.0e}). {remedy}"
-        ),
+        lambda i: f"is not in the group of {space!r}: {what} is {defects[i]:.3e} (allowed: {limits[i]:.0e}). {remedy}",
     )
 
 
@@ -112,9 +110,7 @@ class Congruent(Space[P]):
     def _element(self, g: Any) -> Any:
         g, tol = matrices(self, g, self.point_shape[0], self._dtype)
         sizes = np.linalg.svd(g, compute_uv=False)
-        require(
-            self, sizes[..., 0] / sizes[..., -1], 1e14, "its condition number", "Pass an invertible matrix."
-        )
+        require(self, sizes[..., 0] / sizes[..., -1], 1e14, "its condition number", "Pass an invertible matrix.")
         self._require_subgroup(g, tol)
         return g
 

@@ -515,9 +515,7 @@ class Space(Generic[P]):
         except ValueError as error:
             if isinstance(error, ValidationError):
                 raise
-            raise ValidationError(
-                f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast"
-            ) from None
+            raise ValidationError(f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast") from None
         points: P = self._require_finite(name, result)
         return points
 
@@ -962,10 +960,7 @@ class Space(Generic[P]):
 
     @overload
     def _finite(
-        self,
-        operation: Literal["distance", "inner"],
-        t: NDArray[np.float64] | None = None,
-        **inputs: ArrayLike,
+        self, operation: Literal["distance", "inner"], t: NDArray[np.float64] | None = None, **inputs: ArrayLike
     ) -> FloatArray: ...
 
     @overload
@@ -1012,8 +1007,7 @@ def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callabl
                 raise
             what = re.split("[:.]", " ".join((cls.__doc__ or "").split()))[0]
             raise TypeError(
-                f"{cls.__name__} takes {' and '.join(names)}, such as {example_of(cls)}: "
-                f"{what[:1].lower()}{what[1:]}"
+                f"{cls.__name__} takes {' and '.join(names)}, such as {example_of(cls)}: {what[:1].lower()}{what[1:]}"
             ) from None
 
     return checked

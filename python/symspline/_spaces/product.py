@@ -164,8 +164,7 @@ class Product(Space[PProduct]):
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> PProduct:
         each: Any = tuple(
-            factor.random_tangent(rng, q)
-            for factor, q in zip(self.factors, parts_of(p, self, "p"), strict=True)
+            factor.random_tangent(rng, q) for factor, q in zip(self.factors, parts_of(p, self, "p"), strict=True)
         )
         vectors: PProduct = each
         return vectors

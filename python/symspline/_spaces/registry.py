@@ -63,21 +63,15 @@ def _named(name: str) -> Space:
     if word not in names:
         known = ", ".join(" or ".join(row) for row in rows)
         guess = _guess(word, parameters, names)
-        raise ValidationError(
-            f"unknown space {short_repr(name)}; {guess}known names are {known}, as in 'sphere:2'"
-        )
+        raise ValidationError(f"unknown space {short_repr(name)}; {guess}known names are {known}, as in 'sphere:2'")
     if not parameters.strip():
         raise ValidationError(f"{short_repr(name)} is a family of spaces; {_whole(CLASSES[names[word]])}")
     values = [part.strip() for part in parameters.split(",")]
     if not all(value.isdecimal() and value.isascii() and len(value) <= _DIGITS for value in values):
-        raise ValidationError(
-            f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'"
-        )
+        raise ValidationError(f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'")
     cls: Any = CLASSES[names[word]]
     try:
         made: Space = cls(*map(int, values))
     except TypeError:
-        raise ValidationError(
-            f"{short_repr(name)}: {cls.__name__} does not take {len(values)} parameters"
-        ) from None
+        raise ValidationError(f"{short_repr(name)}: {cls.__name__} does not take {len(values)} parameters") from None
     return made

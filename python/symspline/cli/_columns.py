@@ -50,9 +50,7 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
     usual = [name for name in left if _TIME.fullmatch(_words(name))]
     # Numbers are accepted as times only under the two plainest names, as the unit of others is in doubt.
     certain = [name for name in usual if name not in table.numeric or name.lower() in ("t", "time")]
-    doubtful = [
-        name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))
-    ]
+    doubtful = [name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))]
     if len(certain) == 1:
         # A column of dates with their time of day needs no other columns.
         is_whole = certain[0] not in table.numeric and "time" in certain[0].lower()
@@ -173,9 +171,7 @@ def point_entries(
         refuse("column ", (twice is not None, f"{twice!r} of {table.path} cannot have two meanings"))
     if len(names) == count:
         return entries, _quaternion_columns(names, space, order)
-    wrong = (
-        f" {order}: {listed(names) or 'no columns'} are not the {count} numbers of a quaternion in {space}"
-    )
+    wrong = f" {order}: {listed(names) or 'no columns'} are not the {count} numbers of a quaternion in {space}"
     none = f" is for so:3, se:3 and products with one of them, not for {space}"
     refuse("--quaternion", (order and count is None, none), (order, wrong))
     if not lonlat:
@@ -187,9 +183,7 @@ def point_entries(
 def _lonlat(table: Table) -> list[str]:
     """The first column of each pair of names, whatever their case."""
     lower = {name.lower(): name for name in reversed(table.names)}
-    columns = [
-        lower.get(short) or lower.get(long) for short, long in (("lon", "longitude"), ("lat", "latitude"))
-    ]
+    columns = [lower.get(short) or lower.get(long) for short, long in (("lon", "longitude"), ("lat", "latitude"))]
     if None in columns:
         raise Problem(
             f"{table.path}: --lonlat needs columns lon and lat, or longitude and latitude, or two --columns; "

@@ -37,9 +37,7 @@ class Recordings:
         and those that share their time with another row of noisy data.
     """
 
-    def __init__(
-        self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint
-    ) -> None:
+    def __init__(self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
         """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
         self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
         self._options, self._smooth = options, options.smooth is not None

@@ -283,9 +283,7 @@ def _open_npz(path: Path) -> Table:
     first = {name: "".join(columns[name][:1]) for name, kind in kinds.items() if kind == "U"}
     numeric = [name for name, kind in kinds.items() if kind in "biuf"]
     dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
-    return Table(
-        path, list(kinds), numeric, dates, columns.__getitem__, {key: [*own] for key, own in groups.items()}
-    )
+    return Table(path, list(kinds), numeric, dates, columns.__getitem__, {key: [*own] for key, own in groups.items()})
 
 
 def _arrays(path: Path) -> dict[str, Array]:
@@ -403,9 +401,7 @@ def _pyarrow() -> tuple[Any, Any]:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise Problem(
-            "Parquet files need pyarrow; install it with: pip install 'symspline[parquet]'"
-        ) from None
+        raise Problem("Parquet files need pyarrow; install it with: pip install 'symspline[parquet]'") from None
     return pyarrow, pyarrow.parquet
 
 

@@ -209,9 +209,7 @@ def _hyperboloid(value: ArrayLike) -> tuple[Array, Array]:
     """Return the time-like coordinate, recomputed from the others, and the others."""
     x, tol = real_numbers(value, "x", (None,))
     if x.shape[-1] < 2:
-        raise ValidationError(
-            f"x has shape {x.shape}, but points of the hyperboloid need at least two numbers"
-        )
+        raise ValidationError(f"x has shape {x.shape}, but points of the hyperboloid need at least two numbers")
     time = np.hypot(1.0, length(x[..., 1:]))
     refuse(
         ~(np.abs(x[..., 0] - time) <= tol * time),

@@ -98,9 +98,7 @@ def projector_to_basis(projector: ArrayLike) -> Array:
     refuse(
         np.asarray(ranks != rank),
         "projector",
-        lambda i: (
-            f"has rank {ranks[i]}, but others have rank {rank}; convert subspaces of one dimension at a time"
-        ),
+        lambda i: f"has rank {ranks[i]}, but others have rank {rank}; convert subspaces of one dimension at a time",
     )
     if rank == 0:
         raise ValidationError("projector is zero or empty, but must have rank 1 or more")
@@ -176,9 +174,7 @@ def density_to_state(density: ArrayLike) -> Array:
         "density",
         lambda i: f"is not a density matrix: its trace is {traces[i]}, not 1; divide it by its trace",
     )
-    _check_projectors(
-        rho, tol, "density", "a pure state", "only pure states, of purity tr P² = 1, have a state vector"
-    )
+    _check_projectors(rho, tol, "density", "a pure state", "only pure states, of purity tr P² = 1, have a state vector")
     rho = _hermitian_part(rho)
     best = np.argmax(np.diagonal(rho, axis1=-2, axis2=-1).real, axis=-1)
     psi = np.take_along_axis(rho, best[..., None, None], axis=-1)[..., 0]
@@ -196,9 +192,7 @@ def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -
     refuse(
         ~(off <= tol),
         name,
-        lambda i: (
-            f"is not {what}: |P² - P| is {off[i]:.3e}, tr P² is {np.trace(square[i]).real:.6g}; {advice}"
-        ),
+        lambda i: f"is not {what}: |P² - P| is {off[i]:.3e}, tr P² is {np.trace(square[i]).real:.6g}; {advice}",
     )
 
 

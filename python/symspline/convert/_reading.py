@@ -58,9 +58,7 @@ def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> 
     if array.dtype.kind == "c" or not fits:
         wanted = ", ".join("n" if m is None else str(m) for m in shape)
         kind = "complex" if array.dtype.kind == "c" else "real"
-        raise ValidationError(
-            f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}"
-        )
+        raise ValidationError(f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}")
     return array, tol
 
 

@@ -60,9 +60,7 @@ def basis_to_reflection(basis: ArrayLike, *, negative: int) -> Array:
     refuse(
         ~(singular > tol),
         "basis",
-        lambda i: (
-            f"does not have linearly independent columns: their least singular value is {singular[i]:.3e}"
-        ),
+        lambda i: f"does not have linearly independent columns: their least singular value is {singular[i]:.3e}",
     )
     q = np.linalg.qr(y).Q
     turned = np.swapaxes(q, -1, -2) * signs
@@ -117,11 +115,7 @@ def reflection_to_basis(reflection: ArrayLike, *, negative: int) -> Array:
         off = largest(p @ p - np.eye(n)) / size
         skew = largest(signs[:, None] * p - np.swapaxes(signs[:, None] * p, -1, -2)) / size
     refuse(~(off <= tol), "reflection", lambda i: f"is not a reflection: |P² - 1| is {off[i]:.3e} of |P|²")
-    refuse(
-        ~(skew <= tol),
-        "reflection",
-        lambda i: f"does not preserve the form: |ηP - Pᵀη| is {skew[i]:.3e} of |P|²",
-    )
+    refuse(~(skew <= tol), "reflection", lambda i: f"does not preserve the form: |ηP - Pᵀη| is {skew[i]:.3e} of |P|²")
     counts = np.rint((n + np.trace(p, axis1=-2, axis2=-1)) / 2).astype(int)
     k = int(counts.flat[0]) if counts.size else 0
     refuse(

@@ -16,15 +16,11 @@ from ._spectral import adjoint
 
 
 @overload
-def evaluate(
-    t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0
-) -> jax.Array: ...
+def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0) -> jax.Array: ...
 
 
 @overload
-def evaluate(
-    t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0
-) -> tuple[jax.Array, ...]: ...
+def evaluate(t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0) -> tuple[jax.Array, ...]: ...
 
 
 def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
@@ -82,10 +78,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: A
     space = space_named(space)
     if isinstance(space, Product):
         each = zip(
-            parts_of(points, space, "points"),
-            parts_of(velocities, space, "velocities"),
-            space.factors,
-            strict=True,
+            parts_of(points, space, "points"), parts_of(velocities, space, "velocities"), space.factors, strict=True
         )
         return tuple(evaluate(t, p, v, factor, x, nu=nu) for p, v, factor in each)
     model = model_of(space)

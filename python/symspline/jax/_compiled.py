@@ -100,9 +100,7 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):
-        each = zip(
-            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
-        )
+        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
         return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in each)
     kinds, given = split(bc_type)
     points = jnp.asarray(points)
@@ -143,7 +141,5 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
         jvp = partial(jvp_p.bind, jnp.concatenate(parts), x, *data, velocities)
         moved += jvp(fixed=fixed, lead=0, nu=nu, moving=moving)
         if nu:
-            moved += second_fundamental_form(
-                fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving)
-            )
+            moved += second_fundamental_form(fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving))
     return value, moved

@@ -149,9 +149,7 @@ def _inconsistency(problem: Problem, u: Array, polygon: ControlPolygon, dlog: Ar
             ]
             h0, h1 = (h[:, i] for i in ((0, 1) if which == 0 else (-1, -2)))
             turned = off[0] / norm(*at[:2]) * norm(*at[2:])
-            found[:, node] = (
-                unlike + np.where(off[0] > 0, turned, 0.0) + (off[0] / h0 + off[1] / h1) * (2 + h0 / h1)
-            )
+            found[:, node] = unlike + np.where(off[0] > 0, turned, 0.0) + (off[0] / h0 + off[1] / h1) * (2 + h0 / h1)
     return found
 
 

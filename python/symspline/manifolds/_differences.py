@@ -33,9 +33,7 @@ def dlog_by_differences(
     """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic;
     ``stretch`` multiplies their steps."""
     size = operations.norm(q, w)
-    step = (
-        _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
-    )
+    step = _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
     step = stretch * step
     # Times along the geodesic with velocity w.
     s = np.divide(step, size, out=np.zeros_like(size), where=size > 0)

@@ -143,9 +143,7 @@ def iterate(
     residual = np.array([state.best for state in states])
     first = np.array([state.first for state in states])
     with np.errstate(all="ignore"):
-        rate = np.where(
-            counts > 1, (np.maximum(residual, 1e-300) / first) ** (1 / np.maximum(counts - 1, 1)), 0.0
-        )
+        rate = np.where(counts > 1, (np.maximum(residual, 1e-300) / first) ** (1 / np.maximum(counts - 1, 1)), 0.0)
     converged = np.array([state.converged for state in states])
     return Found(problem.velocities(best), converged, counts, residual, rate)
 
@@ -246,9 +244,7 @@ class _PeriodicCorrection:
         frames = problem.frames
         curves, _, dim, _ = frames.shape
         shape = (curves, dim, *problem.p.shape[2:])
-        turn = products(
-            problem.operations, problem.p[:, 0], frames[:, 0].reshape(shape), frames[:, -1].reshape(shape)
-        )
+        turn = products(problem.operations, problem.p[:, 0], frames[:, 0].reshape(shape), frames[:, -1].reshape(shape))
         couple = corner[:, None, None] * turn
         self._couple = np.zeros((curves, 2 * dim, 2 * dim))
         self._couple[:, :dim, dim:], self._couple[:, dim:, :dim] = couple, np.swapaxes(couple, 1, 2)

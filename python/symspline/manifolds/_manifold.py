@@ -309,9 +309,7 @@ class Manifold(Space):
 def _shape(value: Any) -> tuple[int, ...]:
     sizes = (value,) if isinstance(value, (int, np.integer)) else value
     if not isinstance(sizes, (tuple, list)) or not sizes:
-        raise ValidationError(
-            f"point_shape must be a whole number or a tuple of them, not {short_repr(value)}"
-        )
+        raise ValidationError(f"point_shape must be a whole number or a tuple of them, not {short_repr(value)}")
     return tuple(whole_number(size, "point_shape", 1) for size in sizes)
 
 

@@ -193,8 +193,7 @@ def _geodesic(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> 
     before = (tau < 0.5).reshape(-1, *[1] * (polygon.p.ndim - 2))
     t = tau.reshape(before.shape)
     return operations.exp(
-        np.where(before, polygon.p[0], polygon.p[1]),
-        3 * np.where(before, t * polygon.v[0], (1 - t) * polygon.v[1]),
+        np.where(before, polygon.p[0], polygon.p[1]), 3 * np.where(before, t * polygon.v[0], (1 - t) * polygon.v[1])
     )
 
 

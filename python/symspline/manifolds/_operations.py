@@ -201,9 +201,7 @@ class Operations:
         return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
 
 
-def rows_or_nan(
-    log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)
-) -> Array:
+def rows_or_nan(log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)) -> Array:
     """Logarithms of rows, NaN where there are none. Functions of this library raise for all rows then."""
     try:
         return np.asarray(log(p, q))

@@ -72,9 +72,7 @@ class Stiefel(Manifold):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValidationError(f"Stiefel takes whole numbers k and n, not {short_repr(value)}")
         if not k < n:
-            raise ValidationError(
-                f"Stiefel({k}, {n}) needs k < n: frames of all of R^n are SpecialOrthogonal({n})"
-            )
+            raise ValidationError(f"Stiefel({k}, {n}) needs k < n: frames of all of R^n are SpecialOrthogonal({n})")
         self._k, self._n = self._parameters = int(k), int(n)
         super().__init__(
             exp=self._exp,
@@ -144,9 +142,7 @@ class Stiefel(Manifold):
             # The part orthogonal to the frame stays orthogonal and is multiplied by the mean of exp(sΩ).
             outside = w - frame @ (_transposed(frame) @ w)
             mean = (z[:, 0] * (np.exp(0.5j * x) * np.sinc(x / (2 * np.pi)))[..., None, :]) @ _adjoint(z[:, 0])
-            result = result + _transposed(
-                np.linalg.solve(_transposed(mean.real[..., :k, :k]), _transposed(outside))
-            )
+            result = result + _transposed(np.linalg.solve(_transposed(mean.real[..., :k, :k]), _transposed(outside)))
         return np.asarray(result)
 
 

@@ -33,9 +33,7 @@ _REACH = 0.35
 class Surface(Manifold):
     """A level set F = 0 in Rⁿ with the metric of Rⁿ, see `from_surface`."""
 
-    def __init__(
-        self, f: Function, grad: Function, n: int, hess: Function | None, radius: float | None
-    ) -> None:
+    def __init__(self, f: Function, grad: Function, n: int, hess: Function | None, radius: float | None) -> None:
         self._f, self._grad, self._given_hess = f, grad, hess
         for name, function in (("F", f), ("grad", grad), ("hess", grad if hess is None else hess)):
             if not callable(function):
@@ -87,9 +85,7 @@ class Surface(Manifold):
             halvings[left[~better]] += 1
             v[left] = kept[left] + 0.5 ** halvings[left, None] * step[left]
             # What is left behind a small step of Newton's is its square.
-            there = better & (
-                np.linalg.norm(step[left], axis=1) <= _SMALL * np.maximum(chord[left, 0], _SMALL)
-            )
+            there = better & (np.linalg.norm(step[left], axis=1) <= _SMALL * np.maximum(chord[left, 0], _SMALL))
             found[left[there]] = v[left[there]]
             left = left[~there & (halvings[left] < 10) & np.isfinite(v[left]).all(axis=1)]
             if not left.size and rough:
@@ -141,9 +137,7 @@ class Surface(Manifold):
         x, t = y[:, 0], y[:, 1]
         g = self._gradient(x)
         rough = self._given_hess is None
-        turned = (
-            directional_derivative(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
-        )
+        turned = directional_derivative(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
         pull = np.sum(t * turned, axis=1) / np.sum(g * g, axis=1)
         return np.stack([t, -pull[:, None] * g], axis=1)
 
@@ -178,12 +172,7 @@ class Surface(Manifold):
 
 
 def from_surface(
-    F: Function,
-    grad: Function,
-    n: int,
-    *,
-    hess: Function | None = None,
-    injectivity_radius: float | None = None,
+    F: Function, grad: Function, n: int, *, hess: Function | None = None, injectivity_radius: float | None = None
 ) -> Surface:
     """Define a surface in Rⁿ by an equation, with lengths as in Rⁿ.
 
@@ -242,9 +231,7 @@ def _combined(basis: Array, fields: Array, w: Array) -> Array:
     """Σ cₐ eₐ where w = Σ cₐ Jₐ."""
     gram = np.einsum("mai,mbi->mab", fields, fields)
     right = np.einsum("mai,mi->ma", fields, w)
-    solvable = np.isfinite(gram).all(axis=(1, 2)) & (
-        np.linalg.cond(np.where(np.isfinite(gram), gram, 0.0)) < 1e15
-    )
+    solvable = np.isfinite(gram).all(axis=(1, 2)) & (np.linalg.cond(np.where(np.isfinite(gram), gram, 0.0)) < 1e15)
     c = np.full(right.shape, np.nan)
     c[solvable] = np.linalg.solve(gram[solvable], right[solvable][..., None])[..., 0]
     return np.asarray(np.einsum("ma,mai->mi", c, basis))

@@ -149,10 +149,7 @@ def _steps(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
     """Return the propagators over short intervals inside a segment, shape (curves, m, n, n)."""
     n = curve.space.point_shape[0]
     block = max(1, _BLOCK // (start.shape[0] * (STAGES * n) ** 2 * 16))
-    steps = [
-        _step(curve, start[:, i : i + block], length[:, i : i + block])
-        for i in range(0, start.shape[1], block)
-    ]
+    steps = [_step(curve, start[:, i : i + block], length[:, i : i + block]) for i in range(0, start.shape[1], block)]
     return np.concatenate(steps, axis=1) if steps else np.zeros((*start.shape, n, n), complex)
 
 
@@ -160,8 +157,7 @@ def _step(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
     nodes, weights, matrix = gauss()
     times = start[..., None] + length[..., None] * nodes
     point, velocity = (
-        curve.evaluate(times.reshape(*curve.batch, -1), quantity, "raise", True)
-        for quantity in ("point", "velocity")
+        curve.evaluate(times.reshape(*curve.batch, -1), quantity, "raise", True) for quantity in ("point", "velocity")
     )
     h = generator(curve.space, point, velocity)
     n = h.shape[-1]

@@ -85,9 +85,7 @@ def _edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
     refuse(
         ~(spacing > 0),
         "edges",
-        lambda i: (
-            f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but edges must be strictly increasing"
-        ),
+        lambda i: f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but edges must be strictly increasing",
     )
     return times, spacing
 

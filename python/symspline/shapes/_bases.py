@@ -38,9 +38,7 @@ class Bases:
         refuse(
             ~((own >= shape._times[0]) & (own <= shape._times[-1])),
             "x",
-            lambda i: (
-                f"is {x[i]}, but must be between the times of the first and last drawings, {first} and {last}"
-            ),
+            lambda i: f"is {x[i]}, but must be between the times of the first and last drawings, {first} and {last}",
         )
         basis: Array = self.shape.lift(x, start=self.start)
         return basis

@@ -101,9 +101,7 @@ def read(x: ArrayLike, name: str, base: Any) -> Array:
     """Validate drawings and the base landmark."""
     drawing, _ = numbers(x, name, 2)
     if drawing.dtype.kind == "c":
-        raise ValidationError(
-            f"{name} must be real landmarks, not complex; pass real and imaginary parts as columns"
-        )
+        raise ValidationError(f"{name} must be real landmarks, not complex; pass real and imaginary parts as columns")
     count, n = drawing.shape[-2:]
     if count < n + 2 or n < 1:
         raise ValidationError(

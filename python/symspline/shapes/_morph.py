@@ -232,9 +232,7 @@ class _Between:
 
     def _twisted(self, x: Array, sign: int) -> Array:
         """Return exp(±τw) at times x."""
-        return self._group.exp(
-            np.eye(len(self._twist)), sign * self._bases.share(x)[..., None, None] * self._twist
-        )
+        return self._group.exp(np.eye(len(self._twist)), sign * self._bases.share(x)[..., None, None] * self._twist)
 
 
 def _check_closed(moved: Array, positions: Array) -> None:

@@ -108,9 +108,7 @@ def to_vectors(matrices: ArrayLike, *, order: TensorOrder) -> Array:
         refuse(
             off > point_tol(array.dtype) * largest(array),
             "matrices",
-            lambda i: (
-                f"is not symmetric: |A - Aᵀ| is {off[i]:.3e}; six numbers can represent symmetric matrices only"
-            ),
+            lambda i: f"is not symmetric: |A - Aᵀ| is {off[i]:.3e}; six numbers can represent symmetric matrices only",
         )
     rows, columns = np.transpose(pairs)
     return array[..., rows, columns]

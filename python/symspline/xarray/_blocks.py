@@ -25,11 +25,7 @@ COLUMNS = columns_of(Report)
 
 
 def apply(
-    function: Any,
-    inputs: Inputs,
-    output_core_dims: list[list[Hashable]],
-    output_dtypes: list[Any],
-    **kwargs: Any,
+    function: Any, inputs: Inputs, output_core_dims: list[list[Hashable]], output_dtypes: list[Any], **kwargs: Any
 ) -> tuple[xr.DataArray, ...]:
     """The outputs of a function of blocks."""
     arrays = _cut_alike([array for array, _ in inputs])
@@ -59,10 +55,7 @@ def _cut_alike(arrays: list[xr.DataArray]) -> list[xr.DataArray]:
     """Arrays of dask in the blocks of the first array; dimensions that it does not have are one chunk."""
     first, *others = arrays
     cuts = first.variable.chunksizes
-    return [
-        first,
-        *(a if a.chunks is None else a.chunk({d: cuts.get(d, -1) for d in a.dims}) for a in others),
-    ]
+    return [first, *(a if a.chunks is None else a.chunk({d: cuts.get(d, -1) for d in a.dims}) for a in others)]
 
 
 def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
@@ -79,13 +72,7 @@ def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
 
 
 def spline_of(
-    points: Array,
-    rest: Sequence[Array],
-    space: Space,
-    t: Any,
-    kinds: Any,
-    names: list[str],
-    how: dict[str, Any],
+    points: Array, rest: Sequence[Array], space: Space, t: Any, kinds: Any, names: list[str], how: dict[str, Any]
 ) -> CubicSpline:
     """The splines of a block."""
     named = dict(zip(names, rest, strict=True))

@@ -34,9 +34,7 @@ def along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool 
         check_dims(array, space, dim, point_dims)
     if extrapolate is not None:
         policy = extrapolation_mode(checked_extrapolate(extrapolate), ds.attrs.get("bc_type"))
-    times, axes = times_with_names(
-        x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)]
-    )
+    times, axes = times_with_names(x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
     t = points[dim].values if dim in points.coords else None
     rehearse(times, t, points.sizes[dim], policy)
     own = [KNOTS, *point_dims]
