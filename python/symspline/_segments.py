@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
-from typing import Any, Literal, NamedTuple, Unpack, overload
+from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +27,30 @@ _DUPLICATES = ("raise", "first", "mean")
 _STEPS = 50
 
 
+class SegmentOptions(TypedDict, total=False):
+    """The keywords of `fit_segments` that cut the recording."""
+
+    max_gap: Required[float | timedelta | np.timedelta64]
+    min_points: int
+    duplicates: Duplicates
+
+
+class FitSegmentOptions(SegmentOptions, FitOptions, total=False):
+    """The keywords of `fit_segments` without smoothing."""
+
+
+class SmoothSegmentOptions(SegmentOptions, SmoothingOptions, total=False):
+    """The keywords of `fit_segments` with smoothing."""
+
+
 @overload
 def fit_segments(  # type: ignore[overload-overlap]
     t: TimesLike,
     points: PointsLike,
     space: Product[PProduct],
     *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
     smooth: Literal[True],
-    **options: Unpack[SmoothingOptions],
+    **options: Unpack[SmoothSegmentOptions],
 ) -> list[SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
 
 
@@ -47,11 +60,8 @@ def fit_segments(
     points: PointsLike,
     space: SpecialEuclidean,
     *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
     smooth: Literal[True],
-    **options: Unpack[SmoothingOptions],
+    **options: Unpack[SmoothSegmentOptions],
 ) -> list[SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
 
 
@@ -61,11 +71,8 @@ def fit_segments(
     points: PointsLike,
     space: Space[P] | str,
     *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
     smooth: Literal[True],
-    **options: Unpack[SmoothingOptions],
+    **options: Unpack[SmoothSegmentOptions],
 ) -> list[SmoothingSpline[P]]: ...
 
 
@@ -75,11 +82,8 @@ def fit_segments(
     points: PointsLike,
     space: Space[P] | str,
     *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
     smooth: Literal[False] = False,
-    **options: Unpack[FitOptions],
+    **options: Unpack[FitSegmentOptions],
 ) -> list[CubicSpline[P]]: ...
 
 

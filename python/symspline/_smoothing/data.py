@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -26,6 +27,10 @@ Doubles = NDArray[np.float64]
 
 # Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12
+# If there are more knots than the first number, the fit begins with the second number of knots.
+_MANY, _FIRST = 4000, 2000
+# Largest number of times that the knots are adapted to λ.
+_TRIES = 4
 
 
 class SmoothingData(NamedTuple):
@@ -346,6 +351,48 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
         kept.append(i)
         i = following[i]
     return _picked(knots, np.array([*kept, len(times) - 1]))
+
+
+def with_enough_knots(
+    whole: Knots, noisy: SmoothingData, lams: list[Any], run: Callable[[Knots], list[Any]]
+) -> tuple[list[Any], Knots]:
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
+    given = all(np.isfinite(lam).all() for lam in lams)
+    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
+    if at.times.shape[-1] > _MANY:
+        at = thin_knots(at, _FIRST)
+    for tries in range(_TRIES):
+        found = run(at)
+        count = at.times.shape[-1]
+        known = [np.asarray(part.report.lam) for _, part, _ in found]
+        better = merge_close_knots(whole, noisy, _of_all(known))
+        most = 2 * max(_n_knots_for_df(part.report.df) for _, part, _ in found)
+        if better.times.shape[-1] > max(_MANY, most):
+            better = thin_knots(better, max(_FIRST, most))
+        wanted = better.times.shape[-1]
+        # More knots would make a rough curve rougher, and a stiff curve needs fewer.
+        if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
+            break
+        at = better
+    return found, at
+
+
+def _of_all(lams: list[Any]) -> float:
+    """Return one λ from which the knots of all curves are selected.
+
+    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
+    """
+    flat = np.concatenate([np.ravel(lam) for lam in lams])
+    flat = flat[np.isfinite(flat)]
+    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
+
+
+def _n_knots_for_df(df: Any) -> int:
+    """Return a number of knots that is enough for these degrees of freedom.
+
+    Three times as many knots would already lose nothing.
+    """
+    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
 
 
 def in_gaps(knots: Knots, given: Given) -> Knots:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any, Unpack, overload
 
@@ -35,28 +34,14 @@ from .._typing import (
     TimesLike,
 )
 from ..manifolds._manifold import refuse_functions
-from .data import (
-    Knots,
-    SmoothingData,
-    has_all_times,
-    in_gaps,
-    knots_for,
-    merge_close_knots,
-    points_of,
-    read_noisy,
-    thin_knots,
-)
+from .data import Knots, SmoothingData, has_all_times, in_gaps, knots_for, points_of, read_noisy, with_enough_knots
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
 from .report import SmoothingReport
-from .solve import NO_CURVE, SolverOptions, n_knots_for_df, one_per_curve, smoothed
+from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
 from .warned import warn_of_bounds, warn_of_spread
 
 _FIT = Options("auto", 1e-12, None)
-# If there are more knots than the first number, the fit begins with the second number of knots.
-_MANY, _FIRST = 4000, 2000
-# Largest number of times that the knots are adapted to λ.
-_TRIES = 4
 
 
 @overload
@@ -284,7 +269,7 @@ def make_smoothing_spline(
             f"A closed curve needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data or knots."
         )
     if knots is None:
-        found, at = _with_enough(every, noisy, lams, run)
+        found, at = with_enough_knots(every, noisy, lams, run)
         finer = in_gaps(at, given)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):
@@ -445,40 +430,6 @@ def _in_batch(batch: tuple[int, ...], chosen: Any, column: Any) -> Any:
     out = np.full((int(np.prod(batch)), *rows.shape[1:]), nothing, rows.dtype)
     out[chosen] = rows
     return out.reshape(*batch, *rows.shape[1:])
-
-
-def _with_enough(
-    whole: Knots, noisy: SmoothingData, lams: list[Any], run: Callable[[Knots], list[Any]]
-) -> tuple[list[Any], Knots]:
-    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
-    given = all(np.isfinite(lam).all() for lam in lams)
-    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
-    if at.times.shape[-1] > _MANY:
-        at = thin_knots(at, _FIRST)
-    for tries in range(_TRIES):
-        found = run(at)
-        count = at.times.shape[-1]
-        known = [np.asarray(part.report.lam) for _, part, _ in found]
-        better = merge_close_knots(whole, noisy, _of_all(known))
-        most = 2 * max(n_knots_for_df(part.report.df) for _, part, _ in found)
-        if better.times.shape[-1] > max(_MANY, most):
-            better = thin_knots(better, max(_FIRST, most))
-        wanted = better.times.shape[-1]
-        # More knots would make a rough curve rougher, and a stiff curve needs fewer.
-        if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
-            break
-        at = better
-    return found, at
-
-
-def _of_all(lams: list[Any]) -> float:
-    """Return one λ from which the knots of all curves are selected.
-
-    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
-    """
-    flat = np.concatenate([np.ravel(lam) for lam in lams])
-    flat = flat[np.isfinite(flat)]
-    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
 
 
 def transport_end_velocities(

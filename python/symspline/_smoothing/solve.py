@@ -144,14 +144,6 @@ def _reason(state: str, number: int, report: SmoothingReport, options: SolverOpt
     )
 
 
-def n_knots_for_df(df: Any) -> int:
-    """Return a number of knots that is enough for these degrees of freedom.
-
-    Three times as many knots would already lose nothing.
-    """
-    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
-
-
 def one_per_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
     """Return a number >= 0 per curve; NaN for None."""
     if value is None:

@@ -92,7 +92,14 @@ class Stiefel(Manifold):
         return self._parameters
 
     # Unlike other manifolds, it has a name.
-    __str__, __repr__, __reduce__ = Space.__str__, Space.__repr__, Space.__reduce__
+    def __str__(self) -> str:
+        return Space.__str__(self)
+
+    def __repr__(self) -> str:
+        return Space.__repr__(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Space.__reduce__(self)
 
     def _exp(self, p: Array, v: Array) -> Array:
         frame, a, b = self._reduced(p, v)
