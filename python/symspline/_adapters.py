@@ -73,8 +73,7 @@ class Movable(NamedTuple):
     def _velocity(self, x: Array) -> Array:
         curve = self.curve
         times, per_curve = onto_ends(cast(x), curve.times, curve.batch, False, x.dtype)
-        velocity: Array = curve.evaluate(times, "velocity", "raise", per_curve)
-        return velocity
+        return np.asarray(curve.evaluate(times, "velocity", "raise", per_curve))
 
 
 def movable(spline: CubicSpline) -> Movable:

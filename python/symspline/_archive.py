@@ -179,8 +179,7 @@ def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> N
     if math.prod(shape) * dtype.itemsize != size:
         raise ValidationError(f"entry {name!r} is damaged: it has {size} bytes, not those of {dtype} in shape {shape}")
     with archive.open(member) as entry:
-        array: NDArray[Any] = np.lib.format.read_array(entry, allow_pickle=False)
-    return array
+        return np.asarray(np.lib.format.read_array(entry, allow_pickle=False))
 
 
 def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:

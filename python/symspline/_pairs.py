@@ -60,8 +60,7 @@ class Segments:
 
     def at(self, x: Array, nu: int = 0) -> Array:
         """Evaluate every segment at its own times, the rows of x; shape (S, m, *point_shape)."""
-        values: Array = evaluate(self.t, self.points, self.velocities, self.space, x, nu=nu, per_curve=True)
-        return values
+        return np.asarray(evaluate(self.t, self.points, self.velocities, self.space, x, nu=nu, per_curve=True))
 
     def jumps(self, nu: int, closed: bool = False) -> Jumps:
         """Return the differences between the ends of segments and the starts of the next ones.

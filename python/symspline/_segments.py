@@ -200,8 +200,7 @@ def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
 def _used(weight_options: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
     """Return which points have a nonzero weight."""
     found = read_precision(**weight_options, space=space, data=read(points, space))
-    used: NDArray[np.bool_] = np.any([own.weights > 0 for own in found], axis=0)
-    return used
+    return np.asarray(np.any([own.weights > 0 for own in found], axis=0))
 
 
 def _of_rows(value: Any, rows: NDArray[np.intp]) -> Any:

@@ -336,8 +336,7 @@ def _vee(r: Array, d: Array) -> Array:
 
 def turned(r: Array, v: Array) -> Array:
     """Return Rv for matrices R and vectors v."""
-    result: Array = np.einsum("...ij,...j->...i", r, v)
-    return result
+    return np.asarray(np.einsum("...ij,...j->...i", r, v))
 
 
 def _dot(p: Array, q: Array) -> Array:
@@ -466,8 +465,7 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     sine = length(v)
     # angle / sin(angle/2). Without a rotation v is zero, and any factor will do.
     factor = 2 * np.arctan2(sine, w) / np.where(sine > 0, sine, 1)
-    result: Array = factor[..., None] * v
-    return result
+    return np.asarray(factor[..., None] * v)
 
 
 def from_rotation_vectors(vectors: ArrayLike) -> Array:

@@ -118,8 +118,7 @@ class CoreCurve(CurveArrays):
         if not is_quotient(self.space):
             if start is not None:
                 check_start(self.space, first, start)
-            values: Array = self.evaluate(x, quantity, outside, per_curve, progress)
-            return values
+            return np.asarray(self.evaluate(x, quantity, outside, per_curve, progress))
         self._check_times(x, per_curve)
         if outside == "continue":
             check_reach(self.times, x)

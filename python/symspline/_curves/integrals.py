@@ -63,5 +63,4 @@ def _rule(a: Doubles, b: Doubles, f: Callable[[Doubles], Any]) -> Doubles:
     half = (b - a) / 2
     x = (a / 2 + b / 2)[..., None] + half[..., None] * _NODES
     values = f(np.ascontiguousarray(x.reshape(*a.shape[:-1], -1))).reshape(x.shape)
-    result: Doubles = (values @ _WEIGHTS) * half
-    return result
+    return np.asarray((values @ _WEIGHTS) * half)

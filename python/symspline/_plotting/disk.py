@@ -45,8 +45,7 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def flat(points: Array, middle: Array) -> Array:
     """Return the positions of points in the disk with a given middle, shape (..., 2)."""
     moved = _PLANE.transvection(middle, _PLANE.log(middle, _ORIGIN), points)
-    positions: Array = moved[..., 1:] / (1 + moved[..., :1])
-    return positions
+    return np.asarray(moved[..., 1:] / (1 + moved[..., :1]))
 
 
 def rims(positions: Array, radii: Array) -> Array:

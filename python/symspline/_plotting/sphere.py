@@ -163,8 +163,7 @@ def caps(points: Array, radii: Array) -> Array:
     aside = np.cross(points, np.eye(3)[np.abs(points).argmin(axis=1)])
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     frame = np.stack([aside, np.cross(points, aside)], axis=1)
-    rims: Array = np.cos(radii) * points[:, None] + np.sin(radii) * (CIRCLE @ frame)
-    return rims
+    return np.asarray(np.cos(radii) * points[:, None] + np.sin(radii) * (CIRCLE @ frame))
 
 
 # ---- on the hemisphere ----
@@ -173,8 +172,7 @@ def caps(points: Array, radii: Array) -> Array:
 def lifted(vectors: Array) -> Array:
     """Choose the signs of unit vectors ±x along a curve, shape (m, 3), so that they do not jump."""
     turned = np.sum(vectors[1:] * vectors[:-1], axis=1) < 0
-    line: Array = vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None]
-    return line
+    return np.asarray(vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None])
 
 
 def sides(line: Array) -> Array:

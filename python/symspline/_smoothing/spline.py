@@ -251,8 +251,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
             nu,
             fixed_velocities(self._bc_type),
         )
-        spread: Doubles = sigma * np.sqrt(variance)
-        return spread
+        return np.asarray(sigma * np.sqrt(variance))
 
     @overload
     def band(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95) -> FloatArray: ...

@@ -325,8 +325,7 @@ def _open_parquet(path: Path) -> Table:
         cells = table.column(name)
         if cells.null_count:
             raise _problem(path, _row(int(cells.is_null().to_numpy().argmax())), name, "is empty")
-        values: Array = (cells.cast(pa.float64()) if pa.types.is_decimal(types[name]) else cells).to_numpy()
-        return values
+        return np.asarray((cells.cast(pa.float64()) if pa.types.is_decimal(types[name]) else cells).to_numpy())
 
     def first_text(name: str) -> str:
         is_text = str(types[name]) in ("string", "large_string", "string_view")

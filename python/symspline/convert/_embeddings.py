@@ -65,8 +65,7 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
         ],
         axis=-2,
     )
-    symmetric: Array = 0.5 * (whole + np.swapaxes(whole, -1, -2))
-    return symmetric
+    return np.asarray(0.5 * (whole + np.swapaxes(whole, -1, -2)))
 
 
 def positive_definite_to_siegel(p: ArrayLike) -> Array:

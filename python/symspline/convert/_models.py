@@ -168,8 +168,7 @@ def ball_to_half_space(y: ArrayLike) -> Array:
     y, room = _ball(y)
     ground, last = y[..., :-1], y[..., -1:]
     square = np.sum(ground**2, axis=-1, keepdims=True) + (1 - last) ** 2
-    z: Array = np.concatenate([2 * ground, room], axis=-1) / square
-    return z
+    return np.asarray(np.concatenate([2 * ground, room], axis=-1) / square)
 
 
 @unmoved_by_underflow

@@ -102,8 +102,7 @@ def projector_to_basis(projector: ArrayLike) -> Array:
     )
     if rank == 0:
         raise ValidationError("projector is zero or empty, but must have rank 1 or more")
-    basis: Array = np.linalg.eigh(p).eigenvectors[..., p.shape[-1] - rank :]
-    return basis
+    return np.asarray(np.linalg.eigh(p).eigenvectors[..., p.shape[-1] - rank :])
 
 
 @unmoved_by_underflow
@@ -133,8 +132,7 @@ def state_to_density(state: ArrayLike) -> Array:
     """
     psi, tol = numbers(state, "state", 1)
     psi = unit_vectors(psi, tol, "state", "a state")
-    density: Array = psi[..., :, None] * psi[..., None, :].conj()
-    return density
+    return np.asarray(psi[..., :, None] * psi[..., None, :].conj())
 
 
 @unmoved_by_underflow
@@ -178,8 +176,7 @@ def density_to_state(density: ArrayLike) -> Array:
     rho = _hermitian_part(rho)
     best = np.argmax(np.diagonal(rho, axis1=-2, axis2=-1).real, axis=-1)
     psi = np.take_along_axis(rho, best[..., None, None], axis=-1)[..., 0]
-    state: Array = psi / length(np.abs(psi))[..., None]
-    return state
+    return np.asarray(psi / length(np.abs(psi))[..., None])
 
 
 def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -> None:
@@ -197,5 +194,4 @@ def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -
 
 
 def _hermitian_part(x: Array) -> Array:
-    part: Array = (x + adjoint(x)) / 2
-    return part
+    return np.asarray((x + adjoint(x)) / 2)

@@ -96,8 +96,7 @@ def length(x: Array) -> Array:
 
 def adjoint(x: Array) -> Array:
     """Return conjugate transposes."""
-    result: Array = np.swapaxes(x, -1, -2).conj()
-    return result
+    return np.asarray(np.swapaxes(x, -1, -2).conj())
 
 
 def off_one(x: Array) -> Array:

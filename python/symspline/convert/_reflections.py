@@ -74,8 +74,7 @@ def basis_to_reflection(basis: ArrayLike, *, negative: int) -> Array:
             f"{least[i]:.3e}), since it contains a vector orthogonal to the whole subspace"
         ),
     )
-    reflection: Array = 2 * q @ np.linalg.solve(gram, turned) - np.eye(n)
-    return reflection
+    return np.asarray(2 * q @ np.linalg.solve(gram, turned) - np.eye(n))
 
 
 @unmoved_by_underflow
@@ -130,5 +129,4 @@ def reflection_to_basis(reflection: ArrayLike, *, negative: int) -> Array:
         raise ValidationError("reflection is 1, -1 or empty, but must leave a proper subspace fixed")
     q = np.linalg.svd(p + np.eye(n))[0][..., :k]
     values, vectors = np.linalg.eigh((np.swapaxes(q, -1, -2) * signs) @ q)
-    basis: Array = q @ vectors / np.sqrt(np.abs(values))[..., None, :]
-    return basis
+    return np.asarray(q @ vectors / np.sqrt(np.abs(values))[..., None, :])

@@ -218,8 +218,7 @@ class Tridiagonal:
         dominant by ``weight`` in every row, since holonomies preserve lengths.
         """
         if self._periodic is not None:
-            result: Doubles = (self._right * sizes / self.weight).max(axis=1)
-            return result
+            return np.asarray((self._right * sizes / self.weight).max(axis=1))
         signs = (-1.0) ** np.arange(sizes.shape[1])
         return np.asarray(np.abs(self.solved((signs * self._right * sizes)[:, :, None])).max(axis=(1, 2)))
 

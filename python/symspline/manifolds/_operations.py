@@ -152,8 +152,7 @@ class Operations:
             "random_tangent": self.project_tangent,
         }
         found = work[operation](*points) if operation in work else self._call(operation, *points)
-        flat: Doubles = found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1)
-        return flat
+        return np.asarray(found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1))
 
     def _log(self, p: Array, q: Array) -> Array:
         found = self.log(p, q)

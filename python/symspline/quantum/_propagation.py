@@ -173,8 +173,7 @@ def _step(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
 
 def _unitary(u: Array) -> Array:
     """Return the nearest unitary matrices of nearly unitary ones, by one step of Newton and Schulz."""
-    polished: Array = u @ (3 * np.eye(u.shape[-1]) - adjoint(u) @ u) / 2
-    return polished
+    return np.asarray(u @ (3 * np.eye(u.shape[-1]) - adjoint(u) @ u) / 2)
 
 
 @cache

@@ -40,13 +40,11 @@ class Bases:
             "x",
             lambda i: f"is {x[i]}, but must be between the times of the first and last drawings, {first} and {last}",
         )
-        basis: Array = self.shape.lift(x, start=self.start)
-        return basis
+        return np.asarray(self.shape.lift(x, start=self.start))
 
     def turn(self) -> Array:
         """Return the orthogonal matrix h by which X of a closed spline is rotated after one period."""
-        turn: Array = self.start.T @ self(self.shape.t[-1])
-        return turn
+        return np.asarray(self.start.T @ self(self.shape.t[-1]))
 
     def share(self, x: Array) -> Array:
         """Map times to the interval from 0 at the first knot to 1 at the last."""

@@ -124,8 +124,7 @@ def relative(drawing: Array, base: int | None) -> Array:
 
 def place(drawing: Array, base: int | None) -> Array:
     """Return the centre of drawings, or the landmark ``base``, shape (..., n)."""
-    middle: Array = drawing.mean(axis=-2) if base is None else drawing[..., base, :]
-    return middle
+    return np.asarray(drawing.mean(axis=-2) if base is None else drawing[..., base, :])
 
 
 def placed(moved: Array, place: Array, base: int | None) -> Array:
@@ -145,5 +144,4 @@ def orthonormal(moved: Array, name: str) -> Array:
             f"must span all {moved.shape[-1]} dimensions to have an affine shape"
         ),
     )
-    basis: Array = left @ right
-    return basis
+    return np.asarray(left @ right)
