@@ -212,8 +212,8 @@ class BSpline(Curve[P]):
 
     def __repr__(self) -> str:
         count = self._curve.control_points.shape[-1 - len(self.space.point_shape)]
-        curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
-        return f"<{type(self).__name__} on {self.space!r}: {curves}{count} control points, degree {self.degree}>"
+        what = f"{self._batch_text}{count} control points, degree {self.degree}"
+        return f"<{type(self).__name__} on {self.space!r}: {what}>"
 
 
 class ControlledCurve:

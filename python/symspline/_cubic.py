@@ -14,8 +14,8 @@ from ._core import ValidationError
 from ._curves.curve import CurveArrays, Gradient, SampleTimes
 from ._curves.derivatives import sample_times
 from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
-from ._curves.energy import alternative_energy
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
+from ._curves.integrals import alternative_energy
 from ._curves.product import longest_step
 from ._curves.solve import Progress
 from ._errors import raise_or_warn
@@ -355,7 +355,7 @@ class CubicSpline(SegmentedCurve[P]):
     def _product_report(self) -> Report:
         """Report of all factors, computed on first access because it costs more than a fit of few points."""
         curve, reports = self._curve, self._reports
-        other = alternative_energy(curve, reports)
+        other = alternative_energy(curve.parts, reports)
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
@@ -392,9 +392,8 @@ class CubicSpline(SegmentedCurve[P]):
 
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
-        curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         bc = self._bc_type if isinstance(self._bc_type, str) else "custom end conditions"
-        return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
+        return f"<CubicSpline on {self.space!r}: {self._batch_text}{knots} points, {bc}>"
 
     # Title of plots.
     _kind = "C² spline"

@@ -141,9 +141,7 @@ class HermiteSpline(SegmentedCurve[P]):
         return cls._of(time_axis, knots, curve, extrapolate)
 
     def __repr__(self) -> str:
-        batch = self._curve.batch
-        curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
-        return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
+        return f"<HermiteSpline on {self.space!r}: {self._batch_text}{self._curve.times.shape[-1]} points>"
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return HermiteSpline._of(time_axis, t, curve, self._extrapolate)

@@ -378,9 +378,8 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return cls._of(*parts, *read_noise(state, time_axis, t, curve, is_closed(bc_type)))
 
     def __repr__(self) -> str:
-        batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
-        return f"<SmoothingSpline on {self.space!r}: {batch}{data} data, {knots} knots>"
+        return f"<SmoothingSpline on {self.space!r}: {self._batch_text}{data} data, {knots} knots>"
 
 
 def _radius(space: Space, level: float) -> float:
