@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
 from ._archive import VERSION, Entries, Stored, entry, read_array, read_space
@@ -19,7 +19,7 @@ from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
 from ._faults import of_index
 from ._options import quantity_of
-from ._spaces import Array, Product, Space, point_tol, space_named
+from ._spaces import Array, Doubles, Product, Space, point_tol, space_named
 from ._time import onto_ends
 from ._typing import FloatArray, P
 from .manifolds._manifold import refuse_functions
@@ -134,7 +134,7 @@ class BSpline(Curve[P]):
         speeds: FloatArray = self._curve.evaluate(self._times(x), "speed")[()]
         return speeds
 
-    def _times(self, x: ArrayLike) -> NDArray[np.float64]:
+    def _times(self, x: ArrayLike) -> Doubles:
         """Return times in the domain of the curve as float64."""
         times = as_array(x, "x")
         if times.dtype.kind not in "biuf":
@@ -152,7 +152,7 @@ class BSpline(Curve[P]):
         return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
 
     @property
-    def knots(self) -> NDArray[np.float64]:
+    def knots(self) -> Doubles:
         """Knots, shape (n + degree + 1,)."""
         return self._curve.knots
 
@@ -227,7 +227,7 @@ class ControlledCurve:
 
     quad_rtol = EXACT
 
-    def __init__(self, space: Space[Any], knots: NDArray[np.float64], control_points: Any, degree: int) -> None:
+    def __init__(self, space: Space[Any], knots: Doubles, control_points: Any, degree: int) -> None:
         self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
         self.times = np.unique(knots[degree : knots.size - degree])
         control_points.flags.writeable = knots.flags.writeable = False
@@ -237,7 +237,7 @@ class ControlledCurve:
         shape: tuple[int, ...] = self.control_points.shape
         return shape[: len(shape) - len(self.space.point_shape) - 1]
 
-    def evaluate(self, x: NDArray[np.float64], quantity: str, outside: str = "raise", per_curve: bool = False) -> Any:
+    def evaluate(self, x: Doubles, quantity: str, outside: str = "raise", per_curve: bool = False) -> Any:
         """A quantity at times in the domain; with ``per_curve`` x has the batch axes, along which it is constant."""
         if per_curve:
             x = np.ascontiguousarray(x[(0,) * len(self.batch)])
@@ -322,7 +322,7 @@ def _factor(space: Space[P] | str) -> Space[P]:
     return space
 
 
-def _control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[NDArray[np.float64], float]:
+def _control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[Doubles, float]:
     """Return control points as floating-point numbers of the core, and their tolerance."""
     array = space._array(value, "control_points")
     doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
@@ -334,7 +334,7 @@ def _control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[NDA
     return doubles, point_tol(array.dtype)
 
 
-def _checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float) -> Array:
+def _checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
     """Project control points onto the space.
 
     Raises
@@ -364,7 +364,7 @@ def _checked_points(space: Space[Any], doubles: NDArray[np.float64], tol: float)
     return points
 
 
-def _checked_knots(knots: ArrayLike, count: int, degree: int) -> NDArray[np.float64]:
+def _checked_knots(knots: ArrayLike, count: int, degree: int) -> Doubles:
     """Return a copy of the knots of a B-spline with `count` control points after validation."""
     array = as_array(knots, "knots")
     if array.ndim != 1 or array.dtype.kind not in "biuf":

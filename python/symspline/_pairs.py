@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ._cubic import CubicSpline
 from ._functional import evaluate
-from ._spaces import Space
+from ._spaces import Array, Doubles, Space
 from .manifolds import Manifold
-
-Array = NDArray[Any]
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

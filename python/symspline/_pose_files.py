@@ -15,11 +15,9 @@ from ._arrays import as_array, brief, refuse, short_repr
 from ._core import ValidationError
 from ._disk import path_of, replacing
 from ._input import times_of
-from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._reading import length, off_one
-
-Doubles = NDArray[np.float64]
 
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")

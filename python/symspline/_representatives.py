@@ -16,10 +16,8 @@ from ._curves.fit import Points
 from ._errors import warn
 from ._faults import of_index
 from ._report import MAX_STEP, Columns, FarPointsWarning
-from ._spaces import Array, Space, Sphere, Unitary, factors_of
+from ._spaces import Array, Doubles, Space, Sphere, Unitary, factors_of
 from .manifolds import Manifold
-
-Doubles = NDArray[np.float64]
 
 # The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6
@@ -166,7 +164,7 @@ def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Se
     )
 
 
-def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
+def cut_fractions(space: Space[Any], points: Array) -> Doubles:
     """Return the deciding angle between neighbouring points, divided by the angle at which the cut locus is reached.
 
     Parameters

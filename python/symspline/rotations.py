@@ -26,10 +26,10 @@ from ._arrays import refuse, short_repr
 from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
-from ._curves.curve import CurveArrays, Doubles
+from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
-from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order

@@ -15,18 +15,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ._arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
 from ._pairs import segments_of
-from ._spaces import Array, Product, Space, space_named
+from ._spaces import Array, Doubles, Product, Space, space_named
 from .manifolds import Manifold
 
 __all__ = ["Conformance", "check"]
 
-Doubles = NDArray[np.float64]
 
 # Lengths of steps as parts of the longest.
 _PARTS = (1e-8, 1e-4, 1e-2, 0.3, 1.0)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Self
 
-from .._spaces import Array
-from .curve import Doubles
+from .._spaces import Array, Doubles
 
 
 class UncertaintyBand(NamedTuple):

@@ -10,9 +10,9 @@ import numpy as np
 from .. import _core
 from .._core import ValidationError
 from .._faults import Fault
-from .._spaces import Affine, Array, Similarity, Space, SpecialEuclidean
+from .._spaces import Affine, Array, Doubles, Similarity, Space, SpecialEuclidean
 from . import derivatives
-from .curve import REAL, CurveArrays, Doubles, Gradient, SampleTimes
+from .curve import REAL, CurveArrays, Gradient, SampleTimes
 from .lift import check_reach, check_start, fiber_factors, is_quotient
 from .solve import Options, Progress, Task, solve_single, validate
 

@@ -6,15 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .._spaces import Space
+from .._spaces import Doubles, Space
 from .._typing import FloatArray, P
 from .integrals import EXACT
 from .solve import Progress
-
-Doubles = NDArray[np.float64]
 
 NORMS = ("speed", "bend")
 # Quantities that are real numbers or vectors, not points or tangent vectors of the space.
@@ -68,7 +63,7 @@ class SampleTimes(NamedTuple):
         Order of the derivative in time.
     """
 
-    x: NDArray[np.float64]
+    x: Doubles
     shape: tuple[int, ...]
     nu: int
 

@@ -6,12 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
-from .._spaces import Array
+from .._spaces import Array, Doubles
 from .._time import onto_ends
 from .curve import CurveArrays, Gradient, SampleTimes
 from .ends import End, ends_of
@@ -43,11 +42,11 @@ def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool
 class _Curves(NamedTuple):
     """Arguments of the compiled core, with one row per curve."""
 
-    t: NDArray[np.float64]
-    points: NDArray[np.float64]
-    velocities: NDArray[np.float64]
+    t: Doubles
+    points: Doubles
+    velocities: Doubles
     ends: list[End] | None
-    x: NDArray[np.float64]
+    x: Doubles
     curves: int
     nu: int
 
@@ -109,7 +108,7 @@ def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
     return _Curves(knots, points, velocities, ends, at.x, math.prod(batch), at.nu)
 
 
-def _per_curve(knots: Array, batch: tuple[int, ...]) -> NDArray[np.float64]:
+def _per_curve(knots: Array, batch: tuple[int, ...]) -> Doubles:
     """Return one row of knots per curve."""
     nodes = knots.shape[-1]
     rows = np.broadcast_to(knots, (*batch, nodes)).reshape(math.prod(batch), nodes)
@@ -126,7 +125,7 @@ def _given(bc_type: Any, which: int) -> Array | None:
     return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
 
 
-def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: int) -> NDArray[np.float64]:
+def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: int) -> Doubles:
     space, batch = curve.space, curve.batch
     shape = batch + space._doubles_shape
     if value is None:
@@ -139,7 +138,7 @@ def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: 
     return space._as_doubles(np.ascontiguousarray(space.project_tangent(at, vectors))).reshape(shape)
 
 
-def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: NDArray[np.float64], which: int) -> Any:
+def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: Doubles, which: int) -> Any:
     given = _given(bc_type, which)
     if given is None:
         return None

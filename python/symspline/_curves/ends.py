@@ -6,14 +6,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Product, Space, factors_of, parts_of
+from .._spaces import Doubles, Product, Space, factors_of, parts_of
 
 # The kind of an end condition and its prescribed vectors.
-End = tuple[str, NDArray[np.float64] | None]
+End = tuple[str, Doubles | None]
 
 _WORDS = {"natural", "clamped", "not-a-knot"}
 _ORDERS = {1: "velocity", 2: "acceleration"}

@@ -13,14 +13,13 @@ from itertools import pairwise
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import as_array
 from .._core import ValidationError
 from .._faults import INVALID, Fault
 from .._report import Columns, Report, shaped
-from .._spaces import POINT_TOL, Array, Product, Space, factors_of, parts_of, point_tol
+from .._spaces import POINT_TOL, Array, Doubles, Product, Space, factors_of, parts_of, point_tol
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
@@ -54,7 +53,7 @@ class Points(NamedTuple):
         Number of points per curve.
     """
 
-    numbers: NDArray[np.float64]
+    numbers: Doubles
     tol: float
     batch: tuple[int, ...]
     nodes: int
@@ -89,8 +88,8 @@ class Problem(NamedTuple, Generic[_Times, _Data]):
     skip_invalid: bool = False
 
 
-FitProblem = Problem[NDArray[np.float64], list[Points]]
-ManyProblem = Problem[list[NDArray[np.float64]], list[list[Points]]]
+FitProblem = Problem[Doubles, list[Points]]
+ManyProblem = Problem[list[Doubles], list[list[Points]]]
 
 
 class Fit(NamedTuple):
@@ -172,7 +171,7 @@ def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[l
 
 
 def curve_of(
-    space: Space[Any], times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
+    space: Space[Any], times: Doubles, arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
     """Return the curve with given points and velocities in each factor.
 
@@ -245,7 +244,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
 
 def validated(
     space: Space[Any],
-    times: NDArray[np.float64],
+    times: Doubles,
     points: list[Points],
     ends: list[list[End] | None],
     skip_invalid: bool = False,
@@ -261,7 +260,7 @@ def validated(
 
 
 def hermite_data(
-    space: Space[Any], times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
+    space: Space[Any], times: Doubles, points: list[Points], velocities: list[tuple[Array, float]]
 ) -> list[tuple[Array, Array, Array]]:
     """Validate the data of a Hermite spline.
 
@@ -326,18 +325,11 @@ def _faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
 
     This is the first factor in which a curve failed. If there is none, it is the first factor with faults.
     """
-    skipped = {fault.curve: fault for fault in invalid}
-    others = []
-    for found in solved:
-        rest = []
-        for fault in found.faults:
-            if fault.kind == INVALID:
-                skipped.setdefault(fault.curve, fault)
-            else:
-                rest.append(fault)
-        if rest:
-            others.append(rest)
-    others.sort(key=lambda own: not any(fault.failed for fault in own))
+    of_points = [*invalid, *(fault for found in solved for fault in found.faults if fault.kind == INVALID)]
+    # The first fault of a curve counts.
+    skipped = {fault.curve: fault for fault in reversed(of_points)}
+    others = [[fault for fault in found.faults if fault.kind != INVALID] for found in solved]
+    others = sorted(filter(None, others), key=lambda own: not any(fault.failed for fault in own))
     return sorted([*skipped.values(), *(others[0] if others else [])], key=_number)
 
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from .._arrays import refuse
 from .._core import ValidationError
-from .._spaces import Array, Space
-from .curve import Doubles
+from .._spaces import Array, Doubles, Space
 
 # Largest extrapolation of a lift, in lengths of the first or last segment.
 FURTHEST = 100.0

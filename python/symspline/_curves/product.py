@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .._spaces import Product, parts_of, product_norm
+from .._spaces import Doubles, Product, parts_of, product_norm
 from .core_curve import CoreCurve
-from .curve import NORMS, CurveArrays, Doubles, Gradient, SampleTimes
+from .curve import NORMS, CurveArrays, Gradient, SampleTimes
 from .derivatives import pair_of
 from .ends import ends_in_factors
 from .solve import Progress

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple, Never
 import numpy as np
 
 from .._core import ValidationError
-from .._spaces import Array, ComplexGrassmannian, Grassmannian, Hyperbolic, Space
+from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
-from .curve import NORMS, CurveArrays, Doubles, SampleTimes
+from .curve import NORMS, CurveArrays, SampleTimes
 from .ends import map_ends
 from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
 

@@ -16,14 +16,11 @@ from .._curves.fit import Points, read, read_ends, validated
 from .._faults import INVALID, Fault
 from .._input import times_of
 from .._options import with_atol
-from .._spaces import Array, Space, factors_of
+from .._spaces import Array, Doubles, Space, factors_of
 from .._time import TimeAxis, knots_of
 from .._typing import TimesLike
 from .factors import grouped, smoothed_spaces, split
 from .precision import Precision, read_precision
-
-Doubles = NDArray[np.float64]
-
 
 # Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12

@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .._arrays import as_array, cast, refuse
 from .._core import ValidationError
 from .._curves.fit import Points
-from .._spaces import Array, Product, Space, factors_of
+from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._spaces.base import LARGE
 from .factors import coordinates_in_parts, parts_of_factor, split
 
-Doubles = NDArray[np.float64]
 # Relative size of the entries of a matrix or vector that count as rounding errors.
 _ROUNDING = 1e-8
 # Relative size of the eigenvalues of a matrix that the core treats as zero.

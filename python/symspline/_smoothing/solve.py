@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import refuse, short_repr
@@ -14,12 +13,10 @@ from .._curves.ends import End
 from .._curves.reduced import reduced
 from .._curves.solve import Progress
 from .._faults import UNCONVERGED, Fault
-from .._spaces import Array, Space
+from .._spaces import Array, Doubles, Space
 from .data import Knots, SmoothingData
 from .precision import Precision
 from .report import METHODS, SmoothingReport
-
-Doubles = NDArray[np.float64]
 
 # Part of the message for a smoothing that ended without a curve.
 NO_CURVE = "no spline joins"

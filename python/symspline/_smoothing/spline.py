@@ -17,10 +17,10 @@ from .._curves.curve import CurveArrays
 from .._curves.ends import fixed_velocities, is_closed
 from .._options import order_of
 from .._report import Report
-from .._spaces import Array, Product, Space, factors_of
+from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._time import TimeAxis
 from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P, TimesLike
-from .data import Doubles, SmoothingData
+from .data import SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
 from .report import SmoothingReport
 from .solve import Smoothed

@@ -1,6 +1,6 @@
 """The spaces: points, tangent vectors and their geometry."""
 
-from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Space, point_tol
+from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Doubles, Space, point_tol
 from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
 from .linear import Affine, ComplexGeneralLinear, GeneralLinear, Lorentz, Similarity, SpecialLinear, Symplectic
@@ -27,6 +27,7 @@ __all__ = [
     "ComplexHyperbolic",
     "ComplexProjective",
     "DeSitter",
+    "Doubles",
     "Euclidean",
     "GeneralLinear",
     "Grassmannian",

@@ -17,6 +17,7 @@ from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
 
 Array = AnyArray
+Doubles = FloatArray
 
 # From this ambient dimension on, frames of the whole tangent space are not computed.
 LARGE = 256

@@ -15,12 +15,10 @@ from .._cubic import CubicSpline
 from .._lonlat import compass, from_lonlat, to_lonlat
 from .._pose_files import join, rotations_in_rows
 from .._smoothing import SmoothingSpline
-from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of, space_named
+from .._spaces import POINT_TOL_FLOAT32, Doubles, Product, Space, factors_of, parts_of, space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
 from ._errors import Problem, for_command_line
 from ._tables import IM, RE, Place
-
-Doubles = NDArray[np.float64]
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
 LONLAT = ["lon", "lat"]

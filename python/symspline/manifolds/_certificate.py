@@ -14,15 +14,12 @@ sharp. Norms are the largest over the knots of the Riemannian norm of velocities
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._spaces import Array
+from .._spaces import Array, Doubles
 from ._condition import ControlPolygon, Problem, c2_residuals, c2_residuals_of, control_polygons
 from ._differences import dlog_by_differences
 from ._iteration import Tridiagonal
 from ._operations import Operations
-
-Doubles = NDArray[np.float64]
 
 # Terms of the Neumann series behind the first; each costs one evaluation of F.
 _TERMS = 4

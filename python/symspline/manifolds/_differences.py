@@ -6,12 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._spaces import Array
 from ._operations import Operations
-
-Doubles = NDArray[np.float64]
 
 # Steps along the geodesic at q, as parts of the injectivity radius, or of the distance of p and q and the length of
 # the direction: where errors of order four are as large as those of rounding.

@@ -8,11 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._spaces import Array
+from .._spaces import Array, Doubles
 from ._condition import Problem, c2_residuals, is_parabola
 from ._frames import products
-
-Doubles = NDArray[np.float64]
 
 # How many steps back are mixed.
 _DEPTH = 5

@@ -9,13 +9,11 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import short_repr
 from .._core import CutLocusError, ValidationError
-from .._spaces import Array
+from .._spaces import Array, Doubles
 
-Doubles = NDArray[np.float64]
 Function = Callable[..., Any]
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import short_repr, whole_number
 from .._core import ValidationError
@@ -14,8 +13,6 @@ from .._spaces import Array
 from ._differences import directional_derivative, jacobian
 from ._manifold import Manifold
 from ._operations import Function
-
-Doubles = NDArray[np.float64]
 
 # Newton's iterations, and the size of a step that is the last, relative to the distance.
 _MOST = 40

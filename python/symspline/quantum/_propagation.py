@@ -5,20 +5,17 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import refuse
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import CurveArrays
 from .._curves.reduced import span_of
-from .._spaces import ComplexGrassmannian, ComplexProjective
+from .._spaces import ComplexGrassmannian, ComplexProjective, Doubles
 from .._time import onto_ends
 from .._typing import TimesLike
 from ..convert._reading import Array, adjoint
 from ._generators import generator, quantum_space
-
-Doubles = NDArray[np.float64]
 
 STAGES = 8
 # For steps of this length, the error of eight stages is a rounding error.
