@@ -204,11 +204,10 @@ def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
     ValidationError
         If it is something else.
     """
+    text = text_in(arrays, name)
     try:
-        return json.loads(text_in(arrays, name))
+        return json.loads(text)
     except (ValueError, RecursionError) as error:
-        if isinstance(error, ValidationError):
-            raise
         raise ValidationError(f"entry {name!r} is not JSON: {brief(error)}") from None
 
 

@@ -58,13 +58,7 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
     back = np.linalg.inv(y)
     back = 0.5 * (back + np.swapaxes(back, -1, -2))
     beside = x @ back
-    whole = np.concatenate(
-        [
-            np.concatenate([y + beside @ x, beside], axis=-1),
-            np.concatenate([np.swapaxes(beside, -1, -2), back], axis=-1),
-        ],
-        axis=-2,
-    )
+    whole = np.block([[y + beside @ x, beside], [np.swapaxes(beside, -1, -2), back]])
     return np.asarray(0.5 * (whole + np.swapaxes(whole, -1, -2)))
 
 
