@@ -17,7 +17,7 @@ from .._core import ValidationError
 from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
 from .core_curve import CoreCurve
-from .curve import NORMS, CurveArrays, SampleTimes
+from .curve import NORMS, CurveArrays
 from .ends import map_ends
 from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
 
@@ -154,17 +154,13 @@ class ReducedCurve(CoreCurve):
         found = span.inside(self).transport(times, outside, np.squeeze(span.coordinates(rows), knots))
         return np.squeeze(span.embed(np.expand_dims(found, knots)), knots)
 
-    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
-        self._refuse_derivatives()
-
-    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Never:
-        self._refuse_derivatives()
-
-    def _refuse_derivatives(self) -> Never:
+    def jvp(self, *_: Any, **__: Any) -> Never:
         raise ValidationError(
             f"derivatives with respect to the data are not available, because the dimension of {self.space} is too "
             "large: the curve is computed in the span of its points, which motions of the points leave"
         )
+
+    vjp = jvp
 
 
 def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:

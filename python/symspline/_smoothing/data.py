@@ -142,7 +142,7 @@ class Given(NamedTuple):
                     chosen.flat[number] = False
         if chosen.all():
             return self, faults
-        return self._take_batch(space, np.flatnonzero(chosen)), faults
+        return self._take_batch(np.flatnonzero(chosen)), faults
 
     def _plain(self, space: Space) -> tuple[Space, Doubles, list[Points], list[list[End] | None]]:
         """Return the data in a form in which only points are checked.
@@ -154,7 +154,7 @@ class Given(NamedTuple):
         ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
         return space, plain, self.data, ends
 
-    def _take_batch(self, space: Space, chosen: NDArray[np.intp]) -> Given:
+    def _take_batch(self, chosen: NDArray[np.intp]) -> Given:
         """Return some of the curves, along one batch axis."""
         lead = len(self.batch)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
-from .._curves.curve import NORMS, REAL, SampleTimes
+from .._curves.curve import NORMS, REAL
 from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_unmasked
 from .._faults import Fault
 from .._spaces import Array, Doubles, Euclidean, Space
@@ -124,14 +124,13 @@ class OnManifold(CoreCurve):
     def lift(self, *_: Any, **__: Any) -> Never:
         self._refuse("no horizontal lift is known")
 
-    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Never:
+    def transport(self, *_: Any, **__: Any) -> Never:
         self._refuse("parallel transport along curves is not made")
 
-    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
+    def jvp(self, *_: Any, **__: Any) -> Never:
         self._refuse("derivatives with respect to the data are not made")
 
-    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Never:
-        self._refuse("derivatives with respect to the data are not made")
+    vjp = jvp
 
     def _refuse(self, what: str) -> Never:
         raise ValidationError(f"{what} on a manifold that is made of functions, {self.space!r}")

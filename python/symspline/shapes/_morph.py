@@ -39,8 +39,8 @@ class Bases:
 
     def __call__(self, x: Array) -> Array:
         """Return X at times x, shape x.shape + (rows, n); at the end of a closed spline, the lifted value."""
-        first, last = self.shape.t[0], self.shape.t[-1]
         shape = self.shape
+        first, last = shape.t[0], shape.t[-1]
         own = shape._time_axis.at(x, (), False, shape._times)[0]
         refuse(
             ~((own >= shape._times[0]) & (own <= shape._times[-1])),
