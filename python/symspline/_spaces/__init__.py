@@ -1,3 +1,5 @@
+# ruff: noqa: F401
+# mypy: implicit-reexport
 """The spaces: points, tangent vectors and their geometry."""
 
 from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Doubles, Space, point_tol
@@ -15,46 +17,3 @@ from .subspaces import (
     RealProjective,
 )
 from .vectors import Euclidean, Hyperbolic, Sphere
-
-__all__ = [
-    "POINT_TOL",
-    "POINT_TOL_FLOAT32",
-    "Affine",
-    "AntiDeSitter",
-    "Array",
-    "ComplexGeneralLinear",
-    "ComplexGrassmannian",
-    "ComplexHyperbolic",
-    "ComplexProjective",
-    "DeSitter",
-    "Doubles",
-    "Euclidean",
-    "GeneralLinear",
-    "Grassmannian",
-    "HermitianPositiveDefinite",
-    "Hyperbolic",
-    "IndefiniteGrassmannian",
-    "Lorentz",
-    "Orthogonal",
-    "Product",
-    "QuaternionicProjective",
-    "RealProjective",
-    "Siegel",
-    "Similarity",
-    "Space",
-    "SpecialEuclidean",
-    "SpecialLinear",
-    "SpecialOrthogonal",
-    "SpecialPositiveDefinite",
-    "SpecialUnitary",
-    "Sphere",
-    "SymmetricPositiveDefinite",
-    "Symplectic",
-    "Unitary",
-    "factors_of",
-    "parts_of",
-    "point_tol",
-    "product_norm",
-    "space",
-    "space_named",
-]
