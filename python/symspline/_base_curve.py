@@ -17,14 +17,12 @@ from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
 from ._curve import Curve
-from ._curves.band import UncertaintyBand
-from ._curves.curve import CurveArrays
-from ._curves.solve import Progress
+from ._curves.curve import CurveArrays, UncertaintyBand
 from ._input import times_of
 from ._options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
 from ._spaces import Array, Doubles, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
-from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Time, TimesLike
+from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Progress, Time, TimesLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

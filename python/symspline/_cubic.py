@@ -17,14 +17,13 @@ from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
 from ._curves.integrals import alternative_energy
 from ._curves.product import longest_step
-from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._options import extrapolation_mode, fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
-from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, TimesLike
+from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
 
 class CubicSpline(SegmentedCurve[P]):

@@ -15,7 +15,6 @@ from ._cubic import CubicSpline
 from ._curves import fit as fitting
 from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, take_batch
-from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._input import in_library, library_of
 from ._options import (
@@ -42,6 +41,7 @@ from ._typing import (
     Out,
     P,
     PointsLike,
+    Progress,
     TimesLike,
 )
 

@@ -10,8 +10,8 @@ from ._arrays import checked_atol, checked_flag, short_repr, whole_number
 from ._core import ValidationError
 from ._curves.ends import is_closed
 from ._curves.fit import Points
-from ._curves.solve import Options, Progress
-from ._typing import Extrapolate
+from ._curves.solve import Options
+from ._typing import Extrapolate, Progress
 
 _QUANTITIES = ("point", "velocity", "acceleration")
 _RAISE = "raise"

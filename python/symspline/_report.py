@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Number = float | NDArray[np.float64]
+from ._typing import Number
+
 # A gap between points is long if it exceeds the median by this factor.
 _LONG = 10
 

@@ -11,10 +11,11 @@ from .. import _core
 from .._core import ValidationError
 from .._faults import Fault
 from .._spaces import Affine, Array, Doubles, Similarity, Space, SpecialEuclidean
+from .._typing import Progress
 from . import derivatives
 from .curve import REAL, CurveArrays, Gradient, SampleTimes
 from .lift import check_reach, check_start, fiber_factors, is_quotient
-from .solve import Options, Progress, Task, solve_single, validate
+from .solve import Options, Task, solve_single, validate
 
 # Matrices of these spaces have a constant last row, which the core also writes for curves without a solution.
 _CONSTANT_ROW = (SpecialEuclidean, Similarity, Affine)

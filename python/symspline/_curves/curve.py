@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple
+from typing import Any, Generic, NamedTuple, Self
 
-from .._spaces import Doubles, Space
-from .._typing import FloatArray, P
+from .._spaces import Array, Doubles, Space
+from .._typing import FloatArray, P, Progress
 from .integrals import EXACT
-from .solve import Progress
 
 NORMS = ("speed", "bend")
 # Quantities that are real numbers or vectors, not points or tangent vectors of the space.
@@ -66,6 +65,31 @@ class SampleTimes(NamedTuple):
     x: Doubles
     shape: tuple[int, ...]
     nu: int
+
+
+class UncertaintyBand(NamedTuple):
+    """Noisy data near one curve, and the credible band of the curve.
+
+    Attributes
+    ----------
+    x : ndarray
+        Times of the data as numbers of the core.
+    points : list of ndarray
+        The data in each factor.
+    radii : list of ndarray
+        Radii of the 95 % band around the curve at the requested times, in each factor.
+    speed : ndarray or None
+        Standard deviation of the velocity in one direction; None in a product.
+    """
+
+    x: Doubles
+    points: list[Array]
+    radii: list[Doubles]
+    speed: Doubles | None
+
+    def part(self, number: int) -> Self:
+        """Return the data and the band in one factor of a product."""
+        return self._replace(points=[self.points[number]], radii=[self.radii[number]], speed=None)
 
 
 class CurveArrays(ABC):

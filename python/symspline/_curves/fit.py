@@ -20,6 +20,7 @@ from .._core import ValidationError
 from .._faults import INVALID, Fault
 from .._report import Columns, Report, shaped
 from .._spaces import POINT_TOL, Array, Doubles, Product, Space, factors_of, parts_of, point_tol
+from .._typing import Progress
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
@@ -28,7 +29,7 @@ from .curve import CurveArrays
 from .ends import End, ends_in_factors, ends_of
 from .product import ProductCurve, share
 from .reduced import ReducedCurve
-from .solve import Mask, Options, Progress, Solved, Task, solve, without
+from .solve import Mask, Options, Solved, Task, solve, without
 
 _T = TypeVar("_T")
 _Times = TypeVar("_Times")

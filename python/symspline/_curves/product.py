@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from .._spaces import Doubles, Product, parts_of, product_norm
+from .._typing import Progress
 from .core_curve import CoreCurve
 from .curve import NORMS, CurveArrays, Gradient, SampleTimes
 from .derivatives import pair_of
 from .ends import ends_in_factors
-from .solve import Progress
 
 Tuple = tuple[Any, ...]
 

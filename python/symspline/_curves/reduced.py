@@ -16,10 +16,11 @@ import numpy as np
 from .._core import ValidationError
 from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
+from .._typing import Progress
 from .core_curve import CoreCurve
 from .curve import NORMS, CurveArrays
 from .ends import map_ends
-from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
+from .solve import Options, Solved, Task, one_by_one, solve_single, solve_unmasked
 
 
 class Span(NamedTuple):

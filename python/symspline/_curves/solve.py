@@ -15,9 +15,9 @@ from .. import _core
 from .._faults import Fault, from_core
 from .._report import Columns
 from .._spaces import Array, Space
+from .._typing import Progress
 from .ends import End, map_ends
 
-Progress = Callable[[int, int], object]
 Mask = NDArray[np.bool_]
 
 

@@ -14,8 +14,8 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .._curves.band import UncertaintyBand
 from .._curves.curve import CurveArrays as Data
+from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
 from .._spaces import Space
 from .style import DATA, DATES, INK, Array, Indices, colors, evenly

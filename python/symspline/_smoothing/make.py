@@ -12,7 +12,7 @@ from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._curves.ends import End, freeze_bc_type, is_closed, map_ends
 from .._curves.fit import Points, Problem, fit, mask_of
-from .._curves.solve import Options, Progress
+from .._curves.solve import Options
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_points, warn_of_signs
@@ -29,6 +29,7 @@ from .._typing import (
     P,
     PointsLike,
     PProduct,
+    Progress,
     SmoothingBCType,
     SmoothingMethod,
     TimesLike,

@@ -11,9 +11,9 @@ from .._arrays import refuse, short_repr
 from .._core import ValidationError
 from .._curves.ends import End
 from .._curves.reduced import reduced
-from .._curves.solve import Progress
 from .._faults import UNCONVERGED, Fault
 from .._spaces import Array, Doubles, Space
+from .._typing import Progress
 from .data import Knots, SmoothingData
 from .precision import Precision
 from .report import METHODS, SmoothingReport

@@ -12,8 +12,7 @@ from .._archive import Entries, read_fitted, read_times
 from .._arrays import checked_number
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.band import UncertaintyBand
-from .._curves.curve import CurveArrays
+from .._curves.curve import CurveArrays, UncertaintyBand
 from .._curves.ends import fixed_velocities, is_closed
 from .._options import order_of
 from .._report import Report

@@ -8,10 +8,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .._curves.solve import Options, Progress, Solved, Task
+from .._curves.solve import Options, Solved, Task
 from .._faults import CUT_LOCUS, Fault, unconverged
 from .._report import SOLVERS, Columns
 from .._spaces import Array, Doubles
+from .._typing import Progress
 from ._certificate import velocity_errors
 from ._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
 from ._frames import frames_along

@@ -13,9 +13,10 @@ from .. import _core
 from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
 from .._curves.curve import NORMS, REAL
-from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_unmasked
+from .._curves.solve import Options, Solved, Task, one_by_one, solve_unmasked
 from .._faults import Fault
 from .._spaces import Array, Doubles, Euclidean, Space
+from .._typing import Progress
 from ._checks import validate_on_manifold
 from ._condition import ControlPolygon, control_polygons
 from ._differences import STEPS, eighth_difference, first_derivative, second_derivative
