@@ -61,6 +61,12 @@ class SmoothingData(NamedTuple):
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
         return reduce(np.logical_or, [own.weights > 0 for own in self.precisions])
 
+    def map(self, function: Callable[[Any], Any], batch: tuple[int, ...]) -> SmoothingData:
+        """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
+        t, times = (x if x.ndim == 1 else function(x) for x in (self.t, self.times))
+        points, precisions = [function(own) for own in self.points], [own.map(function) for own in self.precisions]
+        return self._replace(t=t, times=times, points=points, precisions=precisions, batch=batch)
+
 
 class Knots(NamedTuple):
     """Knots as the user sees them, and as the core counts them; shape (K,) or (..., K)."""
@@ -100,14 +106,16 @@ def read_noisy(
                 f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
-    return Given(time_axis, shown_times, times, data, precisions, ends, batch, None)
+    return Given(SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends, None)
 
 
 class Given(NamedTuple):
-    """Noisy data before their points are checked. The fields are those of `SmoothingData`, and further ones.
+    """Noisy data before their points are checked.
 
     Attributes
     ----------
+    noisy : SmoothingData
+        The data without points.
     data : list of Points
         Points in every factor.
     ends : list
@@ -116,13 +124,9 @@ class Given(NamedTuple):
         Indices of these curves in the batch of the user; None for all curves.
     """
 
-    time_axis: TimeAxis
-    t: Array
-    times: Doubles
+    noisy: SmoothingData
     data: list[Points]
-    precisions: list[Precision]
     ends: list[list[End] | None]
-    batch: tuple[int, ...]
     chosen: NDArray[np.intp] | None
 
     def valid_only(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
@@ -130,14 +134,15 @@ class Given(NamedTuple):
 
         Unless `strict`, curves with invalid or too few points are masked.
         """
-        chosen = np.ones(self.batch, bool) if mask is None else mask.copy()
+        batch, times = self.noisy.batch, self.noisy.times
+        chosen = np.ones(batch, bool) if mask is None else mask.copy()
         faults: list[Fault] = []
-        if self.batch and not strict:
+        if batch and not strict:
             _, faults = validated(*self._plain(space), skip_invalid=True, mask=chosen)
             chosen.flat[[fault.curve for fault in faults]] = False
-            for precision in self.precisions:
-                for number in np.flatnonzero(chosen & ~_enough(self.times, precision.weights, self.batch)):
-                    too_few = _too_few(precision.weights, self.batch, int(number))
+            for precision in self.noisy.precisions:
+                for number in np.flatnonzero(chosen & ~_enough(times, precision.weights, batch)):
+                    too_few = _too_few(precision.weights, batch, int(number))
                     faults.append(Fault(int(number), INVALID, too_few))
                     chosen.flat[number] = False
         if chosen.all():
@@ -150,28 +155,19 @@ class Given(NamedTuple):
         Times may repeat, knots need not be times of the data, and the ends of a closed curve are noisy and differ.
         """
         plain = np.arange(self.data[0].nodes, dtype=np.float64)
-        natural = read_ends("natural", space, self.batch)
+        natural = read_ends("natural", space, self.noisy.batch)
         ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
         return space, plain, self.data, ends
 
     def _take_batch(self, chosen: NDArray[np.intp]) -> Given:
         """Return some of the curves, along one batch axis."""
-        lead = len(self.batch)
+        lead, batch = len(self.noisy.batch), (len(chosen),)
 
         def rows(array: Any) -> Any:
             return np.ascontiguousarray(array.reshape(-1, *array.shape[lead:])[chosen])
 
-        shared = self.times.ndim == 1
-        return Given(
-            self.time_axis,
-            self.t if self.t.ndim == 1 else rows(self.t),
-            self.times if shared else rows(self.times),
-            [part._replace(numbers=rows(part.numbers), batch=(len(chosen),)) for part in self.data],
-            [own.map(rows) for own in self.precisions],
-            [map_ends(own, rows) for own in self.ends],
-            (len(chosen),),
-            chosen,
-        )
+        data = [part._replace(numbers=rows(part.numbers), batch=batch) for part in self.data]
+        return Given(self.noisy.map(rows, batch), data, [map_ends(own, rows) for own in self.ends], chosen)
 
     def checked(self, space: Space) -> SmoothingData:
         """Return the data with points projected onto the space.
@@ -181,17 +177,14 @@ class Given(NamedTuple):
         ValidationError
             If a point is invalid, or a curve has data at fewer than two times.
         """
-        on_space, _ = validated(*self._plain(space))
-        for own in self.precisions:
-            enough = _enough(self.times, own.weights, self.batch)
+        points, _ = validated(*self._plain(space))
+        noisy = self.noisy._replace(points=points)
+        for own in noisy.precisions:
+            enough = _enough(noisy.times, own.weights, noisy.batch)
             if not np.all(enough):
                 number = int(np.flatnonzero(~enough)[0])
-                raise ValidationError(_too_few(own.weights, self.batch, number))
-        return self.masked(on_space)
-
-    def masked(self, points: list[Array]) -> SmoothingData:
-        """Return the data with these points, which are NaN for masked curves."""
-        return SmoothingData(self.time_axis, self.t, self.times, points, self.precisions, self.batch)
+                raise ValidationError(_too_few(own.weights, noisy.batch, number))
+        return noisy
 
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
@@ -241,7 +234,7 @@ def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
     return f"The data{of} have one time only. A curve needs points at two or more times."
 
 
-def knots_for(noisy: Given, knots: Any) -> Knots:
+def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
     """Return the knots of a curve from the argument `knots`: None, their number, or the knots themselves."""
     t, times = noisy.t, noisy.times
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
@@ -392,7 +385,7 @@ def _n_knots_for_df(df: Any) -> int:
     return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
 
 
-def in_gaps(knots: Knots, given: Given) -> Knots:
+def in_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
     """Add knots in long gaps.
 
     Between two points far apart, the curve of the space may turn faster than one segment can.
@@ -407,7 +400,7 @@ def in_gaps(knots: Knots, given: Given) -> Knots:
     first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
     whole = step.dtype.kind in "ium"
     shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
-    times, _ = given.time_axis.at(shown_times, (), False)
+    times, _ = noisy.time_axis.at(shown_times, (), False)
     inner = np.flatnonzero(j == 0)
     times[inner], times[-1] = knots.times[:-1], knots.times[-1]
     return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots

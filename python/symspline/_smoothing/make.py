@@ -236,18 +236,17 @@ def make_smoothing_spline(
     most = whole_number(max_iter, "max_iter", 1)
     options = SolverOptions(criterion, gamma, loss, method, tol, most, False)
     given = read_noisy(t, points, space, weights, frames, bc_type, atol)
-    lams = _in_parts(space, lam, "lam", given.batch)
-    sigmas = _in_parts(space, sigma, "sigma", given.batch)
-    if loss != "linear" and sigma is None and any(own.is_singular for own in given.precisions):
+    whole, batch = given.noisy, given.noisy.batch
+    lams, sigmas = _in_parts(space, lam, "lam", batch), _in_parts(space, sigma, "sigma", batch)
+    if loss != "linear" and sigma is None and any(own.is_singular for own in whole.precisions):
         raise ValidationError(
             f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
             "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
-    if given.times.shape[-1] == 2:
+    if whole.times.shape[-1] == 2:
         # Two points have no outliers and do not determine the noise level.
         options = options._replace(loss="linear")
-    mask = mask_of(where, given.batch)
-    some_given, faults = given.valid_only(space, mask, on_failure == "raise")
+    some_given, faults = given.valid_only(space, mask_of(where, batch), on_failure == "raise")
     noisy, chosen = some_given.checked(space), some_given.chosen
     if chosen is not None:
         lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
@@ -256,7 +255,7 @@ def make_smoothing_spline(
         for factor, of_factor in zip(factors_of(space), some_given.ends, strict=True)
         for own in split_ends(factor, of_factor)
     ]
-    every = knots_for(given, knots)
+    every = knots_for(whole, knots)
     free = knots is None or has_all_times(every, noisy)
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
@@ -271,7 +270,7 @@ def make_smoothing_spline(
         )
     if knots is None:
         found, at = with_enough_knots(every, noisy, lams, run)
-        finer = in_gaps(at, given)
+        finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):
             found, at = run(finer, raise_lam=True), finer
@@ -281,21 +280,22 @@ def make_smoothing_spline(
         transport_end_velocities(end, part, own, curve_points, noisy)
         for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
-    in_batch = partial(_in_batch, given.batch, chosen)
-    whole = noisy if chosen is None else given.masked([in_batch(own) for own in noisy.points])
+    in_batch = partial(_in_batch, batch, chosen)
+    # Points of masked curves are NaN.
+    whole = whole._replace(points=[in_batch(own) for own in noisy.points])
     parts, conditions = [], []
     for factor, of_points, of_ends in zip(
         factors_of(space), grouped(space, found), grouped(space, transported), strict=True
     ):
         rows = join(factor, [in_batch(own) for own, _, _ in of_points])
         doubles = np.ascontiguousarray(factor._as_doubles(rows))
-        parts.append(Points(doubles, 0.0, given.batch, at.times.shape[-1]))
+        parts.append(Points(doubles, 0.0, batch, at.times.shape[-1]))
         conditions.append(_joined(factor, [map_ends(one, in_batch) for one in of_ends]))
     good = None if chosen is None else in_batch(np.ones(len(chosen), bool))
     fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
     noise = [part.map(in_batch) for _, part, _ in found]
     kept = _conditions(bc_type, conditions, space)
-    spline = SmoothingSpline._of(given.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
+    spline = SmoothingSpline._of(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
     faults += [
         fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
         for fault in next((own for _, _, own in found if own), [])
@@ -306,11 +306,11 @@ def make_smoothing_spline(
         space,
         [part.report for part in noise],
         [in_batch(np.isnan(own)) for own in lams],
-        [np.sum(own.weights > 0, axis=-1) for own in given.precisions],
+        [np.sum(own.weights > 0, axis=-1) for own in whole.precisions],
     )
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     data = [
-        Points(one._as_doubles(own), 0.0, given.batch, given.times.shape[-1])
+        Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
         for one, own in zip(factors_of(space), whole.points, strict=True)
     ]
     warn_of_signs(space, [data])

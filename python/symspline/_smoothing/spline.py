@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
 import numpy as np
@@ -319,9 +320,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return f"{count} data{each}, {df} degrees of freedom, noise {sigma}"
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
-        noisy = self._noisy
-        times = noisy.times[index] if noisy.times.ndim > 1 else noisy.times
-        used = noisy.used[index] if noisy.used.ndim > 1 else noisy.used
+        noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
         radii = [
             _radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
@@ -329,7 +328,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         ]
         several = is_several(self.space)
         speed = None if several else self._spread(self._smoothed[0], index, x, 1)
-        return UncertaintyBand(times[used], [points[index][used] for points in noisy.points], radii, speed)
+        return UncertaintyBand(noisy.times[noisy.used], [own[noisy.used] for own in noisy.points], radii, speed)
 
     @property
     def _unconverged(self) -> int:
@@ -338,16 +337,9 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(time_axis, t, curve, index)
-        noisy = self._noisy
-        own = noisy._replace(
-            time_axis=time_axis,
-            t=noisy.t[index] if noisy.t.ndim > 1 else noisy.t,
-            times=noisy.times[index] if noisy.times.ndim > 1 else noisy.times,
-            points=[points[index] for points in noisy.points],
-            precisions=[own.map(lambda column: column[index]) for own in noisy.precisions],
-            batch=curve.batch,
-        )
-        return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
+        pick = itemgetter(index)
+        noisy = self._noisy.map(pick, curve.batch)._replace(time_axis=time_axis)
+        return self._like(part, noisy, [found.map(pick) for found in self._smoothed])
 
     @property
     def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
