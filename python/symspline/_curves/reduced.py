@@ -20,7 +20,7 @@ from .._typing import Progress
 from .core_curve import CoreCurve
 from .curve import NORMS, CurveArrays
 from .ends import map_ends
-from .solve import Options, Solved, Task, one_by_one, solve_single, solve_unmasked
+from .solve import Options, Solved, Task, solve_in_python, solve_single
 
 
 class Span(NamedTuple):
@@ -120,9 +120,7 @@ class ReducedCurve(CoreCurve):
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        if task.offsets is None:
-            return solve_unmasked(task, options, progress, _solve)
-        return one_by_one(task, options, progress, _solve)
+        return solve_in_python(task, options, progress, _solve)
 
     @cached_property
     def small(self) -> tuple[Span, CoreCurve]:

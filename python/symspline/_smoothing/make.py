@@ -12,7 +12,7 @@ from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._curves.ends import End, freeze_bc_type, is_closed, map_ends
 from .._curves.fit import Points, Problem, fit, mask_of
-from .._curves.solve import Options
+from .._curves.solve import Options, in_batch
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_points, warn_of_signs
@@ -280,20 +280,20 @@ def make_smoothing_spline(
         transport_end_velocities(end, part, own, curve_points, noisy)
         for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
-    in_batch = partial(_in_batch, batch, chosen)
+    spread = partial(in_batch, batch, chosen)
     # Points of masked curves are NaN.
-    whole = whole._replace(points=[in_batch(own) for own in noisy.points])
+    whole = whole._replace(points=[spread(own) for own in noisy.points])
     parts, conditions = [], []
     for factor, of_points, of_ends in zip(
         factors_of(space), grouped(space, found), grouped(space, transported), strict=True
     ):
-        rows = join(factor, [in_batch(own) for own, _, _ in of_points])
+        rows = join(factor, [spread(own) for own, _, _ in of_points])
         doubles = np.ascontiguousarray(factor._as_doubles(rows))
         parts.append(Points(doubles, 0.0, batch, at.times.shape[-1]))
-        conditions.append(_joined(factor, [map_ends(one, in_batch) for one in of_ends]))
-    good = None if chosen is None else in_batch(np.ones(len(chosen), bool))
+        conditions.append(_joined(factor, [map_ends(one, spread) for one in of_ends]))
+    good = None if chosen is None else spread(np.ones(len(chosen), bool))
     fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
-    noise = [part.map(in_batch) for _, part, _ in found]
+    noise = [part.map(spread) for _, part, _ in found]
     kept = _conditions(bc_type, conditions, space)
     spline = SmoothingSpline._of(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
     faults += [
@@ -305,7 +305,7 @@ def make_smoothing_spline(
     warn_of_bounds(
         space,
         [part.report for part in noise],
-        [in_batch(np.isnan(own)) for own in lams],
+        [spread(np.isnan(own)) for own in lams],
         [np.sum(own.weights > 0, axis=-1) for own in whole.precisions],
     )
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
@@ -420,17 +420,6 @@ def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> li
             )
         return [one_per_curve(one, name, batch) for one in value]
     return [one_per_curve(value, name, batch)] * len(spaces)
-
-
-def _in_batch(batch: tuple[int, ...], chosen: Any, column: Any) -> Any:
-    """Return values of the fitted curves as an array over the whole batch; the others are NaN, False or zero."""
-    if chosen is None:
-        return column
-    rows = np.asarray(column)
-    nothing = np.nan if rows.dtype.kind in "fc" else 0
-    out = np.full((int(np.prod(batch)), *rows.shape[1:]), nothing, rows.dtype)
-    out[chosen] = rows
-    return out.reshape(*batch, *rows.shape[1:])
 
 
 def transport_end_velocities(

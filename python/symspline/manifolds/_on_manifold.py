@@ -13,7 +13,7 @@ from .. import _core
 from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
 from .._curves.curve import NORMS, REAL
-from .._curves.solve import Options, Solved, Task, one_by_one, solve_unmasked
+from .._curves.solve import Options, Solved, Task, solve_in_python
 from .._faults import Fault
 from .._spaces import Array, Doubles, Euclidean, Space
 from .._typing import Progress
@@ -49,9 +49,7 @@ class OnManifold(CoreCurve):
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        if task.offsets is not None:
-            return one_by_one(task, options, progress, fit_of_one_length)
-        return solve_unmasked(task, options, progress, fit_of_one_length)
+        return solve_in_python(task, options, progress, fit_of_one_length)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
