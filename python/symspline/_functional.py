@@ -233,21 +233,24 @@ def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Spac
 def given(t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
-    own = parts_of(velocities, space, "velocities")
-    read = [
-        velocities_of(*each)[0] for each in zip(factors_of(space), (part.numbers for part in data), own, strict=True)
-    ]
+    own = read_velocities(velocities, space, data)
     batch, nodes = data[0].batch, data[0].nodes
     time_axis, _, times = knots_of(t, batch, nodes)
     try:
         on_space, _ = fitting.validated(space, times, data, fitting.read_ends("natural", space, batch))
     except ValidationError as error:
         raise time_axis.explain(error) from None
-    arrays = list(zip(on_space, read, strict=True))
+    arrays = [(points, numbers) for points, (numbers, _) in zip(on_space, own, strict=True)]
     return time_axis, fitting.curve_of(space, times, arrays, fitted=False)
 
 
-def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
+def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Points]) -> list[tuple[Array, float]]:
+    """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
+    each = zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True)
+    return [_velocities(factor, part.numbers, own) for factor, part, own in each]
+
+
+def _velocities(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
     """Return velocities in one factor, after checks of their shape and numbers, and how far they may be from tangent.
 
     The array has flags of its own, so that making it read-only leaves the user's array as it is.
