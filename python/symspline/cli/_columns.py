@@ -17,6 +17,7 @@ from ._tables import IM, RE, Array, Rows, Table
 NUMBERED = "none"
 """The value of --time that numbers the points of every curve, unless a column has this name."""
 ORDERS = ("wxyz", "xyzw")
+_HALVES = {RE: IM, IM: RE}
 
 _IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
@@ -119,13 +120,6 @@ class Entry:
     name: str
     columns: tuple[str, ...]
 
-    @property
-    def other_half(self) -> str | None:
-        """The missing column, if the only column is the real or imaginary part by its name."""
-        halves = {RE: IM, IM: RE}
-        start, end = self.columns[0][:-3], self.columns[0][-3:]
-        return start + halves[end] if len(self.columns) == 1 and end in halves else None
-
 
 def _paired(columns: Sequence[str]) -> list[Entry]:
     """Columns as numbers: A_re and A_im are one number, at the position of the first of them."""
@@ -205,8 +199,10 @@ def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool)
                 f"of {space} has {described(space)}; name its columns one by one with --columns, or give a space of "
                 "complex points, such as cp:1 for sphere:1"
             )
-        half = entry.other_half
-        if half is not None and two:
+        # A column that is the real or imaginary part by its name.
+        start, end = entry.columns[0][:-3], entry.columns[0][-3:]
+        if two and len(entry.columns) == 1 and end in _HALVES:
+            half = start + _HALVES[end]
             where = "in --columns" if given else "with numbers" if half in table.names else "in the table"
             raise Problem(
                 f"{table.path}: column {entry.columns[0]!r} is half of a complex number, "

@@ -83,8 +83,8 @@ class Table:
         The columns of each array of an NPZ file.
     place : callable
         Describes the position of a row.
-    is_utc : callable
-        Whether a column of dates has the time zone UTC; None if it is unknown.
+    is_utc : dict
+        Whether a column of dates has the time zone UTC; empty if it is unknown.
     load : callable
         Reads columns of numbers and columns of text, if the file was not read as a whole.
     """
@@ -96,7 +96,7 @@ class Table:
     column: Callable[[str], Array | list[str]]
     groups: dict[str, list[str]] = field(default_factory=dict)
     place: Place = _row
-    is_utc: Callable[[str], bool | None] = lambda name: None
+    is_utc: dict[str, bool] = field(default_factory=dict)
     load: Callable[[Sequence[str], Sequence[str], Progress], None] = lambda *_: None
 
     def require(self, name: str) -> str:
@@ -170,7 +170,7 @@ class Table:
             return self._numbers(name), False
         if np.isnat(column).any():
             raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
-        return column, self.is_utc(name)
+        return column, self.is_utc.get(name)
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
         return _problem(self.path, self.place(row), name, found)
@@ -335,7 +335,7 @@ def _open_parquet(path: Path) -> Table:
     is_kind = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
     numeric = [name for name, own in types.items() if any(test(own) for test in is_kind)]
     dates = [name for name in types if pa.types.is_temporal(types[name]) or is_date_like(first_text(name))]
-    is_utc = lambda name: getattr(types[name], "tz", None) is not None  # noqa: E731
+    is_utc = {name: getattr(own, "tz", None) is not None for name, own in types.items()}
     return Table(path, table.column_names, numeric, dates, column, is_utc=is_utc)
 
 

@@ -66,9 +66,7 @@ def _is_usual(text: str) -> bool:
 
 def number(text: str) -> float:
     """Read a number in an option."""
-    if not is_number(text):
-        raise ValueError
-    return float(text)
+    return float(numbers([text])[0])
 
 
 def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
