@@ -204,14 +204,7 @@ class SegmentedCurve(Curve[P]):
         if progress is not None:
             check_progress(progress)
         quantity, where = quantity_of(nu), self._where(extrapolate)
-        values: P = call_at_times(
-            self._curve,
-            self._time_axis,
-            x,
-            per_curve,
-            where,
-            lambda curve, x, per_curve, where: curve.lift(x, quantity, where, per_curve, start, progress),
-        )
+        values: P = lifted(self._curve, self._time_axis, x, quantity, where, per_curve, start, progress)
         return values
 
     def transport(self, x0: TimesLike, x1: TimesLike, v: ArrayLike) -> P:
@@ -265,7 +258,7 @@ class SegmentedCurve(Curve[P]):
         times, own = self._time_axis.at(pair, self._batch, False, self._times)
         where = "periodic" if self._extrapolation_mode == "periodic" else "raise"
         try:
-            at = evaluated(self._curve, self._time_axis, pair, "point", where, False, None)
+            at = evaluated(self._curve, self._time_axis, pair, "point", where, False)
         except ValidationError as error:
             what = str(error).partition("; pass extrapolate")[0]
             raise ValidationError(
@@ -510,7 +503,7 @@ def evaluated(
     quantity: str,
     outside: str,
     per_curve: bool,
-    progress: Progress | None,
+    progress: Progress | None = None,
     out: Any = None,
 ) -> Any:
     """Evaluate a quantity at times as a user passes them."""
@@ -519,6 +512,24 @@ def evaluated(
         if out is None:
             return curve.evaluate(x, quantity, outside, per_curve, progress)
         return curve.write(out, x, quantity, outside, per_curve, progress)
+
+    return call_at_times(curve, time_axis, x, per_curve, outside, call)
+
+
+def lifted(
+    curve: CurveArrays,
+    time_axis: TimeAxis,
+    x: TimesLike,
+    quantity: str,
+    outside: str,
+    per_curve: bool,
+    start: Any = None,
+    progress: Progress | None = None,
+) -> Any:
+    """Evaluate a quantity of the horizontal lift that starts at `start`, at times as a user passes them."""
+
+    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
+        return curve.lift(x, quantity, outside, per_curve, start, progress)
 
     return call_at_times(curve, time_axis, x, per_curve, outside, call)
 

@@ -345,13 +345,9 @@ def _checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
         If two neighbouring control points are not joined by a unique shortest geodesic.
     """
     *batch, count = space._lead(doubles)
+    data, ends = Points(doubles, tol, tuple(batch), count), ends_of("natural", space, tuple(batch))
     try:
-        (points,), _ = validated(
-            space,
-            np.arange(count, dtype=np.float64),
-            [Points(doubles, tol, tuple(batch), count)],
-            [ends_of("natural", space, tuple(batch))],
-        )
+        (points,), _ = validated(space, np.arange(count, dtype=np.float64), [data], [ends])
     except ValidationError as error:
         raise ValidationError(str(error).replace("points[", "control_points[")) from None
     p, q = space._neighbours(points)

@@ -371,14 +371,9 @@ class CubicSpline(SegmentedCurve[P]):
     # ---- batches ----
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
-        return CubicSpline._of(
-            time_axis,
-            t,
-            curve,
-            take_batch(self._bc_type, index, len(self._batch), self.space),
-            self._extrapolate,
-            [report.map(lambda column: column[index]) for report in self._reports],
-        )
+        ends = take_batch(self._bc_type, index, len(self._batch), self.space)
+        reports = [report.map(lambda column: column[index]) for report in self._reports]
+        return CubicSpline._of(time_axis, t, curve, ends, self._extrapolate, reports)
 
     # ---- files, pickles and text ----
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._report import Columns
 
+_SUIT = "choose times that suit the distances"
 CUT_LOCUS, UNCONVERGED, INVALID, ALMOST_CUT = "cut-locus", "unconverged", "invalid", "almost-cut"
 
 
@@ -76,16 +77,12 @@ def of_index(index: Sequence[Any]) -> str:
 def unconverged(number: int, columns: Columns, tol: float, more_advice: str = "") -> Fault:
     """Return the fault of a curve whose residual exceeds the tolerance."""
     residual, iterations, longest = (columns.row(x)[number] for x in ("residual", "iterations", "max_step"))
-    return Fault(
-        number,
-        UNCONVERGED,
-        f"no convergence{{of}}: residual {residual:.3e} after {iterations} iterations (tol {tol:.1e}, longest "
-        f"step {_length(longest)})",
-        f"put more points where steps are long, choose times that suit the distances, or raise max_iter{more_advice}",
-        value=float(residual),
-        limit=tol,
-        about_times=True,
+    reached = f"residual {residual:.3e} after {iterations} iterations"
+    what = f"no convergence{{of}}: {reached} (tol {tol:.1e}, longest step {_length(longest)})"
+    remedy = (
+        f"put more points where steps are long, choose times that suit the distances, or raise max_iter{more_advice}"
     )
+    return Fault(number, UNCONVERGED, what, remedy, None, float(residual), tol, about_times=True)
 
 
 def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -> Fault:
@@ -103,7 +100,7 @@ def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -
     number, kind, node, value, limit, why = raw
     if kind == "invalid":
         return Fault(number, INVALID, str(why), "", node, value, limit)
-    times, own, about_times = "choose times that suit the distances", CUT_LOCUS, False
+    own, about_times = CUT_LOCUS, False
     handle, pair = f"the control handle at points[{node}]{{of}}", f"points[{node}] and points[{(node or 0) + 1}]{{of}}"
     past = f"lie at or past each other's cut locus: angle {value}, limit {limit}"
     if kind == "almost-cut":
@@ -117,21 +114,21 @@ def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -
         remedy = "put a point between them" + (", or check their sign" if quaternions else "")
     elif kind == "inner-handles":
         what = f"the control points between {pair} {past}"
-        remedy = f"put a point between them, or {times}"
+        remedy = f"put a point between them, or {_SUIT}"
     elif kind == "outer-handle" and limit == float("inf"):
         own, about_times = UNCONVERGED, True
         what = f"{handle} has length {value:.1f}, too long for floating-point numbers"
-        remedy = f"{times}: the segments next to it differ too much in length"
+        remedy = f"{_SUIT}: the segments next to it differ too much in length"
     elif kind == "outer-handle":
         about_times = True
         what = f"{handle} passes the cut locus: angle {value}, limit {limit}"
-        remedy = f"put more points there, or {times}"
+        remedy = f"put more points there, or {_SUIT}"
     elif kind in ("homotopy", "overflow"):
         own, about_times = UNCONVERGED, kind == "overflow"
         longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]
         why = "numbers exceeded the floating-point range" if about_times else "the homotopy did not reach these points"
         what = f"no convergence{{of}}: after {iterations} iterations {why} (longest step {_length(longest)})"
-        remedy = f"{'' if about_times else 'try another method, '}put more points where steps are long, or {times}"
+        remedy = f"{'' if about_times else 'try another method, '}put more points where steps are long, or {_SUIT}"
     else:
         return unconverged(number, columns, tol)
     return Fault(number, own, what, remedy, node, value, limit, about_times)

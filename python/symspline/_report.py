@@ -318,36 +318,25 @@ def shaped(
 ) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
     gap = longest_gap(times, batch)
+    found: dict[str, Any]
     if batch == ():
         converged, iterations, solver, bits = columns.integers[:, 0].tolist()
         # NaN differs from itself.
         known = {name: x for name, x in zip(NUMBERS, columns.numbers[:, 0].tolist(), strict=True) if x == x}
         if "guaranteed_sweeps" in known:
             known["guaranteed_sweeps"] = int(known["guaranteed_sweeps"])
-        return Report(
-            method=SOLVERS[solver],
-            converged=bool(converged),
-            iterations=iterations,
-            max_gap=gap,
-            curvature=curvature,
-            skipped=_skipped(bits),
-            **_UNKNOWN | known,
-        )
+        found = {"method": SOLVERS[solver], "converged": bool(converged), "iterations": iterations}
+        return Report(max_gap=gap, curvature=curvature, skipped=_skipped(bits), **found | _UNKNOWN | known)
     integers = {name: columns.row(name).reshape(batch) for name in INTEGERS}
     numbers: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in NUMBERS}
     solvers = integers["solver"]
     for name in OPTIONAL:
         if np.isnan(numbers[name]).all():
             numbers[name] = None
-    return Report(
-        method=SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method,
-        converged=integers["converged"].astype(bool),
-        iterations=integers["iterations"],
-        max_gap=gap,
-        curvature=curvature,
-        skipped=_skipped(int(np.bitwise_or.reduce(integers["skipped"], axis=None))),
-        **numbers,
-    )
+    used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
+    found = {"method": used, "converged": integers["converged"].astype(bool), "iterations": integers["iterations"]}
+    skipped = _skipped(int(np.bitwise_or.reduce(integers["skipped"], axis=None)))
+    return Report(max_gap=gap, curvature=curvature, skipped=skipped, **found | numbers)
 
 
 def _count(value: Any) -> Any:

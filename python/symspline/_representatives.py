@@ -101,14 +101,12 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     curve = [number] * (len(curves) > 1) + batch
     of, more = of_index(curve), f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
-    warn(
+    message = (
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
-        f"round. {IN_PYTHON}",
-        UserWarning,
-        tuple(curve),
-        i,
+        f"round. {IN_PYTHON}"
     )
+    warn(message, UserWarning, tuple(curve), i)
 
 
 def _opposite(points: Array) -> NDArray[np.intp]:

@@ -304,7 +304,7 @@ class _Motion:
         return values[..., :3, 3] if self._position.space == _SE3 else values
 
     def _at(self, curve: CurveArrays, quantity: str) -> Array:
-        return np.asarray(evaluated(curve, self._time_axis, self._x, quantity, self._where, self._per_curve, None))
+        return np.asarray(evaluated(curve, self._time_axis, self._x, quantity, self._where, self._per_curve))
 
 
 def _position(spline: Spline) -> CurveArrays:

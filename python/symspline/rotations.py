@@ -246,7 +246,7 @@ def quaternion(
         flipped = (_dot(*ends) < 0).reshape(curve.batch + (1,) * (turns.ndim - len(curve.batch)))
         q = np.where((flipped & (turns % 2 == 1))[..., None], -q, q)
     else:
-        q = evaluated(curve, spline._time_axis, x, "point", where, per_curve, None)
+        q = evaluated(curve, spline._time_axis, x, "point", where, per_curve)
     return q if first else np.roll(q, -1, axis=-1)
 
 
@@ -316,7 +316,7 @@ def check_frame(frame: Any) -> None:
 
 def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
-    values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve, None)
+    values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve)
     return values
 
 

@@ -66,13 +66,8 @@ def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, 
         _end_motion(curve, bc_type, end, name, which)
         for which, (end, name) in enumerate(zip(pair_of(ends), ("start", "end"), strict=True))
     ]
-    moved = _core.push(
-        space._handle,
-        _curves(curve, at, bc_type),
-        np.ascontiguousarray(motion),
-        _per_curve(knots, curve.batch),
-        vectors,
-    )
+    motion, knots = np.ascontiguousarray(motion), _per_curve(knots, curve.batch)
+    moved = _core.push(space._handle, _curves(curve, at, bc_type), motion, knots, vectors)
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 

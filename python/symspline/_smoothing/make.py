@@ -302,12 +302,8 @@ def make_smoothing_spline(
     ]
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
-    warn_of_bounds(
-        space,
-        [part.report for part in noise],
-        [spread(np.isnan(own)) for own in lams],
-        [np.sum(own.weights > 0, axis=-1) for own in whole.precisions],
-    )
+    counts = [np.sum(own.weights > 0, axis=-1) for own in whole.precisions]
+    warn_of_bounds(space, [part.report for part in noise], [spread(np.isnan(own)) for own in lams], counts)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     data = [
         Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])

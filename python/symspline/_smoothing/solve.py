@@ -87,18 +87,9 @@ def smoothed(
     matrices = precision.information
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
+    t, y, at = (np.ascontiguousarray(x) for x in (noisy.times, small._as_doubles(inside), knots.times))
     found, band, columns = _core.smooth(
-        small._handle,
-        np.ascontiguousarray(noisy.times),
-        np.ascontiguousarray(small._as_doubles(inside)),
-        precision.weights,
-        matrices,
-        np.ascontiguousarray(knots.times),
-        lam,
-        sigma,
-        ends,
-        *options,
-        progress,
+        small._handle, t, y, precision.weights, matrices, at, lam, sigma, ends, *options, progress
     )
     state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, scale = (
         column.reshape(batch) if batch else column[0].item()

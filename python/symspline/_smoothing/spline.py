@@ -16,10 +16,9 @@ from .._cubic import CubicSpline
 from .._curves.curve import CurveArrays, UncertaintyBand
 from .._curves.ends import fixed_velocities, is_closed
 from .._options import order_of
-from .._report import Report
 from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._time import TimeAxis
-from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P, TimesLike
+from .._typing import AnyArray, FloatArray, Number, P, TimesLike
 from .data import SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
 from .report import SmoothingReport
@@ -86,19 +85,13 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     def __init__(self) -> None:
         raise TypeError("SmoothingSpline has no public constructor. Use symspline.make_smoothing_spline.")
 
-    def _fill(  # type: ignore[override]
-        self,
-        time_axis: TimeAxis,
-        t: Array,
-        curve: CurveArrays,
-        bc_type: BCType,
-        extrapolate: Extrapolate,
-        reports: list[Report],
-        noisy: SmoothingData,
-        smoothed: list[Smoothed],
-    ) -> None:
-        super()._fill(time_axis, t, curve, bc_type, extrapolate, reports)
-        self._noisy, self._smoothed = noisy, smoothed
+    _noisy: SmoothingData
+    _smoothed: list[Smoothed]
+
+    def _fill(self, *parts: Any) -> None:
+        """Set the state of a `CubicSpline`, the noisy data and the results of the smoothing."""
+        *own, self._noisy, self._smoothed = parts
+        super()._fill(*own)
 
     def _each(self, values: list[Any]) -> Any:
         """Return one value, or a tuple with one value per space in which data were smoothed."""
@@ -243,14 +236,8 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         if not part.between:
             # With λ = 0 the curve has no variance between the knots besides that of the spline.
             lam = 0.0
-        variance = _core.smoothing_variance(
-            np.ascontiguousarray(knots),
-            np.ascontiguousarray(part.band[index]),
-            lam,
-            np.ascontiguousarray(x),
-            nu,
-            fixed_velocities(self._bc_type),
-        )
+        knots, band, x = (np.ascontiguousarray(own) for own in (knots, part.band[index], x))
+        variance = _core.smoothing_variance(knots, band, lam, x, nu, fixed_velocities(self._bc_type))
         return np.asarray(sigma * np.sqrt(variance))
 
     @overload

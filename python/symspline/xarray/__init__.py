@@ -85,20 +85,8 @@ def fit(
     >>> ds.velocities.dims, ds.converged.values
     (('curve', 'time', 'q'), array([ True]))
     """
-    spec = spec_of(
-        da,
-        space,
-        dim,
-        point_dims,
-        where,
-        bc_type,
-        method=method,
-        tol=tol,
-        max_iter=max_iter,
-        extrapolate=extrapolate,
-        on_failure=on_failure,
-        atol=atol,
-    )
+    options = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate, "atol": atol}
+    spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
     axes: list[Hashable] = [dim, *point_dims]
     dtype = spec.space.dtype
     variables = apply(

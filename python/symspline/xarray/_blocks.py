@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from .. import _base_curve
 from .._adapters import joined
-from .._base_curve import call_at_times, evaluated
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._functional import given
@@ -115,7 +115,7 @@ def values_at(
     lead = points.ndim - 1 - len(space.point_shape)
     batch = points.shape[:lead]
     x, per_curve = _per_curve(x, batch, x_axes)
-    good = np.isfinite(velocities).all(axis=tuple(range(lead, points.ndim)))
+    good = space._where_finite(velocities).all(axis=-1)
     everyone = bool(good.all())
     if not everyone:
         points, velocities, x = points[good], velocities[good], x[good] if per_curve else x
@@ -123,17 +123,7 @@ def values_at(
     if not good.any():
         return np.full(batch + x.shape[x.ndim - x_axes :] + shape, np.nan, space.dtype if shape else float)
     time_axis, curve = given(t, points, velocities, space)
-    if lifted:
-        found = call_at_times(
-            curve,
-            time_axis,
-            x,
-            per_curve,
-            policy,
-            lambda curve, x, each, where: curve.lift(x, quantity, where, each, None),
-        )
-    else:
-        found = evaluated(curve, time_axis, x, quantity, policy, per_curve, None)
+    found = (_base_curve.lifted if lifted else _base_curve.evaluated)(curve, time_axis, x, quantity, policy, per_curve)
     if everyone:
         return np.asarray(found)
     values = np.full(batch + found.shape[1:], np.nan, found.dtype)
