@@ -138,7 +138,8 @@ class SegmentedCurve(Curve[P]):
         single = dtype is not None and is_single(dtype)
         if out is not None and dtype is not None:
             raise ValidationError("dtype and out are both given. Pass one of them; the result has the type of out.")
-        values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress, out)
+        quantity, where = quantity_of(nu), self._where(extrapolate)
+        values = evaluated(self._curve, self._time_axis, x, quantity, where, per_curve, progress, out)
         return in_single(values) if single else values
 
     def lift(
@@ -327,20 +328,9 @@ class SegmentedCurve(Curve[P]):
         array([1.5, 1.5])
         """
         single = dtype is not None and is_single(dtype)
-        values = self._at(x, "speed", extrapolate, per_curve)
+        values = evaluated(self._curve, self._time_axis, x, "speed", self._where(extrapolate), per_curve)
         speeds: FloatArray = (in_single(values) if single else values)[()]
         return speeds
-
-    def _at(
-        self,
-        x: TimesLike,
-        quantity: str,
-        extrapolate: Any,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
-    ) -> Any:
-        return evaluated(self._curve, self._time_axis, x, quantity, self._where(extrapolate), per_curve, progress, out)
 
     def _where(self, extrapolate: Any) -> str:
         """Return the core's name of the extrapolation policy."""

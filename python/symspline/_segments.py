@@ -27,7 +27,7 @@ _DUPLICATES = ("raise", "first", "mean")
 _STEPS = 50
 
 
-class SegmentOptions(TypedDict, total=False):
+class CutOptions(TypedDict, total=False):
     """The keywords of `fit_segments` that cut the recording."""
 
     max_gap: Required[float | timedelta | np.timedelta64]
@@ -35,44 +35,29 @@ class SegmentOptions(TypedDict, total=False):
     duplicates: Duplicates
 
 
-class FitSegmentOptions(SegmentOptions, FitOptions, total=False):
+class FitCuts(CutOptions, FitOptions, total=False):
     """The keywords of `fit_segments` without smoothing."""
 
 
-class SmoothSegmentOptions(SegmentOptions, SmoothingOptions, total=False):
+class SmoothCuts(CutOptions, SmoothingOptions, total=False):
     """The keywords of `fit_segments` with smoothing."""
 
 
 @overload
 def fit_segments(  # type: ignore[overload-overlap]
-    t: TimesLike,
-    points: PointsLike,
-    space: Product[PProduct],
-    *,
-    smooth: Literal[True],
-    **options: Unpack[SmoothSegmentOptions],
+    t: TimesLike, points: PointsLike, space: Product[PProduct], *, smooth: Literal[True], **options: Unpack[SmoothCuts]
 ) -> list[SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
-    t: TimesLike,
-    points: PointsLike,
-    space: SpecialEuclidean,
-    *,
-    smooth: Literal[True],
-    **options: Unpack[SmoothSegmentOptions],
+    t: TimesLike, points: PointsLike, space: SpecialEuclidean, *, smooth: Literal[True], **options: Unpack[SmoothCuts]
 ) -> list[SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
-    t: TimesLike,
-    points: PointsLike,
-    space: Space[P] | str,
-    *,
-    smooth: Literal[True],
-    **options: Unpack[SmoothSegmentOptions],
+    t: TimesLike, points: PointsLike, space: Space[P] | str, *, smooth: Literal[True], **options: Unpack[SmoothCuts]
 ) -> list[SmoothingSpline[P]]: ...
 
 
@@ -83,7 +68,7 @@ def fit_segments(
     space: Space[P] | str,
     *,
     smooth: Literal[False] = False,
-    **options: Unpack[FitSegmentOptions],
+    **options: Unpack[FitCuts],
 ) -> list[CubicSpline[P]]: ...
 
 

@@ -10,7 +10,7 @@ import torch
 from ._adapters import fitted, movable, split
 from ._curves.ends import ends_in_factors
 from ._spaces import Product, Space, parts_of, space_named
-from ._typing import CurveOptions, SolverOptions
+from ._typing import CurveOptions
 from .manifolds._manifold import refuse_functions
 
 

@@ -13,7 +13,7 @@ from .._adapters import split
 from .._curves.ends import ends_in_factors
 from .._options import order_of
 from .._spaces import Product, Space, parts_of, space_named
-from .._typing import CurveOptions, SolverOptions
+from .._typing import CurveOptions
 from ..manifolds._manifold import refuse_functions
 from ._primitives import Fixed, fit_p, jvp_p
 from ._registry import second_fundamental_form
@@ -34,14 +34,7 @@ def curve(
 
 
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space[Any] | str,
-    *,
-    nu: int = 0,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Space[Any] | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
 ) -> Any:
     """Evaluate a spline through points by the compiled core, with derivatives in JAX.
 
