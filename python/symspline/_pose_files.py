@@ -220,11 +220,8 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     rows = _numbers(file, 12, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
     r = rows[:, :, :3]
     off = off_one(r)
-    refuse(
-        ~((off <= _ROUNDED) & (np.linalg.det(r) > 0)),
-        f"{_name(file)}: pose ",
-        lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}",
-    )
+    bad = ~((off <= _ROUNDED) & (np.linalg.det(r) > 0))
+    refuse(bad, f"{_name(file)}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
     t = np.arange(len(rows), dtype=float)
     if times is not None:
         t = _numbers(times, 1, "times of KITTI are one number a line", "times")[:, 0].copy()
@@ -447,13 +444,9 @@ def _seconds(t: ArrayLike, count: int) -> Doubles:
 def check_seconds(times: Array, name: str) -> None:
     """Raise if numbers look like milliseconds since 1970, or smaller units, where seconds are expected."""
     if times.dtype.kind in "iuf":
-        refuse(
-            np.abs(times.astype(np.float64)) > _FAR,
-            name,
-            lambda i: (
-                f"is {times[i]}, which cannot be seconds; convert nanoseconds to dates, .astype('datetime64[ns]')"
-            ),
-        )
+        bad = np.abs(times.astype(np.float64)) > _FAR
+        advice = "convert nanoseconds to dates, .astype('datetime64[ns]')"
+        refuse(bad, name, lambda i: f"is {times[i]}, which cannot be seconds; {advice}")
 
 
 # ---- lines ----

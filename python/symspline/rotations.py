@@ -572,11 +572,8 @@ def from_rotation_6d(numbers: ArrayLike, *, order: RotationOrder | None = None) 
         first, second = a / sizes[0][..., None], b / sizes[1][..., None]
         second = second - _dot(first, second)[..., None] * first
         sine = length(second)
-        refuse(
-            ~(sine > _PARALLEL),
-            "numbers",
-            lambda i: f"are {a[i]} and {b[i]}, but the two vectors must be nonzero and not parallel",
-        )
+        advice = "the two vectors must be nonzero and not parallel"
+        refuse(~(sine > _PARALLEL), "numbers", lambda i: f"are {a[i]} and {b[i]}, but {advice}")
         second = second / sine[..., None]
     rows = np.stack([first, second, np.cross(first, second)], axis=-2)
     return _SO3.project(rows if order == "rows" else _swapped(rows))

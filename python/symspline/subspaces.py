@@ -85,14 +85,9 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
             f"x has shape {snapshots.shape}"
         )
     beyond = np.concatenate([sizes, np.zeros((*sizes.shape[:-1], 1))], axis=-1)
-    refuse(
-        ~(beyond[..., k - 1] - beyond[..., k] > _EQUAL * beyond[..., 0]),
-        "x",
-        lambda i: (
-            f"does not determine a subspace of {k} dimensions: its singular values {k} and {k + 1} are "
-            f"{beyond[i][k - 1]:.6g} and {beyond[i][k]:.6g}; take another rank"
-        ),
-    )
+    bad = ~(beyond[..., k - 1] - beyond[..., k] > _EQUAL * beyond[..., 0])
+    what = f"does not determine a subspace of {k} dimensions: its singular values {k} and {k + 1} are"
+    refuse(bad, "x", lambda i: f"{what} {beyond[i][k - 1]:.6g} and {beyond[i][k]:.6g}; take another rank")
     return np.ascontiguousarray(left[..., :k])
 
 

@@ -22,9 +22,7 @@ def curve(x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[Cur
 def curve(x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]) -> tuple[torch.Tensor, ...]: ...
 
 
-def curve(
-    x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural", **options: Unpack[SolverOptions]
-) -> Any:
+def curve(x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural", **options: Any) -> Any:
     """Evaluate a spline through points, with derivatives in PyTorch.
 
     The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the

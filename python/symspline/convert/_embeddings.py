@@ -50,11 +50,8 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
     given = 0.5 * (given + np.swapaxes(given, -1, -2))
     x, y = np.real(given), np.imag(given)
     least = np.linalg.eigvalsh(y)[..., 0]
-    refuse(
-        ~(least > 0),
-        "z",
-        lambda i: f"has an imaginary part that is not positive definite: its smallest eigenvalue is {least[i]:.6e}",
-    )
+    what = "has an imaginary part that is not positive definite: its smallest eigenvalue is"
+    refuse(~(least > 0), "z", lambda i: f"{what} {least[i]:.6e}")
     back = np.linalg.inv(y)
     back = 0.5 * (back + np.swapaxes(back, -1, -2))
     beside = x @ back

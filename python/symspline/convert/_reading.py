@@ -79,11 +79,8 @@ def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
         If the length of a vector is not 1.
     """
     lengths = length(np.abs(x))
-    refuse(
-        ~(np.abs(lengths - 1) <= tol),
-        name,
-        lambda i: f"is not {what}: its length is {lengths[i]}, not 1; divide it by its length",
-    )
+    advice = "divide it by its length"
+    refuse(~(np.abs(lengths - 1) <= tol), name, lambda i: f"is not {what}: its length is {lengths[i]}, not 1; {advice}")
     return x / lengths[..., None]
 
 

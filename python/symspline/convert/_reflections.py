@@ -57,23 +57,15 @@ def basis_to_reflection(basis: ArrayLike, *, negative: int) -> Array:
     length = np.linalg.norm(y, axis=-2, keepdims=True)
     y = y / np.where(length > 0, length, 1.0)
     singular = np.linalg.svd(y, compute_uv=False)[..., -1]
-    refuse(
-        ~(singular > tol),
-        "basis",
-        lambda i: f"does not have linearly independent columns: their least singular value is {singular[i]:.3e}",
-    )
+    what = "does not have linearly independent columns: their least singular value is"
+    refuse(~(singular > tol), "basis", lambda i: f"{what} {singular[i]:.3e}")
     q = np.linalg.qr(y).Q
     turned = np.swapaxes(q, -1, -2) * signs
     gram = turned @ q
     least = np.abs(np.linalg.eigvalsh(gram)).min(axis=-1, initial=1.0)
-    refuse(
-        ~(least > tol),
-        "basis",
-        lambda i: (
-            f"does not span a subspace with a reflection: the form is degenerate on it (least eigenvalue "
-            f"{least[i]:.3e}), since it contains a vector orthogonal to the whole subspace"
-        ),
-    )
+    what = "does not span a subspace with a reflection: the form is degenerate on it"
+    why = "since it contains a vector orthogonal to the whole subspace"
+    refuse(~(least > tol), "basis", lambda i: f"{what} (least eigenvalue {least[i]:.3e}), {why}")
     return np.asarray(2 * q @ np.linalg.solve(gram, turned) - np.eye(n))
 
 
@@ -117,13 +109,9 @@ def reflection_to_basis(reflection: ArrayLike, *, negative: int) -> Array:
     refuse(~(skew <= tol), "reflection", lambda i: f"does not preserve the form: |ηP - Pᵀη| is {skew[i]:.3e} of |P|²")
     counts = np.rint((n + np.trace(p, axis1=-2, axis2=-1)) / 2).astype(int)
     k = int(counts.flat[0]) if counts.size else 0
+    what, advice = "fixes a subspace of dimension", "convert one dimension at a time"
     refuse(
-        np.asarray(counts != k),
-        "reflection",
-        lambda i: (
-            f"fixes a subspace of dimension {counts[i]}, the first one of dimension {k}; convert one dimension at "
-            "a time"
-        ),
+        np.asarray(counts != k), "reflection", lambda i: f"{what} {counts[i]}, the first one of dimension {k}; {advice}"
     )
     if not 0 < k < n:
         raise ValidationError("reflection is 1, -1 or empty, but must leave a proper subspace fixed")

@@ -110,11 +110,8 @@ def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
         )
     first, last = spline._times[..., 0].max(), spline._times[..., -1].min()
     times, _ = onto_ends(times, np.array([first, last]), (), False)
-    refuse(
-        ~((times >= first) & (times <= last)),
-        "x",
-        lambda i: f"is {times[i]}, but must be between the first and last knots, {first} and {last}",
-    )
+    bad = ~((times >= first) & (times <= last))
+    refuse(bad, "x", lambda i: f"is {times[i]}, but must be between the first and last knots, {first} and {last}")
     return times
 
 

@@ -82,11 +82,8 @@ def _edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
             f"edges must be a one-dimensional array of at least two times, not of shape {times.shape}"
         )
     spacing = np.diff(spline._time_axis.at(edges, spline._batch, False, spline._times)[0])
-    refuse(
-        ~(spacing > 0),
-        "edges",
-        lambda i: f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but edges must be strictly increasing",
-    )
+    advice = "edges must be strictly increasing"
+    refuse(~(spacing > 0), "edges", lambda i: f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but {advice}")
     return times, spacing
 
 
@@ -96,23 +93,15 @@ def _basis(operators: Any, n: int) -> Array:
     if basis.ndim != 3 or basis.shape[1] != n:
         raise ValidationError(f"operators must be of shape (q, {n}, {n}), not {basis.shape}")
     skew = largest(basis - adjoint(basis))
-    refuse(
-        ~(skew <= tol * largest(basis)),
-        "operators",
-        lambda i: f"is not Hermitian: |A - A*| is {skew[i]:.3e}; pass Hermitian operators",
-    )
+    bad = ~(skew <= tol * largest(basis))
+    refuse(bad, "operators", lambda i: f"is not Hermitian: |A - A*| is {skew[i]:.3e}; pass Hermitian operators")
     columns = _as_columns(basis)
     # The diagonal of R is the norm of the component of every operator outside the span of its predecessors.
     new = np.zeros(len(basis))
     triangle = np.abs(np.diagonal(np.linalg.qr(columns).R))
     new[: len(triangle)] = triangle
-    refuse(
-        ~(new > 1e-10 * np.linalg.norm(columns, axis=0)),
-        "operators",
-        lambda i: (
-            "is zero or a linear combination of the previous operators; remove it, so that coefficients are unique"
-        ),
-    )
+    why = "is zero or a linear combination of the previous operators; remove it, so that coefficients are unique"
+    refuse(~(new > 1e-10 * np.linalg.norm(columns, axis=0)), "operators", lambda _: why)
     return basis
 
 

@@ -89,11 +89,8 @@ def to_landmarks(shape: ArrayLike, like: ArrayLike, *, base: int | None = None) 
             f"shape must be real, of shape (..., {rows}, {drawing.shape[-1]}) for these drawings, not {basis.shape}"
         )
     off = off_one(basis)
-    refuse(
-        ~(off <= tol),
-        "shape",
-        lambda i: f"does not have orthonormal columns: |YᵀY - 1| is {off[i]:.3e}; use from_landmarks",
-    )
+    advice = "use from_landmarks"
+    refuse(~(off <= tol), "shape", lambda i: f"does not have orthonormal columns: |YᵀY - 1| is {off[i]:.3e}; {advice}")
     return placed(basis @ (np.swapaxes(basis, -1, -2) @ relative(drawing, base)), place(drawing, base), base)
 
 

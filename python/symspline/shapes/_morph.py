@@ -42,11 +42,9 @@ class Bases:
         shape = self.shape
         first, last = shape.t[0], shape.t[-1]
         own = shape._time_axis.at(x, (), False, shape._times)[0]
-        refuse(
-            ~((own >= shape._times[0]) & (own <= shape._times[-1])),
-            "x",
-            lambda i: f"is {x[i]}, but must be between the times of the first and last drawings, {first} and {last}",
-        )
+        bad = ~((own >= shape._times[0]) & (own <= shape._times[-1]))
+        where = f"the times of the first and last drawings, {first} and {last}"
+        refuse(bad, "x", lambda i: f"is {x[i]}, but must be between {where}")
         return np.asarray(self.shape.lift(x, start=self.start))
 
     def turn(self) -> Array:
@@ -243,15 +241,12 @@ class _Between:
         if closed:
             _check_closed(moved, positions)
         matrices = np.swapaxes(bases(t), -1, -2) @ moved
-        refuse(
-            ~(np.linalg.det(matrices) > 0),
-            "landmarks",
-            lambda i: (
-                "is mirrored: along the spline of shapes, the first drawing becomes its mirror image; number its "
-                "landmarks in the order of the others, mirror it (change the sign of a coordinate), add drawings "
-                "in between, or pass frame='first'"
-            ),
+        why = (
+            "is mirrored: along the spline of shapes, the first drawing becomes its mirror image; number its landmarks "
+            "in the order of the others, mirror it (change the sign of a coordinate), add drawings in between, or pass "
+            "frame='first'"
         )
+        refuse(~(np.linalg.det(matrices) > 0), "landmarks", lambda _: why)
         self._bases, self._group = bases, SpecialOrthogonal(n)
         # The basis of a closed film comes back turned by h = exp(w), and A turned by its inverse; exp(τw) A is
         # periodic, τ from 0 to 1.
