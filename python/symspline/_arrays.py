@@ -130,7 +130,6 @@ def checked_number(value: Any, requirement: str, is_valid: Callable[[Any], bool]
 
 def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
     """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
-    found = np.argwhere(bad)
-    if len(found):
-        index = tuple(found[0].tolist())
+    if bad.any():
+        index = tuple(np.argwhere(bad)[0].tolist())
         raise ValidationError(f"{name}{list(index) or ''} {say(index)}")

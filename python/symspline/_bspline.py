@@ -142,8 +142,12 @@ class BSpline(Curve[P]):
         start, end = self.domain
         times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
         outside = ~((times >= start) & (times <= end))
-        where = f"outside the domain [{start}, {end}] of the curve"
-        refuse(outside, "x", lambda i: f"= {times[i]} is {where if np.isfinite(times[i]) else 'not finite'}")
+
+        def say(i: Any) -> str:
+            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(times[i]) else "not finite"
+            return f"= {times[i]} is {where}"
+
+        refuse(outside, "x", say)
         return times
 
     @property

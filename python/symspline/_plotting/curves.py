@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -227,9 +227,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
     curves = []
     for i, color in zip(drawn, colors(len(drawn)), strict=True):
         index = tuple(map(int, np.unravel_index(i, batch)))
-        data = spline._curve
-        for k in index:
-            data = data.take_batch(k)
+        data = reduce(lambda curves, k: curves.take_batch(k), index, spline._curve)
         x = _samples(data.times)
         noise = spline._noise_beside(index, x)
         alone = len(drawn) == 1
@@ -241,8 +239,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
 def _finite(data: Data) -> NDArray[np.bool_]:
     """Return whether each curve is finite, in a flat array."""
     start = np.broadcast_to(data.times, (*data.batch, data.times.shape[-1]))[..., :1]
-    finite: NDArray[np.bool_] = np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))
-    return finite.ravel()
+    return np.asarray(np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))).ravel()
 
 
 def _samples(knots: Array) -> Array:

@@ -39,9 +39,11 @@ def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Ar
 def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
     """Raise ValidationError for the first matrix whose deviation exceeds the limit."""
     limits = np.broadcast_to(allowed, defects.shape)
-    found = f"is not in the group of {space!r}: {what} is"
-    bad = ~(np.isfinite(defects) & (defects <= limits))
-    refuse(bad, "g", lambda i: f"{found} {defects[i]:.3e} (allowed: {limits[i]:.0e}). {remedy}")
+    refuse(
+        ~(np.isfinite(defects) & (defects <= limits)),
+        "g",
+        lambda i: f"is not in the group of {space!r}: {what} is {defects[i]:.3e} (allowed: {limits[i]:.0e}). {remedy}",
+    )
 
 
 def largest(x: Array) -> NDArray[np.float64]:

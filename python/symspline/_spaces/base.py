@@ -632,8 +632,8 @@ class Space(Generic[P]):
         """
         result: Any = self._apply("project", x=x)
         good = self._where_finite(result) & self._where_finite(cast(self._array(x, "x"), self.dtype))
-        why = f"cannot be projected: it is not finite, or no point of {self!r} is close to it"
-        refuse(~good, "x", lambda _: why)
+        why = "cannot be projected: it is not finite, or no point of"
+        refuse(~good, "x", lambda _: f"{why} {self!r} is close to it")
         try:
             self.check_point(result)
         except ValidationError as error:
