@@ -6,7 +6,7 @@ RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml .cargo/
 # Wheels of all these packages exist for the usual platforms; nothing but symspline is compiled.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate check-tools clean
+.PHONY: demo check test test-oracles test-torch test-aarch64 fuzz bench docs wheel sdist test-wheel crate crate-msrv crate-semver check-tools clean
 
 demo: .venv/built
 	$(BIN)/python examples/storms/demo.py --out demo-output
@@ -79,11 +79,31 @@ NUMPY ?= numpy
 test-wheel: .venv/maturin
 	$(BIN)/python packaging/test_wheel.py '$(NUMPY)'
 
-# What Rust users get: documentation without warnings, its examples, and packages without surprises.
+# What Rust users get: documentation without warnings, examples and interface, every feature by itself, and packages with
+# licence and README.
+CRATES := --workspace --exclude symspline-python --exclude symspline-benches
 crate:
-	RUSTDOCFLAGS='-D warnings' cargo doc --quiet --no-deps --workspace --exclude symspline-python
-	cargo test --quiet --doc -p symspline
-	cargo package --quiet --list --allow-dirty -p symspline
+	RUSTDOCFLAGS='-D warnings' cargo doc --quiet --no-deps $(CRATES) --all-features
+	cargo test --quiet -p symspline
+	cargo run --quiet -p symspline --example rotations_and_poses
+	cargo run --quiet -p symspline --example custom_space
+	for features in '' vectors rotations positive-definite subspaces rotations,nalgebra,glam,mint,serde vectors,smoothing; do \
+		RUSTFLAGS='-D warnings' cargo check --quiet -p symspline --no-default-features --features "$$features" \
+			--target-dir target/features || exit 1; done
+	cargo package --quiet --no-verify --allow-dirty $(CRATES)
+	for package in target/package/*.crate; do tar tzf $$package | grep -c -E '/(LICENSE|README.md)$$' | grep -q 2 \
+		|| { echo "$$package lacks its licence or README"; exit 1; }; done
+
+# The oldest compiler that Cargo.toml promises, which rustup must be able to install.
+crate-msrv:
+	rustup toolchain install --profile minimal $(MSRV)
+	cargo +$(MSRV) check --quiet -p symspline --all-features --target-dir target/msrv
+
+MSRV = $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+
+# Whether the interface is compatible with that of the published version; needs cargo-semver-checks.
+crate-semver:
+	cargo semver-checks --package symspline
 
 .venv/maturin: | check-tools
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv

@@ -242,7 +242,10 @@ impl fmt::Display for Error {
                  times and points together"
             ),
             Error::TimesTooFarApart { curve } => {
-                write!(f, "curve {curve}: the times span too much for floating-point numbers. Choose other units")
+                write!(
+                    f,
+                    "curve {curve}: the times span too much for floating-point numbers. Choose other units"
+                )
             }
             Error::OffSpace { curve, node, distance, condition } => {
                 write!(

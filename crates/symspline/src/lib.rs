@@ -144,3 +144,8 @@ pub mod prelude {
     #[doc(no_inline)]
     pub use crate::{Se3, So3, Twist};
 }
+
+/// The program in the README.
+#[cfg(all(doctest, feature = "nalgebra"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
