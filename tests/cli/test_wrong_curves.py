@@ -58,16 +58,6 @@ def test_long_gaps_are_reported(run):
     assert "; 1 long gap, up to 61 " in run("fit a.csv --space r:1 -o a.npz --smooth 0.1")
 
 
-def test_smoothing_that_finds_no_noise_says_so(run):
-    t = np.arange(30)
-    write("a.csv", "t,x\n" + "".join(f"{i},{(-1) ** i * 1.0}\n" for i in t))
-    out = run("fit a.csv --space r:1 -o a.npz --smooth 1e-14")
-    assert "no noise" not in out
-    out = run("fit a.csv --space r:1 -o a.npz --smooth")
-    if ss.load("a.npz").df > 29:
-        assert "(no noise was found: the curve passes through the points" in out
-
-
 # ---- units of standard deviations ----
 
 
@@ -91,14 +81,6 @@ def test_deviations_beside_quaternions_are_of_quaternions(run):
     moved = spline.space.exp(spline(1.0), spline.std(1.0) * spline.space.frame(spline(1.0))[0])
     here, there = ss.rotations.as_quaternions(np.stack([spline(1.0), moved]), scalar_first=True)
     np.testing.assert_allclose(np.linalg.norm(there - here), spline.std(1.0) / 2, rtol=1e-3)
-
-
-def test_deviations_beside_matrices_are_radians(run):
-    t, turns, _, _ = noisy_turns()
-    np.savez("m.npz", t=t, points=turns)
-    run("fit m.npz --space so:3 -o c.npz --smooth")
-    run("sample c.npz -n 9 -o s.csv")
-    np.testing.assert_allclose(read_table("s.csv")["std"], ss.load("c.npz").std(read_table("s.csv")["t"]), rtol=1e-12)
 
 
 def test_deviations_of_poses_are_of_place_and_rotation(run):
