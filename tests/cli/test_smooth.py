@@ -1,6 +1,5 @@
 """Curves near noisy points: ``fit --smooth``."""
 
-
 import numpy as np
 import pytest
 from curves import parts

@@ -12,10 +12,7 @@ import pytest
 import reconstruct
 import recordings
 import riemannian_cubics as cubics
-import variations
 from figure import loglog
-
-import symspline as ss
 
 SCRIPTS = ("order", "cubics", "reconstruct", "ends")
 
@@ -44,11 +41,6 @@ def test_errors_fall_with_the_orders_of_the_end_conditions():
     assert order.text(sizes, everywhere, middle).count("\n") == 4
 
 
-def test_not_a_knot_is_a_hundred_times_better_on_1281_knots():
-    everywhere, _ = order.errors(1281)
-    assert 100 * everywhere[order.NOT_A_KNOT] < everywhere[order.SCIPY]
-
-
 # ---- Riemannian cubics ----
 
 
@@ -70,20 +62,6 @@ def test_cubic_is_critical_and_the_spline_is_not(case):
 
 def test_cubic_satisfies_its_equation():
     assert cubics.residual() < 1e-6
-
-
-def test_cubic_passes_through_the_points(case):
-    t = motions.knots(6)
-    spline = ss.CubicSpline(t, case.motion(t), case.space)
-    np.testing.assert_allclose(case.cubic(spline)(t), spline.points, atol=1e-9)
-
-
-def test_energy_from_points_is_that_of_the_spline():
-    t = motions.knots(8)
-    for case in (cubics.SPHERE, cubics.ROTATIONS):
-        spline = ss.CubicSpline(t, case.motion(t), case.space)
-        found = variations.energy(case.space, t, spline)
-        assert found == pytest.approx(spline.bending_energy(), rel=1e-6)
 
 
 # ---- recordings ----
@@ -142,11 +120,6 @@ def test_recordings_of_others_can_be_read(tmp_path):
     file.write_text("0 0 0\n", encoding="utf-8")
     with pytest.raises(ValueError, match="8 numbers, not 3"):
         recordings.read(file)
-
-
-def test_angular_velocity_there_and_back():
-    r, omega = motions.tumble(np.array([0.2, 0.7])), np.array([[1.0, 2, 3], [-4, 5, 0]])
-    np.testing.assert_allclose(angles.body_rate(r, angles.from_body_rate(r, omega)), omega, atol=1e-12)
 
 
 # ---- the page ----

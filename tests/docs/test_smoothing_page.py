@@ -34,17 +34,6 @@ def test_flat_table():
     assert all(float(number) < 1e-10 for cell in rest for number in cell.split(","))
 
 
-def test_fifty_digits_are_those_of_a_dense_solution():
-    rng = np.random.default_rng(1)
-    t, y, lam = np.sort(rng.random(9)), rng.standard_normal(9), 1e-3
-    h = np.diff(t)
-    q, r = (np.zeros((9, 7)), np.diag((h[1:] + h[:-1]) / 3) + np.diag(h[1:-1] / 6, 1) + np.diag(h[1:-1] / 6, -1))
-    for j in range(7):
-        q[j : j + 3, j] = 1 / h[j], -1 / h[j] - 1 / h[j + 1], 1 / h[j + 1]
-    dense = np.linalg.solve(np.eye(9) + lam * q @ np.linalg.solve(r, q.T), y)
-    np.testing.assert_allclose(smoothing.reinsch(t, y, lam), dense, atol=1e-11)
-
-
 def test_iteration_table():
     rows = cells(smoothing.iteration_table(("S²",), (0.1,), 1))
     assert [row[0] for row in rows] == ["S²", "S², two turns"]
@@ -78,12 +67,6 @@ def test_charts_lead_back_to_their_points(name):
     for chart in (peers.tangent(given.space, given.noisy[0]), peers.ambient(given.space, given.noisy[0])):
         back = chart.points(chart.numbers)
         assert given.space.distance(back, given.noisy[0]).max() < 1e-7
-
-
-def test_lines_and_means_keep_lines_and_constants():
-    x = np.arange(30.0)
-    assert np.allclose(peers.local_lines(30) @ x, x)
-    assert np.allclose(peers.moving_averages(30).sum(axis=-1), 1)
 
 
 def test_scipy_on_a_sphere_removes_noise():

@@ -60,13 +60,6 @@ def test_the_search_finds_what_auto_finds():
     assert search.finds(rng, 20)
 
 
-def test_walks_have_equal_steps_and_stay_near_home():
-    space = ss.Hyperbolic(2)
-    p = solvers.walk(space, 1.5, 0, 60)
-    assert space.distance(p[:-1], p[1:]) == pytest.approx(np.full(59, 1.5))
-    assert space.distance(p[0], p).max() < solvers.HOME + 1.5
-
-
 def test_the_region_of_38_ends_where_it_must():
     kd, low, high = figures.roots(np.linspace(0.2, 0.3, 1001), np.linspace(0.01, 1.0, 20001))
     assert kd[-1] == pytest.approx(0.2610895, abs=1e-4)

@@ -125,65 +125,21 @@ except KeyboardInterrupt:
 """
 
 
-def interrupted(code, *arguments, after=0.0):
-    """What a script prints once it is interrupted some time after its start, and the seconds until it ends."""
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout.readline() == "started\n"
-            time.sleep(after)
-            start = time.perf_counter()
-            process.send_signal(signal.SIGINT)
-            out, _ = process.communicate(timeout=10)
-            assert process.returncode == 0
-            return out.replace("started\n", ""), time.perf_counter() - start
-        finally:
-            process.kill()
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
 @pytest.mark.parametrize("n", [1, 2])
 def test_ctrl_c_stops_a_long_fit(n):
-    out, seconds = interrupted(INTERRUPTED, n)
-    # It takes about 0.05 s; the whole fit takes minutes.
-    assert out == "interrupted\nwell\n" and seconds < 2
-
-
-WORKING = """
-import sys, numpy as np, symspline as ss
-
-space = ss.space("{name}")
-p = np.broadcast_to(space.random_point(np.random.default_rng(0)), (2, *space.point_shape))
-v = space.random_tangent(np.random.default_rng(1), p)
-spline = ss.CubicSpline(None, space.exp(p, 0.3 * v / space.norm(p, v)[:, None, None]), space)
-before = spline(0.5, nu=2)
-print("started", flush=True)
-try:
-    {work}
-    print("finished", flush=True)
-except KeyboardInterrupt:
-    print("interrupted", flush=True)
-assert (spline(0.5, nu=2) == before).all()
-print("well", flush=True)
-"""
-
-
-# All of it takes much longer than the test.
-@pytest.mark.parametrize(
-    "name, work",
-    [
-        ("spd:3", "spline(np.broadcast_to(0.5, 20_000_000), nu=2)"),
-        ("spd:3", "spline.speed(np.broadcast_to(0.5, 50_000_000))"),
-        ("so:8", "space.log(*np.broadcast_to(spline.points[:, None], (2, 1_000_000, 8, 8)))"),
-        ("so:80", "spline(np.broadcast_to(0.5, 4_000), nu=2)"),
-    ],
-    ids=["points", "speeds", "operations", "large-matrices"],
-)
-def test_ctrl_c_stops_long_work(name, work):
-    # After this time arrays are copied, and compiled code runs.
-    out, seconds = interrupted(WORKING.format(name=name, work=work), after=0.6)
-    # It takes about 0.05 s, with six other programs on two cores up to 2 s.
-    assert out == "interrupted\nwell\n" and seconds < 5
+    command = [sys.executable, "-c", INTERRUPTED, str(n)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "started\n"
+            start = time.perf_counter()
+            process.send_signal(signal.SIGINT)
+            out, _ = process.communicate(timeout=10)
+            # It takes about 0.05 s; the whole fit takes minutes.
+            assert process.returncode == 0 and time.perf_counter() - start < 2
+            assert out.replace("started\n", "") == "interrupted\nwell\n"
+        finally:
+            process.kill()
 
 
 # ---- progress of evaluations ----

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from cases import WORDS, loop_over
-from made import ELLIPSOID, flat, knots, torus, twin, walk
+from made import ELLIPSOID, flat, knots, twin, walk
 
 import symspline as ss
 
@@ -116,15 +116,6 @@ def test_a_wrong_derivative_of_the_logarithm_is_noticed(size):
     true = error(SPHERE, spline, exact)
     assert spline.report.residual < 1e-12 and true > 1e-2 * size
     assert true <= spline.report.velocity_error <= 100 * true
-
-
-def test_derivatives_by_differences_count():
-    """The torus has second derivatives of its equation, and logarithms that are integrated, by differences."""
-    space = torus()
-    p = walk(space, 0.4, 5, 1)
-    spline = ss.CubicSpline(None, p, space)
-    exact = ss.CubicSpline(None, p, torus(hess=None), tol=1e-14, on_failure="ignore")
-    assert error(space, spline, exact) <= spline.report.velocity_error <= 1e-9
 
 
 def test_velocity_error_has_the_unit_of_velocities():
