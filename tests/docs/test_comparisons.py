@@ -12,7 +12,6 @@ import pytest
 import reconstruct
 import recordings
 import riemannian_cubics as cubics
-from figure import loglog
 
 SCRIPTS = ("order", "cubics", "reconstruct", "ends")
 
@@ -60,20 +59,7 @@ def test_cubic_is_critical_and_the_spline_is_not(case):
     assert "3 random variations" in cubics.words(*found)
 
 
-def test_cubic_satisfies_its_equation():
-    assert cubics.residual() < 1e-6
-
-
 # ---- recordings ----
-
-
-def test_recordings_are_whole():
-    poses, turns = (recordings.read(file) for file in (reconstruct.POSES, reconstruct.ORIENTATIONS))
-    assert poses.positions.shape == (3000, 3) and poses.rates is None
-    assert turns.rates.shape == (953, 3) and turns.positions is None
-    for recording in (poses, turns):
-        assert recording.t[0] == 0 and np.diff(recording.t).min() > 0
-        np.testing.assert_allclose(np.linalg.det(recording.rotations), 1, atol=1e-12)
 
 
 def tumbling(n=201):
@@ -136,12 +122,6 @@ def test_tables_find_their_place(tmp_path):
     assert "before:" not in text and "Riemannian cubics?" in text
     with pytest.raises(ValueError, match="once each"):
         page.insert("nothing", "", copy)
-
-
-def test_figure_is_drawn(tmp_path):
-    file = tmp_path / "figure.png"
-    loglog(file, (3, 6, 12), {"one": (1.0, 0.1, 0.01), "other": (1.0, 0.5, 0.2)}, {"one": 4}, "error", "title")
-    assert file.stat().st_size > 1000
 
 
 @pytest.mark.parametrize("arguments", [("--every=40",), ("--every=40", str(reconstruct.POSES))])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import smoothing
 import smoothing_others as others
-import smoothing_peers as peers
 from pages import blocks, cells, run
 
 import symspline as ss
@@ -59,21 +58,6 @@ def test_coverage_and_outlier_tables():
 def test_time_table():
     (row,) = cells(smoothing.time_table((200,), 1))
     assert row[0] == "200" and row[-1] == "200" and all(row)
-
-
-@pytest.mark.parametrize("name", smoothing.SPACES.values())
-def test_charts_lead_back_to_their_points(name):
-    given = smoothing.data(name, 0.1, 1, 20)
-    for chart in (peers.tangent(given.space, given.noisy[0]), peers.ambient(given.space, given.noisy[0])):
-        back = chart.points(chart.numbers)
-        assert given.space.distance(back, given.noisy[0]).max() < 1e-7
-
-
-def test_scipy_on_a_sphere_removes_noise():
-    given = smoothing.data("sphere:2", 0.1, 1)
-    found = peers.scipy_spline(given.t, peers.ambient(ss.Sphere(2), given.noisy[0]))
-    errors = [smoothing.rms(given.space, points, given.truth[0]) for points in (found, given.noisy[0])]
-    assert errors[0] < 0.5 * errors[1]
 
 
 def test_other_programs_are_compared_on_the_same_data():

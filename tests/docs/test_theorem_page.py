@@ -124,6 +124,68 @@ def test_normal_coordinates_give_the_covariant_acceleration(setting):
     close(difference(lambda t: space.log(there.p, curve(0.4 + t)), 2), curve(0.4, 2), 1e-8)
 
 
+def test_the_proof_of_the_proposition(setting):
+    group, (q0, q1, p1, *_) = setting
+    space, p = group.space, group.p
+    xi = group.log(q0)
+    there, back = expm(xi), expm(-xi)
+    omega = group.log(group.move(back, q1))
+    v, w = group.vector(xi), group.vector(omega)
+    close(space.log(p, space.transvection(p, -v, q1)), w, 1e-12)
+    alpha = group.unstretch(xi, omega - xi)
+
+    def level(t):
+        a, b, c = (space.geodesic(x, y, t) for x, y in itertools.pairwise([p, q0, q1, p1]))
+        return a, b, c, space.geodesic(a, b, t), space.geodesic(b, c, t)
+
+    close(difference(lambda t: level(t)[1]), group.move(there, w))
+    close(difference(lambda t: level(t)[4]), 2 * group.move(there, w))
+
+    def eta(t):
+        return group.log(group.move(expm(-t * xi), level(t)[1]))
+
+    close(difference(eta), alpha)
+
+    def g(t):
+        return expm(t * xi) @ expm(t * eta(t))
+
+    def zeta(t):
+        return group.log(group.move(np.linalg.inv(g(t)), level(t)[4]))
+
+    close(difference(g), 2 * xi)
+    close(difference(zeta), 2 * alpha)
+    for t in (-0.1, 0.2):
+        close(group.move(g(t), p), level(t)[3], 1e-11)
+        gamma = casteljau(space, [p, q0, q1, p1], t)
+        close(group.move(g(t) @ expm(t * zeta(t)), p), gamma, 1e-11)
+
+    def x(t):
+        return group.log(casteljau(space, [p, q0, q1, p1], t))
+
+    close(difference(x), 3 * xi)
+    close(difference(x, 2), 6 * alpha, 1e-8)
+
+
+def test_condition_13_on_equal_knots(setting):
+    """Of control points with (12), those with (13) are the C² ones; a change of (13) is a jump of 6 S⁻¹ times it."""
+    group, (q, inner, _, far, _, outer) = setting
+    space, p = group.space, group.p
+    v = space.log(p, q)
+    plus, minus = q, space.exp(p, -v)
+    left = space.log(p, space.transvection(p, v, inner)) + v
+    # The control point behind is what (13) makes of the one before.
+    right = space.transvection(p, v, space.exp(p, left + v))
+    for push in (0.0, 0.2):
+        behind = space.transvection(p, v, space.exp(p, left + v + push * v + push * space.log(p, outer)))
+        if push == 0.0:
+            close(behind, right, 1e-12)
+        after = difference(lambda t, b=behind: space.log(p, casteljau(space, [p, plus, b, outer], t)), 2)
+        before = difference(lambda t: space.log(p, casteljau(space, [p, minus, inner, far], t)), 2)
+        change = group.element(push * v + push * space.log(p, outer))
+        jump = group.vector(6 * group.unstretch(group.element(v), change))
+        close(after - before, jump, 1e-7)
+
+
 def test_the_condition_on_any_knots(setting):
     """(e), and that the library's splines satisfy it."""
     group, points = setting
