@@ -2,11 +2,9 @@
 
 import gc
 import weakref
-from pathlib import Path
 
 import numpy as np
 import pytest
-import recordings
 from curves import points_on
 from scipy.spatial.transform import Rotation, RotationSpline
 
@@ -85,18 +83,6 @@ def test_rates_are_those_of_scipy_on_a_dense_motion():
     assert np.abs(rotations.angular_acceleration(spline, x) - scipy(x, 2)).max() < 2e-6
 
 
-def test_rates_are_those_of_a_gyroscope():
-    file = Path(__file__).parents[2] / "docs" / "comparisons" / "data" / "data_xsens.txt.gz"
-    sensor = recordings.read(file)
-    spline = ss.CubicSpline(sensor.t, SO3.project(sensor.rotations), "so:3")
-    x, measured = sensor.rate_times[1:], sensor.rates[1:]
-    off = {
-        frame: np.median(np.abs(rotations.angular_velocity(spline, x, frame) - measured)) for frame in ("body", "world")
-    }
-    # The sensor corrects its attitude by gravity and the magnetic field, too. Rates are about 0.7 rad/s.
-    assert off["body"] < 0.02 and off["world"] > 0.3
-
-
 @every_curve
 @pytest.mark.parametrize("batch", [(), (2,)], ids=str)
 def test_rates_are_derivatives_of_the_rotations(space, batch):
@@ -148,15 +134,6 @@ def test_knots_are_gone_through_once(monkeypatch, space):
     del spline
     gc.collect()
     assert kept() is None
-
-
-def test_quaternions_of_a_whole_turn_change_sign():
-    # Twelve steps of 60 degrees: two turns.
-    t = np.arange(13.0)
-    spline = ss.CubicSpline(t, Rotation.from_rotvec([[0, 0, i * np.pi / 3] for i in t]), "so:3")
-    q = rotations.quaternion(spline, t, scalar_first=True)
-    expected = np.stack([np.cos(t * np.pi / 6), 0 * t, 0 * t, np.sin(t * np.pi / 6)], axis=-1)
-    assert np.abs(q - expected).max() < 1e-14
 
 
 @pytest.mark.parametrize("rounds", [1, 2])
@@ -243,10 +220,8 @@ def test_forms_of_rotations():
     small = np.array([[0.0, 0, 0], [1e-9, 2e-12, 0], [3e-160, 0, 0], [0, np.pi, 0]])
     back = rotations.as_rotation_vectors(rotations.from_rotation_vectors(small))
     assert np.allclose(back, small, rtol=1e-15, atol=0)
-    assert (
-        np.abs(rotations.from_rotation_vectors([0, 0, 100.0]) - Rotation.from_rotvec([0, 0, 100.0]).as_matrix()).max()
-        < 1e-13
-    )
+    far = [0, 0, 100.0]
+    assert np.abs(rotations.from_rotation_vectors(far) - Rotation.from_rotvec(far).as_matrix()).max() < 1e-13
 
 
 @pytest.mark.parametrize(
@@ -266,11 +241,8 @@ def test_six_numbers(order, entries):
     raw = np.random.default_rng(0).standard_normal((50, 6))
     found = rotations.from_rotation_6d(raw, order=order)
     SO3.check_point(found)
-    a, b = (
-        np.moveaxis(raw.reshape(50, 3, 2), -1, 0)
-        if order == "interleaved"
-        else np.moveaxis(raw.reshape(50, 2, 3), 1, 0)
-    )
+    pairs = raw.reshape(50, 3, 2).swapaxes(1, 2) if order == "interleaved" else raw.reshape(50, 2, 3)
+    a, b = pairs.swapaxes(0, 1)
     first, second, third = np.moveaxis(found, -2 if order == "rows" else -1, 0)
     assert np.allclose(first, a / np.linalg.norm(a, axis=-1, keepdims=True), rtol=0, atol=1e-15)
     assert ((second * b).sum(-1) > 0).all() and np.abs((third * b).sum(-1)).max() < 1e-14

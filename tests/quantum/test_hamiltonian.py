@@ -62,21 +62,6 @@ def test_norms_are_the_speed(name):
 
 
 @pytest.mark.parametrize("name", STATES)
-def test_nothing_is_spent_on_what_does_not_move_the_path(name):
-    """H is orthogonal to every Hermitian W that leaves the subspace alone: W = PWP + (1 − P)W(1 − P)."""
-    spline = curve(name)
-    x = columns(spline, spline(X))
-    p = x @ adjoint(x)
-    rng = np.random.default_rng(3)
-    n = p.shape[-1]
-    w = rng.standard_normal((20, 1, n, n)) + 1j * rng.standard_normal((20, 1, n, n))
-    w = w + adjoint(w)
-    w = p @ w @ p + (np.eye(n) - p) @ w @ (np.eye(n) - p)
-    inner = np.sum((hamiltonian(spline, X) * w.conj()).real, axis=(-2, -1))
-    assert np.abs(inner).max() < 1e-13
-
-
-@pytest.mark.parametrize("name", STATES)
 def test_it_is_the_commutator_of_the_projector(name):
     """H = i[P', P], with the derivative of P as a difference of complex order."""
     spline = curve(name, bc_type="not-a-knot")

@@ -87,13 +87,6 @@ def test_states_are_not_taken_for_density_matrices():
         ss.CubicSpline(None, np.eye(2) / 2 + [[0, 0], [1, 0]], "cp:1")
 
 
-def test_distances_are_halved():
-    rng = np.random.default_rng(2)
-    v, w = ss.Sphere(2).random_point(rng, (2, 100))
-    halved = CP1.distance(from_bloch_vector(v), from_bloch_vector(w))
-    assert np.abs(2 * halved - ss.Sphere(2).distance(v, w)).max() < 1e-14
-
-
 def test_kets_are_columns():
     kets = [Ket([1, 0]), Ket([0.6, 0.8j])]
     assert np.array_equal(from_kets(kets), [[1, 0], [0.6, 0.8j]])

@@ -125,18 +125,6 @@ def test_it_does_not_depend_on_the_bases_of_the_data():
     assert np.abs(reduced_operator(other, operator, X, start=spline.points[0]) - found).max() < 1e-10 * size
 
 
-def test_a_reduced_model_between_the_parameters():
-    """The heat equation with drift at a parameter without snapshots: nearly as good as with snapshots there."""
-    spline, mu = curve(), 0.55
-    truth = snapshots(mu)
-    assert spline.space.distance(spline(mu), from_snapshots(truth, 4)) < 0.02
-    x = spline.lift(mu)
-    values, vectors = np.linalg.eig(reduced_operator(spline, operator, mu))
-    start = np.linalg.solve(vectors, x.T @ truth[:, 0])
-    reduced = x @ ((vectors * start) @ np.exp(np.outer(values, TIME))).real
-    assert np.linalg.norm(reduced - truth) < 0.01 * np.linalg.norm(truth)
-
-
 @pytest.mark.parametrize(
     ("match", "call"),
     [
