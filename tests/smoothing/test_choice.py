@@ -18,8 +18,7 @@ def batch(name, sigma):
 
 
 @pytest.mark.parametrize(
-    ("name", "sigma"),
-    [("sphere:2", 0.02), ("sphere:2", 0.4), ("so:3", 0.1), ("hyperbolic:2", 0.4), ("spd:3", 0.1)],
+    ("name", "sigma"), [("sphere:2", 0.02), ("sphere:2", 0.4), ("so:3", 0.1), ("hyperbolic:2", 0.4), ("spd:3", 0.1)]
 )
 def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     space, points, noisy = batch(name, sigma)
