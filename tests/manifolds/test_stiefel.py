@@ -56,13 +56,6 @@ def test_dlog_is_that_of_differences(k, n, length):
     assert np.abs(exact - differences).max() <= (2e-11 if length < 1.5 else 2e-9)
 
 
-def test_one_vector_is_the_sphere():
-    space, sphere = ss.Stiefel(1, 4), ss.Sphere(3)
-    p, v = steps(space, 1.3)
-    assert np.abs(space.exp(p, v)[..., 0] - sphere.exp(p[..., 0], v[..., 0])).max() <= 1e-15
-    assert np.abs(space.inner(p, v, v) - 1.69).max() <= 1e-14
-
-
 def test_all_but_one_vector_is_rotations():
     """The last column of a rotation follows from the others, and the metric of rotations is the canonical one."""
     space, rotations = ss.Stiefel(2, 3), ss.SpecialOrthogonal(3)
@@ -74,15 +67,6 @@ def test_all_but_one_vector_is_rotations():
     curve, frames = ss.CubicSpline(None, p, rotations), ss.CubicSpline(None, p[..., :2], space)
     x = np.linspace(0, 5, 30)
     assert np.abs(frames(x) - curve(x)[..., :2]).max() <= 1e-11
-
-
-def test_the_metric_is_invariant():
-    space = ss.Stiefel(2, 5)
-    p, v = steps(space, 0.9)
-    q = space.exp(p, v)
-    left = ss.SpecialOrthogonal(5).random_point(np.random.default_rng(6))
-    right = ss.SpecialOrthogonal(2).random_point(np.random.default_rng(7))
-    assert np.abs(space.distance(left @ p @ right, left @ q @ right) - 0.9).max() <= 1e-14
 
 
 def test_opposite_frames_have_no_logarithm():

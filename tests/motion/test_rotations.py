@@ -6,7 +6,7 @@ import weakref
 import numpy as np
 import pytest
 from curves import points_on
-from scipy.spatial.transform import Rotation, RotationSpline
+from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline import rotations
@@ -72,15 +72,6 @@ def test_a_rotation_raises_on_other_spaces(space):
 
 
 # ---- along a curve ----
-
-
-def test_rates_are_those_of_scipy_on_a_dense_motion():
-    t = np.linspace(0, 10, 2000)
-    r = Rotation.from_rotvec(np.stack([np.sin(t), 0.7 * np.cos(1.3 * t), 0.4 * t], axis=-1))
-    spline, scipy = ss.CubicSpline(t, r, "so:3", bc_type="not-a-knot"), RotationSpline(t, r)
-    x = np.linspace(1, 9, 5001)
-    assert np.abs(rotations.angular_velocity(spline, x) - scipy(x, 1)).max() < 1e-9
-    assert np.abs(rotations.angular_acceleration(spline, x) - scipy(x, 2)).max() < 2e-6
 
 
 @every_curve

@@ -205,13 +205,6 @@ def test_data_of_frames_stand_beside_the_curve():
     assert set(light.get_offsets()[:, 0]) <= set(T)
 
 
-def test_unconverged_curves_say_so():
-    figure = smooth("r:2", max_iter=1, tol=1e-12, on_failure="ignore").plot()
-    assert any(text.endswith("band 95 %") for text in texts_of(figure))
-    failed = smooth("sphere:2", max_iter=1, tol=1e-12, on_failure="ignore")
-    assert any("not converged" in text for text in texts_of(rendered(failed.plot())))
-
-
 def test_a_long_gap_has_samples_of_its_own():
     # Drawn by a few chords the curve and its band were beside themselves.
     t = np.r_[np.linspace(0, 4, 60), np.linspace(7, 10, 50)]

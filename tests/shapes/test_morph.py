@@ -62,13 +62,6 @@ def test_in_the_coordinates_of_the_first_drawing_only_the_shape_changes(base):
     )
 
 
-def test_similar_drawings_make_similar_films():
-    x = turned(2, 5)
-    similarity = 1.7 * np.array([[0.6, -0.8], [0.8, 0.6]])
-    film = AffineMorph(KNOTS, x)(X)
-    assert np.abs(AffineMorph(KNOTS, x @ similarity + 2)(X) - film @ similarity - 2).max() < 10 * NEAR
-
-
 def test_drawings_of_one_shape_do_not_need_the_lift():
     """If all are similar, the film is that of the similarities."""
     angle, size, at = (np.array([0, 0.8, 1.5, 1.2, 2.0]), np.array([1, 1.5, 1, 2, 1.2]), np.array([0, 1, 5, 2, 0.0]))

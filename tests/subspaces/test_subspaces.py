@@ -54,14 +54,6 @@ def test_the_best_subspace_of_its_dimension(field):
     assert np.abs(np.linalg.norm(left, axis=(1, 2)) - np.linalg.norm(sizes[:, 2:], axis=1)).max() < 1e-14
 
 
-def test_singular_values_that_differ_by_rounding_are_equal():
-    left, right = (np.linalg.qr(np.random.default_rng(i).standard_normal((6, 6)))[0] for i in (0, 1))
-    sizes = np.array([3, 2, 2, 1, 1, 1]) / 7
-    with pytest.raises(ss.ValidationError, match="singular values 2 and 3"):
-        from_snapshots(left * sizes @ right, 2)
-    assert from_snapshots(left * sizes @ right, 3).shape == (6, 3)
-
-
 @pytest.mark.parametrize("energy", [0.5, 0.9, 0.999, 1 - 1e-9])
 def test_enough_dimensions_for_the_energy(energy):
     basis = from_snapshots(ALL, energy=energy)

@@ -38,14 +38,6 @@ def test_there_and_back(order, dtype):
     assert back.dtype == dtype and np.array_equal(back, x, equal_nan=True)
 
 
-def test_curves_through_many_voxels():
-    rng = np.random.default_rng(0)
-    voxels = ss.SymmetricPositiveDefinite(3).random_point(rng, (30, 4)).astype(np.float32)
-    vectors = to_vectors(voxels, order="mrtrix")
-    spline = ss.CubicSpline(None, from_vectors(vectors, order="mrtrix"), "spd:3")
-    assert np.abs(to_vectors(spline(2.0), order="mrtrix") - vectors[:, 2]).max() < 1e-6 * np.abs(vectors).max()
-
-
 @pytest.mark.parametrize(
     ("match", "call"),
     [
