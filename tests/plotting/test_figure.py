@@ -125,21 +125,16 @@ def test_dates(name, unit, step):
     assert 2 <= sum(map(bool, labels)) <= 12
 
 
-def test_curves_with_dates_of_their_own():
+def test_dates_of_every_curve_and_whole_numbers():
     t = np.array([["2024-01-01", "2024-01-03"], ["2024-01-02", "2024-01-09"]], "datetime64[D]")
     lines = lines_of(axes_named(rendered(spline_on("r:2", (2, 2), t).plot()), "speed"))
     for line, dates in zip(lines, t, strict=True):
         np.testing.assert_allclose(line[[0, -1], 0], date2num(dates))
-
-
-def test_nanoseconds_are_finer_than_dates_on_an_axis():
+    # Nanoseconds are finer than dates on an axis.
     t = np.datetime64("2024-01-01", "ns") + np.arange(5) * np.timedelta64(100, "ns")
     axes = axes_named(rendered(spline_on("r:2", (5,), t).plot()), "acceleration")
     assert axes.get_xlabel().startswith("seconds since 2024-01-01")
     np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], [0, 4e-7], atol=1e-15)
-
-
-def test_large_whole_numbers_as_times():
     t = 1_700_000_000_000_000_000 + 10**9 * np.arange(4)
     axes = axes_named(rendered(spline_on("r:2", (4,), t).plot()), "speed")
     np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], t[[0, -1]].astype(float))
