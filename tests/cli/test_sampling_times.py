@@ -98,10 +98,8 @@ def test_invalid_steps(fails):
     for step, found in [
         ("0", "larger than zero"),
         ("-1", "a duration is a number"),
-        ("ten", "a duration is a number"),
         ("1y", "units are ns, us, ms, s, min, h, d"),
         ("0.5ns", "whole number of nanoseconds"),
-        ("1e-12d", "whole number of nanoseconds"),
         ("1ns", "samples of one curve"),
         ("1e401", "too long"),
         ("1e-999999999", "too short"),

@@ -76,10 +76,8 @@ def test_noisy_tracks_are_smoothed():
     "change, what",
     [
         (lambda t: {"by": "ship"}, "column 'ship' does not exist; the columns are mmsi, when, lon, lat"),
-        (lambda t: {"columns": ("x", "lat")}, "column 'x' does not exist"),
         (lambda t: {"time": "lon"}, "column 'lon' must hold dates"),
         (lambda t: {"duplicates": "raise"}, r"mmsi 211, rows in the order of time: t\[2\] and t\[3\] are both"),
-        (lambda t: {"max_gap": 0}, "max_gap must be more than 0"),
         (lambda t: {"smooth": 0.5}, "smooth must be True or False, not 0.5"),
         (lambda t: {"smooth": True, "duplicates": "mean"}, "Omit duplicates='mean'"),
         (lambda t: {"smooth": True, "weights": [1]}, "resample does not support weights"),

@@ -261,12 +261,10 @@ def test_six_numbers_of_nearly_parallel_vectors(order):
         (lambda s: rotations.quaternion(s, 0.5), "scalar_first"),
         (lambda s: rotations.as_quaternions(np.eye(3)), "scalar_first"),
         (lambda s: rotations.as_rotation_6d(np.eye(3)), "order='columns'"),
-        (lambda s: rotations.as_rotation_6d(2 * np.eye(3), order="rows"), "off the space"),
         (lambda s: rotations.from_rotation_6d(np.ones((2, 6)), order="rows"), r"numbers\[0\] are .* not parallel"),
         (lambda s: rotations.from_rotation_6d(np.zeros(6), order="rows"), "must be nonzero"),
         (lambda s: rotations.velocities(2 * np.eye(3), [0, 0, 1]), "off the space"),
         (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
-        (lambda s: rotations.from_rotation_vectors([1, 2, np.nan]), "nan"),
     ],
 )
 def test_invalid_arguments_raise(call, match):
