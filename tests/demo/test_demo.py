@@ -59,17 +59,6 @@ def test_tracks_are_twice_continuously_differentiable(storms, splines):
         assert spline.t[0] <= row.top_time <= spline.t[-1]
 
 
-def test_great_circles_and_linear_lonlat_jump(storms, splines):
-    compared = tracks.comparison(storms[27], splines[27])
-    assert storms[27].label == "Gaston 2022"
-    assert max(compared.steps("C2 spline")) < 1e-9
-    for name in ("great circles (Slerp)", "linear lon/lat"):
-        speed, course = compared.steps(name)
-        assert 5 < speed < 20 and 30 < course < 90
-    slerp = compared.motions["great circles (Slerp)"]
-    assert np.abs(slerp.turn).max() < 1e-9 and np.ptp(slerp.speed, axis=1).max() < 1e-9
-
-
 def test_demo_writes_its_files(tmp_path, capsys):
     assert demo.main(["--out", str(tmp_path / "new" / "folder")]) == 0
     folder = tmp_path / "new" / "folder"

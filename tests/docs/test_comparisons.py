@@ -2,9 +2,6 @@
 
 import sys
 
-import angles
-import ends
-import motions
 import numpy as np
 import order
 import page
@@ -51,50 +48,7 @@ def test_spline_is_close_to_the_cubic_and_bends_more(case):
     assert cubics.text(rows).count("\n") == 3
 
 
-def test_cubic_is_critical_and_the_spline_is_not(case):
-    found = cubics.variations(case, fields=3)
-    cubic, spline = ([abs(one.slope) for one in curve] for curve in found)
-    assert max(cubic) < 1e-4 and max(spline) > 1e-2
-    assert min(one.rise for one in found[0]) > 1e-5
-    assert "3 random variations" in cubics.words(*found)
-
-
 # ---- recordings ----
-
-
-def tumbling(n=201):
-    """A recording without errors, its rates half a sample earlier."""
-    t = motions.DURATION * np.arange(n) / (n - 1)
-    still = recordings.Recording(t, motions.tumble(t), None, np.zeros((n, 3)))
-    x, step = still.rate_times, 1e-5
-    r = motions.tumble(x)
-    slope = (motions.tumble(x + step) - motions.tumble(x - step)) / (2 * step)
-    return still._replace(rates=angles.body_rate(r, slope))
-
-
-def test_smooth_motion_is_reconstructed_by_all_methods():
-    recording = tumbling()
-    coarse, fine = (reconstruct.errors(recording, k) for k in (10, 5))
-    assert list(coarse) == list(fine) and len(coarse) == 5
-    for method, (rms, worst, rates) in fine.items():
-        assert rms < worst < 1 and rates < 20
-        assert rms < coarse[method][0] / 3 and rates < coarse[method][2] / 1.5
-    for ends_of in ("not-a-knot", "end velocities measured"):
-        rms, _, rates = fine[f"symspline, {ends_of}"]
-        assert rms < 0.002 and rates < 0.1
-    assert ends.errors(recording, 4)[1]["symspline, not-a-knot"] < 0.01
-
-
-def test_poses_are_reconstructed_by_all_methods():
-    t = np.linspace(0, 1.5, 201)
-    recording = recordings.Recording(t, motions.tumble(t), motions.track(t), None)
-    found = reconstruct.errors(recording, 10)
-    assert len(found) == 6
-    apart, screw = (found[f"symspline, {name}, not-a-knot"] for name in ("SO(3) × R³", "SE(3)"))
-    # The rotations of a rigid motion do not feel its translations.
-    assert apart[:2] == pytest.approx(screw[:2], rel=1e-6)
-    assert apart[2] == pytest.approx(found["SciPy, RotationSpline and CubicSpline"][2], rel=1e-6)
-    assert all(numbers[2] < numbers[3] < 20 for numbers in found.values())
 
 
 def test_recordings_of_others_can_be_read(tmp_path):

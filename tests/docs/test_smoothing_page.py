@@ -47,14 +47,6 @@ def test_choice_table():
     assert all(1 <= float(cell) < 1.3 for cell in row[3:7])
 
 
-def test_coverage_and_outlier_tables():
-    ((name, cell),) = cells(smoothing.coverage_table(("S²",), (0.1,), 10))
-    assert name == "S²" and 0.85 < float(cell.split(",")[0]) <= 1
-    (row,) = cells(smoothing.outlier_table(("S²",), seeds=3))
-    clean, _, _, linear, huber, cauchy = map(float, row[1:7])
-    assert clean < cauchy < huber < linear
-
-
 def test_time_table():
     (row,) = cells(smoothing.time_table((200,), 1))
     assert row[0] == "200" and row[-1] == "200" and all(row)

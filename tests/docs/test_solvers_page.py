@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import solvers
-import solvers_energy
 import solvers_figures as figures
 from pages import cells
 
@@ -26,13 +25,6 @@ def test_walk_table_counts_walks(monkeypatch):
     assert row[5] == "3 + 0 + 0 + 0"
     assert all(len(row) == 6 for row in cells(solvers.time_table(1)))
     solvers.walks.cache_clear()
-
-
-def test_energy_table(monkeypatch):
-    monkeypatch.setattr(solvers_energy, "KINDS", {"walks of 0.5": solvers_energy.KINDS["walks of 0.5"]})
-    (row,) = cells(solvers_energy.energy_table(3))
-    # Of no set of points does another method give a lower bending energy.
-    assert row[0] == "walks of 0.5" and row[2] == "0" and row[3].startswith("0 of ") and float(row[4]) <= 1.05
 
 
 def test_the_region_of_38_ends_where_it_must():
