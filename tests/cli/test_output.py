@@ -51,21 +51,6 @@ def test_writing_that_fails_midway(curves, fails, ending):
     assert Path(out).read_text() == "as it was"
 
 
-@pytest.mark.parametrize("where", ["fitting", "saving"])
-def test_interrupted(fails, monkeypatch, where):
-    def interrupt(file, *_, **__):
-        if where == "saving":
-            file.write(b"half of it")
-        raise KeyboardInterrupt
-
-    write("a.csv", AXES)
-    write("a.npz", "as it was")
-    target = {"fitting": "symspline.cli._fit.fit_many", "saving": "numpy.savez"}[where]
-    monkeypatch.setattr(target, interrupt)
-    assert fails("fit a.csv --space s:2 -o a.npz", code=130) == "interrupted"
-    assert Path("a.npz").read_text() == "as it was"
-
-
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_interrupted_by_a_signal(curves, folder):
     os.mkdir("out")

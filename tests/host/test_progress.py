@@ -36,6 +36,26 @@ def test_progress_of_a_short_fit():
     calls.clear()
     ss.fit_many([(None, np.eye(3)), (None, np.eye(3)[:2])], S2, progress=lambda *call: calls.append(call))
     assert calls[-1] == (5, 5)
+    calls.clear()
+    ss.CubicSpline(None, (np.eye(3), np.eye(3)), "sphere:2 x r:3", progress=lambda *call: calls.append(call))
+    assert [finished for finished, total in calls].count(calls[-1][0]) == 1
+
+
+def test_an_exception_in_the_last_call_of_progress_comes_out():
+    def stop(*_):
+        raise Enough
+
+    spline = pair_of_curves(S2)
+    for call in (
+        lambda progress: ss.CubicSpline(None, np.eye(3), S2, progress=progress),
+        lambda progress: ss.fit_many([(None, np.eye(3))], S2, progress=progress),
+        lambda progress: spline(0.5, progress=progress),
+        lambda progress: ss.evaluate(None, np.eye(3), np.eye(3), S2, 0.5, progress=progress),
+    ):
+        with pytest.raises(Enough):
+            call(stop)
+        with pytest.raises(ss.ValidationError, match="progress must be a function"):
+            call(3)
 
 
 def test_progress_never_passes_its_total(threads):
@@ -50,12 +70,6 @@ def test_progress_never_passes_its_total(threads):
     ss.CubicSpline(None, S3.project(p), S3, on_failure="ignore", progress=lambda *call: calls.append(call))
     finished, total = np.transpose(calls)
     assert (finished <= total).all() and (np.diff(finished) >= 0).all()
-
-
-def test_progress_of_a_product():
-    calls = []
-    ss.CubicSpline(None, (np.eye(3), np.eye(3)), "sphere:2 x r:3", progress=lambda *call: calls.append(call))
-    assert [finished for finished, total in calls].count(calls[-1][0]) == 1
 
 
 class Enough(Exception):
@@ -77,16 +91,6 @@ def test_an_exception_in_progress_stops_the_work(threads, n, after):
         hard_fit(progress)
     assert caught.value is error
     assert len(calls) == after and calls[-1] < 400_000
-
-
-def test_an_exception_in_the_last_call_of_progress_comes_out():
-    def progress(finished, total):
-        raise Enough
-
-    with pytest.raises(Enough):
-        ss.CubicSpline(None, np.eye(3), S2, progress=progress)
-    with pytest.raises(Enough):
-        ss.fit_many([(None, np.eye(3))], S2, progress=progress)
 
 
 NESTED = """
@@ -175,17 +179,3 @@ def test_progress_within_an_evaluation():
     finished, total = np.transpose(calls)
     assert len(calls) >= 3 and (total == size).all() and (np.diff(finished) >= 0).all()
     assert finished[-1] == size and (finished[1:-1] < size).all()
-
-
-def test_progress_of_evaluation_must_be_a_function():
-    for call in (pair_of_curves(S2), lambda x, **options: ss.evaluate(None, np.eye(3), np.eye(3), S2, x, **options)):
-        with pytest.raises(ss.ValidationError, match="progress must be a function"):
-            call(0.5, progress=3)
-
-
-def test_an_exception_in_progress_stops_an_evaluation():
-    def stop(*_):
-        raise KeyError("enough")
-
-    with pytest.raises(KeyError, match="enough"):
-        pair_of_curves(S2)(0.5, progress=stop)

@@ -90,15 +90,6 @@ def work(seed):
     return spline, *(spline(x, nu=nu) for nu in range(3))
 
 
-def test_calls_from_many_threads_are_bit_identical(threads):
-    ss.set_num_threads(2)
-    expected = [work(seed) for seed in range(8)]
-    with ThreadPoolExecutor(8) as pool:
-        for seed, (spline, *values) in enumerate(pool.map(work, range(64))):
-            assert same_curve(spline, expected[seed % 8][0])
-            assert all(map(same, values, expected[seed % 8][1:]))
-
-
 @every_common
 def test_one_spline_asked_by_many_threads(threads, space):
     """Without a lock of Python's, too, all of them are in the compiled module at once."""

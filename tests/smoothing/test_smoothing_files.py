@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 from curves import parts, same
-from noisy import beside, example
+from noisy import example
 from stored import load, stored, with_arrays
 
 import symspline as ss
@@ -161,7 +161,7 @@ def test_damaged_collections_raise(changes):
         ss.load(damaged)
 
 
-@pytest.mark.parametrize("name", ["one", "batch", "dates", "product", "many"])
+@pytest.mark.parametrize("name", ["batch", "product", "many"])
 def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
     file = tmp_path / "smooth.npz"
     if name == "many":
@@ -174,10 +174,3 @@ def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
     assert main(["plot", str(file), *which, "-o", str(tmp_path / "out.png")]) == 0
     assert "rounding allows" in capsys.readouterr().out
     assert (tmp_path / "out.png").stat().st_size > 1000
-
-
-def test_knots_of_curves_that_count_from_their_own_time():
-    both = SAVED["own dates"]
-    assert both.t.shape == (2, 11) and both[0].t.shape == (11,)
-    with pytest.raises(ss.ValidationError, match=r"must have shape \(K,\)"):
-        ss.make_smoothing_spline(T, beside(S2, NOISY, 0.01), S2, knots=np.eye(3))

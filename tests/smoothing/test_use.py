@@ -134,11 +134,12 @@ def test_between_two_knots_there_is_the_nearest_geodesic(options):
         assert np.abs(straight(T) - T[:, None] * line[0] - line[1]).max() < 1e-12
 
 
-@pytest.mark.parametrize("size", [1e-200, 1e200])
-def test_data_whose_squares_overflow_raise(size):
-    data = size * np.random.default_rng(0).standard_normal((20, 2))
-    with pytest.raises(ss.ConvergenceError):
-        ss.make_smoothing_spline(np.arange(20.0), data, "r:2")
+def test_data_and_weights_whose_squares_overflow_raise():
+    for size in (1e-200, 1e200):
+        with pytest.raises(ss.ConvergenceError):
+            ss.make_smoothing_spline(T, size * np.random.default_rng(0).standard_normal((40, 2)), "r:2")
+    with pytest.raises(ss.ConvergenceError, match=r"do not determine .* remove data with tiny weights"):
+        ss.make_smoothing_spline(T, NOISY, S2, weights=np.r_[1e300, np.ones(39)])
 
 
 @pytest.mark.parametrize(("name", "seed"), [("sphere:2", 4), ("so:3", 0), ("rp:2", 4), ("sphere:2 x r:1", 4)])
