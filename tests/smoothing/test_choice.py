@@ -170,3 +170,26 @@ def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
         both = ss.make_smoothing_spline(t, noisy, sphere, np.array([alone.lam, stiff]))
         assert both.df[0] == pytest.approx(alone.df, rel=0.01) and both.df[1] == pytest.approx(2, abs=0.05)
         assert sphere.distance(both(t)[0], alone(t)).max() < 0.1 * alone.std(5.0)
+
+
+@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
+def test_a_lambda_that_does_not_settle_is_reported():
+    """Random walks for which the choice at one curve leads to another curve, with another choice, and back."""
+    sphere, unsettled = ss.Sphere(2), []
+    for seed, gamma, weighed in ((826, 1.4, False), (1129, 1.0, True)):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(4, 40))
+        t, base = np.cumsum(rng.exponential(size=n)), sphere.random_point(rng)
+        if weighed:
+            walk = np.array([2.0, 0, 0]) + np.cumsum(0.3 * rng.standard_normal((n, 3)), axis=0)
+        else:
+            start = np.repeat(base[None], n, 0)
+            walk = sphere.exp(start, 10 ** rng.uniform(-1, 0) * sphere.random_tangent(rng, start))
+        points = walk / np.linalg.norm(walk, axis=1, keepdims=True)
+        weights = 10 ** rng.uniform(-3, 3, n) if weighed else None
+        spline = ss.make_smoothing_spline(t, points, sphere, gamma=gamma, weights=weights, on_failure="ignore")
+        unsettled.append(not spline.report.converged)
+        # The λ that the message proposes has a curve.
+        assert ss.make_smoothing_spline(t, points, sphere, spline.lam, weights=weights).report.converged
+    # Rounding may settle one of them elsewhere.
+    assert any(unsettled)
