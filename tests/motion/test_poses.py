@@ -245,6 +245,7 @@ def test_euroc_files(tmp_path):
     ("read", "text", "match"),
     [
         (poses.read_tum, "# nothing\n", "no numbers"),
+        (poses.read_tum, "\n0 0 0 0 0 0 1\n", "line 2: 7 numbers, but a line of a TUM trajectory has 8: time tx"),
         (poses.read_tum, "# x\n0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n", "the file, line 3: 7 numbers, but a line"),
         (poses.read_tum, "# x\n0 0 0 0 0 0 0 one\n", "line 2: column 'qw' holds 'one', which is not a number"),
         (poses.read_tum, "0 0 0 0 0 0 0 1\n\n1 0 0 nan 0 0 0 1\n", "line 3: column 'tz' holds nan"),

@@ -79,6 +79,7 @@ def test_what_scipy_and_lists_hold():
     [
         (r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'", {"t": [0, 1, 1, 1, 2]}),
         (r"t\[2\] = 0.5 is before t\[1\] = 1.0. Sort", {"t": [0, 1, 0.5, 2, 3]}),
+        (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
         (r"t has shape \(4,\), but there are 5 points", {"t": range(4)}),
         (
             "no segment has 3 points: 4 of 4 time steps are longer than max_gap=0.5, and the median step is 1",
