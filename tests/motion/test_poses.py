@@ -2,6 +2,7 @@
 
 import gzip
 import io
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -110,16 +111,20 @@ def test_a_sensor_measures_in_its_own_axes(name):
     assert np.allclose(np.einsum("nij,nj->ni", r, force), up, rtol=0, atol=1e-12)
 
 
-@every_space
+@pytest.mark.parametrize("name", ["so:3", "se:3", "so:3 x r:3", "r:3 x sphere:2 x so:3"])
 def test_calls_are_those_of_a_spline(name):
     spline = curve(name, (2,))
-    for call in (poses.twist, poses.linear_acceleration, lambda *a, **k: poses.imu(*a, **k).specific_force):
+    calls = [rotations.angular_velocity, partial(rotations.quaternion, scalar_first=True)]
+    if name != "so:3":
+        calls += [poses.twist, poses.linear_acceleration, lambda *a, **k: poses.imu(*a, **k).specific_force]
+    for call in calls:
         both = call(spline, INNER)
         assert np.array_equal(call(spline, np.stack([INNER, INNER]), per_curve=True), both)
         assert np.array_equal(call(spline[1], INNER), both[1])
+        assert np.array_equal(call(spline, INNER[7]), both[:, 7])
         with pytest.raises(ss.ValidationError, match="outside"):
             call(spline, 5.0)
-        assert np.isfinite(call(spline, 5.0, extrapolate=True)).all()
+        assert np.isfinite(call(spline, 5.0, extrapolate="geodesic")).all()
 
 
 @pytest.mark.parametrize("name", ["so:3", "r:3", "so:3 x r:2", "so:3 x r:3 x r:3", "se:3 x r:3"])

@@ -90,13 +90,10 @@ def test_rounding_is_not_blown_up():
 # ---- batches, times, products ----
 
 
-def test_batch_is_thinned_with_a_note():
+def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
     assert len(axes_named(figure, "speed").lines) == 50
     assert "50 of 70 curves, 4 points each, natural ends" in texts_of(figure)
-
-
-def test_failed_curves_are_not_drawn():
     good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     points = [good, [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]], good]
     figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())
@@ -104,11 +101,11 @@ def test_failed_curves_are_not_drawn():
     assert "2 of 3 curves, 3 points each, natural ends, 1 not converged" in texts_of(figure)
     with pytest.raises(ss.ValidationError, match="nothing to plot"):
         ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot()
-
-
-def test_unconverged_curve_is_drawn_and_named():
     figure = spline_on("sphere:2", max_iter=1, on_failure="ignore").plot()
     assert any(text.endswith("not converged") for text in texts_of(figure))
+    spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
+    figure = rendered(spline.plot())
+    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure) and len(figure.axes) == 6 + 2
 
 
 @pytest.mark.parametrize(
@@ -152,13 +149,6 @@ def test_product_has_a_picture_a_factor(name, shape):
     line = lines_of(axes_named(figure, "speed"))[0]
     np.testing.assert_allclose(line[:, 1], first.speed(line[:, 0]), atol=1e-12)
     assert len(figure.axes) == 4 + 2
-
-
-def test_product_of_many_factors():
-    spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
-    figure = rendered(spline.plot())
-    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure)
-    assert len(figure.axes) == 6 + 2
 
 
 # ---- files, and the rest of the program ----

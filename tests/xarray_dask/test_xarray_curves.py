@@ -99,29 +99,22 @@ def test_one_curve_and_one_time():
     assert sx.speed(ds, 1.25).shape == ()
 
 
-def test_times_of_any_dimensions():
+@pytest.mark.parametrize(
+    "dims", [("run", "sample"), ("lon", "sample"), ("sample", "lat", "lon"), ("lat",), ("time", "lon")]
+)
+def test_times_of_any_dimensions(dims):
+    """Shared by all curves, or of every curve its own."""
     da = field()
-    ds, expected = sx.fit(da, S2, point_dims=("r",)), plain(da, "sphere:2")
-    grid = xr.DataArray(np.linspace(0, 13, 12).reshape(3, 4), dims=("run", "sample"), coords={"run": [7, 8, 9]})
-    for values in (sx.evaluate(ds, grid), sx.resample(da, S2, grid, point_dims=("r",))):
-        assert values.dims == ("lat", "lon", "run", "sample", "r")
-        assert same(values.values, expected(grid.values))
-        assert values.time.dims == ("run", "sample") and list(values.run) == [7, 8, 9]
-
-
-@pytest.mark.parametrize("dims", [("lon", "sample"), ("sample", "lat", "lon"), ("lat",), ("time", "lon")])
-def test_every_curve_has_its_own_times(dims):
-    da = field()
-    sizes = {"lat": LAT, "lon": LON, "sample": 4, "time": 4}
+    sizes = {"lat": LAT, "lon": LON, "run": 3, "sample": 4, "time": 4}
     x = xr.DataArray(np.random.default_rng(0).uniform(0, 13, [sizes[d] for d in dims]), dims=dims)
-    own = [d for d in dims if d in ("sample", "time")]
+    own = [d for d in dims if d not in ("lat", "lon")]
     each = x.broadcast_like(xr.DataArray(np.zeros((LAT, LON)), dims=("lat", "lon"))).transpose("lat", "lon", *own)
     expected = plain(da, "sphere:2")(each.values, per_curve=True)
     ds = sx.fit(da, S2, point_dims=("r",))
     for values in (sx.evaluate(ds, x), sx.resample(da, S2, x, point_dims=("r",))):
         assert same(values.transpose("lat", "lon", *own, "r").values, expected)
-    if dims != ("time", "lon"):
-        assert set(values.time.dims) == set(dims)
+        if dims != ("time", "lon"):
+            assert set(values.time.dims) == set(dims)
 
 
 # ---- curves that are none ----
