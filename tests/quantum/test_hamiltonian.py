@@ -29,11 +29,6 @@ def adjoint(m):
     return np.swapaxes(m, -1, -2).conj()
 
 
-def random_unitary(n, seed=0):
-    rng = np.random.default_rng(seed)
-    return np.linalg.qr(rng.standard_normal((n, n)) + 1j * rng.standard_normal((n, n)))[0]
-
-
 @pytest.mark.parametrize("name", [*STATES, *GATES])
 def test_the_schroedinger_equation_goes_through_every_point(name):
     spline = curve(name)
@@ -80,9 +75,9 @@ def test_it_is_the_commutator_of_the_projector(name):
 @pytest.mark.parametrize("name", ["cp:3", "cgr:2,4"])
 def test_phases_and_bases_do_not_matter(name):
     spline = curve(name)
-    turned = np.array(spline.points)
+    turned, turns = np.array(spline.points), ss.Unitary(2).random_point(np.random.default_rng(0), len(KNOTS))
     for i in range(len(turned)):
-        turned[i] = turned[i] * np.exp(1j * i) if name == "cp:3" else turned[i] @ random_unitary(2, i)
+        turned[i] = turned[i] * np.exp(1j * i) if name == "cp:3" else turned[i] @ turns[i]
     other = ss.CubicSpline(KNOTS, turned, name)
     for nu in (0, 1):
         # The solver's tolerance is 1e-12 of the legs.

@@ -126,14 +126,6 @@ def test_both_solvers_reject_outliers(loss):
     assert rms(space, flat.points, exact.points) < 5e-3 * exact.std(T).max()
 
 
-def assert_solvers_agree(space, t, noisy, **options):
-    """Degrees of freedom are the same whichever solver is chosen."""
-    auto, newton = (
-        ss.make_smoothing_spline(t, noisy, space, method=method, **options) for method in ("auto", "newton")
-    )
-    assert auto.report.converged and newton.report.converged and auto.df == pytest.approx(newton.df, rel=0.02)
-
-
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 @pytest.mark.parametrize("ratio", [3, 30])
 @pytest.mark.parametrize("criterion", ["gcv", "reml"])
@@ -145,7 +137,11 @@ def test_light_data_say_how_stiff_a_curve_is(ratio, criterion):
     for seed in range(3):
         rng = np.random.default_rng(seed)
         noisy = sphere.exp(truth, deviations[:, None] * sphere.random_tangent(rng, truth))
-        assert_solvers_agree(sphere, t, noisy, criterion=criterion, weights=1 / deviations**2)
+        data = {"t": t, "points": noisy, "space": sphere, "weights": 1 / deviations**2}
+        auto, newton = (
+            ss.make_smoothing_spline(**data, criterion=criterion, method=method) for method in ("auto", "newton")
+        )
+        assert auto.report.converged and newton.report.converged and auto.df == pytest.approx(newton.df, rel=0.02)
 
 
 def test_many_dimensions_are_coupled_too():

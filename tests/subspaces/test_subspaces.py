@@ -30,6 +30,8 @@ def snapshots(mu):
     return ((vectors * start) @ np.exp(np.outer(values, TIME))).real
 
 
+EQUAL = np.stack([np.diag([3.0, 2, 1, 0]), np.diag([2.0, 1, 1, 0])])
+SPHERE = ss.CubicSpline(None, np.eye(3), "sphere:2")
 ALL = np.stack([snapshots(mu) for mu in PARAMETERS])
 
 
@@ -125,21 +127,13 @@ def test_it_does_not_depend_on_the_bases_of_the_data():
         ("rank must be at least 1", lambda: from_snapshots(ALL, 0)),
         (r"31 dimensions needs .* 31 snapshots; x has shape \(5, 60, 30\)", lambda: from_snapshots(ALL, 31)),
         ("3 dimensions needs more than 3 numbers", lambda: from_snapshots(np.eye(3), 3)),
-        (r"x\[1\] does not determine .* singular values 2 and 3 are 1 and 1", lambda: from_snapshots(equal(), 2)),
+        (r"x\[1\] does not determine .* singular values 2 and 3 are 1 and 1", lambda: from_snapshots(EQUAL, 2)),
         ("values 2 and 3 are 0 and 0", lambda: from_snapshots(np.outer([1, 2, 3.0], [1, 1, 1]) * [1, 0, 0], 2)),
         ("must contain at least one snapshot", lambda: from_snapshots(np.zeros((5, 0)), 1)),
-        ("one curve on a Grassmannian, not <CubicSpline on Sphere", lambda: reduced_operator(sphere(), np.eye(3), 0.5)),
+        ("one curve on a Grassmannian, not <CubicSpline on Sphere", lambda: reduced_operator(SPHERE, np.eye(3), 0.5)),
         (r"operator has shape \(59, 60\), but bases of 60", lambda: reduced_operator(curve(), np.ones((59, N)), 0.5)),
     ],
 )
 def test_invalid_bases_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
-
-
-def equal():
-    return np.stack([np.diag([3.0, 2, 1, 0]), np.diag([2.0, 1, 1, 0])])
-
-
-def sphere():
-    return ss.CubicSpline(None, np.eye(3), "sphere:2")

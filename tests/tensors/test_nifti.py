@@ -70,6 +70,7 @@ def test_tensors_along_the_axes_are_inside(tmp_path):
 def test_invalid_volumes_raise(tmp_path):
     name, given = str(tmp_path / "tensors.nii"), volume()
     write_nifti(name, given, order="fsl")
+    full = Volume(given.tensors, np.ones_like(given.mask), AFFINE)
     for match, call in [
         ("does not state the order of its six volumes", lambda: read_nifti(name)),
         (
@@ -78,7 +79,7 @@ def test_invalid_volumes_raise(tmp_path):
         ),
         (
             r"the mask has 24 voxels, which need shape \(24, 3, 3\)",
-            lambda: write_nifti(name, all_of(given), order="fsl"),
+            lambda: write_nifti(name, full, order="fsl"),
         ),
         ("order must be", lambda: write_nifti(name, given, order="ants")),
     ]:
@@ -109,10 +110,6 @@ def test_an_order_that_is_not_the_files(tmp_path):
         read_nifti(name, order="fsl")
     for order in (None, "dipy", "itk"):
         assert np.array_equal(read_nifti(name, order=order).tensors, volume().tensors)
-
-
-def all_of(given):
-    return Volume(given.tensors, np.ones_like(given.mask), AFFINE)
 
 
 def test_without_nibabel(monkeypatch):

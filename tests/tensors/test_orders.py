@@ -6,6 +6,7 @@ import pytest
 import symspline as ss
 from symspline.tensors import from_vectors, to_vectors
 
+SKEWED = np.eye(3) + 1e-3 * np.eye(3, k=1)
 # Every entry is named by its place: the tens are the row, the ones the column.
 NAMED = np.array([[11, 12, 13], [12, 22, 23], [13, 23, 33]])
 ORDERS = {
@@ -46,18 +47,12 @@ def test_there_and_back(order, dtype):
         (r"x has shape \(2, 5\), but needs shape \(..., 6\)", lambda: from_vectors(np.ones((2, 5)), order="fsl")),
         ("x must be an array of real numbers, not of complex", lambda: from_vectors(np.ones(6) * 1j, order="fsl")),
         (r"matrices has shape \(3,\)", lambda: to_vectors(np.ones(3), order="fsl")),
-        (r"matrices\[1\] is not symmetric: .* is 1.000e-03", lambda: to_vectors([np.eye(3), skewed()], order="fsl")),
+        (r"matrices\[1\] is not symmetric: .* is 1.000e-03", lambda: to_vectors([np.eye(3), SKEWED], order="fsl")),
     ],
 )
 def test_invalid_tensors_raise(match, call):
     with pytest.raises(ss.ValidationError, match=match):
         call()
-
-
-def skewed():
-    matrix = np.eye(3)
-    matrix[0, 1] = 1e-3
-    return matrix
 
 
 def test_precision():
