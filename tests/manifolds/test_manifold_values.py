@@ -119,6 +119,7 @@ def test_pickles_and_files():
         (lambda s: s.lift(0.5), "no horizontal lift is known"),
         (lambda s: s.transport(0, 1, s(0, nu=1)), "parallel transport along curves is not made"),
         (lambda s: s.jvp(0.5, points=0 * POINTS), "derivatives with respect to the data"),
+        (lambda s: s.vjp(0.5, POINTS[0]), "derivatives with respect to the data"),
         (lambda s: s.save("no.npz"), "curves are not saved"),
         (lambda s: ss.save({"a": s}, "no.npz"), "curves are not saved"),
         (lambda s: ss.BezierCurve(POINTS, s.space), "B-spline and Bézier curves are not made"),
