@@ -209,7 +209,6 @@ def _families():
 
 
 FAMILIES = _families()
-
 POSITIVE = (ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite, ss.SpecialPositiveDefinite, ss.Siegel)
 HYPERBOLIC = (ss.Hyperbolic, ss.ComplexHyperbolic)
 LINEAR = (

@@ -16,7 +16,6 @@ every_kind = pytest.mark.parametrize("space", REPRESENTATIVE, ids=str)
 every_single = pytest.mark.parametrize("space", [s for s in REPRESENTATIVE if not isinstance(s, ss.Product)], ids=str)
 every_common = pytest.mark.parametrize("space", COMMON, ids=str)
 every_batch = loop_over("batch", [(), (2, 3)])
-
 S2, S3 = ss.Sphere(2), ss.Sphere(3)
 # Its axes, as points of S².
 THREE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]

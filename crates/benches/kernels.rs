@@ -3,12 +3,12 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
-use symspline::fit::{End, Ends, Method, Options, Problem, fit};
-use symspline::monitor::Monitor;
-use symspline::parallel::set_num_threads;
-use symspline::space::Erased;
-use symspline::spaces::Sphere;
+use symspline_engine::curve::{Curves, Outside, Quantity, Times, evaluate};
+use symspline_engine::fit::{End, Ends, Method, Options, Problem, fit};
+use symspline_engine::monitor::Monitor;
+use symspline_engine::parallel::set_num_threads;
+use symspline_engine::space::Erased;
+use symspline_engine::spaces::Sphere;
 
 fn main() {
     set_num_threads(1);

@@ -30,9 +30,7 @@ def joined(kinds: Kinds, vectors: tuple[Any, Any]) -> Any:
     """The inverse of `split`."""
     if isinstance(kinds, str):
         return kinds
-    return tuple(
-        kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True)
-    )
+    return tuple(kind if isinstance(kind, str) else (kind, vector) for kind, vector in zip(kinds, vectors, strict=True))
 
 
 def fitted(
@@ -75,8 +73,7 @@ class Movable(NamedTuple):
     def _velocity(self, x: Array) -> Array:
         curve = self.curve
         times, per_curve = onto_ends(cast(x), curve.times, curve.batch, False, x.dtype)
-        velocity: Array = curve.evaluate(times, "velocity", "raise", per_curve)
-        return velocity
+        return np.asarray(curve.evaluate(times, "velocity", "raise", per_curve))
 
 
 def movable(spline: CubicSpline) -> Movable:

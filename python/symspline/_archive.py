@@ -28,8 +28,7 @@ from ._disk import path_of, replacing
 from ._input import NO_ZONE, UTC_ZONE
 from ._options import checked_extrapolate
 from ._report import Report
-from ._spaces import Array, Product, Space, factors_of
-from ._spaces import space as space_named
+from ._spaces import Array, Product, Space, factors_of, space_named
 from ._time import Moments, TimeAxis, time_axis_of
 from ._version import VERSION as LIBRARY
 from .manifolds._manifold import refuse_functions
@@ -176,16 +175,11 @@ def _array_in(archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> N
         size = member.file_size - entry.tell()
     # NumPy makes an array of this shape before it reads the numbers.
     if dtype.hasobject:
-        raise ValidationError(
-            f"entry {name!r} holds Python objects, which are not read; save numbers or texts"
-        )
+        raise ValidationError(f"entry {name!r} holds Python objects, which are not read; save numbers or texts")
     if math.prod(shape) * dtype.itemsize != size:
-        raise ValidationError(
-            f"entry {name!r} is damaged: it has {size} bytes, not those of {dtype} in shape {shape}"
-        )
+        raise ValidationError(f"entry {name!r} is damaged: it has {size} bytes, not those of {dtype} in shape {shape}")
     with archive.open(member) as entry:
-        array: NDArray[Any] = np.lib.format.read_array(entry, allow_pickle=False)
-    return array
+        return np.asarray(np.lib.format.read_array(entry, allow_pickle=False))
 
 
 def text_in(arrays: Mapping[str, NDArray[Any]], name: str) -> str:
@@ -210,11 +204,10 @@ def json_in(arrays: Mapping[str, NDArray[Any]], name: str) -> Any:
     ValidationError
         If it is something else.
     """
+    text = text_in(arrays, name)
     try:
-        return json.loads(text_in(arrays, name))
+        return json.loads(text)
     except (ValueError, RecursionError) as error:
-        if isinstance(error, ValidationError):
-            raise
         raise ValidationError(f"entry {name!r} is not JSON: {brief(error)}") from None
 
 
@@ -270,9 +263,7 @@ def read_segments(
     times = time_axis.knots(knots)
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
         raise ValidationError("entry 't': the knots do not increase")
-    arrays = [
-        _read_nodes(factor, state, suffix_of(space, i), times) for i, factor in enumerate(factors_of(space))
-    ]
+    arrays = [_read_nodes(factor, state, suffix_of(space, i), times) for i, factor in enumerate(factors_of(space))]
     return time_axis, knots, curve_of(space, times, arrays, fitted), extrapolate
 
 
@@ -333,9 +324,7 @@ def read_times(state: Entries, name: str) -> tuple[TimeAxis, NDArray[Any]]:
         return time_axis_of(Moments(times.astype(kind), zone or None))
 
 
-def _read_nodes(
-    factor: Space, state: Entries, suffix: str, times: NDArray[np.float64]
-) -> tuple[Array, Array]:
+def _read_nodes(factor: Space, state: Entries, suffix: str, times: NDArray[np.float64]) -> tuple[Array, Array]:
     """Return points and velocities in a factor."""
     points, velocities = (read_array(state, name + suffix, factor) for name in ("points", "velocities"))
     nodes = points.shape[: points.ndim - len(factor.point_shape)]

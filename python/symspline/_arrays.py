@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -38,9 +39,7 @@ def _first_masked(value: Any) -> tuple[int, ...] | None:
     if isinstance(value, np.ma.MaskedArray):
         found = np.argwhere(np.ma.getmaskarray(value))
         return tuple(found[0].tolist()) if len(found) else None
-    if isinstance(value, (list, tuple)) and any(
-        issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))
-    ):
+    if isinstance(value, (list, tuple)) and any(issubclass(kind, np.ma.MaskedArray) for kind in set(map(type, value))):
         for i, row in enumerate(value):
             index = _first_masked(row)
             if index is not None:
@@ -118,6 +117,19 @@ def in_single(values: Any) -> Any:
 
 def checked_atol(atol: Any) -> float:
     """How far off a space points may be, if that is a number that makes sense."""
-    if isinstance(atol, bool) or not isinstance(atol, (int, float, np.number)) or not 0 <= atol < 1:
-        raise ValidationError(f"atol must be a number from 0 to 1, not {short_repr(atol)}")
-    return float(atol)
+    return checked_number(atol, "atol must be a number from 0 to 1", lambda x: 0 <= x < 1)
+
+
+def checked_number(value: Any, requirement: str, is_valid: Callable[[Any], bool]) -> float:
+    """Return a real number, or raise ValidationError with what is required of it."""
+    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not number or not is_valid(value):
+        raise ValidationError(f"{requirement}, not {short_repr(value)}")
+    return float(value)
+
+
+def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
+    """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
+    if bad.any():
+        index = tuple(np.argwhere(bad)[0].tolist())
+        raise ValidationError(f"{name}{list(index) or ''} {say(index)}")

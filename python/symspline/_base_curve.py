@@ -8,7 +8,7 @@ from collections.abc import Callable
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -17,14 +17,12 @@ from . import _archive
 from ._arrays import as_array, checked_flag, in_single, is_single, read_only, short_repr
 from ._core import ValidationError
 from ._curve import Curve
-from ._curves.band import UncertaintyBand
-from ._curves.curve import CurveArrays, Doubles
-from ._curves.solve import Progress
+from ._curves.curve import CurveArrays, UncertaintyBand
 from ._input import times_of
-from ._options import check_progress, checked_extrapolate, extrapolation_mode, quantity_of
-from ._spaces import Array, Product, Space, parts_of
+from ._options import EvaluationOptions, check_progress, checked_extrapolate, extrapolation_mode, quantity_of
+from ._spaces import Array, Doubles, Product, Space, parts_of
 from ._time import TimeAxis, onto_ends
-from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Time, TimesLike
+from ._typing import AnyArray, AnyArrays, BCType, Extrapolate, File, FloatArray, Out, P, Progress, Time, TimesLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,53 +76,18 @@ class SegmentedCurve(Curve[P]):
 
     @overload
     def __call__(
-        self,
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        dtype: None = None,
-        progress: Progress | None = None,
-        out: None = None,
+        self, x: TimesLike, nu: int = 0, *, dtype: None = None, out: None = None, **options: Unpack[EvaluationOptions]
     ) -> P: ...
-
+    @overload
+    def __call__(self, x: TimesLike, nu: int = 0, *, out: Out, **options: Unpack[EvaluationOptions]) -> Out: ...
     @overload
     def __call__(
-        self,
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        progress: Progress | None = None,
-        out: Out,
-    ) -> Out: ...
-
-    @overload
-    def __call__(
-        self: Curve[AnyArrays],
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        dtype: DTypeLike,
-        progress: Progress | None = None,
+        self: Curve[AnyArrays], x: TimesLike, nu: int = 0, *, dtype: DTypeLike, **options: Unpack[EvaluationOptions]
     ) -> AnyArrays: ...
-
     @overload
     def __call__(
-        self: Curve[AnyArray],
-        x: TimesLike,
-        nu: int = 0,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        dtype: DTypeLike,
-        progress: Progress | None = None,
+        self: Curve[AnyArray], x: TimesLike, nu: int = 0, *, dtype: DTypeLike, **options: Unpack[EvaluationOptions]
     ) -> AnyArray: ...
-
     def __call__(
         self,
         x: TimesLike,
@@ -174,10 +137,9 @@ class SegmentedCurve(Curve[P]):
             check_progress(progress)
         single = dtype is not None and is_single(dtype)
         if out is not None and dtype is not None:
-            raise ValidationError(
-                "dtype and out are both given. Pass one of them; the result has the type of out."
-            )
-        values = self._at(x, quantity_of(nu), extrapolate, per_curve, progress, out)
+            raise ValidationError("dtype and out are both given. Pass one of them; the result has the type of out.")
+        quantity, where = quantity_of(nu), self._where(extrapolate)
+        values = evaluated(self._curve, self._time_axis, x, quantity, where, per_curve, progress, out)
         return in_single(values) if single else values
 
     def lift(
@@ -243,14 +205,7 @@ class SegmentedCurve(Curve[P]):
         if progress is not None:
             check_progress(progress)
         quantity, where = quantity_of(nu), self._where(extrapolate)
-        values: P = call_at_times(
-            self._curve,
-            self._time_axis,
-            x,
-            per_curve,
-            where,
-            lambda curve, x, per_curve, where: curve.lift(x, quantity, where, per_curve, start, progress),
-        )
+        values: P = lifted(self._curve, self._time_axis, x, quantity, where, per_curve, start, progress)
         return values
 
     def transport(self, x0: TimesLike, x1: TimesLike, v: ArrayLike) -> P:
@@ -300,13 +255,11 @@ class SegmentedCurve(Curve[P]):
         ends = [as_array(times_of(x, name)[0], name) for name, x in (("x0", x0), ("x1", x1))]
         if any(end.ndim for end in ends):
             raise ValidationError("x0 and x1 must be single times, the start and the end of the transport")
-        pair = (
-            times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
-        )
+        pair = times_of([x0, x1], "x")[0] if any(end.dtype.kind in "MmU" for end in ends) else np.asarray(ends)
         times, own = self._time_axis.at(pair, self._batch, False, self._times)
         where = "periodic" if self._extrapolation_mode == "periodic" else "raise"
         try:
-            at = evaluated(self._curve, self._time_axis, pair, "point", where, False, None)
+            at = evaluated(self._curve, self._time_axis, pair, "point", where, False)
         except ValidationError as error:
             what = str(error).partition("; pass extrapolate")[0]
             raise ValidationError(
@@ -318,15 +271,13 @@ class SegmentedCurve(Curve[P]):
         ):
             first = np.take(points, 0, axis=len(self._batch))
             # Curves that failed are NaN, and their vectors are not checked.
-            good = np.isfinite(first).all(axis=tuple(range(-len(part.space.point_shape), 0)))
+            good = part.space._where_finite(first)
             given = part.space._array(one, "v")
             part.space._doubles(given, "v")
             try:
                 given = np.broadcast_to(given, first.shape)
             except ValueError:
-                raise ValidationError(
-                    f"v has shape {given.shape}, which does not broadcast to {first.shape}"
-                ) from None
+                raise ValidationError(f"v has shape {given.shape}, which does not broadcast to {first.shape}") from None
             part.space.check_tangent(first[good], given[good])
             vectors.append(given)
         if own:
@@ -344,12 +295,7 @@ class SegmentedCurve(Curve[P]):
         return result
 
     def speed(
-        self,
-        x: TimesLike,
-        *,
-        extrapolate: Extrapolate = None,
-        per_curve: bool = False,
-        dtype: DTypeLike | None = None,
+        self, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False, dtype: DTypeLike | None = None
     ) -> FloatArray:
         """Compute the speed of the curve.
 
@@ -382,22 +328,9 @@ class SegmentedCurve(Curve[P]):
         array([1.5, 1.5])
         """
         single = dtype is not None and is_single(dtype)
-        values = self._at(x, "speed", extrapolate, per_curve)
+        values = evaluated(self._curve, self._time_axis, x, "speed", self._where(extrapolate), per_curve)
         speeds: FloatArray = (in_single(values) if single else values)[()]
         return speeds
-
-    def _at(
-        self,
-        x: TimesLike,
-        quantity: str,
-        extrapolate: Any,
-        per_curve: bool,
-        progress: Progress | None = None,
-        out: Any = None,
-    ) -> Any:
-        return evaluated(
-            self._curve, self._time_axis, x, quantity, self._where(extrapolate), per_curve, progress, out
-        )
 
     def _where(self, extrapolate: Any) -> str:
         """Return the core's name of the extrapolation policy."""
@@ -560,7 +493,7 @@ def evaluated(
     quantity: str,
     outside: str,
     per_curve: bool,
-    progress: Progress | None,
+    progress: Progress | None = None,
     out: Any = None,
 ) -> Any:
     """Evaluate a quantity at times as a user passes them."""
@@ -569,6 +502,24 @@ def evaluated(
         if out is None:
             return curve.evaluate(x, quantity, outside, per_curve, progress)
         return curve.write(out, x, quantity, outside, per_curve, progress)
+
+    return call_at_times(curve, time_axis, x, per_curve, outside, call)
+
+
+def lifted(
+    curve: CurveArrays,
+    time_axis: TimeAxis,
+    x: TimesLike,
+    quantity: str,
+    outside: str,
+    per_curve: bool,
+    start: Any = None,
+    progress: Progress | None = None,
+) -> Any:
+    """Evaluate a quantity of the horizontal lift that starts at `start`, at times as a user passes them."""
+
+    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
+        return curve.lift(x, quantity, outside, per_curve, start, progress)
 
     return call_at_times(curve, time_axis, x, per_curve, outside, call)
 
@@ -613,9 +564,7 @@ def call_at_times(
     return values
 
 
-def _inside(
-    curve: CurveArrays, times: Doubles, per_curve: bool
-) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
+def _inside(curve: CurveArrays, times: Doubles, per_curve: bool) -> tuple[Doubles, bool, NDArray[np.bool_] | None]:
     """Replace times outside the knots by the first knot, and return which times these are, if any."""
     first, last = curve.times[..., 0], curve.times[..., -1]
     if curve.times.ndim > 1:

@@ -5,20 +5,21 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
 from ._archive import VERSION, Entries, Stored, entry, read_array, read_space
-from ._arrays import as_array, cast, whole_number
-from ._core import ValidationError
+from ._arrays import as_array, cast, refuse, whole_number
+from ._core import CutLocusError, ValidationError
 from ._curve import Curve
-from ._curves.control import checked_knots, checked_points, control_array
 from ._curves.curve import NORMS
+from ._curves.ends import ends_of
+from ._curves.fit import Points, validated
 from ._curves.integrals import EXACT
 from ._curves.reduced import reduced
+from ._faults import of_index
 from ._options import quantity_of
-from ._spaces import Product, Space
-from ._spaces import space as space_named
+from ._spaces import Array, Doubles, Product, Space, point_tol, space_named
 from ._time import onto_ends
 from ._typing import FloatArray, P
 from .manifolds._manifold import refuse_functions
@@ -75,14 +76,12 @@ class BSpline(Curve[P]):
     _format = "symspline-bspline"
     _curve: ControlledCurve
 
-    def __init__(
-        self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str
-    ) -> None:
+    def __init__(self, knots: ArrayLike, control_points: ArrayLike, degree: int, space: Space[P] | str) -> None:
         space = _factor(space)
         degree = whole_number(degree, "degree", 1)
-        doubles, tol = control_array(control_points, space, 2)
-        knots = checked_knots(knots, space._lead(doubles)[-1], degree)
-        self._curve = ControlledCurve(space, knots, checked_points(space, doubles, tol), degree)
+        doubles, tol = _control_array(control_points, space, 2)
+        knots = _checked_knots(knots, space._lead(doubles)[-1], degree)
+        self._curve = ControlledCurve(space, knots, _checked_points(space, doubles, tol), degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """Evaluate the curve or its derivatives.
@@ -135,7 +134,7 @@ class BSpline(Curve[P]):
         speeds: FloatArray = self._curve.evaluate(self._times(x), "speed")[()]
         return speeds
 
-    def _times(self, x: ArrayLike) -> NDArray[np.float64]:
+    def _times(self, x: ArrayLike) -> Doubles:
         """Return times in the domain of the curve as float64."""
         times = as_array(x, "x")
         if times.dtype.kind not in "biuf":
@@ -143,11 +142,12 @@ class BSpline(Curve[P]):
         start, end = self.domain
         times, _ = onto_ends(cast(times), np.array([start, end]), (), False, times.dtype)
         outside = ~((times >= start) & (times <= end))
-        if outside.any():
-            index = np.argwhere(outside)[0].tolist()
-            time = times[tuple(index)]
-            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(time) else "not finite"
-            raise ValidationError(f"x{index or ''} = {time} is {where}")
+
+        def say(i: Any) -> str:
+            where = f"outside the domain [{start}, {end}] of the curve" if np.isfinite(times[i]) else "not finite"
+            return f"= {times[i]} is {where}"
+
+        refuse(outside, "x", say)
         return times
 
     @property
@@ -156,7 +156,7 @@ class BSpline(Curve[P]):
         return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
 
     @property
-    def knots(self) -> NDArray[np.float64]:
+    def knots(self) -> Doubles:
         """Knots, shape (n + degree + 1,)."""
         return self._curve.knots
 
@@ -187,14 +187,8 @@ class BSpline(Curve[P]):
         return self
 
     def _state(self) -> dict[str, Any]:
-        return {
-            "format": self._format,
-            "version": VERSION,
-            "space": self.space,
-            "knots": self.knots,
-            "control_points": self.control_points,
-            "degree": self.degree,
-        }
+        head = {"format": self._format, "version": VERSION, "space": self.space}
+        return head | {"knots": self.knots, "control_points": self.control_points, "degree": self.degree}
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
@@ -203,13 +197,11 @@ class BSpline(Curve[P]):
         if isinstance(state, Stored):
             with entry("control_points"):
                 # They keep the values that they had after projection.
-                checked_points(space, *control_array(control, space, 2))
+                _checked_points(space, *_control_array(control, space, 2))
             with entry("degree"):
                 degree = whole_number(degree, "degree", 1)
             with entry("knots"):
-                knots = checked_knots(
-                    knots, space._lead(space._doubles(control, "control_points"))[-1], degree
-                )
+                knots = _checked_knots(knots, space._lead(space._doubles(control, "control_points"))[-1], degree)
         return cls._of(space, knots, control, degree)
 
     def __eq__(self, other: object) -> bool:
@@ -224,10 +216,8 @@ class BSpline(Curve[P]):
 
     def __repr__(self) -> str:
         count = self._curve.control_points.shape[-1 - len(self.space.point_shape)]
-        curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
-        return (
-            f"<{type(self).__name__} on {self.space!r}: {curves}{count} control points, degree {self.degree}>"
-        )
+        what = f"{self._batch_text}{count} control points, degree {self.degree}"
+        return f"<{type(self).__name__} on {self.space!r}: {what}>"
 
 
 class ControlledCurve:
@@ -241,9 +231,7 @@ class ControlledCurve:
 
     quad_rtol = EXACT
 
-    def __init__(
-        self, space: Space[Any], knots: NDArray[np.float64], control_points: Any, degree: int
-    ) -> None:
+    def __init__(self, space: Space[Any], knots: Doubles, control_points: Any, degree: int) -> None:
         self.space, self.knots, self.control_points, self.degree = space, knots, control_points, degree
         self.times = np.unique(knots[degree : knots.size - degree])
         control_points.flags.writeable = knots.flags.writeable = False
@@ -253,21 +241,15 @@ class ControlledCurve:
         shape: tuple[int, ...] = self.control_points.shape
         return shape[: len(shape) - len(self.space.point_shape) - 1]
 
-    def evaluate(
-        self, x: NDArray[np.float64], quantity: str, outside: str = "raise", per_curve: bool = False
-    ) -> Any:
+    def evaluate(self, x: Doubles, quantity: str, outside: str = "raise", per_curve: bool = False) -> Any:
         """A quantity at times in the domain; with ``per_curve`` x has the batch axes, along which it is constant."""
         if per_curve:
             x = np.ascontiguousarray(x[(0,) * len(self.batch)])
         space, control, span = reduced(self.space, self.control_points)
-        values = _core.evaluate_bspline(
-            space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity
-        )
+        values = _core.evaluate_bspline(space._handle, self.knots, space._as_doubles(control), self.degree, x, quantity)
         if quantity in NORMS:
             return values
-        return (
-            space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
-        )
+        return space._numbers(values) if span is None else span.embed_samples(space._numbers(values), self.batch)
 
 
 class BezierCurve(BSpline[P]):
@@ -321,7 +303,7 @@ class BezierCurve(BSpline[P]):
 
     def __init__(self, control_points: ArrayLike, space: Space[P] | str) -> None:
         space = _factor(space)
-        count = space._lead(control_array(control_points, space, 2)[0])[-1]
+        count = space._lead(_control_array(control_points, space, 2)[0])[-1]
         super().__init__([0.0] * count + [1.0] * count, control_points, count - 1, space)
 
     @classmethod
@@ -329,9 +311,7 @@ class BezierCurve(BSpline[P]):
         curve = super()._from_state(state)
         count = curve.degree + 1
         if curve.knots.tolist() != [0.0] * count + [1.0] * count:
-            raise ValidationError(
-                "entry 'knots' must be zeros and ones, as many of either as there are points"
-            )
+            raise ValidationError("entry 'knots' must be zeros and ones, as many of either as there are points")
         return curve
 
 
@@ -344,3 +324,72 @@ def _factor(space: Space[P] | str) -> Space[P]:
         )
     refuse_functions(space, "B-spline and Bézier curves are not made")
     return space
+
+
+def _control_array(value: ArrayLike, space: Space[Any], least: int) -> tuple[Doubles, float]:
+    """Return control points as floating-point numbers of the core, and their tolerance."""
+    array = space._array(value, "control_points")
+    doubles = space._doubles(array, "control_points") if array.ndim > len(space.point_shape) else None
+    if doubles is None or array.size == 0 or space._lead(doubles)[-1] < least:
+        shape = ", ".join(map(str, space.point_shape))
+        raise ValidationError(
+            f"control_points has shape {array.shape}; a curve needs shape (..., n, {shape}) with n >= {least}"
+        )
+    return doubles, point_tol(array.dtype)
+
+
+def _checked_points(space: Space[Any], doubles: Doubles, tol: float) -> Array:
+    """Project control points onto the space.
+
+    Raises
+    ------
+    ValidationError
+        If a control point is not on the space.
+    CutLocusError
+        If two neighbouring control points are not joined by a unique shortest geodesic.
+    """
+    *batch, count = space._lead(doubles)
+    data, ends = Points(doubles, tol, tuple(batch), count), ends_of("natural", space, tuple(batch))
+    try:
+        (points,), _ = validated(space, np.arange(count, dtype=np.float64), [data], [ends])
+    except ValidationError as error:
+        raise ValidationError(str(error).replace("points[", "control_points[")) from None
+    p, q = space._neighbours(points)
+    try:
+        space._apply("log", p=p, q=q)
+    except CutLocusError as error:
+        row, _, why = str(error).removeprefix("pair ").partition(": the points ")
+        *curve, i = map(int, np.unravel_index(int(row), (*batch, count - 1)))
+        raise CutLocusError(f"control_points[{i}] and control_points[{i + 1}]{of_index(curve)} {why}") from None
+    return points
+
+
+def _checked_knots(knots: ArrayLike, count: int, degree: int) -> Doubles:
+    """Return a copy of the knots of a B-spline with `count` control points after validation."""
+    array = as_array(knots, "knots")
+    if array.ndim != 1 or array.dtype.kind not in "biuf":
+        raise ValidationError(
+            f"knots must be a one-dimensional array of real numbers, not {array.dtype} of shape {array.shape}"
+        )
+    needed = count + degree + 1
+    if count <= degree:
+        raise ValidationError(f"degree {degree} needs at least {degree + 1} control points, got {count}")
+    if array.size != needed:
+        raise ValidationError(f"{count} control points of degree {degree} need {needed} knots, got {array.size}")
+    result = cast(array.copy())
+    refuse(~np.isfinite(result), "knots", lambda _: "is not finite")
+    falls = np.flatnonzero(result[1:] < result[:-1])
+    if falls.size:
+        raise ValidationError(f"knots[{falls[0] + 1}] = {result[falls[0] + 1]} is before knots[{falls[0]}]")
+    if not np.isfinite(float(result[-1]) - float(result[0])):
+        raise ValidationError("knots span more than the floating-point range")
+    times, repeats = np.unique(result, return_counts=True)
+    if repeats.max() > degree + 1:
+        most = np.argmax(repeats)
+        raise ValidationError(
+            f"knots repeat {times[most]} {repeats[most]} times; with degree {degree} a knot may repeat at most "
+            f"{degree + 1} times"
+        )
+    if not result[degree] < result[count]:
+        raise ValidationError(f"the domain of the curve is empty: knots[{degree}] and knots[{count}] are equal")
+    return result

@@ -55,12 +55,7 @@ def validate(
     skip_invalid: bool = False,
 ) -> tuple[_Doubles, list[_Fault]]: ...
 def hermite(
-    handle: Handle,
-    t: _Doubles,
-    points: _Doubles,
-    velocities: _Doubles,
-    point_tol: float,
-    tangent_tol: float,
+    handle: Handle, t: _Doubles, points: _Doubles, velocities: _Doubles, point_tol: float, tangent_tol: float
 ) -> list[_Doubles]: ...
 def evaluate(
     handle: Handle,
@@ -98,19 +93,10 @@ def transport(
 ) -> _Doubles: ...
 def lift_knots(handle: Handle, t: _Doubles, points: _Doubles, velocities: _Doubles) -> _Doubles: ...
 def evaluate_bspline(
-    handle: Handle,
-    knots: _Doubles,
-    control: _Doubles,
-    degree: int,
-    x: _Doubles,
-    quantity: str,
+    handle: Handle, knots: _Doubles, control: _Doubles, degree: int, x: _Doubles, quantity: str
 ) -> _Doubles: ...
-def push(
-    handle: Handle, curves: object, points: _Doubles, knots: _Doubles, ends: list[_Doubles]
-) -> _Doubles: ...
-def pull(
-    handle: Handle, curves: object, cotangent: _Doubles
-) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
+def push(handle: Handle, curves: object, points: _Doubles, knots: _Doubles, ends: list[_Doubles]) -> _Doubles: ...
+def pull(handle: Handle, curves: object, cotangent: _Doubles) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles]: ...
 def smooth(
     handle: Handle,
     t: _Doubles,

@@ -11,22 +11,19 @@ from numpy.typing import ArrayLike
 from ._archive import Entries, read_fitted
 from ._base_curve import SegmentedCurve
 from ._core import ValidationError
-from ._curves.curve import CurveArrays
+from ._curves.curve import CurveArrays, Gradient, SampleTimes
 from ._curves.derivatives import sample_times
 from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
-from ._curves.energy import alternative_energy
-from ._curves.fit import Fit, FitProblem, curve_of, fit, mask_of, read, read_ends
-from ._curves.gradient import Gradient, SampleTimes
+from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
+from ._curves.integrals import alternative_energy
 from ._curves.product import longest_step
-from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._options import extrapolation_mode, fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space
-from ._spaces import space as space_named
+from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
-from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, TimesLike
+from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
 
 class CubicSpline(SegmentedCurve[P]):
@@ -168,16 +165,8 @@ class CubicSpline(SegmentedCurve[P]):
         time_axis, shown_times, times = knots_of(t, batch, nodes)
         ends = read_ends(bc_type, space, batch)
         skip_invalid = bool(batch) and on_failure != "raise"
-        problem = FitProblem(
-            space,
-            times,
-            data,
-            ends,
-            options,
-            bool(check),
-            None if where is None else mask_of(where, batch),
-            skip_invalid,
-        )
+        mask = None if where is None else mask_of(where, batch)
+        problem = Problem(space, times, data, ends, options, bool(check), mask, skip_invalid)
         try:
             found = fit(problem, progress)
         except ValidationError as error:
@@ -365,7 +354,7 @@ class CubicSpline(SegmentedCurve[P]):
     def _product_report(self) -> Report:
         """Report of all factors, computed on first access because it costs more than a fit of few points."""
         curve, reports = self._curve, self._reports
-        other = alternative_energy(curve, reports)
+        other = alternative_energy(curve.parts, reports)
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
@@ -382,22 +371,14 @@ class CubicSpline(SegmentedCurve[P]):
     # ---- batches ----
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
-        return CubicSpline._of(
-            time_axis,
-            t,
-            curve,
-            take_batch(self._bc_type, index, len(self._batch), self.space),
-            self._extrapolate,
-            [report.map(lambda column: column[index]) for report in self._reports],
-        )
+        ends = take_batch(self._bc_type, index, len(self._batch), self.space)
+        reports = [report.map(lambda column: column[index]) for report in self._reports]
+        return CubicSpline._of(time_axis, t, curve, ends, self._extrapolate, reports)
 
     # ---- files, pickles and text ----
 
     def _state(self) -> dict[str, Any]:
-        return super()._state() | {
-            "bc_type": self._bc_type,
-            "report": [vars(report) for report in self._reports],
-        }
+        return super()._state() | {"bc_type": self._bc_type, "report": [vars(report) for report in self._reports]}
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
@@ -405,9 +386,8 @@ class CubicSpline(SegmentedCurve[P]):
 
     def __repr__(self) -> str:
         knots = self._times.shape[-1]
-        curves = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         bc = self._bc_type if isinstance(self._bc_type, str) else "custom end conditions"
-        return f"<CubicSpline on {self.space!r}: {curves}{knots} points, {bc}>"
+        return f"<CubicSpline on {self.space!r}: {self._batch_text}{knots} points, {bc}>"
 
     # Title of plots.
     _kind = "C² spline"

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _archive
 from ._arrays import short_repr
-from ._curves.energy import Evaluable, bending_energy
-from ._curves.integrals import integrate
+from ._curves.integrals import Evaluable, bending_energy, integrate
 from ._spaces import Space
 from ._typing import File, Number, P, Time
 
@@ -149,6 +148,11 @@ class Curve(ABC, Generic[P]):
     @property
     def _batch(self) -> tuple[int, ...]:
         return self._curve.batch
+
+    @property
+    def _batch_text(self) -> str:
+        """The batch in the representation of the curve."""
+        return f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
 
     @abstractmethod
     def _picked(self, index: Any) -> Self:

@@ -7,7 +7,8 @@ import io
 import os
 import secrets
 import stat
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -47,9 +48,7 @@ def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -
             raise TypeError(f"{name} must be open {mode}; pass its name, or open it so")
         return None
     if not isinstance(file, (str, os.PathLike)):
-        raise TypeError(
-            f"{name} must be a path or an open file with a method {method}, not {short_repr(file)}"
-        )
+        raise TypeError(f"{name} must be a path or an open file with a method {method}, not {short_repr(file)}")
     path = os.fspath(file)
     if not isinstance(path, str):
         raise TypeError(f"{name} must be a path of text, not {short_repr(path)}")
@@ -58,17 +57,14 @@ def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -
     try:
         os.fsencode(path)
     except UnicodeEncodeError:
-        raise ValidationError(
-            f"{name} = {short_repr(path)} is not the name of a file: it is not Unicode"
-        ) from None
+        raise ValidationError(f"{name} = {short_repr(path)} is not the name of a file: it is not Unicode") from None
     if "\0" in path:
-        raise ValidationError(
-            f"{name} = {short_repr(path)} is not the name of a file: it holds a null character"
-        )
+        raise ValidationError(f"{name} = {short_repr(path)} is not the name of a file: it holds a null character")
     return Path(path)
 
 
-class replacing:
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
     """Write a file as a whole: a context whose value is a temporary path, which takes the place of ``path``.
 
     The temporary file lies in the same folder and has the same ending. If the body fails it is removed, and an
@@ -81,56 +77,42 @@ class replacing:
     OSError
         ``path`` is a folder, a device, a pipe or a socket, or cannot be written.
     """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __enter__(self) -> Path:
-        # Raises for links that go in circles; a link to nothing becomes a file where it points.
-        with suppress(FileNotFoundError):
-            os.stat(self.path)
-        self.target = Path(os.path.realpath(self.path))
-        self.old: os.stat_result | None = None
-        with suppress(FileNotFoundError):
-            self.old = os.stat(self.target)
-        if self.old is not None and not stat.S_ISREG(self.old.st_mode):
-            raise _not_regular(self.path, self.old.st_mode)
-        self.temporary = self.target.with_name(f".{secrets.token_hex(8)}{self.target.name[-_TAIL:]}")
-        # A new file has the permissions of any new file. One that replaces another gets those at the end, and until
-        # then nobody else may read it.
-        mode = 0o666 if self.old is None else 0o600
-        os.close(os.open(self.temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
-        return self.temporary
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        try:
-            if kind is None:
-                self._finish()
-        finally:
-            with suppress(FileNotFoundError):
-                self.temporary.unlink()
-
-    def _finish(self) -> None:
-        with open(self.temporary, "rb+") as file:
+    # Raises for links that go in circles; a link to nothing becomes a file where it points.
+    with suppress(FileNotFoundError):
+        os.stat(path)
+    target = Path(os.path.realpath(path))
+    old: os.stat_result | None = None
+    with suppress(FileNotFoundError):
+        old = os.stat(target)
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        raise _not_regular(path, old.st_mode)
+    temporary = target.with_name(f".{secrets.token_hex(8)}{target.name[-_TAIL:]}")
+    # A new file has the permissions of any new file. One that replaces another gets those at the end, and until then
+    # nobody else may read it.
+    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if old is None else 0o600))
+    try:
+        yield temporary
+        with open(temporary, "rb+") as file:
             os.fsync(file.fileno())
-        if self.old is not None:
-            self._keep(self.old)
-        self.temporary.replace(self.target)
+        if old is not None:
+            _keep(temporary, old)
+        temporary.replace(target)
+    finally:
+        with suppress(FileNotFoundError):
+            temporary.unlink()
 
-    def _keep(self, old: os.stat_result) -> None:
-        """Owner and permissions of the file that is replaced."""
-        new = os.stat(self.temporary)
-        if hasattr(os, "chown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
-            with suppress(OSError):
-                os.chown(self.temporary, old.st_uid, old.st_gid)
-        os.chmod(self.temporary, stat.S_IMODE(old.st_mode))
+
+def _keep(temporary: Path, old: os.stat_result) -> None:
+    """Keep owner and permissions of the file that is replaced."""
+    new = os.stat(temporary)
+    if hasattr(os, "chown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
+        with suppress(OSError):
+            os.chown(temporary, old.st_uid, old.st_gid)
+    os.chmod(temporary, stat.S_IMODE(old.st_mode))
 
 
 def _not_regular(path: Path, mode: int) -> OSError:
     if stat.S_ISDIR(mode):
         return IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
-    return OSError(
-        errno.EINVAL,
-        "it is a device, a pipe or a socket, not a regular file; pass an open file instead",
-        str(path),
-    )
+    what = "it is a device, a pipe or a socket, not a regular file; pass an open file instead"
+    return OSError(errno.EINVAL, what, str(path))

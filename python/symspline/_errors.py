@@ -50,9 +50,7 @@ def raise_or_warn(faults: list[Fault], on_failure: str, spline: Any) -> None:
         warn(message, UserWarning, almost[0].batch_index(batch), almost[0].node)
 
 
-def warn(
-    message: str, category: type[Warning], curve: tuple[int, ...] | None = None, node: int | None = None
-) -> None:
+def warn(message: str, category: type[Warning], curve: tuple[int, ...] | None = None, node: int | None = None) -> None:
     """Issue a warning at the line that called this package.
 
     The warning has the attributes ``curve`` and ``node`` of a `SymsplineError`.

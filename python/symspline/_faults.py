@@ -9,6 +9,7 @@ import numpy as np
 
 from ._report import Columns
 
+_SUIT = "choose times that suit the distances"
 CUT_LOCUS, UNCONVERGED, INVALID, ALMOST_CUT = "cut-locus", "unconverged", "invalid", "almost-cut"
 
 
@@ -65,22 +66,23 @@ CoreFault = tuple[int, str, int | None, float, float, str | None]
 
 def of_curve(number: int, batch: Sequence[int]) -> str:
     """Return " of curve ..." for a curve of a batch, or an empty text for a single curve."""
-    return f" of curve {','.join(map(str, np.unravel_index(number, batch)))}" if batch else ""
+    return of_index(np.unravel_index(number, batch)) if batch else ""
+
+
+def of_index(index: Sequence[Any]) -> str:
+    """Return " of curve ..." for an index in a batch, or an empty text for the index ()."""
+    return f" of curve {','.join(map(str, index))}" if index else ""
 
 
 def unconverged(number: int, columns: Columns, tol: float, more_advice: str = "") -> Fault:
     """Return the fault of a curve whose residual exceeds the tolerance."""
     residual, iterations, longest = (columns.row(x)[number] for x in ("residual", "iterations", "max_step"))
-    return Fault(
-        number,
-        UNCONVERGED,
-        f"no convergence{{of}}: residual {residual:.3e} after {iterations} iterations (tol {tol:.1e}, longest "
-        f"step {_length(longest)})",
-        f"put more points where steps are long, choose times that suit the distances, or raise max_iter{more_advice}",
-        value=float(residual),
-        limit=tol,
-        about_times=True,
+    reached = f"residual {residual:.3e} after {iterations} iterations"
+    what = f"no convergence{{of}}: {reached} (tol {tol:.1e}, longest step {_length(longest)})"
+    remedy = (
+        f"put more points where steps are long, choose times that suit the distances, or raise max_iter{more_advice}"
     )
+    return Fault(number, UNCONVERGED, what, remedy, None, float(residual), tol, about_times=True)
 
 
 def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -> Fault:
@@ -96,67 +98,40 @@ def from_core(raw: CoreFault, columns: Columns, tol: float, quaternions: bool) -
         Whether points may be unit quaternions, whose inconsistent signs are the usual cause of antipodes.
     """
     number, kind, node, value, limit, why = raw
-    i, after = (node, node + 1) if node is not None else (None, None)
-    times = "choose times that suit the distances"
-
-    def fault(kind: str, what: str, remedy: str, about_times: bool = False) -> Fault:
-        return Fault(number, kind, what, remedy, node, value, limit, about_times)
-
     if kind == "invalid":
-        return fault(INVALID, str(why), "")
-    longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]
+        return Fault(number, INVALID, str(why), "", node, value, limit)
+    own, about_times = CUT_LOCUS, False
+    handle, pair = f"the control handle at points[{node}]{{of}}", f"points[{node}] and points[{(node or 0) + 1}]{{of}}"
+    past = f"lie at or past each other's cut locus: angle {value}, limit {limit}"
     if kind == "almost-cut":
-        return fault(
-            ALMOST_CUT,
-            f"neighbours almost at the cut locus: between points[{i}] and points[{after}]{{of}} the angle is {value}, "
-            f"limit {limit}; had it been a little more, the curve would go the other way round: put a point between "
-            "them",
-            "",
+        own, remedy = ALMOST_CUT, ""
+        what = (
+            f"neighbours almost at the cut locus: between {pair} the angle is {value}, limit {limit}; had it been a "
+            "little more, the curve would go the other way round: put a point between them"
         )
-    if kind == "cut-locus":
-        return fault(
-            CUT_LOCUS,
-            f"points[{i}] and points[{after}]{{of}} lie at or past each other's cut locus: angle {value}, "
-            f"limit {limit}",
-            "put a point between them" + (", or check their sign" if quaternions else ""),
-        )
-    if kind == "outer-handle" and limit == float("inf"):
-        return fault(
-            UNCONVERGED,
-            f"the control handle at points[{i}]{{of}} has length {value:.1f}, too long for floating-point numbers",
-            f"{times}: the segments next to it differ too much in length",
-            about_times=True,
-        )
-    if kind == "outer-handle":
-        return fault(
-            CUT_LOCUS,
-            f"the control handle at points[{i}]{{of}} passes the cut locus: angle {value}, limit {limit}",
-            f"put more points there, or {times}",
-            about_times=True,
-        )
-    if kind == "inner-handles":
-        return fault(
-            CUT_LOCUS,
-            f"the control points between points[{i}] and points[{after}]{{of}} lie at or past each other's cut locus: "
-            f"angle {value}, limit {limit}",
-            f"put a point between them, or {times}",
-        )
-    if kind == "homotopy":
-        return fault(
-            UNCONVERGED,
-            f"no convergence{{of}}: after {iterations} iterations the homotopy did not reach these points (longest "
-            f"step {_length(longest)})",
-            "try another method, put more points where steps are long, or choose times that suit the distances",
-        )
-    if kind == "overflow":
-        return fault(
-            UNCONVERGED,
-            f"no convergence{{of}}: after {iterations} iterations numbers exceeded the floating-point range (longest "
-            f"step {_length(longest)})",
-            "put more points where steps are long, or choose times that suit the distances",
-            about_times=True,
-        )
-    return unconverged(number, columns, tol)
+    elif kind == "cut-locus":
+        what = f"{pair} {past}"
+        remedy = "put a point between them" + (", or check their sign" if quaternions else "")
+    elif kind == "inner-handles":
+        what = f"the control points between {pair} {past}"
+        remedy = f"put a point between them, or {_SUIT}"
+    elif kind == "outer-handle" and limit == float("inf"):
+        own, about_times = UNCONVERGED, True
+        what = f"{handle} has length {value:.1f}, too long for floating-point numbers"
+        remedy = f"{_SUIT}: the segments next to it differ too much in length"
+    elif kind == "outer-handle":
+        about_times = True
+        what = f"{handle} passes the cut locus: angle {value}, limit {limit}"
+        remedy = f"put more points there, or {_SUIT}"
+    elif kind in ("homotopy", "overflow"):
+        own, about_times = UNCONVERGED, kind == "overflow"
+        longest, iterations = columns.row("max_step")[number], columns.row("iterations")[number]
+        why = "numbers exceeded the floating-point range" if about_times else "the homotopy did not reach these points"
+        what = f"no convergence{{of}}: after {iterations} iterations {why} (longest step {_length(longest)})"
+        remedy = f"{'' if about_times else 'try another method, '}put more points where steps are long, or {_SUIT}"
+    else:
+        return unconverged(number, columns, tol)
+    return Fault(number, own, what, remedy, node, value, limit, about_times)
 
 
 def _length(x: Any) -> str:

@@ -117,9 +117,7 @@ def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
         raise ValidationError("curves must be a mapping with at least one curve, whose keys are text")
     for name, curve in curves.items():
         if curve._batch:
-            raise ValidationError(
-                f"curves[{name!r}] is a batch. Save it by itself, or pass its curves one by one."
-            )
+            raise ValidationError(f"curves[{name!r}] is a batch. Save it by itself, or pass its curves one by one.")
     states = [curve._state() for curve in curves.values()]
     names, first = list(curves), states[0]
     for name, state in zip(names, states, strict=True):
@@ -142,14 +140,13 @@ def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:
 
 def _layout(state: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parts of a state that all curves of a file must share."""
-    return {
-        key: value
-        if key in _SHARED
-        else (value.dtype, value.shape[1:])
-        if isinstance(value, np.ndarray)
-        else ()
-        for key, value in state.items()
-    }
+
+    def shared(key: str, value: Any) -> Any:
+        if key in _SHARED:
+            return value
+        return (value.dtype, value.shape[1:]) if isinstance(value, np.ndarray) else ()
+
+    return {key: shared(key, value) for key, value in state.items()}
 
 
 def _restored(state: Stored) -> Any:
@@ -177,9 +174,7 @@ def _states(state: Stored) -> Iterator[tuple[str, Entries]]:
         raise ValidationError(f"entry 'rows' must have the numbers of rows of {', '.join(arrays)}")
     for key, value in sorted(lists.items()) + sorted(rows.items()):
         if not isinstance(value, list) or len(value) != len(names):
-            raise ValidationError(
-                f"entry {key!r} must be a list with one value for each of {len(names)} curves"
-            )
+            raise ValidationError(f"entry {key!r} must be a list with one value for each of {len(names)} curves")
     for key, counts in rows.items():
         if not all(type(count) is int and count >= 0 for count in counts) or sum(counts) != len(arrays[key]):
             raise ValidationError(

@@ -8,17 +8,17 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import short_repr
+from ._arrays import refuse, short_repr
 from ._base_curve import evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves import fit as fitting
 from ._curves.curve import CurveArrays
 from ._curves.ends import freeze_bc_type, take_batch
-from ._curves.solve import Progress
 from ._errors import raise_or_warn
 from ._input import in_library, library_of
 from ._options import (
+    EvaluationOptions,
     check_progress,
     checked_extrapolate,
     extrapolation_mode,
@@ -28,8 +28,7 @@ from ._options import (
 )
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of, point_tol
-from ._spaces import space as space_named
+from ._spaces import Array, Space, factors_of, parts_of, point_tol, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import (
     AnyArray,
@@ -42,6 +41,7 @@ from ._typing import (
     Out,
     P,
     PointsLike,
+    Progress,
     TimesLike,
 )
 
@@ -104,10 +104,8 @@ def evaluate(
     x: TimesLike,
     *,
     nu: int = 0,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
-    progress: Progress | None = None,
     out: None = None,
+    **options: Unpack[EvaluationOptions],
 ) -> P: ...
 
 
@@ -120,10 +118,8 @@ def evaluate(
     x: TimesLike,
     *,
     nu: int = 0,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
-    progress: Progress | None = None,
     out: Out,
+    **options: Unpack[EvaluationOptions],
 ) -> Out: ...
 
 
@@ -201,9 +197,7 @@ def evaluate(
     return values if out is not None else in_library(library_of(*libraries), values)
 
 
-def _nodes_around(
-    t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any
-) -> tuple[Any, Any, Any]:
+def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Space, x: Any) -> tuple[Any, Any, Any]:
     """Return the knots, points and velocities of the segments in which times lie.
 
     All nodes are returned if they are not plain arrays or too few for a gain. Each segment is determined by its two
@@ -236,27 +230,27 @@ def _nodes_around(
     return t[start:stop], arrays[0], arrays[1]
 
 
-def given(
-    t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]
-) -> tuple[TimeAxis, CurveArrays]:
+def given(t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]) -> tuple[TimeAxis, CurveArrays]:
     """Return the time axis and the curve with the given knots, points and velocities, after validation."""
     data = fitting.read(points, space)
-    own = parts_of(velocities, space, "velocities")
-    read = [
-        velocities_of(*each)[0]
-        for each in zip(factors_of(space), (part.numbers for part in data), own, strict=True)
-    ]
+    own = read_velocities(velocities, space, data)
     batch, nodes = data[0].batch, data[0].nodes
     time_axis, _, times = knots_of(t, batch, nodes)
     try:
         on_space, _ = fitting.validated(space, times, data, fitting.read_ends("natural", space, batch))
     except ValidationError as error:
         raise time_axis.explain(error) from None
-    arrays = list(zip(on_space, read, strict=True))
+    arrays = [(points, numbers) for points, (numbers, _) in zip(on_space, own, strict=True)]
     return time_axis, fitting.curve_of(space, times, arrays, fitted=False)
 
 
-def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
+def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Points]) -> list[tuple[Array, float]]:
+    """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
+    each = zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True)
+    return [_velocities(factor, part.numbers, own) for factor, part, own in each]
+
+
+def _velocities(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
     """Return velocities in one factor, after checks of their shape and numbers, and how far they may be from tangent.
 
     The array has flags of its own, so that making it read-only leaves the user's array as it is.
@@ -265,12 +259,8 @@ def velocities_of(space: Space, points: Array, velocities: Any) -> tuple[Array, 
     doubles = space._doubles(array, "velocities")
     numbers = space._numbers(doubles).view()
     if doubles.shape != points.shape:
-        raise ValidationError(
-            f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}"
-        )
-    if not np.isfinite(numbers).all():
-        index = np.argwhere(~np.isfinite(numbers))[0].tolist()
-        raise ValidationError(f"velocities{index} is not finite")
+        raise ValidationError(f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}")
+    refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
     return numbers, point_tol(array.dtype)
 
 
@@ -351,7 +341,7 @@ def fit_many(
             raise ValidationError(str(error))._of_curve(number) from None
     ends = fitting.read_ends(bc_type, space, (len(pairs),))
     times = [times for *_, times in knots]
-    problem = fitting.ManyProblem(
+    problem = fitting.Problem(
         space, times, points, ends, options, bool(check), mask, skip_invalid=on_failure != "raise"
     )
     fits, faults = fitting.fit_many(problem, progress)

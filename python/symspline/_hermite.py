@@ -11,11 +11,10 @@ from ._base_curve import SegmentedCurve
 from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
-from ._functional import velocities_of
+from ._functional import read_velocities
 from ._options import checked_extrapolate, extrapolation_mode, with_atol
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of
-from ._spaces import space as space_named
+from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import BCType, Extrapolate, P, PointsLike, TimesLike
 
@@ -110,11 +109,7 @@ class HermiteSpline(SegmentedCurve[P]):
         if atol is not None:
             data = with_atol(data, atol)
         batch, nodes = data[0].batch, data[0].nodes
-        given = parts_of(velocities, space, "velocities")
-        vectors = [
-            velocities_of(factor, part.numbers, own)
-            for factor, part, own in zip(factors_of(space), data, given, strict=True)
-        ]
+        vectors = read_velocities(velocities, space, data)
         time_axis, shown_times, times = knots_of(t, batch, nodes)
         try:
             found = hermite_data(space, times, data, vectors)
@@ -142,9 +137,7 @@ class HermiteSpline(SegmentedCurve[P]):
         return cls._of(time_axis, knots, curve, extrapolate)
 
     def __repr__(self) -> str:
-        batch = self._curve.batch
-        curves = f"{' x '.join(map(str, batch))} curves, " if batch else ""
-        return f"<HermiteSpline on {self.space!r}: {curves}{self._curve.times.shape[-1]} points>"
+        return f"<HermiteSpline on {self.space!r}: {self._batch_text}{self._curve.times.shape[-1]} points>"
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         return HermiteSpline._of(time_axis, t, curve, self._extrapolate)

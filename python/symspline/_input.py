@@ -13,20 +13,9 @@ from ._core import ValidationError
 
 _SIMPLE = {bool, int, float, complex, str, np.ndarray, np.float64, np.float32, np.int64, np.complex128}
 # Attributes that convert an object to an array, in the order in which messages suggest them.
-_CONVERSIONS = (
-    "as_matrix",
-    "full",
-    "to_numpy",
-    "datetime64",
-    "numpy",
-    "toarray",
-    "todense",
-    "magnitude",
-    "as_array",
-)
+_CONVERSIONS = ("as_matrix", "full", "to_numpy", "datetime64", "numpy", "toarray", "todense", "magnitude", "as_array")
 ISO_DATE = re.compile(
-    r"(?P<body>\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?)?) ?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?",
-    re.ASCII,
+    r"(?P<body>\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?)?) ?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?", re.ASCII
 )
 UTC_ZONE, NO_ZONE = "UTC", "none"
 
@@ -68,9 +57,7 @@ def _tensor(value: Any, name: str) -> Any:
     try:
         return value.numpy()
     except (TypeError, RuntimeError) as error:
-        raise ValidationError(
-            f"{name} cannot be converted to an array: {error}; pass {name}.double()"
-        ) from None
+        raise ValidationError(f"{name} cannot be converted to an array: {error}; pass {name}.double()") from None
 
 
 def _quantum(value: Any, name: str) -> Any:
@@ -190,9 +177,7 @@ def _moments(array: NDArray[Any], name: str) -> tuple[Any, str | None]:
     if len(set(zones)) > 1:
         i = zones.index(next(zone for zone in zones if zone != zones[0]))
         has = ["no time zone", "a time zone"][zones[0]]
-        raise ValidationError(
-            f"{name}{_index(i, array)} is {_short(cells[i])}, but {_short(first)} before has {has}"
-        )
+        raise ValidationError(f"{name}{_index(i, array)} is {_short(cells[i])}, but {_short(first)} before has {has}")
     return np.array([moment for moment, _ in pairs]).reshape(array.shape), UTC_ZONE if zones[0] else NO_ZONE
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ._core import ValidationError
 from ._curves.ends import is_closed
 from ._curves.fit import Points
 from ._curves.solve import Options
+from ._typing import Extrapolate, Progress
 
 _QUANTITIES = ("point", "velocity", "acceleration")
 _RAISE = "raise"
@@ -22,6 +23,14 @@ _EXTRAPOLATION_MODES = {
     "geodesic": "geodesic",
     "periodic": "periodic",
 }
+
+
+class EvaluationOptions(TypedDict, total=False):
+    """The keywords of an evaluation that do not affect the type of its result."""
+
+    extrapolate: Extrapolate
+    per_curve: bool
+    progress: Progress | None
 
 
 def quantity_of(nu: Any) -> str:
@@ -56,8 +65,7 @@ def checked_extrapolate(extrapolate: Any) -> Any:
     known = isinstance(extrapolate, str) and extrapolate in _EXTRAPOLATION_MODES
     if extrapolate is not None and not isinstance(extrapolate, bool) and not known:
         raise ValidationError(
-            "extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not "
-            f"{short_repr(extrapolate)}"
+            f"extrapolate must be None, 'raise', True, False, 'geodesic' or 'periodic', not {short_repr(extrapolate)}"
         )
     return extrapolate
 
@@ -74,13 +82,7 @@ def check_progress(progress: Any) -> None:
 
 
 def fit_options(
-    method: str,
-    tol: float,
-    max_iter: int | None,
-    extrapolate: Any,
-    on_failure: Any,
-    check: Any,
-    progress: Any,
+    method: str, tol: float, max_iter: int | None, extrapolate: Any, on_failure: Any, check: Any, progress: Any
 ) -> Options:
     """Return the options of the solver, after validation of all options of a fit.
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ._cubic import CubicSpline
 from ._functional import evaluate
-from ._spaces import Space
+from ._spaces import Array, Doubles, Space
 from .manifolds import Manifold
-
-Array = NDArray[Any]
-Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -60,8 +55,7 @@ class Segments:
 
     def at(self, x: Array, nu: int = 0) -> Array:
         """Evaluate every segment at its own times, the rows of x; shape (S, m, *point_shape)."""
-        values: Array = evaluate(self.t, self.points, self.velocities, self.space, x, nu=nu, per_curve=True)
-        return values
+        return np.asarray(evaluate(self.t, self.points, self.velocities, self.space, x, nu=nu, per_curve=True))
 
     def jumps(self, nu: int, closed: bool = False) -> Jumps:
         """Return the differences between the ends of segments and the starts of the next ones.

@@ -11,15 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, short_repr
+from ._arrays import as_array, brief, refuse, short_repr
 from ._core import ValidationError
 from ._disk import path_of, replacing
 from ._input import times_of
-from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
 from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert._reading import length, off_one, refuse
-
-Doubles = NDArray[np.float64]
+from .convert._reading import length, off_one
 
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
@@ -154,9 +152,7 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     '0.5 0.0 0.0 0.0 0.0 0.0 0.0 1.0\n'
     """
     r, x = split(_checked(poses))
-    write_tum_rows(
-        file, _seconds(t, len(x)), np.concatenate([x, _quaternions(r, scalar_first=False)], axis=1)
-    )
+    write_tum_rows(file, _seconds(t, len(x)), np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1))
 
 
 def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
@@ -224,11 +220,8 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     rows = _numbers(file, 12, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
     r = rows[:, :, :3]
     off = off_one(r)
-    refuse(
-        ~((off <= _ROUNDED) & (np.linalg.det(r) > 0)),
-        f"{_name(file)}: pose ",
-        lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}",
-    )
+    bad = ~((off <= _ROUNDED) & (np.linalg.det(r) > 0))
+    refuse(bad, f"{_name(file)}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
     t = np.arange(len(rows), dtype=float)
     if times is not None:
         t = _numbers(times, 1, "times of KITTI are one number a line", "times")[:, 0].copy()
@@ -346,7 +339,7 @@ def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
         refuse(np.abs(times.astype(np.float64)) > _LAST, "t", lambda i: f"is {times[i]}, after the year 2262")
         times = np.rint(1e9 * times.astype(np.float64)).astype(np.int64)
     ns = times.astype("datetime64[ns]").astype(np.int64).tolist()
-    values = np.concatenate([x, _quaternions(r, scalar_first=True)], axis=1).tolist()
+    values = np.concatenate([x, matrix_to_quaternion(r, scalar_first=True)], axis=1).tolist()
     _write(file, ([time, *row] for time, row in zip(ns, values, strict=True)), ",", _EUROC)
 
 
@@ -429,10 +422,6 @@ def _checked(poses: Any) -> Array:
     return g
 
 
-def _quaternions(r: Array, scalar_first: bool) -> Array:
-    return matrix_to_quaternion(r, scalar_first=scalar_first)
-
-
 def _moments(t: ArrayLike, count: int) -> Array:
     """Times to write: numbers of seconds, or dates."""
     times = as_array(times_of(t, "t")[0], "t")
@@ -455,13 +444,9 @@ def _seconds(t: ArrayLike, count: int) -> Doubles:
 def check_seconds(times: Array, name: str) -> None:
     """Raise if numbers look like milliseconds since 1970, or smaller units, where seconds are expected."""
     if times.dtype.kind in "iuf":
-        refuse(
-            np.abs(times.astype(np.float64)) > _FAR,
-            name,
-            lambda i: (
-                f"is {times[i]}, which cannot be seconds; convert nanoseconds to dates, .astype('datetime64[ns]')"
-            ),
-        )
+        bad = np.abs(times.astype(np.float64)) > _FAR
+        advice = "convert nanoseconds to dates, .astype('datetime64[ns]')"
+        refuse(bad, name, lambda i: f"is {times[i]}, which cannot be seconds; {advice}")
 
 
 # ---- lines ----
@@ -506,22 +491,17 @@ def _lines(file: Any, name: str = "file") -> list[Line]:
     if path is None:
         text = file.read()
         if not isinstance(text, str):
-            raise TypeError(
-                f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so"
-            )
+            raise TypeError(f"{name} must be open as text, without 'b' in its mode; pass its name, or open it so")
         text = text.removeprefix("\ufeff")
     else:
         opener: Any = gzip.open if path.suffix == ".gz" else open
         try:
             with opener(path, "rt", encoding="utf-8-sig") as opened:
                 text = opened.read()
-        except (UnicodeDecodeError, EOFError, zlib.error) as error:
-            what = (
-                "not text in UTF-8"
-                if isinstance(error, UnicodeDecodeError)
-                else "damaged: it cannot be decompressed"
-            )
-            raise ValidationError(f"{_name(file)} is {what}") from None
+        except UnicodeDecodeError:
+            raise ValidationError(f"{_name(file)} is not text in UTF-8") from None
+        except (EOFError, zlib.error):
+            raise ValidationError(f"{_name(file)} is damaged: it cannot be decompressed") from None
     lines = (Line(number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
     return [line for line in lines if line.text and not line.text.startswith("#")]
 

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Number = float | NDArray[np.float64]
+from ._typing import Number
+
 # A gap between points is long if it exceeds the median by this factor.
 _LONG = 10
 
@@ -140,20 +141,15 @@ class Report:
         else:
             state = f"{np.count_nonzero(converged)} of {converged.size} curves converged"
             many = "at most " if converged.size > 1 else ""
-        return (
+        text = (
             f"{state}: {self.method}, {many}{iterations} iterations, residual {many}{residual:.1e}, "
             f"longest step {_worst(self.max_step):.3g}, contraction {_worst(self.rate):.2g}"
-            f"{self._certificate()}{self._accuracy()}"
         )
-
-    def _certificate(self) -> str:
-        radius = self.invariant_radius
-        if radius is None or np.isnan(radius).any():
-            return ""
-        return f", control handles stay below {np.max(radius):.3g} (Theorem 3.1)"
-
-    def _accuracy(self) -> str:
-        return "" if self.velocity_error is None else f", velocities within {_worst(self.velocity_error):.1e}"
+        if self.invariant_radius is not None and not np.isnan(self.invariant_radius).any():
+            text += f", control handles stay below {np.max(self.invariant_radius):.3g} (Theorem 3.1)"
+        if self.velocity_error is not None:
+            text += f", velocities within {_worst(self.velocity_error):.1e}"
+        return text
 
     def __eq__(self, other: object) -> bool:
         return same_report(self, other) if isinstance(other, Report) else NotImplemented
@@ -202,9 +198,7 @@ def same_report(ours: Any, theirs: Any) -> bool:
     """Whether two reports of one class are equal, with NaN equal to NaN."""
     each = ((getattr(ours, own.name), getattr(theirs, own.name)) for own in fields(ours))
     return all(
-        bool(a == b)
-        if a is None or b is None or isinstance(a, (str, tuple))
-        else np.array_equal(a, b, equal_nan=True)
+        bool(a == b) if a is None or b is None or isinstance(a, (str, tuple)) else np.array_equal(a, b, equal_nan=True)
         for a, b in each
     )
 
@@ -245,11 +239,8 @@ class Columns(NamedTuple):
 
     def row(self, name: str) -> NDArray[Any]:
         """Return the values of a field, one per curve, as a writable view."""
-        integer = name in INTEGERS
-        values: NDArray[Any] = (
-            self.integers[INTEGERS.index(name)] if integer else self.numbers[NUMBERS.index(name)]
-        )
-        return values
+        is_integer = name in INTEGERS
+        return np.asarray(self.integers[INTEGERS.index(name)] if is_integer else self.numbers[NUMBERS.index(name)])
 
     def part(self, curves: Any) -> Columns:
         """Return the columns of some curves."""
@@ -270,9 +261,7 @@ class Columns(NamedTuple):
         return Columns(*(np.concatenate(tables, axis=1) for tables in zip(*each, strict=True)))
 
 
-def combined(
-    reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None
-) -> Report:
+def combined(reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None) -> Report:
     """Combine the reports of the factors into the report of a product.
 
     Most fields are the worst of the factors; the arguments are fields of the whole product.
@@ -329,36 +318,25 @@ def shaped(
 ) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
     gap = longest_gap(times, batch)
+    found: dict[str, Any]
     if batch == ():
         converged, iterations, solver, bits = columns.integers[:, 0].tolist()
         # NaN differs from itself.
         known = {name: x for name, x in zip(NUMBERS, columns.numbers[:, 0].tolist(), strict=True) if x == x}
         if "guaranteed_sweeps" in known:
             known["guaranteed_sweeps"] = int(known["guaranteed_sweeps"])
-        return Report(
-            method=SOLVERS[solver],
-            converged=bool(converged),
-            iterations=iterations,
-            max_gap=gap,
-            curvature=curvature,
-            skipped=_skipped(bits),
-            **_UNKNOWN | known,
-        )
+        found = {"method": SOLVERS[solver], "converged": bool(converged), "iterations": iterations}
+        return Report(max_gap=gap, curvature=curvature, skipped=_skipped(bits), **found | _UNKNOWN | known)
     integers = {name: columns.row(name).reshape(batch) for name in INTEGERS}
     numbers: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in NUMBERS}
     solvers = integers["solver"]
     for name in OPTIONAL:
         if np.isnan(numbers[name]).all():
             numbers[name] = None
-    return Report(
-        method=SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method,
-        converged=integers["converged"].astype(bool),
-        iterations=integers["iterations"],
-        max_gap=gap,
-        curvature=curvature,
-        skipped=_skipped(int(np.bitwise_or.reduce(integers["skipped"], axis=None))),
-        **numbers,
-    )
+    used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
+    found = {"method": used, "converged": integers["converged"].astype(bool), "iterations": integers["iterations"]}
+    skipped = _skipped(int(np.bitwise_or.reduce(integers["skipped"], axis=None)))
+    return Report(max_gap=gap, curvature=curvature, skipped=skipped, **found | numbers)
 
 
 def _count(value: Any) -> Any:

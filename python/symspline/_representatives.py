@@ -14,11 +14,10 @@ from ._core import CutLocusError
 from ._curves.curve import CurveArrays
 from ._curves.fit import Points
 from ._errors import warn
+from ._faults import of_index
 from ._report import MAX_STEP, Columns, FarPointsWarning
-from ._spaces import Array, Space, Sphere, Unitary, factors_of
+from ._spaces import Array, Doubles, Space, Sphere, Unitary, factors_of
 from .manifolds import Manifold
-
-Doubles = NDArray[np.float64]
 
 # The fraction of the cut angle from which several C² curves are common, see docs/solvers.md.
 FAR = 0.6
@@ -91,8 +90,7 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     found = [
         (number, index, part.numbers)
         for number, parts in enumerate(curves)
-        if parts is not None
-        for part, factor in zip(parts, factors_of(space), strict=True)
+        for part, factor in zip(parts or (), factors_of(space), strict=parts is not None)
         if _has_quaternions(factor)
         for index in _opposite(part.numbers)
     ]
@@ -101,18 +99,14 @@ def warn_of_signs(space: Space[Any], curves: Sequence[list[Points] | None]) -> N
     number, index, points = found[0]
     *batch, i = index.tolist()
     curve = [number] * (len(curves) > 1) + batch
-    of = f" of curve {','.join(map(str, curve))}" if curve else ""
-    more = f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
+    of, more = of_index(curve), f" (and {len(found) - 1} more pairs)" if len(found) > 1 else ""
     product = float(points[(*batch, i)] @ points[(*batch, i + 1)])
-    warn(
+    message = (
         f"neighbours of opposite sign on sphere:3: points[{i}] and points[{i + 1}]{of} have inner product "
         f"{product:.3g}{more}. The quaternions q and -q are the same rotation, but here the curve turns the long way "
-        f"round. "
-        f"{IN_PYTHON}",
-        UserWarning,
-        tuple(curve),
-        i,
+        f"round. {IN_PYTHON}"
     )
+    warn(message, UserWarning, tuple(curve), i)
 
 
 def _opposite(points: Array) -> NDArray[np.intp]:
@@ -123,9 +117,7 @@ def _opposite(points: Array) -> NDArray[np.intp]:
 # ---- long steps ----
 
 
-def warn_of_far_points(
-    curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]
-) -> None:
+def warn_of_far_points(curves: Sequence[CurveArrays], longest_steps: Sequence[Sequence[Columns | Doubles]]) -> None:
     """Warn if more than half of the steps of a curve exceed 0.6 of the distance to the cut locus.
 
     Parameters
@@ -156,7 +148,7 @@ def warn_of_far_points(
     if not found:
         return
     place, count, steps, space = found[0]
-    of = f" of curve {','.join(map(str, place))}" if place else ""
+    of = of_index(place)
     others = len({place for place, *_ in found}) - 1
     more = f" (and of {others} more curves)" if others else ""
     warn(
@@ -170,7 +162,7 @@ def warn_of_far_points(
     )
 
 
-def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
+def cut_fractions(space: Space[Any], points: Array) -> Doubles:
     """Return the deciding angle between neighbouring points, divided by the angle at which the cut locus is reached.
 
     Parameters
@@ -185,12 +177,10 @@ def cut_fractions(space: Space[Any], points: Array) -> NDArray[np.float64]:
     ndarray, shape (..., N)
         NaN where a point is not finite or the fraction is unknown.
     """
-    axes = len(space.point_shape)
-    lead = (slice(None),) * (points.ndim - axes - 1)
-    finite = np.asarray(np.isfinite(points).all(axis=tuple(range(-axes, 0))))
+    finite = space._where_finite(points)
     good = finite[..., :-1] & finite[..., 1:]
     result = np.full(good.shape, np.nan)
-    p, q = points[(*lead, slice(None, -1))][good], points[(*lead, slice(1, None))][good]
+    p, q = (x[good] for x in space._neighbours(points))
     if not len(p):
         return result
     if isinstance(space, Manifold):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from datetime import timedelta
-from typing import Any, Literal, NamedTuple, Unpack, overload
+from typing import Any, Literal, NamedTuple, Required, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, short_repr, whole_number
+from ._arrays import as_array, checked_number, refuse, short_repr, whole_number
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._curves.fit import read
@@ -17,8 +17,7 @@ from ._input import times_of
 from ._smoothing import SmoothingReport, SmoothingSpline
 from ._smoothing.many import smooth_many
 from ._smoothing.precision import read_precision
-from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of
-from ._spaces import space as space_named
+from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of, space_named
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
 
@@ -28,45 +27,37 @@ _DUPLICATES = ("raise", "first", "mean")
 _STEPS = 50
 
 
+class CutOptions(TypedDict, total=False):
+    """The keywords of `fit_segments` that cut the recording."""
+
+    max_gap: Required[float | timedelta | np.timedelta64]
+    min_points: int
+    duplicates: Duplicates
+
+
+class FitCuts(CutOptions, FitOptions, total=False):
+    """The keywords of `fit_segments` without smoothing."""
+
+
+class SmoothCuts(CutOptions, SmoothingOptions, total=False):
+    """The keywords of `fit_segments` with smoothing."""
+
+
 @overload
 def fit_segments(  # type: ignore[overload-overlap]
-    t: TimesLike,
-    points: PointsLike,
-    space: Product[PProduct],
-    *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
-    smooth: Literal[True],
-    **options: Unpack[SmoothingOptions],
+    t: TimesLike, points: PointsLike, space: Product[PProduct], *, smooth: Literal[True], **options: Unpack[SmoothCuts]
 ) -> list[SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
-    t: TimesLike,
-    points: PointsLike,
-    space: SpecialEuclidean,
-    *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
-    smooth: Literal[True],
-    **options: Unpack[SmoothingOptions],
+    t: TimesLike, points: PointsLike, space: SpecialEuclidean, *, smooth: Literal[True], **options: Unpack[SmoothCuts]
 ) -> list[SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]]: ...
 
 
 @overload
 def fit_segments(
-    t: TimesLike,
-    points: PointsLike,
-    space: Space[P] | str,
-    *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
-    smooth: Literal[True],
-    **options: Unpack[SmoothingOptions],
+    t: TimesLike, points: PointsLike, space: Space[P] | str, *, smooth: Literal[True], **options: Unpack[SmoothCuts]
 ) -> list[SmoothingSpline[P]]: ...
 
 
@@ -76,11 +67,8 @@ def fit_segments(
     points: PointsLike,
     space: Space[P] | str,
     *,
-    max_gap: float | timedelta | np.timedelta64,
-    min_points: int = 2,
-    duplicates: Duplicates = "raise",
     smooth: Literal[False] = False,
-    **options: Unpack[FitOptions],
+    **options: Unpack[FitCuts],
 ) -> list[CubicSpline[P]]: ...
 
 
@@ -197,8 +185,7 @@ def check_smooth(smooth: Any, duplicates: str, options: dict[str, Any]) -> None:
 def _used(weight_options: dict[str, Any], points: Any, space: Space) -> NDArray[np.bool_]:
     """Return which points have a nonzero weight."""
     found = read_precision(**weight_options, space=space, data=read(points, space))
-    used: NDArray[np.bool_] = np.any([own.weights > 0 for own in found], axis=0)
-    return used
+    return np.asarray(np.any([own.weights > 0 for own in found], axis=0))
 
 
 def _of_rows(value: Any, rows: NDArray[np.intp]) -> Any:
@@ -248,9 +235,7 @@ def cut(
         raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {short_repr(duplicates)}")
     data = read(points, space)
     if data[0].batch:
-        raise ValidationError(
-            f"points has batch axes {data[0].batch}, but a recording must be a single curve"
-        )
+        raise ValidationError(f"points has batch axes {data[0].batch}, but a recording must be a single curve")
     given, zone = times_of(t, "t")
     time_axis, times = time_axis_of(Moments(given, zone))
     if times.shape != (data[0].nodes,):
@@ -281,10 +266,7 @@ def cut(
         if np.count_nonzero(new[a:b]) >= least
     ]
     curves = [
-        (
-            Moments(moments[own], zone),
-            tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own],
-        )
+        (Moments(moments[own], zone), tuple(a[own] for a in arrays) if isinstance(space, Product) else arrays[0][own])
         for own in segments
     ]
     return Cut(curves, [rows[own] for own in segments], np.diff(seconds), gap)
@@ -294,20 +276,15 @@ def _seconds(max_gap: Any, dates: bool) -> float:
     """Return the longest gap as the core counts times."""
     if dates and isinstance(max_gap, (np.timedelta64, timedelta)):
         max_gap = np.timedelta64(max_gap) / np.timedelta64(1, "s")
-    if isinstance(max_gap, (bool, np.timedelta64)) or not isinstance(
-        max_gap, (int, float, np.integer, np.floating)
-    ):
-        kind = "a number of seconds or a timedelta64" if dates else "a number"
-        raise ValidationError(f"max_gap must be {kind}, not {short_repr(max_gap)}")
+    unit = " of seconds or a timedelta64" if dates else ""
+    checked_number(max_gap, f"max_gap must be a number{unit}", lambda x: not isinstance(x, np.timedelta64))
     if not max_gap > 0:
         raise ValidationError(f"max_gap must be more than 0, not {max_gap}")
     return float(max_gap)
 
 
 def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(seconds))
-    if len(bad):
-        raise ValidationError(f"t[{bad[0]}] = {times[bad[0]]} is not finite")
+    refuse(~np.isfinite(seconds), "t", lambda i: f"= {times[i]} is not finite")
     steps = np.diff(seconds)
     falls = np.flatnonzero(steps < 0)
     if len(falls):

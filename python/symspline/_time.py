@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import as_array, cast
+from ._arrays import as_array, cast, refuse
 from ._core import ValidationError
 from ._input import NO_ZONE, UTC_ZONE, times_of
 from ._typing import TimesLike
@@ -160,9 +160,7 @@ def time_axis_of(knots: TimesLike | Moments) -> tuple[TimeAxis, NDArray[Any]]:
     return TimeAxis(), cast(array.copy())
 
 
-def knots_of(
-    t: TimesLike | None, batch: tuple[int, ...], nodes: int
-) -> tuple[TimeAxis, NDArray[Any], Doubles]:
+def knots_of(t: TimesLike | None, batch: tuple[int, ...], nodes: int) -> tuple[TimeAxis, NDArray[Any], Doubles]:
     """Return the time axis, the knots as in `CubicSpline.t`, and the knots as numbers of the core."""
     if t is None:
         knots = np.arange(nodes, dtype=np.float64)
@@ -210,11 +208,7 @@ def onto_ends(
         Whether the times have the batch axes.
     """
     ends = knots[..., 0], knots[..., -1]
-    if (
-        not (x.size and knots.size)
-        or (x.min() >= ends[0].max() and x.max() <= ends[1].min())
-        or np.isnan(x).any()
-    ):
+    if not (x.size and knots.size) or (x.min() >= ends[0].max() and x.max() <= ends[1].min()) or np.isnan(x).any():
         return x, per_curve
     own = x.shape[len(batch) :] if per_curve else x.shape
     if per_curve and x.shape[: len(batch)] != batch:
@@ -246,18 +240,14 @@ def _difference(array: NDArray[Any], origin: Any) -> NDArray[np.int64]:
 
 
 def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
-    if np.isnat(array).any():
-        index = np.argwhere(np.isnat(array))[0].tolist()
-        raise ValidationError(f"{name}{index or ''} is NaT (not a time)")
+    refuse(np.isnat(array), name, lambda _: "is NaT (not a time)")
     origin = np.asarray(origin)
     fine = np.promote_types(array.dtype, origin.dtype)
     exact = [x.astype(fine) for x in (array, origin)]
     if all(np.array_equal(e.astype(x.dtype), x) for e, x in zip(exact, (array, origin), strict=True)):
         difference = exact[0] - exact[1]
         # The difference itself may exceed the range of the finer unit.
-        if np.array_equal(exact[1] + difference, exact[0]) and np.all(
-            (difference >= 0) == (exact[0] >= exact[1])
-        ):
+        if np.array_equal(exact[1] + difference, exact[0]) and np.all((difference >= 0) == (exact[0] >= exact[1])):
             return _in_seconds(difference)
     # The times are too far apart for the finer unit, so days and times of day are subtracted separately.
     days = [x.astype("datetime64[D]") for x in (array, origin)]
@@ -266,9 +256,7 @@ def _seconds(array: NDArray[Any], origin: Any, name: str) -> Doubles:
 
 
 def _durations(array: NDArray[Any], name: str) -> Doubles:
-    if np.isnat(array).any():
-        index = np.argwhere(np.isnat(array))[0].tolist()
-        raise ValidationError(f"{name}{index or ''} is NaT (not a time)")
+    refuse(np.isnat(array), name, lambda _: "is NaT (not a time)")
     return _in_seconds(array)
 
 

@@ -29,16 +29,9 @@ if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
     # The type of a point.
-    P = TypeVar(
-        "P",
-        bound=NDArray[Any] | tuple[NDArray[Any], ...],
-        covariant=True,
-        default=NDArray[Any],
-    )
+    P = TypeVar("P", bound=NDArray[Any] | tuple[NDArray[Any], ...], covariant=True, default=NDArray[Any])
     # The type of a point of a product.
-    PProduct = TypeVar(
-        "PProduct", bound=tuple[NDArray[Any], ...], covariant=True, default=tuple[NDArray[Any], ...]
-    )
+    PProduct = TypeVar("PProduct", bound=tuple[NDArray[Any], ...], covariant=True, default=tuple[NDArray[Any], ...])
     # Arrays that results are written into.
     Out = TypeVar("Out", bound=NDArray[Any] | tuple[NDArray[Any], ...])
 else:
@@ -102,6 +95,12 @@ class SolverOptions(TypedDict, total=False):
     atol: float | None
 
 
+class CurveOptions(SolverOptions, total=False):
+    """The keywords of the functions for automatic differentiation that do not affect the type of the result."""
+
+    bc_type: Any
+
+
 class FitOptions(SolverOptions, total=False):
     """The keywords of `CubicSpline`."""
 
@@ -112,8 +111,10 @@ class FitOptions(SolverOptions, total=False):
 
 
 class LsqOptions(TypedDict, total=False):
-    """The keywords of `make_smoothing_spline` that `make_lsq_spline` passes on."""
+    """The keywords of `make_lsq_spline`."""
 
+    weights: Numbers | None
+    loss: Loss
     frames: Numbers | None
     sigma: Numbers | None
     bc_type: SmoothingBCType
@@ -130,11 +131,9 @@ class LsqOptions(TypedDict, total=False):
 class ChoiceOptions(LsqOptions, total=False):
     """The keywords of `make_smoothing_spline`."""
 
-    weights: Numbers | None
     knots: TimesLike | None
     criterion: Criterion
     gamma: float
-    loss: Loss
 
 
 class SmoothingOptions(ChoiceOptions, total=False):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._arrays import short_repr
+from ._arrays import checked_number, short_repr
 from ._base_curve import check_curve
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
@@ -70,9 +70,7 @@ def sog(spline: CubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS) -> F
     np.float64(18.532488)
     """
     _check_globe(spline)
-    if isinstance(radius, bool) or not isinstance(radius, (int, float, np.number)) or not 0 < radius < np.inf:
-        raise ValidationError(f"radius must be a number above 0, not {short_repr(radius)}")
-    return radius * spline.speed(x)
+    return checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf) * spline.speed(x)
 
 
 def cog(spline: CubicSpline, x: TimesLike) -> FloatArray:
@@ -196,9 +194,7 @@ def resample(
                 f"column {name!r} does not exist; the columns are {', '.join(map(str, frame.columns))}"
             )
     name = time or frame.index.name or "time"
-    stamps = (
-        frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
-    )
+    stamps = frame.index.to_series(index=range(len(frame))) if time is None else frame[time].reset_index(drop=True)
     if stamps.dtype.kind != "M":
         raise ValidationError(f"column {name!r} must hold dates; convert strings by pandas.to_datetime")
     check_smooth(smooth, duplicates, options)
@@ -249,9 +245,7 @@ def resample(
     ]
     tables = []
     for spline, label in zip(_fitted(curves, names, smooth, options), owners, strict=True):
-        x = pd.date_range(
-            pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step
-        )
+        x = pd.date_range(pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step)
         at = x.to_numpy()
         lon, lat = to_lonlat(spline(at))
         shown_times = x if zone is None else x.tz_localize("UTC").tz_convert(zone)

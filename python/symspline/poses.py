@@ -136,21 +136,14 @@ def imu(
     check_curve(spline)
     g = as_array(gravity, "gravity")
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
-        raise ValidationError(
-            f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}"
-        )
+        raise ValidationError(f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}")
     check_seconds(spline.t, "t")
     motion = _Motion(spline, x, extrapolate, per_curve)
     return Imu(motion.turning, motion.in_body(motion.acceleration - g))
 
 
 def twist(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "body",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "body", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the twist (ω, v), angular part first.
 
@@ -194,12 +187,7 @@ def twist(
 
 
 def linear_velocity(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "world",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "world", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the velocity ẋ of the position.
 
@@ -235,12 +223,7 @@ def linear_velocity(
 
 
 def linear_acceleration(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "world",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "world", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the acceleration ẍ of the position, without gravity.
 
@@ -321,10 +304,7 @@ class _Motion:
         return values[..., :3, 3] if self._position.space == _SE3 else values
 
     def _at(self, curve: CurveArrays, quantity: str) -> Array:
-        values: Array = evaluated(
-            curve, self._time_axis, self._x, quantity, self._where, self._per_curve, None
-        )
-        return values
+        return np.asarray(evaluated(curve, self._time_axis, self._x, quantity, self._where, self._per_curve))
 
 
 def _position(spline: Spline) -> CurveArrays:

@@ -22,18 +22,18 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import short_repr
+from ._arrays import refuse, short_repr
 from ._base_curve import check_curve, evaluated
 from ._core import ValidationError
 from ._cubic import CubicSpline
-from ._curves.curve import CurveArrays, Doubles
+from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
-from ._spaces import Array, SpecialEuclidean, SpecialOrthogonal, Sphere
+from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
-from .convert._reading import length, real_numbers, refuse
+from .convert._reading import length, real_numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -68,9 +68,7 @@ _LIFTS: WeakKeyDictionary[CurveArrays, CurveArrays] = WeakKeyDictionary()
 # ---- along a curve ----
 
 
-def rotation(
-    spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False
-) -> Rotation:
+def rotation(spline: Spline, x: TimesLike, *, extrapolate: Extrapolate = None, per_curve: bool = False) -> Rotation:
     """Evaluate a curve as a SciPy ``Rotation``.
 
     Parameters
@@ -104,9 +102,7 @@ def rotation(
     try:
         from scipy.spatial.transform import Rotation
     except ImportError:
-        raise ImportError(
-            "rotation returns a SciPy Rotation; install SciPy with: pip install scipy"
-        ) from None
+        raise ImportError("rotation returns a SciPy Rotation; install SciPy with: pip install scipy") from None
     matrices = _at(spline, x, "point", extrapolate, per_curve)
     missing = np.argwhere(np.isnan(matrices[..., 0, 0]))
     if len(missing):
@@ -119,12 +115,7 @@ def rotation(
 
 
 def angular_velocity(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "body",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "body", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the angular velocity of a curve.
 
@@ -167,12 +158,7 @@ def angular_velocity(
 
 
 def angular_acceleration(
-    spline: Spline,
-    x: TimesLike,
-    frame: Frame = "body",
-    *,
-    extrapolate: Extrapolate = None,
-    per_curve: bool = False,
+    spline: Spline, x: TimesLike, frame: Frame = "body", *, extrapolate: Extrapolate = None, per_curve: bool = False
 ) -> Array:
     """Compute the angular acceleration of a curve, which is continuous.
 
@@ -260,7 +246,7 @@ def quaternion(
         flipped = (_dot(*ends) < 0).reshape(curve.batch + (1,) * (turns.ndim - len(curve.batch)))
         q = np.where((flipped & (turns % 2 == 1))[..., None], -q, q)
     else:
-        q = evaluated(curve, spline._time_axis, x, "point", where, per_curve, None)
+        q = evaluated(curve, spline._time_axis, x, "point", where, per_curve)
     return q if first else np.roll(q, -1, axis=-1)
 
 
@@ -330,13 +316,11 @@ def check_frame(frame: Any) -> None:
 
 def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
-    values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve, None)
+    values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve)
     return values
 
 
-def _rate(
-    spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool
-) -> Array:
+def _rate(spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
     check_frame(frame)
     body = _at(spline, x, f"body {quantity}", extrapolate, per_curve)
@@ -352,8 +336,7 @@ def _vee(r: Array, d: Array) -> Array:
 
 def turned(r: Array, v: Array) -> Array:
     """Return Rv for matrices R and vectors v."""
-    result: Array = np.einsum("...ij,...j->...i", r, v)
-    return result
+    return np.asarray(np.einsum("...ij,...j->...i", r, v))
 
 
 def _dot(p: Array, q: Array) -> Array:
@@ -368,19 +351,15 @@ def _lift(curve: CurveArrays) -> CurveArrays:
     turn. The signs at the knots follow from the quaternions of the control points.
     """
     if curve not in _LIFTS:
-        _LIFTS[curve] = _lifted(curve)
+        q = matrix_to_quaternion(curve.points, scalar_first=True)
+        # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
+        rate = quaternion_velocity(q, _vee(curve.points, curve.velocities))
+        control = _above(curve, q, rate).control_points()
+        changes = np.where(_dot(control[..., 1, :], control[..., 2, :]) < 0, -1.0, 1.0)
+        signs = np.ones((*q.shape[:-1], 1))
+        np.cumprod(changes, axis=-1, out=signs[..., 1:, 0])
+        _LIFTS[curve] = _above(curve, signs * q, signs * rate)
     return _LIFTS[curve]
-
-
-def _lifted(curve: CurveArrays) -> CurveArrays:
-    q = matrix_to_quaternion(curve.points, scalar_first=True)
-    # q' = ½ q (0, ω), and so half the velocity of the rotation in the frame that q makes.
-    rate = _velocity_above(q, curve)
-    control = _above(curve, q, rate).control_points()
-    changes = np.where(_dot(control[..., 1, :], control[..., 2, :]) < 0, -1.0, 1.0)
-    signs = np.ones((*q.shape[:-1], 1))
-    np.cumprod(changes, axis=-1, out=signs[..., 1:, 0])
-    return _above(curve, signs * q, signs * rate)
 
 
 def _above(curve: CurveArrays, q: Array, velocities: Array) -> CurveArrays:
@@ -388,11 +367,6 @@ def _above(curve: CurveArrays, q: Array, velocities: Array) -> CurveArrays:
     # The core reads memory in order.
     pair = np.ascontiguousarray(q), np.ascontiguousarray(velocities)
     return curve_of(_S3, curve.times, [pair], fitted=False)
-
-
-def _velocity_above(q: Array, curve: CurveArrays) -> Array:
-    """Return ½ q (0, ω), scalar first, for the velocities R ω̂ of a curve at the quaternions q of its points R."""
-    return quaternion_velocity(q, _vee(curve.points, curve.velocities))
 
 
 def quaternion_velocity(q: Array, omega: Array) -> Array:
@@ -440,9 +414,7 @@ def as_quaternions(rotations: ArrayLike | Rotation, *, scalar_first: bool | None
     return matrix_to_quaternion(_given(rotations), scalar_first=scalar_first)
 
 
-def from_quaternions(
-    quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
-) -> Array:
+def from_quaternions(quaternions: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None) -> Array:
     """Convert unit quaternions to rotations; q and −q give the same rotation.
 
     Parameters
@@ -493,8 +465,7 @@ def as_rotation_vectors(rotations: ArrayLike | Rotation) -> Array:
     sine = length(v)
     # angle / sin(angle/2). Without a rotation v is zero, and any factor will do.
     factor = 2 * np.arctan2(sine, w) / np.where(sine > 0, sine, 1)
-    result: Array = factor[..., None] * v
-    return result
+    return np.asarray(factor[..., None] * v)
 
 
 def from_rotation_vectors(vectors: ArrayLike) -> Array:
@@ -601,11 +572,8 @@ def from_rotation_6d(numbers: ArrayLike, *, order: RotationOrder | None = None) 
         first, second = a / sizes[0][..., None], b / sizes[1][..., None]
         second = second - _dot(first, second)[..., None] * first
         sine = length(second)
-        refuse(
-            ~(sine > _PARALLEL),
-            "numbers",
-            lambda i: f"are {a[i]} and {b[i]}, but the two vectors must be nonzero and not parallel",
-        )
+        advice = "the two vectors must be nonzero and not parallel"
+        refuse(~(sine > _PARALLEL), "numbers", lambda i: f"are {a[i]} and {b[i]}, but {advice}")
         second = second / sine[..., None]
     rows = np.stack([first, second, np.cross(first, second)], axis=-2)
     return _SO3.project(rows if order == "rows" else _swapped(rows))

@@ -20,14 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import as_array, short_repr, whole_number
+from ._arrays import as_array, checked_number, refuse, whole_number
 from ._base_curve import check_curve
 from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._input import times_of
 from ._spaces import ComplexGrassmannian, Grassmannian
 from ._typing import TimesLike
-from .convert._reading import Array, adjoint, numbers, refuse
+from .convert._reading import Array, adjoint, numbers
 
 # Singular values closer than this, in units of the largest, are equal but for rounding.
 _EQUAL = 1e-12
@@ -74,9 +74,7 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
     snapshots, _ = numbers(x, "x", 2)
     n, m = snapshots.shape[-2:]
     if (rank is None) == (energy is None):
-        raise ValidationError(
-            "pass either rank, the dimension of the subspaces, or energy, the fraction they contain"
-        )
+        raise ValidationError("pass either rank, the dimension of the subspaces, or energy, the fraction they contain")
     if not snapshots.size:
         raise ValidationError(f"x has shape {snapshots.shape}, but must contain at least one snapshot")
     left, sizes, _ = np.linalg.svd(snapshots, full_matrices=False)
@@ -87,14 +85,9 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
             f"x has shape {snapshots.shape}"
         )
     beyond = np.concatenate([sizes, np.zeros((*sizes.shape[:-1], 1))], axis=-1)
-    refuse(
-        ~(beyond[..., k - 1] - beyond[..., k] > _EQUAL * beyond[..., 0]),
-        "x",
-        lambda i: (
-            f"does not determine a subspace of {k} dimensions: its singular values {k} and {k + 1} are "
-            f"{beyond[i][k - 1]:.6g} and {beyond[i][k]:.6g}; take another rank"
-        ),
-    )
+    bad = ~(beyond[..., k - 1] - beyond[..., k] > _EQUAL * beyond[..., 0])
+    what = f"does not determine a subspace of {k} dimensions: its singular values {k} and {k + 1} are"
+    refuse(bad, "x", lambda i: f"{what} {beyond[i][k - 1]:.6g} and {beyond[i][k]:.6g}; take another rank")
     return np.ascontiguousarray(left[..., :k])
 
 
@@ -151,9 +144,7 @@ def reduced_operator(
     flat = bases.reshape(-1, n, k)
     if callable(operator) and not hasattr(operator, "shape"):
         made = map(operator, parameters.ravel())
-        moved = np.stack(
-            [_check_operator(a, n) @ basis for a, basis in zip(made, flat, strict=True)] or [flat[:0]]
-        )
+        moved = np.stack([_check_operator(a, n) @ basis for a, basis in zip(made, flat, strict=True)] or [flat[:0]])
     else:
         # All columns at once.
         columns = operator @ np.moveaxis(flat, 0, 1).reshape(n, -1)
@@ -164,8 +155,7 @@ def reduced_operator(
 
 def _rank(sizes: Array, energy: Any) -> int:
     """Return the smallest rank with which every subspace contains the given fraction of the sum of squares."""
-    if isinstance(energy, bool) or not isinstance(energy, (int, float, np.floating)) or not 0 < energy <= 1:
-        raise ValidationError(f"energy must be a fraction above 0 and at most 1, not {short_repr(energy)}")
+    energy = checked_number(energy, "energy must be a fraction above 0 and at most 1", lambda x: 0 < x <= 1)
     squares = (sizes / np.maximum(sizes[..., :1], np.finfo(float).tiny)) ** 2
     # What is left beyond rank 1, 2, …, without cancellation.
     left = np.cumsum(squares[..., ::-1], axis=-1)[..., ::-1]
@@ -177,7 +167,5 @@ def _rank(sizes: Array, energy: Any) -> int:
 def _check_operator(operator: Any, n: int) -> Any:
     shape = np.shape(operator) if not hasattr(operator, "shape") else operator.shape
     if tuple(shape) != (n, n):
-        raise ValidationError(
-            f"the operator has shape {tuple(shape)}, but bases of {n} numbers need {(n, n)}"
-        )
+        raise ValidationError(f"the operator has shape {tuple(shape)}, but bases of {n} numbers need {(n, n)}")
     return operator if hasattr(operator, "shape") else np.asarray(operator)

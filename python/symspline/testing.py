@@ -15,19 +15,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ._arrays import short_repr, whole_number
+from ._arrays import checked_number, whole_number
 from ._core import ConvergenceError, CutLocusError, ValidationError
 from ._cubic import CubicSpline
-from ._functional import evaluate
-from ._spaces import Array, Product, Space
-from ._spaces import space as space_named
+from ._pairs import segments_of
+from ._spaces import Array, Doubles, Product, Space, space_named
 from .manifolds import Manifold
 
 __all__ = ["Conformance", "check"]
 
-Doubles = NDArray[np.float64]
 
 # Lengths of steps as parts of the longest.
 _PARTS = (1e-8, 1e-4, 1e-2, 0.3, 1.0)
@@ -67,10 +65,7 @@ class Conformance:
     allowed: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        lines = [
-            f"  {law:34} {value:.1e} (allowed {self.allowed[law]:.0e})"
-            for law, value in self.deviations.items()
-        ]
+        lines = [f"  {law:34} {value:.1e} (allowed {self.allowed[law]:.0e})" for law, value in self.deviations.items()]
         return "\n".join([f"{self.space!r} obeys", *lines])
 
     def _add(self, law: str, deviation: Any, allowed: float) -> None:
@@ -80,12 +75,6 @@ class Conformance:
             raise AssertionError(
                 f"{self.space!r} breaks the law that {law}: off by {largest:.3e}, allowed {allowed:.1e}"
             )
-
-
-def _check_number(name: str, value: Any) -> None:
-    number = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
-    if not number or not 0 < value < np.inf:
-        raise ValidationError(f"{name} must be a number above 0, not {short_repr(value)}")
 
 
 def check(
@@ -145,9 +134,9 @@ def check(
     space = space_named(space)
     if isinstance(space, Product):
         raise ValidationError("a product cannot be checked; check each factor")
-    _check_number("tol", tol)
-    if length is not None:
-        _check_number("length", length)
+    for name, number in (("tol", tol), ("length", length)):
+        if number is not None:
+            checked_number(number, f"{name} must be a number above 0", lambda x: 0 < x < np.inf)
     rng = np.random.default_rng(whole_number(seed, "seed", 0))
     if point is None:
         base = space.random_point(rng)
@@ -175,9 +164,7 @@ def check(
 class _Sample:
     """Random points, and steps of many lengths from them."""
 
-    def __init__(
-        self, space: Space, base: Array, longest: float, tol: float, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, space: Space, base: Array, longest: float, tol: float, rng: np.random.Generator) -> None:
         self.space, self.base, self.longest, self.tol, self.rng = space, base, longest, tol, rng
         around = self.tangents(np.broadcast_to(base, (_COUNT, *base.shape)))
         points = space.exp(base, longest * around)
@@ -211,22 +198,14 @@ def _operations(found: Conformance, s: _Sample) -> None:
     space.check_point(s.q)
     noise = s.rng.standard_normal(s.p.shape).astype(space.dtype)
     tangent = space.project_tangent(s.p, noise)
-    found._add(
-        "project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol
-    )
+    found._add("project_tangent is a projection", s.size(space.project_tangent(s.p, tangent) - tangent), s.tol)
     found._add("log is tangent", s.size(space.project_tangent(s.p, logs) - logs), s.tol)
     half = space.exp(s.p, s.v / 2)
     found._add(
-        "geodesics run at constant speed",
-        s.size(2 * space.log(s.p, half) - logs) / np.maximum(1.0, s.lengths),
-        s.tol,
+        "geodesics run at constant speed", s.size(2 * space.log(s.p, half) - logs) / np.maximum(1.0, s.lengths), s.tol
     )
     onward = -space.log(half, s.p)
-    found._add("geodesics go on as geodesics", _apart(s, space.exp(half, onward), s.q), s.tol)
-
-
-def _apart(s: _Sample, x: Array, y: Array) -> Array:
-    return np.asarray(s.space.distance(x, y))
+    found._add("geodesics go on as geodesics", s.space.distance(space.exp(half, onward), s.q), s.tol)
 
 
 def _metric(found: Conformance, s: _Sample) -> None:
@@ -282,7 +261,7 @@ def _smoothness(found: Conformance, s: _Sample) -> None:
     for t in (np.arange(len(p), dtype=float), np.cumsum(s.rng.uniform(0.7, 1.3, len(p)))):
         for ends in ("natural", "not-a-knot"):
             spline = CubicSpline(t, p, space, bc_type=ends)
-            offs.append(_apart(s, spline(t), p).max())
+            offs.append(s.space.distance(spline(t), p).max())
             jumps.append(_jumps(s, spline))
     value, velocity, acceleration = np.max(jumps, axis=0)
     found._add("splines interpolate", offs, s.tol)
@@ -296,25 +275,22 @@ def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
 
     Each segment is evaluated by itself. The last two jumps are relative to the quantity.
     """
-    space, p, u = s.space, spline.points, spline.velocities
-    h = np.diff(spline.t)
-    knots = np.stack([0 * h, h], axis=1)
-    points, velocities = (np.stack([x[:-1], x[1:]], axis=1) for x in (p, u))
+    segments = segments_of(spline)
 
     def sides(nu: int) -> tuple[Array, Array]:
-        values = evaluate(knots, points, velocities, space, knots, nu=nu, per_curve=True)
+        values = segments.at(segments.t, nu)
         return values[:-1, 1], values[1:, 0]
 
     def jump(nu: int) -> float:
         left, right = sides(nu)
         if s.size(before - behind).max() > 1e-6:
             # One point may have several arrays.
-            left = space.transport(before, behind, left)
+            left = s.space.transport(before, behind, left)
         # A straight walk has no acceleration.
         return float(s.size(left - right).max() / max(s.size(left).max(), s.size(right).max(), s.longest))
 
     before, behind = sides(0)
-    return float(_apart(s, before, behind).max()), jump(1), jump(2)
+    return float(s.space.distance(before, behind).max()), jump(1), jump(2)
 
 
 def _order(found: Conformance, s: _Sample) -> None:

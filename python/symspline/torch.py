@@ -9,45 +9,20 @@ import torch
 
 from ._adapters import fitted, movable, split
 from ._curves.ends import ends_in_factors
-from ._spaces import Product, Space, parts_of
-from ._spaces import space as space_named
-from ._typing import SolverOptions
+from ._spaces import Product, Space, parts_of, space_named
+from ._typing import CurveOptions
 from .manifolds._manifold import refuse_functions
 
 
 @overload
-def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space | str,
-    *,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
-) -> torch.Tensor: ...
+def curve(x: Any, t: Any, points: Any, space: Space | str, **options: Unpack[CurveOptions]) -> torch.Tensor: ...
 
 
 @overload
-def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Product,
-    *,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
-) -> tuple[torch.Tensor, ...]: ...
+def curve(x: Any, t: Any, points: Any, space: Product, **options: Unpack[CurveOptions]) -> tuple[torch.Tensor, ...]: ...
 
 
-def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space[Any] | str,
-    *,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
-) -> Any:
+def curve(x: Any, t: Any, points: Any, space: Space[Any] | str, *, bc_type: Any = "natural", **options: Any) -> Any:
     """Evaluate a spline through points, with derivatives in PyTorch.
 
     The result equals ``CubicSpline(t, points, space, ...)(x)``. First derivatives with respect to x, t, points and the
@@ -86,9 +61,7 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not available")
     if isinstance(space, Product):
-        each = zip(
-            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
-        )
+        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
         return tuple(curve(x, t, p, factor, bc_type=bc, **options) for p, factor, bc in each)
     kinds, vectors = split(bc_type)
     points = torch.as_tensor(points)
@@ -118,9 +91,7 @@ class _Curve(torch.autograd.Function):
 
     @staticmethod
     def jvp(ctx: Any, *changes: Any) -> Any:
-        dx, dt, points, *ends = (
-            None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5]
-        )
+        dx, dt, points, *ends = (None if a is None else a.detach().resolve_conj().numpy() for a in changes[:5])
         moved = ctx.movable.jvp(ctx.x, dx, points, dt, ends)
         return torch.as_tensor(moved).to(ctx.like[2][0])
 

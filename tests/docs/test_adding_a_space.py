@@ -18,7 +18,7 @@ PAGE = ROOT / "docs/adding-a-space.md"
 
 
 def test_the_page_of_rust_is_the_one_that_is_tested():
-    source = (ROOT / "crates/symspline/tests/torus.rs").read_text(encoding="utf-8")
+    source = (ROOT / "crates/engine/tests/torus.rs").read_text(encoding="utf-8")
     region = source.split("// ---- the page begins ----\n")[1].split("// ---- the page ends ----\n")[0]
     assert "\n".join(blocks(PAGE, "rust")) == region
 

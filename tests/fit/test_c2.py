@@ -115,9 +115,6 @@ def test_a_loop_is_c2(name, n, method, rng):
         assert ss.CubicSpline(t, p, space, bc_type="periodic", method=method).report.iterations <= 7
 
 
-# ----
-
-
 @pytest.mark.parametrize("step", [1.3, 1.5, 1.8])
 def test_long_zigzags_are_c2(step):
     """What happens at a knot fades slowly along a zigzag: the first overlap of the pieces is too short."""

@@ -23,7 +23,6 @@ from scipy.interpolate import CubicSpline as FlatSpline
 import symspline as ss
 
 SEED = 20180308
-
 every_smooth = pytest.mark.parametrize("case", [c for c in CASES if c.smooth and not c.few], ids=lambda case: case.name)
 
 
@@ -128,16 +127,20 @@ def test_batches_are_bit_identical_to_single_curves(case, rng):
     longest = 1.5 if space.dim <= 4 else 0.8
     p = np.stack([walk(space, step, 11, rng) for step in np.linspace(1e-3, longest, 11)])
     t = knots("random", 11, rng)
-    # In any order, in one segment (from curve to curve too), and dense over all.
+    # In any order, in one segment (from curve to curve too), dense over all, and beyond the knots.
     times = rng.uniform(t[0], t[-1], 37), np.linspace(t[2], t[3], 40)[1:-1], np.linspace(t[0], t[-1], 331)
+    beyond = rng.uniform(t[0] - 0.5, t[-1] + 0.5, 40)
     for ends in ("natural", "not-a-knot") if case.interface and not case.few else ("not-a-knot",):
         batch = ss.CubicSpline(t, p, space, bc_type=ends)
         values = [(x, nu, batch(x, nu)) for x in times for nu in range(3)]
+        further = [(nu, batch(beyond, nu, extrapolate="geodesic")) for nu in range(3)]
         for i, points in enumerate(p):
             one = ss.CubicSpline(t, points, space, bc_type=ends)
             assert batch[i] == one
             for x, nu, value in values:
                 assert np.array_equal(value[i], one(x, nu))
+            for nu, value in further:
+                assert np.array_equal(value[i], one(beyond, nu, extrapolate="geodesic"))
 
 
 @pytest.mark.parametrize("ends", ENDS)

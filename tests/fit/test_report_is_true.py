@@ -108,21 +108,6 @@ def test_a_closed_curve_on_unequal_knots_closes(method):
             assert spline.report.converged
 
 
-@pytest.mark.parametrize("method", ["auto", "newton"])
-@pytest.mark.parametrize(("name", "step"), [("sphere:2", 3.0), ("so:3", 1.2), ("cp:1", 0.7)])
-def test_far_closed_curves_have_no_kink_where_they_close(name, step, method):
-    space, rng = ss.space(name), seeded(name, method)
-    centre = np.stack([space.random_point(rng) for _ in range(60)])[:, None]
-    noise = space.random_tangent(rng, np.repeat(centre, 4, axis=1))
-    noise *= 0.5 * step / space.norm(centre, noise).reshape(60, 4, *(1,) * len(space.point_shape))
-    p = space.project(space.exp(centre, noise))
-    p = np.concatenate([p, p[:, :1]], axis=1)
-    t = unequal_knots(5, len(p), rng)
-    spline = ss.CubicSpline(t, p, space, bc_type="periodic", method=method, on_failure="ignore")
-    assert spline.report.converged.sum() > 15
-    assert np.nanmax(truth(spline).worst) <= 1.0
-
-
 @pytest.mark.parametrize("name", ["sphere:2", "gr:2,4", "so:3", "r:2"])
 def test_ends_of_a_closed_curve_that_nearly_meet_are_made_one(name):
     """Last and first point may be 1e-8 apart; the curve has no such gap."""
@@ -133,18 +118,6 @@ def test_ends_of_a_closed_curve_that_nearly_meet_are_made_one(name):
     assert truth(spline).worst <= 1.0
     assert space.distance(spline.points[-1], spline.points[0]) <= 4 * EPS
     assert space.distance(spline.points[-1], near) <= 6e-9
-
-
-def test_a_long_closed_curve_closes():
-    """It is solved in pieces; the first and the last each have the seam inside."""
-    rng = seeded("long")
-    x = np.linspace(0, 2 * np.pi, 1301)
-    p = ss.Sphere(2).project(np.stack([np.cos(x), np.sin(x), 0.3 * np.sin(5 * x)], axis=-1))
-    p[-1] = p[0]
-    t = np.concatenate([[0], np.cumsum(rng.uniform(0.5, 1.5, 1300))])
-    spline = ss.CubicSpline(t, p, "sphere:2", bc_type="periodic")
-    assert np.abs(spline.velocities[-1] - spline.velocities[0]).max() <= 4 * EPS * np.abs(spline.velocities).max()
-    assert truth(spline).worst <= 1.0
 
 
 # ---- rotations ----
@@ -167,21 +140,6 @@ def test_the_middle_geodesic_of_rotations_is_the_shortest():
         assert np.abs(one(x, nu) - other(x, nu)).max() <= 1e-13 * max(1, np.abs(other(x, nu)).max())
     assert np.abs(one(0.5) - turned(np.radians(-95))).max() <= 1e-14
     assert truth(one).bezier <= 1.0
-
-
-@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot"])
-def test_far_rotations_agree_with_orthogonal_matrices(ends):
-    rng = seeded(ends)
-    p = np.array([far_points(ss.space("so:3"), 5, rng, False) for _ in range(40)])
-    t = unequal_knots(5, len(p), rng)
-    # Hundreds of iterations more find one curve more.
-    options = {"bc_type": ends, "max_iter": 120, "on_failure": "ignore"}
-    one, other = (ss.CubicSpline(t, p, name, **options) for name in ("so:3", "o:3"))
-    assert np.nanmax(truth(one).worst) <= 1.0
-    # Both solve the same equations; the paths of their iterations may part near the cut locus.
-    both = one.report.converged & other.report.converged
-    same = np.abs(one.velocities - other.velocities).max(axis=(1, 2, 3))[both] < 1e-8
-    assert same.sum() >= 0.9 * both.sum() > 5
 
 
 # ---- derivatives ----
@@ -274,23 +232,15 @@ def test_times_may_have_any_unit(unit, ends):
 
 
 @pytest.mark.parametrize("unit", [1e-200, 1e-90, 1.0, 1e90, 1e200])
-def test_length_is_a_double_where_it_can_be(unit):
+def test_length_and_energy_are_floating_point_numbers_where_they_can_be(unit):
     for s in (1e-200, 1.0, 1e200):
-        if not 1e-300 < s / unit < 1e300:
-            # Velocities are no doubles.
-            continue
-        spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
-        assert spline.length() == pytest.approx(10 * s, rel=0.1, abs=0)
-        straight = ss.CubicSpline(np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
-        assert straight.length() == pytest.approx(10 * s, rel=1e-14, abs=0)
-
-
-@pytest.mark.parametrize("unit", [1e-90, 1e-40, 1.0, 1e40, 1e90])
-def test_bending_energy_is_a_double_where_it_can_be(unit):
-    spline = ss.CubicSpline(np.array([0, 1, 3.0]) * unit, np.eye(3), "sphere:2")
-    assert spline.bending_energy() * unit**3 == pytest.approx(
-        ss.CubicSpline([0, 1, 3.0], np.eye(3), "sphere:2").bending_energy(), rel=1e-12
-    )
+        # Otherwise velocities are not.
+        if 1e-300 < s / unit < 1e300:
+            straight = ss.CubicSpline(np.array([0, 1.0, 2]) * unit, s * np.array([[0, 0], [3, 4], [6, 8.0]]), "r:2")
+            assert straight.length() == pytest.approx(10 * s, rel=1e-14, abs=0)
+    if 1e-100 < unit < 1e100:
+        one, spline = (ss.CubicSpline(np.array([0, 1, 3.0]) * h, np.eye(3), "sphere:2") for h in (1.0, unit))
+        assert spline.bending_energy() * unit**3 == pytest.approx(one.bending_energy(), rel=1e-12)
 
 
 # ---- far out in hyperbolic space ----
@@ -316,14 +266,6 @@ def test_hyperbolic_points_that_doubles_cannot_tell_apart_are_an_error(r):
         ss.CubicSpline(None, p, "h:2")
 
 
-@pytest.mark.parametrize("r", [16.0, 18.0])
-def test_complex_hyperbolic_points_that_doubles_cannot_tell_apart_are_an_error(r):
-    turn = np.exp(1j * np.exp(-r) * np.arange(4))
-    p = np.stack([np.full(4, np.cosh(r)) + 0j, np.sinh(r) * turn], axis=-1)
-    with pytest.raises(ss.ValidationError, match=rf"points\[0\] .*distance {r:.1f}.* from \(1, 0, "):
-        ss.CubicSpline(None, p, "ch:1")
-
-
 @pytest.mark.parametrize("name", ["h:2", "h:3", "ch:1", "ch:2", "spd:2", "hpd:2", "sspd:2"])
 def test_rounding_of_long_steps_is_reported(name):
     """Geodesics multiply rounding errors by the exponential of their length, however right the velocities are."""
@@ -346,6 +288,17 @@ def test_rounding_of_long_steps_is_reported(name):
     assert 5 <= converged <= 25
 
 
+@pytest.mark.parametrize(("name", "step"), [("hyperbolic:2", 11.0), ("spd:3", 14.0)])
+def test_very_far_points_converge_to_their_rounding(name, step):
+    """Rounding in a residual grows with the length of chords. It is not a failure until the curve shows it."""
+    space = ss.space(name)
+    origin = np.eye(*(3,) * 2) if name == "spd:3" else np.array([1.0, 0, 0])
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        p = [space.exp(origin, step / 2 * unit_tangent(space, origin, rng)) for _ in range(5)]
+        assert ss.CubicSpline(None, np.array(p), space).report.converged
+
+
 WITHOUT_METRIC = [
     *("gl:2", "gl:3", "cgl:2", "aff:2", "sim:3", "sl:3", "sp:4", "so:1,3", "se:2", "se:3"),
     *("ds:3", "ads:4", "igr:1,1,2,2"),
@@ -363,43 +316,3 @@ def test_the_longest_step_without_an_invariant_metric(name):
     # Of an indefinite metric it is the size of the logarithm at the later point.
     longest = space.distance(p[1:], p[:-1]).max()
     assert ss.CubicSpline(None, p, space).report.max_step == pytest.approx(longest, rel=1e-11)
-
-
-@pytest.mark.parametrize("unit", [1.0, 1e3])
-@pytest.mark.parametrize("name", ["se:2", "se:3", "aff:3", "gl:4"])
-def test_long_ways_are_not_far_apart(name, unit):
-    """It is angles that come near the cut locus, whatever the unit of length."""
-    n, rng = (3 if name == "se:2" else 4), np.random.default_rng(3)
-    space = ss.SpecialEuclidean(n - 1)
-    p = [np.eye(n)]
-    for _ in range(11):
-        v = unit * rng.standard_normal(n - 1)
-        p.append(space.exp(p[-1], space.project_tangent(p[-1], p[-1] @ _twist(n, 0.2, v))))
-    found = [ss.CubicSpline(None, p, name, method=method).report for method in ("auto", "quasi-newton")]
-    assert found[0].method == "quasi-newton" and found[0].iterations == found[1].iterations
-
-
-def _twist(n, turn, velocity):
-    xi = np.zeros((n, n))
-    xi[0, 1], xi[1, 0], xi[:-1, -1] = -turn, turn, velocity
-    return xi
-
-
-@pytest.mark.parametrize("name", ["h:2", "spd:2", "ch:1"])
-def test_there_and_back_over_a_long_way(name):
-    """At every knot such a curve stands still, and rounding is all that there is of its velocities."""
-    space, rng = ss.space(name), seeded(name)
-    p = base_point(space, rng)
-    # Of curvature -4, where lengths count twice.
-    way = 4.0 if name == "ch:1" else 8.0
-    p = [p, space.exp(p, way * unit_tangent(space, p, rng)), p]
-    spline = ss.CubicSpline([0, 1, 2], p, space, bc_type="periodic")
-    assert spline.report.converged and space.norm(spline.points, spline.velocities).max() < 1e-6
-
-
-def test_phases_do_not_matter_over_a_long_way():
-    space, rng = ss.space("ch:2"), seeded("phases")
-    middle = base_point(space, rng)
-    p = np.stack([space.exp(middle, 2.85 * unit_tangent(space, middle, rng)) for _ in range(3)])
-    for turn in (np.zeros((3, 1)), rng.uniform(0, 6, (3, 1))):
-        assert ss.CubicSpline([0, 1, 2.5], np.exp(1j * turn) * p, space).report.converged

@@ -76,18 +76,6 @@ def test_newton_converges_quadratically(name, step, ends, rng):
     assert found[near + 3] <= 20 * EPS * condition(space, p), found
 
 
-@pytest.mark.parametrize("n", [4, 5, 17])
-def test_the_homotopy_needs_no_correction_in_flat_space(n, rng):
-    """Velocities are proportional to λ there, as points and end vectors are."""
-    space, t = ss.Euclidean(2), np.cumsum(rng.uniform(0.2, 2, n))
-    p = rng.standard_normal((n, 2))
-    closed = np.concatenate([p[:-1], p[:1]])
-    for ends, points in [*((ends, p) for ends in ends_on(space, p)), ("periodic", closed)]:
-        report = ss.CubicSpline(t, points, space, bc_type=ends, method="homotopy").report
-        # Two residuals at λ = 1/4, where there is nothing to go by, one at 5/8, and two at 1, on the way and at last.
-        assert report.iterations == 5, ends
-
-
 def test_fixed_point_is_linear_with_a_rate_of_one_half(rng):
     for space in (S2, ss.SpecialOrthogonal(3), ss.Grassmannian(2, 5)):
         report = ss.CubicSpline(None, walk(space, 0.1, 20, rng), space, method="fixed-point").report
@@ -117,32 +105,6 @@ def test_it_does_not_matter_where_a_closed_curve_starts(method, rng):
 
 
 # ---- they find the same curve ----
-
-
-@pytest.mark.parametrize(
-    ("name", "steps"),
-    [
-        ("sphere:2", (0.1, 0.5, 1.2)),
-        ("sphere:3", (0.1, 0.5, 1.2)),
-        ("so:3", (0.1, 0.8, 2.0)),
-        ("rp:2", (0.1, 0.5, 1.2)),
-        ("cp:2", (0.1, 0.3, 0.6)),
-        ("gr:2,5", (0.1, 0.5, 0.9)),
-        ("spd:3", (0.1, 0.5, 1.5)),
-        ("se:3", (0.1, 0.5, 1.5)),
-        ("hyperbolic:2", (0.1, 0.5, 1.2)),
-    ],
-)
-def test_solvers_agree_on_wild_walks(name, steps):
-    space = ss.space(name)
-    for step in steps:
-        p = np.array([wild(space, step, 20, np.random.default_rng(seed)) for seed in range(8)])
-        ours, *others = (
-            ss.CubicSpline(None, p, space, method=method).velocities
-            for method in ("auto", "fixed-point", "quasi-newton", "newton")
-        )
-        allowed = 1e-11 * np.abs(ours).max() * condition(space, p)
-        assert max(np.abs(ours - other).max() for other in others) <= allowed
 
 
 def test_auto_is_quasi_newton_where_that_is_quick(rng):
@@ -228,30 +190,6 @@ def test_far_points_converge_or_are_reported(name, part, at_least):
     assert good.mean() >= at_least
 
 
-@pytest.mark.parametrize("name", FAR)
-@pytest.mark.parametrize("part", [0.3, 0.5, 0.7])
-def test_auto_converges_wherever_fixed_point_does(name, part):
-    space, p = far_curves(name, part, 10)
-    auto, fixed = (fit(p, space, method=method).report.converged for method in ("auto", "fixed-point"))
-    assert (auto | ~fixed).all()
-
-
-@loop_over("step", np.arange(0.2, 3.11, 0.1))
-def test_auto_converges_on_zigzags_wherever_fixed_point_does(step):
-    for n in (5, 10, 20):
-        auto, fixed = (fit(zigzag(step, n), S2, method=m).report for m in ("auto", "fixed-point"))
-        assert auto.converged or not fixed.converged, n
-
-
-@pytest.mark.parametrize(("name", "method"), [("sphere:3", "newton"), ("cp:2", "fixed-point")])
-def test_auto_converges_near_the_cut_locus_wherever_another_solver_does(name, method):
-    space = ss.space(name)
-    step = 0.95 * space.injectivity_radius
-    p = np.array([zigzag_on(space, step, 20, np.random.default_rng(seed)) for seed in range(24)])
-    auto, other = (fit(p, space, method=m).report.converged for m in ("auto", method))
-    assert (auto | ~other).all()
-
-
 def test_points_too_far_are_an_error_with_advice():
     advice = "too close for the distance .* between their points: merge the two samples, smooth the data"
     with pytest.raises(ss.ConvergenceError, match=f"longest step 1.0.*{advice}") as error:
@@ -265,11 +203,7 @@ def test_points_too_far_are_an_error_with_advice():
 
 
 EASY, HARD, HARDEST = zigzag(0.5, 8), zigzag(2.8, 8), zigzag(2.3, 8, 0.3)
-
-
 ANTIPODES = np.concatenate([EASY[:4], -EASY[3:4], EASY[5:]])
-
-
 IMPOSSIBLE = zigzag(1.0, 8)
 """With the times `UNEVEN`."""
 
@@ -284,10 +218,12 @@ def assert_is_its_curves(p, t, **options):
 
 
 def test_a_batch_of_easy_and_hard_curves_and_one_that_has_no_spline():
-    p, t = np.array([EASY, HARDEST, ANTIPODES, HARD, zigzag(0.3, 8)]), np.arange(8.0)
-    assert_is_its_curves(p, np.broadcast_to(t, (len(p), 8)))
+    p, t = np.array([EASY, HARDEST, ANTIPODES, HARD, IMPOSSIBLE]), np.tile(np.arange(8.0), (5, 1))
+    t[4] = UNEVEN
+    assert_is_its_curves(p, t)
+    p = p[:4]
     batch = fit(p, S2)
-    assert batch.report.converged.tolist() == [True, True, False, True, True]
+    assert batch.report.converged.tolist() == [True, True, False, True]
     assert np.isnan(batch.velocities[2]).all() and np.isfinite(np.delete(batch.velocities, 2, 0)).all()
     # The last solver that any curve needed.
     assert batch.report.method == "homotopy" and fit(HARD, S2).report.method == "fixed-point"
@@ -296,11 +232,6 @@ def test_a_batch_of_easy_and_hard_curves_and_one_that_has_no_spline():
     assert error.value.spline == batch
     with pytest.warns(ss.ConvergenceWarning, match="of curve 2"):
         ss.CubicSpline(None, p, S2, on_failure="warn")
-
-
-def test_a_batch_with_a_curve_that_does_not_converge():
-    p = np.array([EASY, HARDEST, IMPOSSIBLE, HARD])
-    assert_is_its_curves(p, np.array([UNEVEN if i == 2 else np.arange(8.0) for i in range(len(p))]))
 
 
 @pytest.mark.parametrize("tol", [1e-12, 0.0])
@@ -324,37 +255,6 @@ def test_no_solver_exceeds_max_iter(method):
             report = fit(points, S2, method=method, max_iter=most).report
             assert report.iterations <= most
             assert report.converged == (report.residual <= 1e-12)
-
-
-@pytest.mark.parametrize("most", [200, 1000])
-def test_auto_converges_within_a_larger_max_iter(most):
-    assert fit(zigzag(2.5), S2, max_iter=most).report.converged
-
-
-def test_a_curve_of_the_homotopy_can_be_solved_to_rounding():
-    space = ss.RealProjective(2)
-    p = [zigzag_on(space, 0.95 * np.pi / 2, 20, np.random.default_rng(seed)) for seed in range(20)]
-    assert fit(np.array(p), space).report.converged.all()
-    assert all(fit(points, space, tol=0.0).report.converged for points in p)
-
-
-def test_flat_space_needs_no_other_solver_than_the_first(rng):
-    p = 1e3 * rng.standard_normal((30, 2))
-    report = ss.CubicSpline(np.cumsum(rng.uniform(0.1, 5, 30)), p, ss.Euclidean(2)).report
-    assert report.method == "quasi-newton" and report.iterations == 2
-
-
-def test_auto_never_bends_more_than_a_patient_quasi_newton():
-    """Which takes some 280 residuals here, more than `auto` gives it at first."""
-    p = [
-        *([0.817, -0.541, 0.199], [-0.138, 0.952, -0.275], [-0.573, -0.817, -0.059], [0.305, 0.67, -0.677]),
-        *([-0.449, 0.085, 0.889], [-0.093, 0.498, -0.862], [-0.581, -0.664, 0.471], [0.497, -0.022, -0.867]),
-        [0.172, -0.408, 0.896],
-    ]
-    p = p / np.linalg.norm(p, axis=1, keepdims=True)
-    patient, auto = (fit(p, S2, bc_type="not-a-knot", method=method) for method in ("quasi-newton", "auto"))
-    assert patient.report.converged and patient.report.iterations > 120
-    assert auto.bending_energy() <= patient.bending_energy() * (1 + 1e-9)
 
 
 def test_unfinished_homotopy_is_reported():
@@ -411,59 +311,12 @@ def test_number_of_sweeps_on_the_example_of_the_paper():
 
 
 @pytest.mark.parametrize("step", [1.5, 2.0, 2.5])
-def test_zigzags_converge_to_the_curve_of_the_transcription(step):
-    # An exact zigzag is symmetric, and its symmetric curve repels the iteration: rounding would decide where it goes.
-    rng = np.random.default_rng(1)
-    p = S2.project(zigzag(step) + 0.03 * rng.standard_normal((20, 3)))
-    spline = ss.CubicSpline(None, p, S2, method="fixed-point")
-    found = next(islice(sweeps(S2, p), spline.report.iterations - 1, None))[0]
-    assert np.abs(found - spline.velocities / 3).max() <= 1e-9
-    auto = ss.CubicSpline(None, p, S2)
-    assert auto.bending_energy() <= spline.bending_energy() * (1 + 1e-6)
-
-
-@pytest.mark.parametrize("step", [1.5, 2.0, 2.5])
 def test_auto_finds_a_curve_that_bends_less_than_that_of_quasi_newton(step):
     p = zigzag(step)
     symmetric = ss.CubicSpline(None, p, S2, method="newton").bending_energy()  # by quadrature, to 1e-4
     auto = ss.CubicSpline(None, p, S2)
     assert auto.bending_energy() < 0.98 * symmetric
     assert auto.bending_energy() < auto.report.alternative_energy <= symmetric * (1 + 1e-4)
-
-
-@pytest.mark.parametrize("kind", ["not-a-knot", "acceleration", "periodic"])
-def test_other_ends_and_unequal_knots_converge_to_the_same_curve(kind):
-    rng = np.random.default_rng(5)
-    space = ss.space("so:3")
-    p = walk(space, 0.5, 9, rng)
-    t = np.cumsum(rng.uniform(0.5, 1.5, 9))
-    bc_type = kind
-    if kind == "periodic":
-        p[-1] = p[0]
-    if kind == "acceleration":
-        bc_type = ((2, 0.4 * space.log(p[0], p[1])), (2, 0.3 * space.random_tangent(rng, p[-1])))
-    one, other = (ss.CubicSpline(t, p, space, bc_type=bc_type, method=m) for m in ("fixed-point", "quasi-newton"))
-    assert np.abs(one.velocities - other.velocities).max() <= 1e-11
-
-
-def test_far_sets_converge_where_the_transcription_does():
-    rng = np.random.default_rng(8)
-    found = 0
-    for name in ("sphere:2", "so:3", "cp:1", "gr:2,4"):
-        space = ss.space(name)
-        for _ in range(3):
-            p = walk(space, 0.75 * min(space.injectivity_radius, np.pi), 6, rng, turn=100.0)
-            try:
-                literal = any(delta <= 1e-12 for _, delta in islice(sweeps(space, p), 400))
-            except ss.ValidationError:
-                continue
-            if literal:
-                found += 1
-                spline = ss.CubicSpline(None, p, space, method="fixed-point", on_failure="ignore")
-                # The limit may have a control point past the cut locus, which is another error.
-                passes = np.isnan(spline.velocities).any()
-                assert spline.report.converged or passes
-    assert found >= 6
 
 
 def test_an_undefined_logarithm_names_its_segment():

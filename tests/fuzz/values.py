@@ -8,7 +8,6 @@ NASTY = [
     1e8, 2.0**53, 1e16, -1e150, 1e154, 1e300, -1.7e308,
 ]  # fmt: skip
 
-
 GOOD, BAD, ODD = "good", "bad", "odd"
 moods = st.sampled_from([GOOD, GOOD, BAD, BAD, ODD])
 """How well a user means: all as it should be, sometimes bad numbers or shapes, or even things of wrong types."""

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cases import base_point, unit_tangent, walk
+from cases import unit_tangent, walk
 from jax.test_util import check_grads
 
 import symspline as ss
@@ -28,7 +28,10 @@ def test_gradients_pass_the_checks_of_jax(name, bc_type):
     def function(x, t, points):
         return curve(x, t, points, name, bc_type=bc_type)
 
-    check_grads(function, (X, T, points_of(name)), order=1, modes=["fwd", "rev"], atol=1e-6, rtol=1e-6)
+    data = X, T, points_of(name)
+    check_grads(function, data, order=1, modes=["fwd", "rev"], atol=1e-6, rtol=1e-6)
+    np.testing.assert_array_equal(jax.jit(function)(*data), function(*data))
+    np.testing.assert_allclose(jax.jit(jax.jacrev(function, 2))(*data), jax.jacfwd(function, 2)(*data), atol=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -59,20 +62,6 @@ def test_complex_points_have_gradients(name):
     check_grads(function, (np.zeros(2),), order=1, modes=["fwd", "rev"], atol=1e-6, rtol=1e-6)
 
 
-def test_jit_vmap_and_jacobians_agree():
-    points = points_of("sphere:2")
-
-    def function(points):
-        return curve(X, T, points, "sphere:2")
-
-    forward, backward = jax.jacfwd(function)(points), jax.jacrev(function)(points)
-    np.testing.assert_allclose(forward, backward, atol=1e-12)
-    np.testing.assert_array_equal(jax.jit(function)(points), function(points))
-    np.testing.assert_allclose(jax.jit(jax.jacrev(function))(points), backward, atol=1e-14)
-    many = np.stack([points, points_of("sphere:2", 1)])
-    np.testing.assert_array_equal(jax.vmap(function)(many), curve(X, T, many, "sphere:2"))
-
-
 def test_products_and_batches():
     factors = ("sphere:3", "r:3")
     points = tuple(points_of(name) for name in factors)
@@ -91,41 +80,6 @@ def test_single_precision_comes_back_in_single_precision():
         points = jnp.asarray(points_of("sphere:2"), jnp.float32)
         value, gradient = jax.value_and_grad(lambda p: curve(X, T, p, "sphere:2").sum())(points)
     assert value.dtype == gradient.dtype == jnp.float32
-
-
-def test_an_optimiser_finds_the_points_of_a_curve():
-    """Riemannian gradient descent through the spline."""
-    space = ss.Sphere(2)
-    points = points_of("sphere:2")
-    x = np.linspace(T[0], T[-1], 40)
-    wanted = ss.CubicSpline(T, points, space)(x)
-    loss = jax.jit(jax.value_and_grad(lambda p: jnp.sum((curve(x, T, p, space) - wanted) ** 2)))
-    rng = np.random.default_rng(3)
-    guess = np.array([space.exp(p, 0.2 * unit_tangent(space, p, rng)) for p in points])
-    for _ in range(60):
-        _, gradient = loss(guess)
-        guess = space.exp(guess, -0.05 * np.asarray(gradient))
-    assert space.distance(guess, points).max() < 1e-3
-    assert base_point(space, rng).shape == (3,)
-
-
-FAR = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0.5]]) / np.sqrt([[1.0], [1], [1.25]])
-
-
-def test_a_curve_that_did_not_converge_has_no_derivatives_in_jax():
-    stopped = {"method": "fixed-point", "max_iter": 6, "on_failure": "ignore"}
-    with jax.enable_x64(True):
-        spline = ss.CubicSpline(None, FAR, ss.Sphere(2), **stopped)
-        assert not spline.report.converged
-
-        def function(points, t, x):
-            return curve(x, t, points, ss.Sphere(2), **stopped)
-
-        arguments = (jnp.array(FAR), jnp.arange(3.0), jnp.array([0.5, 1.7]))
-        np.testing.assert_allclose(function(*arguments), spline([0.5, 1.7]), atol=1e-15)
-        for derivatives in (jax.jacfwd, jax.jacrev):
-            for change in derivatives(function, argnums=(0, 1))(*arguments):
-                assert np.isnan(change).all()
 
 
 def test_curves_of_a_batch_that_converged_keep_their_derivatives_in_jax():

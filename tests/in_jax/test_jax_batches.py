@@ -85,14 +85,6 @@ def test_directions_of_many_curves_are_those_of_each(axes):
         np.testing.assert_allclose(found[i], pushed(one, own), atol=1e-14)
 
 
-def test_only_the_data_that_move_are_mapped():
-    """Directions of shared data, one curve: what `jax.jacfwd` does; and cotangents alone, as `jax.jacrev`."""
-    data, _ = some((None,) * 4)
-    for argument in range(4):
-        forward = jax.jacfwd(function, argument)(*data)
-        np.testing.assert_allclose(forward, jax.jacrev(function, argument)(*data), atol=1e-12)
-
-
 @pytest.mark.parametrize("nu", [0, 1, 2])
 def test_nested_maps_are_one_call(nu, calls):
     """Times along one axis, curves along another, and batch axes of the points."""

@@ -10,7 +10,6 @@ import symspline as ss
 from symspline.jax import evaluate
 
 QUICK = True
-
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1])
 X = np.concatenate([np.linspace(0, 4.1, 12), [1.0, 2.2]])
 SPACES = ["r:2", "sphere:2", "h:2", "so:2", "so:3", "se:2", "se:3", "cp:2", "gr:2,5", "cgr:2,4", "spd:3", "hpd:2"]
@@ -76,41 +75,6 @@ def test_curves_that_stand_still_have_derivatives(name):
         np.testing.assert_allclose(second, np.dot([-1, 16, -30, 16, -1], values) / (12 * h * h), atol=1e-5)
 
 
-def test_derivatives_of_third_order_in_time():
-    """Of a geodesic on a sphere, and of a resting one."""
-    p = jnp.array([[1.0, 0, 0], [0.0, 1, 0]])
-    u = jnp.array([[0, 1.0, 0], [-1.0, 0, 0]]) * np.pi / 2
-
-    @jax.jit
-    def third(points, u):
-        curve = lambda x: evaluate(jnp.arange(2.0), points, u, "sphere:2", x)  # noqa: E731
-        return jax.jacfwd(jax.jacfwd(jax.jacfwd(curve)))(0.4)
-
-    angle = 0.2 * np.pi
-    expected = (np.pi / 2) ** 3 * np.array([np.sin(angle), -np.cos(angle), 0])
-    np.testing.assert_allclose(third(p, u), expected, atol=1e-12)
-    np.testing.assert_allclose(third(p[jnp.array([0, 0])], 0 * u), np.zeros(3), atol=1e-15)
-
-
-def test_the_core_has_the_same_gradient():
-    """With respect to points and velocities, by finite differences of `symspline.evaluate`."""
-    space = ss.space("spd:2")
-    points = walk(space, 0.5, 5, np.random.default_rng(0))
-    u = ss.CubicSpline(T, points, space).velocities
-    rng = np.random.default_rng(1)
-    dp, du = (np.array([unit_tangent(space, p, rng) for p in points]) for _ in range(2))
-    move = jax.jit(lambda t, p, u, dt, dp, du: jax.jvp(lambda *a: evaluate(*a, space, X), (t, p, u), (dt, dp, du))[1])
-    found = move(T, points, u, 0.1 * X[:5] * 0, dp, du)
-
-    def moved(e):
-        return ss.evaluate(T, points + e * dp, u + e * du, space, X)
-
-    h = 1e-3
-    weights = {1: 0.75, 2: -0.15, 3: 1 / 60}
-    expected = sum(w * (moved(k * h) - moved(-k * h)) for k, w in weights.items()) / h
-    np.testing.assert_allclose(found, expected, atol=1e-10)
-
-
 def test_batches_products_and_maps():
     names = ("sphere:2", "r:3")
     points = tuple(np.stack([walk(ss.space(n), 0.5, 5, np.random.default_rng(i)) for i in range(3)]) for n in names)
@@ -134,12 +98,6 @@ def test_outside_the_knots_and_off_the_space_is_nan():
     np.testing.assert_array_equal(np.isnan(found).all(axis=-1), [True, False, True])
     mirror = np.stack([np.diag([1.0, 1, -1])] * 2)
     assert np.isnan(jax.jit(lambda p: evaluate([0.0, 1.0], p, 0 * p, "so:3", 0.5))(mirror)).all()
-
-
-def test_single_precision_stays_single():
-    data = (jnp.asarray(a, jnp.float32) for a in ([0, 1], np.eye(3)[:2], np.zeros((2, 3)), 0.5))
-    found = jax.jit(lambda t, p, u, x: evaluate(t, p, u, "sphere:2", x))(*data)
-    assert found.dtype == jnp.float32
 
 
 def test_invalid_arguments_raise():

@@ -10,7 +10,6 @@ import symspline as ss
 from symspline.jax import curve, evaluate, fit
 
 QUICK = True
-
 T = np.array([0.0, 1.0, 2.2, 3.0, 4.1, 5.0])
 
 
@@ -110,6 +109,7 @@ def test_a_curve_that_stands_still_has_a_gradient():
         ("h:2", {}, "does not support"),
         ("sphere:2", {"bc_type": "periodic"}, "bc_type must be 'natural'"),
         ("sphere:2", {"steps": 0}, "steps must be"),
+        ("sphere:2", {"steps": True}, "steps must be"),
         ("sphere:2", {"bc_type": ((1, np.zeros(2)), "natural")}, "start velocity has shape"),
     ],
 )

@@ -87,26 +87,6 @@ def symmetric(seed):
     return a + a.T
 
 
-def test_functions_of_matrices_where_eigenvalues_repeat():
-    """Along lines through multiples of the identity they are power series of one matrix."""
-    h = symmetric(0)
-
-    def derivatives(function):
-        found = []
-        for _ in range(4):
-            found.append(jax.jit(function)(0.0))
-            function = jax.jacfwd(function)
-        return found
-
-    one = jnp.eye(3)
-    powers = [np.linalg.matrix_power(h, k) for k in range(4)]
-    for k, found in enumerate(derivatives(lambda s: spectral.exponential(0.5 * one + s * h))):
-        np.testing.assert_allclose(found, np.exp(0.5) * powers[k], atol=1e-13)
-    logs = [0 * one, powers[1], -powers[2], 2 * powers[3]]
-    for found, expected in zip(derivatives(lambda s: spectral.logarithm(one + s * h)), logs, strict=True):
-        np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
 def test_the_logarithm_inverts_the_exponential_in_two_directions():
     """Second mixed derivatives, where two of three eigenvalues are equal and matrices do not commute."""
     g, h = symmetric(1), symmetric(2)

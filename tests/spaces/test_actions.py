@@ -8,7 +8,6 @@ from lie import Lie
 import symspline as ss
 
 SEED = 1703
-
 one_per_family = pytest.mark.parametrize("case", [c for c in CASES if c.interface], ids=lambda case: case.name)
 
 
@@ -133,14 +132,6 @@ def test_products_act_by_factors(rng):
         assert np.array_equal(moved[i], factor.act(g[i], x[i]))
         assert np.array_equal(mirrored[i], factor.symmetry(p[i], x[i]))
     assert np.allclose(space.distance(space.act(g, p), moved), space.distance(p, x), atol=1e-14)
-
-
-def test_scipy_rotations_act_on_rotations():
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_rotvec([0.1, 0.2, 0.3])
-    moved = ss.SpecialOrthogonal(3).act((turn, np.eye(3)), np.eye(3))
-    assert np.abs(moved - turn.as_matrix()).max() <= 2 * EPS
 
 
 def test_single_precision_elements_have_its_tolerance():

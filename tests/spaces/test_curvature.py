@@ -7,6 +7,7 @@ largest singular value, of one vector at a time.
 import numpy as np
 import pytest
 from cases import CASES, EPS, LINEAR, base_point, compact, has_metric, unit_tangent
+from lie import Lie, bracket
 
 import symspline as ss
 
@@ -22,74 +23,11 @@ NAMES = [
 every = pytest.mark.parametrize("name", NAMES)
 
 
-def bracket(a, b):
-    return a @ b - b @ a
-
-
-def vectors_of(sign):
-    """R(a, b)c = ±(⟨b, c⟩a − ⟨a, c⟩b)."""
-
-    def triple(space, p, a, b, c):
-        return sign * (space.inner(p, a, c) * b - space.inner(p, b, c) * a)
-
-    return triple
-
-
-def of_subspaces(space, p, a, b, c):
-    """[[a, b], c] of the off-diagonal blocks."""
-    if len(space.point_shape) == 1:
-        return of_subspaces(ss.ComplexGrassmannian(1, len(p)), p, a[:, None], b[:, None], c[:, None])[:, 0]
-    turn = a.conj().T @ b - b.conj().T @ a
-    return c @ turn - (a @ b.conj().T - b @ a.conj().T) @ c
-
-
-def of_matrices(space, p, a, b, c):
-    """¼ p [[p⁻¹a, p⁻¹b], p⁻¹c]: what acts in a transvection is half of p⁻¹a."""
-    a, b, c = np.linalg.solve(p, [a, b, c])
-    return p @ bracket(bracket(a, b), c) / 4
-
-
-TRIPLES = {
-    ss.Euclidean: vectors_of(0),
-    ss.Sphere: vectors_of(1),
-    ss.Hyperbolic: vectors_of(-1),
-    **dict.fromkeys((ss.RealProjective, ss.ComplexProjective), of_subspaces),
-    **dict.fromkeys((ss.Grassmannian, ss.ComplexGrassmannian), of_subspaces),
-    **dict.fromkeys((ss.SpecialOrthogonal, ss.Orthogonal, ss.Unitary, ss.SpecialUnitary), of_matrices),
-    **dict.fromkeys((ss.SymmetricPositiveDefinite, ss.HermitianPositiveDefinite), of_matrices),
-}
-
-
 def triple(space, p, a, b, c):
-    return TRIPLES[type(space)](space, p, a, b, c)
-
-
-def around_a_parallelogram(space, p, a, b, c, size):
-    """c after parallel transport around a small parallelogram, first along a."""
-    q, sides = p, [size * a, size * b]
-    for step in (0, 1, 0, 1):
-        r = space.exp(q, sides[step])
-        *sides, c = (space.transport(q, r, v) for v in (*sides, c))
-        # The way back.
-        sides[step] = -sides[step]
-        q = r
-    return space.transport(q, p, c)
-
-
-@every
-def test_the_triple_product_is_curvature(name, rng):
-    """Holonomy of a small parallelogram, from `transport` alone: R(a, b)c is its limit."""
-    space = ss.space(name)
-    p = base_point(space, rng)
-    a, b, c = (unit_tangent(space, p, rng) for _ in range(3))
-
-    def holonomy(h):
-        # The mean over both directions has an error of h², which extrapolation makes h⁴.
-        there, back = (around_a_parallelogram(space, p, s * a, s * b, c, h) for s in (1, -1))
-        return ((there - c) + (back - c)) / (2 * h**2)
-
-    limit = (4 * holonomy(0.01) - holonomy(0.02)) / 3
-    assert space.norm(p, limit - triple(space, p, a, b, c)) <= 1e-5
+    """R(a, b)c by the double bracket of the Lie algebra."""
+    lie = Lie(space)
+    a, b, c = (lie.lift(p, v) for v in (a, b, c))
+    return lie.at(bracket(bracket(a, b), c), p)
 
 
 def orthonormal_basis(space, p, rng):

@@ -47,8 +47,6 @@ def compare(space, geometry, p, v, x, scale=1.0, size=1.0, log_size=1.0):
 
 
 LENGTHS = [1e-12, 1e-8, 1e-4, 0.1, 0.6, 1.5]
-
-
 GAPS = [0.5, 1e-2, 1e-4, 1e-8, 1e-12, 1e-14]
 
 

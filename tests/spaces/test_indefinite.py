@@ -4,13 +4,12 @@ and the spaces of definite metric that lie in them."""
 import mpmath
 import numpy as np
 import pytest
-from cases import EPS, WORDS, base_point, centre_of, condition, jumps, loop_over
+from cases import EPS, base_point, centre_of, condition, jumps, loop_over, walk
 from scipy.linalg import expm
 
 import symspline as ss
 
 SEED = 8
-
 QUADRICS = ["ds:2", "ds:3", "ads:2", "ads:3"]
 NAMES = [*QUADRICS, "igr:0,1,1,2", "igr:1,0,2,1", "igr:1,1,2,2"]
 quadrics = pytest.mark.parametrize("name", QUADRICS)
@@ -38,23 +37,8 @@ def group_element(eta, rng, size=0.4):
     return flips @ expm(eta[:, None] * (x - x.T))
 
 
-def act(name, g, x):
-    """An isometry on points, or on tangent vectors."""
-    if name.startswith("igr"):
-        return g @ x @ np.linalg.inv(g)
-    return x @ g.T
-
-
 def origin(name):
     return centre_of(ss.space(name)).astype(float)
-
-
-def data(name, rng, n=6, step=0.2):
-    """Points around one of the space, with steps of every kind."""
-    space, o = ss.space(name), origin(name)
-    return act(
-        name, group_element(signs(name), rng, 0.3), space.exp(o, step * space.random_tangent(rng, np.array([o] * n)))
-    )
 
 
 # ---- exponential and logarithm ----
@@ -134,7 +118,7 @@ def test_points_without_a_geodesic_raise(name):
 @every
 def test_transport_preserves_the_invariant_form(name, rng):
     space = ss.space(name)
-    p = data(name, rng)
+    p = walk(space, 0.4, 6, rng)
     u, v = (space.random_tangent(rng, p[:-1]) for _ in range(2))
     moved = [space.transport(p[:-1], p[1:], x) for x in (u, v)]
     before, after = space.invariant_form(p[:-1], u, v), space.invariant_form(p[1:], *moved)
@@ -146,96 +130,6 @@ def test_transport_preserves_the_invariant_form(name, rng):
         gram = gram * 8
     np.testing.assert_allclose(np.abs(gram), np.eye(space.dim), rtol=0, atol=1e-12)
     assert np.linalg.eigvalsh(gram).min() < -0.9 and (np.linalg.eigvalsh(gram).max() > 0.9)
-
-
-@every
-@loop_over("bc_type", WORDS[:3])
-def test_splines_commute_with_isometries(name, bc_type, rng):
-    space = ss.space(name)
-    p = data(name, rng)
-    g = group_element(signs(name), rng)
-    x = np.linspace(KNOTS[0], KNOTS[-1], 51)
-    spline = ss.CubicSpline(KNOTS, p, space, bc_type=bc_type, tol=1e-14)
-    moved = ss.CubicSpline(KNOTS, act(name, g, p), space, bc_type=bc_type, tol=1e-14)
-    for nu in range(3):
-        expected = act(name, g, spline(x, nu))
-        allowed = 1e-11 * max(1.0, np.abs(expected).max()) * np.linalg.cond(g) ** 2
-        np.testing.assert_allclose(moved(x, nu), expected, rtol=0, atol=allowed)
-
-
-# ---- spaces in each other ----
-
-
-def line_reflection(name, x):
-    """1 on the line of x and −1 on its complement."""
-    eta = signs(name)
-    dual = x * eta
-    square = (x * dual).sum(axis=-1)[..., None, None]
-    return 2 * x[..., :, None] * dual[..., None, :] / square - np.eye(len(eta))
-
-
-@pytest.mark.parametrize(
-    ("name", "lines"),
-    [("ds:2", "igr:0,1,1,2"), ("ads:2", "igr:1,0,2,1"), ("ds:3", "igr:0,1,1,3"), ("ads:3", "igr:1,0,2,2")],
-)
-@loop_over("bc_type", WORDS[:3])
-def test_quadrics_are_lines_of_an_indefinite_form(name, lines, bc_type, rng):
-    p = data(name, rng, step=0.15)
-    x = np.linspace(KNOTS[0], KNOTS[-1], 51)
-    spline = ss.CubicSpline(KNOTS, p, name, bc_type=bc_type, tol=1e-14)
-    other = ss.CubicSpline(KNOTS, line_reflection(name, p), lines, bc_type=bc_type, tol=1e-14)
-    expected = line_reflection(name, spline(x))
-    np.testing.assert_allclose(other(x), expected, rtol=0, atol=1e-12 * np.abs(expected).max() ** 2)
-    # The metric of lines is ⟨v, v⟩/⟨x, x⟩.
-    found = other.space.invariant_form(other(x), other(x, 1), other(x, 1))
-    metric = spline.space.invariant_form(spline(x), spline(x, 1), spline(x, 1)) * kappa(name)
-    np.testing.assert_allclose(found, metric, rtol=0, atol=1e-11 * np.abs(expected).max() ** 2)
-
-
-@loop_over("bc_type", WORDS)
-def test_de_sitter_space_without_time_is_a_sphere(bc_type, rng):
-    p = ss.Sphere(2).random_point(rng, 8)
-    p = ss.Sphere(2).project(p[0] + 0.5 * p)
-    p[-1] = p[0] if bc_type == "periodic" else p[-1]
-    wide = np.concatenate([np.zeros((8, 1)), p], axis=1)
-    x = np.linspace(0, 7, 57)
-    sphere, own = (ss.CubicSpline(None, y, s, bc_type=bc_type, tol=1e-14) for y, s in ((p, "sphere:2"), (wide, "ds:3")))
-    for nu in range(3):
-        assert np.abs(own(x, nu)[:, 0]).max() == 0
-        np.testing.assert_allclose(own(x, nu)[:, 1:], sphere(x, nu), rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("name", ["ds:2", "ads:3"])
-@loop_over("bc_type", WORDS)
-def test_hyperbolic_slices(name, bc_type, rng):
-    """x₂ = 0 of dS² is a line with coordinates (x₁, x₀); x₁ = 0 of AdSⁿ is hyperbolic space."""
-    h = ss.Hyperbolic(1 if name == "ds:2" else 2)
-    p = h.exp(np.eye(1, h.point_shape[0])[0], 0.6 * np.insert(rng.standard_normal((8, h.dim)), 0, 0.0, axis=1))
-    p[-1] = p[0] if bc_type == "periodic" else p[-1]
-
-    def wide(y):
-        if name == "ds:2":
-            return np.stack([y[..., 1], y[..., 0], 0 * y[..., 0]], axis=-1)
-        return np.insert(y, 1, 0.0, axis=-1)
-
-    x = np.linspace(0, 7, 57)
-    own = ss.CubicSpline(None, wide(p), name, bc_type=bc_type, tol=1e-14)
-    plane = ss.CubicSpline(None, p, h, bc_type=bc_type, tol=1e-14)
-    for nu in range(3):
-        expected = wide(plane(x, nu))
-        np.testing.assert_allclose(own(x, nu), expected, rtol=0, atol=2e-11 * max(1.0, np.abs(expected).max()))
-
-
-def test_a_definite_form_gives_the_grassmannian(rng):
-    space = ss.Grassmannian(2, 4)
-    p = space.random_point(rng, 6)
-    p = np.array([space.geodesic(p[0], q, 0.3) for q in p])
-    p = p @ np.diag([2.0, -1.0])
-    for name, bases in (("igr:0,2,0,4", 0), ("igr:2,0,4,0", 4)):
-        points = ss.convert.basis_to_reflection(p, negative=bases)
-        curve = ss.CubicSpline(KNOTS, points, name, tol=1e-14)(np.linspace(0, 5, 41))
-        y = ss.CubicSpline(KNOTS, p / [2.0, 1.0], space, tol=1e-14)(np.linspace(0, 5, 41))
-        np.testing.assert_allclose(curve, ss.convert.basis_to_reflection(y, negative=bases), rtol=0, atol=1e-12)
 
 
 # ---- steps of every kind ----

@@ -7,7 +7,6 @@ from cases import loop_over
 import symspline as ss
 
 SEED = 1000
-
 N = 300
 
 

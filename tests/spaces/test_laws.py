@@ -19,7 +19,6 @@ from cases import (
 )
 
 SEED = 20180308
-
 every = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 

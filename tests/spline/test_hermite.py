@@ -1,8 +1,5 @@
 """The interface of `HermiteSpline`."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 from curves import (
@@ -12,14 +9,10 @@ from curves import (
     bezier,
     each,
     every_batch,
-    every_common,
     every_kind,
     largest_difference,
     off,
-    parts,
-    pick,
     points_on,
-    same,
     tangents_at,
     vectors_off,
 )
@@ -81,62 +74,7 @@ def test_hermite_spline_has_the_given_points_and_velocities(space):
     assert largest_difference(found.points, p) < 1e-14
 
 
-def test_exact_velocities_give_fourth_order():
-    def error(n):
-        t = np.linspace(0, 3, n)
-
-        def motion(t):
-            lon, lat = 0.7 * t, 0.5 * np.sin(t)
-            p = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], -1)
-            east = np.stack([-np.sin(lon), np.cos(lon), 0 * lon], -1)
-            north = np.stack([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)], -1)
-            return p, (0.7 * np.cos(lat))[:, None] * east + (0.5 * np.cos(t))[:, None] * north
-
-        x = np.linspace(0, 3, 1001)
-        return S2.distance(ss.HermiteSpline(t, *motion(t), S2)(x), motion(x)[0]).max()
-
-    assert error(41) < 1e-6
-    assert 14 < error(21) / error(41) < 18
-
-
-def test_rotations_with_measured_rates():
-    rng = np.random.default_rng(3)
-    r = points_on(ss.SpecialOrthogonal(3), 6, step=0.4)
-    rates = rng.standard_normal((6, 3))
-    for frame in ("body", "world"):
-        v = ss.rotations.velocities(r, rates, frame)
-        spline = ss.HermiteSpline(KNOTS, r, v, "so:3")
-        assert np.abs(ss.rotations.angular_velocity(spline, KNOTS, frame) - rates).max() < 1e-13
-    x = rng.standard_normal((6, 3))
-    pose = ss.HermiteSpline(KNOTS, (r, x), (v, 2 * x), "so:3 x r:3")
-    assert np.abs(ss.poses.linear_velocity(pose, KNOTS) - 2 * x).max() < 1e-13
-    q = ss.rotations.quaternion(pose, np.linspace(0, 4.5, 2001), scalar_first=True)
-    assert ((q[1:] * q[:-1]).sum(-1) > 0.99).all()
-
-
 # ---- the interface ----
-
-
-@every_common
-def test_batches(space):
-    both = curve(space, (2,))
-    assert len(both) == 2 and [c == both[i] for i, c in enumerate(both)] == [True, True] and len(both[:1]) == 1
-    assert same(both[1](X), pick(both(X), 1))
-    assert same(both(np.stack([X, X]), per_curve=True), both(X))
-    own = ss.HermiteSpline(np.stack([KNOTS, KNOTS + 1]), both.points, both.velocities, space)
-    assert largest_difference(own[1](X + 1), both[1](X)) < 1e-12
-
-
-@every_common
-def test_as_a_value(space):
-    found = curve(space, extrapolate="geodesic")
-    assert found == curve(space) and found != curve(space, (2,))
-    for other in (copy.deepcopy(found), pickle.loads(pickle.dumps(found))):
-        assert other == found and other.extrapolate == "geodesic" and same(other(5.0), found(5.0))
-    assert repr(found) == f"<HermiteSpline on {space!r}: 6 points>"
-    assert found != 5
-    for array in (found.t, *parts(found.points), *parts(found.velocities)):
-        assert not array.flags.writeable
 
 
 def test_outside_the_knots():
@@ -199,16 +137,6 @@ def test_control_points_beyond_reach_raise(batch, curve):
         ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"
     ):
         ss.HermiteSpline(None, points, velocities, S2)
-
-
-def test_only_batches_are_sequences():
-    found = curve(S2)
-    for use in (len, lambda s: s[0]):
-        with pytest.raises(TypeError, match="one curve"):
-            use(found)
-    with pytest.raises(TypeError, match="integer or a slice"):
-        curve(S2, (2,))["a"]
-    assert found
 
 
 def test_velocities_become_tangent_to_rounding():

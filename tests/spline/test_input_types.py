@@ -1,6 +1,7 @@
 """Input of other types: dates, durations, tensors, quantum objects and tables; and input that could be misread.
 
-pandas, PyTorch and QuTiP need not be there: stand-ins do what the library looks at, as those do it.
+PyTorch and QuTiP need not be there: stand-ins do what the library looks at, as those do it. Times of pandas are in
+test_pandas.
 """
 
 import io
@@ -53,19 +54,6 @@ class Qobj:
         return self._array
 
 
-class Zoned:
-    """As pandas.DatetimeIndex with a time zone: np.asarray alone gives objects."""
-
-    class dtype:
-        kind, tz, unit = "M", "Europe/Berlin", "s"
-
-    def __init__(self, utc):
-        self._utc = utc
-
-    def __array__(self, dtype=None, copy=None):
-        return self._utc.astype(dtype or object)
-
-
 class Quantity:
     """As pint.Quantity."""
 
@@ -83,15 +71,13 @@ class Quantity:
         ["2021-08-29T00:00", "2021-08-29T06:00", "2021-08-29T18:00"],
         ["2021-08-29 00:00:00Z", "2021-08-29T08:00+02:00", "2021-08-29T15:30-0230"],
         np.array(["2021-08-29T00:00:00.000", "2021-08-29T06:00", "2021-08-29T18:00"]),
-        Zoned(HOURS),
     ],
 )
 def test_dates_of_any_kind(t):
     spline = ss.CubicSpline(t, P, S2)
     assert np.array_equal(spline.t, HOURS) and np.array_equal(spline.velocities, SPLINE.velocities)
     assert np.array_equal(spline(t), SPLINE(HOURS))
-    if not isinstance(t, Zoned):
-        assert np.array_equal(spline(t[1]), SPLINE(HOURS[1]))
+    assert np.array_equal(spline(t[1]), SPLINE(HOURS[1]))
     assert np.array_equal(spline(spline.t), SPLINE(HOURS))
 
 
@@ -155,16 +141,6 @@ def test_time_zones_are_kept(zone, kind):
             for x in (middle.replace(tzinfo=KOLKATA), "2026-01-01T06:00Z"):
                 with pytest.raises(ss.ValidationError, match="a time zone, but the knots have none"):
                     curve(x)
-
-
-def test_many_curves_in_a_file_are_of_one_kind_of_time(tmp_path):
-    aware = [moment.replace(tzinfo=BERLIN) for moment in NAIVE]
-    one, other = (ss.CubicSpline(t, P, S2) for t in (aware, NAIVE))
-    with pytest.raises(ss.ValidationError, match=r"differ in .*unit.* times of one type"):
-        ss.save({"one": one, "other": other}, tmp_path / "c.npz")
-    ss.save({"one": one}, tmp_path / "c.npz")
-    with pytest.raises(ss.ValidationError, match="x has no time zone"):
-        ss.load(tmp_path / "c.npz")["one"](NAIVE[1])
 
 
 def test_max_gap_accepts_durations():

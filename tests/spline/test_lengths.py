@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import EPS, QUADRICS
+from cases import EPS
 from curves import (
     KNOTS,
     S2,
@@ -45,20 +45,6 @@ def test_control_points(space, batch):
         assert off(space, r, space.exp(s, each(lambda v, h=h: -v * h / 3, w))) < 20 * EPS
         middle = pick(spline(KNOTS[k] + 0.4 * h), first)
         assert off(space, middle, bezier(space, segment, 0.4)) < 20 * EPS
-
-
-@every_common
-@every_batch
-def test_length_and_energy_of_a_batch(space, batch):
-    p = points_on(space, 6, batch)
-    t = np.cumsum(np.random.default_rng(0).uniform(0.5, 2, (*batch, 6)), axis=-1)
-    spline = ss.CubicSpline(t, p, space)
-    length, energy = spline.length(), spline.bending_energy()
-    assert np.shape(length) == np.shape(energy) == batch
-    for i in np.ndindex(*batch):
-        alone = ss.CubicSpline(t[i], each(lambda q, i=i: q[i], p), space)
-        assert length[i] == pytest.approx(alone.length(), rel=1e-13)
-        assert energy[i] == pytest.approx(alone.bending_energy(), rel=1e-13)
 
 
 def on_a_geodesic(space, theta, t):
@@ -117,20 +103,6 @@ far = np.stack([np.cosh(10 + 0 * a), np.sinh(10) * np.cos(a), np.sinh(10) * np.s
 )
 def test_integrals_come_to_rest_at_the_rounding_floor(code):
     run_python(f"{RESTS}\nassert {code}", timeout=3)
-
-
-@every_kind
-def test_length_and_energy_of_a_geodesic(space):
-    p = points_on(space, 2, step=0.5)
-    ends = at_node(space, p, 0), at_node(space, p, 1)
-    spline = ss.CubicSpline(KNOTS, space.geodesic(*ends, KNOTS / 4.5), space, bc_type="not-a-knot")
-    distance = space.distance(*ends)
-    assert isinstance(spline.length(), float)
-    if not isinstance(space, QUADRICS):
-        # There the size of a vector is that of its numbers.
-        assert spline.length() == pytest.approx(distance, rel=1e-13)
-        assert spline.speed(np.linspace(0, 4.5, 30)) == pytest.approx(distance / 4.5, rel=1e-11)
-    assert spline.bending_energy() < 1e-20
 
 
 @every_kind

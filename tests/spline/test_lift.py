@@ -1,20 +1,15 @@
 """Horizontal lifts: representatives that are continuous and turn no more than their subspaces."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from cases import EPS, loop_over, walk
 from curves import same
 from rounding import rounding
-from scipy.integrate import solve_ivp
 
 import symspline as ss
 
 SEED = 11
-
 NAMES = ["rp:2", "rp:3", "cp:1", "cp:3", "gr:2,5", "gr:2,3", "cgr:2,4", "hp:2", "ch:2"]
-ORTHONORMAL = NAMES[:-1]
 KNOTS = np.array([0.0, 0.4, 1.9, 2.3, 3.6, 4.0, 5.1])
 
 
@@ -67,24 +62,6 @@ def test_lift_is_horizontal_and_projects_to_the_curve(name, rng):
     slope = (around[0] - 8 * around[1] + 8 * around[2] - around[3]) / (12 * h)
     bend = space.project_tangent(spline.lift(x), slope)
     np.testing.assert_allclose(bend, spline.lift(x, nu=2), rtol=0, atol=1e-7 * np.abs(bend).max())
-
-
-@pytest.mark.parametrize("name", ORTHONORMAL)
-def test_solution_satisfies_the_equation(name, rng):
-    """X' = P'X for the projector P = YY*, in which representatives cancel; P' = DY* + YD* for a velocity D at Y."""
-    space, points = points_of(name, rng)
-    spline = ss.CubicSpline(KNOTS, points, space)
-    shape = wide(space, points[0]).shape
-
-    def rate(t, x):
-        y, d = (wide(space, spline(t, nu=nu)) for nu in (0, 1))
-        return ((d @ y.conj().T + y @ d.conj().T) @ x.reshape(shape)).ravel()
-
-    x = wide(space, points[0]).ravel()
-    for a, b in pairwise(KNOTS):
-        x = solve_ivp(rate, (a, b), x, method="DOP853", rtol=3e-14, atol=1e-15, max_step=0.02).y[:, -1]
-        # What is left is the integrator's.
-        np.testing.assert_allclose(wide(space, spline.lift(b)).ravel(), x, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", NAMES)

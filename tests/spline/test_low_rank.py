@@ -1,6 +1,5 @@
 """Curves of high ambient dimension, which are computed in the span of their points."""
 
-import pickle
 import sys
 
 import numpy as np
@@ -73,17 +72,6 @@ def data(space, rng, kind="natural", n=N):
 
 
 @every_space
-@loop_over("method", ["auto", "fixed-point", "newton"])
-def test_solvers(name, method, rng):
-    embed = Embedded(name, rng)
-    t, p, _ = data(embed.small, rng)
-    here, there = (ss.CubicSpline(t, *x, method=method) for x in ((embed(p), embed.space), (p, embed.small)))
-    embed.check(here, there)
-    assert here.report.method == there.report.method and here.report.curvature == embed.space.curvature
-    assert np.isclose(here.report.max_step, there.report.max_step, rtol=1e-12)
-
-
-@every_space
 @loop_over("kind", ENDS)
 def test_curves(name, kind, rng):
     embed = Embedded(name, rng)
@@ -102,21 +90,6 @@ def test_curves(name, kind, rng):
     for policy in (True, "geodesic", "periodic"):
         values = [[c(outside, nu, extrapolate=policy) for nu in range(3)] for c in (here, there)]
         embed.agree(*values, 30)
-
-
-@every_space
-def test_batches(name, rng):
-    embed = Embedded(name, rng)
-    p = np.stack([[walk(embed.small, 0.5, N, rng) for _ in range(3)] for _ in range(2)])
-    t = np.cumsum(rng.uniform(0.7, 1.3, (2, 3, N)), axis=-1)
-    v = 0.5 * embed.small.random_tangent(rng, p[:, :, 0]) / np.sqrt(embed.small.dim)
-    bc_type = ((1, v), "natural")
-    for own in (True, False):
-        times, x = (t, t[..., :1] + rng.uniform(0, 3.5, (2, 3, 4))) if own else (t[0, 0], t[0, 0, :3] + 0.1)
-        there = ss.CubicSpline(times, p, embed.small, bc_type=bc_type)
-        here = ss.CubicSpline(times, embed(p), embed.space, bc_type=embed.ends(bc_type))
-        embed.check(here, there)
-        embed.agree(*([c(x, nu, per_curve=own) for nu in (0, 1)] for c in (here, there)), 10)
 
 
 @every_space
@@ -194,24 +167,6 @@ def test_error_names_the_invalid_curve(rng):
         ss.CubicSpline(None, np.stack([good, far]), space)
     with pytest.raises(ss.ValidationError, match=r"points\[1\] of curve 1 is off the space"):
         ss.fit_many([(None, good), (None, good * [[1.0], [2], [1], [1], [1]])], space)
-
-
-@every_large
-def test_copies(space, rng):
-    spline = ss.CubicSpline(None, walk(space, 0.4, 6, rng), space, extrapolate="geodesic")
-    x = [-1.0, 0.3, 2.0, 7.0]
-    before = [spline(x, nu) for nu in range(3)]
-    made = pickle.loads(pickle.dumps(spline))
-    assert made == spline and made.report == spline.report
-    assert all(np.array_equal(made(x, nu), y) for nu, y in enumerate(before))
-
-
-def test_products_have_large_factors(rng):
-    space = ss.space("sphere:299 x so:3")
-    p = tuple(walk(factor, 0.4, 6, rng) for factor in space.factors)
-    spline = ss.CubicSpline(None, p, space)
-    alone = ss.CubicSpline(None, p[0], "sphere:299")
-    assert np.array_equal(spline(2.5)[0], alone(2.5))
 
 
 # ---- random tangent vectors ----

@@ -29,16 +29,6 @@ def test_unmasked_curves_equal_those_of_the_whole_batch(name, own_times):
     np.testing.assert_array_equal(some.report.residual[mask], whole.report.residual[mask])
 
 
-def test_vectors_at_the_ends_go_with_their_curves():
-    p = points_on(ss.Sphere(2), 4, (5,), step=0.4)
-    v = ss.Sphere(2).random_tangent(np.random.default_rng(0), p[:, 0])
-    mask = np.array([True, False, False, True, True])
-    whole = ss.CubicSpline(None, p, "s:2", bc_type=((1, v), "natural"))
-    some = ss.CubicSpline(None, p, "s:2", bc_type=((1, v), "natural"), where=mask)
-    assert np.array_equal(some.velocities[mask], whole.velocities[mask])
-    assert np.isnan(some.velocities[~mask]).all()
-
-
 def test_no_curve_at_all():
     some = ss.CubicSpline(None, points_on(ss.Sphere(2), 4, (5,)), "s:2", where=np.zeros(5, bool))
     assert np.isnan(some(X)).all() and not some.report.converged.any()

@@ -1,25 +1,12 @@
 """Options of a fit: methods, limits, and invalid values."""
 
-import inspect
-
 import numpy as np
 import pytest
 from cases import loop_over
-from curves import KNOTS, S2, every_common, largest_difference, points_on
+from curves import KNOTS, S2, points_on
 from refused import INF, NAN, P, fit_error
 
 import symspline as ss
-
-
-@every_common
-def test_methods_agree(space):
-    p = points_on(space, 6)
-    reference = ss.CubicSpline(KNOTS, p, space)
-    for method in ("fixed-point", "quasi-newton", "newton"):
-        spline = ss.CubicSpline(KNOTS, p, space, method=method)
-        assert spline.report.method == method and spline.report.converged
-        assert largest_difference(spline.velocities, reference.velocities) < 1e-12
-        assert method != "newton" or spline.report.iterations <= reference.report.iterations
 
 
 def test_tol_and_max_iter_bound_the_work():
@@ -86,21 +73,8 @@ def test_options_of_a_wrong_type_raise(options):
             fit(*data, S2, **options)
 
 
-def test_unknown_options_raise():
-    for call in (ss.CubicSpline, ss.fit, lambda t, p, space, **options: ss.fit_many([(t, p)], space, **options)):
-        with pytest.raises(TypeError, match="smooth"):
-            call(None, P, S2, smooth=True)
-
-
 def test_messages_quote_no_large_arrays():
     # NumPy would write out all of it, as no axis is long.
     wrong = np.zeros((2,) * 20)
     with pytest.raises(ss.ValidationError, match=r"not an array of shape \(2, 2, 2, .*\)$"):
         ss.CubicSpline(None, P, S2, on_failure=wrong)
-
-
-def test_the_signature_names_the_parameters():
-    assert list(inspect.signature(ss.CubicSpline).parameters) == [
-        "t", "points", "space", "bc_type", "method", "tol", "max_iter", "extrapolate", "on_failure", "check",
-        "atol", "where", "progress",
-    ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Columns and indices of pandas itself as times and points; test_input_types has stand-ins."""
+"""Columns and indices of pandas as times and points."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 import symspline as ss
 
 pd = pytest.importorskip("pandas")
-
 HOURS = np.array(["2025-12-31T23", "2026-01-01T00", "2026-01-01T01"], "datetime64[us]")
 BERLIN = pd.date_range("2026-01-01", periods=3, freq="h", tz="Europe/Berlin")
 
@@ -19,19 +18,6 @@ def test_times_with_a_zone_become_utc(times):
         assert np.array_equal(spline(x), [0, 1, 0])
     with pytest.raises(ss.ValidationError, match="x has no time zone, but the knots have one"):
         spline(pd.Timestamp("2026-01-01 00:00"))
-
-
-def test_two_zones_are_one_time():
-    spline = ss.CubicSpline(BERLIN, np.eye(3), "sphere:2")
-    there = BERLIN.tz_convert("America/New_York")
-    assert np.array_equal(spline(there), spline(BERLIN)) and np.array_equal(spline(BERLIN), np.eye(3))
-    # The same hours of the clock are six hours later.
-    with pytest.raises(ss.ValidationError, match="outside the knots"):
-        spline(BERLIN.tz_localize(None).tz_localize("America/New_York"))
-    (piece,) = ss.fit_segments(BERLIN, np.eye(3), "sphere:2", max_gap=7200)
-    assert np.array_equal(piece(there), np.eye(3))
-    with pytest.raises(ss.ValidationError, match="x has no time zone"):
-        piece(BERLIN.tz_localize(None))
 
 
 @pytest.mark.parametrize(

@@ -52,17 +52,10 @@ def test_another_curve_of_a_product_is_another_curve_of_a_factor(batch):
     assert np.isnan(other[1]) if batch else other > total
 
 
-def test_a_product_of_near_points_has_no_other_curve():
-    p = points_on(S2, 5)
-    assert ss.CubicSpline(None, (p, p), "s:2 x s:2").report.alternative_energy is None
-
-
 # ---- bad input ----
 
 
 PRODUCT = "sphere:2 x r:1"
-
-
 FLAT, OFF = np.zeros((3, 1)), changed(2, [0, 0, 2])
 
 

@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pytest
 from cases import has_metric
 from curves import KNOTS, S2, at_node, every_batch, every_common, every_kind, every_single, failing, points_on
 
@@ -43,16 +42,6 @@ def test_max_step_is_the_longest_distance(space, batch):
 
 
 @every_common
-@pytest.mark.parametrize("batch", [(1,), (4,), (2, 3)], ids=str)
-def test_report_of_a_batch(space, batch):
-    report = ss.CubicSpline(KNOTS, points_on(space, 6, batch), space).report
-    for name in ("converged", "iterations", "residual", "max_step", "rate"):
-        assert getattr(report, name).shape == batch
-    assert report.converged.dtype == bool and report.iterations.dtype.kind == "i"
-    assert isinstance(report.method, str) and report.curvature == space.curvature
-
-
-@every_common
 @every_batch
 def test_max_gap_is_the_longest_time_between_points(space, batch):
     p = points_on(space, 6, batch)
@@ -66,7 +55,7 @@ def test_max_gap_is_the_longest_time_between_points(space, batch):
         assert [s.report.max_gap for s in ss.fit_many([(KNOTS, p), (None, p)], space)] == [1.5, 1.0]
 
 
-@every_kind
+@every_common
 @every_batch
 def test_report_reads_as_one_line(space, batch):
     spline = ss.CubicSpline(KNOTS, points_on(space, batch=batch, step=0.5), space)

@@ -5,6 +5,7 @@
 //! over knots and samples in that table are implemented in `kernels`, above `fit` and `curve`.
 
 pub mod curve;
+#[cfg(feature = "dense")]
 pub mod derivative;
 pub mod fit;
 mod kernels;

@@ -8,16 +8,34 @@ mod unitary;
 
 pub use rotations::Rotations;
 pub use special_euclidean::SpecialEuclidean;
+#[cfg(feature = "unitary")]
 pub use unitary::{UnitaryGroup, orthogonal, special_orthogonal};
 
+#[cfg(feature = "unitary")]
 use symspline_core::matrix::Known;
+use symspline_core::scalar::{few, lane};
 use symspline_core::space::{Entry, Made, table};
+
+/// The rotation matrix of a unit quaternion w, x, y, z, row by row.
+pub fn matrix_of_quaternion(q: [f64; 4]) -> [f64; 9] {
+    rigid::to_matrix(q.map(lane)).map(|x| x.as_array()[0])
+}
+
+/// The unit quaternion w, x, y, z of a rotation matrix, with w ≥ 0 up to rounding.
+pub fn quaternion_of_matrix(r: &[f64]) -> [f64; 4] {
+    let minus_identity: [f64; 9] = few(|i| r[i] - if i % 4 == 0 { 1.0 } else { 0.0 });
+    let q = rigid::of_matrix(minus_identity.map(lane)).map(|x| x.as_array()[0]);
+    if q[0] < 0.0 { q.map(|x| -x) } else { q }
+}
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
     Entry { names: &["so", "special-orthogonal"], parameters: &["n"], make: rotations },
+    #[cfg(feature = "unitary")]
     Entry { names: &["o", "orthogonal"], parameters: &["n"], make: |p| table(orthogonal(p[0])) },
+    #[cfg(feature = "unitary")]
     Entry { names: &["u", "unitary"], parameters: &["n"], make: |p| complex(p[0], false) },
+    #[cfg(feature = "unitary")]
     Entry { names: &["su", "special-unitary"], parameters: &["n"], make: |p| complex(p[0], true) },
     Entry {
         names: &["se", "special-euclidean"],
@@ -27,10 +45,17 @@ pub static FAMILY: &[Entry] = &[
 ];
 
 fn rotations(p: &[usize]) -> Made {
-    if p[0] == 3 { table(Rotations::new()) } else { table(special_orthogonal(p[0])) }
+    match p[0] {
+        3 => table(Rotations::new()),
+        #[cfg(feature = "unitary")]
+        n => table(special_orthogonal(n)),
+        #[cfg(not(feature = "unitary"))]
+        n => Err(format!("SpecialOrthogonal({n}) was not compiled: it needs the feature \"unitary\"")),
+    }
 }
 
 /// U(n) and SU(n); common sizes are constants at compile time.
+#[cfg(feature = "unitary")]
 fn complex(n: usize, special: bool) -> Made {
     match n {
         2 => table(UnitaryGroup::<2, Known<2, 4>>::new(n, special)),

@@ -24,6 +24,7 @@ pub struct UnitaryGroup<const D: usize, A = Dynamic> {
 }
 
 /// Rotations and reflections of n dimensions.
+#[cfg(feature = "unitary")]
 pub fn orthogonal(n: usize) -> Result<UnitaryGroup<1>, String> {
     UnitaryGroup::new(n, false)
 }

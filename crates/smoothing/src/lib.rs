@@ -24,6 +24,7 @@ mod jacobi_operator;
 mod linearized;
 mod loss;
 mod misfit;
+mod observations;
 mod path;
 mod problem;
 mod progress;
@@ -33,6 +34,7 @@ mod smooth;
 mod start;
 mod variance;
 
+pub use observations::Observations;
 pub use problem::{Criterion, Data, EndCondition, Ends, Loss, Options, Report, Smooth, State, Tier};
 pub use smooth::smooth;
 pub use variance::variance;

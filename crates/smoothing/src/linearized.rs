@@ -223,7 +223,8 @@ fn gram(count: usize, rows: impl Iterator<Item = (Row, Row, f64)>) -> Vec<f64> {
             for (b, y) in right.factors.iter().enumerate() {
                 let (i, j) = (left.first + a, right.first + b);
                 let value = factor * x * y;
-                if i >= j && value != 0.0 {
+                // Products outside the band are zero, or NaN if 1/h overflows.
+                if i >= j && i < count.min(j + BAND) && value != 0.0 {
                     out[i * BAND + i - j] += value;
                 }
             }

@@ -6,9 +6,9 @@ use crate::space::Handle;
 use crate::validate::Names;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::fit::{End, Ends, Problem};
-use symspline::space::{Ambient, Erased};
-use symspline::validate;
+use symspline_engine::fit::{End, Ends, Problem};
+use symspline_engine::space::{Ambient, Erased};
+use symspline_engine::validate;
 
 pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A kind, and the vectors that it prescribes: one per curve.

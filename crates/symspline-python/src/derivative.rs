@@ -7,11 +7,11 @@ use crate::space::Handle;
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use symspline::derivative::{Data, Derivative, Of};
-use symspline::fit::{End, Ends};
-use symspline::monitor::Monitor;
-use symspline::parallel;
-use symspline::space::{Ambient, Erased, Origin};
+use symspline_engine::derivative::{Data, Derivative, Of};
+use symspline_engine::fit::{End, Ends};
+use symspline_engine::monitor::Monitor;
+use symspline_engine::parallel;
+use symspline_engine::space::{Ambient, Erased, Origin};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 

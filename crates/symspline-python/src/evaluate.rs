@@ -7,12 +7,12 @@ use crate::validate::of_curve;
 use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::curve::{
+use symspline_engine::curve::{
     BSpline, Curves, Outside, Quantity, Times, evaluate as run, evaluate_bspline as run_bspline,
     lift as run_lift, lift_knots as find_knots, transport as run_transport,
 };
-use symspline::monitor::Monitor;
-use symspline::space::{Ambient, Erased};
+use symspline_engine::monitor::Monitor;
+use symspline_engine::space::{Ambient, Erased};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 

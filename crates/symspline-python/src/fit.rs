@@ -7,8 +7,8 @@ use crate::space::Handle;
 use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::fit::{Method, Options, Report, Solver, Status, fit as solve, memory};
-use symspline::space::{Ambient, Erased};
+use symspline_engine::fit::{Method, Options, Report, Solver, Status, fit as solve, memory};
+use symspline_engine::space::{Ambient, Erased};
 
 /// Points on the space, velocities, the columns of the report, and faults.
 type Fitted<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Columns<'py>, Vec<Fault>);

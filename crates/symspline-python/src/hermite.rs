@@ -8,8 +8,8 @@ use crate::validate;
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::rows::{Operation, apply, tangent_defects};
-use symspline::space::Ambient;
+use symspline_engine::rows::{Operation, apply, tangent_defects};
+use symspline_engine::space::Ambient;
 
 /// Validates points and velocities, and requires a unique geodesic between the inner control points of every segment.
 /// Returns the points on the space, the tangential parts of the velocities, and the longest distance between neighbours of

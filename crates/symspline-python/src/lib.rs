@@ -40,13 +40,13 @@ pub extern "C" fn symspline_has_v3() -> bool {
 /// Limits the number of threads; 0 means all cores.
 #[pyfunction]
 fn set_num_threads(n: usize) {
-    symspline::parallel::set_num_threads(n);
+    symspline_engine::parallel::set_num_threads(n);
 }
 
 /// The number of threads that parallel work uses.
 #[pyfunction]
 fn num_threads() -> usize {
-    symspline::parallel::num_threads()
+    symspline_engine::parallel::num_threads()
 }
 
 #[pymodule]

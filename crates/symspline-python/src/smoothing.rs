@@ -8,11 +8,11 @@ use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
-use symspline::smoothing::{
-    Criterion, Data, EndCondition, Ends, Loss, Options, Report, Smooth, State, Tier, chi, smooth as run,
-    variance as variance_at,
+use symspline_engine::smoothing::{
+    Criterion, Data, EndCondition, Ends, Loss, Observations, Options, Report, Smooth, State, Tier, chi,
+    smooth as run, variance as variance_at,
 };
-use symspline::space::{Ambient, Origin};
+use symspline_engine::space::{Ambient, Origin};
 
 /// Points times the cube of the dimension from which one iteration may take tenths of a second.
 const HEAVY_FACTORS: usize = 1_000_000;
@@ -90,55 +90,27 @@ pub fn smooth<'py>(
     let matrices = information.as_ref().map_or(Ok(none), in_order)?;
     let entries = if matrices.is_empty() { 0 } else { space.dim() * space.dim() };
     drop(reserve::<f64>(curves * count * (8 * len + 64))?);
-    // Data without weight are removed, and copies of a row, as loggers write them, are merged into one of their
-    // weight: they would make the noise appear to be zero.
-    let rows: Vec<[Vec<f64>; 4]> = (0..curves)
+    let data: Vec<Observations> = (0..curves)
         .map(|c| {
-            let (times, weights) = (&t[own(t, n, c)..][..n], &w[own(w, n, c)..][..n]);
-            let point = |i: usize| &p[(c * n + i) * len..][..len];
-            let matrix = |i: usize| &matrices[(c * n + i) * entries..][..entries];
-            let mut rows = [(); 4].map(|()| Vec::new());
-            let mut before = None;
-            for i in (0..n).filter(|&i| weights[i] > 0.0) {
-                match before {
-                    Some(k) if times[k] == times[i] && same(point(k), point(i)) => {
-                        if let Some(weight) = rows[2].last_mut() {
-                            *weight += weights[i];
-                        }
-                        let last = rows[3].len() - entries;
-                        rows[3][last..].iter_mut().zip(matrix(i)).for_each(|(sum, x)| *sum += x);
-                    }
-                    _ => {
-                        rows[0].push(times[i]);
-                        rows[1].extend_from_slice(point(i));
-                        rows[2].push(weights[i]);
-                        rows[3].extend_from_slice(matrix(i));
-                    }
-                }
-                before = Some(i);
-            }
-            // The first point of a closed curve, repeated at its end as for interpolating splines, would have the
-            // same effect.
-            let (last, knots) = (rows[0].len().saturating_sub(1), &k[own(k, count, c)..][..count]);
-            if ends.is_none()
-                && last > 0
-                && rows[0][last] - rows[0][0] == knots[count - 1] - knots[0]
-                && same(&rows[1][last * len..], &rows[1][..len])
-            {
-                rows[2][0] = rows[2][0].max(rows[2][last]);
-                for (row, size) in rows.iter_mut().zip([1, len, 1, entries]) {
-                    row.truncate(last * size);
-                }
-            }
-            rows
+            let knots = &k[own(k, count, c)..][..count];
+            Observations::new(
+                &t[own(t, n, c)..][..n],
+                &p[c * n * len..][..n * len],
+                &w[own(w, n, c)..][..n],
+                if entries == 0 { none } else { &matrices[c * n * entries..][..n * entries] },
+                len,
+                ends.is_none().then(|| knots[count - 1] - knots[0]),
+            )
         })
         .collect();
-    let data: Vec<Data> = (0..curves)
-        .map(|c| Data {
-            times: &rows[c][0],
-            points: &rows[c][1],
-            weights: &rows[c][2],
-            information: &rows[c][3],
+    let data: Vec<Data> = data
+        .iter()
+        .enumerate()
+        .map(|(c, data)| Data {
+            times: &data.times,
+            points: &data.points,
+            weights: &data.weights,
+            information: &data.information,
             knots: &k[own(k, count, c)..][..count],
             lam: Some(lam[c]).filter(|lam| !lam.is_nan()),
             sigma: Some(sigma[c]).filter(|sigma| !sigma.is_nan()),
@@ -158,13 +130,6 @@ pub fn smooth<'py>(
         gathered(py, &[batch, &[coefficients, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
     ))
-}
-
-/// Whether two arrays are equal up to the rounding of a text file.
-fn same(p: &[f64], q: &[f64]) -> bool {
-    const COPY: f64 = 1e-9;
-    let size = p.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    p.iter().zip(q).all(|(p, q)| (p - q).abs() <= COPY * size)
 }
 
 fn kind((name, _): &EndOf) -> PyResult<EndCondition> {

@@ -5,9 +5,9 @@ use crate::errors::{CutLocusError, format_index, invalid};
 use crate::watch::{is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use symspline::rows::{Operation, apply, memory, project_points, tangent_defects};
-use symspline::space::{Ambient, Origin};
-use symspline::spaces::{self, AnySpace};
+use symspline_engine::rows::{Operation, apply, memory, project_points, tangent_defects};
+use symspline_engine::space::{Ambient, Origin};
+use symspline_engine::spaces::{self, AnySpace};
 
 /// A space of the core.
 #[pyclass(frozen, module = "symspline._core")]

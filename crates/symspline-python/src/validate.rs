@@ -2,7 +2,7 @@
 
 use crate::errors::{Invalid, format_index, number};
 use crate::space::off_space;
-use symspline::validate::{Invalid as Fault, Reason};
+use symspline_engine::validate::{Invalid as Fault, Reason};
 
 /// The names of curves in messages: their indices in the user's batch, which may contain further curves.
 pub struct Names<'a> {

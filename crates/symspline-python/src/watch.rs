@@ -7,8 +7,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use symspline::monitor::Monitor;
-use symspline::space::{Ambient, Erased, Origin};
+use symspline_engine::monitor::Monitor;
+use symspline_engine::space::{Ambient, Erased, Origin};
 
 /// The interval at which Python handles signals.
 const INTERVAL: Duration = Duration::from_millis(50);

@@ -1,69 +1,146 @@
-//! C² cubic splines on symmetric spaces.
+//! C² cubic splines through points of curved spaces: rotations, poses, directions, subspaces, covariance matrices, and
+//! all other symmetric spaces.
 //!
-//! The method of Bogfjellmo, Modin and Verdier, *A Numerical Algorithm for C²-splines on Symmetric
-//! Spaces* (2018, SIAM J. Numer. Anal. 56(4)). Equation numbers in these crates are that paper's.
+//! Give times and points. The result is a curve that stays on the space, passes through every point, and has continuous
+//! velocity and covariant acceleration. The method is that of Bogfjellmo, Modin and Verdier, *A Numerical Algorithm for
+//! C²-splines on Symmetric Spaces* (2018), extended to any knots and more end conditions. In flat space the curve is the
+//! classical cubic spline.
 //!
-//! A curve consists of three arrays: knots t, points p and velocities u = γ'(t). [`fit`] computes the velocities,
-//! [`curve`] evaluates curves, [`space`] contains the geometry, and [`spaces`] lists all spaces. [`derivative`]
-//! computes the sensitivity of a curve to its data, [`smoothing`] fits curves close to noisy points.
-//!
-//! # A spline through unit quaternions
-//!
-//! Arrays are one-dimensional: the numbers of each point are adjacent, point after point.
+//! # Directions
 //!
 //! ```
-//! use symspline::curve::{Curves, Outside, Quantity, Times, evaluate};
-//! use symspline::fit::{End, Ends, Method, Options, Problem, Status, fit};
-//! use symspline::monitor::Monitor;
-//! use symspline::space::Erased;
-//! use symspline::spaces::Sphere;
+//! use symspline::prelude::*;
 //!
-//! let sphere = Sphere::new(3).unwrap();
-//! let space = Erased(&sphere);
-//! let go_on = |_| true; // is called from time to time; false stops the work
+//! let times = [0.0, 1.0, 2.5];
+//! let directions = [[1.0, 0.0, 0.0], [0.8, 0.6, 0.0], [0.6, 0.64, 0.48]];
+//! let spline = CubicSpline::new(Sphere::<3>, &times, &directions)?;
+//! let direction = spline.at(0.7);
+//! let velocity = spline.velocity(0.7); // tangent: orthogonal to the direction
+//! assert!(direction.iter().zip(velocity).map(|(p, v)| p * v).sum::<f64>().abs() < 1e-14);
+//! # Ok::<(), Error>(())
+//! ```
 //!
-//! // w, x, y, z at three times. Neighbours must have the same sign, w w' + … > 0.
-//! let t = [0.0, 1.0, 2.5];
-//! let points = [1.0, 0.0, 0.0, 0.0, 0.8, 0.6, 0.0, 0.0, 0.6, 0.64, 0.48, 0.0];
+//! # Rotations and poses
 //!
-//! let problem = Problem {
-//!     t: &t,
-//!     shared: true,
-//!     points: &points,
-//!     offsets: &[0, 3], // one curve of three points; more may follow, and are fitted in parallel
-//!     ends: Ends::Open([End::Natural, End::NotAKnot]),
-//! };
-//! let options = Options { method: Method::Auto, tol: 1e-12, max_iter: None };
-//! let mut velocities = [0.0; 12];
-//! let reports = fit(&space, &problem, &options, &Monitor::new(&go_on), &mut velocities);
-//! assert_eq!(reports[0].status, Status::Converged);
+//! With the features `nalgebra`, `glam` or `mint`, points have the types of these libraries; signs of quaternions need not
+//! agree. Velocities are those of the body frame.
 //!
-//! let curves = Curves { t: &t, nodes: 3, points: &points, velocities: &velocities };
-//! let x = [0.0, 0.5, 1.0, 2.0];
-//! let times = Times { x: &x, count: x.len() };
-//! let mut q = [0.0; 16];
-//! evaluate(&space, &curves, &times, Quantity::Point, Outside::Continue, &Monitor::new(&go_on), &mut q);
+//! ```
+//! # #[cfg(feature = "nalgebra")] {
+//! use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+//! use symspline::prelude::*;
 //!
-//! // The curve stays on the sphere and passes through the points.
-//! for point in q.chunks(4) {
-//!     let square: f64 = point.iter().map(|x| x * x).sum();
-//!     assert!((square - 1.0).abs() < 1e-14);
+//! let times = [0.0, 1.0, 2.5];
+//! let turns = [0.0, 0.4, 1.1].map(|angle| UnitQuaternion::from_euler_angles(0.2 * angle, 0.0, angle));
+//! let spline = CubicSpline::builder(So3).ends(End::NotAKnot).fit(&times, &turns)?;
+//! let rotation: UnitQuaternion<f64> = spline.at(0.7);
+//! let rate: Vector3<f64> = spline.body_velocity(0.7); // radians per unit of time
+//!
+//! let poses = turns.map(|turn| Isometry3::from_parts(Vector3::new(turn.angle(), 0.0, 1.0).into(), turn));
+//! let path = CubicSpline::new(Se3, &times, &poses)?;
+//! let twist = path.body_velocity(1.0);
+//! println!("{rotation} {rate} {} {}", twist.angular, twist.linear);
+//! # }
+//! # Ok::<(), symspline::Error>(())
+//! ```
+//!
+//! # Errors
+//!
+//! Input is validated before any work is done. [`Error`] names the curve, the node and the numbers.
+//!
+//! ```
+//! use symspline::prelude::*;
+//!
+//! let opposite = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]];
+//! match CubicSpline::new(Sphere::<3>, &[0.0, 1.0], &opposite) {
+//!     Err(Error::CutLocus { node, angle, limit, .. }) => assert!(node == 0 && angle >= 0.999 * limit),
+//!     other => panic!("{other:?}"),
 //! }
-//! assert!(q[8..12].iter().zip(&points[4..8]).all(|(a, b)| (a - b).abs() < 1e-14));
 //! ```
 //!
-//! Rotations whose quaternions have any sign are points of [`spaces::Rotations`] as matrices.
-//! [`spaces::AnySpace`] creates a space from a name, such as `"so"` with `[3]`.
+//! # Layout of points
 //!
-//! [`fit`] does not check its input: pass a problem to [`validate::validate`] first. It describes the first fault, or
-//! returns the points projected onto their space.
+//! Vectors are arrays. Matrices are arrays of rows, `[[f64; 3]; 3]`: the entry in row i and column j is `m[i][j]`. A pose is
+//! a homogeneous matrix with the position in its last column. Libraries that store columns are converted.
+//!
+//! # Features
+//!
+//! | feature | adds |
+//! |---|---|
+//! | `vectors` | [`Euclidean`], [`Sphere`], [`Hyperbolic`] |
+//! | `rotations` | [`So3`], [`Se3`] |
+//! | `positive-definite` | [`PositiveDefinite`] |
+//! | `subspaces` | [`Grassmannian`] |
+//! | `all-spaces` | these, and all others by name: [`AnySpace`] |
+//! | `smoothing` | [`Smoothing`] of noisy data |
+//! | `rayon` | all cores |
+//! | `nalgebra`, `glam`, `mint` | points of these libraries |
+//! | `serde` | curves in files and messages |
+//!
+//! `all-spaces`, `smoothing` and `rayon` are on by default.
 
-pub mod spaces;
+mod batch;
+#[cfg(feature = "rotations")]
+mod body;
+mod curves;
+pub mod custom;
+mod error;
+#[cfg(feature = "glam")]
+mod glam;
+#[cfg(feature = "mint")]
+mod mint;
+#[cfg(feature = "nalgebra")]
+mod nalgebra;
+mod point;
+mod samples;
+#[cfg(feature = "serde")]
+mod serde;
+#[cfg(feature = "smoothing")]
+mod smoothing;
+mod space;
+mod spline;
 
-pub use symspline_smoothing as smoothing;
+pub use batch::Batch;
+pub use error::Error;
+#[cfg(feature = "rotations")]
+pub use point::Twist;
+pub use point::{Point, Row};
+pub use samples::Samples;
+#[cfg(feature = "smoothing")]
+pub use smoothing::{Criterion, Loss, Smoothing, SmoothingReport, SmoothingSpline};
+#[cfg(feature = "subspaces")]
+pub use space::Grassmannian;
+#[cfg(feature = "positive-definite")]
+pub use space::PositiveDefinite;
+pub use space::{AnySpace, Space};
+#[cfg(feature = "rotations")]
+pub use space::{BodyFrame, Se3, So3};
+#[cfg(feature = "vectors")]
+pub use space::{Euclidean, Hyperbolic, Sphere};
+pub use spline::{Builder, CubicSpline, End, Ends, Extrapolate, Method, Report};
 
-#[cfg(feature = "laws")]
-pub use symspline_core::laws;
-pub use symspline_core::{
-    curve, derivative, fit, matrix, monitor, parallel, rows, scalar, space, special, validate,
-};
+/// Limits the number of threads; 0 means all cores, which is the default.
+pub use symspline_engine::parallel::set_num_threads;
+
+/// What most programs use: `use symspline::prelude::*`.
+pub mod prelude {
+    #[cfg(feature = "subspaces")]
+    #[doc(no_inline)]
+    pub use crate::Grassmannian;
+    #[cfg(feature = "positive-definite")]
+    #[doc(no_inline)]
+    pub use crate::PositiveDefinite;
+    #[doc(no_inline)]
+    pub use crate::spline::End::{Natural, NotAKnot};
+    #[doc(no_inline)]
+    pub use crate::{AnySpace, Batch, CubicSpline, End, Ends, Error, Extrapolate, Method};
+    #[cfg(feature = "smoothing")]
+    #[doc(no_inline)]
+    pub use crate::{Criterion, Loss, Smoothing};
+    #[cfg(feature = "vectors")]
+    #[doc(no_inline)]
+    pub use crate::{Euclidean, Hyperbolic, Sphere};
+    #[cfg(feature = "rotations")]
+    #[doc(no_inline)]
+    pub use crate::{Se3, So3, Twist};
+}

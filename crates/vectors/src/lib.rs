@@ -10,9 +10,11 @@ mod sphere;
 pub use curved::{AntiDeSitter, Curved, DeSitter, Hyperbolic, Sphere};
 pub use euclidean::Euclidean;
 
+#[cfg(feature = "named")]
 use symspline_core::space::{Entry, table};
 
 /// The spaces of this family.
+#[cfg(feature = "named")]
 pub static FAMILY: &[Entry] = &[
     Entry { names: &["euclidean", "r"], parameters: &["n"], make: |p| table(Euclidean::new(p[0])) },
     Entry { names: &["sphere", "s"], parameters: &["n"], make: |p| table(Sphere::new(p[0])) },

@@ -3,21 +3,93 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .._spaces import Space
-from .gradient import Gradient, SampleTimes
+from .._spaces import Array, Doubles, Space
+from .._typing import FloatArray, P, Progress
 from .integrals import EXACT
-from .solve import Progress
-
-Doubles = NDArray[np.float64]
 
 NORMS = ("speed", "bend")
 # Quantities that are real numbers or vectors, not points or tangent vectors of the space.
 REAL = (*NORMS, "body velocity", "body acceleration")
+
+
+@dataclass(frozen=True)
+class Gradient(Generic[P]):
+    """Gradient of a function of a spline with respect to its data.
+
+    `CubicSpline.vjp` returns objects of this class.
+
+    Attributes
+    ----------
+    points : ndarray or tuple of ndarray
+        Tangent vectors at the points, with their shape.
+    t : ndarray
+        One number per knot, with the shape of the knots.
+    ends : tuple
+        Tangent vectors for the velocity or acceleration prescribed at either end, with its shape; None where none was
+        prescribed.
+
+    See Also
+    --------
+    CubicSpline.vjp : Compute the gradient of a function of the curve.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+    >>> gradient = spline.vjp(0.5, [1.0])
+    >>> gradient.points.shape, gradient.t.shape, gradient.ends
+    ((3, 1), (3,), (None, None))
+    """
+
+    points: P
+    t: FloatArray
+    ends: tuple[P | None, P | None]
+
+
+class SampleTimes(NamedTuple):
+    """Times on the curves of a batch at which derivatives are computed.
+
+    Attributes
+    ----------
+    x : ndarray, shape (curves, times)
+        Times of each curve.
+    shape : tuple of int
+        Shape of a result, without the axes of a point.
+    nu : {0, 1, 2}
+        Order of the derivative in time.
+    """
+
+    x: Doubles
+    shape: tuple[int, ...]
+    nu: int
+
+
+class UncertaintyBand(NamedTuple):
+    """Noisy data near one curve, and the credible band of the curve.
+
+    Attributes
+    ----------
+    x : ndarray
+        Times of the data as numbers of the core.
+    points : list of ndarray
+        The data in each factor.
+    radii : list of ndarray
+        Radii of the 95 % band around the curve at the requested times, in each factor.
+    speed : ndarray or None
+        Standard deviation of the velocity in one direction; None in a product.
+    """
+
+    x: Doubles
+    points: list[Array]
+    radii: list[Doubles]
+    speed: Doubles | None
+
+    def part(self, number: int) -> Self:
+        """Return the data and the band in one factor of a product."""
+        return self._replace(points=[self.points[number]], radii=[self.radii[number]], speed=None)
 
 
 class CurveArrays(ABC):
@@ -80,13 +152,7 @@ class CurveArrays(ABC):
 
     @abstractmethod
     def lift(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Any,
-        progress: Progress | None = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Any, progress: Progress | None = None
     ) -> Any:
         """Evaluate the horizontal lift that starts at `start`; see `symspline.CubicSpline.lift`."""
 

@@ -6,16 +6,14 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
-from .._spaces import Array
+from .._spaces import Array, Doubles
 from .._time import onto_ends
-from .curve import CurveArrays
+from .curve import CurveArrays, Gradient, SampleTimes
 from .ends import End, ends_of
-from .gradient import Gradient, SampleTimes
 
 
 def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> SampleTimes:
@@ -44,11 +42,11 @@ def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool
 class _Curves(NamedTuple):
     """Arguments of the compiled core, with one row per curve."""
 
-    t: NDArray[np.float64]
-    points: NDArray[np.float64]
-    velocities: NDArray[np.float64]
+    t: Doubles
+    points: Doubles
+    velocities: Doubles
     ends: list[End] | None
-    x: NDArray[np.float64]
+    x: Doubles
     curves: int
     nu: int
 
@@ -68,13 +66,8 @@ def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, 
         _end_motion(curve, bc_type, end, name, which)
         for which, (end, name) in enumerate(zip(pair_of(ends), ("start", "end"), strict=True))
     ]
-    moved = _core.push(
-        space._handle,
-        _curves(curve, at, bc_type),
-        np.ascontiguousarray(motion),
-        _per_curve(knots, curve.batch),
-        vectors,
-    )
+    motion, knots = np.ascontiguousarray(motion), _per_curve(knots, curve.batch)
+    moved = _core.push(space._handle, _curves(curve, at, bc_type), motion, knots, vectors)
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 
@@ -83,9 +76,7 @@ def vjp(curve: CurveArrays, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gr
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
     _same_shape(space._numbers(doubles), (*at.shape, *space.point_shape), "cotangent")
-    points, knots, *ends = _core.pull(
-        space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles)
-    )
+    points, knots, *ends = _core.pull(space._handle, _curves(curve, at, bc_type), np.ascontiguousarray(doubles))
     knots = knots.reshape(*batch, nodes)
     if curve.times.ndim == 1:
         knots = knots.reshape(-1, nodes).sum(axis=0)
@@ -107,21 +98,12 @@ def pair_of(ends: Any) -> tuple[Any, Any]:
 
 def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
     space, batch = curve.space, curve.batch
-    points, velocities = (
-        space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities)
-    )
-    return _Curves(
-        _per_curve(curve.times, batch),
-        points,
-        velocities,
-        ends_of(bc_type, space, batch),
-        at.x,
-        math.prod(batch),
-        at.nu,
-    )
+    points, velocities = (space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities))
+    knots, ends = _per_curve(curve.times, batch), ends_of(bc_type, space, batch)
+    return _Curves(knots, points, velocities, ends, at.x, math.prod(batch), at.nu)
 
 
-def _per_curve(knots: Array, batch: tuple[int, ...]) -> NDArray[np.float64]:
+def _per_curve(knots: Array, batch: tuple[int, ...]) -> Doubles:
     """Return one row of knots per curve."""
     nodes = knots.shape[-1]
     rows = np.broadcast_to(knots, (*batch, nodes)).reshape(math.prod(batch), nodes)
@@ -138,7 +120,7 @@ def _given(bc_type: Any, which: int) -> Array | None:
     return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
 
 
-def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: int) -> NDArray[np.float64]:
+def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: int) -> Doubles:
     space, batch = curve.space, curve.batch
     shape = batch + space._doubles_shape
     if value is None:
@@ -151,7 +133,7 @@ def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: 
     return space._as_doubles(np.ascontiguousarray(space.project_tangent(at, vectors))).reshape(shape)
 
 
-def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: NDArray[np.float64], which: int) -> Any:
+def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: Doubles, which: int) -> Any:
     given = _given(bc_type, which)
     if given is None:
         return None

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Product, Space, factors_of, parts_of
+from .._spaces import Doubles, Product, Space, factors_of, parts_of
 
 # The kind of an end condition and its prescribed vectors.
-End = tuple[str, NDArray[np.float64] | None]
+End = tuple[str, Doubles | None]
 
 _WORDS = {"natural", "clamped", "not-a-knot"}
 _ORDERS = {1: "velocity", 2: "acceleration"}
@@ -68,6 +68,11 @@ def _end(name: str, word: str | int, vector: Any, space: Space, batch: tuple[int
         raise ValidationError(
             f"the {name} {kind} has shape {np.shape(vector)}, which does not broadcast to {batch + space.point_shape}"
         ) from None
+
+
+def map_ends(ends: list[End] | None, function: Callable[[Any], Any]) -> list[End] | None:
+    """Apply a function to the vectors of end conditions."""
+    return ends and [(kind, None if vector is None else function(vector)) for kind, vector in ends]
 
 
 def freeze_bc_type(bc_type: Any) -> Any:

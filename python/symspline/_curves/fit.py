@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._arrays import as_array
 from .._core import ValidationError
 from .._faults import INVALID, Fault
 from .._report import Columns, Report, shaped
-from .._spaces import POINT_TOL, Array, Product, Space, factors_of, parts_of, point_tol
+from .._spaces import POINT_TOL, Array, Doubles, Product, Space, factors_of, parts_of, point_tol
+from .._typing import Progress
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
@@ -29,9 +29,11 @@ from .curve import CurveArrays
 from .ends import End, ends_in_factors, ends_of
 from .product import ProductCurve, share
 from .reduced import ReducedCurve
-from .solve import Mask, Options, Progress, Solved, Task, solve, without
+from .solve import Mask, Options, Solved, Task, solve, without
 
 _T = TypeVar("_T")
+_Times = TypeVar("_Times")
+_Data = TypeVar("_Data")
 # Options for a validation, which has no solver.
 _ANY = Options("auto", 0.0, None)
 _NATURAL: list[End] = [("natural", None), ("natural", None)]
@@ -52,21 +54,23 @@ class Points(NamedTuple):
         Number of points per curve.
     """
 
-    numbers: NDArray[np.float64]
+    numbers: Doubles
     tol: float
     batch: tuple[int, ...]
     nodes: int
 
 
-class FitProblem(NamedTuple):
-    """Curves with equal numbers of points to fit.
+class Problem(NamedTuple, Generic[_Times, _Data]):
+    """Curves to fit: with equal numbers of points, or single curves of different lengths.
 
     Attributes
     ----------
-    times : ndarray, shape (N+1,) or (..., N+1)
-        Knots, shared or with one row per curve.
-    points, ends : list
-        Points and end conditions in each factor.
+    times : ndarray, shape (N+1,) or (..., N+1), or list of ndarray
+        Knots, shared or with one row per curve; for curves of different lengths, one array per curve.
+    points : list of Points, or list of lists of them
+        Points in each factor; for curves of different lengths, one such list per curve.
+    ends : list
+        End conditions in each factor.
     check : bool
         Whether to validate points and ends.
     mask : ndarray of bool or None
@@ -76,8 +80,8 @@ class FitProblem(NamedTuple):
     """
 
     space: Space[Any]
-    times: NDArray[np.float64]
-    points: list[Points]
+    times: _Times
+    points: _Data
     ends: list[list[End] | None]
     options: Options
     check: bool = True
@@ -85,20 +89,8 @@ class FitProblem(NamedTuple):
     skip_invalid: bool = False
 
 
-class ManyProblem(NamedTuple):
-    """Single curves of different lengths to fit.
-
-    The fields are those of `FitProblem`, but `times` and `points` have one entry per curve.
-    """
-
-    space: Space[Any]
-    times: list[NDArray[np.float64]]
-    points: list[list[Points]]
-    ends: list[list[End] | None]
-    options: Options
-    check: bool = True
-    mask: Mask | None = None
-    skip_invalid: bool = False
+FitProblem = Problem[Doubles, list[Points]]
+ManyProblem = Problem[list[Doubles], list[list[Points]]]
 
 
 class Fit(NamedTuple):
@@ -144,9 +136,7 @@ def read(points: Any, space: Space[Any]) -> list[Points]:
     found = _in_factors(space, _read, parts_of(points, space, "points"))
     if len({(part.batch, part.nodes) for part in found}) > 1:
         described = ", ".join(f"{part.nodes} points, batch axes {part.batch}" for part in found)
-        raise ValidationError(
-            f"the factors of points have different lengths, or their batch axes differ: {described}"
-        )
+        raise ValidationError(f"the factors of points have different lengths, or their batch axes differ: {described}")
     return found
 
 
@@ -182,7 +172,7 @@ def read_ends(bc_type: Any, space: Space[Any], batch: tuple[int, ...]) -> list[l
 
 
 def curve_of(
-    space: Space[Any], times: NDArray[np.float64], arrays: Sequence[tuple[Array, Array]], fitted: bool = True
+    space: Space[Any], times: Doubles, arrays: Sequence[tuple[Array, Array]], fitted: bool = True
 ) -> CurveArrays:
     """Return the curve with given points and velocities in each factor.
 
@@ -191,19 +181,9 @@ def curve_of(
     fitted : bool
         Whether velocities are those of a C² curve.
     """
-    if isinstance(space, Product):
-        each = zip(space.factors, arrays, strict=True)
-        return ProductCurve(space, tuple([_part(factor, times, *pair, fitted) for factor, pair in each]))
-    return _part(space, times, *arrays[0], fitted)
-
-
-def _part(
-    space: Space, times: NDArray[np.float64], points: Array, velocities: Array, fitted: bool
-) -> CoreCurve:
-    kind = kind_of(space)
-    if kind is ReducedCurve:
-        return ReducedCurve(space, times, points, velocities, fitted)
-    return kind(space, times, points, velocities)
+    factors = factors_of(space)
+    parts = [kind_of(f)(f, times, *pair, fitted) for f, pair in zip(factors, arrays, strict=True)]
+    return ProductCurve(space, tuple(parts)) if isinstance(space, Product) else parts[0]
 
 
 def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
@@ -212,9 +192,7 @@ def mask_of(where: Any, batch: tuple[int, ...]) -> Mask | None:
         return None
     mask = as_array(where, "where")
     if mask.dtype != bool or mask.shape != batch:
-        raise ValidationError(
-            f"where must be a Boolean array of shape {batch}, not {mask.dtype} of shape {mask.shape}"
-        )
+        raise ValidationError(f"where must be a Boolean array of shape {batch}, not {mask.dtype} of shape {mask.shape}")
     return None if mask.all() else mask
 
 
@@ -224,22 +202,13 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
     if len(points) == 1 and kind_of(space) is CoreCurve:
         # The core validates the points in the same call.
         data = points[0]
-        task = Task(
-            space, times, data.numbers, ends[0], data.tol if check else None, None, mask, check and skip
-        )
+        tol = data.tol if check else None
+        task = Task(space, times, data.numbers, ends[0], tol, None, mask, check and skip)
         (found,) = solve((task,), options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
     tasks = [
-        Task(
-            factor,
-            times,
-            part.numbers,
-            end,
-            part.tol if check else None,
-            mask=mask,
-            skip_invalid=check and skip,
-        )
+        Task(factor, times, part.numbers, end, part.tol if check else None, None, mask, check and skip)
         for factor, part, end in zip(factors_of(space), points, ends, strict=True)
     ]
     solved, faults = _solve(space, tasks, options, progress)
@@ -276,7 +245,7 @@ def fit_many(problem: ManyProblem, progress: Progress | None) -> tuple[list[Fit]
 
 def validated(
     space: Space[Any],
-    times: NDArray[np.float64],
+    times: Doubles,
     points: list[Points],
     ends: list[list[End] | None],
     skip_invalid: bool = False,
@@ -292,7 +261,7 @@ def validated(
 
 
 def hermite_data(
-    space: Space[Any], times: NDArray[np.float64], points: list[Points], velocities: list[tuple[Array, float]]
+    space: Space[Any], times: Doubles, points: list[Points], velocities: list[tuple[Array, float]]
 ) -> list[tuple[Array, Array, Array]]:
     """Validate the data of a Hermite spline.
 
@@ -321,9 +290,7 @@ def hermite_data(
             task = Task(factor, times, part.numbers, _NATURAL, part.tol)
             return *hermite_on_manifold(task, vectors), np.full(math.prod(part.batch), np.inf)
         doubles = factor._as_doubles(vectors)
-        found, tangent, longest = _core.hermite(
-            factor._handle, times, part.numbers, doubles, part.tol, tangent_tol
-        )
+        found, tangent, longest = _core.hermite(factor._handle, times, part.numbers, doubles, part.tol, tangent_tol)
         return factor._numbers(found), factor._numbers(tangent), longest
 
     return _in_factors(space, checked, list(zip(points, velocities, strict=True)))
@@ -341,10 +308,7 @@ def _solve(
             raise (error if number is None else _in_factor(error, number, tasks[number].space)) from None
         return solved, _faults_of(solved, [])
     tasks, invalid = _validated(space, tasks, options)
-    solved = [
-        kind_of(task.space).solve(task, options, share(progress, i, len(tasks)))
-        for i, task in enumerate(tasks)
-    ]
+    solved = [kind_of(task.space).solve(task, options, share(progress, i, len(tasks))) for i, task in enumerate(tasks)]
     return solved, _faults_of(solved, invalid)
 
 
@@ -362,18 +326,11 @@ def _faults_of(solved: list[Solved], invalid: list[Fault]) -> list[Fault]:
 
     This is the first factor in which a curve failed. If there is none, it is the first factor with faults.
     """
-    skipped = {fault.curve: fault for fault in invalid}
-    others = []
-    for found in solved:
-        rest = []
-        for fault in found.faults:
-            if fault.kind == INVALID:
-                skipped.setdefault(fault.curve, fault)
-            else:
-                rest.append(fault)
-        if rest:
-            others.append(rest)
-    others.sort(key=lambda own: not any(fault.failed for fault in own))
+    of_points = [*invalid, *(fault for found in solved for fault in found.faults if fault.kind == INVALID)]
+    # The first fault of a curve counts.
+    skipped = {fault.curve: fault for fault in reversed(of_points)}
+    others = [[fault for fault in found.faults if fault.kind != INVALID] for found in solved]
+    others = sorted(filter(None, others), key=lambda own: not any(fault.failed for fault in own))
     return sorted([*skipped.values(), *(others[0] if others else [])], key=_number)
 
 
@@ -406,21 +363,15 @@ def _check_precision(problem: ManyProblem) -> list[Fault]:
     for i, factor in enumerate(factors_of(space)):
         most = max(own[i].tol for own in points)
         for number, own in enumerate(points):
+            if own[i].tol >= most or (mask is not None and not mask[number]):
+                continue
             # Invalid times are an error in any case, which is raised later.
-            if own[i].tol < most and (mask is None or mask[number]):
-                try:
-                    kind_of(factor).validate(
-                        Task(
-                            factor,
-                            np.arange(len(times[number]), dtype=float),
-                            own[i].numbers,
-                            _NATURAL,
-                            own[i].tol,
-                        ),
-                        _ANY,
-                    )
-                except ValidationError as error:
-                    if not skip:
-                        raise error._of_curve(number) from None
-                    faults.setdefault(number, Fault(number, INVALID, f"curve {number}: {error}"))
+            knots = np.arange(len(times[number]), dtype=float)
+            task = Task(factor, knots, own[i].numbers, _NATURAL, own[i].tol)
+            try:
+                kind_of(factor).validate(task, _ANY)
+            except ValidationError as error:
+                if not skip:
+                    raise error._of_curve(number) from None
+                faults.setdefault(number, Fault(number, INVALID, f"curve {number}: {error}"))
     return list(faults.values())

@@ -1,13 +1,14 @@
-"""Integrals along curves, accurate up to rounding errors."""
+"""Integrals along curves, accurate up to rounding errors: lengths and bending energies."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._report import Report
 from .._typing import Number
 
 Doubles = NDArray[np.float64]
@@ -18,9 +19,7 @@ EXACT = 1e-14
 _PATIENCE = 5
 
 
-def integrate(
-    times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT
-) -> Number:
+def integrate(times: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float = EXACT) -> Number:
     """Integrate f over all segments by adaptive bisection, to the relative tolerance `tol`.
 
     The function takes times of shape batch + (m,). The speed of a curve has a kink where the curve stops and turns;
@@ -36,9 +35,7 @@ def integrate(
         return _refined(a, b, f, batch, tol)
 
 
-def _refined(
-    a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float
-) -> Number:
+def _refined(a: Doubles, b: Doubles, f: Callable[[Doubles], Any], batch: tuple[int, ...], tol: float) -> Number:
     total = np.zeros(batch)
     whole = _rule(a, b, f)
     scale = np.abs(whole).sum(axis=-1)
@@ -67,5 +64,47 @@ def _rule(a: Doubles, b: Doubles, f: Callable[[Doubles], Any]) -> Doubles:
     half = (b - a) / 2
     x = (a / 2 + b / 2)[..., None] + half[..., None] * _NODES
     values = f(np.ascontiguousarray(x.reshape(*a.shape[:-1], -1))).reshape(x.shape)
-    result: Doubles = (values @ _WEIGHTS) * half
-    return result
+    return np.asarray((values @ _WEIGHTS) * half)
+
+
+class Evaluable(Protocol):
+    """Curve with a length and an energy: it is smooth between `times`, and its norms can be evaluated."""
+
+    @property
+    def times(self) -> Doubles: ...
+    @property
+    def batch(self) -> tuple[int, ...]: ...
+    @property
+    def quad_rtol(self) -> float: ...
+
+    def evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool) -> Any: ...
+
+
+def bending_energy(curve: Evaluable) -> Number:
+    """Compute ∫ |∇γ'|² dt, equation (1), for each curve."""
+    # The unit of time is the whole domain: otherwise squares of accelerations can overflow or underflow.
+    times = curve.times
+    unit = np.broadcast_to(times[..., -1:] - times[..., :1], (*curve.batch, 1))
+
+    def power(x: Doubles) -> Doubles:
+        bend: Doubles = curve.evaluate(x, "bend", "continue", True) * unit * unit
+        return bend * bend / unit
+
+    with np.errstate(all="ignore"):
+        return integrate(times, power, curve.batch, curve.quad_rtol) / unit[..., 0] / unit[..., 0] / unit[..., 0]
+
+
+def alternative_energy(parts: Sequence[Evaluable], reports: list[Report]) -> Any:
+    """Return the lowest energy of the alternative curves through the points of a product, or None.
+
+    An alternative curve replaces the solution in one factor by the alternative solution of that factor.
+    """
+    if all(report.alternative_energy is None for report in reports):
+        return None
+    energies: list[Any] = [bending_energy(part) for part in parts]
+    others = [
+        sum(energies) - energy + report.alternative_energy
+        for energy, report in zip(energies, reports, strict=True)
+        if report.alternative_energy is not None
+    ]
+    return np.fmin.reduce(others)

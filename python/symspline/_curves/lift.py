@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import refuse
 from .._core import ValidationError
-from .._spaces import Array, Space
-from .curve import Doubles
+from .._spaces import Array, Doubles, Space
 
 # Largest extrapolation of a lift, in lengths of the first or last segment.
 FURTHEST = 100.0
@@ -58,12 +58,14 @@ def _given(space: Space, first: Array, start: Any) -> Array:
     given = space._array(start, "start")
     # This raises if an entry is not a number, or if an imaginary part would be discarded.
     space._doubles(given, "start")
-    if given.shape[-len(space.point_shape) :] != space.point_shape or not _fits(given.shape, first.shape):
-        raise ValidationError(
-            f"start must have the shape of a point {space.point_shape}, after the batch axes if any, "
-            f"not {given.shape}"
-        )
-    return np.broadcast_to(given, first.shape)
+    try:
+        if given.shape[-len(space.point_shape) :] == space.point_shape:
+            return np.broadcast_to(given, first.shape)
+    except ValueError:
+        pass
+    raise ValidationError(
+        f"start must have the shape of a point {space.point_shape}, after the batch axes if any, not {given.shape}"
+    )
 
 
 def _check_near(space: Space, nearest: Array, given: Array) -> None:
@@ -83,18 +85,8 @@ def check_reach(times: Doubles, x: Doubles) -> None:
     """Raise ValidationError for times too far beyond the knots, because the lift is computed in small steps."""
     first, last = times[..., 1] - times[..., 0], times[..., -1] - times[..., -2]
     low, high = np.max(times[..., 0] - FURTHEST * first), np.min(times[..., -1] + FURTHEST * last)
-    bad = np.argwhere((x < low) | (x > high))
-    if len(bad):
-        index = tuple(bad[0])
-        where = f"x[{', '.join(map(str, index))}]" if index else "x"
-        raise ValidationError(
-            f"{where} = {x[index]} is more than {FURTHEST:.0f} lengths of the last segment beyond the knots, "
-            "which is the limit for lifts; use extrapolate='geodesic'"
-        )
-
-
-def _fits(shape: tuple[int, ...], whole: tuple[int, ...]) -> bool:
-    try:
-        return np.broadcast_shapes(shape, whole) == whole
-    except ValueError:
-        return False
+    limit = (
+        f"is more than {FURTHEST:.0f} lengths of the last segment beyond the knots, which is the limit for lifts; use "
+        "extrapolate='geodesic'"
+    )
+    refuse((x < low) | (x > high), "x", lambda i: f"= {x[i]} {limit}")

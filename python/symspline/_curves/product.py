@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from .._spaces import Product, parts_of, product_norm
+from .._spaces import Doubles, Product, parts_of, product_norm
+from .._typing import Progress
 from .core_curve import CoreCurve
-from .curve import NORMS, CurveArrays, Doubles
+from .curve import NORMS, CurveArrays, Gradient, SampleTimes
 from .derivatives import pair_of
 from .ends import ends_in_factors
-from .gradient import Gradient, SampleTimes
-from .solve import Progress
 
 Tuple = tuple[Any, ...]
 
@@ -60,13 +59,7 @@ class ProductCurve(CurveArrays):
         )
 
     def lift(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Any,
-        progress: Progress | None = None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Any, progress: Progress | None = None
     ) -> Tuple:
         count = len(self._parts)
         starts = (None,) * count if start is None else parts_of(start, self.space, "start")
@@ -86,8 +79,7 @@ class ProductCurve(CurveArrays):
         count = len(self._parts)
         moved = (None,) * count if points is None else parts_of(points, self.space, "points")
         vectors = [
-            (None,) * count if end is None else parts_of(end, self.space, "an end vector")
-            for end in pair_of(ends)
+            (None,) * count if end is None else parts_of(end, self.space, "an end vector") for end in pair_of(ends)
         ]
         conditions = ends_in_factors(bc_type, self.space)
         each = zip(self._parts, conditions, moved, zip(*vectors, strict=True), strict=True)
@@ -120,12 +112,7 @@ def _advance(progress: Progress, i: int, count: int, finished: int, total: int) 
 
 def longest_step(curve: CurveArrays) -> Any:
     """Compute D in equation (21), the longest distance between neighbours in the product metric."""
-    index = (slice(None),) * len(curve.batch)
-    steps = [
-        part.space._apply(
-            "distance", p=part.points[(*index, slice(None, -1))], q=part.points[(*index, slice(1, None))]
-        )
-        for part in curve.parts
-    ]
+    pairs = ((part.space, *part.space._neighbours(part.points)) for part in curve.parts)
+    steps = [space._apply("distance", p=p, q=q) for space, p, q in pairs]
     longest = np.max(product_norm(tuple(steps)), axis=-1)
     return float(longest) if np.ndim(longest) == 0 else longest

@@ -7,19 +7,98 @@ Curves are fitted and evaluated in these coordinates, and the results are embedd
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
-from typing import Any, Never, Self
+from typing import Any, NamedTuple, Never
 
 import numpy as np
 
 from .._core import ValidationError
-from .._spaces import Array, Space
+from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
+from .._typing import Progress
 from .core_curve import CoreCurve
-from .curve import NORMS, Doubles
-from .gradient import SampleTimes
-from .solve import Options, Progress, Solved, Task, one_by_one, solve_single, solve_unmasked
-from .subspan import Span, span_of
+from .curve import NORMS, CurveArrays
+from .ends import map_ends
+from .solve import Options, Solved, Task, solve_in_python, solve_single
+
+
+class Span(NamedTuple):
+    """A large space, the small space of coordinates in a span, and a basis of that span.
+
+    In hyperbolic space, the basis is that of the space-like part. The time-like coordinate does not change.
+
+    Attributes
+    ----------
+    large : Space
+        The large space.
+    space : Space
+        The space of coordinates.
+    basis : ndarray, shape (..., n, m)
+        Orthonormal columns.
+    """
+
+    large: Space
+    space: Space
+    basis: Array
+
+    def coordinates(self, x: Array) -> Array:
+        """Return coordinates of points or vectors of shape (..., knots, *point_shape)."""
+        time, columns, shape = _columns(self.space, x)
+        small = np.swapaxes(self.basis.conj(), -1, -2) @ columns
+        return _uncolumns(self.space, time, small, shape)
+
+    def inside(self, curve: CurveArrays) -> CoreCurve:
+        """Return a curve in the small space."""
+        points, velocities = self.coordinates(curve.points), self.coordinates(curve.velocities)
+        return CoreCurve(self.space, curve.times, points, velocities)
+
+    def embed(self, x: Array) -> Array:
+        """Return the points or vectors with given coordinates."""
+        time, columns, shape = _columns(self.space, x)
+        return _uncolumns(self.space, time, self.basis @ columns, shape)
+
+    def embed_samples(self, values: Array, batch: tuple[int, ...]) -> Array:
+        """Embed points or vectors of shape batch + times + (*point_shape)."""
+        axes = len(self.space.point_shape)
+        times = values.shape[len(batch) : values.ndim - axes]
+        flat = values.reshape(*batch, math.prod(times), *self.space.point_shape)
+        return self.embed(flat).reshape(*batch, *times, *self.large.point_shape)
+
+
+def span_of(space: Space, *arrays: Array) -> Span:
+    """Compute the span of points or vectors, in arrays of shape batch + (knots, *point_shape)."""
+    columns = np.concatenate([_columns(space, array)[1] for array in arrays], axis=-1)
+    basis = np.linalg.qr(columns)[0]
+    return Span(space, _small(space, basis.shape[-1]), basis)
+
+
+def _small(space: Space, m: int) -> Space:
+    if isinstance(space, (Grassmannian, ComplexGrassmannian)):
+        return type(space)(space.point_shape[1], m)
+    if isinstance(space, Hyperbolic):
+        return Hyperbolic(m)
+    small: Space = type(space)(m - 1)
+    return small
+
+
+def _columns(space: Space, x: Array) -> tuple[Array | None, Array, tuple[int, ...]]:
+    """Return the time-like part, one matrix of shape (..., n, knots · width) with all columns, and the shape of x."""
+    if len(space.point_shape) == 1:
+        time, rest = (x[..., :1], x[..., 1:]) if isinstance(space, Hyperbolic) else (None, x)
+        return time, np.swapaxes(rest, -1, -2), x.shape
+    moved = np.moveaxis(x, -3, -2)
+    *lead, knots, width = moved.shape
+    return None, moved.reshape(*lead, knots * width), x.shape
+
+
+def _uncolumns(space: Space, time: Array | None, columns: Array, shape: tuple[int, ...]) -> Array:
+    if len(space.point_shape) == 1:
+        rows = np.swapaxes(columns, -1, -2)
+        return np.ascontiguousarray(rows if time is None else np.concatenate([time, rows], axis=-1))
+    knots, width = shape[-3], shape[-1]
+    stacked = columns.reshape(*columns.shape[:-1], knots, width)
+    return np.ascontiguousarray(np.moveaxis(stacked, -2, -3))
 
 
 def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span | None]:
@@ -31,21 +110,9 @@ def reduced(space: Space[Any], points: Array) -> tuple[Space[Any], Array, Span |
 
 
 class ReducedCurve(CoreCurve):
-    """Curves in a large space that are computed in the span of their points.
-
-    Parameters
-    ----------
-    fitted : bool
-        Whether velocities are those of a C² curve, which lie in the span of the points and the end velocities.
-    """
+    """Curves in a large space that are computed in the span of their points."""
 
     _compiled = False
-
-    def __init__(
-        self, space: Space, times: Doubles, points: Array, velocities: Array, fitted: bool = True
-    ) -> None:
-        super().__init__(space, times, points, velocities)
-        self._fitted = fitted
 
     @staticmethod
     def suits(space: Space) -> bool:
@@ -53,9 +120,7 @@ class ReducedCurve(CoreCurve):
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        if task.offsets is None:
-            return solve_unmasked(task, options, progress, _solve)
-        return one_by_one(task, options, progress, _solve)
+        return solve_in_python(task, options, progress, _solve)
 
     @cached_property
     def small(self) -> tuple[Span, CoreCurve]:
@@ -64,9 +129,7 @@ class ReducedCurve(CoreCurve):
         if self._fitted:
             vectors = np.take(vectors, [0, -1], axis=len(self.batch))
         span = span_of(self.space, self.points, vectors)
-        return span, CoreCurve(
-            span.space, self.times, span.coordinates(self.points), span.coordinates(self.velocities)
-        )
+        return span, span.inside(self)
 
     def evaluate(
         self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
@@ -76,13 +139,7 @@ class ReducedCurve(CoreCurve):
         return values if quantity in NORMS else span.embed_samples(values, self.batch)
 
     def _lifted(
-        self,
-        x: Doubles,
-        quantity: str,
-        outside: str,
-        per_curve: bool,
-        start: Doubles,
-        progress: Progress | None,
+        self, x: Doubles, quantity: str, outside: str, per_curve: bool, start: Doubles, progress: Progress | None
     ) -> Array:
         # Unitary factors of the lift are the same in the span.
         span, small = self.small
@@ -93,30 +150,16 @@ class ReducedCurve(CoreCurve):
         knots = len(self.batch)
         rows = np.expand_dims(np.asarray(v, self.space.dtype), knots)
         span = span_of(self.space, self.points, self.velocities, rows)
-        small = CoreCurve(
-            span.space, self.times, span.coordinates(self.points), span.coordinates(self.velocities)
-        )
-        found = small.transport(times, outside, np.squeeze(span.coordinates(rows), knots))
+        found = span.inside(self).transport(times, outside, np.squeeze(span.coordinates(rows), knots))
         return np.squeeze(span.embed(np.expand_dims(found, knots)), knots)
 
-    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
-        self._refuse_derivatives()
-
-    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Never:
-        self._refuse_derivatives()
-
-    def _refuse_derivatives(self) -> Never:
+    def jvp(self, *_: Any, **__: Any) -> Never:
         raise ValidationError(
             f"derivatives with respect to the data are not available, because the dimension of {self.space} is too "
             "large: the curve is computed in the span of its points, which motions of the points leave"
         )
 
-    def _with(self, times: Doubles, points: Array, velocities: Array) -> Self:
-        return type(self)(self.space, times, points, velocities, self._fitted)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        kind, arguments = super().__reduce__()
-        return kind, (*arguments, self._fitted)
+    vjp = jvp
 
 
 def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
@@ -125,16 +168,9 @@ def _solve(task: Task, options: Options, progress: Progress | None) -> Solved:
     points = space._numbers(task.points)
     # End vectors have shape (..., 1, *point_shape), as arrays with one knot.
     axis = -1 - len(space.point_shape)
-    vectors = [
-        None if value is None else np.expand_dims(space._numbers(value), axis) for _, value in task.ends or []
-    ]
-    span = span_of(space, points, *(vector for vector in vectors if vector is not None))
-    ends = task.ends and [
-        (kind, None if vector is None else span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
-        for (kind, _), vector in zip(task.ends, vectors, strict=True)
-    ]
-    small = task._replace(
-        space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends
-    )
+    vectors = map_ends(task.ends, lambda value: np.expand_dims(space._numbers(value), axis))
+    span = span_of(space, points, *(vector for _, vector in vectors or [] if vector is not None))
+    ends = map_ends(vectors, lambda vector: span.space._as_doubles(span.coordinates(vector).squeeze(axis)))
+    small = task._replace(space=span.space, points=span.space._as_doubles(span.coordinates(points)), ends=ends)
     found = solve_single(small, options, progress)
     return found._replace(points=points, velocities=span.embed(found.velocities))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +16,9 @@ from .. import _core
 from .._faults import Fault, from_core
 from .._report import Columns
 from .._spaces import Array, Space
-from .ends import End
+from .._typing import Progress
+from .ends import End, map_ends
 
-Progress = Callable[[int, int], object]
 Mask = NDArray[np.bool_]
 
 
@@ -77,13 +79,14 @@ class Solved(NamedTuple):
     faults: list[Fault]
 
 
+Solver = Callable[[Task, Options, Progress | None], Solved]
+
+
 def solve(tasks: Sequence[Task], options: Options, progress: Progress | None = None) -> list[Solved]:
     """Validate and solve the tasks of all factors, which share knots and masks, in one call of the core."""
     _, times, _, _, _, offsets, mask, skip = tasks[0]
     factors = [(task.space._handle, task.points, task.ends, task.tol) for task in tasks]
-    each = _core.fit(
-        factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress
-    )
+    each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
     solved = []
     for task, (points, velocities, tables, raw) in zip(tasks, each, strict=True):
         space, columns = task.space, Columns(*tables)
@@ -121,14 +124,7 @@ def validate(task: Task) -> tuple[Task, list[Fault]]:
     if tol is None:
         return task._replace(points=points.copy()), []
     found, raw = _core.validate(
-        space._handle,
-        times,
-        points,
-        ends,
-        tol,
-        offsets,
-        None if mask is None else mask.ravel().tolist(),
-        skip,
+        space._handle, times, points, ends, tol, offsets, None if mask is None else mask.ravel().tolist(), skip
     )
     faults = [from_core(one, Columns.empty(0), 0.0, False) for one in raw]
     return task._replace(points=found, tol=None, mask=without(mask, faults, task.batch)), faults
@@ -143,13 +139,13 @@ def without(mask: Mask | None, faults: list[Fault], batch: tuple[int, ...]) -> M
     return kept
 
 
-def one_by_one(
-    task: Task,
-    options: Options,
-    progress: Progress | None,
-    solve_one: Callable[[Task, Options, Progress | None], Solved],
-) -> Solved:
-    """Solve curves of different lengths, stored one after the other, one at a time and without validation."""
+def solve_in_python(task: Task, options: Options, progress: Progress | None, solver: Solver) -> Solved:
+    """Solve a validated task by a solver of unmasked curves of one length."""
+    return (_one_by_one if task.offsets is not None else _unmasked)(task, options, progress, solver)
+
+
+def _one_by_one(task: Task, options: Options, progress: Progress | None, solver: Solver) -> Solved:
+    """Solve curves of different lengths, stored one after the other, one at a time."""
     offsets = task.offsets or []
     velocities = np.full((offsets[-1], *task.space.point_shape), np.nan, task.space.dtype)
     points = np.array(task.space._numbers(task.points))
@@ -158,52 +154,44 @@ def one_by_one(
         if task.mask is not None and not task.mask[i]:
             points[start:stop] = np.nan
             continue
-        ends = task.ends and [
-            (kind, None if value is None else value[i : i + 1]) for kind, value in task.ends
-        ]
+        ends = map_ends(task.ends, operator.itemgetter(slice(i, i + 1)))
         one = Task(task.space, task.times[start:stop], task.points[None, start:stop], ends, None)
-        found = solve_one(one, options, progress and partial(_advance, progress, start, offsets[-1]))
+        found = solver(one, options, progress and partial(_advance, progress, start, offsets[-1]))
         velocities[start:stop] = found.velocities[0]
         columns.put([i], found.columns)
         faults += [fault._replace(curve=i) for fault in found.faults]
     return Solved(points, velocities, columns, faults)
 
 
-def solve_unmasked(
-    task: Task,
-    options: Options,
-    progress: Progress | None,
-    solve_all: Callable[[Task, Options, Progress | None], Solved],
-) -> Solved:
-    """Solve the unmasked curves by a solver without support for masks, without validation."""
+def _unmasked(task: Task, options: Options, progress: Progress | None, solver: Solver) -> Solved:
+    """Solve the unmasked curves of a batch."""
     if task.mask is None or task.mask.all():
-        return solve_all(task._replace(mask=None), options, progress)
-    space, chosen = task.space, np.flatnonzero(task.mask)
-
-    def rows(array: Array, axes: int) -> Array:
-        return np.ascontiguousarray(array.reshape(-1, *array.shape[array.ndim - axes :])[chosen])
-
-    axes = len(space._doubles_shape)
-    points = space._numbers(task.points)
-    whole = Solved(
-        np.full(points.shape, np.nan, space.dtype),
-        np.full(points.shape, np.nan, space.dtype),
-        Columns.empty(task.mask.size),
-        [],
-    )
+        return solver(task._replace(mask=None), options, progress)
+    batch, chosen = task.batch, np.flatnonzero(task.mask)
+    columns = Columns.empty(task.mask.size)
     if not chosen.size:
-        return whole
-    some = task._replace(
-        times=rows(task.times, 1) if task.times.ndim > 1 else task.times,
-        points=rows(task.points, 1 + axes),
-        ends=task.ends and [(kind, None if v is None else rows(v, axes)) for kind, v in task.ends],
-        mask=None,
-    )
-    found = solve_all(some, options, progress)
-    for all_rows, own in ((whole.points, found.points), (whole.velocities, found.velocities)):
-        all_rows.reshape(-1, *own.shape[1:])[chosen] = own
-    whole.columns.put(chosen, found.columns)
-    return whole._replace(faults=[fault._replace(curve=int(chosen[fault.curve])) for fault in found.faults])
+        nothing = np.full(task.space._numbers(task.points).shape, np.nan, task.space.dtype)
+        return Solved(nothing, nothing.copy(), columns, [])
+
+    def rows(array: Array) -> Array:
+        return np.ascontiguousarray(array.reshape(-1, *array.shape[len(batch) :])[chosen])
+
+    times = rows(task.times) if task.times.ndim > 1 else task.times
+    some = task._replace(times=times, points=rows(task.points), ends=map_ends(task.ends, rows), mask=None)
+    found = solver(some, options, progress)
+    columns.put(chosen, found.columns)
+    points, velocities = (in_batch(batch, chosen, own) for own in (found.points, found.velocities))
+    return Solved(points, velocities, columns, [own._replace(curve=int(chosen[own.curve])) for own in found.faults])
+
+
+def in_batch(batch: tuple[int, ...], chosen: NDArray[np.intp] | None, column: Any) -> Any:
+    """Return values of some curves as an array over the whole batch; the others are NaN, False or zero."""
+    if chosen is None:
+        return column
+    rows = np.asarray(column)
+    out = np.full((math.prod(batch), *rows.shape[1:]), np.nan if rows.dtype.kind in "fc" else 0, rows.dtype)
+    out[chosen] = rows
+    return out.reshape(*batch, *rows.shape[1:])
 
 
 def _advance(progress: Progress, before: int, total: int, finished: int, _: int) -> object:

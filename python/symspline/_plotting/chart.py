@@ -75,19 +75,16 @@ def box(
     axes.set_box_aspect((1, 1, 1), zoom=0.9)
     for axis, number, name in zip("xyz", middle, "₁₂₃", strict=True):
         getattr(axes, f"set_{axis}lim")(number - half, number + half)
-        _lighten(getattr(axes, f"{axis}axis"), f"x{name}")
+        # White walls with faint lines.
+        wall = getattr(axes, f"{axis}axis")
+        wall.set_pane_color("white")
+        wall.pane.set_edgecolor(GRID)
+        wall.line.set_color(EDGE)
+        wall._axinfo["grid"].update(color=GRID, linewidth=0.6)
+        wall.set_major_locator(MaxNLocator(5))
+        wall.label.set(text=f"x{name}", color=INK, fontsize=10)
     # Choose the direction from which the curve looks widest.
     angles = np.radians([-60, -30, 30, 60])
     right = everything[:, 1:2] * np.cos(angles) - everything[:, :1] * np.sin(angles)
     axes.view_init(elev=24, azim=(-60, -30, 30, 60)[np.std(right, axis=0).argmax()])
     return axes
-
-
-def _lighten(axis: Any, label: str) -> None:
-    """Draw a white wall with faint lines."""
-    axis.set_pane_color("white")
-    axis.pane.set_edgecolor(GRID)
-    axis.line.set_color(EDGE)
-    axis._axinfo["grid"].update(color=GRID, linewidth=0.6)
-    axis.set_major_locator(MaxNLocator(5))
-    axis.label.set(text=label, color=INK, fontsize=10)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,8 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from .._core import ValidationError
-from .._curves.band import UncertaintyBand
 from .._curves.curve import CurveArrays as Data
+from .._curves.curve import UncertaintyBand
 from .._report import long_gaps
 from .._spaces import Space
 from .style import DATA, DATES, INK, Array, Indices, colors, evenly
@@ -153,10 +153,7 @@ class Curve:
                 data = np.unique(np.abs(given[:, None] - even).argmin(axis=0))
                 even = given[data]
             bold = np.unique(self._nearest(even))
-        groups = {
-            "between": (self.times[between], self.points[between]),
-            "bold": (self.times[bold], self.points[bold]),
-        }
+        groups = {"between": (self.times[between], self.points[between]), "bold": (self.times[bold], self.points[bold])}
         if self.noise is not None:
             groups["data"] = self.on_axis(given[data]), self.given[data]
         return groups
@@ -221,9 +218,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
     if not everything:
         raise ValidationError("there is nothing to plot: the batch has no curves")
     if not good.size:
-        raise ValidationError(
-            "there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)"
-        )
+        raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
     drawn = good[evenly(len(good), MOST)]
     few = drawn[evenly(len(drawn), FEW)]
     start = spline.t.min() if spline.t.dtype.kind == "M" else None
@@ -232,9 +227,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
     curves = []
     for i, color in zip(drawn, colors(len(drawn)), strict=True):
         index = tuple(map(int, np.unravel_index(i, batch)))
-        data = spline._curve
-        for k in index:
-            data = data.take_batch(k)
+        data = reduce(lambda curves, k: curves.take_batch(k), index, spline._curve)
         x = _samples(data.times)
         noise = spline._noise_beside(index, x)
         alone = len(drawn) == 1
@@ -246,10 +239,7 @@ def curves_of(spline: Any) -> tuple[list[Curve], str]:
 def _finite(data: Data) -> NDArray[np.bool_]:
     """Return whether each curve is finite, in a flat array."""
     start = np.broadcast_to(data.times, (*data.batch, data.times.shape[-1]))[..., :1]
-    finite: NDArray[np.bool_] = np.isfinite(
-        data.evaluate(np.ascontiguousarray(start), "speed", "raise", True)
-    )
-    return finite.ravel()
+    return np.asarray(np.isfinite(data.evaluate(np.ascontiguousarray(start), "speed", "raise", True))).ravel()
 
 
 def _samples(knots: Array) -> Array:

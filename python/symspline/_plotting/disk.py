@@ -45,8 +45,7 @@ def draw_disk(panel: SubFigure, curves: Sequence[Curve]) -> None:
 def flat(points: Array, middle: Array) -> Array:
     """Return the positions of points in the disk with a given middle, shape (..., 2)."""
     moved = _PLANE.transvection(middle, _PLANE.log(middle, _ORIGIN), points)
-    positions: Array = moved[..., 1:] / (1 + moved[..., :1])
-    return positions
+    return np.asarray(moved[..., 1:] / (1 + moved[..., :1]))
 
 
 def rims(positions: Array, radii: Array) -> Array:
@@ -67,9 +66,7 @@ def _middle(points: Array) -> tuple[Array, float]:
     """
     points = points[:: 1 + len(points) // 2000]
     middle = centre_of(_PLANE, points)
-    around_origin, around_middle = (
-        float(_PLANE.distance(centre, points).max()) for centre in (_ORIGIN, middle)
-    )
+    around_origin, around_middle = (float(_PLANE.distance(centre, points).max()) for centre in (_ORIGIN, middle))
     return (middle, around_middle) if around_middle < 0.8 * around_origin else (_ORIGIN, around_origin)
 
 

@@ -30,8 +30,7 @@ _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 def outlines(matrices: Array) -> Array:
     """Return the ellipses of matrices or the outlines of ellipsoids, shape (m, 97, 2)."""
     roots, axes = _half_axes(matrices[:, :2, :2])
-    ellipses: Array = _CIRCLE[:, :2] * roots[:, None] @ axes
-    return ellipses
+    return np.asarray(_CIRCLE[:, :2] * roots[:, None] @ axes)
 
 
 def sections(matrices: Array) -> Array:
@@ -39,8 +38,7 @@ def sections(matrices: Array) -> Array:
     roots, axes = (array[:, None] for array in _half_axes(matrices))
     rings = np.stack([np.roll(_CIRCLE[:, [1, 0, 2]], i + 1, axis=1) for i in range(3)])
     normals = rings / roots[..., None, :] @ axes
-    near: Array = np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ axes)[..., :2], np.nan)
-    return near
+    return np.asarray(np.where(normals[..., 2:] > 0, (rings * roots[..., None, :] @ axes)[..., :2], np.nan))
 
 
 def _half_axes(matrices: Array) -> tuple[Array, Array]:

@@ -40,9 +40,7 @@ def plot_film(t: NDArray[Any], landmarks: Array, film: Callable[[Any], Array], f
     strip, multiples = _times(t, _STRIP), _times(t, _ROWS * _COLUMNS)
     seen = [film(x) if n == 2 else film(x) @ VIEW[:2].T for x in (t, strip, multiples)]
     figure = CurveFigure(figsize=(_WIDTH, _HEIGHT), dpi=DPI, facecolor="white")
-    heading(
-        figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93
-    )
+    heading(figure, "Morph along a C² spline of affine shapes", f"{drawings} drawings of {count} landmarks", 0.93)
     # Every drawing fits into a square of this size around its centre.
     size = 2.1 * max(float(np.abs(_centred(x)).max()) for x in seen)
     _draw_strip(figure.add_axes((0.05, 0.58, 0.9, 0.26)), t, strip, seen[0], seen[1], size)
@@ -74,18 +72,14 @@ def _centred(drawings: Array) -> Array:
     return drawings - middles
 
 
-def _draw_strip(
-    axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, film: Array, size: float
-) -> None:
+def _draw_strip(axes: Axes, t: NDArray[Any], strip: NDArray[Any], given: Array, film: Array, size: float) -> None:
     """Draw a row of drawings with their centres at their times. Given ones are filled."""
     plain(axes)
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)
     axes.set(yticks=[], ylim=(-1, 1))
     dates = t.dtype.kind == "M"
-    positions, knots = (
-        np.asarray(DATES.date2num(values) if dates else values, float) for values in (strip, t)
-    )
+    positions, knots = (np.asarray(DATES.date2num(values) if dates else values, float) for values in (strip, t))
     if dates:
         show_dates(axes, 3, 8)
     else:

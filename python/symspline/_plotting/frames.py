@@ -67,9 +67,7 @@ def _draw_arrows(axes: Axes, times: Array, row: int, frames: Array, bold: bool) 
     right, up, _ = np.moveaxis(np.take_along_axis(seen, order[:, None], axis=-1), 1, 0)
     look: Any = {"units": "inches", "scale_units": "inches", "scale": 1, "clip_on": False}
     look |= {"headwidth": 3.5, "headlength": 4.5, "headaxislength": 4.2}
-    look |= (
-        {"width": 0.032, "alpha": 1, "zorder": 4} if bold else {"width": 0.014, "alpha": 0.55, "zorder": 3}
-    )
+    look |= {"width": 0.032, "alpha": 1, "zorder": 4} if bold else {"width": 0.014, "alpha": 0.55, "zorder": 3}
     positions = np.repeat(times, 3), np.full(3 * len(times), row)
     axes.quiver(*positions, right.ravel(), up.ravel(), color=np.array(AXES)[order.ravel()], **look)
 

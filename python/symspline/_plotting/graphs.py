@@ -27,9 +27,7 @@ _LINES, _TICKS = 60, 2000
 # ---- axes ----
 
 
-def timelines(
-    panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], top: float = TOP
-) -> list[Axes]:
+def timelines(panel: SubFigure, curves: Sequence[Curve], labels: Sequence[str], top: float = TOP) -> list[Axes]:
     """Add a column of axes with the same time axis, one per label of the vertical axis."""
     height = (size(panel)[1] - BOTTOM - top) / len(labels)
     made = []
@@ -118,11 +116,7 @@ draw_phase = partial(_draw_angle, lambda numbers: np.angle(numbers[:, 0, 0]))
 
 
 def draw_numbers(
-    panel: SubFigure,
-    curves: Sequence[Curve],
-    label: str,
-    names: Sequence[str],
-    numbers: Callable[[Any, Any], Array],
+    panel: SubFigure, curves: Sequence[Curve], label: str, names: Sequence[str], numbers: Callable[[Any, Any], Array]
 ) -> None:
     """Draw several numbers against time, the first twelve with their names.
 

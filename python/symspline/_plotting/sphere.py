@@ -62,9 +62,7 @@ def bloch_vectors(states: Any) -> Array:
     return np.stack([across.real, across.imag, np.abs(a) ** 2 - np.abs(b) ** 2], axis=-1)
 
 
-def _draw_on_half(
-    what: str, vectors: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]
-) -> None:
+def _draw_on_half(what: str, vectors: Callable[[Any], Array], panel: SubFigure, curves: Sequence[Curve]) -> None:
     """Draw lines, given by unit vectors, on the hemisphere or, if they are close together, on a part of the sphere."""
     lines = [lifted(vectors(curve.points)) for curve in curves]
     lines = [line if line[0] @ lines[0][0] >= 0 else -line for line in lines]
@@ -76,10 +74,7 @@ def _draw_on_half(
     for curve, line, shown in zip(curves, lines, lines if is_part else above, strict=True):
         given = shown[curve.knots]
         if curve.noise is not None:
-            near, given = (
-                curve.closest_samples(line) if is_part else np.array([0.0, 0.0, 1.0]),
-                vectors(curve.given),
-            )
+            near, given = (curve.closest_samples(line) if is_part else np.array([0.0, 0.0, 1.0]), vectors(curve.given))
             given = given * np.where(np.sum(given * near, axis=1) < 0, -1.0, 1.0)[:, None]
         whole, radii = (line, curve.radii) if is_part else (broken_at_rim(line), None)
         _draw_on_globe(axes, view, curve, whole, given, radii)
@@ -95,9 +90,7 @@ draw_normals = partial(_draw_on_half, "plane", lambda bases: np.cross(bases[...,
 # ---- on a globe ----
 
 
-def _draw_on_globe(
-    axes: Axes, view: View, curve: Curve, line: Array, given: Array, radii: Array | None
-) -> None:
+def _draw_on_globe(axes: Axes, view: View, curve: Curve, line: Array, given: Array, radii: Array | None) -> None:
     """Draw a curve on a globe, dashed on the far side.
 
     ``line`` and ``given`` are the unit vectors of samples and of given points, shape (m, 3). ``radii`` are the angular
@@ -139,9 +132,7 @@ class _Globe(NamedTuple):
     half: bool = False
 
 
-def _draw_globe(
-    panel: SubFigure, points: Array, look: _Globe, above: Array | None = None
-) -> tuple[Axes, View, bool]:
+def _draw_globe(panel: SubFigure, points: Array, look: _Globe, above: Array | None = None) -> tuple[Axes, View, bool]:
     """Draw the part of a globe where points are, or all of it if they are not close together.
 
     Returns the axes, the view, and whether it is a part. A whole globe is turned towards the points ``above``.
@@ -172,8 +163,7 @@ def caps(points: Array, radii: Array) -> Array:
     aside = np.cross(points, np.eye(3)[np.abs(points).argmin(axis=1)])
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     frame = np.stack([aside, np.cross(points, aside)], axis=1)
-    rims: Array = np.cos(radii) * points[:, None] + np.sin(radii) * (CIRCLE @ frame)
-    return rims
+    return np.asarray(np.cos(radii) * points[:, None] + np.sin(radii) * (CIRCLE @ frame))
 
 
 # ---- on the hemisphere ----
@@ -182,8 +172,7 @@ def caps(points: Array, radii: Array) -> Array:
 def lifted(vectors: Array) -> Array:
     """Choose the signs of unit vectors ±x along a curve, shape (m, 3), so that they do not jump."""
     turned = np.sum(vectors[1:] * vectors[:-1], axis=1) < 0
-    line: Array = vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None]
-    return line
+    return np.asarray(vectors * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None])
 
 
 def sides(line: Array) -> Array:

@@ -61,9 +61,7 @@ def size(panel: SubFigure) -> tuple[float, float]:
     return panel.bbox.width / panel.dpi, panel.bbox.height / panel.dpi
 
 
-def inside(
-    panel: SubFigure, left: float, bottom: float, right: float, top: float
-) -> tuple[float, float, float, float]:
+def inside(panel: SubFigure, left: float, bottom: float, right: float, top: float) -> tuple[float, float, float, float]:
     """Return the rectangle for ``add_axes`` with given margins in inches."""
     width, height = size(panel)
     return left / width, bottom / height, 1 - (left + right) / width, 1 - (bottom + top) / height

@@ -5,10 +5,4 @@ from .report import SmoothingReport
 from .spline import SmoothingSpline
 from .warned import SmoothingWarning
 
-__all__ = [
-    "SmoothingReport",
-    "SmoothingSpline",
-    "SmoothingWarning",
-    "make_lsq_spline",
-    "make_smoothing_spline",
-]
+__all__ = ["SmoothingReport", "SmoothingSpline", "SmoothingWarning", "make_lsq_spline", "make_smoothing_spline"]

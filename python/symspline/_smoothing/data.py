@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import as_array, short_repr
+from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
-from .._curves.ends import End
+from .._curves.ends import End, map_ends
 from .._curves.fit import Points, read, read_ends, validated
 from .._faults import INVALID, Fault
 from .._input import times_of
 from .._options import with_atol
-from .._spaces import Array, Space, factors_of
+from .._spaces import Array, Doubles, Space, factors_of
 from .._time import TimeAxis, knots_of
 from .._typing import TimesLike
 from .factors import grouped, smoothed_spaces, split
 from .precision import Precision, read_precision
 
-Doubles = NDArray[np.float64]
-
-
 # Segments longer than this fraction of the curve are divided if no curve was found without additional knots.
 _GAPS = 12
+# The cube of the time between the first and the last datum must not overflow.
+_LONGEST = 1e100
+# If there are more knots than the first number, the fit begins with the second number of knots.
+_MANY, _FIRST = 4000, 2000
+# Largest number of times that the knots are adapted to λ.
+_TRIES = 4
 
 
 class SmoothingData(NamedTuple):
@@ -59,6 +63,12 @@ class SmoothingData(NamedTuple):
         """Which data have a nonzero weight in some factor, shape (N,) or (..., N)."""
         return reduce(np.logical_or, [own.weights > 0 for own in self.precisions])
 
+    def map(self, function: Callable[[Any], Any], batch: tuple[int, ...]) -> SmoothingData:
+        """Apply a function to the arrays that have batch axes, such as the selection of some curves."""
+        t, times = (x if x.ndim == 1 else function(x) for x in (self.t, self.times))
+        points, precisions = [function(own) for own in self.points], [own.map(function) for own in self.precisions]
+        return self._replace(t=t, times=times, points=points, precisions=precisions, batch=batch)
+
 
 class Knots(NamedTuple):
     """Knots as the user sees them, and as the core counts them; shape (K,) or (..., K)."""
@@ -75,13 +85,7 @@ class Knots(NamedTuple):
 
 
 def read_noisy(
-    t: TimesLike | None,
-    points: Any,
-    space: Space,
-    weights: Any,
-    frames: Any,
-    bc_type: Any,
-    atol: float | None,
+    t: TimesLike | None, points: Any, space: Space, weights: Any, frames: Any, bc_type: Any, atol: float | None
 ) -> Given:
     """Return the data as a user passes them, after all checks except those of points.
 
@@ -104,14 +108,16 @@ def read_noisy(
                 f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
-    return Given(time_axis, shown_times, times, data, precisions, ends, batch, None)
+    return Given(SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends, None)
 
 
 class Given(NamedTuple):
-    """Noisy data before their points are checked. The fields are those of `SmoothingData`, and further ones.
+    """Noisy data before their points are checked.
 
     Attributes
     ----------
+    noisy : SmoothingData
+        The data without points.
     data : list of Points
         Points in every factor.
     ends : list
@@ -120,35 +126,30 @@ class Given(NamedTuple):
         Indices of these curves in the batch of the user; None for all curves.
     """
 
-    time_axis: TimeAxis
-    t: Array
-    times: Doubles
+    noisy: SmoothingData
     data: list[Points]
-    precisions: list[Precision]
     ends: list[list[End] | None]
-    batch: tuple[int, ...]
     chosen: NDArray[np.intp] | None
 
-    def valid_only(
-        self, space: Space, mask: NDArray[np.bool_] | None, strict: bool
-    ) -> tuple[Given, list[Fault]]:
+    def valid_only(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
         """Return the valid curves of the mask, and the faults of the others.
 
         Unless `strict`, curves with invalid or too few points are masked.
         """
-        chosen = np.ones(self.batch, bool) if mask is None else mask.copy()
+        batch, times = self.noisy.batch, self.noisy.times
+        chosen = np.ones(batch, bool) if mask is None else mask.copy()
         faults: list[Fault] = []
-        if self.batch and not strict:
+        if batch and not strict:
             _, faults = validated(*self._plain(space), skip_invalid=True, mask=chosen)
             chosen.flat[[fault.curve for fault in faults]] = False
-            for precision in self.precisions:
-                for number in np.flatnonzero(chosen & ~_enough(self.times, precision.weights, self.batch)):
-                    too_few = _too_few(precision.weights, self.batch, int(number))
+            for precision in self.noisy.precisions:
+                for number in np.flatnonzero(chosen & ~_enough(times, precision.weights, batch)):
+                    too_few = _too_few(precision.weights, batch, int(number))
                     faults.append(Fault(int(number), INVALID, too_few))
                     chosen.flat[number] = False
         if chosen.all():
             return self, faults
-        return self._take_batch(space, np.flatnonzero(chosen)), faults
+        return self._take_batch(np.flatnonzero(chosen)), faults
 
     def _plain(self, space: Space) -> tuple[Space, Doubles, list[Points], list[list[End] | None]]:
         """Return the data in a form in which only points are checked.
@@ -156,28 +157,19 @@ class Given(NamedTuple):
         Times may repeat, knots need not be times of the data, and the ends of a closed curve are noisy and differ.
         """
         plain = np.arange(self.data[0].nodes, dtype=np.float64)
-        natural = read_ends("natural", space, self.batch)
+        natural = read_ends("natural", space, self.noisy.batch)
         ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
         return space, plain, self.data, ends
 
-    def _take_batch(self, space: Space, chosen: NDArray[np.intp]) -> Given:
+    def _take_batch(self, chosen: NDArray[np.intp]) -> Given:
         """Return some of the curves, along one batch axis."""
-        lead = len(self.batch)
+        lead, batch = len(self.noisy.batch), (len(chosen),)
 
         def rows(array: Any) -> Any:
             return np.ascontiguousarray(array.reshape(-1, *array.shape[lead:])[chosen])
 
-        shared = self.times.ndim == 1
-        return Given(
-            self.time_axis,
-            self.t if self.t.ndim == 1 else rows(self.t),
-            self.times if shared else rows(self.times),
-            [part._replace(numbers=rows(part.numbers), batch=(len(chosen),)) for part in self.data],
-            [own.map(rows) for own in self.precisions],
-            [own and [(kind, None if v is None else rows(v)) for kind, v in own] for own in self.ends],
-            (len(chosen),),
-            chosen,
-        )
+        data = [part._replace(numbers=rows(part.numbers), batch=batch) for part in self.data]
+        return Given(self.noisy.map(rows, batch), data, [map_ends(own, rows) for own in self.ends], chosen)
 
     def checked(self, space: Space) -> SmoothingData:
         """Return the data with points projected onto the space.
@@ -187,20 +179,19 @@ class Given(NamedTuple):
         ValidationError
             If a point is invalid, or a curve has data at fewer than two times.
         """
-        on_space, _ = validated(*self._plain(space))
-        for own in self.precisions:
-            enough = _enough(self.times, own.weights, self.batch)
+        points, _ = validated(*self._plain(space))
+        noisy = self.noisy._replace(points=points)
+        for own in noisy.precisions:
+            enough = _enough(noisy.times, own.weights, noisy.batch)
             if not np.all(enough):
                 number = int(np.flatnonzero(~enough)[0])
-                raise ValidationError(_too_few(own.weights, self.batch, number))
-        return SmoothingData(self.time_axis, self.t, self.times, on_space, self.precisions, self.batch)
+                raise ValidationError(_too_few(own.weights, noisy.batch, number))
+        return noisy
 
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:
     time_axis, shown_times, times = knots_of(t, batch, count)
-    if not np.isfinite(times).all():
-        index = np.argwhere(~np.isfinite(times))[0].tolist()
-        raise ValidationError(f"t{index} is {times[tuple(index)]}; times must be finite")
+    refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}; times must be finite")
     back = np.argwhere(np.diff(times) < 0)
     if len(back):
         *curve, i = back[0].tolist()
@@ -208,6 +199,8 @@ def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[
             f"t{[*curve, i + 1]} is before t{[*curve, i]}. Sort times and points together, for instance with "
             "order = np.argsort(t)."
         )
+    if np.any(times[..., -1] / 2 - times[..., 0] / 2 > _LONGEST):
+        raise ValidationError(f"t spans more than {_LONGEST:.0e}, too much for smoothing. Choose another unit of time.")
     return time_axis, shown_times, times
 
 
@@ -216,9 +209,7 @@ def _without_missing(part: Points, weights: list[Doubles]) -> Points:
 
     Points without such a predecessor become the first point that has a weight.
     """
-    missing = reduce(
-        np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights]
-    )
+    missing = reduce(np.logical_and, [np.broadcast_to(own == 0, (*part.batch, part.nodes)) for own in weights])
     if not missing.any():
         return part
     order = np.arange(part.nodes)
@@ -247,7 +238,7 @@ def _too_few(weights: Doubles, batch: tuple[int, ...], number: int) -> str:
     return f"The data{of} have one time only. A curve needs points at two or more times."
 
 
-def knots_for(noisy: Given, knots: Any) -> Knots:
+def knots_for(noisy: SmoothingData, knots: Any) -> Knots:
     """Return the knots of a curve from the argument `knots`: None, their number, or the knots themselves."""
     t, times = noisy.t, noisy.times
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
@@ -255,9 +246,7 @@ def knots_for(noisy: Given, knots: Any) -> Knots:
     if knots is None:
         return _different(t, times)
     if isinstance(knots, (str, bool)):
-        raise ValidationError(
-            f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}"
-        )
+        raise ValidationError(f"knots must be None, a number of knots, or an array of them, not {short_repr(knots)}")
     given = as_array(times_of(knots, "knots")[0], "knots")
     if given.ndim != 1:
         raise ValidationError(
@@ -298,9 +287,7 @@ def has_all_times(knots: Knots, noisy: SmoothingData) -> bool:
         used = np.logical_or.reduce(used.reshape(-1, used.shape[-1]))
     if knots.times.ndim == 1 and noisy.times.ndim == 1:
         return bool(np.isin(noisy.times[used], knots.times).all())
-    return bool(
-        np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)])
-    )
+    return bool(np.all([np.isin(t[u], k).all() for t, u, k in zip(noisy.times, used, knots.times, strict=True)]))
 
 
 def _different(t: Array, times: Doubles) -> Knots:
@@ -360,7 +347,49 @@ def merge_close_knots(knots: Knots, noisy: SmoothingData, lam: float | None) -> 
     return _picked(knots, np.array([*kept, len(times) - 1]))
 
 
-def in_gaps(knots: Knots, given: Given) -> Knots:
+def with_enough_knots(
+    whole: Knots, noisy: SmoothingData, lams: list[Any], run: Callable[[Knots], list[Any]]
+) -> tuple[list[Any], Knots]:
+    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
+    given = all(np.isfinite(lam).all() for lam in lams)
+    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
+    if at.times.shape[-1] > _MANY:
+        at = thin_knots(at, _FIRST)
+    for tries in range(_TRIES):
+        found = run(at)
+        count = at.times.shape[-1]
+        known = [np.asarray(part.report.lam) for _, part, _ in found]
+        better = merge_close_knots(whole, noisy, _of_all(known))
+        most = 2 * max(_n_knots_for_df(part.report.df) for _, part, _ in found)
+        if better.times.shape[-1] > max(_MANY, most):
+            better = thin_knots(better, max(_FIRST, most))
+        wanted = better.times.shape[-1]
+        # More knots would make a rough curve rougher, and a stiff curve needs fewer.
+        if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
+            break
+        at = better
+    return found, at
+
+
+def _of_all(lams: list[Any]) -> float:
+    """Return one λ from which the knots of all curves are selected.
+
+    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
+    """
+    flat = np.concatenate([np.ravel(lam) for lam in lams])
+    flat = flat[np.isfinite(flat)]
+    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
+
+
+def _n_knots_for_df(df: Any) -> int:
+    """Return a number of knots that is enough for these degrees of freedom.
+
+    Three times as many knots would already lose nothing.
+    """
+    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
+
+
+def in_gaps(knots: Knots, noisy: SmoothingData) -> Knots:
     """Add knots in long gaps.
 
     Between two points far apart, the curve of the space may turn faster than one segment can.
@@ -375,7 +404,7 @@ def in_gaps(knots: Knots, given: Given) -> Knots:
     first, step = knots.t[i], knots.t[i + 1] - knots.t[i]
     whole = step.dtype.kind in "ium"
     shown_times = np.append(first + (step * j // parts[i] if whole else step * (j / parts[i])), knots.t[-1:])
-    times, _ = given.time_axis.at(shown_times, (), False)
+    times, _ = noisy.time_axis.at(shown_times, (), False)
     inner = np.flatnonzero(j == 0)
     times[inner], times[-1] = knots.times[:-1], knots.times[-1]
     return Knots(shown_times, times) if np.all(np.diff(times) > 0) else knots

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import short_repr, whole_number
+from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
-from .._curves.ends import End, freeze_bc_type, is_closed
-from .._curves.fit import FitProblem, Points, fit, mask_of
-from .._curves.solve import Options, Progress
+from .._curves.ends import End, freeze_bc_type, is_closed, map_ends
+from .._curves.fit import Points, Problem, fit, mask_of
+from .._curves.solve import Options, in_batch
 from .._errors import raise_or_warn
 from .._options import check_on_failure, check_progress, checked_extrapolate
 from .._representatives import warn_of_far_points, warn_of_signs
-from .._spaces import Product, Space, SpecialEuclidean, factors_of
-from .._spaces import space as space_named
+from .._spaces import Product, Space, SpecialEuclidean, factors_of, space_named
 from .._typing import (
     ChoiceOptions,
     Criterion,
@@ -30,35 +29,20 @@ from .._typing import (
     P,
     PointsLike,
     PProduct,
+    Progress,
     SmoothingBCType,
     SmoothingMethod,
     TimesLike,
 )
 from ..manifolds._manifold import refuse_functions
-from .data import (
-    Given,
-    Knots,
-    SmoothingData,
-    has_all_times,
-    in_gaps,
-    knots_for,
-    merge_close_knots,
-    points_of,
-    read_noisy,
-    thin_knots,
-)
+from .data import Knots, SmoothingData, has_all_times, in_gaps, knots_for, points_of, read_noisy, with_enough_knots
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
 from .report import SmoothingReport
-from .solve import NO_CURVE, SolverOptions, n_knots_for_df, one_per_curve, smoothed
+from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
 from .spline import SmoothingSpline
-from .spread import warn_of_spread
-from .warned import warn_of_bounds
+from .warned import warn_of_bounds, warn_of_spread
 
 _FIT = Options("auto", 1e-12, None)
-# If there are more knots than the first number, the fit begins with the second number of knots.
-_MANY, _FIRST = 4000, 2000
-# Largest number of times that the knots are adapted to λ.
-_TRIES = 4
 
 
 @overload
@@ -247,26 +231,22 @@ def make_smoothing_spline(
     for name, word in (("criterion", criterion), ("loss", loss), ("method", method)):
         if not isinstance(word, str):
             raise ValidationError(f"{name} must be a word, not {short_repr(word)}")
-    if isinstance(gamma, bool) or not (isinstance(gamma, (int, float, np.number)) and 1 <= gamma < np.inf):
-        raise ValidationError(f"gamma must be a number >= 1, not {short_repr(gamma)}")
-    if isinstance(tol, bool) or not (isinstance(tol, (int, float, np.number)) and 0 < tol < np.inf):
-        raise ValidationError(f"tol must be a number > 0, not {short_repr(tol)}")
-    options = SolverOptions(
-        criterion, float(gamma), loss, method, float(tol), whole_number(max_iter, "max_iter", 1), False
-    )
+    gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
+    tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
+    most = whole_number(max_iter, "max_iter", 1)
+    options = SolverOptions(criterion, gamma, loss, method, tol, most, False)
     given = read_noisy(t, points, space, weights, frames, bc_type, atol)
-    lams = _in_parts(space, lam, "lam", given.batch)
-    sigmas = _in_parts(space, sigma, "sigma", given.batch)
-    if loss != "linear" and sigma is None and any(own.is_singular for own in given.precisions):
+    whole, batch = given.noisy, given.noisy.batch
+    lams, sigmas = _in_parts(space, lam, "lam", batch), _in_parts(space, sigma, "sigma", batch)
+    if loss != "linear" and sigma is None and any(own.is_singular for own in whole.precisions):
         raise ValidationError(
             f"loss={loss!r} estimates the noise level from the data, but `weights` has matrices without information in "
             "some directions. Pass sigma; it is 1 if the matrices are inverse covariances."
         )
-    if given.times.shape[-1] == 2:
+    if whole.times.shape[-1] == 2:
         # Two points have no outliers and do not determine the noise level.
         options = options._replace(loss="linear")
-    mask = mask_of(where, given.batch)
-    some_given, faults = given.valid_only(space, mask, on_failure == "raise")
+    some_given, faults = given.valid_only(space, mask_of(where, batch), on_failure == "raise")
     noisy, chosen = some_given.checked(space), some_given.chosen
     if chosen is not None:
         lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
@@ -275,38 +255,22 @@ def make_smoothing_spline(
         for factor, of_factor in zip(factors_of(space), some_given.ends, strict=True)
         for own in split_ends(factor, of_factor)
     ]
-    named = _names(given.batch, chosen)
-    every = knots_for(given, knots)
+    every = knots_for(whole, knots)
     free = knots is None or has_all_times(every, noisy)
 
     def run(at: Knots, raise_lam: bool = False) -> list[Any]:
-        own = at.of_curves(chosen)
-        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, own), sigmas, ends, strict=True)
-        return [
-            smoothed(
-                part,
-                noisy,
-                points_of_part,
-                precision,
-                own,
-                one_lam,
-                one_sigma,
-                end,
-                options._replace(raise_lam=raise_lam),
-                named,
-                free,
-                progress,
-            )
-            for (part, points_of_part), precision, one_lam, one_sigma, end in each
-        ]
+        at = at.of_curves(chosen)
+        shared = noisy, at, options._replace(raise_lam=raise_lam), free, progress
+        each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, at), sigmas, ends, strict=True)
+        return [smoothed(part, own, p, lam, sigma, end, *shared) for (part, own), p, lam, sigma, end in each]
 
     if is_closed(bc_type) and every.times.shape[-1] < 4:
         raise ValidationError(
             f"A closed curve needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data or knots."
         )
     if knots is None:
-        found, at = _with_enough(every, noisy, lams, run)
-        finer = in_gaps(at, given)
+        found, at = with_enough_knots(every, noisy, lams, run)
+        finer = in_gaps(at, whole)
         # Knots in gaps are tried before a larger λ, which would affect the whole curve.
         if any(NO_CURVE in fault.what for _, _, own in found for fault in own):
             found, at = run(finer, raise_lam=True), finer
@@ -316,44 +280,33 @@ def make_smoothing_spline(
         transport_end_velocities(end, part, own, curve_points, noisy)
         for end, (part, own), (curve_points, _, _) in zip(ends, points_of(noisy, space), found, strict=True)
     ]
-    whole = _whole(given, noisy, chosen)
-    at_knots = [
-        join(factor, [_in_batch(own, given.batch, chosen) for own, _, _ in parts])
-        for factor, parts in zip(factors_of(space), grouped(space, found), strict=True)
+    spread = partial(in_batch, batch, chosen)
+    # Points of masked curves are NaN.
+    whole = whole._replace(points=[spread(own) for own in noisy.points])
+    parts, conditions = [], []
+    for factor, of_points, of_ends in zip(
+        factors_of(space), grouped(space, found), grouped(space, transported), strict=True
+    ):
+        rows = join(factor, [spread(own) for own, _, _ in of_points])
+        doubles = np.ascontiguousarray(factor._as_doubles(rows))
+        parts.append(Points(doubles, 0.0, batch, at.times.shape[-1]))
+        conditions.append(_joined(factor, [map_ends(one, spread) for one in of_ends]))
+    good = None if chosen is None else spread(np.ones(len(chosen), bool))
+    fitted = fit(Problem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
+    noise = [part.map(spread) for _, part, _ in found]
+    kept = _conditions(bc_type, conditions, space)
+    spline = SmoothingSpline._of(whole.time_axis, at.t, fitted.curve, kept, policy, fitted.reports(), whole, noise)
+    faults += [
+        fault if chosen is None else fault._replace(curve=int(chosen[fault.curve]))
+        for fault in next((own for _, _, own in found if own), [])
     ]
-    conditions = [
-        _joined(factor, [_ends_in_batch(one, given.batch, chosen) for one in own])
-        for factor, own in zip(factors_of(space), grouped(space, transported), strict=True)
-    ]
-    parts = [
-        Points(np.ascontiguousarray(factor._as_doubles(own)), 0.0, given.batch, at.times.shape[-1])
-        for factor, own in zip(factors_of(space), at_knots, strict=True)
-    ]
-    good = None if chosen is None else _flags(given.batch, chosen)
-    fitted = fit(FitProblem(space, at.times, parts, conditions, _FIT, check=False, mask=good))
-    noise = [part.map(lambda column: _in_batch(column, given.batch, chosen)) for _, part, _ in found]
-    spline = SmoothingSpline._of(
-        given.time_axis,
-        at.t,
-        fitted.curve,
-        _conditions(bc_type, conditions, space),
-        policy,
-        fitted.reports(),
-        whole,
-        noise,
-    )
-    faults += next((own for _, _, own in found if own), [])
     if faults:
         raise_or_warn(sorted(faults, key=lambda fault: fault.curve), on_failure, spline)
-    warn_of_bounds(
-        space,
-        [part.report for part in noise],
-        [_in_batch(np.isnan(own), given.batch, chosen) for own in lams],
-        [np.sum(own.weights > 0, axis=-1) for own in given.precisions],
-    )
+    counts = [np.sum(own.weights > 0, axis=-1) for own in whole.precisions]
+    warn_of_bounds(space, [part.report for part in noise], [spread(np.isnan(own)) for own in lams], counts)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
     data = [
-        Points(one._as_doubles(own), 0.0, given.batch, given.times.shape[-1])
+        Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
         for one, own in zip(factors_of(space), whole.points, strict=True)
     ]
     warn_of_signs(space, [data])
@@ -363,40 +316,19 @@ def make_smoothing_spline(
 
 @overload
 def make_lsq_spline(  # type: ignore[overload-overlap]
-    t: TimesLike | None,
-    points: PointsLike,
-    knots: TimesLike,
-    space: Product[PProduct],
-    *,
-    weights: Numbers | None = None,
-    loss: Loss = "linear",
-    **options: Unpack[LsqOptions],
+    t: TimesLike | None, points: PointsLike, knots: TimesLike, space: Product[PProduct], **options: Unpack[LsqOptions]
 ) -> SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]: ...
 
 
 @overload
 def make_lsq_spline(
-    t: TimesLike | None,
-    points: PointsLike,
-    knots: TimesLike,
-    space: SpecialEuclidean,
-    *,
-    weights: Numbers | None = None,
-    loss: Loss = "linear",
-    **options: Unpack[LsqOptions],
+    t: TimesLike | None, points: PointsLike, knots: TimesLike, space: SpecialEuclidean, **options: Unpack[LsqOptions]
 ) -> SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]: ...
 
 
 @overload
 def make_lsq_spline(
-    t: TimesLike | None,
-    points: PointsLike,
-    knots: TimesLike,
-    space: Space[P] | str,
-    *,
-    weights: Numbers | None = None,
-    loss: Loss = "linear",
-    **options: Unpack[LsqOptions],
+    t: TimesLike | None, points: PointsLike, knots: TimesLike, space: Space[P] | str, **options: Unpack[LsqOptions]
 ) -> SmoothingSpline[P]: ...
 
 
@@ -408,7 +340,7 @@ def make_lsq_spline(
     *,
     weights: Numbers | None = None,
     loss: Loss = "linear",
-    **options: Unpack[LsqOptions],
+    **options: Any,
 ) -> SmoothingSpline[Any, Any]:
     """Fit a C² curve with given knots to noisy points by least squares.
 
@@ -486,79 +418,6 @@ def _in_parts(space: Space, value: Any, name: str, batch: tuple[int, ...]) -> li
     return [one_per_curve(value, name, batch)] * len(spaces)
 
 
-def _names(batch: tuple[int, ...], chosen: Any) -> Callable[[int], tuple[int, str]]:
-    """Return a function from the number of a fitted curve to its number in the batch and its name in messages."""
-
-    def name(number: int) -> tuple[int, str]:
-        there = number if chosen is None else int(chosen[number])
-        return there, f" of curve {','.join(map(str, np.unravel_index(there, batch)))}" if batch else ""
-
-    return name
-
-
-def _flags(batch: tuple[int, ...], chosen: Any) -> Any:
-    flags = np.zeros(batch, bool)
-    flags.flat[chosen] = True
-    return flags
-
-
-def _in_batch(column: Any, batch: tuple[int, ...], chosen: Any) -> Any:
-    """Return values of the fitted curves as an array over the whole batch; the others are NaN, False or zero."""
-    if chosen is None:
-        return column
-    rows = np.asarray(column)
-    nothing = np.nan if rows.dtype.kind in "fc" else 0
-    out = np.full((int(np.prod(batch)), *rows.shape[1:]), nothing, rows.dtype)
-    out[chosen] = rows
-    return out.reshape(*batch, *rows.shape[1:])
-
-
-def _ends_in_batch(ends: list[End] | None, batch: tuple[int, ...], chosen: Any) -> list[End] | None:
-    return ends and [(kind, None if v is None else _in_batch(v, batch, chosen)) for kind, v in ends]
-
-
-def _whole(given: Given, noisy: SmoothingData, chosen: Any) -> SmoothingData:
-    """Return the data of all curves; points of masked curves are NaN."""
-    if chosen is None:
-        return noisy
-    points = [_in_batch(own, given.batch, chosen) for own in noisy.points]
-    return SmoothingData(given.time_axis, given.t, given.times, points, given.precisions, given.batch)
-
-
-def _with_enough(
-    whole: Knots, noisy: SmoothingData, lams: list[Any], run: Callable[[Knots], list[Any]]
-) -> tuple[list[Any], Knots]:
-    """Fit with as many knots as λ and the degrees of freedom require, and return the results and the knots."""
-    given = all(np.isfinite(lam).all() for lam in lams)
-    at = merge_close_knots(whole, noisy, _of_all(lams) if given else None)
-    if at.times.shape[-1] > _MANY:
-        at = thin_knots(at, _FIRST)
-    for tries in range(_TRIES):
-        found = run(at)
-        count = at.times.shape[-1]
-        known = [np.asarray(part.report.lam) for _, part, _ in found]
-        better = merge_close_knots(whole, noisy, _of_all(known))
-        most = 2 * max(n_knots_for_df(part.report.df) for _, part, _ in found)
-        if better.times.shape[-1] > max(_MANY, most):
-            better = thin_knots(better, max(_FIRST, most))
-        wanted = better.times.shape[-1]
-        # More knots would make a rough curve rougher, and a stiff curve needs fewer.
-        if tries == _TRIES - 1 or count >= wanted > 0.8 * count or (most <= 2 * count and wanted > count):
-            break
-        at = better
-    return found, at
-
-
-def _of_all(lams: list[Any]) -> float:
-    """Return one λ from which the knots of all curves are selected.
-
-    It is the smallest λ, so that the roughest curve has enough knots, but at least 1e-3 of the largest one.
-    """
-    flat = np.concatenate([np.ravel(lam) for lam in lams])
-    flat = flat[np.isfinite(flat)]
-    return float(max(flat.min(), 1e-3 * flat.max())) if flat.size else 0.0
-
-
 def transport_end_velocities(
     ends: list[End] | None, space: Space, data: Any, points: Any, noisy: SmoothingData
 ) -> list[End] | None:
@@ -568,7 +427,7 @@ def transport_end_velocities(
     for (kind, vector), index in zip(ends or [], (0, -1), strict=ends is not None):
         if vector is not None:
             y, x = (np.take(rows, index, axis=axis) for rows in (data, points))
-            good = np.isfinite(x).all(axis=tuple(range(axis, x.ndim)))
+            good = space._where_finite(x)
             moved = np.array(space._numbers(vector))
             moved[good] = space._apply("transport", p=y[good], q=x[good], v=moved[good])
             vector = np.ascontiguousarray(space._as_doubles(moved))
@@ -580,15 +439,12 @@ def _joined(space: Space, ends: list[list[End] | None]) -> list[End] | None:
     """Combine the end conditions of the parts of a factor."""
     if ends[0] is None or len(ends) == 1:
         return ends[0]
-    parts: tuple[Space, ...] = parts_of_factor(space)
     joined: list[End] = []
     for each in zip(*[own or [] for own in ends], strict=True):
-        vectors = [vector for _, vector in each]
-        if any(vector is None for vector in vectors):
-            joined.append((each[0][0], None))
-            continue
-        rows = [part._numbers(vector) for part, vector in zip(parts, vectors, strict=True)]
-        joined.append((each[0][0], np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0)))))
+        pairs = zip(parts_of_factor(space), each, strict=True)
+        rows = [part._numbers(vector) for part, (_, vector) in pairs if vector is not None]
+        vector = np.ascontiguousarray(space._as_doubles(join(space, rows, 0.0))) if rows else None
+        joined.append((each[0][0], vector))
     return joined
 
 
@@ -601,11 +457,8 @@ def _conditions(bc_type: Any, transported: list[list[End] | None], space: Space)
         each = [(ends or [])[e] for ends in transported]
         if each[0][1] is None:
             return "natural"
-        vectors = tuple(
-            factor._numbers(vector)
-            for factor, (_, vector) in zip(factors_of(space), each, strict=True)
-            if vector is not None
-        )
+        pairs = zip(factors_of(space), each, strict=True)
+        vectors = tuple(factor._numbers(vector) for factor, (_, vector) in pairs if vector is not None)
         return (1, vectors if isinstance(space, Product) else vectors[0])
 
     return freeze_bc_type((one(0), one(1)))

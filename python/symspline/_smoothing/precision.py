@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import as_array, cast
+from .._arrays import as_array, cast, refuse
 from .._core import ValidationError
 from .._curves.fit import Points
-from .._spaces import Array, Product, Space, factors_of
+from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._spaces.base import LARGE
 from .factors import coordinates_in_parts, parts_of_factor, split
 
-Doubles = NDArray[np.float64]
 # Relative size of the entries of a matrix or vector that count as rounding errors.
 _ROUNDING = 1e-8
 # Relative size of the eigenvalues of a matrix that the core treats as zero.
@@ -63,21 +62,15 @@ def read_precision(weights: Any, frames: Any, space: Space, data: list[Points]) 
         Tangent vectors to which matrices refer, m at every point, shape (..., N, m, *point_shape). For a product, a
         tuple. None means ``space.frame``.
     """
-    factors = factors_of(space)
-    own = [weights] * len(factors)
-    if isinstance(space, Product) and isinstance(weights, tuple):
-        own = _one_a_factor(weights, "weights", len(factors))
-    own_frames = [frames] * len(factors)
-    if isinstance(space, Product) and frames is not None:
-        own_frames = _one_a_factor(frames, "frames", len(factors))
+    factors, several = factors_of(space), isinstance(space, Product)
+    own = _per_part(weights, "weights", len(factors), several and isinstance(weights, tuple))
+    own_frames = _per_part(frames, "frames", len(factors), several and frames is not None)
     found: list[Precision] = []
     for factor, given, frame, part in zip(factors, own, own_frames, data, strict=True):
         spaces = parts_of_factor(factor)
         if len(spaces) > 1 and isinstance(given, tuple):
-            each = _one_a_factor(given, "weights", len(spaces))
-            frames_of = (
-                [frame] * len(spaces) if frame is None else _one_a_factor(frame, "frames", len(spaces))
-            )
+            each = _per_part(given, "weights", len(spaces), True)
+            frames_of = _per_part(frame, "frames", len(spaces), frame is not None)
             points = split(factor, factor._numbers(part.numbers))
             for space_of, one, at, rows in zip(spaces, each, frames_of, points, strict=True):
                 doubles = np.ascontiguousarray(space_of._as_doubles(rows))
@@ -97,7 +90,7 @@ def _in_factor(space: Space, given: Any, frames: Any, data: Points) -> Precision
                 "`frames` is given, but `weights` are numbers, which do not refer to frames. Omit `frames`, or pass "
                 "information matrices."
             )
-        return Precision(checked_weights(given, data.batch, data.nodes, shape), None)
+        return Precision(_checked_weights(given, data, shape), None)
     return _with_matrices(array, frames, space, data)
 
 
@@ -108,7 +101,7 @@ def _in_parts(precision: Precision, space: Space, data: Points) -> list[Precisio
         return [precision] * len(parts)
     lead = (*data.batch, data.nodes)
     points = space._numbers(data.numbers).reshape(lead + space.point_shape)
-    good = np.isfinite(points).all(axis=(-2, -1))
+    good = space._where_finite(points)
     into = np.zeros((*lead, space.dim, space.dim))
     into[good] = np.linalg.inv(coordinates_in_parts(space, space.project(points[good])))
     whole = np.swapaxes(into, -1, -2) @ precision.information @ into
@@ -119,44 +112,34 @@ def _in_parts(precision: Precision, space: Space, data: Points) -> list[Precisio
         block = whole[..., own[:, None], own]
         cross = whole[..., own[:, None], rest]
         others = np.linalg.pinv(whole[..., rest[:, None], rest], rcond=_SINGULAR, hermitian=True)
-        matrix = block - cross @ others @ np.swapaxes(cross, -1, -2)
-        matrix = np.ascontiguousarray(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
-        found.append(Precision(np.trace(matrix, axis1=-2, axis2=-1) / part.dim, matrix))
+        found.append(_of_matrices(block - cross @ others @ np.swapaxes(cross, -1, -2)))
         first += part.dim
     return found
 
 
-def _one_a_factor(values: Any, name: str, count: int) -> list[Any]:
-    if not isinstance(values, tuple) or len(values) != count:
+def _per_part(value: Any, name: str, count: int, is_split: bool) -> list[Any]:
+    """Return one value per part: the entries of a tuple, or the same value for all parts."""
+    if not is_split:
+        return [value] * count
+    if not isinstance(value, tuple) or len(value) != count:
         raise ValidationError(f"{name} of a product must be a tuple with {count} entries, one per factor")
-    return list(values)
+    return list(value)
 
 
-def checked_weights(
-    weights: ArrayLike | None, batch: tuple[int, ...], count: int, matrix: tuple[int, ...] = ()
-) -> Doubles:
-    """Return weights, one per point.
-
-    Parameters
-    ----------
-    matrix : tuple of int
-        Shape of the matrices that are accepted as well, for the message.
-    """
+def _checked_weights(weights: ArrayLike | None, data: Points, matrix: tuple[int, ...]) -> Doubles:
+    """Return weights, one per point. Matrices of the other shape are accepted as well, but elsewhere."""
+    batch, count = data.batch, data.nodes
     if weights is None:
         return np.ones(count)
     found = _numbers(weights)
-    if found.shape != (count,) and found.shape != (*batch, count):
+    if found.shape not in ((count,), (*batch, count)):
         own = f" or {(*batch, count)}" if batch else ""
-        or_matrices = f", or as matrices {(count, *matrix)}" if matrix else ""
         raise ValidationError(
-            f"weights has shape {found.shape}, but {count} points need {(count,)}{own}{or_matrices}"
+            f"weights has shape {found.shape}, but {count} points need {(count,)}{own}, or as matrices "
+            f"{(count, *matrix)}"
         )
-    bad = ~(np.isfinite(found) & (found >= 0))
-    if bad.any():
-        index = np.argwhere(bad)[0].tolist()
-        raise ValidationError(
-            f"weights{index} is {found[tuple(index)]}, but weights must be >= 0. A weight of 0 excludes a point."
-        )
+    negative = "but weights must be >= 0. A weight of 0 excludes a point."
+    refuse(~(np.isfinite(found) & (found >= 0)), "weights", lambda i: f"is {found[i]}, {negative}")
     return found
 
 
@@ -185,15 +168,18 @@ def _with_matrices(given: ArrayLike, frames: Any, space: Space, data: Points) ->
     _check(finite, "is not finite")
     _check(skew <= _ROUNDING * np.abs(matrices).max(axis=(-2, -1), initial=0.0), "is not symmetric")
     least, most = (np.linalg.eigvalsh(matrices)[..., i] for i in (0, -1))
-    _check(
-        least >= -_ROUNDING * np.maximum(most, 0.0),
-        "has a negative eigenvalue, but it must be the inverse of a covariance",
-    )
+    negative = "has a negative eigenvalue, but it must be the inverse of a covariance"
+    _check(least >= -_ROUNDING * np.maximum(most, 0.0), negative)
     if frames is not None:
         into = _inverse_frames(frames, space, data, np.any(matrices != 0, axis=(-2, -1)))
         matrices = np.swapaxes(into, -1, -2) @ matrices @ into
-    matrices = 0.5 * (matrices + np.swapaxes(matrices, -1, -2))
-    return Precision(np.trace(matrices, axis1=-2, axis2=-1) / m, np.ascontiguousarray(matrices))
+    return _of_matrices(matrices)
+
+
+def _of_matrices(matrices: Doubles) -> Precision:
+    """Return matrices without the rounding errors of their symmetry, and their mean eigenvalues as weights."""
+    matrices = np.ascontiguousarray(0.5 * (matrices + np.swapaxes(matrices, -1, -2)))
+    return Precision(np.trace(matrices, axis1=-2, axis2=-1) / matrices.shape[-1], matrices)
 
 
 def _check(good: Any, complaint: str, name: str = "weights", indices: Any = None) -> None:
@@ -217,10 +203,10 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
         )
     points = space._numbers(data.numbers).reshape(lead + space.point_shape)
     # Invalid points are reported later.
-    used = np.broadcast_to(used, lead) & np.isfinite(points).all(axis=tuple(range(len(lead), points.ndim)))
+    used = np.broadcast_to(used, lead) & space._where_finite(points)
     vectors = np.broadcast_to(given, (*lead, m, *space.point_shape))[used]
-    finite = np.isfinite(vectors).all(axis=tuple(range(1, vectors.ndim)))
-    _check(finite, "are not finite", "frames", np.argwhere(used))
+    indices = np.argwhere(used)
+    _check(space._where_finite(vectors).all(axis=1), "are not finite", "frames", indices)
     own = space.frame(space.project(points[used]))
 
     def flat(x: Array) -> Doubles:
@@ -231,11 +217,9 @@ def _inverse_frames(frames: Any, space: Space, data: Points, used: Any) -> Doubl
     coordinates = np.linalg.pinv(flat(own)) @ columns
     off = np.abs(flat(own) @ coordinates - columns).max(axis=(-2, -1))
     size = np.abs(columns).max(axis=(-2, -1))
-    for bad, complaint in (
-        (~(off <= 1e-6 * size), "are not tangent at their point. Project them with space.project_tangent."),
-        (np.linalg.cond(coordinates) > 1e8, "do not span the tangent space"),
-    ):
-        _check(~bad, complaint, "frames", np.argwhere(used))
+    tangent = "are not tangent at their point. Project them with space.project_tangent."
+    _check(off <= 1e-6 * size, tangent, "frames", indices)
+    _check(~(np.linalg.cond(coordinates) > 1e8), "do not span the tangent space", "frames", indices)
     found = np.broadcast_to(np.eye(m), (*lead, m, m)).copy()
     found[used] = np.linalg.inv(coordinates)
     return found

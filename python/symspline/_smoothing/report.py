@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .._report import BOOL, FLOAT, INT, mapped_columns, same_report
 from .._typing import Number
 
-METHODS = ("linearized", "newton")
+METHODS: tuple[Literal["linearized", "newton"], ...] = ("linearized", "newton")
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,7 @@ class SmoothingReport:
         good = np.asarray(self.converged)
         if good.ndim == 0:
             state = "converged" if good else "NOT converged"
-            bound = (
-                f" (at its bound: {'a geodesic' if self.is_stiff() else 'rough'})" if self.at_bound else ""
-            )
+            bound = f" (at its bound: {'a geodesic' if self.is_stiff() else 'rough'})" if self.at_bound else ""
             return (
                 f"{state}: {self.method}, {self.iterations} iterations, λ = {self.lam:.3g}{bound}, "
                 f"{self.df:.1f} degrees of freedom, noise {self.sigma:.2g}"

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import short_repr
+from .._arrays import refuse, short_repr
 from .._core import ValidationError
 from .._curves.ends import End
 from .._curves.reduced import reduced
-from .._curves.solve import Progress
 from .._faults import UNCONVERGED, Fault
-from .._spaces import Array, Space
+from .._spaces import Array, Doubles, Space
+from .._typing import Progress
 from .data import Knots, SmoothingData
 from .precision import Precision
-from .report import SmoothingReport
-
-Doubles = NDArray[np.float64]
+from .report import METHODS, SmoothingReport
 
 # Part of the message for a smoothing that ended without a curve.
 NO_CURVE = "no spline joins"
@@ -54,11 +50,7 @@ class Smoothed(NamedTuple):
     def map(self, function: Any) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
         return Smoothed(
-            self.report.map(function),
-            function(self.band),
-            function(self.band_lam),
-            function(self.sigma),
-            self.between,
+            self.report.map(function), function(self.band), function(self.band_lam), function(self.sigma), self.between
         )
 
 
@@ -76,15 +68,14 @@ class SolverOptions(NamedTuple):
 
 def smoothed(
     space: Space,
-    noisy: SmoothingData,
     points: Array,
     precision: Precision,
-    knots: Knots,
     lam: Doubles,
     sigma: Doubles,
     ends: list[End] | None,
+    noisy: SmoothingData,
+    knots: Knots,
     options: SolverOptions,
-    name: Callable[[int], tuple[int, str]],
     between: bool,
     progress: Progress | None,
 ) -> tuple[Array, Smoothed, list[Fault]]:
@@ -92,86 +83,53 @@ def smoothed(
     small, inside, span = reduced(space, points)
     batch = noisy.batch
     if span is not None and any(vector is not None for _, vector in ends or []):
-        raise ValidationError(
-            f"the dimension of {space!r} is too large for end velocities. Use natural ends."
-        )
+        raise ValidationError(f"the dimension of {space!r} is too large for end velocities. Use natural ends.")
     matrices = precision.information
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
+    t, y, at = (np.ascontiguousarray(x) for x in (noisy.times, small._as_doubles(inside), knots.times))
     found, band, columns = _core.smooth(
-        small._handle,
-        np.ascontiguousarray(noisy.times),
-        np.ascontiguousarray(small._as_doubles(inside)),
-        precision.weights,
-        matrices,
-        np.ascontiguousarray(knots.times),
-        lam,
-        sigma,
-        ends,
-        *options,
-        progress,
+        small._handle, t, y, precision.weights, matrices, at, lam, sigma, ends, *options, progress
     )
-    state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact = (
-        column.reshape(batch) if batch else column[0].item() for column in columns
+    state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, scale = (
+        column.reshape(batch) if batch else column[0].item()
+        for column in (*columns, np.where(np.isnan(sigma), columns[6], sigma))
     )
-    report = SmoothingReport(
-        "newton" if np.any(exact) else "linearized",
-        np.asarray(state) == 0 if batch else state == 0,
-        iterations,
-        step,
-        rate,
-        lams,
-        at_bound,
-        df,
-        noise,
-    )
-    known = sigma.reshape(batch) if batch else sigma[0].item()
-    scale = np.where(np.isnan(known), noise, known) if batch else noise if np.isnan(known) else known
+    report = SmoothingReport(METHODS[int(np.any(exact))], state == 0, iterations, step, rate, lams, at_bound, df, noise)
     numbers = small._numbers(found)
-    faults: list[Fault] = []
-    for number, kind in enumerate(np.ravel(state).tolist()):
-        if kind:
-            there, of = name(number)
-            faults.append(Fault(there, UNCONVERGED, _reason(_STATES[kind], of, number, report, options)))
-    return (
-        numbers if span is None else span.embed(numbers),
-        Smoothed(report, band, band_lam, scale, between),
-        faults,
-    )
+    faults = [
+        Fault(number, UNCONVERGED, _reason(_STATES[kind], number, report, options))
+        for number, kind in enumerate(np.ravel(state).tolist())
+        if kind
+    ]
+    on_space = numbers if span is None else span.embed(numbers)
+    return on_space, Smoothed(report, band, band_lam, scale, between), faults
 
 
-def _reason(state: str, of: str, number: int, report: SmoothingReport, options: SolverOptions) -> str:
+def _reason(state: str, number: int, report: SmoothingReport, options: SolverOptions) -> str:
     if state == "no curve":
         return (
-            f"The smoothing{of} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
+            f"The smoothing{{of}} led to points that {NO_CURVE}: the curve turns too far between two knots. Pass more "
             "knots in the gaps of the data, a larger lam, or cut the recording at its gaps (symspline.fit_segments). "
             "Check units and signs of the data."
         )
     if state == "undetermined":
         return (
-            f"The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
+            "The data{of} do not determine the curve. With lam=0 there must be data near every knot: pass fewer "
             "knots. Otherwise the weights differ by more than the precision of floating-point numbers: remove data "
             "with tiny weights."
         )
+    lam, step, iterations = (np.ravel(x)[number] for x in (report.lam, report.step, report.iterations))
     if state == "unsettled":
         return (
-            f"The choice of lam{of} did not converge; its last value is {np.ravel(report.lam)[number]:.3g}. Pass this "
-            "lam, or another criterion."
+            f"The choice of lam{{of}} did not converge; its last value is {lam:.3g}. Pass this lam, or another "
+            "criterion."
         )
-    step = np.ravel(report.step)[number]
     other = "" if options.method == "newton" else " or pass method='newton'"
     return (
-        f"No convergence of the smoothing{of}: the last step is {step:.1e} standard deviations after "
-        f"{np.ravel(report.iterations)[number]} iterations (tol {options.tol:.1e}). Raise max_iter{other}."
+        f"No convergence of the smoothing{{of}}: the last step is {step:.1e} standard deviations after "
+        f"{iterations} iterations (tol {options.tol:.1e}). Raise max_iter{other}."
     )
-
-
-def n_knots_for_df(df: Any) -> int:
-    """Return a number of knots that is enough for these degrees of freedom.
-
-    Three times as many knots would already lose nothing.
-    """
-    return 4 * int(np.ceil(np.max(df, initial=2.0, where=np.isfinite(df)))) + 8
 
 
 def one_per_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
@@ -182,8 +140,5 @@ def one_per_curve(value: Any, name: str, batch: tuple[int, ...]) -> Doubles:
     if array.dtype.kind not in "iuf" or array.shape not in ((), batch):
         own = f" or an array of shape {batch}" if batch else ""
         raise ValidationError(f"{name} must be a number{own}, not {short_repr(value)}")
-    bad = ~(np.isfinite(array) & (array >= 0))
-    if bad.any():
-        index = np.argwhere(bad)[0].tolist() if array.ndim else ""
-        raise ValidationError(f"{name}{index} must be finite and >= 0, not {array[bad].flat[0]}")
+    refuse(~(np.isfinite(array) & (array >= 0)), name, lambda i: f"must be finite and >= 0, not {array[i]}")
     return np.ascontiguousarray(np.broadcast_to(array, batch), np.float64).ravel()

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
 import numpy as np
 
 from .. import _core
 from .._archive import Entries, read_fitted, read_times
-from .._arrays import short_repr
+from .._arrays import checked_number
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.band import UncertaintyBand
-from .._curves.curve import CurveArrays
+from .._curves.curve import CurveArrays, UncertaintyBand
 from .._curves.ends import fixed_velocities, is_closed
 from .._options import order_of
-from .._report import Report
-from .._spaces import Array, Product, Space, factors_of
+from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._time import TimeAxis
-from .._typing import AnyArray, BCType, Extrapolate, FloatArray, Number, P, TimesLike
-from .data import Doubles, SmoothingData
+from .._typing import AnyArray, FloatArray, Number, P, TimesLike
+from .data import SmoothingData
 from .factors import grouped, is_several, smoothed_spaces
 from .report import SmoothingReport
 from .solve import Smoothed
@@ -30,9 +29,7 @@ if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
     # The report: one, or on products and for poses one for each part.
-    R = TypeVar(
-        "R", bound=SmoothingReport | tuple[SmoothingReport, ...], covariant=True, default=SmoothingReport
-    )
+    R = TypeVar("R", bound=SmoothingReport | tuple[SmoothingReport, ...], covariant=True, default=SmoothingReport)
 
     class noise_property:
         """A property with the type of a number for one report, and of a tuple of them for several."""
@@ -88,19 +85,13 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     def __init__(self) -> None:
         raise TypeError("SmoothingSpline has no public constructor. Use symspline.make_smoothing_spline.")
 
-    def _fill(  # type: ignore[override]
-        self,
-        time_axis: TimeAxis,
-        t: Array,
-        curve: CurveArrays,
-        bc_type: BCType,
-        extrapolate: Extrapolate,
-        reports: list[Report],
-        noisy: SmoothingData,
-        smoothed: list[Smoothed],
-    ) -> None:
-        super()._fill(time_axis, t, curve, bc_type, extrapolate, reports)
-        self._noisy, self._smoothed = noisy, smoothed
+    _noisy: SmoothingData
+    _smoothed: list[Smoothed]
+
+    def _fill(self, *parts: Any) -> None:
+        """Set the state of a `CubicSpline`, the noisy data and the results of the smoothing."""
+        *own, self._noisy, self._smoothed = parts
+        super()._fill(*own)
 
     def _each(self, values: list[Any]) -> Any:
         """Return one value, or a tuple with one value per space in which data were smoothed."""
@@ -161,7 +152,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         ):
             counts = np.any([own.weights > 0 for own in precisions], axis=0)
             used = np.broadcast_to(counts, (*noisy.batch, points.shape[len(noisy.batch)]))
-            used = used & np.isfinite(gamma).all(axis=tuple(range(len(noisy.batch) + 1, gamma.ndim)))
+            used = used & space._where_finite(gamma)
             vectors = np.full(points.shape, np.nan, points.dtype)
             vectors[used] = space._apply("log", p=gamma[used], q=points[used])
             found.append(vectors)
@@ -245,21 +236,12 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         if not part.between:
             # With λ = 0 the curve has no variance between the knots besides that of the spline.
             lam = 0.0
-        variance = _core.smoothing_variance(
-            np.ascontiguousarray(knots),
-            np.ascontiguousarray(part.band[index]),
-            lam,
-            np.ascontiguousarray(x),
-            nu,
-            fixed_velocities(self._bc_type),
-        )
-        spread: Doubles = sigma * np.sqrt(variance)
-        return spread
+        knots, band, x = (np.ascontiguousarray(own) for own in (knots, part.band[index], x))
+        variance = _core.smoothing_variance(knots, band, lam, x, nu, fixed_velocities(self._bc_type))
+        return np.asarray(sigma * np.sqrt(variance))
 
     @overload
-    def band(
-        self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95
-    ) -> FloatArray: ...
+    def band(self: SmoothingSpline[Any, SmoothingReport], x: TimesLike, level: float = 0.95) -> FloatArray: ...
 
     @overload
     def band(
@@ -306,17 +288,12 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         >>> (s.band(0.5) / s.std(0.5)).round(2)
         np.float64(1.96)
         """
-        number = isinstance(level, (int, float, np.integer, np.floating)) and not isinstance(level, bool)
-        if not number or not 0 < level < 1:
-            raise ValidationError(f"level must lie between 0 and 1, not {short_repr(level)}")
+        level = checked_number(level, "level must lie between 0 and 1", lambda x: 0 < x < 1)
         whole: SmoothingSpline[Any, Any] = self
         spreads = whole.std(x)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
-            [
-                _radius(part, level) * spread
-                for part, spread in zip(smoothed_spaces(self.space), each, strict=True)
-            ]
+            [_radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
         )
 
     # ---- plots ----
@@ -330,9 +307,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return f"{count} data{each}, {df} degrees of freedom, noise {sigma}"
 
     def _noise_beside(self, index: tuple[int, ...], x: Doubles) -> UncertaintyBand:
-        noisy = self._noisy
-        times = noisy.times[index] if noisy.times.ndim > 1 else noisy.times
-        used = noisy.used[index] if noisy.used.ndim > 1 else noisy.used
+        noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
         radii = [
             _radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
@@ -340,7 +315,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         ]
         several = is_several(self.space)
         speed = None if several else self._spread(self._smoothed[0], index, x, 1)
-        return UncertaintyBand(times[used], [points[index][used] for points in noisy.points], radii, speed)
+        return UncertaintyBand(noisy.times[noisy.used], [own[noisy.used] for own in noisy.points], radii, speed)
 
     @property
     def _unconverged(self) -> int:
@@ -349,16 +324,9 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(time_axis, t, curve, index)
-        noisy = self._noisy
-        own = noisy._replace(
-            time_axis=time_axis,
-            t=noisy.t[index] if noisy.t.ndim > 1 else noisy.t,
-            times=noisy.times[index] if noisy.times.ndim > 1 else noisy.times,
-            points=[points[index] for points in noisy.points],
-            precisions=[own.map(lambda column: column[index]) for own in noisy.precisions],
-            batch=curve.batch,
-        )
-        return self._like(part, own, [found.map(lambda column: column[index]) for found in self._smoothed])
+        pick = itemgetter(index)
+        noisy = self._noisy.map(pick, curve.batch)._replace(time_axis=time_axis)
+        return self._like(part, noisy, [found.map(pick) for found in self._smoothed])
 
     @property
     def _parts(self) -> tuple[SmoothingSpline[Any, Any], ...]:
@@ -374,14 +342,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
     @classmethod
     def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
-        parts = (
-            spline._time_axis,
-            spline._t,
-            spline._curve,
-            spline._bc_type,
-            spline._extrapolate,
-            spline._reports,
-        )
+        parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
         return cls._of(*parts, noisy, smoothed)
 
     def _state(self) -> dict[str, Any]:
@@ -395,9 +356,8 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return cls._of(*parts, *read_noise(state, time_axis, t, curve, is_closed(bc_type)))
 
     def __repr__(self) -> str:
-        batch = f"{' x '.join(map(str, self._batch))} curves, " if self._batch else ""
         data, knots = self._noisy.times.shape[-1], self._times.shape[-1]
-        return f"<SmoothingSpline on {self.space!r}: {batch}{data} data, {knots} knots>"
+        return f"<SmoothingSpline on {self.space!r}: {self._batch_text}{data} data, {knots} knots>"
 
 
 def _radius(space: Space, level: float) -> float:

@@ -86,8 +86,7 @@ def read_noise(
             raise ValidationError(f"entry 'data': the data have shape {rows.shape}")
         if isinstance(state, Stored):
             # Masked curves are NaN, and so are their data.
-            there = np.isfinite(part.points).all(axis=tuple(range(len(batch), part.points.ndim)))
-            part.space.check_point(rows[there])
+            part.space.check_point(rows[part.space._where_finite(part.points).all(axis=-1)])
     precisions, smoothed = [], []
     with entry("noise"):
         for i, (own, numbers) in enumerate(zip(smoothed_spaces(space), state["noise"], strict=True)):
@@ -102,9 +101,7 @@ def read_noise(
                 raise ValidationError("the weights must be numbers >= 0")
             precisions.append(Precision(weights, information))
             band, numbers = state["band" + suffix], dict(numbers)
-            lam, scale = (
-                read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale")
-            )
+            lam, scale = (read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale"))
             between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.

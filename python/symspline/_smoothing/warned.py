@@ -1,4 +1,4 @@
-"""Warnings about the chosen amount of smoothing."""
+"""Warnings about the chosen amount of smoothing, and about data that are far from their curve."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from .._curves.curve import CurveArrays
 from .._errors import warn
-from .._spaces import Space
-from .factors import is_several, smoothed_spaces
+from .._faults import of_index
+from .._spaces import Array, Space, factors_of
+from .data import SmoothingData, points_of
+from .factors import is_several, smoothed_spaces, split
 
 # Ratio of the degrees of freedom to the number of data from which a curve follows nearly all data.
 _ALL = 0.9
+# Limit of the ratio of squared distances. The ratio is below it where smoothing still recovers the curve, as with noise
+# of half a radian on S², SO(3) or RP². It is above it for random points, unless the curve follows them.
+_FAR = 0.5
+# Number of data of a curve that are enough for the check.
+_SAMPLE = 1000
 
 
 class SmoothingWarning(UserWarning):
@@ -38,44 +46,83 @@ def warn_of_bounds(space: Space, reports: list[Any], chosen: list[Any], counts: 
         if not len(found):
             continue
         index = tuple(map(int, found[0]))
-        of = f" of curve {','.join(map(str, index))}" if index else ""
+        of = of_index(index)
         of += f" in factor {number}, {spaces[number]!r}" if is_several(space) else ""
-        more = f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
-        warn(
-            _message(
-                of, more, float(np.asarray(report.df)[index]), bool(rough[index]), report.is_stiff(index)
-            ),
-            SmoothingWarning,
-            index,
-        )
+        of += f" (and of {len(found) - 1} more curves)" if len(found) > 1 else ""
+        message = _message(of, float(np.asarray(report.df)[index]), bool(rough[index]), report.is_stiff(index))
+        warn(message, SmoothingWarning, index)
         return
 
 
-def _message(of: str, more: str, df: float, rough: bool, stiff: bool) -> str:
+def _message(of: str, df: float, rough: bool, stiff: bool) -> str:
     if stiff:
-        return _stiff(of, more, df)
-    return _rough(of, more, df) if rough else _least(of, more, df)
+        lam = "the largest lam: the curve is a geodesic"
+        advice = (
+            "This is correct for data along a geodesic. Otherwise the true curve bends faster than the data are "
+            "sampled, or less than their noise: plot the data, and pass lam= to set the smoothness."
+        )
+    elif rough:
+        lam = "a lam so small that the curve follows nearly all data"
+        advice = (
+            "Its standard deviations are only valid if the data are that accurate. Data at nearly equal times and "
+            "correlated noise cause this. Pass a larger gamma, criterion='reml', sigma= with criterion='cp', or lam=."
+        )
+    else:
+        lam = "the smallest lam for which a curve was found"
+        advice = (
+            "With less smoothing, the curve would turn too far between two knots. Pass more knots in the gaps of the "
+            "data, or cut the recording at its gaps (symspline.fit_segments)."
+        )
+    return f"The smoothing{of} chose {lam} ({df:.3g} degrees of freedom). {advice}"
 
 
-def _least(of: str, more: str, df: float) -> str:
-    return (
-        f"The smoothing{of}{more} chose the smallest lam for which a curve was found ({df:.3g} degrees of freedom). "
-        "With less smoothing, the curve would turn too far between two knots. Pass more knots in the gaps of the data, "
-        "or cut the recording at its gaps (symspline.fit_segments)."
-    )
+# ---- data that are spread over all of a compact space, so that a smooth curve has little meaning ----
 
 
-def _rough(of: str, more: str, df: float) -> str:
-    return (
-        f"The smoothing{of}{more} chose a lam so small that the curve follows nearly all data ({df:.3g} degrees of "
-        "freedom). Its standard deviations are only valid if the data are that accurate. Data at nearly equal times "
-        "and correlated noise cause this. Pass a larger gamma, criterion='reml', sigma= with criterion='cp', or lam=."
-    )
+def warn_of_spread(space: Space, curve: CurveArrays, noisy: SmoothingData, dfs: list[Any]) -> None:
+    """Warn once if data of a curve are about as far from it as random points of the space would be.
+
+    The degrees of freedom with which the curve follows the data are taken into account.
+    """
+    every = -(-noisy.times.shape[-1] // _SAMPLE)
+    at = np.ascontiguousarray(noisy.times[..., ::every])
+    chosen = (slice(None),) * len(noisy.batch) + (slice(None, None, every),)
+    parts = zip(factors_of(space), curve.parts, strict=True)
+    at_curve = [x for factor, part in parts for x in split(factor, part.evaluate(at, "point", "raise", at.ndim > 1))]
+    for x, (factor, own), precision, df in zip(at_curve, points_of(noisy, space), noisy.precisions, dfs, strict=True):
+        # Other spaces have no uniform distribution of points, or no largest distance.
+        if not np.isfinite(factor.injectivity_radius) or np.isnan(factor.curvature):
+            continue
+        counts = np.broadcast_to(_counts(precision.weights), (*noisy.batch, noisy.times.shape[-1]))
+        found = _median_distance(factor, x, own[chosen], counts[..., ::every])
+        random = factor.random_point(np.random.default_rng(0), (2, _SAMPLE))
+        expected = float(np.median(factor._apply("distance", p=random[0], q=random[1])))
+        count = np.sum(counts, axis=-1)
+        # A curve through all data has no residuals to compare.
+        far = np.argwhere((found**2 * count > _FAR * expected**2 * (count - df)) & (count - df >= 1))
+        if len(far):
+            index = tuple(map(int, far[0]))
+            more = f" (and {len(far) - 1} more curves)" if len(far) > 1 else ""
+            warn(
+                f"half of the data{of_index(index)} are {found[index]:.2g} or more away from their smooth curve{more}. "
+                f"For random points of {factor!r} this distance is {expected:.2g}, so the curve has little meaning. "
+                "Check the units and signs of the data.",
+                UserWarning,
+                index,
+            )
+            return
 
 
-def _stiff(of: str, more: str, df: float) -> str:
-    return (
-        f"The smoothing{of}{more} chose the largest lam: the curve is a geodesic ({df:.3g} degrees of freedom). This "
-        "is correct for data along a geodesic. Otherwise the true curve bends faster than the data are sampled, or "
-        "less than their noise: plot the data, and pass lam= to set the smoothness."
-    )
+def _counts(weights: Array) -> Any:
+    """Return which data have a weight that is not negligible."""
+    return weights > 1e-6 * weights.max(axis=-1, keepdims=True)
+
+
+def _median_distance(space: Space, x: Array, y: Array, counts: Any) -> Array:
+    """Return the median distance between the curve and the data that count; 0 for curves that failed."""
+    lead = x.shape[: x.ndim - len(space.point_shape)]
+    used = np.broadcast_to(counts, lead) & space._where_finite(x)
+    distances = np.full(lead, np.nan)
+    distances[used] = space._apply("distance", p=x[used], q=y[used])
+    distances[~used.any(axis=-1)] = 0.0
+    return np.asarray(np.nanmedian(distances, axis=-1))

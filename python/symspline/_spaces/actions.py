@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, short_repr
+from .._arrays import as_array, cast, refuse, short_repr
 from .._core import ValidationError
 from .._typing import P
-from .base import Array, Space
-from .tolerance import point_tol
+from .base import Array, Space, point_tol
 
 
 def adjoint(x: Array) -> Array:
@@ -32,22 +31,19 @@ def matrices(space: Space[Any], g: ArrayLike, size: int, dtype: Any) -> tuple[Ar
             f"g has shape {array.shape}, but the group of {space!r} consists of {size} × {size} matrices. "
             f"Pass an array of shape (..., {size}, {size})."
         )
-    if not np.isfinite(array).all():
-        index = np.argwhere(~np.isfinite(array).all(axis=(-2, -1)))[0].tolist()
-        raise ValidationError(f"g{index or ''} has entries that are not finite. Pass finite numbers.")
+    infinite = ~np.isfinite(array).all(axis=(-2, -1))
+    refuse(infinite, "g", lambda _: "has entries that are not finite. Pass finite numbers.")
     return cast(array, np.dtype(dtype)), point_tol(array.dtype)
 
 
 def require(space: Space[Any], defects: NDArray[np.float64], allowed: Any, what: str, remedy: str) -> None:
     """Raise ValidationError for the first matrix whose deviation exceeds the limit."""
-    bad = np.argwhere(~(np.isfinite(defects) & (defects <= allowed)))
-    if len(bad):
-        index = bad[0].tolist()
-        limit = np.broadcast_to(allowed, defects.shape)[tuple(index)]
-        raise ValidationError(
-            f"g{index or ''} is not in the group of {space!r}: {what} is {defects[tuple(index)]:.3e} "
-            f"(allowed: {limit:.0e}). {remedy}"
-        )
+    limits = np.broadcast_to(allowed, defects.shape)
+    refuse(
+        ~(np.isfinite(defects) & (defects <= limits)),
+        "g",
+        lambda i: f"is not in the group of {space!r}: {what} is {defects[i]:.3e} (allowed: {limits[i]:.0e}). {remedy}",
+    )
 
 
 def largest(x: Array) -> NDArray[np.float64]:
@@ -69,6 +65,9 @@ class Preserving(Space[P]):
 
     # Indices of the entries −1 of the diagonal matrix J; the other entries are 1.
     _negative: tuple[int, ...] = ()
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
 
     def _signs(self) -> NDArray[np.float64]:
         signs = np.ones(self.point_shape[0])
@@ -100,6 +99,9 @@ class Preserving(Space[P]):
 class Congruent(Space[P]):
     """Positive definite matrices: g acts as x ↦ g x g*."""
 
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+
     def _reflected(self, p: Array, x: Array) -> Any:
         # p x⁻¹ p by Cholesky factors, which remains accurate for matrices with entries of very different size.
         y = np.linalg.solve(np.linalg.cholesky(x), p)
@@ -108,9 +110,7 @@ class Congruent(Space[P]):
     def _element(self, g: Any) -> Any:
         g, tol = matrices(self, g, self.point_shape[0], self._dtype)
         sizes = np.linalg.svd(g, compute_uv=False)
-        require(
-            self, sizes[..., 0] / sizes[..., -1], 1e14, "its condition number", "Pass an invertible matrix."
-        )
+        require(self, sizes[..., 0] / sizes[..., -1], 1e14, "its condition number", "Pass an invertible matrix.")
         self._require_subgroup(g, tol)
         return g
 
@@ -126,6 +126,9 @@ class Group(Space[P]):
 
     # Whether x⁻¹ = x*.
     _unitary = False
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
 
     def _inverse_times(self, x: Array, y: Array) -> Any:
         return adjoint(x) @ y if self._unitary else np.linalg.solve(x, y)

@@ -12,12 +12,12 @@ from typing import Any, ClassVar, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, short_repr, whole_number
+from .._arrays import as_array, cast, refuse, short_repr, whole_number
 from .._core import Handle, ValidationError
 from .._typing import AnyArray, FloatArray, P
-from .tolerance import point_tol
 
 Array = AnyArray
+Doubles = FloatArray
 
 # From this ambient dimension on, frames of the whole tangent space are not computed.
 LARGE = 256
@@ -38,6 +38,13 @@ COMPLEX_TWINS = {
     "spd": "HermitianPositiveDefinite",
     "sphere": "ComplexProjective",
 }
+# Tolerances for the distance of points from the manifold.
+POINT_TOL, POINT_TOL_FLOAT32 = 1e-8, 1e-4
+
+
+def point_tol(dtype: np.dtype[Any]) -> float:
+    """Return the largest distance from the manifold of points with this type of numbers."""
+    return POINT_TOL_FLOAT32 if dtype in (np.float32, np.float16, np.complex64) else POINT_TOL
 
 
 class Space(Generic[P]):
@@ -509,9 +516,7 @@ class Space(Generic[P]):
         except ValueError as error:
             if isinstance(error, ValidationError):
                 raise
-            raise ValidationError(
-                f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast"
-            ) from None
+            raise ValidationError(f"the leading axes of g and x {np.shape(inputs['x'])} do not broadcast") from None
         points: P = self._require_finite(name, result)
         return points
 
@@ -626,12 +631,9 @@ class Space(Generic[P]):
         array([0.6, 0. , 0.8])
         """
         result: Any = self._apply("project", x=x)
-        good = np.isfinite(result) & np.isfinite(cast(self._array(x, "x"), self.dtype))
-        if not good.all():
-            bad = np.argwhere(~good.all(axis=self._point_axes(result)))[0].tolist()
-            raise ValidationError(
-                f"x{bad or ''} cannot be projected: it is not finite, or no point of {self!r} is close to it"
-            )
+        good = self._where_finite(result) & self._where_finite(cast(self._array(x, "x"), self.dtype))
+        why = "cannot be projected: it is not finite, or no point of"
+        refuse(~good, "x", lambda _: f"{why} {self!r} is close to it")
         try:
             self.check_point(result)
         except ValidationError as error:
@@ -901,6 +903,15 @@ class Space(Generic[P]):
     def _point_axes(self, array: Array) -> tuple[int, ...]:
         return tuple(range(array.ndim - len(self.point_shape), array.ndim))
 
+    def _neighbours(self, points: Array) -> tuple[Array, Array]:
+        """Return the starts and the ends of the segments between points along the last of the leading axes."""
+        index = (slice(None),) * (points.ndim - len(self._point_shape) - 1)
+        return points[(*index, slice(-1))], points[(*index, slice(1, None))]
+
+    def _where_finite(self, points: Array) -> NDArray[np.bool_]:
+        """Return which points or vectors are finite."""
+        return np.asarray(np.isfinite(points).all(axis=self._point_axes(points)))
+
     def _doubles(self, value: ArrayLike, name: str) -> NDArray[np.float64]:
         """Return points as contiguous floating-point numbers of the core.
 
@@ -950,10 +961,7 @@ class Space(Generic[P]):
 
     @overload
     def _finite(
-        self,
-        operation: Literal["distance", "inner"],
-        t: NDArray[np.float64] | None = None,
-        **inputs: ArrayLike,
+        self, operation: Literal["distance", "inner"], t: NDArray[np.float64] | None = None, **inputs: ArrayLike
     ) -> FloatArray: ...
 
     @overload
@@ -1000,8 +1008,7 @@ def _taking_numbers(cls: type[Space[Any]], init: Callable[..., None]) -> Callabl
                 raise
             what = re.split("[:.]", " ".join((cls.__doc__ or "").split()))[0]
             raise TypeError(
-                f"{cls.__name__} takes {' and '.join(names)}, such as {example_of(cls)}: "
-                f"{what[:1].lower()}{what[1:]}"
+                f"{cls.__name__} takes {' and '.join(names)}, such as {example_of(cls)}: {what[:1].lower()}{what[1:]}"
             ) from None
 
     return checked

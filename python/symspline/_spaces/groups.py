@@ -42,9 +42,6 @@ class SpecialOrthogonal(Group[FloatArray]):
     _name = "so"
     _unitary = True
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
     def _array(self, value: Any, name: str) -> Array:
         return super()._array(_matrices(value) if self.point_shape == (3, 3) else value, name)
 
@@ -90,9 +87,6 @@ class Orthogonal(DisconnectedGroup[FloatArray], Group[FloatArray]):
     _name = "o"
     _unitary = True
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class SpecialUnitary(Group[ComplexArray]):
     r"""The special unitary group SU(n).
@@ -122,9 +116,6 @@ class SpecialUnitary(Group[ComplexArray]):
     _name = "su"
     _unitary = True
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class Unitary(Group[ComplexArray]):
     r"""The unitary group U(n).
@@ -153,9 +144,6 @@ class Unitary(Group[ComplexArray]):
 
     _name = "u"
     _unitary = True
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
 
 class SpecialEuclidean(Group[FloatArray]):
@@ -193,6 +181,3 @@ class SpecialEuclidean(Group[FloatArray]):
     """
 
     _name = "se"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)

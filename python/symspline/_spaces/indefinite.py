@@ -124,9 +124,6 @@ class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
     _name = "ds"
     _negative = (0,)
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
     def _form(self, u: Array, v: Array) -> Array:
         return np.asarray((u[..., 1:] * v[..., 1:]).sum(axis=-1) - u[..., 0] * v[..., 0])
 
@@ -165,9 +162,6 @@ class AntiDeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
 
     _name = "ads"
     _negative = (0, 1)
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
     def _form(self, u: Array, v: Array) -> Array:
         return np.asarray((u[..., 2:] * v[..., 2:]).sum(axis=-1) - (u[..., :2] * v[..., :2]).sum(axis=-1))

@@ -40,9 +40,6 @@ class GeneralLinear(DisconnectedGroup[FloatArray], Group[FloatArray]):
 
     _name = "gl"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class ComplexGeneralLinear(Group[ComplexArray]):
     """The complex general linear group GL(n, ℂ).
@@ -66,9 +63,6 @@ class ComplexGeneralLinear(Group[ComplexArray]):
     """
 
     _name = "cgl"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
 
 class Affine(DisconnectedGroup[FloatArray], Group[FloatArray]):
@@ -96,9 +90,6 @@ class Affine(DisconnectedGroup[FloatArray], Group[FloatArray]):
 
     _name = "aff"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class Similarity(Group[FloatArray]):
     """The group of similarities x ↦ sRx + b.
@@ -124,9 +115,6 @@ class Similarity(Group[FloatArray]):
 
     _name = "sim"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class SpecialLinear(Group[FloatArray]):
     """The special linear group SL(n, ℝ).
@@ -151,9 +139,6 @@ class SpecialLinear(Group[FloatArray]):
     """
 
     _name = "sl"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
 
 class Symplectic(Group[FloatArray]):
@@ -181,9 +166,6 @@ class Symplectic(Group[FloatArray]):
 
     _name = "sp"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class Lorentz(Group[FloatArray]):
     """The Lorentz group SO⁺(1, n).
@@ -209,6 +191,3 @@ class Lorentz(Group[FloatArray]):
     """
 
     _name = "lorentz"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)

@@ -57,9 +57,6 @@ class SymmetricPositiveDefinite(_PositiveDefinite[FloatArray]):
 
     _name = "spd"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):
     """Symmetric positive definite matrices of determinant 1, SL(n)/SO(n).
@@ -85,9 +82,6 @@ class SpecialPositiveDefinite(_PositiveDefinite[FloatArray]):
     """
 
     _name = "sspd"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
     def _require_subgroup(self, g: Array, tol: float) -> None:
         defects = np.abs(np.abs(np.linalg.det(g)) - 1)
@@ -120,9 +114,6 @@ class HermitianPositiveDefinite(_PositiveDefinite[ComplexArray]):
     """
 
     _name = "hpd"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
 
 class Siegel(_PositiveDefinite[FloatArray]):
@@ -158,9 +149,6 @@ class Siegel(_PositiveDefinite[FloatArray]):
     """
 
     _name = "siegel"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
     def _require_subgroup(self, g: Array, tol: float) -> None:
         form = np.kron([[0.0, 1.0], [-1.0, 0.0]], np.eye(self._parameters[0]))

@@ -1,17 +1,19 @@
-"""Products of spaces, whose points are tuples with one point per factor."""
+"""Products of spaces, whose points are tuples with one point per factor, and all spaces by name."""
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
 from functools import reduce
 from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._core import ValidationError
-from .._typing import AnyArray, AnyArrays, FloatArray, PProduct
-from .base import Space
-from .registry import spaces_named
+from .._arrays import short_repr
+from .._core import Handle, ValidationError
+from .._typing import AnyArray, AnyArrays, FloatArray, P, PProduct
+from .base import CLASSES, Space, example_of
 
 Tuple = tuple[Any, ...]
 # Points of factors, which are not products themselves.
@@ -19,6 +21,8 @@ _A = TypeVar("_A", bound=AnyArray)
 _B = TypeVar("_B", bound=AnyArray)
 _C = TypeVar("_C", bound=AnyArray)
 _D = TypeVar("_D", bound=AnyArray)
+# Longer parameters are rejected before they are converted to integers.
+_DIGITS = 40
 
 
 class Product(Space[PProduct]):
@@ -58,23 +62,13 @@ class Product(Space[PProduct]):
     """
 
     @overload
-    def __init__(self: Product[tuple[_A, _B]], first: Space[_A], second: Space[_B], /) -> None: ...
-
+    def __init__(self: Product[tuple[_A, _B]], a: Space[_A], b: Space[_B], /) -> None: ...
+    @overload
+    def __init__(self: Product[tuple[_A, _B, _C]], a: Space[_A], b: Space[_B], c: Space[_C], /) -> None: ...
     @overload
     def __init__(
-        self: Product[tuple[_A, _B, _C]], first: Space[_A], second: Space[_B], third: Space[_C], /
+        self: Product[tuple[_A, _B, _C, _D]], a: Space[_A], b: Space[_B], c: Space[_C], d: Space[_D], /
     ) -> None: ...
-
-    @overload
-    def __init__(
-        self: Product[tuple[_A, _B, _C, _D]],
-        first: Space[_A],
-        second: Space[_B],
-        third: Space[_C],
-        fourth: Space[_D],
-        /,
-    ) -> None: ...
-
     @overload
     def __init__(self: Product[AnyArrays], *factors: Space[Any] | str) -> None: ...
 
@@ -164,8 +158,7 @@ class Product(Space[PProduct]):
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> PProduct:
         each: Any = tuple(
-            factor.random_tangent(rng, q)
-            for factor, q in zip(self.factors, parts_of(p, self, "p"), strict=True)
+            factor.random_tangent(rng, q) for factor, q in zip(self.factors, parts_of(p, self, "p"), strict=True)
         )
         vectors: PProduct = each
         return vectors
@@ -219,3 +212,114 @@ def product_norm(lengths: Tuple) -> FloatArray:
     with np.errstate(all="ignore"):
         length: FloatArray = reduce(np.hypot, lengths)
         return length
+
+
+# ---- names ----
+
+
+@overload
+def space(name: str) -> Space: ...
+
+
+@overload
+def space(name: str | Space[P]) -> Space[P]: ...
+
+
+def space(name: str | Space[Any]) -> Space[Any]:
+    """Return the space with a name.
+
+    Parameters
+    ----------
+    name : str or Space
+        The name of a space, followed by a colon and its parameters, such as ``"sphere:2"`` or ``"h:3"``. The names of
+        the factors of a product are joined by ``" x "``, as in ``"so:3 x r:3"``. A space is returned unchanged.
+
+    Returns
+    -------
+    Space
+        The space. ``str(space)`` is its full name.
+
+    Raises
+    ------
+    ValidationError
+        If the name is unknown, or its parameters are invalid.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> ss.space("sphere:2")
+    Sphere(2)
+    >>> ss.space("so:3 x r:3")
+    Product(SpecialOrthogonal(3), Euclidean(3))
+    """
+    if isinstance(name, Space):
+        return name
+    factors = spaces_named(name)
+    return factors[0] if len(factors) == 1 else Product(*factors)
+
+
+# The same function, for modules in which `space` is the name of an argument.
+space_named = space
+
+
+def spaces_named(name: Any) -> list[Space]:
+    """Return the spaces that a name lists, none of them a product.
+
+    >>> spaces_named("sphere:3 x r:3")
+    [Sphere(3), Euclidean(3)]
+    """
+    if isinstance(name, type) and issubclass(name, Space):
+        raise ValidationError(f"{name.__name__} is a family of spaces; {_whole(name)}")
+    if not isinstance(name, str):
+        raise ValidationError(f"a space or its name is needed, not {short_repr(name)}")
+    return [_named(factor) for factor in name.split(" x ")]
+
+
+def _rows() -> list[list[str]]:
+    """Return all names, one row per class: those of the compiled core, and those of spaces implemented in Python."""
+    compiled = Handle.names()
+    known = {row[0] for row in compiled}
+    return compiled + [[name, *cls._aliases] for name, cls in CLASSES.items() if name not in known]
+
+
+def _guess(word: str, parameters: str, names: dict[str, str]) -> str:
+    """Suggest the name that was probably meant, also for "SO3" and "SpecialOrthogonal(3)", or return an empty text."""
+    glued = re.fullmatch(r"([a-z_ -]+)\(?(\d[\d, ]*)\)?", word)
+    if glued is not None and not parameters:
+        word, parameters = glued[1], glued[2]
+    meant = {cls.__name__.lower(): own for own, cls in CLASSES.items()} | {name: name for name in names}
+    close = get_close_matches(re.sub("[-_ ]", "", word), meant, 1, 0.7)
+    colon = ":" if parameters else ""
+    return f"did you mean {short_repr(meant[close[0]] + colon + parameters.strip())}? " if close else ""
+
+
+def _whole(cls: Any) -> str:
+    """Explain how to specify one space of a class."""
+    if not hasattr(cls, "_name"):
+        return "a space or its name is needed, such as Sphere(2) or 'sphere:2'"
+    return f"give its dimension, such as {example_of(cls)}"
+
+
+def _named(name: str) -> Space:
+    word, _, parameters = name.partition(":")
+    word = word.strip().lower()
+    # SO(1, n) is the usual notation for the Lorentz group.
+    if word == "so" and parameters.count(",") == 1 and parameters.partition(",")[0].strip() == "1":
+        word, parameters = "lorentz", parameters.partition(",")[2]
+    rows = _rows()
+    names = {alias: row[0] for row in rows for alias in row}
+    if word not in names:
+        known = ", ".join(" or ".join(row) for row in rows)
+        guess = _guess(word, parameters, names)
+        raise ValidationError(f"unknown space {short_repr(name)}; {guess}known names are {known}, as in 'sphere:2'")
+    if not parameters.strip():
+        raise ValidationError(f"{short_repr(name)} is a family of spaces; {_whole(CLASSES[names[word]])}")
+    values = [part.strip() for part in parameters.split(",")]
+    if not all(value.isdecimal() and value.isascii() and len(value) <= _DIGITS for value in values):
+        raise ValidationError(f"{short_repr(name)}: the parameters after the colon must be integers, as in 'sphere:2'")
+    cls: Any = CLASSES[names[word]]
+    try:
+        made: Space = cls(*map(int, values))
+    except TypeError:
+        raise ValidationError(f"{short_repr(name)}: {cls.__name__} does not take {len(values)} parameters") from None
+    return made

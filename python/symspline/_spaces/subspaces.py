@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._core import ValidationError
 from .._typing import ComplexArray, FloatArray, P
 from .actions import Preserving, largest, require
-from .base import LARGE, Array
-from .tolerance import point_tol
+from .base import LARGE, Array, Space, point_tol
 
 # Tolerance for recognising density matrices. It only selects the text of an error message, since rows of density
 # matrices are not unit vectors.
@@ -88,9 +87,6 @@ class RealProjective(_Projective[FloatArray]):
     _linear = True
     _definite = "SymmetricPositiveDefinite"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class ComplexProjective(_Projective[ComplexArray]):
     r"""Complex projective space ℂPⁿ, the pure quantum states of n + 1 levels.
@@ -123,9 +119,6 @@ class ComplexProjective(_Projective[ComplexArray]):
     _linear = True
     _definite = "HermitianPositiveDefinite"
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class ComplexHyperbolic(Preserving[ComplexArray]):
     r"""Complex hyperbolic space ℂHⁿ.
@@ -156,14 +149,14 @@ class ComplexHyperbolic(Preserving[ComplexArray]):
     _name = "ch"
     _negative = (0,)
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class _Subspaces(Preserving[P]):
     """Grassmannians. In large ambient spaces, operations on two points are computed in the span of both."""
 
     _linear = True
+
+    def __init__(self, k: int, n: int) -> None:
+        Space.__init__(self, k, n)
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: ArrayLike) -> Any:
         k, n = self._parameters
@@ -216,9 +209,6 @@ class Grassmannian(_Subspaces[FloatArray]):
 
     _name = "gr"
 
-    def __init__(self, k: int, n: int) -> None:
-        super().__init__(k, n)
-
 
 class ComplexGrassmannian(_Subspaces[ComplexArray]):
     """The complex Grassmannian of k-dimensional subspaces of ℂⁿ.
@@ -244,9 +234,6 @@ class ComplexGrassmannian(_Subspaces[ComplexArray]):
     """
 
     _name = "cgr"
-
-    def __init__(self, k: int, n: int) -> None:
-        super().__init__(k, n)
 
 
 class QuaternionicProjective(Preserving[ComplexArray]):
@@ -278,9 +265,6 @@ class QuaternionicProjective(Preserving[ComplexArray]):
     """
 
     _name = "hp"
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
     def _element(self, g: Any) -> Any:
         g = super()._element(g)

@@ -75,9 +75,6 @@ class Sphere(Preserving[FloatArray]):
     _name = "sphere"
     _linear = True
 
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
-
 
 class Hyperbolic(Preserving[FloatArray]):
     r"""Hyperbolic space Hⁿ as a hyperboloid.
@@ -110,9 +107,6 @@ class Hyperbolic(Preserving[FloatArray]):
     _name = "hyperbolic"
     _linear = True
     _negative = (0,)
-
-    def __init__(self, n: int) -> None:
-        super().__init__(n)
 
     def _element(self, g: Any) -> Any:
         g = super()._element(g)

@@ -70,9 +70,7 @@ def run(options: argparse.Namespace) -> int:
             failed.append(name)
     if failed:
         many = f"{len(failed)} of {len(curves.splines)} curves: {listed(failed)}"
-        raise Failure(
-            f"{options.curves}: more than rounding allows in {many if curves.named else 'the curve'}"
-        )
+        raise Failure(f"{options.curves}: more than rounding allows in {many if curves.named else 'the curve'}")
     print("All is within what rounding allows.")
     return 0
 

@@ -17,6 +17,7 @@ from ._tables import IM, RE, Array, Rows, Table
 NUMBERED = "none"
 """The value of --time that numbers the points of every curve, unless a column has this name."""
 ORDERS = ("wxyz", "xyzw")
+_HALVES = {RE: IM, IM: RE}
 
 _IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
@@ -50,9 +51,7 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None]) -
     usual = [name for name in left if _TIME.fullmatch(_words(name))]
     # Numbers are accepted as times only under the two plainest names, as the unit of others is in doubt.
     certain = [name for name in usual if name not in table.numeric or name.lower() in ("t", "time")]
-    doubtful = [
-        name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))
-    ]
+    doubtful = [name for name in left if name not in certain and (name in usual or _TIME_PART.fullmatch(name.lower()))]
     if len(certain) == 1:
         # A column of dates with their time of day needs no other columns.
         is_whole = certain[0] not in table.numeric and "time" in certain[0].lower()
@@ -121,13 +120,6 @@ class Entry:
     name: str
     columns: tuple[str, ...]
 
-    @property
-    def other_half(self) -> str | None:
-        """The missing column, if the only column is the real or imaginary part by its name."""
-        halves = {RE: IM, IM: RE}
-        start, end = self.columns[0][:-3], self.columns[0][-3:]
-        return start + halves[end] if len(self.columns) == 1 and end in halves else None
-
 
 def _paired(columns: Sequence[str]) -> list[Entry]:
     """Columns as numbers: A_re and A_im are one number, at the position of the first of them."""
@@ -173,9 +165,7 @@ def point_entries(
         refuse("column ", (twice is not None, f"{twice!r} of {table.path} cannot have two meanings"))
     if len(names) == count:
         return entries, _quaternion_columns(names, space, order)
-    wrong = (
-        f" {order}: {listed(names) or 'no columns'} are not the {count} numbers of a quaternion in {space}"
-    )
+    wrong = f" {order}: {listed(names) or 'no columns'} are not the {count} numbers of a quaternion in {space}"
     none = f" is for so:3, se:3 and products with one of them, not for {space}"
     refuse("--quaternion", (order and count is None, none), (order, wrong))
     if not lonlat:
@@ -187,9 +177,7 @@ def point_entries(
 def _lonlat(table: Table) -> list[str]:
     """The first column of each pair of names, whatever their case."""
     lower = {name.lower(): name for name in reversed(table.names)}
-    columns = [
-        lower.get(short) or lower.get(long) for short, long in (("lon", "longitude"), ("lat", "latitude"))
-    ]
+    columns = [lower.get(short) or lower.get(long) for short, long in (("lon", "longitude"), ("lat", "latitude"))]
     if None in columns:
         raise Problem(
             f"{table.path}: --lonlat needs columns lon and lat, or longitude and latitude, or two --columns; "
@@ -211,8 +199,10 @@ def _check_halves(table: Table, entries: list[Entry], space: Space, given: bool)
                 f"of {space} has {described(space)}; name its columns one by one with --columns, or give a space of "
                 "complex points, such as cp:1 for sphere:1"
             )
-        half = entry.other_half
-        if half is not None and two:
+        # A column that is the real or imaginary part by its name.
+        start, end = entry.columns[0][:-3], entry.columns[0][-3:]
+        if two and len(entry.columns) == 1 and end in _HALVES:
+            half = start + _HALVES[end]
             where = "in --columns" if given else "with numbers" if half in table.names else "in the table"
             raise Problem(
                 f"{table.path}: column {entry.columns[0]!r} is half of a complex number, "

@@ -49,8 +49,7 @@ from .._report import long_gaps
 from .._representatives import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
 from .._smoothing.many import smooth_many
-from .._spaces import Space
-from .._spaces import space as space_named
+from .._spaces import Space, space_named
 from . import _smoothing
 from ._columns import ORDERS, check_days, column_of_names, completed, point_entries, split_names, time_column
 from ._curves import ENDING, Curves, write_curves

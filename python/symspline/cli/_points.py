@@ -15,13 +15,10 @@ from .._cubic import CubicSpline
 from .._lonlat import compass, from_lonlat, to_lonlat
 from .._pose_files import join, rotations_in_rows
 from .._smoothing import SmoothingSpline
-from .._spaces import POINT_TOL_FLOAT32, Product, Space, factors_of, parts_of
-from .._spaces import space as space_named
+from .._spaces import POINT_TOL_FLOAT32, Doubles, Product, Space, factors_of, parts_of, space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
 from ._errors import Problem, for_command_line
 from ._tables import IM, RE, Place
-
-Doubles = NDArray[np.float64]
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
 LONLAT = ["lon", "lat"]
@@ -64,14 +61,9 @@ def require_globe(space: Space) -> None:
 # ---- names ----
 
 
-def is_complex(space: Space) -> bool:
-    """Whether points of a space, not a product, are complex."""
-    return bool(space.dtype.kind == "c")
-
-
 def complex_numbers(space: Space) -> list[bool]:
     """For every number of a point whether it is complex."""
-    return [is_complex(factor) for factor in factors_of(space) for _ in range(math.prod(factor.point_shape))]
+    return [factor._complex for factor in factors_of(space) for _ in range(math.prod(factor.point_shape))]
 
 
 def labels(space: Space) -> list[str]:
@@ -103,8 +95,8 @@ def described(space: Space) -> str:
 
 def _described(space: Space) -> str:
     count = math.prod(space.point_shape)
-    text = f"{count} {'complex number' if is_complex(space) else 'number'}{'s' if count > 1 else ''}"
-    text += f", A{RE} and A{IM} each" if is_complex(space) else ""
+    text = f"{count} {'complex number' if space._complex else 'number'}{'s' if count > 1 else ''}"
+    text += f", A{RE} and A{IM} each" if space._complex else ""
     return f"{text}, a {matrix(space)}" if _is_matrix(space) else text
 
 
@@ -123,7 +115,7 @@ def _is_matrix(space: Space) -> bool:
 def count_with_quaternion(space: Space) -> int | None:
     """Count the numbers of a point whose rotation is a quaternion; None without exactly one rotation in space."""
     factors = factors_of(space)
-    if sum(factor in (ROTATIONS, POSES) for factor in factors) != 1 or any(map(is_complex, factors)):
+    if sum(factor in (ROTATIONS, POSES) for factor in factors) != 1 or any(factor._complex for factor in factors):
         return None
     return sum(width(factor, True) for factor in factors)
 
@@ -132,7 +124,7 @@ def width(space: Space, quaternion: bool) -> int:
     """Count the columns of a point of a space, not a product."""
     if quaternion and space in (ROTATIONS, POSES):
         return 4 if space == ROTATIONS else 7
-    return math.prod(space.point_shape) * (2 if is_complex(space) else 1)
+    return math.prod(space.point_shape) * (2 if space._complex else 1)
 
 
 # ---- numbers ----

@@ -37,9 +37,7 @@ class Recordings:
         and those that share their time with another row of noisy data.
     """
 
-    def __init__(
-        self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint
-    ) -> None:
+    def __init__(self, path: Path, rows: Rows, points: Any, space: Space, options: Namespace, hint: Hint) -> None:
         """Read the curves. ``hint`` returns a column that may hold the names of several curves."""
         self._path, self._rows, self._points, self._space, self._hint = path, rows, points, space, hint
         self._options, self._smooth = options, options.smooth is not None
@@ -96,7 +94,8 @@ class Recordings:
         self._check(first, of)
         self.merged += len(own) - len(first)
         self.repeated += int(again.sum()) if self._smooth and options.dedup is None else 0
-        points = _picked(self._points, own)
+        given = self._points
+        points = tuple(part[own] for part in given) if isinstance(given, tuple) else given[own]
         if options.dedup is None and options.max_gap is None:
             return [((times if times.size else None, points), own)]
         gap = np.inf if options.max_gap is None else longest_gap(options.max_gap, times.dtype.kind == "M")
@@ -141,7 +140,3 @@ def group(rows: Rows) -> Groups:
     of_row = np.array([codes.setdefault(label, len(codes)) for label in rows.labels], dtype=np.int64)
     order = np.argsort(of_row, kind="stable")
     return dict(zip(codes, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True))
-
-
-def _picked(points: Any, own: NDArray[np.int64]) -> Any:
-    return tuple(part[own] for part in points) if isinstance(points, tuple) else points[own]

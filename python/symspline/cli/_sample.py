@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._smoothing import SmoothingSpline
-from .._spaces import space as space_named
+from .._spaces import space_named
 from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves
@@ -162,11 +162,7 @@ def _check_times(path: Path, rows: Rows, own: NDArray[np.int64], curves: Curves,
     kinds = f": the times of {called} are {expected}, but these are {found}"
     zones = f": its times have {these}, but those of {called} have {those}: which time is meant is in doubt"
     mixed = dates and {rows.utc, curves.columns.utc} == {True, False}
-    refuse(
-        path,
-        ((times.dtype.kind == "M") != dates, kinds),
-        (mixed, f"{zones}; write both with a zone, or neither"),
-    )
+    refuse(path, ((times.dtype.kind == "M") != dates, kinds), (mixed, f"{zones}; write both with a zone, or neither"))
     if spline._extrapolation_mode != "raise":
         return
     inside = onto_ends(times, knots, (), False)[0] if times.dtype.kind == knots.dtype.kind == "f" else times

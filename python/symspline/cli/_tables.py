@@ -83,8 +83,8 @@ class Table:
         The columns of each array of an NPZ file.
     place : callable
         Describes the position of a row.
-    is_utc : callable
-        Whether a column of dates has the time zone UTC; None if it is unknown.
+    is_utc : dict
+        Whether a column of dates has the time zone UTC; empty if it is unknown.
     load : callable
         Reads columns of numbers and columns of text, if the file was not read as a whole.
     """
@@ -96,7 +96,7 @@ class Table:
     column: Callable[[str], Array | list[str]]
     groups: dict[str, list[str]] = field(default_factory=dict)
     place: Place = _row
-    is_utc: Callable[[str], bool | None] = lambda name: None
+    is_utc: dict[str, bool] = field(default_factory=dict)
     load: Callable[[Sequence[str], Sequence[str], Progress], None] = lambda *_: None
 
     def require(self, name: str) -> str:
@@ -170,7 +170,7 @@ class Table:
             return self._numbers(name), False
         if np.isnat(column).any():
             raise self._problem(name, int(np.isnat(column).argmax()), "holds no time")
-        return column, self.is_utc(name)
+        return column, self.is_utc.get(name)
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
         return _problem(self.path, self.place(row), name, found)
@@ -283,9 +283,7 @@ def _open_npz(path: Path) -> Table:
     first = {name: "".join(columns[name][:1]) for name, kind in kinds.items() if kind == "U"}
     numeric = [name for name, kind in kinds.items() if kind in "biuf"]
     dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
-    return Table(
-        path, list(kinds), numeric, dates, columns.__getitem__, {key: [*own] for key, own in groups.items()}
-    )
+    return Table(path, list(kinds), numeric, dates, columns.__getitem__, {key: [*own] for key, own in groups.items()})
 
 
 def _arrays(path: Path) -> dict[str, Array]:
@@ -327,8 +325,7 @@ def _open_parquet(path: Path) -> Table:
         cells = table.column(name)
         if cells.null_count:
             raise _problem(path, _row(int(cells.is_null().to_numpy().argmax())), name, "is empty")
-        values: Array = (cells.cast(pa.float64()) if pa.types.is_decimal(types[name]) else cells).to_numpy()
-        return values
+        return np.asarray((cells.cast(pa.float64()) if pa.types.is_decimal(types[name]) else cells).to_numpy())
 
     def first_text(name: str) -> str:
         is_text = str(types[name]) in ("string", "large_string", "string_view")
@@ -338,7 +335,7 @@ def _open_parquet(path: Path) -> Table:
     is_kind = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
     numeric = [name for name, own in types.items() if any(test(own) for test in is_kind)]
     dates = [name for name in types if pa.types.is_temporal(types[name]) or is_date_like(first_text(name))]
-    is_utc = lambda name: getattr(types[name], "tz", None) is not None  # noqa: E731
+    is_utc = {name: getattr(own, "tz", None) is not None for name, own in types.items()}
     return Table(path, table.column_names, numeric, dates, column, is_utc=is_utc)
 
 
@@ -403,9 +400,7 @@ def _pyarrow() -> tuple[Any, Any]:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise Problem(
-            "Parquet files need pyarrow; install it with: pip install 'symspline[parquet]'"
-        ) from None
+        raise Problem("Parquet files need pyarrow; install it with: pip install 'symspline[parquet]'") from None
     return pyarrow, pyarrow.parquet
 
 

@@ -66,9 +66,7 @@ def _is_usual(text: str) -> bool:
 
 def number(text: str) -> float:
     """Read a number in an option."""
-    if not is_number(text):
-        raise ValueError
-    return float(text)
+    return float(numbers([text])[0])
 
 
 def parse_times(cells: Sequence[str], fail: Fail) -> tuple[Times, bool]:
@@ -158,8 +156,7 @@ def every(step: str, knots: Times) -> Times:
             raise Problem(f"--every {step}: that is too {'long' if length else 'short'}")
         # The last sample is at the end if the step divides the curve up to rounding.
         samples = _samples((float(knots[-1]) - float(knots[0])) / length * (1 + 1e-12), step)
-        times: Times = np.minimum(knots[0] + length * np.arange(samples), knots[-1])
-        return times
+        return np.asarray(np.minimum(knots[0] + length * np.arange(samples), knots[-1]))
     if kind == "M":
         count *= _NANOSECONDS[unit or "s"]
     if count != int(count):
@@ -196,8 +193,7 @@ def _span(knots: Times) -> int:
 
 def _after(knots: Times, steps: NDArray[np.uint64]) -> Times:
     """Return the first knot plus whole numbers. The sum is exact, as it is computed modulo 2**64."""
-    times: Times = (knots[:1].astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(knots.dtype)
-    return times
+    return np.asarray((knots[:1].astype(np.int64).astype(np.uint64) + steps).astype(np.int64).astype(knots.dtype))
 
 
 def _in_unit(knots: Times, unit: Any) -> Times:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import Array, adjoint, largest, numbers, real_numbers, refuse, square_matrices
+from ._reading import Array, adjoint, largest, numbers, real_numbers, square_matrices
 
 
 def siegel_to_positive_definite(z: ArrayLike) -> Array:
@@ -49,25 +50,13 @@ def siegel_to_positive_definite(z: ArrayLike) -> Array:
     given = 0.5 * (given + np.swapaxes(given, -1, -2))
     x, y = np.real(given), np.imag(given)
     least = np.linalg.eigvalsh(y)[..., 0]
-    refuse(
-        ~(least > 0),
-        "z",
-        lambda i: (
-            f"has an imaginary part that is not positive definite: its smallest eigenvalue is {least[i]:.6e}"
-        ),
-    )
+    what = "has an imaginary part that is not positive definite: its smallest eigenvalue is"
+    refuse(~(least > 0), "z", lambda i: f"{what} {least[i]:.6e}")
     back = np.linalg.inv(y)
     back = 0.5 * (back + np.swapaxes(back, -1, -2))
     beside = x @ back
-    whole = np.concatenate(
-        [
-            np.concatenate([y + beside @ x, beside], axis=-1),
-            np.concatenate([np.swapaxes(beside, -1, -2), back], axis=-1),
-        ],
-        axis=-2,
-    )
-    symmetric: Array = 0.5 * (whole + np.swapaxes(whole, -1, -2))
-    return symmetric
+    whole = np.block([[y + beside @ x, beside], [np.swapaxes(beside, -1, -2), back]])
+    return np.asarray(0.5 * (whole + np.swapaxes(whole, -1, -2)))
 
 
 def positive_definite_to_siegel(p: ArrayLike) -> Array:
@@ -98,16 +87,12 @@ def positive_definite_to_siegel(p: ArrayLike) -> Array:
     given, tol = square_matrices(p, "p")
     n, odd = divmod(given.shape[-1], 2)
     if odd or np.iscomplexobj(given):
-        raise ValidationError(
-            f"p must be real, of shape (..., 2n, 2n), not {given.dtype} of shape {given.shape}"
-        )
+        raise ValidationError(f"p must be real, of shape (..., 2n, 2n), not {given.dtype} of shape {given.shape}")
     off = largest(given - np.swapaxes(given, -1, -2))
     refuse(~(off <= tol * largest(given)), "p", lambda i: f"is not symmetric: entries differ by {off[i]:.3e}")
     values, vectors = np.linalg.eigh(given)
     refuse(
-        ~(values[..., 0] > 0),
-        "p",
-        lambda i: f"is not positive definite: its smallest eigenvalue is {values[i][0]:.6e}",
+        ~(values[..., 0] > 0), "p", lambda i: f"is not positive definite: its smallest eigenvalue is {values[i][0]:.6e}"
     )
     # Relative to p^½, a symplectic p equals Jp⁻¹Jᵀ up to rounding errors times its condition number.
     j = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
@@ -199,9 +184,5 @@ def subspace_to_quaternions(basis: ArrayLike) -> Array:
     # The second column of the vector: j times the first.
     partner = np.stack([-odd.conj(), even.conj()], -1).reshape(*first.shape, 1)
     off = largest(partner - given @ (adjoint(given) @ partner))
-    refuse(
-        ~(off <= tol),
-        "basis",
-        lambda i: f"does not span a quaternionic line: j times it differs by {off[i]:.3e}",
-    )
+    refuse(~(off <= tol), "basis", lambda i: f"does not span a quaternionic line: j times it differs by {off[i]:.3e}")
     return np.stack([even.real, even.imag, -odd.real, odd.imag], -1)

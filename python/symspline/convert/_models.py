@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import Array, length, real_numbers, refuse, unmoved_by_underflow
+from ._reading import Array, length, real_numbers, unmoved_by_underflow
 
 
 @unmoved_by_underflow
@@ -132,11 +133,8 @@ def half_space_to_hyperboloid(z: ArrayLike) -> Array:
         rest = ground / height
         last = (np.sum(rest * ground, axis=-1, keepdims=True) + (height - 1) * (1 + 1 / height)) / 2
         x = _with_time(np.concatenate([rest, last], axis=-1))
-    refuse(
-        ~np.isfinite(length(x)),
-        "z",
-        lambda i: f"is too distant for the hyperboloid, where it overflows: its height is {height[i][0]}",
-    )
+    bad = ~np.isfinite(length(x))
+    refuse(bad, "z", lambda i: f"is too distant for the hyperboloid, where it overflows: its height is {height[i][0]}")
     return x
 
 
@@ -167,8 +165,7 @@ def ball_to_half_space(y: ArrayLike) -> Array:
     y, room = _ball(y)
     ground, last = y[..., :-1], y[..., -1:]
     square = np.sum(ground**2, axis=-1, keepdims=True) + (1 - last) ** 2
-    z: Array = np.concatenate([2 * ground, room], axis=-1) / square
-    return z
+    return np.asarray(np.concatenate([2 * ground, room], axis=-1) / square)
 
 
 @unmoved_by_underflow
@@ -208,18 +205,12 @@ def _hyperboloid(value: ArrayLike) -> tuple[Array, Array]:
     """Return the time-like coordinate, recomputed from the others, and the others."""
     x, tol = real_numbers(value, "x", (None,))
     if x.shape[-1] < 2:
-        raise ValidationError(
-            f"x has shape {x.shape}, but points of the hyperboloid need at least two numbers"
-        )
+        raise ValidationError(f"x has shape {x.shape}, but points of the hyperboloid need at least two numbers")
     time = np.hypot(1.0, length(x[..., 1:]))
-    refuse(
-        ~(np.abs(x[..., 0] - time) <= tol * time),
-        "x",
-        lambda i: (
-            f"is not on the hyperboloid: its time-like coordinate, the first, is {x[i][0]}, but "
-            f"sqrt(1 + |rest|²) is {time[i]}; Hyperbolic(n).project(x) projects points onto it"
-        ),
-    )
+    bad = ~(np.abs(x[..., 0] - time) <= tol * time)
+    advice = "Hyperbolic(n).project(x) projects points onto it"
+    what = "is not on the hyperboloid: its time-like coordinate, the first, is"
+    refuse(bad, "x", lambda i: f"{what} {x[i][0]}, but sqrt(1 + |rest|²) is {time[i]}; {advice}")
     return time, x[..., 1:]
 
 
@@ -227,14 +218,8 @@ def _ball(value: ArrayLike) -> tuple[Array, Array]:
     """Return vectors y of the ball, and 1 − |y|², shape (..., 1)."""
     y, _ = real_numbers(value, "y", (None,))
     lengths = length(y)
-    refuse(
-        ~(lengths < 1),
-        "y",
-        lambda i: (
-            f"is not inside the unit ball: its length is {lengths[i]}; points of the Poincaré ball must be "
-            "shorter than 1"
-        ),
-    )
+    advice = "points of the Poincaré ball must be shorter than 1"
+    refuse(~(lengths < 1), "y", lambda i: f"is not inside the unit ball: its length is {lengths[i]}; {advice}")
     return y, ((1 - lengths) * (1 + lengths))[..., None]
 
 
@@ -242,28 +227,18 @@ def _half_space(value: ArrayLike) -> tuple[Array, Array]:
     """Return the coordinates on the ground, and the height, shape (..., 1)."""
     z, _ = real_numbers(value, "z", (None,))
     height = z[..., -1:]
-    refuse(
-        ~(height[..., 0] > 0),
-        "z",
-        lambda i: (
-            f"is not in the upper half-space: its last coordinate, the height, is {z[i][-1]}; it must be "
-            "positive (put the height last)"
-        ),
-    )
+    what = "is not in the upper half-space: its last coordinate, the height, is"
+    advice = "it must be positive (put the height last)"
+    refuse(~(height[..., 0] > 0), "z", lambda i: f"{what} {z[i][-1]}; {advice}")
     return z[..., :-1], height
 
 
 def _inside(y: Array, name: str) -> Array:
     """Raise ValidationError for vectors that rounding errors move out of the ball."""
     lengths = length(y)
-    refuse(
-        ~(lengths < 1),
-        name,
-        lambda i: (
-            f"is too distant for the ball: in double precision its length is {lengths[i]}, but must be below 1; use "
-            "the hyperboloid or the half-space"
-        ),
-    )
+    what = "is too distant for the ball: in double precision its length is"
+    advice = "must be below 1; use the hyperboloid or the half-space"
+    refuse(~(lengths < 1), name, lambda i: f"{what} {lengths[i]}, but {advice}")
     return y
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
 from ._reading import (
     Array,
@@ -14,7 +15,6 @@ from ._reading import (
     length,
     numbers,
     off_one,
-    refuse,
     square_matrices,
     unit_vectors,
     unmoved_by_underflow,
@@ -54,14 +54,8 @@ def basis_to_projector(basis: ArrayLike) -> Array:
     if not 1 <= y.shape[-1] <= y.shape[-2]:
         raise ValidationError(f"basis must be of shape (..., n, k) with 1 <= k <= n, not {y.shape}")
     off = off_one(y)
-    refuse(
-        ~(off <= tol),
-        "basis",
-        lambda i: (
-            f"does not have orthonormal columns: |Y*Y - 1| is {off[i]:.3e}; orthonormalise it, for example by "
-            "numpy.linalg.qr(basis).Q"
-        ),
-    )
+    advice = "orthonormalise it, for example by numpy.linalg.qr(basis).Q"
+    refuse(~(off <= tol), "basis", lambda i: f"does not have orthonormal columns: |Y*Y - 1| is {off[i]:.3e}; {advice}")
     q = np.linalg.qr(y).Q
     return _hermitian_part(q @ adjoint(q))
 
@@ -95,17 +89,12 @@ def projector_to_basis(projector: ArrayLike) -> Array:
     _check_projectors(p, tol, "projector", "a projector", "use basis_to_projector to convert bases")
     ranks = np.rint(np.trace(p, axis1=-2, axis2=-1).real).astype(int)
     rank = int(ranks.max(initial=0))
-    refuse(
-        np.asarray(ranks != rank),
-        "projector",
-        lambda i: (
-            f"has rank {ranks[i]}, but others have rank {rank}; convert subspaces of one dimension at a time"
-        ),
-    )
+    bad = np.asarray(ranks != rank)
+    advice = "convert subspaces of one dimension at a time"
+    refuse(bad, "projector", lambda i: f"has rank {ranks[i]}, but others have rank {rank}; {advice}")
     if rank == 0:
         raise ValidationError("projector is zero or empty, but must have rank 1 or more")
-    basis: Array = np.linalg.eigh(p).eigenvectors[..., p.shape[-1] - rank :]
-    return basis
+    return np.asarray(np.linalg.eigh(p).eigenvectors[..., p.shape[-1] - rank :])
 
 
 @unmoved_by_underflow
@@ -135,8 +124,7 @@ def state_to_density(state: ArrayLike) -> Array:
     """
     psi, tol = numbers(state, "state", 1)
     psi = unit_vectors(psi, tol, "state", "a state")
-    density: Array = psi[..., :, None] * psi[..., None, :].conj()
-    return density
+    return np.asarray(psi[..., :, None] * psi[..., None, :].conj())
 
 
 @unmoved_by_underflow
@@ -171,19 +159,14 @@ def density_to_state(density: ArrayLike) -> Array:
     """
     rho, tol = square_matrices(density, "density")
     traces = np.trace(rho, axis1=-2, axis2=-1)
-    refuse(
-        ~(np.abs(traces - 1) <= tol),
-        "density",
-        lambda i: f"is not a density matrix: its trace is {traces[i]}, not 1; divide it by its trace",
-    )
-    _check_projectors(
-        rho, tol, "density", "a pure state", "only pure states, of purity tr P² = 1, have a state vector"
-    )
+    bad = ~(np.abs(traces - 1) <= tol)
+    advice = "divide it by its trace"
+    refuse(bad, "density", lambda i: f"is not a density matrix: its trace is {traces[i]}, not 1; {advice}")
+    _check_projectors(rho, tol, "density", "a pure state", "only pure states, of purity tr P² = 1, have a state vector")
     rho = _hermitian_part(rho)
     best = np.argmax(np.diagonal(rho, axis1=-2, axis2=-1).real, axis=-1)
     psi = np.take_along_axis(rho, best[..., None, None], axis=-1)[..., 0]
-    state: Array = psi / length(np.abs(psi))[..., None]
-    return state
+    return np.asarray(psi / length(np.abs(psi))[..., None])
 
 
 def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -> None:
@@ -193,15 +176,9 @@ def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -
         off = largest(square - p)
     refuse(~(skew <= tol), name, lambda i: f"is not Hermitian: |P - P*| is {skew[i]:.3e}; {advice}")
 
-    refuse(
-        ~(off <= tol),
-        name,
-        lambda i: (
-            f"is not {what}: |P² - P| is {off[i]:.3e}, tr P² is {np.trace(square[i]).real:.6g}; {advice}"
-        ),
-    )
+    what = f"is not {what}: |P² - P| is"
+    refuse(~(off <= tol), name, lambda i: f"{what} {off[i]:.3e}, tr P² is {np.trace(square[i]).real:.6g}; {advice}")
 
 
 def _hermitian_part(x: Array) -> Array:
-    part: Array = (x + adjoint(x)) / 2
-    return part
+    return np.asarray((x + adjoint(x)) / 2)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import checked_atol
+from .._arrays import checked_atol, refuse
 from .._core import ValidationError
 from .._quaternions import Rows, quaternion_rows, rotation_rows
-from ._reading import Array, length, off_one, real_numbers, refuse, unit_vectors, unmoved_by_underflow
+from ._reading import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
 
 
 @unmoved_by_underflow
@@ -111,20 +111,8 @@ def checked_order(scalar_first: bool | None) -> bool:
 
 def _check_rotations(r: Array, tol: float) -> None:
     off = off_one(r)
-    refuse(
-        ~(off <= tol),
-        "matrix",
-        lambda i: (
-            f"is not a rotation: |RᵀR - 1| is {off[i]:.3e}; SpecialOrthogonal(3).project(matrix) projects nearby "
-            "matrices onto the rotations"
-        ),
-    )
+    advice = "SpecialOrthogonal(3).project(matrix) projects nearby matrices onto the rotations"
+    refuse(~(off <= tol), "matrix", lambda i: f"is not a rotation: |RᵀR - 1| is {off[i]:.3e}; {advice}")
     determinants = np.linalg.det(r)
-    refuse(
-        ~(determinants > 0),
-        "matrix",
-        lambda i: (
-            f"is a reflection, not a rotation: its determinant is {determinants[i]:.3g}; swap two columns, or "
-            "change the sign of one"
-        ),
-    )
+    what, advice = "is a reflection, not a rotation: its determinant is", "swap two columns, or change the sign of one"
+    refuse(~(determinants > 0), "matrix", lambda i: f"{what} {determinants[i]:.3g}; {advice}")

@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast
+from .._arrays import as_array, cast, refuse
 from .._core import ValidationError
 from .._spaces import point_tol
 
@@ -58,9 +58,7 @@ def real_numbers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> 
     if array.dtype.kind == "c" or not fits:
         wanted = ", ".join("n" if m is None else str(m) for m in shape)
         kind = "complex" if array.dtype.kind == "c" else "real"
-        raise ValidationError(
-            f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}"
-        )
+        raise ValidationError(f"{name} must be real, of shape (..., {wanted}), not {kind} of shape {array.shape}")
     return array, tol
 
 
@@ -81,20 +79,9 @@ def unit_vectors(x: Array, tol: float, name: str, what: str) -> Array:
         If the length of a vector is not 1.
     """
     lengths = length(np.abs(x))
-    refuse(
-        ~(np.abs(lengths - 1) <= tol),
-        name,
-        lambda i: f"is not {what}: its length is {lengths[i]}, not 1; divide it by its length",
-    )
+    advice = "divide it by its length"
+    refuse(~(np.abs(lengths - 1) <= tol), name, lambda i: f"is not {what}: its length is {lengths[i]}, not 1; {advice}")
     return x / lengths[..., None]
-
-
-def refuse(bad: NDArray[np.bool_], name: str, say: Callable[[Any], str]) -> None:
-    """Raise ValidationError for the first bad entry, with the message ``say(index)``."""
-    found = np.argwhere(bad)
-    if len(found):
-        index = tuple(found[0].tolist())
-        raise ValidationError(f"{name}{list(index) or ''} {say(index)}")
 
 
 def length(x: Array) -> Array:
@@ -106,8 +93,7 @@ def length(x: Array) -> Array:
 
 def adjoint(x: Array) -> Array:
     """Return conjugate transposes."""
-    result: Array = np.swapaxes(x, -1, -2).conj()
-    return result
+    return np.asarray(np.swapaxes(x, -1, -2).conj())
 
 
 def off_one(x: Array) -> Array:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import Array, largest, real_numbers, refuse, unmoved_by_underflow
+from ._reading import Array, largest, real_numbers, unmoved_by_underflow
 
 
 def _signs(n: int, negative: int) -> Array:
@@ -56,27 +57,16 @@ def basis_to_reflection(basis: ArrayLike, *, negative: int) -> Array:
     length = np.linalg.norm(y, axis=-2, keepdims=True)
     y = y / np.where(length > 0, length, 1.0)
     singular = np.linalg.svd(y, compute_uv=False)[..., -1]
-    refuse(
-        ~(singular > tol),
-        "basis",
-        lambda i: (
-            f"does not have linearly independent columns: their least singular value is {singular[i]:.3e}"
-        ),
-    )
+    what = "does not have linearly independent columns: their least singular value is"
+    refuse(~(singular > tol), "basis", lambda i: f"{what} {singular[i]:.3e}")
     q = np.linalg.qr(y).Q
     turned = np.swapaxes(q, -1, -2) * signs
     gram = turned @ q
     least = np.abs(np.linalg.eigvalsh(gram)).min(axis=-1, initial=1.0)
-    refuse(
-        ~(least > tol),
-        "basis",
-        lambda i: (
-            f"does not span a subspace with a reflection: the form is degenerate on it (least eigenvalue "
-            f"{least[i]:.3e}), since it contains a vector orthogonal to the whole subspace"
-        ),
-    )
-    reflection: Array = 2 * q @ np.linalg.solve(gram, turned) - np.eye(n)
-    return reflection
+    what = "does not span a subspace with a reflection: the form is degenerate on it"
+    why = "since it contains a vector orthogonal to the whole subspace"
+    refuse(~(least > tol), "basis", lambda i: f"{what} (least eigenvalue {least[i]:.3e}), {why}")
+    return np.asarray(2 * q @ np.linalg.solve(gram, turned) - np.eye(n))
 
 
 @unmoved_by_underflow
@@ -116,24 +106,15 @@ def reflection_to_basis(reflection: ArrayLike, *, negative: int) -> Array:
         off = largest(p @ p - np.eye(n)) / size
         skew = largest(signs[:, None] * p - np.swapaxes(signs[:, None] * p, -1, -2)) / size
     refuse(~(off <= tol), "reflection", lambda i: f"is not a reflection: |P² - 1| is {off[i]:.3e} of |P|²")
-    refuse(
-        ~(skew <= tol),
-        "reflection",
-        lambda i: f"does not preserve the form: |ηP - Pᵀη| is {skew[i]:.3e} of |P|²",
-    )
+    refuse(~(skew <= tol), "reflection", lambda i: f"does not preserve the form: |ηP - Pᵀη| is {skew[i]:.3e} of |P|²")
     counts = np.rint((n + np.trace(p, axis1=-2, axis2=-1)) / 2).astype(int)
     k = int(counts.flat[0]) if counts.size else 0
+    what, advice = "fixes a subspace of dimension", "convert one dimension at a time"
     refuse(
-        np.asarray(counts != k),
-        "reflection",
-        lambda i: (
-            f"fixes a subspace of dimension {counts[i]}, the first one of dimension {k}; convert one dimension at "
-            "a time"
-        ),
+        np.asarray(counts != k), "reflection", lambda i: f"{what} {counts[i]}, the first one of dimension {k}; {advice}"
     )
     if not 0 < k < n:
         raise ValidationError("reflection is 1, -1 or empty, but must leave a proper subspace fixed")
     q = np.linalg.svd(p + np.eye(n))[0][..., :k]
     values, vectors = np.linalg.eigh((np.swapaxes(q, -1, -2) * signs) @ q)
-    basis: Array = q @ vectors / np.sqrt(np.abs(values))[..., None, :]
-    return basis
+    return np.asarray(q @ vectors / np.sqrt(np.abs(values))[..., None, :])

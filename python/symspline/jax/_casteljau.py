@@ -9,24 +9,18 @@ import jax.numpy as jnp
 
 from .._core import ValidationError
 from .._options import order_of
-from .._spaces import Product, Space, parts_of
-from .._spaces import space as space_named
-from ._embedding import second_fundamental_form
+from .._spaces import Product, Space, parts_of, space_named
 from ._models import Model
-from ._registry import QUOTIENTS, model_of
+from ._registry import QUOTIENTS, model_of, second_fundamental_form
 from ._spectral import adjoint
 
 
 @overload
-def evaluate(
-    t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0
-) -> jax.Array: ...
+def evaluate(t: Any, points: Any, velocities: Any, space: Space | str, x: Any, *, nu: int = 0) -> jax.Array: ...
 
 
 @overload
-def evaluate(
-    t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0
-) -> tuple[jax.Array, ...]: ...
+def evaluate(t: Any, points: Any, velocities: Any, space: Product, x: Any, *, nu: int = 0) -> tuple[jax.Array, ...]: ...
 
 
 def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: Any, *, nu: int = 0) -> Any:
@@ -84,10 +78,7 @@ def evaluate(t: Any, points: Any, velocities: Any, space: Space[Any] | str, x: A
     space = space_named(space)
     if isinstance(space, Product):
         each = zip(
-            parts_of(points, space, "points"),
-            parts_of(velocities, space, "velocities"),
-            space.factors,
-            strict=True,
+            parts_of(points, space, "points"), parts_of(velocities, space, "velocities"), space.factors, strict=True
         )
         return tuple(evaluate(t, p, v, factor, x, nu=nu) for p, v, factor in each)
     model = model_of(space)

@@ -12,51 +12,29 @@ from jax.custom_derivatives import SymbolicZero
 from .._adapters import split
 from .._curves.ends import ends_in_factors
 from .._options import order_of
-from .._spaces import Product, Space, parts_of
-from .._spaces import space as space_named
-from .._typing import SolverOptions
+from .._spaces import Product, Space, parts_of, space_named
+from .._typing import CurveOptions
 from ..manifolds._manifold import refuse_functions
-from ._embedding import second_fundamental_form
 from ._primitives import Fixed, fit_p, jvp_p
+from ._registry import second_fundamental_form
 
 Array = jax.Array
 
 
 @overload
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space | str,
-    *,
-    nu: int = 0,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Space | str, *, nu: int = 0, **options: Unpack[CurveOptions]
 ) -> Array: ...
 
 
 @overload
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Product,
-    *,
-    nu: int = 0,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Product, *, nu: int = 0, **options: Unpack[CurveOptions]
 ) -> tuple[Array, ...]: ...
 
 
 def curve(
-    x: Any,
-    t: Any,
-    points: Any,
-    space: Space[Any] | str,
-    *,
-    nu: int = 0,
-    bc_type: Any = "natural",
-    **options: Unpack[SolverOptions],
+    x: Any, t: Any, points: Any, space: Space[Any] | str, *, nu: int = 0, bc_type: Any = "natural", **options: Any
 ) -> Any:
     """Evaluate a spline through points by the compiled core, with derivatives in JAX.
 
@@ -115,9 +93,7 @@ def curve(
     space = space_named(space)
     refuse_functions(space, "derivatives with respect to the data are not made")
     if isinstance(space, Product):
-        each = zip(
-            parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True
-        )
+        each = zip(parts_of(points, space, "points"), space.factors, ends_in_factors(bc_type, space), strict=True)
         return tuple(curve(x, t, p, factor, nu=nu, bc_type=bc, **options) for p, factor, bc in each)
     kinds, given = split(bc_type)
     points = jnp.asarray(points)
@@ -158,7 +134,5 @@ def _curve_jvp(fixed: Fixed, nu: int, primals: Any, tangents: Any) -> Any:
         jvp = partial(jvp_p.bind, jnp.concatenate(parts), x, *data, velocities)
         moved += jvp(fixed=fixed, lead=0, nu=nu, moving=moving)
         if nu:
-            moved += second_fundamental_form(
-                fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving)
-            )
+            moved += second_fundamental_form(fixed.space, point, value, jvp(fixed=fixed, lead=0, nu=0, moving=moving))
     return value, moved

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 from .._adapters import split
 from .._arrays import short_repr
 from .._core import ValidationError
-from .._spaces import Space, SpecialOrthogonal, Sphere
-from .._spaces import space as space_named
+from .._spaces import Space, SpecialOrthogonal, Sphere, space_named
 from ._casteljau import arrays_of
 from ._chain import Data, defects, step_of, weights
 from ._models import Curved, Model
@@ -93,18 +92,13 @@ def fit(
         left = jnp.linalg.norm(defects(given, u, data), axis=-1) / weights(given, t)[1]
         largest = jnp.max(jnp.linalg.norm(jax.lax.stop_gradient(u), axis=-1))
         residual = jnp.max(jax.lax.stop_gradient(left)) / jnp.where(largest > 0, largest, 1.0)
-        return _velocities_outside(model, p, u), residual
+        # The velocities of the arrays that the model represents.
+        return jax.jvp(model.from_internal, (p,), (u,))[1], residual
 
     for _ in batch:
         one = jax.vmap(one, (0 if t.ndim > 1 else None, 0, 0, 0))
     found: tuple[Any, Any] = one(t, points, *ends)
     return found
-
-
-def _velocities_outside(model: Model, p: Any, u: Any) -> Any:
-    """Return the velocities of the arrays that a model represents."""
-    moved = jax.jvp(model.from_internal, (p,), (u,))[1]
-    return moved
 
 
 def _model_of(space: Space) -> Model:

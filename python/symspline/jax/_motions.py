@@ -53,9 +53,7 @@ class Poses(Model):
 
     def from_internal(self, points: Any) -> Any:
         n = self.size
-        top = jnp.concatenate(
-            [matrix_of(points[..., :4])[..., :n, :n], points[..., 4 : 4 + n, None]], axis=-1
-        )
+        top = jnp.concatenate([matrix_of(points[..., :4])[..., :n, :n], points[..., 4 : 4 + n, None]], axis=-1)
         last = jnp.broadcast_to(jnp.eye(n + 1, dtype=top.dtype)[n:], (*top.shape[:-2], 1, n + 1))
         return jnp.concatenate([top, last], axis=-2)
 
@@ -66,9 +64,7 @@ class Poses(Model):
         # V(ω)v = v + (1 − cos θ)/θ² ω×v + (θ − sin θ)/θ³ ω×(ω×v)
         across = jnp.cross(turn, ahead)
         moved = ahead + stumpff(2, 1, z) * across + stumpff(3, 1, z) * jnp.cross(turn, across)
-        step = jnp.concatenate(
-            [1 - 0.125 * z * stumpff(1, 1, z / 16) ** 2, 0.5 * stumpff(1, 1, z / 4) * turn], axis=-1
-        )
+        step = jnp.concatenate([1 - 0.125 * z * stumpff(1, 1, z / 16) ** 2, 0.5 * stumpff(1, 1, z / 4) * turn], axis=-1)
         return jnp.concatenate([product(quaternion, step), place + turned(quaternion, moved)], axis=-1)
 
     def log(self, p: Any, q: Any) -> Any:

@@ -74,8 +74,7 @@ def _ends(kinds: Kinds, vectors: Any) -> tuple[Any, Any]:
     """Vectors for both ends, None where none is given."""
     left = iter(vectors)
     first, last = (
-        None if isinstance(kind, str) else next(left)
-        for kind in ((kinds, kinds) if isinstance(kinds, str) else kinds)
+        None if isinstance(kind, str) else next(left) for kind in ((kinds, kinds) if isinstance(kinds, str) else kinds)
     )
     return first, last
 
@@ -97,13 +96,9 @@ def _jvp(change: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, movi
     layout = _layout(fixed, lead, x, data, change.shape[:lead])
     curve, at, bc_type = _moved(fixed, layout, nu, x, data)
     sizes = [math.prod(a.shape[lead:]) * moves for a, moves in zip(data, moving, strict=False)]
-    each = zip(
-        np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False
-    )
+    each = zip(np.split(change, np.cumsum(sizes)[:-1], axis=-1), data, _cores(fixed, data), moving, strict=False)
     knots, steps, *ends = (
-        layout.data(_like(own, array).reshape(*change.shape[:lead], *array.shape[lead:]), core)
-        if moves
-        else None
+        layout.data(_like(own, array).reshape(*change.shape[:lead], *array.shape[lead:]), core) if moves else None
         for own, array, core, moves in each
     )
     found = curve.jvp(at, bc_type, steps, knots, _ends(fixed.kinds, ends))
@@ -115,9 +110,7 @@ def _vjp_shape(_: Any, x: Any, *data: Any, lead: int, moving: Any, kept: Shape, 
     return ShapedArray((*kept, sum(sizes)), data[1].dtype)
 
 
-def _vjp(
-    cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape
-) -> Any:
+def _vjp(cotangent: Any, x: Any, *data: Any, fixed: Fixed, lead: int, nu: int, moving: Any, kept: Shape) -> Any:
     """The transpose. JAX pairs complex numbers without conjugation.
 
     Args:

@@ -62,9 +62,7 @@ def _derivative(divided: Divided, a: Any, values: Any, vectors: Any, directions:
     """
     k, n = len(directions), values.shape[-1]
     # λ along an axis of its own for each of the k + 1 indices.
-    own = [
-        values.reshape(*values.shape[:-1], *(n if i == j else 1 for j in range(k + 1))) for i in range(k + 1)
-    ]
+    own = [values.reshape(*values.shape[:-1], *(n if i == j else 1 for j in range(k + 1))) for i in range(k + 1)]
     weights = divided(*own)
     if not directions:
         return (vectors * weights[..., None, :]) @ adjoint(vectors)

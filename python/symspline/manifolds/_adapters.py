@@ -13,9 +13,7 @@ from .._spaces import Array
 from ._manifold import Manifold
 
 
-def from_geomstats(
-    space: Any, *, injectivity_radius: float | None = None, dtype: Any = np.float64
-) -> Manifold:
+def from_geomstats(space: Any, *, injectivity_radius: float | None = None, dtype: Any = np.float64) -> Manifold:
     """Use a space of geomstats with its metric, on the NumPy backend.
 
     Parameters
@@ -92,9 +90,7 @@ def from_pymanopt(manifold: Any, *, injectivity_radius: float | None = None) -> 
     """
     missing = [name for name in ("exp", "log") if not _has(manifold, name)]
     if missing:
-        raise ValidationError(
-            f"{manifold} has no {' and no '.join(missing)}; pass functions of your own to Manifold"
-        )
+        raise ValidationError(f"{manifold} has no {' and no '.join(missing)}; pass functions of your own to Manifold")
     # Only a random point has the shape and the type of points. NumPy's global generator is restored.
     state = np.random.get_state()  # noqa: NPY002
     try:

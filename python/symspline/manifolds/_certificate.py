@@ -14,15 +14,12 @@ sharp. Norms are the largest over the knots of the Riemannian norm of velocities
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._spaces import Array
+from .._spaces import Array, Doubles
 from ._condition import ControlPolygon, Problem, c2_residuals, c2_residuals_of, control_polygons
 from ._differences import dlog_by_differences
+from ._iteration import Tridiagonal
 from ._operations import Operations
-from ._tridiagonal import Tridiagonal
-
-Doubles = NDArray[np.float64]
 
 # Terms of the Neumann series behind the first; each costs one evaluation of F.
 _TERMS = 4
@@ -99,8 +96,7 @@ def _largest(x: Doubles) -> Doubles:
 
 
 def _most(x: Doubles) -> Doubles:
-    result: Doubles = x.max(axis=1)
-    return result
+    return np.asarray(x.max(axis=1))
 
 
 def _unit(x: Doubles) -> Doubles:
@@ -150,9 +146,7 @@ def _inconsistency(problem: Problem, u: Array, polygon: ControlPolygon, dlog: Ar
             ]
             h0, h1 = (h[:, i] for i in ((0, 1) if which == 0 else (-1, -2)))
             turned = off[0] / norm(*at[:2]) * norm(*at[2:])
-            found[:, node] = (
-                unlike + np.where(off[0] > 0, turned, 0.0) + (off[0] / h0 + off[1] / h1) * (2 + h0 / h1)
-            )
+            found[:, node] = unlike + np.where(off[0] > 0, turned, 0.0) + (off[0] / h0 + off[1] / h1) * (2 + h0 / h1)
     return found
 
 

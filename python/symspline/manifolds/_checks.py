@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import CutLocusError, ValidationError
+from .._curves.ends import map_ends
 from .._curves.solve import Options, Task, validate, without
 from .._faults import INVALID, Fault, of_curve
 from .._spaces import Array, Euclidean
@@ -35,10 +36,7 @@ def validate_on_manifold(task: Task, options: Options) -> tuple[Task, list[Fault
     flat = task._replace(
         space=Euclidean(width),
         points=task.points.reshape(*task.points.shape[: -len(shape)], width),
-        ends=task.ends
-        and [
-            (kind, None if v is None else v.reshape(*v.shape[: -len(shape)], width)) for kind, v in task.ends
-        ],
+        ends=map_ends(task.ends, lambda v: v.reshape(*v.shape[: -len(shape)], width)),
     )
     flat, faults = validate(flat)
     points = np.array(space._numbers(task.points))

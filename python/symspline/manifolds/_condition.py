@@ -15,10 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._spaces import Array
+from .._spaces import Array, Doubles
 from ._operations import Operations
-
-Doubles = NDArray[np.float64]
 
 
 class End(NamedTuple):

@@ -6,12 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._spaces import Array
 from ._operations import Operations
-
-Doubles = NDArray[np.float64]
 
 # Steps along the geodesic at q, as parts of the injectivity radius, or of the distance of p and q and the length of
 # the direction: where errors of order four are as large as those of rounding.
@@ -33,9 +30,7 @@ def dlog_by_differences(
     """The derivative of log_p at q = exp_p(v) in the direction w, by differences of order four along its geodesic;
     ``stretch`` multiplies their steps."""
     size = operations.norm(q, w)
-    step = (
-        _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
-    )
+    step = _OF_RADIUS * radius if math.isfinite(radius) else _OF_HANDLES * np.hypot(size, operations.norm(p, v))
     step = stretch * step
     # Times along the geodesic with velocity w.
     s = np.divide(step, size, out=np.zeros_like(size), where=size > 0)

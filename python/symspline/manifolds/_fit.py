@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .._curves.curve import Doubles
-from .._curves.solve import Options, Progress, Solved, Task
+from .._curves.solve import Options, Solved, Task
 from .._faults import CUT_LOCUS, Fault, unconverged
 from .._report import SOLVERS, Columns
-from .._spaces import Array
+from .._spaces import Array, Doubles
+from .._typing import Progress
 from ._certificate import velocity_errors
 from ._condition import ControlPolygon, End, Problem, control_polygons, not_a_knot
 from ._frames import frames_along
@@ -62,18 +62,13 @@ def fit_of_one_length(task: Task, options: Options, progress: Progress | None) -
         coordinates = problem.coordinates(found.velocities[:, unknowns], unknowns)
         columns.row("velocity_error")[good] = velocity_errors(problem, coordinates, pace)
         polygon = control_polygons(operations, problem.h, problem.p, found.velocities)
-        faults |= _unfit(space, polygon, good, found.converged, columns, options)
+        faults |= _unfit(space, polygon, good, columns, options.tol)
         for i in faults:
             if faults[i].kind == CUT_LOCUS:
                 velocities[i] = np.nan
                 columns.row("converged")[i], columns.row("residual")[i] = False, np.inf
                 columns.row("velocity_error")[i] = np.nan
-    return Solved(
-        points,
-        velocities.reshape(points.shape),
-        columns,
-        [faults[i] for i in sorted(faults)],
-    )
+    return Solved(points, velocities.reshape(points.shape), columns, [faults[i] for i in sorted(faults)])
 
 
 def _report(progress: Progress, nodes: int, count: int, finished: int) -> object:
@@ -105,24 +100,17 @@ def _far(space: Manifold, lengths: Doubles, what: str) -> dict[int, Fault]:
     limit = space.injectivity_radius
     for curve, i in np.argwhere(~(lengths < limit)).tolist():
         distance = lengths[curve, i]
-        why = (
-            f"are {distance:.6g} apart, the injectivity radius is {limit:.6g}"
-            if np.isfinite(distance)
-            else f"have no geodesic between them: the function log of {space!r} is not finite there"
-        )
-        what_now = f"{what.format(i, i + 1)}{{of}} {why}"
-        fault = Fault(curve, CUT_LOCUS, what_now, "put a point between them", i, float(distance), limit)
+        why = f"are {distance:.6g} apart, the injectivity radius is {limit:.6g}"
+        if not np.isfinite(distance):
+            why = f"have no geodesic between them: the function log of {space!r} is not finite there"
+        problem = f"{what.format(i, i + 1)}{{of}} {why}"
+        fault = Fault(curve, CUT_LOCUS, problem, "put a point between them", i, float(distance), limit)
         faults.setdefault(curve, fault)
     return faults
 
 
 def _unfit(
-    space: Manifold,
-    polygon: ControlPolygon,
-    good: NDArray[np.int64],
-    converged: NDArray[np.bool_],
-    columns: Columns,
-    options: Options,
+    space: Manifold, polygon: ControlPolygon, good: NDArray[np.int64], columns: Columns, tol: float
 ) -> dict[int, Fault]:
     """Return the faults of curves that were solved."""
     faults: dict[int, Fault] = {}
@@ -131,8 +119,8 @@ def _unfit(
     inner = norm(polygon.q[0], polygon.w[0])
     far = _far(space, np.maximum(outer, inner), "the control points between points[{0}] and points[{1}]")
     for number, own in enumerate(good.tolist()):
-        if converged[number] and number in far:
+        if not columns.row("converged")[own]:
+            faults[own] = unconverged(own, columns, tol, "; exp, log and dlog must fit each other")
+        elif number in far:
             faults[own] = far[number]._replace(curve=own)
-        elif not converged[number]:
-            faults[own] = unconverged(own, columns, options.tol, "; exp, log and dlog must fit each other")
     return faults

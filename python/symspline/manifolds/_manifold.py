@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import short_repr, whole_number
+from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array, Space, factors_of
 from ._differences import dlog_by_differences
@@ -167,8 +168,7 @@ class Manifold(Space):
     def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
         """Return `dlog` of rows at q = exp(p, v)."""
         if self.functions.dlog is not None:
-            result: Array = self.functions.dlog(p, q, w)
-            return result
+            return np.asarray(self.functions.dlog(p, q, w))
         return dlog_by_differences(self.operations, p, v, q, w, self._radius)
 
     def frame(self, p: ArrayLike) -> Array:
@@ -309,21 +309,13 @@ class Manifold(Space):
 def _shape(value: Any) -> tuple[int, ...]:
     sizes = (value,) if isinstance(value, (int, np.integer)) else value
     if not isinstance(sizes, (tuple, list)) or not sizes:
-        raise ValidationError(
-            f"point_shape must be a whole number or a tuple of them, not {short_repr(value)}"
-        )
+        raise ValidationError(f"point_shape must be a whole number or a tuple of them, not {short_repr(value)}")
     return tuple(whole_number(size, "point_shape", 1) for size in sizes)
 
 
 def _radius(value: Any) -> float:
-    if value is None:
-        return float(np.inf)
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not number or not value > 0:
-        raise ValidationError(
-            f"injectivity_radius must be a positive number, or None for no limit, not {short_repr(value)}"
-        )
-    return float(value)
+    requirement = "injectivity_radius must be a positive number, or None for no limit"
+    return math.inf if value is None else checked_number(value, requirement, lambda x: x > 0)
 
 
 def refuse_functions(space: Space[Any], what: str, named: bool = False) -> None:

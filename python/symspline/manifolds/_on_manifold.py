@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Never
+from typing import Any, NamedTuple, Never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +12,27 @@ from numpy.typing import NDArray
 from .. import _core
 from .._core import ValidationError
 from .._curves.core_curve import CoreCurve
-from .._curves.curve import NORMS, REAL, Doubles
-from .._curves.gradient import SampleTimes
-from .._curves.solve import Options, Progress, Solved, Task, one_by_one, solve_unmasked
+from .._curves.curve import NORMS, REAL
+from .._curves.solve import Options, Solved, Task, solve_in_python
 from .._faults import Fault
-from .._spaces import Array, Euclidean, Space
+from .._spaces import Array, Doubles, Euclidean, Space
+from .._typing import Progress
 from ._checks import validate_on_manifold
 from ._condition import ControlPolygon, control_polygons
-from ._evaluation import Rows, derivative, points
+from ._differences import STEPS, eighth_difference, first_derivative, second_derivative
 from ._fit import fit_of_one_length
 from ._manifold import Manifold
+from ._operations import Operations
 
 # Samples that are computed at a time.
 _AT_ONCE = 1 << 12
+# Of the length of a segment. Errors of order eight of a segment that turns by a radian, and rounding, are some 1e-12
+# of its squared speed in its acceleration.
+STEP = 1 / 64
+# Eighth differences beyond this part of the way, and this part of the size of arrays, show that a segment is not
+# smooth on that scale: de Casteljau's inner geodesics jump where their ends pass each other's cut locus. Then steps
+# are halved, this often at most.
+ROUGH, NOISE, HALVINGS = 1e-8, 1e-9, 7
 
 
 class OnManifold(CoreCurve):
@@ -41,9 +49,7 @@ class OnManifold(CoreCurve):
 
     @staticmethod
     def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-        if task.offsets is not None:
-            return one_by_one(task, options, progress, fit_of_one_length)
-        return solve_unmasked(task, options, progress, fit_of_one_length)
+        return solve_in_python(task, options, progress, fit_of_one_length)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
@@ -61,10 +67,8 @@ class OnManifold(CoreCurve):
         shape = x.shape if per_curve else batch + x.shape
         each = math.prod(shape[len(batch) :])
         own = np.broadcast_to(x, shape).reshape(count, each)
-        norm = quantity in NORMS
-        values = np.empty(
-            (count * each, *(() if norm else space.point_shape)), float if norm else space.dtype
-        )
+        of_each, dtype = ((), float) if quantity in NORMS else (space.point_shape, space.dtype)
+        values = np.empty((count * each, *of_each), dtype)
         for start in range(0, len(values), _AT_ONCE):
             number = np.arange(start, min(start + _AT_ONCE, len(values)))
             values[number] = self._at(number // max(each, 1), own.ravel()[number], quantity, outside)
@@ -76,17 +80,13 @@ class OnManifold(CoreCurve):
         """A quantity at one time for each of some curves."""
         operations, rows = self.space.operations, self._rows(curve, x, outside)
         if quantity == "point":
-            return points(operations, rows)
+            return points_at(operations, rows)
         at, vectors = derivative(operations, rows, 1 if quantity in ("velocity", "speed") else 2)
         return operations.norm(at, vectors) if quantity in NORMS else vectors
 
     def _rows(self, curve: NDArray[np.int64], x: Doubles, outside: str) -> Rows:
-        t = (
-            self._knots[curve]
-            if self.times.ndim > 1
-            else np.broadcast_to(self.times, (len(x), self.times.size))
-        )
-        first, last = t[:, 0], t[:, -1]
+        knots = self._knots
+        first, last = knots[curve, 0], knots[curve, -1]
         if outside == "periodic":
             x = first + np.mod(x - first, last - first)
         # The segment that begins last before x; of the end the last one.
@@ -95,11 +95,10 @@ class OnManifold(CoreCurve):
             i = np.searchsorted(self.times, x, side="right") - 1
         else:
             for c in np.unique(curve):
-                i[curve == c] = np.searchsorted(self._knots[c], x[curve == c], side="right") - 1
-        i = np.clip(i, 0, t.shape[1] - 2)
-        number = np.arange(len(x))
-        h = t[number, i + 1] - t[number, i]
-        tau = (x - t[number, i]) / h
+                i[curve == c] = np.searchsorted(knots[c], x[curve == c], side="right") - 1
+        i = np.clip(i, 0, knots.shape[1] - 2)
+        h = knots[curve, i + 1] - knots[curve, i]
+        tau = (x - knots[curve, i]) / h
         straight = np.full(len(x), outside == "geodesic") & ((x < first) | (x > last))
         return Rows(tau, h, self._polygon.at((curve, i)), straight)
 
@@ -124,14 +123,116 @@ class OnManifold(CoreCurve):
     def lift(self, *_: Any, **__: Any) -> Never:
         self._refuse("no horizontal lift is known")
 
-    def transport(self, times: tuple[float, float], outside: str, v: Any) -> Never:
+    def transport(self, *_: Any, **__: Any) -> Never:
         self._refuse("parallel transport along curves is not made")
 
-    def jvp(self, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Never:
+    def jvp(self, *_: Any, **__: Any) -> Never:
         self._refuse("derivatives with respect to the data are not made")
 
-    def vjp(self, at: SampleTimes, bc_type: Any, cotangent: Any) -> Never:
-        self._refuse("derivatives with respect to the data are not made")
+    vjp = jvp
 
     def _refuse(self, what: str) -> Never:
         raise ValidationError(f"{what} on a manifold that is made of functions, {self.space!r}")
+
+
+# ---- de Casteljau's algorithm with exp and log, and derivatives by differences ----
+
+
+class Rows(NamedTuple):
+    """Positions on segments, one per row.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (rows,)
+        0 at the start of the segment and 1 at its end.
+    h : ndarray, shape (rows,)
+        Duration of the segment.
+    polygon : ControlPolygon
+        Control polygon of the segment, with rows in place of curves and segments.
+    straight : ndarray of bool, shape (rows,)
+        Whether the curve continues as a geodesic, before the start of the segment or after its end.
+    """
+
+    tau: Doubles
+    h: Doubles
+    polygon: ControlPolygon
+    straight: NDArray[np.bool_]
+
+    def at(self, chosen: NDArray[np.int64]) -> Rows:
+        """Some of the rows."""
+        return Rows(self.tau[chosen], self.h[chosen], self.polygon.at(chosen), self.straight[chosen])
+
+
+def points_at(operations: Operations, rows: Rows) -> Array:
+    """The curve (8), by its control polygon."""
+    polygon = rows.polygon
+    if not rows.straight.any():
+        return _bezier(operations, rows.tau, polygon)
+    result: Array = np.empty_like(polygon.p[0])
+    for chosen, work in ((~rows.straight, _bezier), (rows.straight, _geodesic)):
+        result[chosen] = work(operations, rows.tau[chosen], polygon.at(chosen))
+    return result
+
+
+def _bezier(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> Array:
+    t = tau.reshape(-1, *[1] * (polygon.p.ndim - 2))
+    # The outer handles are given by their velocities, which is exact for long ones, too.
+    starts = np.stack([polygon.p[0], polygon.q[0], polygon.p[1]])
+    a, b, c = operations.exp(starts, np.stack([t * polygon.v[0], t * polygon.w[0], (1 - t) * polygon.v[1]]))
+    d, e = _between(operations, np.stack([a, b]), np.stack([b, c]), t)
+    return _between(operations, d, e, t)
+
+
+def _between(operations: Operations, p: Array, q: Array, t: Array) -> Array:
+    return operations.exp(p, t * operations.log(p, q))
+
+
+def _geodesic(operations: Operations, tau: Doubles, polygon: ControlPolygon) -> Array:
+    before = (tau < 0.5).reshape(-1, *[1] * (polygon.p.ndim - 2))
+    t = tau.reshape(before.shape)
+    return operations.exp(
+        np.where(before, polygon.p[0], polygon.p[1]), 3 * np.where(before, t * polygon.v[0], (1 - t) * polygon.v[1])
+    )
+
+
+def derivative(operations: Operations, rows: Rows, nu: int) -> tuple[Array, Array]:
+    """Points, and there the velocity or the covariant acceleration, by differences of order eight in normal
+    coordinates. Beyond its ends a segment goes on, so that they are those of one segment everywhere; where it goes
+    over a cut locus soon, steps are shorter."""
+    here = points_at(operations, rows)
+    vectors, least = np.empty_like(here), np.full(len(here), np.inf)
+    axes = tuple(range(1, here.ndim))
+    left, step = np.arange(len(here)), STEP
+    for halvings in range(HALVINGS + 1):
+        moved = _around(operations, rows.at(left), here[left], step)
+        difference = first_derivative if nu == 1 else second_derivative
+        found = difference(moved, (step * rows.h[left]).reshape(-1, *[1] * (here.ndim - 1)))
+        jump, size = (np.abs(x).max(axis=axes) for x in (eighth_difference(moved), here[left]))
+        # What the jump may have done to the derivative: where it is noise of the logarithm, longer steps are better.
+        harm = jump / step**nu
+        better = (harm < least[left]) | (halvings == 0)
+        vectors[left[better]], least[left[better]] = found[better], harm[better]
+        least[np.isnan(least)] = np.inf
+        smooth = jump <= ROUGH * np.abs(moved).max(axis=(0, *(a + 1 for a in axes))) + NOISE * size
+        left, step = left[~smooth], step / 2
+        if not left.size:
+            break
+    return here, vectors
+
+
+def _around(operations: Operations, rows: Rows, here: Array, step: float) -> Array:
+    """Return the logarithms of the curve at `STEPS` from the points `here`."""
+    shape = (len(STEPS), *here.shape)
+    tau = rows.tau + np.multiply.outer(STEPS * step, np.ones_like(rows.tau))
+
+    def repeated(x: Array) -> Array:
+        return np.broadcast_to(x[:, None], (2, *shape)).reshape(2, -1, *here.shape[1:])
+
+    # A geodesic goes on through the knot at which it begins.
+    around = Rows(
+        tau.ravel(),
+        np.tile(rows.h, len(STEPS)),
+        ControlPolygon(*map(repeated, rows.polygon)),
+        np.tile(rows.straight, len(STEPS)),
+    )
+    return operations.log(np.broadcast_to(here, shape), points_at(operations, around).reshape(shape))

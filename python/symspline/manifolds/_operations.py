@@ -6,16 +6,14 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import short_repr
 from .._core import CutLocusError, ValidationError
-from .._spaces import Array
+from .._spaces import Array, Doubles
 
-Doubles = NDArray[np.float64]
 Function = Callable[..., Any]
 
 
@@ -31,24 +29,6 @@ class Functions(NamedTuple):
     project: Function | None = None
 
 
-class _Made(Protocol):
-    """The attributes of a manifold that are used here."""
-
-    functions: Functions
-    _radius: float
-    _dim: int | None
-    _complex: bool
-    _doubles_shape: tuple[int, ...]
-
-    @property
-    def point_shape(self) -> tuple[int, ...]: ...
-    @property
-    def dtype(self) -> Any: ...
-    def _dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array: ...
-    def _numbers(self, doubles: Doubles) -> Array: ...
-    def _as_doubles(self, numbers: Array) -> Doubles: ...
-
-
 class Operations:
     """The counterpart of the `Handle` of the compiled core: operations on rows of floating-point numbers.
 
@@ -56,8 +36,9 @@ class Operations:
     one.
     """
 
-    def __init__(self, space: _Made) -> None:
-        self.space = space
+    def __init__(self, space: Any) -> None:
+        # A `Manifold`, which is defined in terms of this class.
+        self.space: Any = space
 
     # ---- geometry, on arrays of numbers ----
 
@@ -68,7 +49,7 @@ class Operations:
         """NaN where there is no logarithm."""
         found = self._applied("log", partial(rows_or_nan, self._function("log")), (p, q))
         # Formulas that divide by the distance are undefined at equal points.
-        same = (p == q).all(axis=tuple(range(p.ndim - len(self.space.point_shape), p.ndim)))
+        same = (p == q).all(axis=self.space._point_axes(p))
         if same.any():
             # A copy: logarithms of other libraries may be read-only arrays.
             found = found.copy()
@@ -88,8 +69,7 @@ class Operations:
         return self._call("inner", p, u, v)
 
     def norm(self, p: Array, v: Array) -> Doubles:
-        result: Doubles = np.sqrt(np.maximum(self.inner(p, v, v), 0.0))
-        return result
+        return np.asarray(np.sqrt(np.maximum(self.inner(p, v, v), 0.0)))
 
     def dlog(self, p: Array, v: Array, q: Array, w: Array) -> Array:
         """The derivative of log_p at q = exp_p(v) in the direction w."""
@@ -109,17 +89,29 @@ class Operations:
         axes = tuple(range(1, rows[0].ndim))
         good = np.logical_and.reduce([np.isfinite(x).all(axis=axes) for x in rows])
         if good.all() and count:
-            return self._of_rows(name, function, rows).reshape(lead + shape)
+            return self._of_rows(name, function, rows, shape, dtype).reshape(lead + shape)
         result = np.full((count, *shape), np.nan, dtype)
         if good.any():
-            result[good] = self._of_rows(name, function, [x[good] for x in rows])
+            result[good] = self._of_rows(name, function, [x[good] for x in rows], shape, dtype)
         return result.reshape(lead + shape)
 
-    def _of_rows(self, name: str, function: Callable[..., Any], rows: list[Array]) -> Array:
-        shape = () if name == "inner" else self.space.point_shape
+    def _of_rows(
+        self, name: str, function: Callable[..., Any], rows: list[Array], shape: tuple[int, ...], dtype: Any
+    ) -> Array:
+        """Call a function, and check the shape and the type of its result."""
         with np.errstate(all="ignore"):
             found = np.asarray(function(*rows))
-        return self._checked(name, found, (len(rows[0]), *shape))
+        wanted = (len(rows[0]), *shape)
+        if found.shape != wanted:
+            raise ValidationError(
+                f"the function {name} of {self.space!r} gave an array of shape {found.shape} for {wanted[0]} points; "
+                f"{wanted} is needed"
+            )
+        if found.dtype.kind not in ("iuf" if dtype == np.float64 else "iufc"):
+            raise ValidationError(
+                f"the function {name} of {self.space!r} gave numbers of type {found.dtype}; {dtype} is needed"
+            )
+        return np.ascontiguousarray(found, dtype)
 
     def _function(self, name: str) -> Callable[..., Any]:
         function: Callable[..., Any] | None = getattr(self.space.functions, name)
@@ -127,29 +119,15 @@ class Operations:
             raise ValidationError(f"{self.space!r} was made without {name}=, which is needed here")
         return function
 
-    def _checked(self, name: str, found: Array, shape: tuple[int, ...]) -> Array:
-        if found.shape != shape:
-            raise ValidationError(
-                f"the function {name} of {self.space!r} gave an array of shape {found.shape} for {shape[0]} points; "
-                f"{shape} is needed"
-            )
-        real = name == "inner" or not self.space._complex
-        if found.dtype.kind not in ("iuf" if real else "iufc"):
-            raise ValidationError(
-                f"the function {name} of {self.space!r} gave numbers of type {found.dtype}; "
-                f"{'float64' if real else 'complex128'} is needed"
-            )
-        return np.ascontiguousarray(found, np.float64 if name == "inner" else self.space.dtype)
-
     # ---- the interface of a handle of the compiled core ----
 
     def dim(self) -> int:
         if self.space._dim is None:
             raise ValidationError(f"{self.space!r} was made without dim=, which is needed here")
-        return self.space._dim
+        return int(self.space._dim)
 
     def injectivity_radius(self) -> float:
-        return self.space._radius
+        return float(self.space._radius)
 
     def curvature(self) -> float:
         return math.nan
@@ -157,7 +135,7 @@ class Operations:
     def fibre(self) -> int:
         return 0
 
-    def apply(self, operation: str, inputs: list[Doubles], t: Doubles | None = None) -> Doubles:
+    def apply(self, operation: str, inputs: list[Doubles], t: Any = None) -> Doubles:
         if operation == "rounding":
             return np.ones(len(inputs[0]))
         if operation == "transvection":
@@ -166,14 +144,13 @@ class Operations:
         points = [self.space._numbers(np.ascontiguousarray(x).reshape(shape)) for x in inputs]
         work: dict[str, Callable[..., Array]] = {
             "log": self._log,
-            "geodesic": lambda p, q: self.exp(p, _times(t, p) * self._log(p, q)),
+            "geodesic": lambda p, q: self.exp(p, t.reshape(-1, *[1] * (p.ndim - 1)) * self._log(p, q)),
             "distance": lambda p, q: self.norm(p, self.log(p, q)),
             "scatter": self.project,
-            "random_tangent": lambda p, noise: self.project_tangent(p, noise),
+            "random_tangent": self.project_tangent,
         }
         found = work[operation](*points) if operation in work else self._call(operation, *points)
-        flat: Doubles = found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1)
-        return flat
+        return np.asarray(found if found.ndim == 1 else self.space._as_doubles(found).reshape(len(found), -1))
 
     def _log(self, p: Array, q: Array) -> Array:
         found = self.log(p, q)
@@ -221,9 +198,7 @@ class Operations:
         return np.asarray(np.divide(off, size, out=np.where(np.isfinite(size), 0.0, np.nan), where=size > 0))
 
 
-def rows_or_nan(
-    log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)
-) -> Array:
+def rows_or_nan(log: Function, p: Array, q: Array, errors: tuple[type[Exception], ...] = (CutLocusError,)) -> Array:
     """Logarithms of rows, NaN where there are none. Functions of this library raise for all rows then."""
     try:
         return np.asarray(log(p, q))
@@ -233,12 +208,6 @@ def rows_or_nan(
         with suppress(*errors):
             found[i] = log(p[i : i + 1], q[i : i + 1])[0]
     return found
-
-
-def _times(t: Doubles | None, p: Array) -> Doubles:
-    assert t is not None
-    times: Doubles = t.reshape(-1, *[1] * (p.ndim - 1))
-    return times
 
 
 def described(value: Any) -> str:

@@ -72,9 +72,7 @@ class Stiefel(Manifold):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValidationError(f"Stiefel takes whole numbers k and n, not {short_repr(value)}")
         if not k < n:
-            raise ValidationError(
-                f"Stiefel({k}, {n}) needs k < n: frames of all of R^n are SpecialOrthogonal({n})"
-            )
+            raise ValidationError(f"Stiefel({k}, {n}) needs k < n: frames of all of R^n are SpecialOrthogonal({n})")
         self._k, self._n = self._parameters = int(k), int(n)
         super().__init__(
             exp=self._exp,
@@ -94,7 +92,6 @@ class Stiefel(Manifold):
         return self._parameters
 
     # Unlike other manifolds, it has a name.
-
     def __str__(self) -> str:
         return Space.__str__(self)
 
@@ -152,9 +149,7 @@ class Stiefel(Manifold):
             # The part orthogonal to the frame stays orthogonal and is multiplied by the mean of exp(sΩ).
             outside = w - frame @ (_transposed(frame) @ w)
             mean = (z[:, 0] * (np.exp(0.5j * x) * np.sinc(x / (2 * np.pi)))[..., None, :]) @ _adjoint(z[:, 0])
-            result = result + _transposed(
-                np.linalg.solve(_transposed(mean.real[..., :k, :k]), _transposed(outside))
-            )
+            result = result + _transposed(np.linalg.solve(_transposed(mean.real[..., :k, :k]), _transposed(outside)))
         return np.asarray(result)
 
 
@@ -185,9 +180,7 @@ def _project(x: Array) -> Array:
 def _generator(a: Array, b: Array) -> Array:
     """((a, −bᵀ), (b, 0))."""
     zero = np.zeros((*b.shape[:-1], b.shape[-2]))
-    return np.concatenate(
-        [np.concatenate([a, -_transposed(b)], axis=-1), np.concatenate([b, zero], axis=-1)], axis=-2
-    )
+    return np.asarray(np.block([[a, -_transposed(b)], [b, zero]]))
 
 
 def _units(k: int, m: int) -> Array:

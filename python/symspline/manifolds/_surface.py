@@ -2,33 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import short_repr, whole_number
 from .._core import ValidationError
 from .._spaces import Array
 from ._differences import directional_derivative, jacobian
-from ._geodesics import FINE, integrate
 from ._manifold import Manifold
 from ._operations import Function
-
-Doubles = NDArray[np.float64]
 
 # Newton's iterations, and the size of a step that is the last, relative to the distance.
 _MOST = 40
 _SMALL = 1e-7
 _ROUGH = 1e-5
+# Steps of Gragg's method, whose results are extrapolated to order twelve.
+_NUMBERS = (2, 4, 6, 8, 10, 12)
+# The error of order ten at which that of order twelve is rounding, relative to the largest number.
+FINE = 1e-12
+_MOST_STEPS = 64
+# By what angle a solution may turn in one step that is fine.
+_REACH = 0.35
 
 
 class Surface(Manifold):
     """A level set F = 0 in Rⁿ with the metric of Rⁿ, see `from_surface`."""
 
-    def __init__(
-        self, f: Function, grad: Function, n: int, hess: Function | None, radius: float | None
-    ) -> None:
+    def __init__(self, f: Function, grad: Function, n: int, hess: Function | None, radius: float | None) -> None:
         self._f, self._grad, self._given_hess = f, grad, hess
         for name, function in (("F", f), ("grad", grad), ("hess", grad if hess is None else hess)):
             if not callable(function):
@@ -80,9 +82,7 @@ class Surface(Manifold):
             halvings[left[~better]] += 1
             v[left] = kept[left] + 0.5 ** halvings[left, None] * step[left]
             # What is left behind a small step of Newton's is its square.
-            there = better & (
-                np.linalg.norm(step[left], axis=1) <= _SMALL * np.maximum(chord[left, 0], _SMALL)
-            )
+            there = better & (np.linalg.norm(step[left], axis=1) <= _SMALL * np.maximum(chord[left, 0], _SMALL))
             found[left[there]] = v[left[there]]
             left = left[~there & (halvings[left] < 10) & np.isfinite(v[left]).all(axis=1)]
             if not left.size and rough:
@@ -134,9 +134,7 @@ class Surface(Manifold):
         x, t = y[:, 0], y[:, 1]
         g = self._gradient(x)
         rough = self._given_hess is None
-        turned = (
-            directional_derivative(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
-        )
+        turned = directional_derivative(self._gradient, x, t) if rough else (self._hess(x) @ t[..., None])[..., 0]
         pull = np.sum(t * turned, axis=1) / np.sum(g * g, axis=1)
         return np.stack([t, -pull[:, None] * g], axis=1)
 
@@ -171,12 +169,7 @@ class Surface(Manifold):
 
 
 def from_surface(
-    F: Function,
-    grad: Function,
-    n: int,
-    *,
-    hess: Function | None = None,
-    injectivity_radius: float | None = None,
+    F: Function, grad: Function, n: int, *, hess: Function | None = None, injectivity_radius: float | None = None
 ) -> Surface:
     """Define a surface in Rⁿ by an equation, with lengths as in Rⁿ.
 
@@ -235,9 +228,66 @@ def _combined(basis: Array, fields: Array, w: Array) -> Array:
     """Σ cₐ eₐ where w = Σ cₐ Jₐ."""
     gram = np.einsum("mai,mbi->mab", fields, fields)
     right = np.einsum("mai,mi->ma", fields, w)
-    solvable = np.isfinite(gram).all(axis=(1, 2)) & (
-        np.linalg.cond(np.where(np.isfinite(gram), gram, 0.0)) < 1e15
-    )
+    solvable = np.isfinite(gram).all(axis=(1, 2)) & (np.linalg.cond(np.where(np.isfinite(gram), gram, 0.0)) < 1e15)
     c = np.full(right.shape, np.nan)
     c[solvable] = np.linalg.solve(gram[solvable], right[solvable][..., None])[..., 0]
     return np.asarray(np.einsum("ma,mai->mi", c, basis))
+
+
+# ---- ordinary differential equations: extrapolation (Hairer, Nørsett and Wanner, Solving ordinary differential
+# equations I, 1993, II.9) ----
+
+
+def integrate(f: Callable[[Array], Array], y: Array, turns: Array, tol: float = FINE) -> Array:
+    """y(1) of y' = f(y), of rows y: each by as many steps of order twelve as it needs; NaN where 64 are too few.
+
+    Args:
+        turns: approximate angle by which the solution turns, one per row; it sets the first number of steps.
+        tol: largest error of order ten.
+    """
+    result = np.full_like(y, np.nan)
+    reach = _REACH * (tol / FINE) ** 0.1
+    steps = 2.0 ** np.clip(np.rint(np.log2(np.maximum(turns, 1e-300) / reach)), 0, np.log2(_MOST_STEPS))
+    left = np.arange(len(y))
+    while left.size:
+        # All that need the fewest steps.
+        count = steps[left].min()
+        own = left[steps[left] == count]
+        now, error = y[own], np.zeros(len(own))
+        with np.errstate(all="ignore"):
+            for _ in range(int(count)):
+                now, more = _step(f, now, 1 / count)
+                error += more
+            excess = error / (tol * np.maximum(1.0, _sizes(now)))
+            # It falls with the tenth power of the steps.
+            factor = 2.0 ** np.ceil(np.maximum(1.0, np.log2(excess) / 10))
+        done = excess <= 1
+        result[own[done]] = now[done]
+        steps[own] = np.where(done | ~(count * factor <= _MOST_STEPS), np.inf, count * factor)
+        left = left[np.isfinite(steps[left])]
+    return result
+
+
+def _sizes(y: Array) -> Array:
+    return np.asarray(np.abs(y).reshape(len(y), -1).max(axis=1))
+
+
+def _step(f: Callable[[Array], Array], y: Array, h: float) -> tuple[Array, Array]:
+    """One step, and the error of the order before."""
+    start = f(y)
+    table: list[Array] = []
+    for j, n in enumerate(_NUMBERS):
+        row = [_midpoint(f, y, start, h / n, n)]
+        for k in range(1, j + 1):
+            ratio = (n / _NUMBERS[j - k]) ** 2 - 1
+            row.append(row[-1] + (row[-1] - table[k - 1]) / ratio)
+        table = row
+    return table[-1], _sizes(table[-1] - table[-2])
+
+
+def _midpoint(f: Callable[[Array], Array], y: Array, start: Array, h: float, n: int) -> Array:
+    """Gragg's method, whose error is a series in h²."""
+    before, now = y, y + h * start
+    for _ in range(n - 1):
+        before, now = now, before + 2 * h * f(now)
+    return np.asarray((before + now + h * f(now)) / 2)

@@ -20,12 +20,4 @@ from ._pulse_trains import pulses
 from ._solvers import qobjevo
 from ._states import bloch_vector, from_bloch_vector, from_kets
 
-__all__ = [
-    "bloch_vector",
-    "from_bloch_vector",
-    "from_kets",
-    "hamiltonian",
-    "propagator",
-    "pulses",
-    "qobjevo",
-]
+__all__ = ["bloch_vector", "from_bloch_vector", "from_kets", "hamiltonian", "propagator", "pulses", "qobjevo"]

@@ -5,20 +5,17 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import refuse
 from .._core import ValidationError
 from .._cubic import CubicSpline
-from .._curves.core_curve import CoreCurve
 from .._curves.curve import CurveArrays
-from .._curves.subspan import span_of
-from .._spaces import ComplexGrassmannian, ComplexProjective
+from .._curves.reduced import span_of
+from .._spaces import ComplexGrassmannian, ComplexProjective, Doubles
 from .._time import onto_ends
 from .._typing import TimesLike
-from ..convert._reading import Array, adjoint, refuse
+from ..convert._reading import Array, adjoint
 from ._generators import generator, quantum_space
-
-Doubles = NDArray[np.float64]
 
 STAGES = 8
 # For steps of this length, the error of eight stages is a rounding error.
@@ -100,10 +97,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
     if (curve.times.shape[-1] + 2) * width >= curve.space.point_shape[0]:
         return curve, None
     span = span_of(curve.space, curve.points, np.take(curve.velocities, [0, -1], axis=len(curve.batch)))
-    small = CoreCurve(
-        span.space, curve.times, span.coordinates(curve.points), span.coordinates(curve.velocities)
-    )
-    return small, span.basis
+    return span.inside(curve), span.basis
 
 
 def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
@@ -116,11 +110,8 @@ def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
         )
     first, last = spline._times[..., 0].max(), spline._times[..., -1].min()
     times, _ = onto_ends(times, np.array([first, last]), (), False)
-    refuse(
-        ~((times >= first) & (times <= last)),
-        "x",
-        lambda i: f"is {times[i]}, but must be between the first and last knots, {first} and {last}",
-    )
+    bad = ~((times >= first) & (times <= last))
+    refuse(bad, "x", lambda i: f"is {times[i]}, but must be between the first and last knots, {first} and {last}")
     return times
 
 
@@ -152,10 +143,7 @@ def _steps(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
     """Return the propagators over short intervals inside a segment, shape (curves, m, n, n)."""
     n = curve.space.point_shape[0]
     block = max(1, _BLOCK // (start.shape[0] * (STAGES * n) ** 2 * 16))
-    steps = [
-        _step(curve, start[:, i : i + block], length[:, i : i + block])
-        for i in range(0, start.shape[1], block)
-    ]
+    steps = [_step(curve, start[:, i : i + block], length[:, i : i + block]) for i in range(0, start.shape[1], block)]
     return np.concatenate(steps, axis=1) if steps else np.zeros((*start.shape, n, n), complex)
 
 
@@ -163,8 +151,7 @@ def _step(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
     nodes, weights, matrix = gauss()
     times = start[..., None] + length[..., None] * nodes
     point, velocity = (
-        curve.evaluate(times.reshape(*curve.batch, -1), quantity, "raise", True)
-        for quantity in ("point", "velocity")
+        curve.evaluate(times.reshape(*curve.batch, -1), quantity, "raise", True) for quantity in ("point", "velocity")
     )
     h = generator(curve.space, point, velocity)
     n = h.shape[-1]
@@ -180,8 +167,7 @@ def _step(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
 
 def _unitary(u: Array) -> Array:
     """Return the nearest unitary matrices of nearly unitary ones, by one step of Newton and Schulz."""
-    polished: Array = u @ (3 * np.eye(u.shape[-1]) - adjoint(u) @ u) / 2
-    return polished
+    return np.asarray(u @ (3 * np.eye(u.shape[-1]) - adjoint(u) @ u) / 2)
 
 
 @cache

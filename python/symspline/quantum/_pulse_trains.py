@@ -7,12 +7,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, short_repr
+from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
 from .._typing import TimesLike
-from ..convert._reading import Array, adjoint, largest, refuse, square_matrices
+from ..convert._reading import Array, adjoint, largest, square_matrices
 from ._generators import generator, hamiltonian, quantum_space
 
 
@@ -69,12 +69,7 @@ def pulses(
     if kind == "midpoint":
         h = hamiltonian(spline, times[:-1] + (times[1:] - times[:-1]) / 2)
     else:
-        points = spline(times)
-        axis = len(spline._batch)
-        first, last = (
-            np.take(points, range(len(times) - 1), axis),
-            np.take(points, range(1, len(times)), axis),
-        )
+        first, last = space._neighbours(spline(times))
         h = generator(space, first, space.log(first, last)) / spacing[..., None, None]
     return h if basis is None else _coefficients(h, basis)
 
@@ -87,13 +82,8 @@ def _edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
             f"edges must be a one-dimensional array of at least two times, not of shape {times.shape}"
         )
     spacing = np.diff(spline._time_axis.at(edges, spline._batch, False, spline._times)[0])
-    refuse(
-        ~(spacing > 0),
-        "edges",
-        lambda i: (
-            f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but edges must be strictly increasing"
-        ),
-    )
+    advice = "edges must be strictly increasing"
+    refuse(~(spacing > 0), "edges", lambda i: f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but {advice}")
     return times, spacing
 
 
@@ -103,23 +93,15 @@ def _basis(operators: Any, n: int) -> Array:
     if basis.ndim != 3 or basis.shape[1] != n:
         raise ValidationError(f"operators must be of shape (q, {n}, {n}), not {basis.shape}")
     skew = largest(basis - adjoint(basis))
-    refuse(
-        ~(skew <= tol * largest(basis)),
-        "operators",
-        lambda i: f"is not Hermitian: |A - A*| is {skew[i]:.3e}; pass Hermitian operators",
-    )
+    bad = ~(skew <= tol * largest(basis))
+    refuse(bad, "operators", lambda i: f"is not Hermitian: |A - A*| is {skew[i]:.3e}; pass Hermitian operators")
     columns = _as_columns(basis)
     # The diagonal of R is the norm of the component of every operator outside the span of its predecessors.
     new = np.zeros(len(basis))
     triangle = np.abs(np.diagonal(np.linalg.qr(columns).R))
     new[: len(triangle)] = triangle
-    refuse(
-        ~(new > 1e-10 * np.linalg.norm(columns, axis=0)),
-        "operators",
-        lambda i: (
-            "is zero or a linear combination of the previous operators; remove it, so that coefficients are unique"
-        ),
-    )
+    why = "is zero or a linear combination of the previous operators; remove it, so that coefficients are unique"
+    refuse(~(new > 1e-10 * np.linalg.norm(columns, axis=0)), "operators", lambda _: why)
     return basis
 
 

@@ -81,9 +81,7 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEv
     def at(t: float) -> Any:
         # QuTiP evaluates at 0 to determine the type of the result.
         if beyond and t < first and t != 0:
-            raise ValidationError(
-                f"the time {t} is before the first knot, {first}; start the solver at {first}"
-            )
+            raise ValidationError(f"the time {t} is before the first knot, {first}; start the solver at {first}")
         return qutip.Qobj(hamiltonian(spline, float(t), extrapolate=beyond), dims=both)
 
     return qutip.QobjEvo(at)

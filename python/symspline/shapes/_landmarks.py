@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import short_repr
+from .._arrays import refuse, short_repr
 from .._core import ValidationError
-from ..convert._reading import numbers, off_one, refuse
+from ..convert._reading import numbers, off_one
 
 Array = NDArray[np.float64]
 
@@ -89,11 +89,8 @@ def to_landmarks(shape: ArrayLike, like: ArrayLike, *, base: int | None = None) 
             f"shape must be real, of shape (..., {rows}, {drawing.shape[-1]}) for these drawings, not {basis.shape}"
         )
     off = off_one(basis)
-    refuse(
-        ~(off <= tol),
-        "shape",
-        lambda i: f"does not have orthonormal columns: |YᵀY - 1| is {off[i]:.3e}; use from_landmarks",
-    )
+    advice = "use from_landmarks"
+    refuse(~(off <= tol), "shape", lambda i: f"does not have orthonormal columns: |YᵀY - 1| is {off[i]:.3e}; {advice}")
     return placed(basis @ (np.swapaxes(basis, -1, -2) @ relative(drawing, base)), place(drawing, base), base)
 
 
@@ -101,9 +98,7 @@ def read(x: ArrayLike, name: str, base: Any) -> Array:
     """Validate drawings and the base landmark."""
     drawing, _ = numbers(x, name, 2)
     if drawing.dtype.kind == "c":
-        raise ValidationError(
-            f"{name} must be real landmarks, not complex; pass real and imaginary parts as columns"
-        )
+        raise ValidationError(f"{name} must be real landmarks, not complex; pass real and imaginary parts as columns")
     count, n = drawing.shape[-2:]
     if count < n + 2 or n < 1:
         raise ValidationError(
@@ -126,8 +121,7 @@ def relative(drawing: Array, base: int | None) -> Array:
 
 def place(drawing: Array, base: int | None) -> Array:
     """Return the centre of drawings, or the landmark ``base``, shape (..., n)."""
-    middle: Array = drawing.mean(axis=-2) if base is None else drawing[..., base, :]
-    return middle
+    return np.asarray(drawing.mean(axis=-2) if base is None else drawing[..., base, :])
 
 
 def placed(moved: Array, place: Array, base: int | None) -> Array:
@@ -147,5 +141,4 @@ def orthonormal(moved: Array, name: str) -> Array:
             f"must span all {moved.shape[-1]} dimensions to have an affine shape"
         ),
     )
-    basis: Array = left @ right
-    return basis
+    return np.asarray(left @ right)

@@ -8,18 +8,53 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, read_only, short_repr
+from .._arrays import as_array, read_only, refuse, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
-from .._spaces import Euclidean, SpecialOrthogonal, SymmetricPositiveDefinite
+from .._spaces import Euclidean, Grassmannian, SpecialOrthogonal, SymmetricPositiveDefinite
 from .._typing import AnyArray, BCWords, File, TimesLike
-from ..convert._reading import refuse
-from ._bases import Bases
 from ._landmarks import Array, orthonormal, place, placed, read, relative
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+class Bases:
+    """Horizontal lift X(t) of a spline of shapes.
+
+    Attributes
+    ----------
+    shape : CubicSpline
+        Spline on a Grassmannian.
+    start : ndarray
+        X at the first knot.
+    closed : bool
+        Whether the spline is closed.
+    """
+
+    def __init__(self, t: TimesLike | None, points: Array, bc_type: Any) -> None:
+        self.shape = CubicSpline(t, points, Grassmannian(*points.shape[:0:-1]), bc_type=bc_type)
+        self.start, self.closed = points[0], bc_type == "periodic"
+
+    def __call__(self, x: Array) -> Array:
+        """Return X at times x, shape x.shape + (rows, n); at the end of a closed spline, the lifted value."""
+        shape = self.shape
+        first, last = shape.t[0], shape.t[-1]
+        own = shape._time_axis.at(x, (), False, shape._times)[0]
+        bad = ~((own >= shape._times[0]) & (own <= shape._times[-1]))
+        where = f"the times of the first and last drawings, {first} and {last}"
+        refuse(bad, "x", lambda i: f"is {x[i]}, but must be between {where}")
+        return np.asarray(self.shape.lift(x, start=self.start))
+
+    def turn(self) -> Array:
+        """Return the orthogonal matrix h by which X of a closed spline is rotated after one period."""
+        return np.asarray(self.start.T @ self(self.shape.t[-1]))
+
+    def share(self, x: Array) -> Array:
+        """Map times to the interval from 0 at the first knot to 1 at the last."""
+        times, knots = self.shape._time_axis.at(x, (), False, self.shape._times)[0], self.shape._times
+        return np.asarray((times - knots[0]) / (knots[-1] - knots[0]))
 
 
 class AffineMorph:
@@ -206,15 +241,12 @@ class _Between:
         if closed:
             _check_closed(moved, positions)
         matrices = np.swapaxes(bases(t), -1, -2) @ moved
-        refuse(
-            ~(np.linalg.det(matrices) > 0),
-            "landmarks",
-            lambda i: (
-                "is mirrored: along the spline of shapes, the first drawing becomes its mirror image; number its "
-                "landmarks in the order of the others, mirror it (change the sign of a coordinate), add drawings "
-                "in between, or pass frame='first'"
-            ),
+        why = (
+            "is mirrored: along the spline of shapes, the first drawing becomes its mirror image; number its landmarks "
+            "in the order of the others, mirror it (change the sign of a coordinate), add drawings in between, or pass "
+            "frame='first'"
         )
+        refuse(~(np.linalg.det(matrices) > 0), "landmarks", lambda _: why)
         self._bases, self._group = bases, SpecialOrthogonal(n)
         # The basis of a closed film comes back turned by h = exp(w), and A turned by its inverse; exp(τw) A is
         # periodic, τ from 0 to 1.
@@ -233,9 +265,7 @@ class _Between:
 
     def _twisted(self, x: Array, sign: int) -> Array:
         """Return exp(±τw) at times x."""
-        return self._group.exp(
-            np.eye(len(self._twist)), sign * self._bases.share(x)[..., None, None] * self._twist
-        )
+        return self._group.exp(np.eye(len(self._twist)), sign * self._bases.share(x)[..., None, None] * self._twist)
 
 
 def _check_closed(moved: Array, positions: Array) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, brief, short_repr
+from .._arrays import as_array, brief, refuse, short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._typing import TensorOrder
@@ -53,9 +53,7 @@ class Volume:
     header: Any = field(default=None, compare=False, repr=False)
 
 
-def read_nifti(
-    file: File, *, order: TensorOrder | None = None, mask: ArrayLike | File | None = None
-) -> Volume:
+def read_nifti(file: File, *, order: TensorOrder | None = None, mask: ArrayLike | File | None = None) -> Volume:
     """Read diffusion tensors from a NIfTI file with six volumes.
 
     Several files with V voxels in the same mask form a batch of curves: stack their ``tensors`` along axis 1 to shape
@@ -116,9 +114,7 @@ def read_nifti(
     if numbers.ndim != 4 or numbers.shape[3] != 6:
         raise ValidationError(f"{path} has shape {numbers.shape}, but tensors need shape (X, Y, Z, 6)")
     inside = _mask(mask, numbers, image.affine)
-    return Volume(
-        from_vectors(numbers[inside], order=order), inside, np.asarray(image.affine, float), image.header
-    )
+    return Volume(from_vectors(numbers[inside], order=order), inside, np.asarray(image.affine, float), image.header)
 
 
 def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
@@ -161,9 +157,7 @@ def write_nifti(file: File, volume: Volume, *, order: TensorOrder) -> None:
     nibabel = _nibabel()
     path = _path(file)
     if not path.name.endswith((".nii", ".nii.gz")):
-        raise ValidationError(
-            f"file = {short_repr(str(path))}: the name of a NIfTI file must end in .nii or .nii.gz"
-        )
+        raise ValidationError(f"file = {short_repr(str(path))}: the name of a NIfTI file must end in .nii or .nii.gz")
     if not isinstance(volume, Volume):
         raise TypeError(f"volume must be a symspline.tensors.Volume, not {short_repr(volume)}")
     mask = np.asarray(volume.mask, bool)
@@ -220,10 +214,7 @@ def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.
             )
         mask = voxels
     values = as_array(mask, "mask")
-    bad = np.argwhere(~(values >= 0))
-    if len(bad):
-        place = tuple(map(int, bad[0]))
-        raise ValidationError(f"mask[{', '.join(map(str, place))}] is {values[place]}; it must be 0 or more")
+    refuse(~(values >= 0), "mask", lambda i: f"is {values[i]}; it must be 0 or more")
     inside: NDArray[np.bool_] = values.astype(bool)
     if inside.shape != numbers.shape[:3]:
         raise ValidationError(f"the mask has shape {inside.shape}, but the volume {numbers.shape[:3]}")

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, short_repr
+from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
 from .._spaces import point_tol
 from .._typing import TensorOrder
-from ..convert._reading import largest, refuse
+from ..convert._reading import largest
 
 Array = NDArray[Any]
 
@@ -105,13 +105,9 @@ def to_vectors(matrices: ArrayLike, *, order: TensorOrder) -> Array:
         raise ValidationError(f"matrices has shape {array.shape}, but needs shape (..., 3, 3)")
     with np.errstate(invalid="ignore"):
         off = largest(array - np.swapaxes(array, -1, -2))
-        refuse(
-            off > point_tol(array.dtype) * largest(array),
-            "matrices",
-            lambda i: (
-                f"is not symmetric: |A - Aᵀ| is {off[i]:.3e}; six numbers can represent symmetric matrices only"
-            ),
-        )
+        bad = off > point_tol(array.dtype) * largest(array)
+        advice = "six numbers can represent symmetric matrices only"
+        refuse(bad, "matrices", lambda i: f"is not symmetric: |A - Aᵀ| is {off[i]:.3e}; {advice}")
     rows, columns = np.transpose(pairs)
     return array[..., rows, columns]
 

@@ -85,28 +85,12 @@ def fit(
     >>> ds.velocities.dims, ds.converged.values
     (('curve', 'time', 'q'), array([ True]))
     """
-    spec = spec_of(
-        da,
-        space,
-        dim,
-        point_dims,
-        where,
-        bc_type,
-        method=method,
-        tol=tol,
-        max_iter=max_iter,
-        extrapolate=extrapolate,
-        on_failure=on_failure,
-        atol=atol,
-    )
+    options = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate, "atol": atol}
+    spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
     axes: list[Hashable] = [dim, *point_dims]
     dtype = spec.space.dtype
     variables = apply(
-        fitted,
-        spec.inputs,
-        [axes, axes, *([] for _ in COLUMNS)],
-        [dtype, dtype, *COLUMNS.values()],
-        **spec.options,
+        fitted, spec.inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], **spec.options
     )
     ds = xr.Dataset(dict(zip(("points", "velocities", *COLUMNS), variables, strict=True)))
     ds.points.attrs = dict(da.attrs)
@@ -271,13 +255,6 @@ def resample(
     rehearse(times, spec.options["t"], da.sizes[dim], policy)
     first, *rest = spec.inputs
     inputs: Inputs = [(bare(first[0], dim), [KNOTS, *point_dims]), (times, axes), *rest]
-    (values,) = apply(
-        resampled,
-        inputs,
-        [[*axes, *point_dims]],
-        [spec.space.dtype],
-        x_axes=len(axes),
-        **spec.options,
-    )
+    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec.space.dtype], x_axes=len(axes), **spec.options)
     values.attrs = dict(da.attrs)
     return timed_by(values, times, dim).rename(da.name)

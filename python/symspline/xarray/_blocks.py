@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from .. import _base_curve
 from .._adapters import joined
-from .._base_curve import call_at_times, evaluated
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._functional import given
@@ -25,11 +25,7 @@ COLUMNS = columns_of(Report)
 
 
 def apply(
-    function: Any,
-    inputs: Inputs,
-    output_core_dims: list[list[Hashable]],
-    output_dtypes: list[Any],
-    **kwargs: Any,
+    function: Any, inputs: Inputs, output_core_dims: list[list[Hashable]], output_dtypes: list[Any], **kwargs: Any
 ) -> tuple[xr.DataArray, ...]:
     """The outputs of a function of blocks."""
     arrays = _cut_alike([array for array, _ in inputs])
@@ -59,10 +55,7 @@ def _cut_alike(arrays: list[xr.DataArray]) -> list[xr.DataArray]:
     """Arrays of dask in the blocks of the first array; dimensions that it does not have are one chunk."""
     first, *others = arrays
     cuts = first.variable.chunksizes
-    return [
-        first,
-        *(a if a.chunks is None else a.chunk({d: cuts.get(d, -1) for d in a.dims}) for a in others),
-    ]
+    return [first, *(a if a.chunks is None else a.chunk({d: cuts.get(d, -1) for d in a.dims}) for a in others)]
 
 
 def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
@@ -79,13 +72,7 @@ def _block(*arrays: Array, function: Any, alone: bool, **kwargs: Any) -> Any:
 
 
 def spline_of(
-    points: Array,
-    rest: Sequence[Array],
-    space: Space,
-    t: Any,
-    kinds: Any,
-    names: list[str],
-    how: dict[str, Any],
+    points: Array, rest: Sequence[Array], space: Space, t: Any, kinds: Any, names: list[str], how: dict[str, Any]
 ) -> CubicSpline:
     """The splines of a block."""
     named = dict(zip(names, rest, strict=True))
@@ -128,7 +115,7 @@ def values_at(
     lead = points.ndim - 1 - len(space.point_shape)
     batch = points.shape[:lead]
     x, per_curve = _per_curve(x, batch, x_axes)
-    good = np.isfinite(velocities).all(axis=tuple(range(lead, points.ndim)))
+    good = space._where_finite(velocities).all(axis=-1)
     everyone = bool(good.all())
     if not everyone:
         points, velocities, x = points[good], velocities[good], x[good] if per_curve else x
@@ -136,17 +123,7 @@ def values_at(
     if not good.any():
         return np.full(batch + x.shape[x.ndim - x_axes :] + shape, np.nan, space.dtype if shape else float)
     time_axis, curve = given(t, points, velocities, space)
-    if lifted:
-        found = call_at_times(
-            curve,
-            time_axis,
-            x,
-            per_curve,
-            policy,
-            lambda curve, x, each, where: curve.lift(x, quantity, where, each, None),
-        )
-    else:
-        found = evaluated(curve, time_axis, x, quantity, policy, per_curve, None)
+    found = (_base_curve.lifted if lifted else _base_curve.evaluated)(curve, time_axis, x, quantity, policy, per_curve)
     if everyone:
         return np.asarray(found)
     values = np.full(batch + found.shape[1:], np.nan, found.dtype)

@@ -10,8 +10,8 @@ import xarray as xr
 from .._arrays import short_repr
 from .._core import ValidationError
 from .._options import checked_extrapolate, extrapolation_mode
-from .._spaces import space as space_named
-from ._blocks import apply, values_at
+from .._spaces import space_named
+from ._blocks import Inputs, apply, values_at
 from ._spec import check_dims, rehearse, times_with_names
 
 # The dimension of the knots where a result has times of its own, which may have the same name.
@@ -34,25 +34,14 @@ def along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool 
         check_dims(array, space, dim, point_dims)
     if extrapolate is not None:
         policy = extrapolation_mode(checked_extrapolate(extrapolate), ds.attrs.get("bc_type"))
-    times, axes = times_with_names(
-        x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)]
-    )
+    times, axes = times_with_names(x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
     t = points[dim].values if dim in points.coords else None
     rehearse(times, t, points.sizes[dim], policy)
     own = [KNOTS, *point_dims]
     shape = [] if quantity == "speed" else point_dims
-    (values,) = apply(
-        values_at,
-        [(bare(points, dim), own), (bare(velocities, dim), own), (times, axes)],
-        [[*axes, *shape]],
-        [space.dtype if shape else np.float64],
-        space=space,
-        t=t,
-        quantity=quantity,
-        policy=policy,
-        x_axes=len(axes),
-        lifted=lifted,
-    )
+    inputs: Inputs = [(bare(points, dim), own), (bare(velocities, dim), own), (times, axes)]
+    fixed = {"space": space, "t": t, "quantity": quantity, "policy": policy, "x_axes": len(axes), "lifted": lifted}
+    (values,) = apply(values_at, inputs, [[*axes, *shape]], [space.dtype if shape else np.float64], **fixed)
     if quantity == "point":
         values.attrs = dict(points.attrs)
     return timed_by(values, times, dim).rename(quantity)

@@ -13,8 +13,7 @@ from .._arrays import as_array, short_repr
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
-from .._spaces import Array, Euclidean, Product, Space
-from .._spaces import space as space_named
+from .._spaces import Array, Euclidean, Product, Space, space_named
 from ._blocks import Inputs, values_at
 
 # A curve of numbers that stands still raises for every invalid option.
@@ -54,22 +53,14 @@ def spec_of(
         _refuse_other_times(da, dim)
     t = da[dim].values if dim in da.coords else None
     still = np.zeros((da.sizes[dim], 1))
-    CubicSpline(
-        t,
-        still,
-        LINE,
-        bc_type=joined(kinds, (np.zeros(1), np.zeros(1))),
-        **options,
-    )
+    CubicSpline(t, still, LINE, bc_type=joined(kinds, (np.zeros(1), np.zeros(1))), **options)
     own = [dim, *point_dims]
     curves = [d for d in da.dims if d not in own]
     inputs: Inputs = [(da, own)]
     names = []
     if where is not None:
         if not isinstance(where, xr.DataArray) or where.dtype != bool or not set(where.dims) <= set(curves):
-            raise ValidationError(
-                f"where must be a DataArray of bool whose dimensions are among {tuple(curves)}"
-            )
+            raise ValidationError(f"where must be a DataArray of bool whose dimensions are among {tuple(curves)}")
         names.append("where")
         inputs.append((where, []))
     for name, vector in zip(("start", "end"), vectors, strict=True):
@@ -81,9 +72,7 @@ def spec_of(
 
 def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[str]) -> None:
     if isinstance(space, Product):
-        raise ValidationError(
-            f"{space} is a product, whose factors are independent; fit each factor separately"
-        )
+        raise ValidationError(f"{space} is a product, whose factors are independent; fit each factor separately")
     if not isinstance(point_dims, (tuple, list)) or len(point_dims) != len(space.point_shape):
         raise ValidationError(
             f"a point of {space} has shape {space.point_shape}, so point_dims must be {len(space.point_shape)} names "
@@ -91,9 +80,7 @@ def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[st
         )
     for name in (dim, *point_dims):
         if name not in da.dims:
-            raise ValidationError(
-                f"da has the dimensions {da.dims}, but not {name!r}; pass dim= and point_dims="
-            )
+            raise ValidationError(f"da has the dimensions {da.dims}, but not {name!r}; pass dim= and point_dims=")
     if len({dim, *point_dims}) <= len(point_dims):
         raise ValidationError(f"dim {dim!r} and point_dims {tuple(point_dims)} name a dimension twice")
     found = tuple(da.sizes[name] for name in point_dims)
@@ -138,9 +125,7 @@ def _are_times(name: Hashable, coordinate: xr.DataArray) -> bool:
     )
 
 
-def _vector(
-    vector: Any, name: str, space: Space, point_dims: Sequence[str], curves: list[Hashable]
-) -> xr.DataArray:
+def _vector(vector: Any, name: str, space: Space, point_dims: Sequence[str], curves: list[Hashable]) -> xr.DataArray:
     """A vector of an end condition."""
     if not isinstance(vector, xr.DataArray):
         array = as_array(vector, f"the {name} vector")
@@ -176,6 +161,4 @@ def rehearse(times: xr.DataArray, t: Array | None, nodes: int, policy: str) -> N
     """Raise now what the curves would raise about their times."""
     if times.chunks is None:
         still = np.zeros((nodes, 1))
-        values_at(
-            still, still, times.values, space=LINE, t=t, quantity="point", policy=policy, x_axes=times.ndim
-        )
+        values_at(still, still, times.values, space=LINE, t=t, quantity="point", policy=policy, x_axes=times.ndim)

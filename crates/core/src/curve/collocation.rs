@@ -1,5 +1,6 @@
 //! Linear equations g' = −A(t) g by Gauss collocation: a polynomial that approximates the solution along an interval.
 
+#[cfg(feature = "dense")]
 use nalgebra::{ComplexField, DMatrix};
 use std::sync::LazyLock;
 
@@ -67,6 +68,7 @@ pub fn nodes() -> &'static [f64; STAGES] {
 
 /// Legendre coefficients, over an interval of length h, of the matrix g with g' = −A g and g = 1 at its start. A is
 /// given at the nodes. NaN where A is NaN.
+#[cfg(feature = "dense")]
 pub fn solve<T: ComplexField<RealField = f64> + Copy>(h: f64, a: &[DMatrix<T>]) -> Vec<DMatrix<T>> {
     let k = a[0].nrows();
     let one = DMatrix::<T>::identity(k, k);
@@ -103,17 +105,19 @@ pub fn integrate(rates: &[f64; STAGES]) -> ([f64; STAGES], f64) {
 }
 
 /// Value at the end of the interval.
+#[cfg(feature = "dense")]
 pub fn end<T: ComplexField<RealField = f64> + Copy>(coefficients: &[DMatrix<T>]) -> DMatrix<T> {
     let k = coefficients[0].nrows();
     coefficients.iter().fold(DMatrix::zeros(k, k), |sum, c| sum + c)
 }
 
 /// The size of the last coefficients, which bounds the truncation error.
+#[cfg(feature = "dense")]
 pub fn tail<T: ComplexField<RealField = f64> + Copy>(coefficients: &[DMatrix<T>]) -> f64 {
     coefficients[STAGES - 1..].iter().flat_map(|c| c.iter()).fold(0.0, |most, x| x.modulus().max(most))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dense"))]
 mod tests {
     use super::*;
     use nalgebra::Complex;

@@ -5,6 +5,7 @@ mod bspline;
 mod collocation;
 pub(crate) mod data;
 mod evaluate;
+#[cfg(feature = "dense")]
 mod lift;
 mod locate;
 mod sample_cursor;
@@ -14,5 +15,6 @@ pub use bezier::Segment;
 pub use bspline::{BSpline, evaluate_bspline};
 pub use data::{Curves, Job, Outside, Quantity, Times};
 pub use evaluate::evaluate;
+#[cfg(feature = "dense")]
 pub use lift::{lift, lift_knots};
 pub use transport::transport;

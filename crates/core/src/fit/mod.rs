@@ -102,6 +102,10 @@ pub fn fit(
             let transported = problem.across_closure(space, curve, &own[..len]);
             own[problem.segments(curve) * len..].copy_from_slice(&transported);
         }
+        if report.status == Status::Converged && !own.iter().all(|u| u.is_finite()) {
+            // Points whose differences per unit of time exceed the largest floating-point number.
+            (report.status, report.residual) = (Status::Unconverged, f64::INFINITY);
+        }
         if report.status == Status::Converged
             && let Some(missed) = rounded::missed(space, problem, curve, own, report.condition)
         {

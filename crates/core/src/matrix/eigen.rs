@@ -1,11 +1,13 @@
 //! Jacobi's method: eigenvalues and singular values of small matrices in SIMD lanes.
 //!
 //! Every lane rotates until it has converged and then does not change, whatever its neighbours require. Larger
-//! matrices are diagonalised by a library up to rounding, and completed here.
+//! matrices are diagonalised by a library up to rounding, and completed here, with the feature `dense`.
 
 use super::base::{Matrix, Storage};
+#[cfg(feature = "dense")]
 use super::blocked::LARGE;
 use super::entry::{Entry, conjugate, inner_add, mul_add};
+#[cfg(feature = "dense")]
 use super::large::{eigenvectors, in_basis};
 use crate::scalar::{Each, Lane, few, lane, max_or_nan};
 
@@ -16,6 +18,7 @@ const NEGLIGIBLE: f64 = 1e-17;
 /// Commuting matrices do not commute after rounding: pairs below this limit are as diagonal as possible.
 const NEGLIGIBLE_PAIR: f64 = 2.0 * f64::EPSILON;
 /// A sum of the cosine and this multiple of the sine coincides for two angles only by chance.
+#[cfg(feature = "dense")]
 const GENERIC: f64 = 0.414_213_562_373_095;
 
 /// The rotation `[[c, −s̄], [s, c]]` whose first column is the eigenvector of `[[α, β], [β̄, −α]]` that
@@ -84,14 +87,17 @@ fn diagonalize_in<const D: usize>(n: usize, numbers: &mut [Vec<Lane>]) -> Vec<La
     let mut all: Vec<Matrix<Lane, D>> = numbers.iter().map(|x| Matrix::read(n, n, x)).collect();
     let a = &mut all[..];
     let pair = a.len() > 1;
-    let mut v = Matrix::identity(n);
+    #[cfg_attr(not(feature = "dense"), expect(unused_mut))]
+    let (mut v, mut nearly_diagonal) = (Matrix::identity(n), false);
+    #[cfg(feature = "dense")]
     if n >= LARGE {
         // Eigenvalues that coincide in both matrices, or by chance in this sum, are separated below.
         v = eigenvectors(&if pair { &a[0] + &a[1].scaled(lane(GENERIC)) } else { a[0].clone() });
         a.iter_mut().for_each(|a| *a = in_basis(a, &v));
+        nearly_diagonal = true;
     }
     let size = a.iter().fold(Lane::ZERO, |m, a| max_or_nan(m, a.size()));
-    let negligible = size * lane(if !pair && n < LARGE { NEGLIGIBLE } else { NEGLIGIBLE_PAIR });
+    let negligible = size * lane(if pair || nearly_diagonal { NEGLIGIBLE_PAIR } else { NEGLIGIBLE });
     let square = negligible * negligible;
     for _ in 0..MAX_SWEEPS {
         let mut moved = false;

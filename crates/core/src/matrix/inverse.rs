@@ -1,9 +1,12 @@
 //! The inverse of a matrix, with its derivatives.
 
 use super::base::{Matrix, Storage};
+#[cfg(feature = "dense")]
 use super::dense::determinant;
 use super::entry::{inner_add, mul_add};
-use crate::scalar::{Each, Lane, Scalar, few, lane};
+#[cfg(feature = "dense")]
+use crate::scalar::lane;
+use crate::scalar::{Each, Lane, Scalar, few};
 
 /// `A⁻¹`; not finite on lanes where A is singular.
 pub fn inverse<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
@@ -62,6 +65,7 @@ fn exchange<const D: usize, A: Storage>(m: &mut Matrix<Lane, D, A>, (p, q): (usi
 }
 
 /// `|det A|` to the power −1/n: the factor that scales the determinant to size one. One if that is not finite.
+#[cfg(feature = "dense")]
 pub(super) fn balance<const D: usize, A: Storage>(a: &Matrix<Lane, D, A>) -> Lane {
     let det = determinant(a);
     let size = inner_add(det, det, Lane::ZERO).sqrt();

@@ -10,11 +10,14 @@ mod dense;
 mod eigen;
 mod entry;
 mod function;
+#[cfg(feature = "dense")]
 mod general;
 mod inverse;
+#[cfg(feature = "dense")]
 mod large;
 mod moved;
 mod products;
+#[cfg(feature = "dense")]
 mod schur;
 mod select;
 mod series;
@@ -26,9 +29,11 @@ pub use eigen::{diagonalize, orthogonalize, sort_columns};
 pub use entry::{Entry, multiply_add};
 pub(crate) use function::GAUSS;
 pub use function::{Unary, from_parts, function_of, parts_of, polar};
+#[cfg(feature = "dense")]
 pub use general::{exp_any_minus_one, log_any_one_plus};
 pub use inverse::inverse;
 pub use moved::Moved;
+#[cfg(feature = "dense")]
 pub use schur::{largest_argument, largest_imaginary};
 pub use select::{Select, by_size};
 pub use series::{arc, exp_minus_one, exp_skew_minus_one, log_one_plus, log_one_plus_alike, trig};

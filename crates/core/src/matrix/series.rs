@@ -77,6 +77,7 @@ impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
     }
 
     /// For any matrix. The theorem requires complex numbers if the entries are complex.
+    #[cfg(feature = "dense")]
     pub(super) fn of_any(h: &'a Matrix<S, D, A>, terms: usize) -> Self {
         let known = match h.rows() {
             1 if D == 1 => Known::Itself,

@@ -1,0 +1,101 @@
+//! Independent items of work on all cores.
+
+#[cfg(feature = "rayon")]
+mod pool;
+
+use crate::monitor::Monitor;
+use crate::scalar::LANES;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+static THREADS: AtomicUsize = AtomicUsize::new(0);
+
+/// Limits the number of threads; 0 means all cores.
+pub fn set_num_threads(n: usize) {
+    THREADS.store(n, Ordering::Relaxed);
+}
+
+/// The number of threads that parallel work uses: 1 without the feature `rayon`.
+pub fn num_threads() -> usize {
+    if cfg!(not(feature = "rayon")) {
+        return 1;
+    }
+    match THREADS.load(Ordering::Relaxed) {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    }
+}
+
+/// The number of rows of `len` numbers per item of work: at most `most`, and so few for long rows that cancellation
+/// is quick. A multiple of the number of lanes.
+pub fn block(most: usize, len: usize) -> usize {
+    (most * 4 / len.max(4)).max(1).next_multiple_of(LANES).min(most)
+}
+
+/// Calls `work` on every item, on all cores if `parallel` is true. Stops early if the monitor is cancelled.
+pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
+    // To determine the number of cores the system reads files, which takes longer than a small fit.
+    #[cfg(feature = "rayon")]
+    if parallel
+        && items.len() > 1
+        && let cores = num_threads()
+        && cores > 1
+        && let Some(pool) = pool::pool(cores)
+    {
+        return pool::for_each(pool, cores.min(items.len()), items, monitor, work);
+    }
+    let _ = parallel;
+    for item in items {
+        if monitor.poll() {
+            return;
+        }
+        work(item);
+    }
+}
+
+#[cfg(all(test, feature = "rayon"))]
+mod tests {
+    use super::*;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::sync::{Condvar, Mutex, mpsc};
+    use std::time::Duration;
+
+    #[test]
+    fn two_items_run_concurrently() {
+        set_num_threads(2);
+        let quiet = |_| true;
+        let both = (Mutex::new(0), Condvar::new());
+        let met = AtomicUsize::new(0);
+        // Each item waits for the other.
+        for_each(vec![(); 2], true, &Monitor::new(&quiet), |()| {
+            *both.0.lock().unwrap() += 1;
+            both.1.notify_all();
+            let here = both.0.lock().unwrap();
+            let wait = both.1.wait_timeout_while(here, Duration::from_secs(5), |here| *here < 2);
+            met.fetch_add(usize::from(!wait.unwrap().1.timed_out()), Ordering::Relaxed);
+        });
+        assert_eq!(met.into_inner(), 2);
+    }
+
+    #[test]
+    fn a_panic_of_a_thread_reaches_the_caller_at_once() {
+        set_num_threads(2);
+        let (send, receive) = mpsc::channel();
+        std::thread::spawn(move || {
+            let quiet = |_| true;
+            let begun = AtomicUsize::new(0);
+            let work = |i: usize| {
+                begun.fetch_add(1, Ordering::Relaxed);
+                assert!(i != 3, "the fourth item");
+                std::thread::sleep(Duration::from_millis(5));
+            };
+            let run = || for_each((0..10_000).collect(), true, &Monitor::new(&quiet), work);
+            let failed = catch_unwind(AssertUnwindSafe(run)).is_err();
+            // Nobody listens any more if this comes too late.
+            let _ = send.send((failed, begun.load(Ordering::Relaxed)));
+        });
+        let (failed, begun) = receive.recv_timeout(Duration::from_secs(2)).expect("the call returns");
+        // The other threads continue while the panic and its backtrace are printed, which takes some tenths of a
+        // second.
+        assert!(failed && begun < 1000);
+    }
+}

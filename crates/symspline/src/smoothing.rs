@@ -1,0 +1,378 @@
+//! Curves close to noisy data.
+
+use crate::curves::{Curves, rows};
+use crate::error::Error;
+use crate::point::Point;
+use crate::space::Space;
+use crate::spline::{Builder, CubicSpline, Extrapolate, Report};
+use std::ops::Deref;
+use symspline_engine::monitor::Monitor;
+use symspline_engine::smoothing::{self as engine, Data, EndCondition, Observations, State, Tier};
+use symspline_engine::space::{Ambient, Erased};
+use symspline_engine::validate;
+
+/// The cube of the time between the first and the last datum must not overflow.
+const LONGEST: f64 = 1e100;
+/// The C² residual that suffices for a curve through smoothed points.
+const ENOUGH: f64 = 1e-8;
+
+/// The criterion that chooses λ from the data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Criterion {
+    /// Generalised cross-validation.
+    #[default]
+    Gcv,
+    /// Restricted maximum likelihood.
+    Reml,
+    /// Mallows' C_p, for a known standard deviation of the noise.
+    Cp,
+}
+
+/// The loss of a residual.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Loss {
+    /// Its square.
+    #[default]
+    Linear,
+    /// Its square if it is small, and linear beyond: for data with outliers.
+    Huber,
+    /// Almost constant for large residuals: for data with many outliers.
+    Cauchy,
+}
+
+/// The options of smoothing: the curve γ with the smallest `Σ wₖ d(yₖ, γ(tₖ))² + λ ∫ |∇γ'|² dt`.
+///
+/// # Examples
+/// ```
+/// use symspline::prelude::*;
+///
+/// // A quarter of a circle with noise.
+/// let times: Vec<f64> = (0..40).map(|i| i as f64 / 39.0).collect();
+/// let noise = |i: f64| 0.02 * (37.0 * i).sin() * (11.0 * i).cos();
+/// let noisy: Vec<[f64; 3]> = times
+///     .iter()
+///     .map(|t| {
+///         let (angle, height) = (1.5 * t + noise(40.0 * t), noise(17.0 + 40.0 * t));
+///         [height.cos() * angle.cos(), height.cos() * angle.sin(), height.sin()]
+///     })
+///     .collect();
+/// let soft = Smoothing::default().loss(Loss::Huber).fit(Sphere::<3>, &times, &noisy)?;
+/// let direction = soft.at(0.5);
+/// assert!((direction[0] - 0.75_f64.cos()).abs() < 0.02);
+/// assert!(soft.std(0.5) < soft.smoothing_report().sigma);
+/// # Ok::<(), Error>(())
+/// ```
+#[derive(Clone, Debug)]
+#[must_use = "the options do nothing before `fit`"]
+pub struct Smoothing {
+    criterion: Criterion,
+    loss: Loss,
+    lam: Option<f64>,
+    sigma: Option<f64>,
+    weights: Option<Vec<f64>>,
+    knots: Option<Vec<f64>>,
+    periodic: bool,
+    tol: f64,
+    max_iter: usize,
+    point_tol: f64,
+    extrapolate: Extrapolate,
+}
+
+impl Default for Smoothing {
+    fn default() -> Self {
+        Smoothing {
+            criterion: Criterion::Gcv,
+            loss: Loss::Linear,
+            lam: None,
+            sigma: None,
+            weights: None,
+            knots: None,
+            periodic: false,
+            tol: 1e-3,
+            max_iter: 50,
+            point_tol: 1e-8,
+            extrapolate: Extrapolate::Error,
+        }
+    }
+}
+
+impl Smoothing {
+    /// The criterion that chooses λ; by default [`Criterion::Gcv`].
+    pub fn criterion(mut self, criterion: Criterion) -> Self {
+        self.criterion = criterion;
+        self
+    }
+
+    /// The loss of a residual; by default its square.
+    pub fn loss(mut self, loss: Loss) -> Self {
+        self.loss = loss;
+        self
+    }
+
+    /// λ; by default it is chosen from the data. 0 is the curve of least squares.
+    pub fn lam(mut self, lam: f64) -> Self {
+        self.lam = Some(lam);
+        self
+    }
+
+    /// The standard deviation of the noise in a coordinate at weight one; by default it is estimated.
+    pub fn sigma(mut self, sigma: f64) -> Self {
+        self.sigma = Some(sigma);
+        self
+    }
+
+    /// One weight per point, up to a factor one over the variance of its noise; by default 1. Points of weight 0 are not
+    /// used.
+    pub fn weights(mut self, weights: &[f64]) -> Self {
+        self.weights = Some(weights.to_vec());
+        self
+    }
+
+    /// The knots of the curve, from the first to the last time; by default all times.
+    pub fn knots(mut self, knots: &[f64]) -> Self {
+        self.knots = Some(knots.to_vec());
+        self
+    }
+
+    /// Makes the curve periodic, with the first and the last knot as one period.
+    pub fn periodic(mut self) -> Self {
+        self.periodic = true;
+        self
+    }
+
+    /// The distance from the space at which a point is refused; by default 1e-8.
+    pub fn point_tol(mut self, point_tol: f64) -> Self {
+        self.point_tol = point_tol;
+        self
+    }
+
+    /// What the curve does at times outside its knots; by default they are an error.
+    pub fn extrapolate(mut self, extrapolate: Extrapolate) -> Self {
+        self.extrapolate = extrapolate;
+        self
+    }
+
+    /// Fits a curve close to noisy points. Times do not decrease; they may repeat.
+    ///
+    /// # Errors
+    /// If the input is invalid, or if the data do not determine a curve.
+    pub fn fit<S: Space, P: Point<S>>(
+        &self,
+        space: S,
+        times: &[f64],
+        points: &[P],
+    ) -> Result<SmoothingSpline<S, P>, Error> {
+        for (name, value) in [("lam", self.lam), ("sigma", self.sigma), ("point_tol", Some(self.point_tol))] {
+            if let Some(value) = value.filter(|value| !(*value >= 0.0 && value.is_finite())) {
+                return Err(Error::InvalidOption { name, value, requirement: "a finite number >= 0" });
+            }
+        }
+        let table = space.table()?;
+        let handle = Erased(&*table);
+        let len = handle.point_len();
+        let (mut numbers, offsets) = rows::<S, P>(len, &[points])?;
+        let same_length = |what, found| match found == points.len() {
+            true => Ok(()),
+            false => Err(Error::LengthMismatch { curve: 0, what, expected: points.len(), found }),
+        };
+        same_length("times", times.len())?;
+        let ones = vec![1.0; points.len()];
+        let weights = self.weights.as_deref().unwrap_or(&ones);
+        same_length("weights", weights.len())?;
+        if let Some(index) = weights.iter().position(|w| !(*w >= 0.0 && w.is_finite())) {
+            return Err(Error::InvalidWeight { index, weight: weights[index] });
+        }
+        not_decreasing(times)?;
+        validate::points(&handle, &mut numbers, &offsets, self.point_tol).map_err(Error::of_input)?;
+        let knots = self.knots_for(times, weights)?;
+        let period = self.periodic.then(|| knots[knots.len() - 1] - knots[0]);
+        let own = Observations::new(times, &numbers, weights, &[], len, period);
+        let data = Data {
+            times: &own.times,
+            points: &own.points,
+            weights: &own.weights,
+            information: &[],
+            knots: &knots,
+            lam: self.lam,
+            sigma: self.sigma,
+            ends: [&[], &[]],
+        };
+        let ends = if self.periodic {
+            engine::Ends::Periodic
+        } else {
+            engine::Ends::Open([EndCondition::Natural; 2])
+        };
+        let options = engine::Options {
+            criterion: match self.criterion {
+                Criterion::Gcv => engine::Criterion::Gcv { gamma: 1.0 },
+                Criterion::Reml => engine::Criterion::Reml,
+                Criterion::Cp => engine::Criterion::Cp,
+            },
+            loss: match self.loss {
+                Loss::Linear => engine::Loss::Linear,
+                Loss::Huber => engine::Loss::Huber,
+                Loss::Cauchy => engine::Loss::Cauchy,
+            },
+            tier: Tier::Auto,
+            ends,
+            tol: self.tol,
+            max_iter: self.max_iter,
+            raise_lam: self.lam.is_none(),
+        };
+        let go_on = |_| true;
+        let found = engine::smooth(&handle, &[data], &options, &Monitor::new(&go_on)).remove(0);
+        failure(found.report.state)?;
+        let builder: Builder<S, P> =
+            CubicSpline::builder(space).ends(natural(self.periodic)).extrapolate(self.extrapolate);
+        let offsets = vec![0, found.knots.len()];
+        let (curves, reports) = Curves::through(&builder, table, found.knots, true, found.points, offsets)?;
+        // Knots that nearly coincide leave a residual of rounding errors, which is small compared with the noise.
+        let error = Error::of_fit(0, &reports[0], &curves.table(), ENOUGH);
+        if let Some(error) = error.filter(|_| !(reports[0].residual < ENOUGH)) {
+            return Err(error);
+        }
+        let report = found.report;
+        Ok(SmoothingSpline {
+            spline: CubicSpline { curves, report: Report::new(&reports[0]) },
+            inverse: found.inverse,
+            ends,
+            // A spline with other knots than the times of the data has no freedom between its knots.
+            between: if self.knots.is_some() { 0.0 } else { report.band_lam },
+            report: SmoothingReport {
+                lam: report.lam,
+                df: report.freedom,
+                sigma: self.sigma.unwrap_or(report.sigma),
+                iterations: report.iterations,
+            },
+        })
+    }
+
+    /// The knots: those given, or all times of data with a weight.
+    fn knots_for(&self, times: &[f64], weights: &[f64]) -> Result<Vec<f64>, Error> {
+        let (start, end) = (times[0], times[times.len() - 1]);
+        let knots = match &self.knots {
+            Some(knots) => knots.clone(),
+            None => {
+                let mut knots = times.to_vec();
+                knots.dedup();
+                knots
+            }
+        };
+        if knots.len() < 2
+            || !weights.iter().zip(times).any(|(w, t)| *w > 0.0 && *t > first_used(times, weights))
+        {
+            return Err(Error::NotSmoothed {
+                reason: "a curve needs data of positive weight at two or more times, and two or more knots",
+            });
+        }
+        validate::knots(&knots, 0).map_err(Error::of_input)?;
+        if knots[0] > start || knots[knots.len() - 1] < end {
+            return Err(Error::NotSmoothed {
+                reason: "knots must reach from the first to the last time of the data",
+            });
+        }
+        Ok(knots)
+    }
+}
+
+/// The first time of data with a weight.
+fn first_used(times: &[f64], weights: &[f64]) -> f64 {
+    times.iter().zip(weights).find(|(_, w)| **w > 0.0).map_or(f64::INFINITY, |(t, _)| *t)
+}
+
+fn natural<T>(periodic: bool) -> crate::Ends<T> {
+    if periodic {
+        crate::Ends::Periodic
+    } else {
+        crate::Ends::Open([crate::End::Natural, crate::End::Natural])
+    }
+}
+
+/// Times are finite, do not decrease, and do not span too much.
+fn not_decreasing(times: &[f64]) -> Result<(), Error> {
+    if let Some(node) = times.iter().position(|t| !t.is_finite()) {
+        return Err(Error::TimeNotFinite { curve: 0, node, time: times[node] });
+    }
+    match (1..times.len()).find(|&i| times[i] < times[i - 1]) {
+        Some(node) => {
+            Err(Error::UnsortedTimes { curve: 0, node, before: times[node - 1], time: times[node] })
+        }
+        None if times[times.len() - 1] - times[0] > LONGEST => Err(Error::TimesTooFarApart { curve: 0 }),
+        None => Ok(()),
+    }
+}
+
+/// The error of a curve that could not be smoothed.
+fn failure(state: State) -> Result<(), Error> {
+    let reason = match state {
+        State::Converged => return Ok(()),
+        State::Running | State::Unconverged => {
+            "the smoothing did not converge: pass lam, or check units and signs"
+        }
+        State::Unsettled => "the choice of lam did not converge: pass lam, or another criterion",
+        State::NoCurve => {
+            "no spline joins the smoothed points: pass more knots in the gaps of the data, or a larger lam"
+        }
+        State::Undetermined => {
+            "the data do not determine the curve: pass fewer knots, or remove tiny weights"
+        }
+    };
+    Err(Error::NotSmoothed { reason })
+}
+
+/// How smoothing went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SmoothingReport {
+    /// λ.
+    pub lam: f64,
+    /// Degrees of freedom per coordinate: 2 for a geodesic, the number of data for interpolation.
+    pub df: f64,
+    /// The standard deviation of the noise in a coordinate at weight one.
+    pub sigma: f64,
+    /// The number of iterations.
+    pub iterations: usize,
+}
+
+/// A spline close to noisy points. It has the methods of [`CubicSpline`].
+#[derive(Clone, Debug)]
+pub struct SmoothingSpline<S: Space, P: Point<S>> {
+    spline: CubicSpline<S, P>,
+    inverse: Vec<f64>,
+    ends: engine::Ends,
+    between: f64,
+    report: SmoothingReport,
+}
+
+impl<S: Space, P: Point<S>> Deref for SmoothingSpline<S, P> {
+    type Target = CubicSpline<S, P>;
+
+    fn deref(&self) -> &CubicSpline<S, P> {
+        &self.spline
+    }
+}
+
+impl<S: Space, P: Point<S>> SmoothingSpline<S, P> {
+    /// The curve without its data.
+    pub fn into_spline(self) -> CubicSpline<S, P> {
+        self.spline
+    }
+
+    /// How smoothing went.
+    pub fn smoothing_report(&self) -> &SmoothingReport {
+        &self.report
+    }
+
+    /// The standard deviation of the curve at a time, in one coordinate of an orthonormal frame. Beyond the knots it is
+    /// that of a curve that continues with constant velocity, or periodically.
+    ///
+    /// # Panics
+    /// If the time is NaN or infinite.
+    #[track_caller]
+    pub fn std(&self, time: f64) -> f64 {
+        assert!(time.is_finite(), "the time is {time}, but times must be finite");
+        let knots = self.spline.times();
+        let variance = engine::variance(knots, &self.inverse, self.between, self.ends, &[time], 0);
+        self.report.sigma * variance[0].sqrt()
+    }
+}
