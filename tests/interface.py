@@ -5,19 +5,7 @@ import inspect
 from pathlib import Path
 
 SNAPSHOT = Path(__file__).with_name("interface.txt")
-MODULES = [
-    "",
-    "convert",
-    "geo",
-    "jax",
-    "manifolds",
-    "poses",
-    "quantum",
-    "rotations",
-    "shapes",
-    "subspaces",
-    "tensors",
-]
+MODULES = ["", "convert", "geo", "jax", "manifolds", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors"]
 MODULES += ["testing", "xarray"]
 
 

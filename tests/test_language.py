@@ -67,10 +67,7 @@ RETIRED = [
     Retired("left out", "masked, omitted", r"\b(left|leaves?) out\b", "points that are left out"),
     Retired("stands for", "represents", r"\bstands? for\b", "an array stands for a point"),
     Retired(
-        "follows its data",
-        "sensitivity",
-        r"\bhow (it|an?|the) ?(curve|spline)? follows\b",
-        "how the curve follows",
+        "follows its data", "sensitivity", r"\bhow (it|an?|the) ?(curve|spline)? follows\b", "how the curve follows"
     ),
     Retired("push", "forward mode", r"\bpush(es|ed)?\b", "push a change through"),
     Retired("pull", "reverse mode", r"\bpull(ed)? back\b", "a gradient is pulled back"),
@@ -82,12 +79,7 @@ RETIRED = [
     Retired("seam", "periodic ends", r"\bseams?\b", "the seam of closed curves"),
     Retired("side by side", "SIMD lanes", r"\b(eight|several) \w+ side by side\b", "eight curves side by side"),
     Retired("beside the diagonal", "bandwidth", r"\bbeside the diagonal\b", "places beside the diagonal"),
-    Retired(
-        "one a",
-        "one per",
-        r"\bone an? (curve|factor|knot|line|point|row|vessel)\b",
-        "a λ for each, one a factor",
-    ),
+    Retired("one a", "one per", r"\bone an? (curve|factor|knot|line|point|row|vessel)\b", "a λ for each, one a factor"),
 ]
 
 

@@ -54,19 +54,21 @@ def test_t_and_points_of_an_npz_file(run, fails):
     np.savez("b.npz", when=[0, 1, 3], u=np.eye(3)[:, :2], w=np.eye(3)[:, 2])
     run("fit b.npz --space s:2 --time when --columns u,w -o curve2.npz")
     assert ss.load("curve.npz") == ss.load("curve2.npz")
-    np.savez("c.npz", t=[0, 1], points=np.eye(3))
-    assert fails("fit c.npz --space s:2 -o d.npz") == "c.npz: arrays differ in length: 2 and 3"
-    np.savez("c.npz", t=[0, 1, np.inf], points=np.eye(3))
-    assert "c.npz, row 2 (counted from 0): column 't' holds inf" in fails("fit c.npz --space s:2 -o d.npz")
-    np.savez("c.npz", t=np.array(["2020-01-01", "NaT"], "datetime64[D]"), points=np.eye(2))
-    assert "column 't' holds no time" in fails("fit c.npz --space s:1 -o d.npz")
-    assert "did you mean 'points'?" in fails("fit c.npz --space s:1 --columns point -o d.npz")
-    np.savez("c.npz", t=[], points=np.empty((0, 2)))
-    assert fails("fit c.npz --space s:1 -o d.npz") == "c.npz has no rows"
-    np.savez("c.npz", t=[0, 1], points=np.array([["a"], ["b"]]))
-    assert "not numbers" in fails("fit c.npz --space r:1 -o d.npz")
-    np.savez("c.npz", t=np.array([{}, {}]))
-    assert "c.npz: entry 't' holds Python objects" in fails("fit c.npz --space r:1 -o d.npz")
+    for arrays, options, problem in [
+        ({"t": [0, 1], "points": np.eye(3)}, "--space s:2", "c.npz: arrays differ in length: 2 and 3"),
+        (
+            {"t": [0, 1, np.inf], "points": np.eye(3)},
+            "--space s:2",
+            "c.npz, row 2 (counted from 0): column 't' holds inf",
+        ),
+        ({"t": np.array(["2020", "NaT"], "M8[D]"), "points": np.eye(2)}, "--space s:1", "column 't' holds no time"),
+        ({"t": [0, 1], "points": np.eye(2)}, "--space s:1 --columns point", "did you mean 'points'?"),
+        ({"t": [], "points": np.empty((0, 2))}, "--space s:1", "c.npz has no rows"),
+        ({"t": [0, 1], "points": np.array([["a"], ["b"]])}, "--space r:1", "not numbers"),
+        ({"t": np.array([{}, {}])}, "--space r:1", "c.npz: entry 't' holds Python objects"),
+    ]:
+        np.savez("c.npz", **arrays)
+        assert problem in fails(f"fit c.npz {options} -o d.npz")
     assert "was fitted already" in fails("fit curve.npz --space s:2 -o d.npz")
     write("e.npz", "no zip")
     assert fails("fit e.npz --space s:2 -o d.npz") == "e.npz is not an NPZ file"

@@ -29,16 +29,6 @@ def test_a_track_across_the_date_line(run):
     assert np.abs(acceleration[[0, -1]]).max() < 1e-12 * np.abs(acceleration).max()  # natural ends
 
 
-def test_a_track_over_the_pole(run):
-    write("a.csv", "t,Longitude,LATITUDE\n0,10,88\n1,10,90\n2,190,88\n")
-    run("fit a.csv --lonlat -o a.npz")
-    run("sample a.npz --every 0.5 --nu 0,1 -o b.csv")
-    columns = table("b.csv")
-    assert list(columns)[:3] == ["t", "Longitude", "LATITUDE"]
-    np.testing.assert_allclose(numbers(columns, "LATITUDE")[:, 0], [88, 89, 90, 89, 88], atol=1e-9)
-    np.testing.assert_allclose(np.hypot(*numbers(columns, "east_d1", "north_d1").T), 2, atol=1e-9)
-
-
 def test_lonlat_by_column_names(run, fails):
     write("a.csv", "t,b,l\n0,50,7\n1,51,8\n")
     run("fit a.csv --lonlat --columns l,b -o a.npz")
@@ -59,12 +49,6 @@ def test_lonlat_of_a_curve_that_was_made_in_python(run, fails):
     np.testing.assert_allclose(numbers(table("b.csv"), "lon", "lat")[:2], [[0, 0], [90, 0]], atol=1e-13)
     ss.CubicSpline(None, [[0], [1]], "r:1").save("c.npz")
     assert fails("sample c.npz -n 3 --lonlat -o b.csv") == "--lonlat is for sphere:2, not for euclidean:1"
-
-
-def test_longitudes_of_other_spaces(fails):
-    ss.CubicSpline(None, [[0.0, 0], [1, 2]], "r:2").save("a.npz")
-    np.savez("b.npz", **dict(np.load("a.npz")), columns='{"points": ["lon", "lat"], "lonlat": true}')
-    assert fails("check b.npz") == "b.npz is damaged: its names of columns do not suit euclidean:2"
 
 
 def test_longitudes_go_once_around_at_most(run, fails):

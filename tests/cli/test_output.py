@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -34,71 +33,22 @@ def test_output_that_cannot_be_written(run, fails, monkeypatch):
     assert fails("fit a.csv --space s:2 -o c.npz") == "cannot write c.npz: no permission to write into ."
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission(run, fails, folder):
-    write("a.csv", AXES)
-    folder.chmod(0o500)
-    try:
-        assert "no permission" in fails("fit a.csv --space s:2 -o a.npz")
-    finally:
-        folder.chmod(0o700)
-
-
-ENDINGS = pytest.mark.parametrize("ending", ["csv", "npz", "parquet", "png", "fit"])
-
-
-def written_into(ending, folder):
-    """A line that writes more than 16 kB into a folder, and the name of the file."""
-    if ending == "parquet":
-        pytest.importorskip("pyarrow")
-    if ending == "fit":
-        return f"fit long.csv --space r:1 -o {folder}/out.npz", f"{folder}/out.npz"
-    verb = "plot a.npz" if ending == "png" else "sample a.npz -n 3000"
-    return f"{verb} -o {folder}/out.{ending}", f"{folder}/out.{ending}"
-
-
-@ENDINGS
-def test_a_full_disk(curves, fails, folder, ending):
-    os.mkdir("disk")
-    mount = ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", "disk"]
-    if not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("only root can mount a small disk")
-    try:
-        line, out = written_into(ending, "disk")
-        write(out, "as it was")
-        assert fails(line) == f"cannot write {out}: No space left on device"
-        assert [(path.name, path.read_text()) for path in Path("disk").iterdir()] == [(out[5:], "as it was")]
-    finally:
-        subprocess.run(["umount", "disk"], check=True)
-
-
-@ENDINGS
+@pytest.mark.parametrize("ending", ["csv", "npz", "parquet", "png", "fit"])
 def test_writing_that_fails_midway(curves, fails, ending):
     resource = pytest.importorskip("resource")
-    line, out = written_into(ending, ".")
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    lines = {"fit": "fit long.csv --space r:1 -o out.npz", "png": "plot a.npz -o out.png"}
+    line = lines.get(ending, f"sample a.npz -n 3000 -o out.{ending}")
+    out = line.split()[-1]
     write(out, "as it was")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, hard))
     try:
-        assert fails(line) == f"cannot write {Path(out)}: File too large"
+        assert fails(line) == f"cannot write {out}: File too large"
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert Path(out).read_text() == "as it was"
-
-
-@pytest.mark.parametrize("where", ["fitting", "saving"])
-def test_interrupted(fails, monkeypatch, where):
-    def interrupt(file, *_, **__):
-        if where == "saving":
-            file.write(b"half of it")
-        raise KeyboardInterrupt
-
-    write("a.csv", AXES)
-    write("a.npz", "as it was")
-    target = {"fitting": "symspline.cli._fit.fit_many", "saving": "numpy.savez"}[where]
-    monkeypatch.setattr(target, interrupt)
-    assert fails("fit a.csv --space s:2 -o a.npz", code=130) == "interrupted"
-    assert Path("a.npz").read_text() == "as it was"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -160,6 +110,3 @@ def test_links_are_followed_and_pipes_refused(run, fails):
     assert fails("fit a.csv --space s:2 -o pipe.npz") == (
         "cannot write pipe.npz: it is a device, a pipe or a socket; give the name of a regular file"
     )
-    os.chmod("kept/curve.npz", 0o600)
-    run("fit a.csv --space s:2 -o a.npz")
-    assert os.stat("a.npz").st_mode & 0o777 == 0o600

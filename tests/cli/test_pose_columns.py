@@ -150,11 +150,8 @@ def test_tum_of_curves_from_matrices_and_dates(run):
 
 def test_bad_tum_trajectories(fails):
     for text, problem in [
-        ("", "a.tum is empty"),
         ("# x\n", "a.tum is empty"),
         ("# x\n0 1 2 3\n", "a.tum, line 2: 4 numbers, but a line of a TUM trajectory has 8: time tx ty tz qx"),
-        ("0 0 0 0 0 0 0 1\n1 0 0 x 0 0 0 1\n", "a.tum, line 2: column 'tz' holds 'x', which is not a number"),
-        ("0 0 0 0 0 0 0 1\n1 0 nan 0 0 0 0 1\n", "a.tum, line 2: column 'ty' holds nan"),
         ("0 0 0 0 0 0 0 1\n1 0 0 0 1 0 0 1\n", "a.tum, line 2: the quaternion has length 1.41421"),
         ("0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "a.tum, line 2: time 0.0 does not come after 0.0 in line 1"),
     ]:

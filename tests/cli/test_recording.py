@@ -8,45 +8,54 @@ from tabular import numbered, table, write, write_table
 import symspline as ss
 
 
-def line(t, x=None, name="a.csv", **more):
+def line(t, x=None, **more):
     columns = {"t": t, **more, "x": list(range(len(t))) if x is None else x}
     rows = zip(*columns.values(), strict=True)
-    write(name, "\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    write("a.csv", "\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
 
 
-def test_sort(run, fails):
+@pytest.fixture
+def fit(run):
+    """Fits numbers with some options, and returns the curve or the curves."""
+
+    def fit(options):
+        run(f"fit a.csv --space r:1 {options} -o a.npz")
+        return ss.load("a.npz")
+
+    return fit
+
+
+def through(t, x):
+    return ss.CubicSpline(t, np.reshape(x, (-1, 1)), "r:1")
+
+
+def test_sort(fit, fails):
     line([0, 3, 1, 2])
     problem = fails("fit a.csv --space r:1 -o a.npz")
     assert problem.startswith("a.csv, line 4: time 1.0 does not come after 3.0 in line 3")
     assert problem.endswith("times must increase; --sort puts rows in order")
-    run("fit a.csv --space r:1 --sort -o a.npz")
-    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2, 3], [[0], [2], [3], [1]], "r:1")
+    assert fit("--sort") == through([0, 1, 2, 3], [0, 2, 3, 1])
+    line([5, 0, 1, 4], id=[*"abba"])
+    assert fit("--curve id --sort") == {"a": through([4, 5], [3, 0]), "b": through([0, 1], [1, 2])}
     line([0, 3, 1, 1])
     problem = fails("fit a.csv --space r:1 --sort -o b.npz")
     assert problem.startswith("a.csv, line 5: time 1.0 does not come after 1.0 in line 4")
     assert problem.endswith("--dedup first or mean makes one point of them")
 
 
-def test_sort_within_every_curve(run):
-    line([5, 0, 1, 4], id=[*"abba"])
-    run("fit a.csv --space r:1 --curve id --sort -o a.npz")
-    found = ss.load("a.npz")
-    assert found["a"] == ss.CubicSpline([4, 5], [[3], [0]], "r:1")
-    assert found["b"] == ss.CubicSpline([0, 1], [[1], [2]], "r:1")
-
-
-def test_dedup(run, fails):
+def test_dedup(run, fit, fails):
     line([0, 0, 1, 2, 2, 2], [1, 3, 5, 1, 2, 6])
     out = run("fit a.csv --space r:1 --dedup first -o a.npz")
     assert out.endswith("; 3 rows omitted after another of their time (--dedup first)\n")
-    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[1], [5], [1]], "r:1")
-    run("fit a.csv --space r:1 --dedup mean -o a.npz")
-    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[2], [5], [3]], "r:1")
+    assert ss.load("a.npz") == through([0, 1, 2], [1, 5, 1])
+    assert fit("--dedup mean") == through([0, 1, 2], [2, 5, 3])
     line([0, 1, 0, 2], [1, 3, 5, 7])
     assert "line 4: time 0.0 does not come after 1.0" in fails("fit a.csv --space r:1 --dedup first -o b.npz")
-    run("fit a.csv --space r:1 --dedup mean --sort -o a.npz")
-    assert ss.load("a.npz") == ss.CubicSpline([0, 1, 2], [[3], [3], [7]], "r:1")
+    assert fit("--dedup mean --sort") == through([0, 1, 2], [3, 3, 7])
     assert "--dedup" in fails("fit a.csv --space r:1 --dedup last -o b.npz")
+    write("a.csv", "t,x,y,z\n0,1,0,0\n1,0,1,0\n1,0,-1,0\n")
+    problem = fails("fit a.csv --space s:2 --dedup mean -o a.npz")
+    assert problem.startswith("a.csv: points with one time are too far apart to have a mean; --dedup first")
 
 
 @pytest.mark.parametrize("name", ["s:2", "cp:2", "spd:3", "s:2 x so:3"])
@@ -58,43 +67,36 @@ def test_means_are_those_of_the_library(run, name):
     assert [ss.load("b.npz")] == ss.fit_segments(t, p, space, max_gap=9, duplicates="mean")
 
 
-def test_points_without_a_mean(fails):
-    write("a.csv", "t,x,y,z\n0,1,0,0\n1,0,1,0\n1,0,-1,0\n")
-    problem = fails("fit a.csv --space s:2 --dedup mean -o a.npz")
-    assert problem.startswith("a.csv: points with one time are too far apart to have a mean; --dedup first")
-
-
-def test_max_gap(run, fails):
+def test_max_gap(run, fit, fails):
     line([0, 1, 2, 12, 13, 40, 60, 61])
     out = run("fit a.csv --space r:1 --max-gap 5 -o a.npz")
     assert out.startswith("a.npz: 3 curves through 7 points") and out.endswith("; 1 row alone between gaps omitted\n")
-    found = ss.load("a.npz")
-    assert {name: spline.t.tolist() for name, spline in found.items()} == {"1": [0, 1, 2], "2": [12, 13], "3": [60, 61]}
-    assert found["2"] == ss.CubicSpline([12, 13], [[3], [4]], "r:1")
+    assert ss.load("a.npz") == {
+        "1": through([0, 1, 2], [0, 1, 2]),
+        "2": through([12, 13], [3, 4]),
+        "3": through([60, 61], [6, 7]),
+    }
     run("sample a.npz --every 1 -o b.csv")
     assert table("b.csv")["curve"] == [*"1112233"]
     # As long as the limit is no gap.
-    run("fit a.csv --space r:1 --max-gap 27 -o a.npz")
-    assert list(ss.load("a.npz")) == ["1"]
-    assert "every point is alone" in fails("fit a.csv --space r:1 --max-gap 0.5 -o c.npz")
-    assert "give a gap without a unit" in fails("fit a.csv --space r:1 --max-gap 5s -o c.npz")
-    assert "--max-gap soon: a duration is a number" in fails("fit a.csv --space r:1 --max-gap soon -o c.npz")
-
-
-def test_max_gap_of_dates_and_of_named_curves(run, fails):
+    assert list(fit("--max-gap 27")) == ["1"]
+    for gap, problem in [
+        ("0.5", "every point is alone"),
+        ("5s", "give a gap without a unit"),
+        ("soon", "--max-gap soon: a duration is a number"),
+    ]:
+        assert problem in fails(f"fit a.csv --space r:1 --max-gap {gap} -o c.npz")
     days = [f"2021-08-{day:02}" for day in (1, 2, 9, 10, 1, 2)]
     line(days, id=[*"aaaabb"])
-    run("fit a.csv --space r:1 --curve id --max-gap 36h -o a.npz")
-    assert list(ss.load("a.npz")) == ["a/1", "a/2", "b"]
-    run("fit a.csv --space r:1 --curve id --max-gap 604800 -o a.npz")
-    assert list(ss.load("a.npz")) == ["a", "b"]
+    assert list(fit("--curve id --max-gap 36h")) == ["a/1", "a/2", "b"]
+    assert list(fit("--curve id --max-gap 604800")) == ["a", "b"]
     line(days, id=["a", "a", "a", "a", "a/1", "a/1"])
     assert "two curves would have the name 'a/1'" in fails("fit a.csv --space r:1 --curve id --max-gap 36h -o b.npz")
 
 
 def test_options_that_need_times(fails):
+    write("a.csv", "x\n1\n2\n")
     for option in ["--sort", "--dedup first", "--max-gap 3"]:
-        write("a.csv", "x\n1\n2\n")
         problem = fails(f"fit a.csv --space r:1 {option} -o a.npz")
         assert problem.startswith(f"{option.split()[0]} needs times, and there is no column of times")
 

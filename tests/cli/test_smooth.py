@@ -1,10 +1,8 @@
 """Curves near noisy points: ``fit --smooth``."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from curves import each, parts
+from curves import parts
 from tabular import numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss
@@ -103,27 +101,9 @@ def test_smoothing_parameters_per_factor(run, line, options):
     assert f"so:3: λ {turning.lam:.3g}" in out and f"; euclidean:3: λ {place.lam:.3g}" in out
 
 
-def test_segments_of_two_points(run):
-    t = np.r_[T[:30], T[30:32] + 50, T[32:] + 200]
-    write_table("a.csv", {"t": t, "lon": LON, "lat": LAT})
-    for more in ("", "--robust", "--sigma 0.01"):
-        run(f"fit a.csv --lonlat --smooth --max-gap 5 {more} -o a.npz")
-        piece = ss.load("a.npz")["2"]
-        assert np.abs(piece.points - PLACES[30:32]).max() < 1e-10
-
-
 def test_a_bound_is_reported(run):
     write_table("b.csv", {"t": T, "x": T**2})
     assert "(at its bound), 60 degrees" in run("fit b.csv --space r:1 --smooth reml -o b.npz")
-
-
-def test_repeated_rows_are_merged(run):
-    i = np.sort(np.r_[np.arange(60), 30])
-    write_table("a.csv", {"t": T[i], "lon": LON[i], "lat": LAT[i]})
-    # Else cross-validation would take two points that agree exactly for data without noise.
-    assert "(at its bound)" not in run("fit a.csv --lonlat --smooth -o a.npz")
-    run("fit a.csv --lonlat --smooth --dedup first -o a.npz")
-    near(ss.load("a.npz"), ss.make_smoothing_spline(T, PLACES, "sphere:2"))
 
 
 def test_contradicting_options(fails):
@@ -140,7 +120,6 @@ def test_contradicting_options(fails):
         ("--smooth b.csv", "--smooth b.csv: give gcv, reml or a number; write the name of the table before"),
         ("--smooth 1_0", "--smooth 1_0: give gcv"),
         ("--smooth=-1", "--smooth -1: -1 is not a finite number >= 0"),
-        ("--smooth nan", "--smooth nan: nan is not a finite number >= 0"),
         ("--smooth 1,2", "lam must be a number, not (1.0, 2.0)"),
         ("--smooth --sigma small", "--sigma small: give a number such as 0.1"),
         ("--smooth --sigma 0", "--sigma 0: the standard deviation must be greater than 0"),
@@ -161,18 +140,3 @@ def test_samples_have_standard_deviations(run):
     assert [name for name in found if name.startswith("std")] == ["std", "std_d1"]
     assert np.array_equal(found["std"], np.degrees(spline.std(x)))
     assert np.array_equal(found["std_d1"], np.degrees(spline.std(x, nu=1)))
-
-
-def test_deviations_of_every_factor(run):
-    p = poses()
-    write_table("a.npz", {"t": T, **numbered(p)})
-    run("fit a.npz --space 'so:3 x r:3' --smooth -o b.npz")
-    spline = ss.load("b.npz")
-    run("sample b.npz -n 7 -o c.npz")
-    found = read_table("c.npz")
-    for i, expected in enumerate(spline.std(np.linspace(0, 59, 7)), 1):
-        assert np.array_equal(found[f"std{i}"], expected)
-    assert found["a0"].shape == each(np.shape, expected)
-    # Poses of TUM have no place for them.
-    run("sample b.npz -n 7 -o c.tum")
-    assert len(Path("c.tum").read_text().splitlines()) == 8

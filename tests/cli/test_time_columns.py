@@ -1,6 +1,7 @@
 """The column of times is found by its name and never ignored silently."""
 
 import numpy as np
+import pytest
 from tabular import table, write, write_table
 
 import symspline as ss
@@ -9,66 +10,58 @@ DATES = ["2021-08-29T00:00:00Z", "2021-08-29T06:00:00Z", "2021-08-29T18:00:00Z"]
 HOURS = np.array(["2021-08-29T00", "2021-08-29T06", "2021-08-29T18"], "datetime64[h]")
 
 
-def tabled(**columns):
+def write_columns(**columns):
     columns |= {"x": [0, 1, 5]}
     rows = zip(*columns.values(), strict=True)
     write("a.csv", "\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
 
 
-def test_dates_under_a_usual_name_are_the_time(run):
-    for name in [
-        "timestamp",
-        "ISO_TIME",
-        "Date",
-        "DateTime",
-        "date_time",
-        "#timestamp [ns]",
-        "BaseDateTime",
-        "Date (UTC)",
-        "utc",
-    ]:
-        write("a.csv", f"{name},x\n" + "".join(f"{date},{x}\n" for date, x in zip(DATES, [0, 1, 5], strict=True)))
-        run("fit a.csv --space r:1 -o a.npz")
-        np.testing.assert_array_equal(ss.load("a.npz").t, HOURS)
+@pytest.fixture
+def times(run):
+    """The knots of a curve through a table of these columns."""
+
+    def times(options="--columns x", **columns):
+        write_columns(**columns)
+        run(f"fit a.csv --space r:1 {options} -o a.npz")
+        return ss.load("a.npz").t.tolist()
+
+    return times
+
+
+def test_dates_under_a_usual_name_are_the_time(run, times):
+    names = ["timestamp", "ISO_TIME", "Date", "DateTime", "date_time", "#timestamp [ns]", "BaseDateTime", "Date (UTC)"]
+    for name in [*names, "utc"]:
+        assert times("", **{name: DATES}) == HOURS.astype("M8[s]").tolist()
         run("sample a.npz --every 6h -o b.csv")
         assert list(table("b.csv")) == [name, "x"]
+    # A date with the time of day needs no other columns.
+    assert times(ISO_TIME=DATES, year=[2021] * 3, hour=[0, 6, 18]) == HOURS.astype("M8[s]").tolist()
 
 
 def test_dates_in_arrays(run, fails):
     for ending in ["npz", "parquet"]:
-        for kind in ["text", "date"]:
-            dates = np.array([date[:-1] for date in DATES]) if kind == "text" else HOURS.astype("M8[s]")
+        for dates in (np.array([date[:-1] for date in DATES]), HOURS.astype("M8[s]")):
             write_table(f"a.{ending}", {"timestamp": dates, "x": np.array([0.0, 1, 5])})
             run(f"fit a.{ending} --space r:1 -o c.npz")
             np.testing.assert_array_equal(ss.load("c.npz").t, HOURS)
             write_table(f"a.{ending}", {"when": dates, "x": np.array([0.0, 1, 5])})
-            assert f"a.{ending}: when may hold the times; say --time when" in fails(
-                f"fit a.{ending} --space r:1 -o b.npz"
-            )
+            problem = fails(f"fit a.{ending} --space r:1 -o b.npz")
+            assert f"a.{ending}: when may hold the times; say --time when" in problem
+    np.savez("a.npz", t=np.array([0, 1, 2], "m8[s]"), x=[0.0, 1, 2])
+    assert "column 't' holds timedelta64[s], not numbers" in fails("fit a.npz --space r:1 -o b.npz")
 
 
-def test_dates_under_other_names(run, fails):
-    for cells in [
-        DATES,
-        ["29.8.2021", "30.8.2021", "31.8.2021"],
-        ["8/29/21", "8/30/21", "8/31/21"],
-        ["29 Aug 2021", "30 Aug 2021", "31 Aug 2021"],
-        ["Aug 29 2021", "Aug 30 2021", "Aug 31 2021"],
-        ["20210829T1655", "20210829T1755", "20210829T1855"],
-        ["16:55", "17:55", "18:55"],
-        ["", "2021-08-30", "2021-08-31"],
-    ]:
-        tabled(when=cells)
-        problem = fails("fit a.csv --space r:1 --columns x -o a.npz")
-        assert problem.startswith(
-            "a.csv: when may hold the times; say --time when, or --time none to number the points"
-        )
-        run("fit a.csv --space r:1 --time none -o a.npz")
-        assert ss.load("a.npz").t.tolist() == [0, 1, 2]
-
-
-def test_ambiguous_time_columns(fails):
+def test_columns_that_may_hold_the_times_raise(fails, times):
     for columns, named in [
+        ({"when": DATES}, "when"),
+        ({"when": ["29.8.2021", "30.8.2021", "31.8.2021"]}, "when"),
+        ({"when": ["8/29/21", "8/30/21", "8/31/21"]}, "when"),
+        ({"when": ["29 Aug 2021", "30 Aug 2021", "31 Aug 2021"]}, "when"),
+        ({"when": ["Aug 29 2021", "Aug 30 2021", "Aug 31 2021"]}, "when"),
+        ({"when": ["20210829T1655", "20210829T1755", "20210829T1855"]}, "when"),
+        ({"when": ["16:55", "17:55", "18:55"]}, "when"),
+        ({"when": ["", "2021-08-30", "2021-08-31"]}, "when"),
+        ({"seen": [20210829, 20210831, 20210901]}, "seen"),
         ({"timestamp": [0, 5, 9]}, "timestamp"),
         ({"time_ns": [0, 5, 9]}, "time_ns"),
         ({"year": [2001, 2002, 2005]}, "year"),
@@ -77,51 +70,22 @@ def test_ambiguous_time_columns(fails):
         ({"time": ["0000", "0600", "1200"], "date": [20210829] * 3}, "time, date"),
         ({"date": ["2021-08-29", "2021-08-30", "2021-08-31"], "hour": [0, 6, 18]}, "date, hour"),
     ]:
-        tabled(**columns)
+        write_columns(**columns)
         assert f"a.csv: {named} may " in fails("fit a.csv --space r:1 --columns x -o a.npz")
+        assert times("--columns x --time none", **columns) == [0, 1, 2]
 
 
-def test_a_date_with_time_needs_no_parts(run):
-    tabled(ISO_TIME=DATES, year=[2021] * 3, hour=[0, 6, 18])
-    run("fit a.csv --space r:1 --columns x -o a.npz")
-    np.testing.assert_array_equal(ss.load("a.npz").t, HOURS)
-
-
-def test_words_that_resemble_dates(run):
-    for cell in ("1.2.3", "10.0.0.1", "a-1-2", "12-34", "north"):
-        tabled(note=[cell] * 3)
-        run("fit a.csv --space r:1 --columns x -o a.npz")
-        assert ss.load("a.npz").t.tolist() == [0, 1, 2]
-
-
-def test_days_as_one_number_are_refused(run, fails):
-    tabled(date=[20210829, 20210831, 20210901])
-    problem = fails("fit a.csv --space r:1 --time date -o a.npz")
-    assert (
-        "a.csv, line 2: column 'date' holds 20210829, which is a day but not a number of days; write 2021-08-29"
-        in problem
-    )
-    tabled(date=[20210829, 20210899, 20210901])
-    run("fit a.csv --space r:1 --time date -o a.npz")
-
-
-def test_days_as_one_number_are_found_under_any_name(run, fails):
-    tabled(seen=[20210829, 20210831, 20210901])
-    assert "seen may hold the times; say --time seen" in fails("fit a.csv --space r:1 --columns x -o a.npz")
-    assert "which is a day but not a number" in fails("fit a.csv --space r:1 --columns x --time seen -o a.npz")
-    run("fit a.csv --space r:1 --columns x --time none -o a.npz")
+def test_other_columns_are_not_times(times):
+    for cells in (["1.2.3"] * 3, ["10.0.0.1"] * 3, ["a-1-2"] * 3, ["12-34"] * 3, ["north"] * 3):
+        assert times(note=cells) == [0, 1, 2]
     # No days: of another century, or with numbers that no month has.
     for cells in ([18990829, 18990830, 18990831], [20211329, 20211330, 20211331], [0.5, 20210829, 20210830]):
-        tabled(seen=cells)
-        run("fit a.csv --space r:1 --columns x -o a.npz")
+        assert times(seen=cells) == [0, 1, 2]
+    assert times("--time none", none=[3, 4, 5]) == [3, 4, 5]
 
 
-def test_a_column_called_none_is_a_column(run):
-    tabled(none=[3, 4, 5])
-    run("fit a.csv --space r:1 --time none -o a.npz")
-    assert ss.load("a.npz").t.tolist() == [3, 4, 5]
-
-
-def test_durations_are_not_times(fails):
-    np.savez("a.npz", t=np.array([0, 1, 2], "m8[s]"), x=[0.0, 1, 2])
-    assert "column 't' holds timedelta64[s], not numbers" in fails("fit a.npz --space r:1 -o b.npz")
+def test_days_as_one_number_are_refused(fails, times):
+    write_columns(date=[20210829, 20210831, 20210901])
+    problem = fails("fit a.csv --space r:1 --time date -o a.npz")
+    assert "line 2: column 'date' holds 20210829, which is a day but not a number of days; write 2021-08-29" in problem
+    assert times("--time date", date=[20210829, 20210899, 20210901]) == [20210829, 20210899, 20210901]

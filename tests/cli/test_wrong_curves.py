@@ -1,6 +1,7 @@
 """Tables that would silently give wrong curves raise an error or a warning."""
 
 import numpy as np
+from curves import parts
 from tabular import read_table, write
 
 import symspline as ss
@@ -58,73 +59,30 @@ def test_long_gaps_are_reported(run):
     assert "; 1 long gap, up to 61 " in run("fit a.csv --space r:1 -o a.npz --smooth 0.1")
 
 
-def test_smoothing_that_finds_no_noise_says_so(run):
-    t = np.arange(30)
-    write("a.csv", "t,x\n" + "".join(f"{i},{(-1) ** i * 1.0}\n" for i in t))
-    out = run("fit a.csv --space r:1 -o a.npz --smooth 1e-14")
-    assert "no noise" not in out
-    out = run("fit a.csv --space r:1 -o a.npz --smooth")
-    if ss.load("a.npz").df > 29:
-        assert "(no noise was found: the curve passes through the points" in out
-
-
-# ---- units of standard deviations ----
-
-
-def noisy_turns():
-    rng = np.random.default_rng(0)
-    t = np.linspace(0, 4, 60)
+def test_deviations_are_in_the_units_of_the_columns(run):
+    """Of quaternions, half the angle: a turn by a small angle moves a quaternion half as far."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 4, 60)
     turns = ss.rotations.from_rotation_vectors(np.outer(t, [0, 0, 0.5]) + 0.02 * rng.standard_normal((60, 3)))
-    return t, turns, ss.rotations.as_quaternions(turns, scalar_first=True), 3 * rng.standard_normal((60, 3))
-
-
-def test_deviations_beside_quaternions_are_of_quaternions(run):
-    t, _, q, _ = noisy_turns()
-    lines = (",".join(map(repr, [a, *b])) + "\n" for a, b in zip(t.tolist(), q.tolist(), strict=True))
-    write("q.csv", "t,qw,qx,qy,qz\n" + "".join(lines))
-    run("fit q.csv --space so:3 -o q.npz --smooth")
-    run("sample q.npz -n 9 --nu 0,1 -o s.csv")
-    spline, x = ss.load("q.npz"), read_table("s.csv")["t"]
-    np.testing.assert_allclose(read_table("s.csv")["std"], spline.std(x) / 2, rtol=1e-12)
-    np.testing.assert_allclose(read_table("s.csv")["std_d1"], spline.std(x, nu=1) / 2, rtol=1e-12)
-    # A turn by a small angle moves the quaternion half as far.
-    moved = spline.space.exp(spline(1.0), spline.std(1.0) * spline.space.frame(spline(1.0))[0])
-    here, there = ss.rotations.as_quaternions(np.stack([spline(1.0), moved]), scalar_first=True)
-    np.testing.assert_allclose(np.linalg.norm(there - here), spline.std(1.0) / 2, rtol=1e-3)
-
-
-def test_deviations_beside_matrices_are_radians(run):
-    t, turns, _, _ = noisy_turns()
-    np.savez("m.npz", t=t, points=turns)
-    run("fit m.npz --space so:3 -o c.npz --smooth")
-    run("sample c.npz -n 9 -o s.csv")
-    np.testing.assert_allclose(read_table("s.csv")["std"], ss.load("c.npz").std(read_table("s.csv")["t"]), rtol=1e-12)
-
-
-def test_deviations_of_poses_are_of_place_and_rotation(run):
-    t, turns, _, places = noisy_turns()
-    np.savez("m.npz", t=t, points=ss.poses.join(turns, places))
-    run("fit m.npz --space se:3 -o c.npz --smooth 0.1")
-    run("sample c.npz -n 9 --nu 0,1 -o s.csv")
-    spline, x = ss.load("c.npz"), read_table("s.csv")["t"]
-    for name, expected in zip(("std_rotation", "std_position"), spline.std(x), strict=True):
-        np.testing.assert_allclose(read_table("s.csv")[name], expected, rtol=1e-12)
-    assert "std" not in read_table("s.csv") and "std_position_d1" in read_table("s.csv")
-    write("p.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + "".join(
-        ",".join(map(repr, [a, *p.tolist(), *q.tolist()])) + "\n"
-        for a, p, q in zip(t.tolist(), places, ss.rotations.as_quaternions(turns, scalar_first=False), strict=True)
-    ))  # fmt: skip
-    run("fit p.csv --space se:3 -o c.npz --smooth 0.1")
-    run("sample c.npz -n 9 -o s.csv")
-    # Beside quaternions, half the angle.
-    turn, place = ss.load("c.npz").std(read_table("s.csv")["t"])
-    np.testing.assert_allclose(read_table("s.csv")["std_rotation"], turn / 2, rtol=1e-12)
-    np.testing.assert_allclose(read_table("s.csv")["std_position"], place, rtol=1e-12)
-    run("fit p.csv --space 'so:3 x r:3' --columns qw,qx,qy,qz,tx,ty,tz -o c.npz --smooth")
-    run("sample c.npz -n 9 -o s.csv")
-    turn, place = ss.load("c.npz").std(read_table("s.csv")["t"])
-    np.testing.assert_allclose(read_table("s.csv")["std1"], turn / 2, rtol=1e-12)
-    np.testing.assert_allclose(read_table("s.csv")["std2"], place, rtol=1e-12)
+    q, places = ss.rotations.as_quaternions(turns, scalar_first=True), 3 * rng.standard_normal((60, 3))
+    quaternions = dict(zip(("qw", "qx", "qy", "qz"), q.T, strict=True))
+    poses = quaternions | dict(zip(("tx", "ty", "tz"), places.T, strict=True))
+    both = "'so:3 x r:3' --columns qw,qx,qy,qz,tx,ty,tz"
+    for columns, space, scales in [
+        ({"points": turns}, "so:3", {"std": 1}),
+        (quaternions, "so:3", {"std": 1 / 2}),
+        ({"points": ss.poses.join(turns, places)}, "se:3", {"std_rotation": 1, "std_position": 1}),
+        (poses, "se:3", {"std_rotation": 1 / 2, "std_position": 1}),
+        (poses, both, {"std1": 1 / 2, "std2": 1}),
+    ]:
+        np.savez("m.npz", t=t, **columns)
+        run(f"fit m.npz --space {space} -o c.npz --smooth 0.1")
+        run("sample c.npz -n 9 --nu 0,1 -o s.csv")
+        spline, found = ss.load("c.npz"), read_table("s.csv")
+        assert {name for name in found if name.startswith("std")} == {*scales, *(f"{name}_d1" for name in scales)}
+        for nu, mark in enumerate(("", "_d1")):
+            deviations = parts(spline.std(found["t"], nu=nu))
+            for (name, scale), expected in zip(scales.items(), deviations, strict=True):
+                np.testing.assert_allclose(found[name + mark], scale * expected, rtol=1e-12)
 
 
 def test_escape_characters_do_not_reach_the_terminal(run, fails):

@@ -2,9 +2,6 @@
 
 import sys
 
-import angles
-import ends
-import motions
 import numpy as np
 import order
 import page
@@ -12,10 +9,6 @@ import pytest
 import reconstruct
 import recordings
 import riemannian_cubics as cubics
-import variations
-from figure import loglog
-
-import symspline as ss
 
 SCRIPTS = ("order", "cubics", "reconstruct", "ends")
 
@@ -44,11 +37,6 @@ def test_errors_fall_with_the_orders_of_the_end_conditions():
     assert order.text(sizes, everywhere, middle).count("\n") == 4
 
 
-def test_not_a_knot_is_a_hundred_times_better_on_1281_knots():
-    everywhere, _ = order.errors(1281)
-    assert 100 * everywhere[order.NOT_A_KNOT] < everywhere[order.SCIPY]
-
-
 # ---- Riemannian cubics ----
 
 
@@ -60,77 +48,7 @@ def test_spline_is_close_to_the_cubic_and_bends_more(case):
     assert cubics.text(rows).count("\n") == 3
 
 
-def test_cubic_is_critical_and_the_spline_is_not(case):
-    found = cubics.variations(case, fields=3)
-    cubic, spline = ([abs(one.slope) for one in curve] for curve in found)
-    assert max(cubic) < 1e-4 and max(spline) > 1e-2
-    assert min(one.rise for one in found[0]) > 1e-5
-    assert "3 random variations" in cubics.words(*found)
-
-
-def test_cubic_satisfies_its_equation():
-    assert cubics.residual() < 1e-6
-
-
-def test_cubic_passes_through_the_points(case):
-    t = motions.knots(6)
-    spline = ss.CubicSpline(t, case.motion(t), case.space)
-    np.testing.assert_allclose(case.cubic(spline)(t), spline.points, atol=1e-9)
-
-
-def test_energy_from_points_is_that_of_the_spline():
-    t = motions.knots(8)
-    for case in (cubics.SPHERE, cubics.ROTATIONS):
-        spline = ss.CubicSpline(t, case.motion(t), case.space)
-        found = variations.energy(case.space, t, spline)
-        assert found == pytest.approx(spline.bending_energy(), rel=1e-6)
-
-
 # ---- recordings ----
-
-
-def test_recordings_are_whole():
-    poses, turns = (recordings.read(file) for file in (reconstruct.POSES, reconstruct.ORIENTATIONS))
-    assert poses.positions.shape == (3000, 3) and poses.rates is None
-    assert turns.rates.shape == (953, 3) and turns.positions is None
-    for recording in (poses, turns):
-        assert recording.t[0] == 0 and np.diff(recording.t).min() > 0
-        np.testing.assert_allclose(np.linalg.det(recording.rotations), 1, atol=1e-12)
-
-
-def tumbling(n=201):
-    """A recording without errors, its rates half a sample earlier."""
-    t = motions.DURATION * np.arange(n) / (n - 1)
-    still = recordings.Recording(t, motions.tumble(t), None, np.zeros((n, 3)))
-    x, step = still.rate_times, 1e-5
-    r = motions.tumble(x)
-    slope = (motions.tumble(x + step) - motions.tumble(x - step)) / (2 * step)
-    return still._replace(rates=angles.body_rate(r, slope))
-
-
-def test_smooth_motion_is_reconstructed_by_all_methods():
-    recording = tumbling()
-    coarse, fine = (reconstruct.errors(recording, k) for k in (10, 5))
-    assert list(coarse) == list(fine) and len(coarse) == 5
-    for method, (rms, worst, rates) in fine.items():
-        assert rms < worst < 1 and rates < 20
-        assert rms < coarse[method][0] / 3 and rates < coarse[method][2] / 1.5
-    for ends_of in ("not-a-knot", "end velocities measured"):
-        rms, _, rates = fine[f"symspline, {ends_of}"]
-        assert rms < 0.002 and rates < 0.1
-    assert ends.errors(recording, 4)[1]["symspline, not-a-knot"] < 0.01
-
-
-def test_poses_are_reconstructed_by_all_methods():
-    t = np.linspace(0, 1.5, 201)
-    recording = recordings.Recording(t, motions.tumble(t), motions.track(t), None)
-    found = reconstruct.errors(recording, 10)
-    assert len(found) == 6
-    apart, screw = (found[f"symspline, {name}, not-a-knot"] for name in ("SO(3) × R³", "SE(3)"))
-    # The rotations of a rigid motion do not feel its translations.
-    assert apart[:2] == pytest.approx(screw[:2], rel=1e-6)
-    assert apart[2] == pytest.approx(found["SciPy, RotationSpline and CubicSpline"][2], rel=1e-6)
-    assert all(numbers[2] < numbers[3] < 20 for numbers in found.values())
 
 
 def test_recordings_of_others_can_be_read(tmp_path):
@@ -142,11 +60,6 @@ def test_recordings_of_others_can_be_read(tmp_path):
     file.write_text("0 0 0\n", encoding="utf-8")
     with pytest.raises(ValueError, match="8 numbers, not 3"):
         recordings.read(file)
-
-
-def test_angular_velocity_there_and_back():
-    r, omega = motions.tumble(np.array([0.2, 0.7])), np.array([[1.0, 2, 3], [-4, 5, 0]])
-    np.testing.assert_allclose(angles.body_rate(r, angles.from_body_rate(r, omega)), omega, atol=1e-12)
 
 
 # ---- the page ----
@@ -163,12 +76,6 @@ def test_tables_find_their_place(tmp_path):
     assert "before:" not in text and "Riemannian cubics?" in text
     with pytest.raises(ValueError, match="once each"):
         page.insert("nothing", "", copy)
-
-
-def test_figure_is_drawn(tmp_path):
-    file = tmp_path / "figure.png"
-    loglog(file, (3, 6, 12), {"one": (1.0, 0.1, 0.01), "other": (1.0, 0.5, 0.2)}, {"one": 4}, "error", "title")
-    assert file.stat().st_size > 1000
 
 
 @pytest.mark.parametrize("arguments", [("--every=40",), ("--every=40", str(reconstruct.POSES))])

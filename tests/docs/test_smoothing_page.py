@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import smoothing
 import smoothing_others as others
-import smoothing_peers as peers
 from pages import blocks, cells, run
 
 import symspline as ss
@@ -34,17 +33,6 @@ def test_flat_table():
     assert all(float(number) < 1e-10 for cell in rest for number in cell.split(","))
 
 
-def test_fifty_digits_are_those_of_a_dense_solution():
-    rng = np.random.default_rng(1)
-    t, y, lam = np.sort(rng.random(9)), rng.standard_normal(9), 1e-3
-    h = np.diff(t)
-    q, r = (np.zeros((9, 7)), np.diag((h[1:] + h[:-1]) / 3) + np.diag(h[1:-1] / 6, 1) + np.diag(h[1:-1] / 6, -1))
-    for j in range(7):
-        q[j : j + 3, j] = 1 / h[j], -1 / h[j] - 1 / h[j + 1], 1 / h[j + 1]
-    dense = np.linalg.solve(np.eye(9) + lam * q @ np.linalg.solve(r, q.T), y)
-    np.testing.assert_allclose(smoothing.reinsch(t, y, lam), dense, atol=1e-11)
-
-
 def test_iteration_table():
     rows = cells(smoothing.iteration_table(("S²",), (0.1,), 1))
     assert [row[0] for row in rows] == ["S²", "S², two turns"]
@@ -59,38 +47,9 @@ def test_choice_table():
     assert all(1 <= float(cell) < 1.3 for cell in row[3:7])
 
 
-def test_coverage_and_outlier_tables():
-    ((name, cell),) = cells(smoothing.coverage_table(("S²",), (0.1,), 10))
-    assert name == "S²" and 0.85 < float(cell.split(",")[0]) <= 1
-    (row,) = cells(smoothing.outlier_table(("S²",), seeds=3))
-    clean, _, _, linear, huber, cauchy = map(float, row[1:7])
-    assert clean < cauchy < huber < linear
-
-
 def test_time_table():
     (row,) = cells(smoothing.time_table((200,), 1))
     assert row[0] == "200" and row[-1] == "200" and all(row)
-
-
-@pytest.mark.parametrize("name", smoothing.SPACES.values())
-def test_charts_lead_back_to_their_points(name):
-    given = smoothing.data(name, 0.1, 1, 20)
-    for chart in (peers.tangent(given.space, given.noisy[0]), peers.ambient(given.space, given.noisy[0])):
-        back = chart.points(chart.numbers)
-        assert given.space.distance(back, given.noisy[0]).max() < 1e-7
-
-
-def test_lines_and_means_keep_lines_and_constants():
-    x = np.arange(30.0)
-    assert np.allclose(peers.local_lines(30) @ x, x)
-    assert np.allclose(peers.moving_averages(30).sum(axis=-1), 1)
-
-
-def test_scipy_on_a_sphere_removes_noise():
-    given = smoothing.data("sphere:2", 0.1, 1)
-    found = peers.scipy_spline(given.t, peers.ambient(ss.Sphere(2), given.noisy[0]))
-    errors = [smoothing.rms(given.space, points, given.truth[0]) for points in (found, given.noisy[0])]
-    assert errors[0] < 0.5 * errors[1]
 
 
 def test_other_programs_are_compared_on_the_same_data():

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 import solvers
-import solvers_energy
 import solvers_figures as figures
-import solvers_uneven
 from pages import cells
 
 import symspline as ss
@@ -27,44 +25,6 @@ def test_walk_table_counts_walks(monkeypatch):
     assert row[5] == "3 + 0 + 0 + 0"
     assert all(len(row) == 6 for row in cells(solvers.time_table(1)))
     solvers.walks.cache_clear()
-
-
-def test_energy_table(monkeypatch):
-    monkeypatch.setattr(solvers_energy, "KINDS", {"walks of 0.5": solvers_energy.KINDS["walks of 0.5"]})
-    (row,) = cells(solvers_energy.energy_table(3))
-    # Of no set of points does another method give a lower bending energy.
-    assert row[0] == "walks of 0.5" and row[2] == "0" and row[3].startswith("0 of ") and float(row[4]) <= 1.05
-
-
-def test_spaces_table(monkeypatch):
-    monkeypatch.setattr(solvers_energy, "SPACES", ("gr:2,4", "spd:3"))
-    for row in cells(solvers_energy.spaces_table(4)):
-        # Where Algorithm 1 converges, so does auto, and never to a curve of higher bending energy.
-        assert int(row[1]) <= int(row[5]) and row[6] == "0" and float(row[7]) <= 1.001
-
-
-def test_uneven_table(monkeypatch):
-    monkeypatch.setattr(solvers_uneven, "WALKS", 20)
-    monkeypatch.setattr(solvers_uneven, "SEARCHED", 1)
-    (row,) = cells(solvers_uneven.uneven_table((0.5,)))
-    assert row == ["0.5", "100.0%", "0 of 0", "100.0%", "0 of 0"]
-
-
-def test_the_search_finds_what_auto_finds():
-    rng = np.random.default_rng(1)
-    p, t = solvers_uneven.walks(1.5, rng)[0], np.array([0.0, 1, 2, 4, 5, 8, 9])
-    assert ss.CubicSpline(t, p, solvers_uneven.S2).report.converged
-    search = solvers_uneven.Search(t, p)
-    legs = ss.CubicSpline(t, p, solvers_uneven.S2).velocities * search.longer[:, None] / 3
-    assert np.abs(search.jumps(np.einsum("nd,nkd->nk", legs, search.frames))).max() < 1e-13
-    assert search.finds(rng, 20)
-
-
-def test_walks_have_equal_steps_and_stay_near_home():
-    space = ss.Hyperbolic(2)
-    p = solvers.walk(space, 1.5, 0, 60)
-    assert space.distance(p[:-1], p[1:]) == pytest.approx(np.full(59, 1.5))
-    assert space.distance(p[0], p).max() < solvers.HOME + 1.5
 
 
 def test_the_region_of_38_ends_where_it_must():

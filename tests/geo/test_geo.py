@@ -79,11 +79,7 @@ def test_other_spaces():
 @pytest.mark.parametrize(
     "lon, lat, what",
     [
-        (
-            40.0,
-            178.0,
-            "lat is 178.0, but lat must be from -90 to 90 degrees. Check whether lon and lat are swapped",
-        ),
+        (40.0, 178.0, "lat is 178.0, but lat must be from -90 to 90 degrees. Check whether lon and lat are swapped"),
         ([0, -9999], [0, 0], r"lon\[1\] is -9999.0, but lon must be from -3600 to 3600"),
         ([[0], [1]], [[0], [90.001]], r"lat\[1\]\[0\] is 90.001"),
     ],

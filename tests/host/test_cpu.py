@@ -25,67 +25,56 @@ needs_v3 = pytest.mark.skipif(
 )
 
 
+ANY, V3 = {"_core": FOR_ANY}, {"_core": FOR_V3}
+BOTH = {"_core": FOR_ANY, "_core_v3": FOR_V3}
+
+
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(_cpu, "_has_v3", lambda: False)
-    monkeypatch.delenv("SYMSPLINE_CPU", raising=False)
-    return tmp_path
+def folder_with(tmp_path, monkeypatch):
+    """A folder with these modules, on a processor with or without x86-64-v3, and SYMSPLINE_CPU."""
 
+    def make(modules, has_v3, asked):
+        for name, content in modules.items():
+            (tmp_path / NAMED[name]).write_bytes(content)
+        monkeypatch.setattr(_cpu, "_has_v3", lambda: has_v3)
+        monkeypatch.setattr(_cpu, "_says_v3", lambda plain: has_v3)
+        monkeypatch.setenv("SYMSPLINE_CPU", asked)
+        return tmp_path
 
-def test_an_old_processor_gets_a_clear_message(folder):
-    (folder / NAMED["_core"]).write_bytes(FOR_V3)
-    with pytest.raises(ImportError, match=r"AVX2 and FMA.*RUSTFLAGS"):
-        _cpu.load(folder)
-
-
-def test_a_module_built_for_any_processor_is_let_in(folder):
-    (folder / NAMED["_core"]).write_bytes(FOR_ANY)
-    assert _cpu._choose(folder) == (None, "the only one here")
-
-
-@pytest.mark.parametrize("content, other", [(FOR_ANY, "v3"), (FOR_V3, "plain")])
-def test_missing_modules_cannot_be_forced(folder, monkeypatch, content, other):
-    monkeypatch.setattr(_cpu, "_has_v3", lambda: True)
-    (folder / NAMED["_core"]).write_bytes(content)
-    monkeypatch.setenv("SYMSPLINE_CPU", other)
-    with pytest.raises(ImportError, match=f"SYMSPLINE_CPU={other} cannot be done: the only compiled module"):
-        _cpu.load(folder)
-    monkeypatch.setenv("SYMSPLINE_CPU", {"plain": "v3", "v3": "plain"}[other])
-    assert _cpu._choose(folder)[0] is None
+    return make
 
 
 @pytest.mark.parametrize(
-    "has_v3, asked, name",
+    "modules, has_v3, asked, name",
     [
-        (True, "", "_core_v3"),
-        (True, "v3", "_core_v3"),
-        (True, "plain", None),
-        (False, "", None),
-        (False, "plain", None),
+        (ANY, False, "", None),
+        (ANY, True, "plain", None),
+        (V3, True, "v3", None),
+        (BOTH, True, "", "_core_v3"),
+        (BOTH, True, "v3", "_core_v3"),
+        (BOTH, True, "plain", None),
+        (BOTH, False, "", None),
+        (BOTH, False, "plain", None),
     ],
 )
-def test_of_two_the_one_that_suits(folder, monkeypatch, has_v3, asked, name):
-    monkeypatch.setattr(_cpu, "_says_v3", lambda plain: has_v3)
-    (folder / NAMED["_core"]).write_bytes(FOR_ANY)
-    (folder / NAMED["_core_v3"]).write_bytes(FOR_V3)
-    monkeypatch.setenv("SYMSPLINE_CPU", asked)
+def test_the_module_that_suits_the_processor_is_chosen(folder_with, modules, has_v3, asked, name):
+    folder = folder_with(modules, has_v3, asked)
     assert _cpu._choose(folder)[0] == (name and folder / NAMED[name])
 
 
-def test_unsupported_modules_cannot_be_forced(folder, monkeypatch):
-    monkeypatch.setattr(_cpu, "_says_v3", lambda plain: False)
-    for name in NAMED.values():
-        (folder / name).touch()
-    monkeypatch.setenv("SYMSPLINE_CPU", "v3")
-    with pytest.raises(ImportError, match="this processor lacks x86-64-v3"):
-        _cpu.load(folder)
-
-
-@pytest.mark.parametrize("value", ["v4", "V3", "1", "plain "])
-def test_other_values_are_refused(folder, monkeypatch, value):
-    monkeypatch.setenv("SYMSPLINE_CPU", value)
-    with pytest.raises(ImportError, match=f"SYMSPLINE_CPU must be plain or v3, not '{value}'"):
-        _cpu.load(folder)
+@pytest.mark.parametrize(
+    "modules, has_v3, asked, message",
+    [
+        (V3, False, "", r"AVX2 and FMA.*RUSTFLAGS"),
+        (ANY, True, "v3", "SYMSPLINE_CPU=v3 cannot be done: the only compiled module"),
+        (V3, True, "plain", "SYMSPLINE_CPU=plain cannot be done: the only compiled module"),
+        (BOTH, False, "v3", "this processor lacks x86-64-v3"),
+        *((BOTH, True, asked, f"must be plain or v3, not '{asked}'") for asked in ("v4", "V3", "1", "plain ")),
+    ],
+)
+def test_missing_and_unsupported_modules_raise(folder_with, modules, has_v3, asked, message):
+    with pytest.raises(ImportError, match=message):
+        _cpu.load(folder_with(modules, has_v3, asked))
 
 
 # ---- a package with both, as in a wheel ----
@@ -124,16 +113,14 @@ def printed(both, asked):
 
 
 @needs_v3
-def test_each_of_two_can_be_forced(both):
-    plain, fast = printed(both, "plain"), printed(both, "v3")
-    assert plain.startswith("_core.") and plain.endswith("; SYMSPLINE_CPU=plain)")
-    assert fast.startswith("_core_v3.") and fast.endswith("; SYMSPLINE_CPU=v3)")
-
-
-@needs_v3
-def test_the_processor_decides_by_itself(both):
-    chosen = printed(both, "")
-    assert chosen.startswith("_core_v3.") and chosen.endswith("(for x86-64-v3; the processor has x86-64-v3)")
+def test_the_processor_decides_unless_one_of_two_is_forced(both):
+    for asked, start, end in (
+        ("plain", "_core.", "; SYMSPLINE_CPU=plain)"),
+        ("v3", "_core_v3.", "; SYMSPLINE_CPU=v3)"),
+        ("", "_core_v3.", "(for x86-64-v3; the processor has x86-64-v3)"),
+    ):
+        chosen = printed(both, asked)
+        assert chosen.startswith(start) and chosen.endswith(end)
 
 
 def test_the_configuration_is_printed(capsys):

@@ -136,6 +136,7 @@ LONG_CALLS = {
     "log": "many(ss.space('so:150'), 'log')",
     "large log": "one(ss.space('u:280'))",
     "geodesic": "many(ss.space('spd:120'), 'distance')",
+    "speed": "spline('spd:3', 4).speed(np.broadcast_to(0.5, 50_000_000))",
     "evaluate": "spline('spd:30', 4)(np.linspace(0, 3, 200_000))",
     "smooth": "ss.make_smoothing_spline(None, far(ss.space('spd:9'), 400), 'spd:9', method='newton')",
     "gl": "many(ss.space('gl:120'), 'log')",
@@ -186,6 +187,8 @@ def test_long_calls_end_soon_after_a_signal(call):
         print("done")
     except KeyboardInterrupt:
         print(time.monotonic() - sent[-1])
+    # Everything still works.
+    assert np.array_equal(ss.CubicSpline(None, np.eye(3), "sphere:2")([0, 1, 2]), np.eye(3))
     """
     said = run(script, 60).strip()
     # A machine that is fast enough may finish before the signal comes. Alone on the machine all end within a second;

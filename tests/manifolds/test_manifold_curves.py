@@ -38,7 +38,7 @@ def ends_on(kind, space, p):
 
 
 @every
-@pytest.mark.parametrize("spacing", ["equal", "unequal"])
+@loop_over("spacing", ["equal", "unequal"])
 def test_acceleration_is_continuous(name, spacing):
     space, start, allowed = SPACES[name]
     p = walk(space, 0.5, 7, 1, start)
@@ -110,8 +110,8 @@ def test_derivatives_where_a_segment_ends_almost_at_the_cut_locus(name):
         assert np.abs(ours(x, nu) - core(x, nu)).max() <= allowed * np.abs(core(x, nu)).max()
 
 
-@pytest.mark.parametrize("ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "mixed"])
 @pytest.mark.parametrize("name", ["sphere:2", "cp:2", "so:3"])
+@loop_over("ends", ["natural", "clamped", "not-a-knot", "periodic", "velocity", "mixed"])
 def test_symmetric_spaces_give_the_same_curve(name, ends):
     """The compiled core solves the S-form of the paper."""
     space = ss.space(name)
@@ -148,21 +148,6 @@ def test_flat_space_is_scipy(ends, n):
         assert np.abs(ours(x, nu, extrapolate=True) - theirs(x, nu, extrapolate=True)).max() <= allowed
     # Differences of a linear function are exact, and the matrix is that of the spline.
     assert ours.report.iterations <= 3
-
-
-@pytest.mark.parametrize("ends", ["natural", "periodic"])
-def test_solution_does_not_need_transport(ends):
-    space = ss.Sphere(2)
-    p = space_walk(space, 1.2, 10, np.random.default_rng(10))
-    if ends == "periodic":
-        p[-1] = p[0]
-    one, other = (
-        ss.CubicSpline(None, p, twin(space, transport=transport), bc_type=ends) for transport in (None, space.transport)
-    )
-    assert np.abs(one.velocities - other.velocities).max() <= 1e-11
-    if ends == "natural":
-        # The rotation nearest to projection is parallel transport here, up to a quarter of a turn.
-        assert one.report.iterations == other.report.iterations
 
 
 def pulled_back(p, q, w):
@@ -219,9 +204,3 @@ def test_functions_may_return_arrays_that_cannot_be_written_to(ends):
     bc = ends_on(ends, ST52, p)
     curves = [ss.CubicSpline(None, p, one, bc_type=bc) for one in (ST52, space)]
     assert np.abs(curves[0](1.3) - curves[1](1.3)).max() <= 1e-9
-
-
-@pytest.mark.parametrize("method", ["homotopy", "newton", "fixed-point"])
-def test_solvers_that_are_not_made_for_functions(method):
-    with pytest.raises(ss.ValidationError, match=f"method '{method}' is not available on a manifold"):
-        ss.CubicSpline(None, walk(ST52, 0.3, 5, 1), ST52, method=method)

@@ -91,10 +91,9 @@ def test_dates_and_progress():
 
 def test_plot(tmp_path):
     pytest.importorskip("matplotlib")
-    SPLINE.plot(tmp_path / "curve.png")
-    sphere = ss.Sphere(2)
-    ss.CubicSpline(None, np.eye(3), twin(sphere)).plot(tmp_path / "twin.png")
-    assert (tmp_path / "twin.png").stat().st_size > 1000
+    for spline in (SPLINE, ss.CubicSpline(None, np.eye(3), twin(ss.Sphere(2)))):
+        spline.plot(tmp_path / "curve.png")
+        assert (tmp_path / "curve.png").stat().st_size > 1000
 
 
 def test_pickles_and_files():
@@ -125,7 +124,6 @@ def test_pickles_and_files():
         (lambda s: ss.save({"a": s}, "no.npz"), "curves are not saved"),
         (lambda s: ss.BezierCurve(POINTS, s.space), "B-spline and Bézier curves are not made"),
         (lambda s: ss.make_smoothing_spline(None, POINTS, s.space), "smoothing splines are not made"),
-        (lambda s: ss.make_lsq_spline(None, POINTS, 3, s.space), "smoothing splines are not made"),
         (lambda s: ss.CubicSpline(None, POINTS, s.space, method="newton"), "method 'newton' is not available"),
         (lambda s: ss.rotations.angular_velocity(s, 0.5), "so:3|rotations"),
     ],
@@ -135,36 +133,20 @@ def test_missing_operations_raise(call, what):
         call(ss.CubicSpline(None, POINTS, NAMELESS))
 
 
-def changed(change):
-    p = POINTS.copy()
-    change(p)
-    return p
-
-
-def off(p):
-    p[2, 0, 0] += 0.1
-
-
-def missing(p):
-    p[3, 1, 1] = np.nan
-
-
-def opposite(p):
-    p[2] = -p[1]
-
-
 @pytest.mark.parametrize(
-    ("change", "error", "what"),
+    ("index", "value", "error", "what"),
     [
-        (off, ss.ValidationError, r"points\[2\]{} is off the space by"),
-        (missing, ss.ValidationError, r"points\[3\]{} is off the space: it is not finite"),
-        (opposite, ss.CutLocusError, r"points\[1\] and points\[2\]{} have no geodesic between them"),
+        ((2, 0, 0), POINTS[2, 0, 0] + 0.1, ss.ValidationError, r"points\[2\]{} is off the space by"),
+        ((3, 1, 1), np.nan, ss.ValidationError, r"points\[3\]{} is off the space: it is not finite"),
+        (2, -POINTS[1], ss.CutLocusError, r"points\[1\] and points\[2\]{} have no geodesic between them"),
     ],
 )
-def test_invalid_points_raise(change, error, what):
+def test_invalid_points_raise(index, value, error, what):
+    changed = POINTS.copy()
+    changed[index] = value
     with pytest.raises(error, match=what.format("")):
-        ss.CubicSpline(None, changed(change), SPACE)
-    two = np.stack([POINTS, changed(change)])
+        ss.CubicSpline(None, changed, SPACE)
+    two = np.stack([POINTS, changed])
     with pytest.raises(error, match=what.format(" of curve 1")):
         ss.CubicSpline(None, two, SPACE)
     kept = ss.CubicSpline(None, two, SPACE, on_failure="ignore")
@@ -175,9 +157,7 @@ def test_invalid_points_raise(change, error, what):
 
 def test_far_points_name_distance_and_limit():
     space = ss.Manifold(**FUNCTIONS, injectivity_radius=0.4, point_shape=(5, 2))
-    with pytest.raises(
-        ss.CutLocusError, match=r"points\[0\] and points\[1\] are 0\.5 apart, the injectivity radius is 0\.4"
-    ):
+    with pytest.raises(ss.CutLocusError, match=r"points\[1\] are 0\.5 apart, the injectivity radius is 0\.4"):
         ss.CubicSpline(None, POINTS, space)
     with pytest.raises(ss.CutLocusError) as caught:
         ss.CubicSpline(None, np.stack([POINTS, POINTS]), space)
@@ -224,20 +204,13 @@ def test_invalid_ends_raise(bc, what):
         ss.CubicSpline(None, POINTS, SPACE, bc_type=bc)
 
 
-def test_times_are_checked():
-    with pytest.raises(ss.ValidationError, match=r"t\[2\] = 1 repeats t\[1\] = 1"):
-        ss.CubicSpline([0, 1, 1, 2, 3, 4], POINTS, SPACE)
-
-
 @pytest.mark.parametrize(
     ("changes", "what"),
     [
-        ({"exp": None}, "exp must be a function, not None"),
         ({"transport": 3}, "transport must be a function, not 3"),
         ({"point_shape": ()}, "point_shape must be a whole number or a tuple"),
         ({"point_shape": (2, 0)}, "point_shape must be at least 1"),
         ({"injectivity_radius": -1.0}, "injectivity_radius must be a positive number"),
-        ({"injectivity_radius": True}, "injectivity_radius must be a positive number"),
         ({"dim": 0}, "dim must be at least 1"),
         ({"dtype": np.float32}, "dtype must be float64 or complex128"),
     ],
@@ -277,15 +250,7 @@ def test_missing_functions_of_a_manifold_raise():
 def test_noise_of_a_logarithm_does_not_shorten_steps(digits, allowed):
     """Noise does not shrink with the steps of differences, and the shortest make most of it."""
     sphere = ss.Sphere(2)
-    noisy = ss.Manifold(
-        exp=sphere.exp,
-        log=lambda p, q: sphere.project_tangent(p, np.round(sphere.log(p, q), digits)),
-        project_tangent=sphere.project_tangent,
-        inner=sphere.inner,
-        project=sphere.project,
-        injectivity_radius=np.pi,
-        point_shape=(3,),
-    )
+    noisy = twin(sphere, log=lambda p, q: sphere.project_tangent(p, np.round(sphere.log(p, q), digits)))
     points = ss.geo.from_lonlat([0, 20, 40, 60], [0, 10, -5, 10])
     core = ss.CubicSpline(None, points, sphere)
     spline = ss.HermiteSpline(None, points, core.velocities, noisy)

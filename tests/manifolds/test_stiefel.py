@@ -56,24 +56,6 @@ def test_dlog_is_that_of_differences(k, n, length):
     assert np.abs(exact - differences).max() <= (2e-11 if length < 1.5 else 2e-9)
 
 
-def test_dlog_inverts_the_derivative_of_exp():
-    space = ss.Stiefel(2, 5)
-    p, v = steps(space, 1.0)
-    e = space.random_tangent(np.random.default_rng(3), p)
-    h = 1e-3
-    values = [space.exp(p, v + s * h * e) for s in (-2, -1, 1, 2)]
-    w = np.tensordot([1, -8, 8, -1], values, 1) / (12 * h)
-    q = space.exp(p, v)
-    assert np.abs(space.dlog(p, q, w) - e).max() <= 1e-10
-
-
-def test_one_vector_is_the_sphere():
-    space, sphere = ss.Stiefel(1, 4), ss.Sphere(3)
-    p, v = steps(space, 1.3)
-    assert np.abs(space.exp(p, v)[..., 0] - sphere.exp(p[..., 0], v[..., 0])).max() <= 1e-15
-    assert np.abs(space.inner(p, v, v) - 1.69).max() <= 1e-14
-
-
 def test_all_but_one_vector_is_rotations():
     """The last column of a rotation follows from the others, and the metric of rotations is the canonical one."""
     space, rotations = ss.Stiefel(2, 3), ss.SpecialOrthogonal(3)
@@ -85,15 +67,6 @@ def test_all_but_one_vector_is_rotations():
     curve, frames = ss.CubicSpline(None, p, rotations), ss.CubicSpline(None, p[..., :2], space)
     x = np.linspace(0, 5, 30)
     assert np.abs(frames(x) - curve(x)[..., :2]).max() <= 1e-11
-
-
-def test_the_metric_is_invariant():
-    space = ss.Stiefel(2, 5)
-    p, v = steps(space, 0.9)
-    q = space.exp(p, v)
-    left = ss.SpecialOrthogonal(5).random_point(np.random.default_rng(6))
-    right = ss.SpecialOrthogonal(2).random_point(np.random.default_rng(7))
-    assert np.abs(space.distance(left @ p @ right, left @ q @ right) - 0.9).max() <= 1e-14
 
 
 def test_opposite_frames_have_no_logarithm():
@@ -121,31 +94,24 @@ def test_names():
 # ---- manifolds of pymanopt ----
 
 
-RNG = np.random.default_rng(1)
-
-
 @pytest.mark.parametrize(
-    ("theirs", "ours", "scale"),
+    ("theirs", "ours"),
     [
-        (manifolds.Sphere(3), ss.Sphere(2), 1.0),
-        (manifolds.SymmetricPositiveDefinite(2), ss.SymmetricPositiveDefinite(2), 1.0),
-        (manifolds.Grassmann(4, 2), ss.Grassmannian(2, 4), 1.0),
-        (manifolds.ComplexGrassmann(3, 1), ss.ComplexGrassmannian(1, 3), 1.0),
+        (manifolds.SymmetricPositiveDefinite(2), ss.SymmetricPositiveDefinite(2)),
+        (manifolds.Grassmann(4, 2), ss.Grassmannian(2, 4)),
+        (manifolds.ComplexGrassmann(3, 1), ss.ComplexGrassmannian(1, 3)),
     ],
-    ids=["sphere", "spd", "grassmannian", "complex grassmannian"],
+    ids=["spd", "grassmannian", "complex grassmannian"],
 )
-def test_the_curve_is_that_of_our_space(theirs, ours, scale):
+def test_the_curve_is_that_of_our_space(theirs, ours):
     space = from_pymanopt(theirs)
     assert space.point_shape == ours.point_shape and space.dim == ours.dim and space.dtype == ours.dtype
-    p = [ours.random_point(RNG)]
-    for _ in range(4):
-        v = ours.random_tangent(RNG, p[-1])
-        p.append(ours.exp(p[-1], 0.4 * v / ours.norm(p[-1], v)))
-    spline, core = ss.CubicSpline(None, np.array(p), space), ss.CubicSpline(None, np.array(p), ours)
+    p = walk(ours, 0.4, 5, 1)
+    spline, core = ss.CubicSpline(None, p, space), ss.CubicSpline(None, p, ours)
     x = np.linspace(0, 4, 9)
-    # Their logarithms are good to 1e-12 or so; and one array of a point of a quotient is not the other.
+    # Their logarithms are good to 1e-12 or so. Points of a quotient have many arrays.
     assert ours.distance(ours.project(spline(x)), core(x)).max() <= 1e-10
-    assert np.abs(spline.speed(x) - scale * core.speed(x)).max() <= 1e-9
+    assert np.abs(spline.speed(x) - core.speed(x)).max() <= 1e-9
 
 
 def test_rotations_have_velocities_in_the_lie_algebra():

@@ -77,18 +77,6 @@ def test_circles_of_a_torus():
     assert np.abs(w - [0.0, 0.0, length / np.sinh(length)]).max() <= 1e-12
 
 
-def test_clairaut():
-    """Of a surface of revolution the distance from the axis times the rate around it is constant along geodesics."""
-    p, v = steps(TORUS, 1.0)
-    q = TORUS.exp(p, v)
-    u = -TORUS.log(q, p)
-
-    def moment(x, t):
-        return x[:, 0] * t[:, 1] - x[:, 1] * t[:, 0]
-
-    assert np.abs(moment(p, v) - moment(q, u)).max() <= 1e-11
-
-
 @pytest.mark.parametrize(("exact", "make"), [(ELLIPSOID, ellipsoid), (TORUS, torus)], ids=["ellipsoid", "torus"])
 def test_second_derivatives_may_be_differences(exact, make):
     rough = make()

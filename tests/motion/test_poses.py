@@ -2,6 +2,7 @@
 
 import gzip
 import io
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -54,17 +55,9 @@ def test_velocity_and_acceleration_are_derivatives(name, batch):
 
 
 @every_space
-def test_acceleration_is_continuous_at_knots(name):
-    spline, h = curve(name), 1e-9
-    before, after = (poses.linear_acceleration(spline, KNOTS[1:-1] + k * h) for k in (-1, 1))
-    assert np.abs(before - after).max() < 1e-6
-
-
-@every_space
 def test_twist_is_that_of_the_matrices(name):
     spline = curve(name)
-    g, inverse = pose(spline, INNER), np.linalg.inv(pose(spline, INNER))
-    change = np.zeros_like(g)
+    inverse = np.linalg.inv(pose(spline, INNER))
     h = 1e-5
     change = (pose(spline, INNER + h) - pose(spline, INNER - h)) / (2 * h)
     for frame, hat in (("body", inverse @ change), ("world", change @ inverse)):
@@ -118,16 +111,20 @@ def test_a_sensor_measures_in_its_own_axes(name):
     assert np.allclose(np.einsum("nij,nj->ni", r, force), up, rtol=0, atol=1e-12)
 
 
-@every_space
+@pytest.mark.parametrize("name", ["so:3", "se:3", "so:3 x r:3", "r:3 x sphere:2 x so:3"])
 def test_calls_are_those_of_a_spline(name):
     spline = curve(name, (2,))
-    for call in (poses.twist, poses.linear_acceleration, lambda *a, **k: poses.imu(*a, **k).specific_force):
+    calls = [rotations.angular_velocity, partial(rotations.quaternion, scalar_first=True)]
+    if name != "so:3":
+        calls += [poses.twist, poses.linear_acceleration, lambda *a, **k: poses.imu(*a, **k).specific_force]
+    for call in calls:
         both = call(spline, INNER)
         assert np.array_equal(call(spline, np.stack([INNER, INNER]), per_curve=True), both)
         assert np.array_equal(call(spline[1], INNER), both[1])
+        assert np.array_equal(call(spline, INNER[7]), both[:, 7])
         with pytest.raises(ss.ValidationError, match="outside"):
             call(spline, 5.0)
-        assert np.isfinite(call(spline, 5.0, extrapolate=True)).all()
+        assert np.isfinite(call(spline, 5.0, extrapolate="geodesic")).all()
 
 
 @pytest.mark.parametrize("name", ["so:3", "r:3", "so:3 x r:2", "so:3 x r:3 x r:3", "se:3 x r:3"])
@@ -138,16 +135,15 @@ def test_spaces_without_poses_are_refused(name):
             call(spline, 0.5)
 
 
-def test_frames_have_two_names():
+def test_invalid_frames_gravity_and_curves_raise():
     for call in (poses.twist, poses.linear_velocity, poses.linear_acceleration):
         with pytest.raises(ss.ValidationError, match="'body' or 'world'"):
             call(curve("se:3"), 0.5, "camera")
-
-
-@pytest.mark.parametrize("gravity", [9.81, (0, 0), (0, 0, np.nan), ("a", "b", "c")])
-def test_gravity_is_a_vector(gravity):
-    with pytest.raises(ss.ValidationError, match="gravity must be three numbers"):
-        poses.imu(curve("se:3"), 0.5, gravity=gravity)
+    for gravity in (9.81, (0, 0), (0, 0, np.nan), ("a", "b", "c")):
+        with pytest.raises(ss.ValidationError, match="gravity must be three numbers"):
+            poses.imu(curve("se:3"), 0.5, gravity=gravity)
+    with pytest.raises(TypeError, match=r"spline must be a curve with knots and .*CubicSpline, not <BezierCurve"):
+        poses.imu(ss.BezierCurve(np.stack([np.eye(4)] * 4), "se:3"), 0.5)
 
 
 def test_nanoseconds_are_not_seconds():
@@ -199,14 +195,11 @@ def test_a_tum_file_goes_in_and_comes_out(tmp_path, form):
     assert np.array_equal(times, t)
     assert np.array_equal(found[:, :3, 3], given[:, :3, 3])
     assert absolute_pose_error(given, found).max() < 1e-14
-
-
-def test_a_tum_file_as_numpy_and_scipy_read_it(tmp_path):
-    t, given = recording()
-    poses.write_tum(tmp_path / "a.txt", t, poses.split(given))
-    table = np.loadtxt(tmp_path / "a.txt")
-    assert np.array_equal(table[:, :4], np.column_stack([t, given[:, :3, 3]]))
-    assert np.abs(Rotation.from_quat(table[:, 4:]).as_matrix() - given[:, :3, :3]).max() < 2e-15
+    if form == "path":
+        # As NumPy and SciPy read it.
+        table = np.loadtxt(file)
+        assert np.array_equal(table[:, :4], np.column_stack([t, given[:, :3, 3]]))
+        assert np.abs(Rotation.from_quat(table[:, 4:]).as_matrix() - given[:, :3, :3]).max() < 2e-15
 
 
 def test_a_recording_of_the_benchmark():
@@ -253,16 +246,9 @@ def test_euroc_files(tmp_path):
     assert np.abs(poses.read_euroc(tmp_path / "b.csv")[0] - t).max() < np.timedelta64(300, "ns")
 
 
-def test_dates_in_tum_files():
-    file = io.StringIO()
-    poses.write_tum(file, np.array(["1970-01-01T00:00:01.5", "1970-01-02"], "M8[ms]"), np.stack([np.eye(4)] * 2))
-    assert file.getvalue().splitlines()[1].startswith("86400.0 0.0 0.0 0.0 0.0 0.0 0.0 1.0")
-
-
 @pytest.mark.parametrize(
     ("read", "text", "match"),
     [
-        (poses.read_tum, "", "no numbers"),
         (poses.read_tum, "# nothing\n", "no numbers"),
         (poses.read_tum, "\n0 0 0 0 0 0 1\n", "line 2: 7 numbers, but a line of a TUM trajectory has 8: time tx"),
         (poses.read_tum, "# x\n0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n", "the file, line 3: 7 numbers, but a line"),
@@ -270,10 +256,7 @@ def test_dates_in_tum_files():
         (poses.read_tum, "0 0 0 0 0 0 0 1\n\n1 0 0 nan 0 0 0 1\n", "line 3: column 'tz' holds nan"),
         (poses.read_tum, "0 0 0 0 0 0 0 1\n# x\n1 0 0 0 0 0 1 1\n", r"line 3: the quaternion has length 1\.41421"),
         (poses.read_euroc, "# x\n1,0,0,0,1,1,0,0\n", r"line 2: the quaternion has length 1\.41421, not 1"),
-        (poses.read_tum, "0 0 0 0 0 0 0 1.01\n", r"line 1: the quaternion has length 1\.01"),
-        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1.01 0\n", r"pose \[0\] has no rotation"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1\n", "not of 11 numbers"),
-        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 2 0\n", r"pose \[0\] has no rotation"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 -1 0\n", r"pose \[0\] has no rotation"),
         (poses.read_euroc, "1.5,0,0,0,1,0,0,0\n", "nanoseconds"),
         (poses.read_euroc, "1,0,0,0,1\n", "nanoseconds"),
@@ -324,7 +307,7 @@ def test_times_to_write_in_any_form(write):
     for t in (
         ["2023-11-14T22:13:20Z", "2023-11-14T22:13:21Z"],
         pd.to_datetime(["2023-11-14T22:13:20", "2023-11-14T22:13:21"], utc=True),
-        np.array(["2023-11-14T22:13:20", "2023-11-14T22:13:21"], "M8[s]"),
+        np.array(["2023-11-14T22:13:20", "2023-11-14T22:13:21"], "M8[ms]"),
         [1_700_000_000, 1_700_000_001],
     ):
         file = io.StringIO()
@@ -333,9 +316,3 @@ def test_times_to_write_in_any_form(write):
     assert len(set(texts)) == 1
     with pytest.raises(ss.ValidationError, match=r"t\[1\] is nan, which is not a time"):
         write(io.StringIO(), [0, np.nan], given)
-
-
-def test_curves_with_control_points_have_no_readings():
-    curve = ss.BezierCurve(np.stack([np.eye(4)] * 4), "se:3")
-    with pytest.raises(TypeError, match=r"spline must be a curve with knots and .*CubicSpline, not <BezierCurve"):
-        ss.poses.imu(curve, 0.5)

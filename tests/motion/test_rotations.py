@@ -2,13 +2,11 @@
 
 import gc
 import weakref
-from pathlib import Path
 
 import numpy as np
 import pytest
-import recordings
 from curves import points_on
-from scipy.spatial.transform import Rotation, RotationSpline
+from scipy.spatial.transform import Rotation
 
 import symspline as ss
 from symspline import rotations
@@ -76,27 +74,6 @@ def test_a_rotation_raises_on_other_spaces(space):
 # ---- along a curve ----
 
 
-def test_rates_are_those_of_scipy_on_a_dense_motion():
-    t = np.linspace(0, 10, 2000)
-    r = Rotation.from_rotvec(np.stack([np.sin(t), 0.7 * np.cos(1.3 * t), 0.4 * t], axis=-1))
-    spline, scipy = ss.CubicSpline(t, r, "so:3", bc_type="not-a-knot"), RotationSpline(t, r)
-    x = np.linspace(1, 9, 5001)
-    assert np.abs(rotations.angular_velocity(spline, x) - scipy(x, 1)).max() < 1e-9
-    assert np.abs(rotations.angular_acceleration(spline, x) - scipy(x, 2)).max() < 2e-6
-
-
-def test_rates_are_those_of_a_gyroscope():
-    file = Path(__file__).parents[2] / "docs" / "comparisons" / "data" / "data_xsens.txt.gz"
-    sensor = recordings.read(file)
-    spline = ss.CubicSpline(sensor.t, SO3.project(sensor.rotations), "so:3")
-    x, measured = sensor.rate_times[1:], sensor.rates[1:]
-    off = {
-        frame: np.median(np.abs(rotations.angular_velocity(spline, x, frame) - measured)) for frame in ("body", "world")
-    }
-    # The sensor corrects its attitude by gravity and the magnetic field, too. Rates are about 0.7 rad/s.
-    assert off["body"] < 0.02 and off["world"] > 0.3
-
-
 @every_curve
 @pytest.mark.parametrize("batch", [(), (2,)], ids=str)
 def test_rates_are_derivatives_of_the_rotations(space, batch):
@@ -116,13 +93,6 @@ def test_rates_are_derivatives_of_the_rotations(space, batch):
 
 
 @every_curve
-def test_rotation_is_a_scipy_rotation(space):
-    spline = curve(space)
-    assert np.abs(rotations.rotation(spline, X).as_matrix() - turns(spline, X)).max() < 1e-14
-    assert rotations.rotation(spline, 1.0).as_matrix().shape == (3, 3)
-
-
-@every_curve
 @pytest.mark.parametrize("scalar_first", [True, False])
 @pytest.mark.parametrize("step", [0.9, 2.6])
 def test_quaternions_do_not_jump(space, scalar_first, step):
@@ -132,8 +102,8 @@ def test_quaternions_do_not_jump(space, scalar_first, step):
     assert np.abs(np.linalg.norm(q, axis=-1) - 1).max() < 1e-15
     assert ((q[1:] * q[:-1]).sum(axis=-1) > 0.999).all()
     assert q[0, 0 if scalar_first else 3] >= 0
-    found = rotations.from_quaternions(q, scalar_first=scalar_first)
-    assert np.abs(found - turns(spline, x)).max() < 2e-14
+    for found in (rotations.from_quaternions(q, scalar_first=scalar_first), rotations.rotation(spline, x).as_matrix()):
+        assert np.abs(found - turns(spline, x)).max() < 2e-14
 
 
 @pytest.mark.parametrize("space", [SO3, SE3], ids=str)
@@ -148,15 +118,6 @@ def test_knots_are_gone_through_once(monkeypatch, space):
     del spline
     gc.collect()
     assert kept() is None
-
-
-def test_quaternions_of_a_whole_turn_change_sign():
-    # Twelve steps of 60 degrees: two turns.
-    t = np.arange(13.0)
-    spline = ss.CubicSpline(t, Rotation.from_rotvec([[0, 0, i * np.pi / 3] for i in t]), "so:3")
-    q = rotations.quaternion(spline, t, scalar_first=True)
-    expected = np.stack([np.cos(t * np.pi / 6), 0 * t, 0 * t, np.sin(t * np.pi / 6)], axis=-1)
-    assert np.abs(q - expected).max() < 1e-14
 
 
 @pytest.mark.parametrize("rounds", [1, 2])
@@ -208,19 +169,6 @@ def test_quaternions_follow_the_curve_and_not_its_chord():
     assert np.abs(rotations.from_quaternions(q, scalar_first=True) - spline(x)).max() < 1e-14
 
 
-@every_curve
-def test_calls_are_those_of_a_spline(space):
-    spline = curve(space, (2,))
-    for call in (rotations.angular_velocity, lambda *a, **k: rotations.quaternion(*a, scalar_first=True, **k)):
-        both = call(spline, X)
-        assert np.array_equal(call(spline, np.stack([X, X]), per_curve=True), both)
-        assert np.array_equal(call(spline[1], X), both[1])
-        assert np.array_equal(call(spline, X[7]), both[:, 7])
-        with pytest.raises(ss.ValidationError, match="outside"):
-            call(spline, 5.0)
-        assert np.isfinite(call(spline, 5.0, extrapolate="geodesic")).all()
-
-
 def test_dates():
     dates = np.array(["2020-01-01T00:00:00", "2020-01-01T00:00:02"], "M8[s]")
     spline = ss.CubicSpline(dates, rotations.from_rotation_vectors([[0, 0, 0], [0, 0, 1]]), "so:3")
@@ -243,10 +191,8 @@ def test_forms_of_rotations():
     small = np.array([[0.0, 0, 0], [1e-9, 2e-12, 0], [3e-160, 0, 0], [0, np.pi, 0]])
     back = rotations.as_rotation_vectors(rotations.from_rotation_vectors(small))
     assert np.allclose(back, small, rtol=1e-15, atol=0)
-    assert (
-        np.abs(rotations.from_rotation_vectors([0, 0, 100.0]) - Rotation.from_rotvec([0, 0, 100.0]).as_matrix()).max()
-        < 1e-13
-    )
+    far = [0, 0, 100.0]
+    assert np.abs(rotations.from_rotation_vectors(far) - Rotation.from_rotvec(far).as_matrix()).max() < 1e-13
 
 
 @pytest.mark.parametrize(
@@ -266,11 +212,8 @@ def test_six_numbers(order, entries):
     raw = np.random.default_rng(0).standard_normal((50, 6))
     found = rotations.from_rotation_6d(raw, order=order)
     SO3.check_point(found)
-    a, b = (
-        np.moveaxis(raw.reshape(50, 3, 2), -1, 0)
-        if order == "interleaved"
-        else np.moveaxis(raw.reshape(50, 2, 3), 1, 0)
-    )
+    pairs = raw.reshape(50, 3, 2).swapaxes(1, 2) if order == "interleaved" else raw.reshape(50, 2, 3)
+    a, b = pairs.swapaxes(0, 1)
     first, second, third = np.moveaxis(found, -2 if order == "rows" else -1, 0)
     assert np.allclose(first, a / np.linalg.norm(a, axis=-1, keepdims=True), rtol=0, atol=1e-15)
     assert ((second * b).sum(-1) > 0).all() and np.abs((third * b).sum(-1)).max() < 1e-14
@@ -298,12 +241,10 @@ def test_six_numbers_of_nearly_parallel_vectors(order):
         (lambda s: rotations.quaternion(s, 0.5), "scalar_first"),
         (lambda s: rotations.as_quaternions(np.eye(3)), "scalar_first"),
         (lambda s: rotations.as_rotation_6d(np.eye(3)), "order='columns'"),
-        (lambda s: rotations.as_rotation_6d(2 * np.eye(3), order="rows"), "off the space"),
         (lambda s: rotations.from_rotation_6d(np.ones((2, 6)), order="rows"), r"numbers\[0\] are .* not parallel"),
         (lambda s: rotations.from_rotation_6d(np.zeros(6), order="rows"), "must be nonzero"),
         (lambda s: rotations.velocities(2 * np.eye(3), [0, 0, 1]), "off the space"),
         (lambda s: rotations.from_rotation_vectors([1, 2]), "vectors must be real"),
-        (lambda s: rotations.from_rotation_vectors([1, 2, np.nan]), "nan"),
     ],
 )
 def test_invalid_arguments_raise(call, match):

@@ -1,5 +1,7 @@
 """Figures: their content, batches, times and files, and no changes of global state."""
 
+import base64
+import re
 import subprocess
 import sys
 from io import BytesIO
@@ -61,43 +63,37 @@ def test_every_space_is_drawn(name, shape):
             np.testing.assert_allclose(line[:, 1], norm, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_a_curve_that_stands_still(name):
-    point = ss.space(name).random_point(np.random.default_rng(3))
-    figure = ss.CubicSpline(None, np.stack([point] * 3), name).plot()
-    assert axes_named(figure, "speed").get_ylim()[1] > 0.5
-
-
 def test_knots_are_marked():
     t = [0.0, 0.5, 2.0, 3.5]
+    figure = spline_on("r:2", (4,), t).plot()
     for label in ("speed", "acceleration"):
-        (marks,) = axes_named(spline_on("r:2", (4,), t).plot(), label).collections
+        # No gaps are marked.
+        (marks,) = axes_named(figure, label).collections
         np.testing.assert_array_equal([path[0, 0] for path in marks.get_segments()], t)
-
-
-def test_many_knots_are_marked_at_the_bottom():
+    # Many of them are marked at the bottom.
     (marks,) = axes_named(spline_on("r:2", (5000,)).plot(), "speed").collections
     assert len(marks.get_segments()) < 2500
     assert marks.get_segments()[0][1, 1] < 0.1
 
 
 def test_rounding_is_not_blown_up():
-    """A great circle at constant speed has acceleration 0, whatever the rounding."""
+    """A great circle at constant speed has acceleration 0, whatever the rounding; a point at rest has no speed."""
     angle = np.arange(5)
     spline = ss.CubicSpline(None, np.stack([np.cos(angle), np.sin(angle)], axis=-1), "sphere:1")
     assert axes_named(spline.plot(), "acceleration").get_ylim()[1] > 0.1
+    for name in FIRST.values():
+        point = ss.space(name).random_point(np.random.default_rng(3))
+        figure = ss.CubicSpline(None, np.stack([point] * 3), name).plot()
+        assert axes_named(figure, "speed").get_ylim()[1] > 0.5
 
 
 # ---- batches, times, products ----
 
 
-def test_batch_is_thinned_with_a_note():
+def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
     assert len(axes_named(figure, "speed").lines) == 50
     assert "50 of 70 curves, 4 points each, natural ends" in texts_of(figure)
-
-
-def test_failed_curves_are_not_drawn():
     good = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     points = [good, [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]], good]
     figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())
@@ -105,11 +101,11 @@ def test_failed_curves_are_not_drawn():
     assert "2 of 3 curves, 3 points each, natural ends, 1 not converged" in texts_of(figure)
     with pytest.raises(ss.ValidationError, match="nothing to plot"):
         ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot()
-
-
-def test_unconverged_curve_is_drawn_and_named():
     figure = spline_on("sphere:2", max_iter=1, on_failure="ignore").plot()
     assert any(text.endswith("not converged") for text in texts_of(figure))
+    spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
+    figure = rendered(spline.plot())
+    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure) and len(figure.axes) == 6 + 2
 
 
 @pytest.mark.parametrize(
@@ -126,21 +122,16 @@ def test_dates(name, unit, step):
     assert 2 <= sum(map(bool, labels)) <= 12
 
 
-def test_curves_with_dates_of_their_own():
+def test_dates_of_every_curve_and_whole_numbers():
     t = np.array([["2024-01-01", "2024-01-03"], ["2024-01-02", "2024-01-09"]], "datetime64[D]")
     lines = lines_of(axes_named(rendered(spline_on("r:2", (2, 2), t).plot()), "speed"))
     for line, dates in zip(lines, t, strict=True):
         np.testing.assert_allclose(line[[0, -1], 0], date2num(dates))
-
-
-def test_nanoseconds_are_finer_than_dates_on_an_axis():
+    # Nanoseconds are finer than dates on an axis.
     t = np.datetime64("2024-01-01", "ns") + np.arange(5) * np.timedelta64(100, "ns")
     axes = axes_named(rendered(spline_on("r:2", (5,), t).plot()), "acceleration")
     assert axes.get_xlabel().startswith("seconds since 2024-01-01")
     np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], [0, 4e-7], atol=1e-15)
-
-
-def test_large_whole_numbers_as_times():
     t = 1_700_000_000_000_000_000 + 10**9 * np.arange(4)
     axes = axes_named(rendered(spline_on("r:2", (4,), t).plot()), "speed")
     np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], t[[0, -1]].astype(float))
@@ -160,31 +151,30 @@ def test_product_has_a_picture_a_factor(name, shape):
     assert len(figure.axes) == 4 + 2
 
 
-def test_product_of_many_factors():
-    spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
-    figure = rendered(spline.plot())
-    assert "4 points, natural ends, 6 of 7 factors" in texts_of(figure)
-    assert len(figure.axes) == 6 + 2
-
-
 # ---- files, and the rest of the program ----
 
 
-@pytest.mark.parametrize("suffix, start", [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
-def test_figure_is_saved(tmp_path, suffix, start):
-    path = tmp_path / f"curve.{suffix}"
-    assert isinstance(spline_on("r:2").plot(path), Figure)
-    assert path.read_bytes().startswith(start)
-
-
-def test_figure_is_saved_into_an_open_file():
+def test_figure_is_saved(tmp_path):
+    spline = spline_on("r:2")
+    for suffix, start in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
+        path = tmp_path / f"curve.{suffix}"
+        assert isinstance(spline.plot(path), Figure) and path.read_bytes().startswith(start)
     file = BytesIO()
-    spline_on("r:2").plot(file)
-    assert file.getvalue().startswith(b"\x89PNG")
+    assert spline.plot(file)._repr_png_().startswith(b"\x89PNG") and file.getvalue().startswith(b"\x89PNG")
 
 
-def test_notebooks_show_the_figure():
-    assert spline_on("r:2").plot()._repr_png_().startswith(b"\x89PNG")
+def test_notebooks_show_a_small_picture_and_the_text(monkeypatch):
+    spline, text = (
+        ss.CubicSpline(None, np.eye(3), "s:2"),
+        "<pre>&lt;CubicSpline on Sphere(2): 3 points, natural&gt;</pre>",
+    )
+    shown = spline._repr_html_()
+    picture = base64.b64decode(re.search(r'base64,([^"]*)"', shown)[1])
+    assert shown.startswith(f"{text}<img ") and picture.startswith(b"\x89PNG") and len(picture) < 200_000
+    lost = ss.CubicSpline(None, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]], "s:2", on_failure="ignore")
+    assert "<img" not in lost._repr_html_()
+    monkeypatch.setattr("symspline._base_curve.find_spec", lambda _: None)
+    assert spline._repr_html_() == text
 
 
 def test_without_matplotlib(monkeypatch):
@@ -223,9 +213,3 @@ def test_gaps_far_longer_than_the_rest_are_marked(dates):
         edges = [sorted(set(path.vertices[:, 0])) for path in bands.get_paths()]
         since = date2num(t[0]) if dates else 0.0
         assert np.allclose(edges, since + np.array([[4, 18], [22, 33]]))
-
-
-def test_even_times_have_no_gaps():
-    figure = rendered(spline_on("r:2").plot())
-    assert not any("gap" in text for text in texts_of(figure))
-    assert not [c for axes in figure.axes for c in axes.collections if c.get_label() == "gaps"]

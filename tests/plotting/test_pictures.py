@@ -12,18 +12,12 @@ from symspline.geo import from_lonlat
 
 
 MERIDIAN = np.array([[1.0, 0, 0], [1, 0, 1], [0, 0, 1], [-1, 0, 2], [-1, 0, 0]])
-
-
 DATE_LINE = from_lonlat([150, 170, -170, 175, -160], [-20, 10, 20, 30, 40])
-
-
 ROUND = from_lonlat([0, 120, 240, 360], [10, 20, 30, 10])
-
-
 NEAR_POLE = from_lonlat([20, 25, -150, -140], [40, 80, 85, 30])
 
 
-@pytest.mark.parametrize("points", [MERIDIAN, -MERIDIAN, DATE_LINE, ROUND, NEAR_POLE, ROUND[::-1]])
+@pytest.mark.parametrize("points", [MERIDIAN, -MERIDIAN, DATE_LINE, ROUND, NEAR_POLE])
 def test_no_line_jumps_across_the_map(points):
     spline = ss.CubicSpline(None, ss.Sphere(2).project(points), "sphere:2")
     line = lines_of(axes_named(rendered(spline.plot()), "map"))[0]
@@ -82,14 +76,8 @@ def test_degrees():
 
 
 TURN = 1.3 * np.arange(12)
-
-
 DIRECTION = np.stack([np.cos(TURN), np.sin(TURN)], axis=-1)
-
-
 TURNED = np.stack([DIRECTION, DIRECTION[:, ::-1] * [-1, 1]], axis=-1)
-
-
 SIGNS = np.random.default_rng(9).choice([-1, 1], (12, 1))
 
 
@@ -184,7 +172,7 @@ def planes(normals, rng):
 
 
 @pytest.mark.parametrize("name", ["rp:2", "gr:1,3", "gr:2,3"])
-@pytest.mark.parametrize("points, crossings", [(HALF_SPHERE, 3), (HALF_SPHERE[::-1], 3), (RIM, 0)])
+@pytest.mark.parametrize("points, crossings", [(HALF_SPHERE, 3), (RIM, 0)])
 def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
     rng = np.random.default_rng(13)
     signs = rng.choice([-1, 1], (len(points), 1))
@@ -201,12 +189,6 @@ def test_no_line_jumps_across_the_half_sphere(name, points, crossings):
     np.testing.assert_allclose(line[gaps - 1], -line[gaps + 1], atol=1e-12)
     for dot in dots:
         assert np.nanmin(np.linalg.norm(line - dot, axis=1)) < 1e-12
-
-
-def test_half_sphere_is_the_upper_one():
-    line = sphere.broken_at_rim(sphere.lifted(ss.CubicSpline(None, HALF_SPHERE, "sphere:2")(np.linspace(0, 5, 2001))))
-    np.testing.assert_allclose(np.linalg.norm(line[~np.isnan(line[:, 0])], axis=1), 1)
-    assert np.nanmin(line) >= -1 and np.nanmin(line[:, 2]) >= 0
 
 
 def test_small_curve_on_the_half_sphere_is_enlarged():

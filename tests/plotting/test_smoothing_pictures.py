@@ -58,12 +58,6 @@ def test_every_space_shows_data(name):
     assert speed.get_ylim()[1] > wanted.max()
 
 
-@pytest.mark.parametrize("name", ["r:2", "r:3", "sphere:2", "h:2", "so:3", "spd:3", "se:2", "se:3", "rp:2", "s:1"])
-def test_batches(name):
-    figure = rendered(smooth(name, curves=3).plot())
-    assert len(bands_of(axes_named(figure, "speed"))) == (0 if name.startswith("se") else 3)
-
-
 def test_heading():
     spline = smooth("r:2", weights=np.where(np.arange(40) % 4, 1.0, 0.0))
     wanted = f"30 data, {spline.df:.3g} degrees of freedom, noise {spline.sigma:.2g}, band 95 %"
@@ -209,17 +203,6 @@ def test_data_of_frames_stand_beside_the_curve():
     light, bold = sorted(arrows, key=lambda c: c.width)
     np.testing.assert_allclose(light.get_offsets()[:, 0], bold.get_offsets()[:, 0])
     assert set(light.get_offsets()[:, 0]) <= set(T)
-
-
-def test_unconverged_curves_say_so():
-    figure = smooth("r:2", max_iter=1, tol=1e-12, on_failure="ignore").plot()
-    assert any(text.endswith("band 95 %") for text in texts_of(figure))
-    failed = smooth("sphere:2", max_iter=1, tol=1e-12, on_failure="ignore")
-    assert any("not converged" in text for text in texts_of(rendered(failed.plot())))
-
-
-def test_notebooks_show_smoothing_splines():
-    assert smooth("sphere:2")._repr_html_().startswith("<pre>&lt;SmoothingSpline")
 
 
 def test_a_long_gap_has_samples_of_its_own():

@@ -135,28 +135,6 @@ def test_faults_raise_with_the_place(entry, how, capsys):
     assert len(message) < 600
 
 
-def test_one_bad_curve_in_a_batch():
-    batch = np.stack([P, dirty("missing points")[1], P])
-    with pytest.raises(ss.ValidationError, match="curve 1"):
-        ss.CubicSpline(T, batch, "sphere:2")
-    curves = ss.CubicSpline(T, batch, "sphere:2", on_failure="ignore")
-    alone = ss.CubicSpline(T, P, "sphere:2")
-    assert curves.report.converged.tolist() == [True, False, True]
-    assert np.array_equal(curves[0](T), alone(T)) and np.isnan(curves[1](T)).all()
-    assert np.array_equal(curves[2].velocities, alone.velocities)
-
-
-def test_repeated_times_of_a_recording_are_merged_or_refused():
-    t, points = dirty("repeated")
-    with pytest.raises(ss.ValidationError, match="duplicates"):
-        ss.fit_segments(t, points, "sphere:2", max_gap=9)
-    (merged,) = ss.fit_segments(t, points, "sphere:2", max_gap=9, duplicates="mean")
-    mean = ss.Sphere(2).geodesic(points[6], points[7], 0.5)
-    by_hand = np.delete(points, 7, axis=0)
-    by_hand[6] = mean
-    np.testing.assert_allclose(merged.points, by_hand, atol=1e-12)
-
-
 def test_a_table_of_pandas_in_any_order():
     pd = pytest.importorskip("pandas")
     lon, lat = ss.geo.to_lonlat(P)

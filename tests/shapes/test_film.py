@@ -70,11 +70,6 @@ def test_dates_of_whole_days():
     assert labels[0] == "2024-01-01 00:00" and labels[1] == "2024-01-04 15:16" and labels[-1] == "2024-02-10 00:00"
 
 
-def test_saved(tmp_path):
-    AffineMorph(KNOTS, turned(2, 5)).plot(tmp_path / "film.svg")
-    assert (tmp_path / "film.svg").read_text("utf-8").startswith("<?xml")
-
-
 def test_four_dimensions_have_no_picture():
     x = drawings(3, landmarks=8, n=4, spread=0.1)
     with pytest.raises(ss.ValidationError, match="in 2 or 3 dimensions, not in 4"):
@@ -112,14 +107,3 @@ def test_equations_24_and_25_draw_the_curve_in_the_unit_disc():
     assert len(crossings) == 1
     leaving, returning = disc[crossings[0]], disc[crossings[0] + 1]
     assert np.linalg.norm(leaving) > 0.99 and np.linalg.norm(leaving + returning) < 0.01
-
-
-def test_local_coordinates_are_infinite_at_one_shape():
-    spline = figures.shape_spline()
-    near = np.array([1.9, 1.99, 1.999, 2.001, 2.01, 2.1])
-    b = np.abs(figures.coordinates(spline(near))[:, 1])
-    assert (np.diff(b[:3]) > 9 * b[:2] * 0.5).all() and (b[3] > 50 and b[2] > 50)
-    # They are coordinates of the shape: any basis gives the same.
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    off = figures.coordinates(spline(near) @ turn) - figures.coordinates(spline(near))
-    assert np.abs(off).max() < 1e-8

@@ -22,16 +22,12 @@ def affine_images(x, seed=1):
     return x @ maps + rng.standard_normal((*x.shape[:-2], 1, n))
 
 
-def grassmannian(points):
-    return ss.Grassmannian(points.shape[-1], points.shape[-2])
-
-
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("base", [None, 0, 4])
 def test_affine_images_have_one_shape(n, base):
     x = drawings(7, n=n)
     shapes, images = from_landmarks(x, base=base), from_landmarks(affine_images(x), base=base)
-    space = grassmannian(shapes)
+    space = ss.Grassmannian(n, shapes.shape[-2])
     assert shapes.shape == (7, 6 if base is None else 5, n)
     space.check_point(shapes)
     assert space.distance(shapes, images).max() < 1e-14
@@ -79,10 +75,7 @@ FLAT = np.array([[0.0, 0], [1, 1], [2, 2], [3, 3]])
     [
         (r"x\[1\] lies in a hyperplane: its extents are 3.16, \d", lambda: from_landmarks([SQUARE, FLAT])),
         (r"x lies in a hyperplane", lambda: from_landmarks(FLAT, base=2)),
-        (
-            r"x has shape \(3, 2\): 3 landmarks in 2 dimensions; .* need at least 4 landmarks",
-            lambda: from_landmarks(FLAT[1:]),
-        ),
+        (r"x has shape \(3, 2\): 3 landmarks in 2 dim.* at least 4 landmarks", lambda: from_landmarks(FLAT[1:])),
         ("base must be None or the number of a landmark, 0 to 3, not 4", lambda: from_landmarks(SQUARE, base=4)),
         ("base must be .* not True", lambda: from_landmarks(SQUARE, base=True)),
         ("x must be real landmarks, not complex", lambda: from_landmarks(SQUARE * 1j)),

@@ -43,6 +43,14 @@ TIGHT = {"tol": 1e-8, "max_iter": 200}
 """Steps of the search that end it, in standard deviations; the linearised solver stagnates at rounding."""
 
 
+def both_solvers(*data, **options):
+    """The splines of the linearised and of the full Gauss-Newton solver, which both converge."""
+    splines = [ss.make_smoothing_spline(*data, method=method, **options) for method in ("linearized", "newton")]
+    for spline, method in zip(splines, ("linearized", "newton"), strict=True):
+        assert spline.report.converged and spline.report.method == method
+    return splines
+
+
 def acceleration_energy(space, spline, lam):
     """λ ∫ |∇γ'|² dt, by two Gauss points per segment."""
     h = np.diff(spline.t)[:, None]

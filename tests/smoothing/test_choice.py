@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from noisy import beside, each, rms, truth
+from noisy import beside, both_solvers, rms, truth
 
 import symspline as ss
 
@@ -18,8 +18,7 @@ def batch(name, sigma):
 
 
 @pytest.mark.parametrize(
-    ("name", "sigma"),
-    [(name, sigma) for name in ("sphere:2", "so:3", "hyperbolic:2") for sigma in (0.02, 0.1, 0.4)] + [("spd:3", 0.1)],
+    ("name", "sigma"), [("sphere:2", 0.02), ("sphere:2", 0.4), ("so:3", 0.1), ("hyperbolic:2", 0.4), ("spd:3", 0.1)]
 )
 def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     space, points, noisy = batch(name, sigma)
@@ -37,30 +36,6 @@ def test_the_chosen_curve_is_nearly_as_good_as_the_best(name, sigma):
     # So they are where degrees of freedom count 1.4 times, which makes stiffer curves.
     assert (0.92 if sigma < 0.2 else 0.75) < covered.mean() < 0.995
     assert chosen.sigma.mean() == pytest.approx(sigma, rel=0.05)
-
-
-@pytest.mark.parametrize(("name", "limit"), [("sphere:2", 1.35), ("so:3", 1.2), ("spd:3", 1.2)])
-def test_outliers_do_little_harm(name, limit):
-    space, points, noisy = batch(name, 0.1)
-    rng = np.random.default_rng(0)
-    bad = rng.random(noisy.shape[:2]) < 0.15
-    dirty = noisy.copy()
-    dirty[bad] = space.exp(points[bad], 1.2 * space.random_tangent(rng, points[bad]))
-    clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
-    errors = {
-        loss: rms(space, ss.make_smoothing_spline(T, dirty, space, loss=loss, on_failure="ignore")(T), points).mean()
-        for loss in ("linear", "huber", "cauchy")
-    }
-    assert errors["cauchy"] < limit * clean
-    assert errors["cauchy"] < errors["huber"] < 0.75 * errors["linear"]
-
-
-def test_robust_losses_change_little_where_nothing_is_wrong():
-    space, points, noisy = batch("so:3", 0.1)
-    clean = rms(space, ss.make_smoothing_spline(T, noisy, space)(T), points).mean()
-    for loss in ("huber", "cauchy"):
-        robust = ss.make_smoothing_spline(T, noisy, space, loss=loss)
-        assert rms(space, robust(T), points).mean() < 1.1 * clean
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
@@ -108,26 +83,14 @@ def test_geodesic_motion_is_seen_to_be_geodesic(criterion, gamma, most):
 @pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e8])
 def test_both_solvers_find_stiff_curves(lam):
     sphere = ss.Sphere(2)
-    flat, exact = (
-        ss.make_smoothing_spline(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam, method=method)
-        for method in ("linearized", "newton")
-    )
-    for spline in (flat, exact):
-        assert spline.report.converged and spline.report.iterations <= 10
+    flat, exact = both_solvers(TURNS, beside(sphere, CIRCLE, 0.1), sphere, lam)
+    assert max(flat.report.iterations, exact.report.iterations) <= 10
     assert rms(sphere, flat(TURNS), exact(TURNS)) < 2e-3 * rms(sphere, exact(TURNS), CIRCLE)
 
 
 @pytest.mark.parametrize(
     ("name", "length", "lam"),
-    [
-        ("sphere:2", 4.0, 0.1),
-        ("sphere:2", 4.0, 1.0),
-        ("so:3", 5.0, 1.0),
-        ("hyperbolic:2", 3.0, 0.1),
-        ("cp:2", 3.0, 0.01),
-        ("spd:2", 3.0, 1.0),
-        ("gr:2,4", 2.0, 0.1),
-    ],
+    [("sphere:2", 4.0, 0.1), ("so:3", 5.0, 1.0), ("hyperbolic:2", 3.0, 0.1), ("cp:2", 3.0, 0.01), ("gr:2,4", 2.0, 0.1)],
 )
 def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
     """The trace by differences of curves of the full Gauss-Newton solver.
@@ -154,38 +117,13 @@ def test_degrees_of_freedom_are_the_trace_of_the_influence(name, length, lam):
     assert found == pytest.approx(np.sum(followed) / space.dim, rel=5e-4)
 
 
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-def test_the_search_ends_soon_where_lambda_hardly_matters():
-    # Near a geodesic the best λ wanders from round to round, but the degrees of freedom do not.
-    space, rng = ss.space("so:3"), np.random.default_rng(0)
-    ends = space.random_point(rng, (40, 2))
-    straight = np.array([space.geodesic(p, q, np.linspace(0, 0.5, 60)) for p, q in ends])
-    noisy = space.exp(straight, 0.05 * space.random_tangent(rng, straight))
-    report = ss.make_smoothing_spline(None, noisy, space).report
-    assert np.all(report.converged) and report.iterations.mean() < 7
-
-
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
 def test_both_solvers_reject_outliers(loss):
     space, _, noisy = batch("so:3", 0.1)
     dirty = noisy[0]
     dirty[5::9] = space.exp(dirty[5::9], 1.2 * space.random_tangent(np.random.default_rng(1), dirty[5::9]))
-    flat, exact = (
-        ss.make_smoothing_spline(T, dirty, space, 0.3, loss=loss, sigma=0.1, method=method, tol=1e-6)
-        for method in ("linearized", "newton")
-    )
-    assert exact.report.method == "newton"
+    flat, exact = both_solvers(T, dirty, space, 0.3, loss=loss, sigma=0.1, tol=1e-6)
     assert rms(space, flat.points, exact.points) < 5e-3 * exact.std(T).max()
-
-
-def agree(space, t, noisy, criterion="gcv", **options):
-    """λ and degrees of freedom are the same whichever way is taken."""
-    ways = [
-        ss.make_smoothing_spline(t, noisy, space, criterion=criterion, method=method, **options)
-        for method in ("auto", "newton")
-    ]
-    assert all(way.report.converged for way in ways)
-    return ways[0].df == pytest.approx(ways[1].df, rel=0.02)
 
 
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
@@ -199,23 +137,11 @@ def test_light_data_say_how_stiff_a_curve_is(ratio, criterion):
     for seed in range(3):
         rng = np.random.default_rng(seed)
         noisy = sphere.exp(truth, deviations[:, None] * sphere.random_tangent(rng, truth))
-        assert agree(sphere, t, noisy, criterion, weights=1 / deviations**2)
-
-
-@pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
-@pytest.mark.parametrize(("name", "length"), [("sphere:2", 6.3), ("so:3", 5.0), ("cp:2", 3.0)])
-def test_light_directions_do_too(name, length):
-    space, rng = ss.space(name), np.random.default_rng(0)
-    t, p = np.linspace(0, 1, 60), space.random_point(rng)
-    v = space.random_tangent(rng, p)
-    truth = space.exp(p, np.multiply.outer(length * t / space.norm(p, v), v))
-    deviations = np.linspace(0.01, 0.2, space.dim)
-    frame = space.frame(truth)
-    noise = rng.standard_normal((60, space.dim)) * deviations
-    noisy = space.exp(truth, np.einsum("nm,nm...->n...", noise, frame))
-    frames = space.transport(truth[:, None], noisy[:, None], frame)
-    weights = np.tile(np.diag(1 / deviations**2), (60, 1, 1))
-    assert agree(space, t, noisy, weights=weights, frames=frames)
+        data = {"t": t, "points": noisy, "space": sphere, "weights": 1 / deviations**2}
+        auto, newton = (
+            ss.make_smoothing_spline(**data, criterion=criterion, method=method) for method in ("auto", "newton")
+        )
+        assert auto.report.converged and newton.report.converged and auto.df == pytest.approx(newton.df, rel=0.02)
 
 
 def test_many_dimensions_are_coupled_too():
@@ -226,23 +152,6 @@ def test_many_dimensions_are_coupled_too():
     noisy = space.exp(truth, 0.02 * space.random_tangent(rng, truth))
     spline = ss.make_smoothing_spline(t, noisy, space, 10.0)
     assert spline.report.method == "linearized" and spline.df == pytest.approx(2.0, abs=0.05)
-
-
-@pytest.mark.parametrize("lam", [1.0, 1e2, 1e4, 1e9])
-def test_stiff_curves_of_poses_are_found(lam):
-    space = ss.space("se:3")
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        t, p = np.linspace(0, 1, 80), [space.random_point(rng)]
-        for _ in range(5):
-            p.append(space.exp(p[-1], 0.6 * space.random_tangent(rng, p[-1])))
-        truth = ss.CubicSpline(np.linspace(0, 1, 6), np.array(p), space)(t)
-        noisy = space.exp(truth, 0.05 * space.random_tangent(rng, truth))
-        spline = ss.make_smoothing_spline(t, noisy, space, lam)
-        assert all(report.converged and report.iterations <= 10 for report in each(spline.report))
-    # Natural ends of curves of poses are those of the group, where straight lines of a turning body bend.
-    bends = ss.poses.linear_acceleration(spline, t[15:-15])
-    assert lam < 1e9 or np.abs(bends).max() < 1e-3 * np.abs(ss.poses.linear_velocity(spline, t)).max()
 
 
 def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
@@ -262,7 +171,7 @@ def test_knots_of_a_batch_are_enough_for_its_roughest_curve():
 @pytest.mark.filterwarnings("ignore::symspline.SmoothingWarning")
 def test_a_lambda_that_does_not_settle_is_reported():
     """Random walks for which the choice at one curve leads to another curve, with another choice, and back."""
-    sphere, told = ss.Sphere(2), []
+    sphere, unsettled = ss.Sphere(2), []
     for seed, gamma, weighed in ((826, 1.4, False), (1129, 1.0, True)):
         rng = np.random.default_rng(seed)
         n = int(rng.integers(4, 40))
@@ -275,10 +184,8 @@ def test_a_lambda_that_does_not_settle_is_reported():
         points = walk / np.linalg.norm(walk, axis=1, keepdims=True)
         weights = 10 ** rng.uniform(-3, 3, n) if weighed else None
         spline = ss.make_smoothing_spline(t, points, sphere, gamma=gamma, weights=weights, on_failure="ignore")
-        told.append(not spline.report.converged)
+        unsettled.append(not spline.report.converged)
         # The λ that the message proposes has a curve.
         assert ss.make_smoothing_spline(t, points, sphere, spline.lam, weights=weights).report.converged
     # Rounding may settle one of them elsewhere.
-    assert any(told)
-    with pytest.raises(ss.ConvergenceError, match=r"do not determine .* remove data with tiny weights"):
-        ss.make_smoothing_spline(None, points, sphere, weights=np.r_[1e300, np.ones(n - 1)])
+    assert any(unsettled)

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from noisy import each, rms
+from noisy import rms
 
 import symspline as ss
 
@@ -82,27 +82,12 @@ def test_more_smoothing_than_was_chosen_is_a_warning():
     """A body that turns between three bursts, with an outlier beside each gap."""
     t = [0, 0.0001, 0.0004, 0.0011, 0.0066, 0.008, 0.0081, 0.4977, 0.5016, 0.502, 0.5037]
     t += [0.9907, 0.9914, 0.9914, 0.9915, 0.9936, 0.9936, 0.9968, 0.9984, 1]
-    turns = [
-        [94, 55, 7],
-        [96, 56, 7],
-        [95, 54, 6],
-        [95, 57, 7],
-        [97, 56, 8],
-        [95, 57, 7],
-        [97, 57, 7],
-        [-137, -121, -16],
-    ]
-    turns += [
-        [-15, 48, 15],
-        [-14, 47, 16],
-        [-13, 48, 16],
-        [-47, -32, 20],
-        [-47, -33, 20],
-        [-46, -34, 21],
-        [-47, -33, 22],
-    ]
-    turns += [[-46, -32, 21], [-47, -33, 22], [-46, -32, 20], [-45, -34, 20], [-46, -33, 21]]
-    noisy = ss.rotations.from_rotation_vectors(np.array(turns) / 100)
+    words = (
+        "94 55 7  96 56 7  95 54 6  95 57 7  97 56 8  95 57 7  97 57 7  -137 -121 -16  -15 48 15  -14 47 16  -13 "
+        "48 16  -47 -32 20  -47 -33 20  -46 -34 21  -47 -33 22  -46 -32 21  -47 -33 22  -46 -32 20  -45 -34 20 "
+        "-46 -33 21 "
+    )
+    noisy = ss.rotations.from_rotation_vectors(np.reshape(words.split(), (20, 3)).astype(float) / 100)
     with pytest.warns(ss.SmoothingWarning, match="smallest lam for which a curve was found"):
         spline = ss.make_smoothing_spline(t, noisy, "so:3", loss="huber")
     assert spline.report.converged and spline.report.at_bound and 2.5 < spline.df < 18
@@ -121,14 +106,6 @@ def test_knots_that_end_a_rounding_before_the_data():
     assert beside
     with pytest.raises(ss.ValidationError, match="knots must reach"):
         ss.make_lsq_spline([0, 0.4, 0.7, 1], np.zeros((4, 1)), [0, 0.5, 1 - 1e-12], "r:1")
-
-
-def test_the_noise_level_is_estimated_despite_outliers():
-    found = []
-    for seed in range(20):
-        _, t, _, noisy, _ = recorded("r:2", "uniform", 150, seed, True)
-        found.append(ss.make_smoothing_spline(t, noisy, "r:2", loss="cauchy").sigma)
-    assert 0.045 < np.median(found) < 0.065 and max(found) < 0.1
 
 
 @pytest.mark.parametrize("name", ["r:2", "sphere:2"])
@@ -230,26 +207,6 @@ def test_a_bad_curve_does_not_stop_a_batch():
         ss.make_smoothing_spline(t, batch, space, where=[True])
     nothing = ss.make_smoothing_spline(t, batch, space, where=np.zeros(4, bool))
     assert np.isnan(nothing(0.5)).all()
-
-
-@pytest.mark.parametrize("name", ["sphere:2", "se:3", "sphere:2 x r:3"])
-def test_files_keep_masked_curves(name, tmp_path):
-    space, rng = ss.space(name), np.random.default_rng(0)
-    points = space.exp(space.random_point(rng), 0.1 * rng.random()) if name == "r:3" else None
-    t = np.linspace(0, 1, 12)
-    ends = [space.random_point(rng, 3), space.random_point(rng, 3)]
-    points = space.geodesic(*[
-        tuple(x[:, None] for x in end) if isinstance(end, tuple) else end[:, None] for end in ends
-    ], 0.3 * t)  # fmt: skip
-    arrays = each(points)
-    for array in arrays:
-        array[1] = np.nan
-    batch = arrays if isinstance(points, tuple) else arrays[0]
-    spline = ss.make_smoothing_spline(t, batch, space, 1e-3, on_failure="ignore")
-    spline.save(tmp_path / "curves.npz")
-    back = ss.load(tmp_path / "curves.npz")
-    assert np.array_equal(back.report.converged if name == "sphere:2" else back.report[0].converged, [1, 0, 1])
-    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(each(back(0.2)), each(spline(0.2)), strict=True))
 
 
 def test_missing_samples_are_the_same_alone_and_in_a_batch():

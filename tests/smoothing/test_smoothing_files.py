@@ -8,13 +8,15 @@ import pickle
 import numpy as np
 import pytest
 from curves import parts, same
-from noisy import beside, example
+from noisy import example
 from stored import load, stored, with_arrays
 
 import symspline as ss
 from symspline.cli import main
 
 S2, T, NOISY, _ = example("sphere:2", 0.05, n=40)
+POSES = np.tile(np.eye(4), (40, 1, 1))
+POSES[:, :3, 3] = NOISY
 WEIGHTS = np.where(np.arange(40) == 3, 0.0, np.linspace(0.5, 2, 40))
 DATES = np.datetime64("2024-03-01") + (T * 60).astype("timedelta64[s]")
 TEXTS = DATES[8::8].astype(str)
@@ -43,6 +45,10 @@ def saved_curves():
         "complex": smooth(T, example("cp:1", 0.05, n=40)[2], "cp:1"),
         "closed": smooth(T, np.concatenate([NOISY[:-1], NOISY[:1]]), S2, 1.0, bc_type="periodic"),
         "closed too": smooth(T, np.concatenate([NOISY[:-1], NOISY[:1]]), S2, 2.0, knots=9, bc_type="periodic"),
+        "clamped": smooth(T, NOISY, S2, 1.0, bc_type="clamped"),
+        "masked": smooth(T, np.where([[[1.0]], [[np.nan]]], pair, np.nan), S2, 0.1, on_failure="ignore"),
+        "masked product": smooth(T, (pair, pair[..., :1]), "sphere:2 x r:1", where=[True, False]),
+        "masked poses": smooth(T, np.stack([POSES] * 2), "se:3", 0.1, where=[False, True]),
         "unconverged": smooth(T, pair, S2, max_iter=1, on_failure="ignore"),
     }
 
@@ -79,20 +85,8 @@ def test_zones_are_kept():
         read.std(datetime.datetime(2024, 3, 1))
 
 
-def test_curves_of_a_batch_come_back_one_by_one():
-    for name in ("batch", "own times", "own dates"):
-        for read, spline in zip(load(stored(SAVED[name])), SAVED[name], strict=True):
-            assert_same(read, spline)
-
-
 def test_many_smoothing_splines_in_one_file():
-    for names in (
-        ["one", "few knots", "robust"],
-        ["dates"],
-        ["product"],
-        ["zones"],
-        ["closed", "closed too"],
-    ):
+    for names in (["one", "few knots", "robust"], ["dates"], ["product"], ["zones"], ["closed", "closed too"]):
         curves = {name: SAVED[name] for name in names}
         file = io.BytesIO()
         ss.save(curves, file)
@@ -128,37 +122,26 @@ def test_files_with_a_missing_array(name):
     "changes",
     [
         {"data": 2 * ARRAYS["data"]},
-        {"data": np.nan * ARRAYS["data"]},
         {"data": ARRAYS["data"][1:]},
         {"data": ARRAYS["data"] + 0j},
         {"data_t": ARRAYS["data_t"][::-1].copy()},
         {"data_t": ARRAYS["data_t"] - 1},
         {"data_t": ARRAYS["data_t"] + 1},
-        {"data_t": ARRAYS["data_t"][1:]},
-        {"data_t": np.nan * ARRAYS["data_t"]},
         {"data_t": np.arange(40), "data_t_unit": "s"},
         {"data_t_unit": "s CET"},
         {"data_t": 1.0},
         {"data_weights": -ARRAYS["data_weights"]},
-        {"data_weights": ARRAYS["data_weights"][1:]},
         {"data_weights": ARRAYS["data_weights"].astype(str)},
         {"band": ARRAYS["band"][1:]},
         {"band": ARRAYS["band"][:, :3]},
         {"band": np.nan * ARRAYS["band"]},
-        {"band": 3.0},
-        {"noise": "{"},
-        {"noise": "[]"},
         {"noise": "[{}]"},
         {"noise": "5"},
         {"noise": noise_with(method="guess")},
-        {"noise": noise_with(method=[])},
         {"noise": noise_with(converged="no")},
         {"noise": noise_with(lam=[1.0])},
         {"noise": noise_with(iterations=1.5)},
-        {"noise": noise_with(scale=None)},
         {"noise": noise_with(surprise=1)},
-        {"points": 2 * ARRAYS["points"]},
-        {"version": 99},
     ],
     ids=lambda changes: " ".join(changes),
 )
@@ -178,7 +161,7 @@ def test_damaged_collections_raise(changes):
         ss.load(damaged)
 
 
-@pytest.mark.parametrize("name", ["one", "batch", "dates", "product", "many"])
+@pytest.mark.parametrize("name", ["batch", "product", "many"])
 def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
     file = tmp_path / "smooth.npz"
     if name == "many":
@@ -191,10 +174,3 @@ def test_the_command_line_reads_smoothing_splines(name, tmp_path, capsys):
     assert main(["plot", str(file), *which, "-o", str(tmp_path / "out.png")]) == 0
     assert "rounding allows" in capsys.readouterr().out
     assert (tmp_path / "out.png").stat().st_size > 1000
-
-
-def test_knots_of_curves_that_count_from_their_own_time():
-    both = SAVED["own dates"]
-    assert both.t.shape == (2, 11) and both[0].t.shape == (11,)
-    with pytest.raises(ss.ValidationError, match=r"must have shape \(K,\)"):
-        ss.make_smoothing_spline(T, beside(S2, NOISY, 0.01), S2, knots=np.eye(3))

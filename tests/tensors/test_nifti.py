@@ -1,9 +1,7 @@
-"""Volumes of tensors in NIfTI files; where nibabel is not installed, with a stand-in that keeps images in memory."""
+"""Volumes of tensors in NIfTI files."""
 
 import dataclasses
 import sys
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -11,31 +9,9 @@ import pytest
 import symspline as ss
 from symspline.tensors import Volume, read_nifti, to_vectors, write_nifti
 
+nibabel = pytest.importorskip("nibabel")
+
 AFFINE = np.diag([2.0, 2.0, 2.5, 1.0])
-
-
-@pytest.fixture(params=["nibabel", "stand-in"])
-def nibabel(request, monkeypatch):
-    if request.param == "nibabel":
-        return pytest.importorskip("nibabel")
-    images = []
-
-    class Image:
-        def __init__(self, data, affine, header=None, dtype=None):
-            self.dataobj, self.affine = np.array(data, dtype), np.array(affine)
-            self.header = dict(header or {"intent_code": 0, "intent_p1": 0.0})
-
-    module = ModuleType("nibabel")
-    module.Nifti1Image = Image
-
-    def save(image, name):
-        Path(name).write_text(str(len(images)))
-        images.append(image)
-
-    module.save = save
-    module.load = lambda name: images[int(Path(name).read_text())]
-    monkeypatch.setitem(sys.modules, "nibabel", module)
-    return module
 
 
 def volume(dtype=np.float32):
@@ -45,19 +21,19 @@ def volume(dtype=np.float32):
     return Volume((tensors + tensors.swapaxes(1, 2)) / 2, mask, AFFINE)
 
 
-def raw(nibabel, name):
+def raw(name):
     image = nibabel.load(name)
     return image, np.asanyarray(image.dataobj)
 
 
 @pytest.mark.parametrize("order", ["dipy", "fsl", "mrtrix", "itk"])
-def test_there_and_back(order, nibabel, tmp_path):
+def test_there_and_back(order, tmp_path):
     name, given = str(tmp_path / "tensors.nii.gz"), volume()
     write_nifti(name, given, order=order)
     back = read_nifti(name, order=None if order == "itk" else order)
     assert np.array_equal(back.tensors, given.tensors) and back.tensors.dtype == np.float32
     assert np.array_equal(back.mask, given.mask) and np.array_equal(back.affine, AFFINE)
-    image, numbers = raw(nibabel, name)
+    image, numbers = raw(name)
     assert int(image.header["intent_code"]) == (1005 if order == "itk" else 0)
     # nifti1.h: intent_p1 is the number of rows.
     assert image.header["intent_p1"] == (3 if order == "itk" else 0)
@@ -68,7 +44,7 @@ def test_there_and_back(order, nibabel, tmp_path):
     assert not numbers.reshape(4, 3, 2, 6)[~given.mask].any()
 
 
-def test_masks(nibabel, tmp_path):
+def test_masks(tmp_path):
     name, given = str(tmp_path / "tensors.nii"), volume()
     write_nifti(name, given, order="fsl")
     some = given.mask.copy()
@@ -77,23 +53,24 @@ def test_masks(nibabel, tmp_path):
     for mask in (some, some.astype(int).tolist(), str(tmp_path / "mask.nii")):
         picked = read_nifti(name, order="fsl", mask=mask)
         assert np.array_equal(picked.mask, some) and np.array_equal(picked.tensors, given.tensors[2:])
-    _, numbers = raw(nibabel, name)
+    _, numbers = raw(name)
     numbers = np.array(numbers)
     numbers[1, 1, 0, 3] = np.nan
     nibabel.save(nibabel.Nifti1Image(numbers, AFFINE), name)
     assert np.array_equal(read_nifti(name, order="fsl").tensors, given.tensors[1:])
 
 
-def test_tensors_along_the_axes_are_inside(nibabel, tmp_path):
+def test_tensors_along_the_axes_are_inside(tmp_path):
     """Three of their six numbers are 0."""
     name, given = str(tmp_path / "tensors.nii"), volume()
     write_nifti(name, Volume(np.stack([np.diag([1.0, 2, 3])] * 4), given.mask, AFFINE), order="fsl")
     assert np.array_equal(read_nifti(name, order="fsl").mask, given.mask)
 
 
-def test_invalid_volumes_raise(nibabel, tmp_path):
+def test_invalid_volumes_raise(tmp_path):
     name, given = str(tmp_path / "tensors.nii"), volume()
     write_nifti(name, given, order="fsl")
+    full = Volume(given.tensors, np.ones_like(given.mask), AFFINE)
     for match, call in [
         ("does not state the order of its six volumes", lambda: read_nifti(name)),
         (
@@ -102,7 +79,7 @@ def test_invalid_volumes_raise(nibabel, tmp_path):
         ),
         (
             r"the mask has 24 voxels, which need shape \(24, 3, 3\)",
-            lambda: write_nifti(name, all_of(given), order="fsl"),
+            lambda: write_nifti(name, full, order="fsl"),
         ),
         ("order must be", lambda: write_nifti(name, given, order="ants")),
     ]:
@@ -113,7 +90,7 @@ def test_invalid_volumes_raise(nibabel, tmp_path):
         read_nifti(name, order="fsl")
 
 
-def test_masks_that_are_none(nibabel, tmp_path):
+def test_masks_that_are_none(tmp_path):
     name, given = str(tmp_path / "tensors.nii"), volume()
     write_nifti(name, given, order="fsl")
     for value in (np.nan, -1.0):
@@ -126,17 +103,13 @@ def test_masks_that_are_none(nibabel, tmp_path):
         read_nifti(name, order="fsl", mask=str(tmp_path / "mask.nii"))
 
 
-def test_an_order_that_is_not_the_files(nibabel, tmp_path):
+def test_an_order_that_is_not_the_files(tmp_path):
     name = str(tmp_path / "tensors.nii")
     write_nifti(name, volume(), order="itk")
     with pytest.raises(ss.ValidationError, match="in the order of NIfTI, not in that of 'fsl'; omit order"):
         read_nifti(name, order="fsl")
     for order in (None, "dipy", "itk"):
         assert np.array_equal(read_nifti(name, order=order).tensors, volume().tensors)
-
-
-def all_of(given):
-    return Volume(given.tensors, np.ones_like(given.mask), AFFINE)
 
 
 def test_without_nibabel(monkeypatch):
@@ -147,7 +120,6 @@ def test_without_nibabel(monkeypatch):
 
 @pytest.mark.parametrize("order", ["fsl", "itk"])
 def test_the_header_of_the_volume_that_was_read_is_kept(order, tmp_path):
-    nibabel = pytest.importorskip("nibabel")
     first, second = str(tmp_path / "first.nii.gz"), str(tmp_path / "second.nii.gz")
     given = volume(np.float64)
     numbers = np.zeros((4, 3, 2, 1, 6), np.float32)

@@ -79,9 +79,3 @@ def test_a_failure_in_a_worker_comes_here(client):
     ds = sx.fit(da.chunk(curve=EACH), S2, on_failure="raise")
     with pytest.raises(ss.ValidationError, match="of curve 3"):
         ds.compute()
-
-
-def test_workers_keep_their_number_of_threads(client):
-    before = client.run(ss.num_threads)
-    sx.fit(curves().chunk(curve=EACH), S2).compute()
-    assert client.run(ss.num_threads) == before
