@@ -55,7 +55,9 @@ fn main() -> Result<(), Error> {
     let t: Vec<f64> = (0..60).map(|i| f64::from(i) / 10.0).collect();
     let mut noisy: Vec<Vector3<f64>> = t
         .iter()
-        .map(|t| Vector3::new((0.4 * t).cos(), (0.4 * t).sin(), 0.03 * (50.0 * t).sin()).normalize())
+        .map(|t| {
+            Vector3::new((0.4 * t).cos(), (0.4 * t).sin(), 0.05 * (1e4 * (1.0 + t).sin()).fract()).normalize()
+        })
         .collect();
     noisy[20] = Vector3::z();
     let soft = Smoothing::default().loss(Loss::Huber).fit(Sphere::<3>, &t, &noisy)?;

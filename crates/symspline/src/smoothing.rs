@@ -47,12 +47,12 @@ pub enum Loss {
 /// use symspline::prelude::*;
 ///
 /// // A quarter of a circle with noise.
-/// let times: Vec<f64> = (0..40).map(|i| i as f64 / 39.0).collect();
-/// let noise = |i: f64| 0.02 * (37.0 * i).sin() * (11.0 * i).cos();
+/// let noise = |i: f64| 0.02 * (1e4 * (1.0 + i).sin()).fract();
+/// let times: Vec<f64> = (0..40).map(|i| f64::from(i) / 39.0).collect();
 /// let noisy: Vec<[f64; 3]> = times
 ///     .iter()
 ///     .map(|t| {
-///         let (angle, height) = (1.5 * t + noise(40.0 * t), noise(17.0 + 40.0 * t));
+///         let (angle, height) = (1.5 * t + noise(*t), noise(7.0 + t));
 ///         [height.cos() * angle.cos(), height.cos() * angle.sin(), height.sin()]
 ///     })
 ///     .collect();

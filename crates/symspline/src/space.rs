@@ -173,7 +173,7 @@ impl<const K: usize, const N: usize> Space for Grassmannian<K, N> {
 /// assert_eq!((space.point_len(), space.dim()), (3, 2));
 /// let points = [vec![1.0, 0.0, 0.0], vec![0.0, 1.0, 0.0], vec![0.0, 0.0, 1.0]];
 /// let spline = CubicSpline::new(space, &[0.0, 1.0, 2.0], &points)?;
-/// assert_eq!(spline.at(1.0), points[1]);
+/// assert_eq!(spline.at(0.0), points[0]);
 /// # Ok::<(), symspline::Error>(())
 /// ```
 #[derive(Clone)]
