@@ -2,12 +2,34 @@
 
 use crate::curves::Curves;
 use crate::error::Error;
+use crate::options::Builder;
 use crate::point::Point;
 use crate::samples::Samples;
 use crate::space::Space;
-use crate::spline::{Builder, CubicSpline, Report};
+use crate::spline::{CubicSpline, Report};
 use symspline_engine::curve::Quantity;
 use symspline_engine::fit;
+
+impl<S: Space, P: Point<S>> Builder<S, P> {
+    /// Fits many curves whose points are at the same times, on all cores.
+    ///
+    /// # Errors
+    /// As [`fit`](Builder::fit); the error names the first curve that fails.
+    pub fn fit_shared(&self, times: &[f64], curves: &[impl AsRef<[P]>]) -> Result<Batch<S, P>, Error> {
+        let points: Vec<&[P]> = curves.iter().map(AsRef::as_ref).collect();
+        Batch::of(Curves::fit(self, &[times], &points, true)?)
+    }
+
+    /// Fits many curves, each with times and points of its own, on all cores.
+    ///
+    /// # Errors
+    /// As [`fit`](Builder::fit); the error names the first curve that fails.
+    pub fn fit_each(&self, curves: &[(impl AsRef<[f64]>, impl AsRef<[P]>)]) -> Result<Batch<S, P>, Error> {
+        let times: Vec<&[f64]> = curves.iter().map(|(t, _)| t.as_ref()).collect();
+        let points: Vec<&[P]> = curves.iter().map(|(_, p)| p.as_ref()).collect();
+        Batch::of(Curves::fit(self, &times, &points, false)?)
+    }
+}
 
 /// Many curves on a space, fitted and evaluated together on all cores.
 ///

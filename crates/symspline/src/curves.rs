@@ -1,10 +1,10 @@
 //! Fitted curves as lists of numbers: validation, fit and evaluation.
 
 use crate::error::Error;
+use crate::options::{Builder, End, Ends, Extrapolate, Method};
 use crate::point::{Point, Row};
 use crate::samples::Samples;
 use crate::space::{Space, Table};
-use crate::spline::{Builder, End, Ends, Extrapolate, Method};
 use std::fmt;
 use std::marker::PhantomData;
 use std::sync::Arc;

@@ -91,6 +91,7 @@ mod glam;
 mod mint;
 #[cfg(feature = "nalgebra")]
 mod nalgebra;
+mod options;
 mod point;
 mod samples;
 #[cfg(feature = "serde")]
@@ -102,6 +103,7 @@ mod spline;
 
 pub use batch::Batch;
 pub use error::Error;
+pub use options::{Builder, End, Ends, Extrapolate, Method};
 #[cfg(feature = "rotations")]
 pub use point::Twist;
 pub use point::{Point, Row};
@@ -117,7 +119,7 @@ pub use space::{AnySpace, Space};
 pub use space::{BodyFrame, Se3, So3};
 #[cfg(feature = "vectors")]
 pub use space::{Euclidean, Hyperbolic, Sphere};
-pub use spline::{Builder, CubicSpline, End, Ends, Extrapolate, Method, Report};
+pub use spline::{CubicSpline, Report};
 
 /// Limits the number of threads; 0 means all cores, which is the default.
 pub use symspline_engine::parallel::set_num_threads;
@@ -131,7 +133,7 @@ pub mod prelude {
     #[doc(no_inline)]
     pub use crate::PositiveDefinite;
     #[doc(no_inline)]
-    pub use crate::spline::End::{Natural, NotAKnot};
+    pub use crate::options::End::{Natural, NotAKnot};
     #[doc(no_inline)]
     pub use crate::{AnySpace, Batch, CubicSpline, End, Ends, Error, Extrapolate, Method};
     #[cfg(feature = "smoothing")]

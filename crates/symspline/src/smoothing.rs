@@ -2,9 +2,10 @@
 
 use crate::curves::{Curves, rows};
 use crate::error::Error;
+use crate::options::{Builder, End, Ends, Extrapolate};
 use crate::point::Point;
 use crate::space::Space;
-use crate::spline::{Builder, CubicSpline, Extrapolate, Report};
+use crate::spline::{CubicSpline, Report};
 use std::ops::Deref;
 use symspline_engine::monitor::Monitor;
 use symspline_engine::smoothing::{self as engine, Data, EndCondition, Observations, State, Tier};
@@ -280,12 +281,8 @@ fn first_used(times: &[f64], weights: &[f64]) -> f64 {
     times.iter().zip(weights).find(|(_, w)| **w > 0.0).map_or(f64::INFINITY, |(t, _)| *t)
 }
 
-fn natural<T>(periodic: bool) -> crate::Ends<T> {
-    if periodic {
-        crate::Ends::Periodic
-    } else {
-        crate::Ends::Open([crate::End::Natural, crate::End::Natural])
-    }
+fn natural<T>(periodic: bool) -> Ends<T> {
+    if periodic { Ends::Periodic } else { Ends::Open([End::Natural, End::Natural]) }
 }
 
 /// Times are finite, do not decrease, and do not span too much.

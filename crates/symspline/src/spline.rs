@@ -1,95 +1,14 @@
 //! One spline curve, and how to fit it.
 
-use crate::batch::Batch;
 use crate::curves::Curves;
 use crate::error::{Error, name_of};
+use crate::options::Builder;
 use crate::point::Point;
 #[cfg(feature = "rotations")]
 use crate::space::BodyFrame;
 use crate::space::Space;
-use symspline_engine::curve::{Outside, Quantity};
+use symspline_engine::curve::Quantity;
 use symspline_engine::fit;
-
-/// The condition at one end of a curve. `T` is the type of its velocities.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum End<T> {
-    /// The covariant acceleration is zero.
-    Natural,
-    /// The first two segments are one cubic.
-    #[default]
-    NotAKnot,
-    /// The velocity is given. It is tangent at the point; for rotations and poses it is that of the body frame.
-    Velocity(T),
-    /// The covariant acceleration is given.
-    Acceleration(T),
-}
-
-/// The conditions at both ends. An [`End`] stands for the same condition at both.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ends<T> {
-    /// A condition at either end.
-    Open([End<T>; 2]),
-    /// The last point equals the first, and so do velocity and acceleration.
-    Periodic,
-}
-
-impl<T> Default for Ends<T> {
-    fn default() -> Self {
-        Ends::Open([End::NotAKnot, End::NotAKnot])
-    }
-}
-
-impl<T: Clone> From<End<T>> for Ends<T> {
-    fn from(end: End<T>) -> Self {
-        Ends::Open([end.clone(), end])
-    }
-}
-
-impl<T> From<[End<T>; 2]> for Ends<T> {
-    fn from(ends: [End<T>; 2]) -> Self {
-        Ends::Open(ends)
-    }
-}
-
-/// The solver of the C² condition.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
-    /// Several solvers; the curve with the lowest bending energy is kept.
-    #[default]
-    Auto,
-    /// Algorithm 1 of the paper.
-    FixedPoint,
-    /// Tridiagonal systems on transported vectors, with Anderson mixing.
-    QuasiNewton,
-    /// Newton's method.
-    Newton,
-    /// Newton's method along a homotopy from flat space.
-    Homotopy,
-}
-
-/// What a curve does at times outside its knots.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Extrapolate {
-    /// Such times are an error.
-    #[default]
-    Error,
-    /// The curve continues with constant velocity.
-    Geodesic,
-    /// The first or the last segment continues.
-    Segment,
-    /// The curve repeats.
-    Periodic,
-}
-
-impl Extrapolate {
-    pub(crate) fn policy(self) -> Outside {
-        match self {
-            Extrapolate::Error | Extrapolate::Segment => Outside::Continue,
-            Extrapolate::Geodesic => Outside::Geodesic,
-            Extrapolate::Periodic => Outside::Wrap,
-        }
-    }
-}
 
 /// How a fit went. For a curve that was read from a file, residual and longest step are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,69 +41,7 @@ impl Report {
     }
 }
 
-/// The options of a fit. [`CubicSpline::builder`] and [`Batch::builder`] create it.
-#[derive(Clone, Debug)]
-#[must_use = "a builder does nothing before `fit`"]
-pub struct Builder<S: Space, P: Point<S>> {
-    pub(crate) space: S,
-    pub(crate) ends: Ends<P::Tangent>,
-    pub(crate) method: Method,
-    pub(crate) tol: f64,
-    pub(crate) max_iter: Option<usize>,
-    pub(crate) point_tol: f64,
-    pub(crate) extrapolate: Extrapolate,
-}
-
 impl<S: Space, P: Point<S>> Builder<S, P> {
-    pub(crate) fn new(space: S) -> Self {
-        Builder {
-            space,
-            ends: Ends::default(),
-            method: Method::Auto,
-            tol: 1e-12,
-            max_iter: None,
-            point_tol: 1e-8,
-            extrapolate: Extrapolate::Error,
-        }
-    }
-
-    /// The end conditions; by default [`End::NotAKnot`] at both ends.
-    pub fn ends(mut self, ends: impl Into<Ends<P::Tangent>>) -> Self {
-        self.ends = ends.into();
-        self
-    }
-
-    /// The solver; by default [`Method::Auto`].
-    pub fn method(mut self, method: Method) -> Self {
-        self.method = method;
-        self
-    }
-
-    /// The largest relative C² residual of a converged fit; by default 1e-12.
-    pub fn tol(mut self, tol: f64) -> Self {
-        self.tol = tol;
-        self
-    }
-
-    /// The largest number of iterations; by default it depends on the method.
-    pub fn max_iter(mut self, max_iter: usize) -> Self {
-        self.max_iter = Some(max_iter);
-        self
-    }
-
-    /// The distance from the space at which a point is refused; by default 1e-8. Points nearer than that are projected.
-    /// Points with the precision of `f32` need 1e-4.
-    pub fn point_tol(mut self, point_tol: f64) -> Self {
-        self.point_tol = point_tol;
-        self
-    }
-
-    /// What the curve does at times outside its knots; by default they are an error.
-    pub fn extrapolate(mut self, extrapolate: Extrapolate) -> Self {
-        self.extrapolate = extrapolate;
-        self
-    }
-
     /// Fits the curve through points at increasing times.
     ///
     /// # Errors
@@ -192,25 +49,6 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
     pub fn fit(&self, times: &[f64], points: &[P]) -> Result<CubicSpline<S, P>, Error> {
         let (curves, reports) = Curves::fit(self, &[times], &[points], false)?;
         Ok(CubicSpline { curves, report: Report::new(&reports[0]) })
-    }
-
-    /// Fits many curves whose points are at the same times, on all cores.
-    ///
-    /// # Errors
-    /// As [`fit`](Builder::fit); the error names the first curve that fails.
-    pub fn fit_shared(&self, times: &[f64], curves: &[impl AsRef<[P]>]) -> Result<Batch<S, P>, Error> {
-        let points: Vec<&[P]> = curves.iter().map(AsRef::as_ref).collect();
-        Batch::of(Curves::fit(self, &[times], &points, true)?)
-    }
-
-    /// Fits many curves, each with times and points of its own, on all cores.
-    ///
-    /// # Errors
-    /// As [`fit`](Builder::fit); the error names the first curve that fails.
-    pub fn fit_each(&self, curves: &[(impl AsRef<[f64]>, impl AsRef<[P]>)]) -> Result<Batch<S, P>, Error> {
-        let times: Vec<&[f64]> = curves.iter().map(|(t, _)| t.as_ref()).collect();
-        let points: Vec<&[P]> = curves.iter().map(|(_, p)| p.as_ref()).collect();
-        Batch::of(Curves::fit(self, &times, &points, false)?)
     }
 }
 
@@ -235,7 +73,7 @@ pub struct CubicSpline<S: Space, P: Point<S>> {
 }
 
 impl<S: Space, P: Point<S>> CubicSpline<S, P> {
-    /// Fits the curve through points at increasing times, with [`End::NotAKnot`] at both ends.
+    /// Fits the curve through points at increasing times, with [`End::NotAKnot`](crate::End::NotAKnot) at both ends.
     ///
     /// # Errors
     /// As [`Builder::fit`].
