@@ -174,6 +174,12 @@ fn curves_are_read_as_they_were_written() {
     let text = serde_json::to_string(&spline).expect("it is written");
     let read: CubicSpline<AnySpace, Vec<f64>> = serde_json::from_str(&text).expect("it is read");
     assert_eq!((read.at(0.1), read.space()), (spline.at(0.1), spline.space()));
+    let velocity = text.split("\"velocities\":").nth(1).expect("it has velocities");
+    let across = text.replace(velocity, "[5.0,1.0,1.0,0.0]}");
+    assert!(
+        serde_json::from_str::<CubicSpline<AnySpace, Vec<f64>>>(&across).is_err(),
+        "a velocity is not tangent"
+    );
     // What was changed in the file is noticed.
     for (good, bad) in [("[1.0,0.0,", "[1.5,0.0,"), ("\"times\":[0.0", "\"times\":[0.5"), ("[1]", "[2]")] {
         assert!(text.contains(good), "{text}");
