@@ -16,9 +16,12 @@ use symspline_core::matrix::Known;
 use symspline_core::scalar::{few, lane};
 use symspline_core::space::{Entry, Made, table};
 
-/// The rotation matrix of a unit quaternion w, x, y, z, row by row.
+/// The rotation matrix of a unit quaternion w, x, y, z, row by row; for any quaternion, |q|² times a rotation matrix, so
+/// that a wrong norm is noticed.
 pub fn matrix_of_quaternion(q: [f64; 4]) -> [f64; 9] {
-    rigid::to_matrix(q.map(lane)).map(|x| x.as_array()[0])
+    let excess = q.iter().map(|x| x * x).sum::<f64>() - 1.0;
+    let r = rigid::to_matrix(q.map(lane)).map(|x| x.as_array()[0]);
+    few(|i| if i % 4 == 0 { r[i] + excess } else { r[i] })
 }
 
 /// The unit quaternion w, x, y, z of a rotation matrix, with w ≥ 0 up to rounding.

@@ -152,7 +152,8 @@ pub enum Error {
         /// The angle that it must not reach.
         limit: f64,
     },
-    /// The solver did not reach the tolerance.
+    /// The solver did not reach the tolerance. If points are far apart, more points or other end conditions help, such as
+    /// [`End::Natural`](crate::End::Natural). If the residual is infinite, numbers exceeded the floating-point range.
     Unconverged {
         /// The curve.
         curve: usize,
@@ -283,7 +284,11 @@ impl fmt::Display for Error {
                  {limit:.6}. Add points near it"
             ),
             Error::Unconverged { curve, residual, tol } => {
-                write!(f, "curve {curve}: the C² residual is {residual:.1e}, above the tolerance {tol:.1e}")
+                write!(
+                    f,
+                    "curve {curve}: the C² residual is {residual:.1e}, above the tolerance {tol:.1e}. Try \
+                     other end conditions, such as `End::Natural`, or add points where they are far apart"
+                )
             }
             Error::NotSmoothed { reason } => write!(f, "{reason}"),
             Error::OutsideDomain { time, start, end } => write!(

@@ -9,7 +9,7 @@ use symspline_engine::curve::Outside;
 pub enum End<T> {
     /// The covariant acceleration is zero.
     Natural,
-    /// The first two segments are one cubic.
+    /// The first two segments, at the other end the last two, are one cubic. A curve through two points is a geodesic.
     #[default]
     NotAKnot,
     /// The velocity is given. It is tangent at the point; for rotations and poses it is that of the body frame.
@@ -48,7 +48,8 @@ impl<T> From<[End<T>; 2]> for Ends<T> {
 /// The solver of the C² condition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Several solvers; the curve with the lowest bending energy is kept.
+    /// Several solvers. Points that are far apart may have several curves; the one with the lowest bending energy among
+    /// those found is kept. The other methods return the first that they find.
     #[default]
     Auto,
     /// Algorithm 1 of the paper.
@@ -113,6 +114,25 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
     }
 
     /// The end conditions; by default [`End::NotAKnot`] at both ends.
+    ///
+    /// # Examples
+    /// ```
+    /// use symspline::prelude::*;
+    ///
+    /// let (times, points) = ([0.0, 1.0, 3.0], [[0.0], [1.0], [0.0]]);
+    /// let natural = CubicSpline::builder(Euclidean::<1>).ends(End::Natural).fit(&times, &points)?;
+    /// assert!(natural.acceleration(0.0)[0].abs() < 1e-14);
+    /// let ends = [End::Velocity([2.0]), End::Velocity([0.0])];
+    /// let clamped = CubicSpline::builder(Euclidean::<1>).ends(ends).fit(&times, &points)?;
+    /// assert_eq!(clamped.velocity(0.0), [2.0]);
+    ///
+    /// // A pose at rest at both ends.
+    /// let turn = [[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    /// let start = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    /// let path = CubicSpline::builder(Se3).ends(End::Velocity(Twist::default())).fit(&times[..2], &[start, turn])?;
+    /// assert!(path.velocity(1.0).linear[0].abs() < 1e-12);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn ends(mut self, ends: impl Into<Ends<P::Tangent>>) -> Self {
         self.ends = ends.into();
         self

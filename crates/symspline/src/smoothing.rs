@@ -361,7 +361,8 @@ impl<S: Space, P: Point<S>> SmoothingSpline<S, P> {
     }
 
     /// The standard deviation of the curve at a time, in one coordinate of an orthonormal frame. Beyond the knots it is
-    /// that of a curve that continues with constant velocity, or periodically.
+    /// that of a curve that continues with constant velocity, or periodically. On a sphere and for rotations it is in
+    /// radians. It is NaN if there are too few data to estimate the noise: then pass [`Smoothing::sigma`].
     ///
     /// # Panics
     /// If the time is NaN or infinite.

@@ -81,7 +81,9 @@ pub struct So3;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Se3;
 
-/// Symmetric positive definite N × N matrices, such as covariances, with the affine invariant metric.
+/// Symmetric positive definite N × N matrices, such as covariances, with the affine invariant metric: the curve of
+/// `m P mᵀ` is that of P, transformed, for every invertible m. Tangent vectors are symmetric matrices, the derivatives of the
+/// entries.
 #[cfg(feature = "positive-definite")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

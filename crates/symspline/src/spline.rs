@@ -18,7 +18,7 @@ pub struct Report {
     pub iterations: usize,
     /// The relative C² residual.
     pub residual: f64,
-    /// The longest distance between neighbours, D of (21).
+    /// The longest distance between neighbouring points, D of (21) of the paper.
     pub max_step: f64,
     /// The name of the solver that found the curve.
     pub solver: &'static str,

@@ -69,6 +69,22 @@ fn points_off_the_space_are_errors() {
 }
 
 #[test]
+fn quaternions_of_another_norm_are_errors() {
+    for [w, x] in [[0.0, 0.0], [2.0, 0.0], [0.5, 0.0], [1.5, 1e-5], [0.0, 1.1], [1.0 + 1e-6, 0.0]] {
+        let q = nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, 0.0, 0.0));
+        let found = CubicSpline::new(So3, &T[..2], &[q, q]).expect_err("it is no rotation");
+        assert!(matches!(found, Error::OffSpace { node: 0, .. }), "{found}");
+        let pose = Isometry3::from_parts(nalgebra::Translation3::new(1.0, 2.0, 3.0), q);
+        assert!(matches!(
+            CubicSpline::new(Se3, &T[..2], &[pose, pose]),
+            Err(Error::OffSpace { node: 0, .. })
+        ));
+        let found = CubicSpline::new(So3, &T[..2], &[glam::DQuat::from_xyzw(x, 0.0, 0.0, w); 2]);
+        assert!(matches!(found, Err(Error::OffSpace { .. })));
+    }
+}
+
+#[test]
 fn points_of_two_components_and_open_polygons_are_errors() {
     let space = AnySpace::new("o", &[2]).expect("it is a space");
     let points = [vec![1.0, 0.0, 0.0, 1.0], vec![1.0, 0.0, 0.0, -1.0]];
