@@ -376,7 +376,7 @@ class Space(Generic[P]):
 
         See Also
         --------
-        Curve.transport : Transport tangent vectors along a curve.
+        CubicSpline.transport : Transport tangent vectors along a curve.
 
         Examples
         --------

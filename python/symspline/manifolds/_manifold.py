@@ -26,7 +26,7 @@ class Manifold(Space):
     Noakes [1]_: de Casteljau's algorithm with geodesics, with covariant accelerations that agree at the points.
 
     All functions take arrays of points and of tangent vectors, shape (m, *point_shape) with the same m, and return an
-    array of this shape; `inner` returns shape (m,).
+    array of this shape; ``inner`` returns shape (m,).
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Manifold(Space):
         makes the solver faster and does not change the solution. By default vectors are projected.
     injectivity_radius : float, optional
         Distance below which geodesics are unique. Points and control points farther apart raise `CutLocusError`. By
-        default there is no limit, and `log` decides.
+        default there is no limit, and ``log`` decides.
     point_shape : int or tuple of int
         Shape of the array of one point.
     project : callable, optional
