@@ -86,6 +86,11 @@ def test_an_unconverged_curve_keeps_its_best_iterate():
         assert (np.diff(residuals) <= 0).all()
 
 
+def test_velocities_beyond_the_largest_number_are_no_curve():
+    with pytest.raises(ss.ConvergenceError, match="exceeded the floating-point range"):
+        ss.CubicSpline([0, 1.57, 1.85], [[0.5, 0.5], [0.5, 0.5], [1e308, 0.5]], "r:2")
+
+
 def test_kinds_of_errors():
     assert issubclass(ss.ValidationError, ValueError)
     assert issubclass(ss.CutLocusError, ValueError)
