@@ -92,12 +92,12 @@ impl<S: Space, P: Point<S>> Batch<S, P> {
     /// One of the curves.
     ///
     /// # Panics
-    /// If there are not so many curves.
+    /// If the index is not less than the number of curves.
     pub fn curve(&self, index: usize) -> CubicSpline<S, P> {
         CubicSpline { curves: self.curves.one(index), report: self.reports[index] }
     }
 
-    /// How the fits went, curve by curve.
+    /// Reports of the fits, one per curve.
     pub fn reports(&self) -> &[Report] {
         &self.reports
     }

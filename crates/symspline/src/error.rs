@@ -1,37 +1,37 @@
-//! What can go wrong, with numbers.
+//! Errors, with the numbers that they are about.
 
 use std::fmt;
 use symspline_engine::fit::{Report, Solver, Status};
 use symspline_engine::space::{Ambient, Erased};
 use symspline_engine::validate::{Invalid, Reason};
 
-/// Why there is no curve, or no point of a curve.
+/// The reason why a curve was not fitted or evaluated.
 ///
 /// `curve` and `node` count from 0. `curve` is 0 for the fit of a single curve.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is no such space, or it was not compiled: its family is a feature.
+    /// The name or the size of a space is invalid, or the feature of its family is off.
     InvalidSpace {
         /// The reason.
         reason: String,
     },
-    /// A curve needs two points at least.
+    /// The curve has fewer than two points.
     TooFewPoints {
         /// The curve.
         curve: usize,
         /// The number of its points.
         points: usize,
     },
-    /// There must be as many times, weights or curves as points.
+    /// The number of times or weights differs from the number of points, or a batch is empty.
     LengthMismatch {
         /// The curve.
         curve: usize,
-        /// What there is too little or too much of.
+        /// The kind of values that were counted, such as times.
         what: &'static str,
-        /// How many were expected.
+        /// The required number.
         expected: usize,
-        /// How many were given.
+        /// The given number.
         found: usize,
     },
     /// The array of a point has another length than the points of the space.
@@ -119,7 +119,7 @@ pub enum Error {
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// The requirement.
         requirement: &'static str,
     },
     /// A weight of noisy data is negative or not finite.
@@ -245,7 +245,7 @@ impl fmt::Display for Error {
             Error::TimesTooFarApart { curve } => {
                 write!(
                     f,
-                    "curve {curve}: the times span too much for floating-point numbers. Choose other units"
+                    "curve {curve}: the times span more than floating-point numbers can represent. Choose another unit of time"
                 )
             }
             Error::OffSpace { curve, node, distance, condition } => {

@@ -124,7 +124,7 @@ pub use spline::{CubicSpline, Report};
 /// Limits the number of threads; 0 means all cores, which is the default.
 pub use symspline_engine::parallel::set_num_threads;
 
-/// What most programs use: `use symspline::prelude::*`.
+/// The names that most programs need: `use symspline::prelude::*`.
 pub mod prelude {
     #[cfg(feature = "subspaces")]
     #[doc(no_inline)]

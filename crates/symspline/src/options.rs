@@ -62,7 +62,7 @@ pub enum Method {
     Homotopy,
 }
 
-/// What a curve does at times outside its knots.
+/// The extrapolation policy: the evaluation of a curve at times outside its knots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Extrapolate {
     /// Such times are an error.
@@ -163,7 +163,7 @@ impl<S: Space, P: Point<S>> Builder<S, P> {
         self
     }
 
-    /// What the curve does at times outside its knots; by default they are an error.
+    /// The extrapolation policy for times outside the knots; by default such times are an error.
     pub fn extrapolate(mut self, extrapolate: Extrapolate) -> Self {
         self.extrapolate = extrapolate;
         self

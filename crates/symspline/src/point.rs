@@ -16,7 +16,8 @@ pub trait Row: Sized {
     fn write(&self, row: &mut Vec<f64>);
     /// The value with these numbers.
     fn read(row: &[f64]) -> Self;
-    /// Chooses, of two values that mean the same such as the quaternions q and −q, the one that continues another value.
+    /// Replaces a quaternion q by −q, which represents the same rotation, if −q is closer to the quaternion `before`.
+    /// Other values do not change.
     fn align(&mut self, _before: &Self) {}
 }
 

@@ -37,7 +37,7 @@ pub enum Loss {
     Linear,
     /// Its square if it is small, and linear beyond: for data with outliers.
     Huber,
-    /// Almost constant for large residuals: for data with many outliers.
+    /// It grows as the logarithm of large residuals: for data with many outliers.
     Cauchy,
 }
 
@@ -122,8 +122,8 @@ impl Smoothing {
         self
     }
 
-    /// One weight per point, up to a factor one over the variance of its noise; by default 1. Points of weight 0 are not
-    /// used.
+    /// One weight per point, proportional to the inverse variance of its noise; by default 1. Points with weight 0 are
+    /// ignored, but must be on the space.
     pub fn weights(mut self, weights: &[f64]) -> Self {
         self.weights = Some(weights.to_vec());
         self
@@ -147,13 +147,13 @@ impl Smoothing {
         self
     }
 
-    /// What the curve does at times outside its knots; by default they are an error.
+    /// The extrapolation policy for times outside the knots; by default such times are an error.
     pub fn extrapolate(mut self, extrapolate: Extrapolate) -> Self {
         self.extrapolate = extrapolate;
         self
     }
 
-    /// Fits a curve close to noisy points. Times do not decrease; they may repeat.
+    /// Fits a curve close to noisy points. Times must not decrease, but may repeat.
     ///
     /// # Errors
     /// If the input is invalid, or if the data do not determine a curve.
@@ -317,7 +317,7 @@ fn failure(state: State) -> Result<(), Error> {
     Err(Error::NotSmoothed { reason })
 }
 
-/// How smoothing went.
+/// Report of a smoothing fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SmoothingReport {
@@ -355,7 +355,7 @@ impl<S: Space, P: Point<S>> SmoothingSpline<S, P> {
         self.spline
     }
 
-    /// How smoothing went.
+    /// Report of a smoothing fit.
     pub fn smoothing_report(&self) -> &SmoothingReport {
         &self.report
     }

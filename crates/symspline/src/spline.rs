@@ -1,4 +1,4 @@
-//! One spline curve, and how to fit it.
+//! Spline curves and their fit.
 
 use crate::curves::Curves;
 use crate::error::{Error, name_of};
@@ -10,7 +10,7 @@ use crate::space::Space;
 use symspline_engine::curve::Quantity;
 use symspline_engine::fit;
 
-/// How a fit went. For a curve that was read from a file, residual and longest step are NaN.
+/// Report of a fit. For a curve that was read from a file, residual and longest step are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -122,7 +122,7 @@ impl<S: Space, P: Point<S>> CubicSpline<S, P> {
         self.curves.domain(0)
     }
 
-    /// How the fit went.
+    /// Report of the fit.
     pub fn report(&self) -> &Report {
         &self.report
     }
@@ -146,7 +146,7 @@ impl<S: Space, P: Point<S>> CubicSpline<S, P> {
         expect(self.try_at(time))
     }
 
-    /// The point at a time, or why there is none.
+    /// The point at a time, or an error.
     ///
     /// # Errors
     /// [`Error::OutsideDomain`] if the time is NaN or infinite, or outside the knots without [`Builder::extrapolate`].
