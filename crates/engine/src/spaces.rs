@@ -12,7 +12,7 @@ pub use symspline_groups::{UnitaryGroup, orthogonal, special_orthogonal};
 #[cfg(feature = "linear")]
 pub use symspline_linear::{GeneralLinear, IndefiniteGrassmannian, Members};
 #[cfg(feature = "subspaces")]
-pub use symspline_subspaces::{ComplexHyperbolic, QuaternionicProjective, Subspaces};
+pub use symspline_subspaces::{Lines, Subspaces};
 #[cfg(feature = "vectors")]
 pub use symspline_vectors::{AntiDeSitter, Curved, DeSitter, Euclidean, Hyperbolic, Sphere};
 

@@ -1,9 +1,9 @@
-//! Grassmannians and projective spaces: k-dimensional subspaces of Rⁿ or Cⁿ, G = U(n).
+//! Grassmannians: k-dimensional subspaces of Rⁿ or Cⁿ, G = U(n).
 //!
 //! A point is any matrix Y with orthonormal columns that span the subspace, a tangent vector at that
 //! representative is *horizontal*, Y*Δ = 0. All formulas are functions of the k × k matrix Δ*Δ, whose
 //! eigenvalues are the squares of the principal angles (Edelman, Arias & Smith 1998; the transvection
-//! from the product of two symmetries). With k = 1 they are those of the sphere.
+//! from the product of two symmetries). Projective spaces are in `lines`.
 
 use crate::logarithm::log_from;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
@@ -20,8 +20,6 @@ use symspline_core::space::{Ambient, Frame, Origin, Space, stretch_series};
 pub struct Subspaces<const D: usize, A = Dynamic> {
     k: usize,
     n: usize,
-    /// A projective space: k = 1, and points are vectors instead of n × 1 matrices.
-    lines: bool,
     storage: PhantomData<A>,
 }
 
@@ -37,16 +35,7 @@ impl<const D: usize> Subspaces<D> {
         if k == 0 || k == n {
             return Err(format!("{name}(k, n) needs 1 <= k < n; {name}({k}, {n}) is a single point"));
         }
-        Ok(Subspaces { k, n, lines: false, storage: PhantomData })
-    }
-
-    /// Lines through the origin of n + 1 dimensions: projective space, for D = 2 that of pure quantum states.
-    pub fn lines(n: usize) -> Result<Self, String> {
-        let name = if D == 1 { "RealProjective" } else { "ComplexProjective" };
-        if n == 0 || n == usize::MAX {
-            return Err(format!("{name}(n) needs n >= 1"));
-        }
-        Ok(Subspaces { k: 1, n: n + 1, lines: true, storage: PhantomData })
+        Ok(Subspaces { k, n, storage: PhantomData })
     }
 
     /// Entries of a point's matrix.
@@ -56,7 +45,7 @@ impl<const D: usize> Subspaces<D> {
 
     /// The same with matrices in another storage.
     pub fn stored<A: Storage>(self) -> Subspaces<D, A> {
-        Subspaces { k: self.k, n: self.n, lines: self.lines, storage: PhantomData }
+        Subspaces { k: self.k, n: self.n, storage: PhantomData }
     }
 }
 
@@ -148,7 +137,7 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         self.n * self.k * D
     }
     fn point_shape(&self) -> Vec<usize> {
-        if self.lines { vec![self.n] } else { vec![self.n, self.k] }
+        vec![self.n, self.k]
     }
     fn is_complex(&self) -> bool {
         D == 2
@@ -238,19 +227,10 @@ impl<const D: usize, A: Storage> Ambient for Subspaces<D, A> {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
         let y = self.read(&lanes);
         let off = y.adjoint_times(&y).plus_identity(lane(-1.0)).size().to_array()[0];
-        if self.k == 1 {
-            let norm = y.size().to_array()[0];
-            if norm == 0.0 {
-                "it is the zero vector, which spans no line".into()
-            } else {
-                format!("its norm is {norm}, not 1 (off by {:.3e})", (norm - 1.0).abs())
-            }
-        } else {
-            format!(
-                "its columns are not orthonormal: |{} - 1| = {off:.3e} (np.linalg.qr gives an orthonormal basis)",
-                if D == 1 { "xᵀx" } else { "x*x" }
-            )
-        }
+        format!(
+            "its columns are not orthonormal: |{} - 1| = {off:.3e} (np.linalg.qr gives an orthonormal basis)",
+            if D == 1 { "xᵀx" } else { "x*x" }
+        )
     }
 }
 

@@ -1,16 +1,16 @@
 //! Lines and subspaces: Grassmannians, projective spaces and complex hyperbolic space.
 
-mod complex_hyperbolic;
 mod grassmannian;
+mod line_spaces;
+mod lines;
 mod logarithm;
 mod quaternionic;
 
-pub use complex_hyperbolic::ComplexHyperbolic;
 pub use grassmannian::Subspaces;
-pub use quaternionic::QuaternionicProjective;
+pub use line_spaces::{ComplexHyperbolic, ComplexProjective, Lines, QuaternionicProjective, RealProjective};
 
 use symspline_core::matrix::Small;
-use symspline_core::space::{Entry, Made, Within, table};
+use symspline_core::space::{Entry, Made, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
@@ -19,40 +19,41 @@ pub static FAMILY: &[Entry] = &[
         parameters: &["n"],
         make: |p| table(ComplexHyperbolic::new(p[0])),
     },
-    Entry { names: &["rp", "real-projective"], parameters: &["n"], make: |p| real(Subspaces::lines(p[0])) },
+    Entry {
+        names: &["rp", "real-projective"],
+        parameters: &["n"],
+        make: |p| table(RealProjective::new(p[0])),
+    },
     Entry {
         names: &["cp", "complex-projective"],
         parameters: &["n"],
-        make: |p| complex(Subspaces::lines(p[0])),
+        make: |p| table(ComplexProjective::new(p[0])),
     },
     Entry {
         names: &["hp", "quaternionic-projective"],
         parameters: &["n"],
-        make: |p| table(QuaternionicProjective::new(p[0]).map(Within)),
+        make: |p| table(QuaternionicProjective::new(p[0])),
     },
     Entry {
         names: &["gr", "grassmannian"],
         parameters: &["k", "n"],
-        make: |p| real(Subspaces::new(p[0], p[1])),
+        make: |p| match p[..] {
+            [1, n] if n > 1 => table(RealProjective::new(n - 1).map(Lines::columns)),
+            _ => stored(Subspaces::<1>::new(p[0], p[1])),
+        },
     },
     Entry {
         names: &["cgr", "complex-grassmannian"],
         parameters: &["k", "n"],
-        make: |p| complex(Subspaces::new(p[0], p[1])),
+        make: |p| match p[..] {
+            [1, n] if n > 1 => table(ComplexProjective::new(n - 1).map(Lines::columns)),
+            _ => stored(Subspaces::<2>::new(p[0], p[1])),
+        },
     },
 ];
 
 /// Storage for few numbers, mostly in registers.
-fn real(space: Result<Subspaces<1>, String>) -> Made {
+fn stored<const D: usize>(space: Result<Subspaces<D>, String>) -> Made {
     let space = space?;
-    match space.count() {
-        ..=4 => table(Ok(space.stored::<Small<4>>())),
-        5..=10 => table(Ok(space.stored::<Small<10>>())),
-        _ => table(Ok(space)),
-    }
-}
-
-fn complex(space: Result<Subspaces<2>, String>) -> Made {
-    let space = space?;
-    if space.count() <= 4 { table(Ok(space.stored::<Small<4>>())) } else { table(Ok(space)) }
+    if space.count() <= 10 { table(Ok(space.stored::<Small<10>>())) } else { table(Ok(space)) }
 }
