@@ -151,18 +151,22 @@ def _draw_rates(panel: SubFigure, curves: Sequence[Curve]) -> None:
     rigid = isinstance(curves[0].space, SpecialEuclidean)
     first, second = ("|(ω, v)|", "|(ω′, v′)|") if rigid else ("|γ′|", "|∇γ′|")
     upper, lower = timelines(panel, curves, [f"speed\n{first}{per[0]}", f"acceleration\n{second}{per[1]}"])
-    top = highest = 0.0
+    top = highest = rounding = 0.0
     for curve in curves:
         speed, bend = curve.at("speed"), curve.at("bend")
         look: Any = {"color": curve.color, "linewidth": 1.8 if curve.alone else 1.1}
         upper.plot(curve.times, speed, **look)
         lower.plot(curve.times, bend, **look)
         top, highest = max(top, speed.max()), max(highest, bend.max())
+        # Rounding errors of points between the closest knots, which a curve at rest has.
+        points = curve.data.points if isinstance(curve.space, Product) else (curve.data.points,)
+        size = max(np.abs(part).max() for part in points)
+        rounding = max(rounding, 1e-15 * size / np.diff(curve.data.times).min())
         if curve.noise is not None and curve.noise.speed is not None and curve.shown:
             spread = _NORMAL * curve.noise.speed
             fill_band(upper, curve, np.maximum(speed - spread, 0), speed + spread)
             top = max(top, (speed + spread).max())
-    top = top or 1.0
+    top = top if top > rounding else 1.0
     unit = top / max(curve.x[-1] - curve.x[0] for curve in curves)
     upper.set_ylim(0, 1.08 * top)
     # Rounding errors of a geodesic, whose acceleration is 0, are not magnified.
