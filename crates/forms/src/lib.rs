@@ -4,10 +4,10 @@ mod positive_definite;
 mod siegel;
 
 pub use positive_definite::PositiveDefinite;
-pub use siegel::Siegel;
+pub use siegel::{HalfPlane, Siegel};
 
 use symspline_core::matrix::Known;
-use symspline_core::space::{Entry, Made, Within, table};
+use symspline_core::space::{Entry, Isometric, Made, Within, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
@@ -18,8 +18,12 @@ pub static FAMILY: &[Entry] = &[
         make: |p| table(PositiveDefinite::<2>::new(p[0], false)),
     },
     Entry { names: &["sspd", "special-positive-definite"], parameters: &["n"], make: |p| real(p, true) },
-    Entry { names: &["siegel"], parameters: &["n"], make: |p| table(Siegel::new(p[0]).map(Within)) },
+    Entry { names: &["siegel"], parameters: &["n"], make: |p| half_space(p[0]) },
 ];
+
+fn half_space(n: usize) -> Made {
+    if n == 1 { table(HalfPlane::new().map(Isometric)) } else { table(Siegel::new(n).map(Within)) }
+}
 
 /// Common sizes are constants at compile time.
 fn real(p: &[usize], special: bool) -> Made {

@@ -6,7 +6,8 @@ use crate::positive_definite::PositiveDefinite;
 use std::f64::consts::FRAC_1_SQRT_2;
 use symspline_core::matrix::{Matrix, cholesky, solve_lower};
 use symspline_core::scalar::{Each, Lane, Scalar, lane};
-use symspline_core::space::{Ambient, Origin, Part};
+use symspline_core::space::{Ambient, Isometry, Origin, Part, Within};
+use symspline_vectors::Hyperbolic;
 
 /// Siegel's upper half space of n × n matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,5 +126,43 @@ impl Part for Siegel {
             "it is not symplectic: |pJpJ + 1| = {off:.3e} (symspline.convert.siegel_to_positive_definite makes points \
              of complex symmetric matrices)"
         )
+    }
+}
+
+/// The half plane of complex numbers, whose points are matrices (h + x, y; y, h − x) for points (h, x, y) of the
+/// hyperbolic plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HalfPlane {
+    general: Within<Siegel>,
+    plane: Hyperbolic,
+}
+
+impl HalfPlane {
+    /// Siegel's half space of 1 × 1 matrices.
+    pub fn new() -> Result<Self, String> {
+        Ok(HalfPlane { general: Within(Siegel::new(1)?), plane: Hyperbolic::new(2)? })
+    }
+}
+
+impl Isometry for HalfPlane {
+    type Image = Hyperbolic;
+    type General = Within<Siegel>;
+    const LEN: usize = 3;
+    const SCALE: f64 = std::f64::consts::SQRT_2;
+    const ANGLE: f64 = Self::SCALE;
+    fn image(&self) -> Hyperbolic {
+        self.plane
+    }
+    fn general(&self) -> &Self::General {
+        &self.general
+    }
+    #[inline(always)]
+    fn enter<S: Scalar>(x: &[S], y: &mut [S]) {
+        let half = lane(0.5);
+        y.copy_from_slice(&[(x[0] + x[3]) * half, (x[0] - x[3]) * half, (x[1] + x[2]) * half]);
+    }
+    #[inline(always)]
+    fn leave<S: Scalar>(y: &[S], x: &mut [S]) {
+        x.copy_from_slice(&[y[0] + y[1], y[2], y[2], y[0] - y[1]]);
     }
 }

@@ -1,6 +1,10 @@
 //! Groups as symmetric spaces: rotations, unitary matrices and rigid motions.
 
+#[cfg(feature = "unitary")]
+mod isometries;
 mod logarithm;
+#[cfg(feature = "unitary")]
+mod pairs;
 mod rigid;
 mod rotations;
 mod special_euclidean;
@@ -12,9 +16,13 @@ pub use special_euclidean::SpecialEuclidean;
 pub use unitary::{UnitaryGroup, orthogonal, special_orthogonal};
 
 #[cfg(feature = "unitary")]
+use isometries::{Phases, PlaneRotations, UnitQuaternions};
+#[cfg(feature = "unitary")]
+use pairs::Pairs;
+#[cfg(feature = "unitary")]
 use symspline_core::matrix::Known;
 use symspline_core::scalar::{few, lane};
-use symspline_core::space::{Entry, Made, table};
+use symspline_core::space::{Entry, Isometric, Made, table};
 
 /// The rotation matrix of a unit quaternion w, x, y, z, row by row; for any quaternion, |q|² times a rotation matrix, so
 /// that a wrong norm is noticed.
@@ -35,7 +43,7 @@ pub fn quaternion_of_matrix(r: &[f64]) -> [f64; 4] {
 pub static FAMILY: &[Entry] = &[
     Entry { names: &["so", "special-orthogonal"], parameters: &["n"], make: rotations },
     #[cfg(feature = "unitary")]
-    Entry { names: &["o", "orthogonal"], parameters: &["n"], make: |p| table(orthogonal(p[0])) },
+    Entry { names: &["o", "orthogonal"], parameters: &["n"], make: |p| with_reflections(p[0]) },
     #[cfg(feature = "unitary")]
     Entry { names: &["u", "unitary"], parameters: &["n"], make: |p| complex(p[0], false) },
     #[cfg(feature = "unitary")]
@@ -51,9 +59,22 @@ fn rotations(p: &[usize]) -> Made {
     match p[0] {
         3 => table(Rotations::new()),
         #[cfg(feature = "unitary")]
+        2 => table(PlaneRotations::new().map(Isometric)),
+        #[cfg(feature = "unitary")]
+        4 => table(Pairs::rotations()),
+        #[cfg(feature = "unitary")]
         n => table(special_orthogonal(n)),
         #[cfg(not(feature = "unitary"))]
         n => Err(format!("SpecialOrthogonal({n}) was not compiled: it needs the feature \"unitary\"")),
+    }
+}
+
+#[cfg(feature = "unitary")]
+fn with_reflections(n: usize) -> Made {
+    match n {
+        2 => table(UnitaryGroup::<1, Known<2, 4>>::new(n, false)),
+        3 => table(Rotations::with_reflections()),
+        n => table(orthogonal(n)),
     }
 }
 
@@ -61,7 +82,9 @@ fn rotations(p: &[usize]) -> Made {
 #[cfg(feature = "unitary")]
 fn complex(n: usize, special: bool) -> Made {
     match n {
-        2 => table(UnitaryGroup::<2, Known<2, 4>>::new(n, special)),
+        1 if !special => table(Phases::new().map(Isometric)),
+        2 if special => table(UnitQuaternions::new().map(Isometric)),
+        2 => table(Pairs::unitary()),
         4 => table(UnitaryGroup::<2, Known<4, 16>>::new(n, special)),
         _ => table(UnitaryGroup::<2>::new(n, special)),
     }

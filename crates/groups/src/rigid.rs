@@ -76,8 +76,9 @@ pub fn of_matrix<S: Scalar>(r: [S; 9]) -> Quaternion<S> {
     best.each(|x| x * scale)
 }
 
+/// 1/√x
 #[inline(always)]
-fn inverse_sqrt<S: Scalar>(x: S) -> S {
+pub fn inverse_sqrt<S: Scalar>(x: S) -> S {
     let v = x.value();
     let root = Lane::ONE / v.sqrt();
     let first = lane(-0.5) * root / v;

@@ -1,15 +1,17 @@
 //! Rotations of three dimensions, SO(3), by unit quaternions: S³ covers SO(3) twice, and a rotation vector ω is twice
 //! a tangent vector of S³. Curves are solved and evaluated on the sphere, where q and −q represent the same point.
+//!
+//! A reflection p of O(3) is a rotation times −1. Formulas with p⁻¹q and p⁻¹v are the same for both.
 
 use crate::rigid::{Quaternion, Vector, conjugate, cross, multiply, of_matrix, rotate, to_matrix};
-use crate::unitary::{UnitaryGroup, special_orthogonal};
+use crate::unitary::UnitaryGroup;
 use std::f64::consts::PI;
 use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
 use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use symspline_core::special::{Trig, theta_over_sin};
 use symspline_vectors::{Sphere, constant_curvature as cc};
 
-/// SO(3), with its own implementation for speed; it agrees with SO(n).
+/// SO(3) and O(3), with their own implementation for speed; it agrees with SO(n) and O(n).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rotations {
     general: UnitaryGroup<1>,
@@ -19,8 +21,19 @@ pub struct Rotations {
 impl Rotations {
     /// Rotations of three dimensions.
     pub fn new() -> Result<Self, String> {
-        Ok(Rotations { general: special_orthogonal(3)?, cover: Sphere::new(3)? })
+        Ok(Rotations { general: UnitaryGroup::new(3, true)?, cover: Sphere::new(3)? })
     }
+
+    /// Rotations and reflections of three dimensions.
+    pub fn with_reflections() -> Result<Self, String> {
+        Ok(Rotations { general: UnitaryGroup::new(3, false)?, cover: Sphere::new(3)? })
+    }
+}
+
+/// The determinant of an orthogonal matrix.
+#[inline(always)]
+fn determinant(p: &[Lane]) -> Lane {
+    dot(&p[..3], &cross([p[3], p[4], p[5]], [p[6], p[7], p[8]]))
 }
 
 const HALF: Lane = lane(0.5);
@@ -111,7 +124,7 @@ fn defect(p: &[Lane; 9]) -> [Lane; 9] {
     few(|i| if i.is_multiple_of(4) { square[i] - Lane::ONE } else { square[i] })
 }
 
-/// Replaces a matrix by the nearest rotation; returns the distance. Matrices close to a rotation use the Newton steps
+/// Replaces a matrix by the nearest one of the group; returns the distance. Matrices close to it use the Newton steps
 /// of [`polar`](symspline_core::matrix::polar), others the general implementation.
 pub fn nearest(general: &UnitaryGroup<1>, x: &mut [Lane]) -> Lane {
     /// Up to this distance three steps are sufficient.
@@ -129,7 +142,7 @@ pub fn nearest(general: &UnitaryGroup<1>, x: &mut [Lane]) -> Lane {
         }
     }
     // A reflection is far from every rotation.
-    let reflection = dot(&p[..3], &cross([p[3], p[4], p[5]], [p[6], p[7], p[8]])).simd_lt(Lane::ZERO);
+    let reflection = if general.is_connected() { determinant(&p).simd_lt(Lane::ZERO) } else { Lane::ZERO };
     q = few(|i| reflection.select(lane(f64::NAN), exact.select(p[i], q[i])));
     off = reflection.select(lane(f64::INFINITY), off);
     if !near.all() {
@@ -166,8 +179,18 @@ impl Ambient for Rotations {
         out.copy_from_slice(&times(&matrix(p), &skew(omega)));
         angle
     }
-    fn distance(&self, _p: &[Lane], _q: &[Lane], _log: &[Lane], angle: Lane) -> Lane {
-        angle
+    fn distance(&self, p: &[Lane], q: &[Lane], _log: &[Lane], angle: Lane) -> Lane {
+        if self.is_connected() {
+            return angle;
+        }
+        // No curve joins a rotation and a reflection.
+        (determinant(p) * determinant(q)).simd_lt(Lane::ZERO).select(lane(f64::INFINITY), angle)
+    }
+    fn is_connected(&self) -> bool {
+        self.general.is_connected()
+    }
+    fn component(&self, p: &[f64]) -> bool {
+        self.general.component(p)
     }
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         let (omega, _) = log(between(p, q));
@@ -256,8 +279,10 @@ impl Origin for Rotations {
         w_minus: &mut [S],
     ) {
         let half = |x: &[S]| [x[0], x[1], x[2]].each(|x| x * HALF);
-        let d = [d[0], d[1], d[2]].each(|x| x * HALF);
-        cc::inner_handles::<1, false, true, S>(&d, prepared, &half(a), &half(b), w_plus, w_minus);
+        let (d, a, b) = ([d[0], d[1], d[2]].each(|x| x * HALF), half(a), half(b));
+        let handles = cc::Handles::new::<1, false>(&d, prepared, &a, &b);
+        let away = handles.height().simd_lt(Lane::ZERO);
+        handles.opposite(away).write(&d, &a, &b, w_plus, w_minus);
         w_plus.iter_mut().chain(w_minus).for_each(|w| *w = *w * TWO);
     }
     #[inline(always)]
@@ -288,7 +313,12 @@ impl Covered for Rotations {
     #[inline(always)]
     fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]) {
         for e in 0..2 {
-            let q = quaternion(p[e]);
+            let q = if self.is_connected() {
+                quaternion(p[e])
+            } else {
+                let side = self.side(p[0]);
+                quaternion(&matrix(p[e]).each(|x| x * side))
+            };
             y[e].copy_from_slice(&q);
             w[e].copy_from_slice(&times_pure(q, vector(p[e], v[e]).each(|x| x * HALF)));
         }
@@ -301,9 +331,16 @@ impl Covered for Rotations {
         }
     }
     #[inline(always)]
-    fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]) {
+    fn side(&self, p: &[Lane]) -> Lane {
+        if self.is_connected() { Lane::ONE } else { determinant(p).signum() }
+    }
+    #[inline(always)]
+    fn leave(&self, side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]) {
         let q: Quaternion<Lane> = few(|i| y[i]);
-        let p = to_matrix(q);
+        let mut p = to_matrix(q);
+        if !self.is_connected() {
+            p = p.each(|x| x * side);
+        }
         let Some(w) = w else {
             out.copy_from_slice(&p);
             return;

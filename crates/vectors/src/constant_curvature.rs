@@ -338,10 +338,9 @@ pub fn prepare<const K: i32, const L: bool>(chord: &[Lane], prepared: &mut [Lane
     prepared.copy_from_slice(&[trig.s, trig.k * kappa::<K>(), square]);
 }
 
-/// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only. With `PAIRS` x
-/// and −x represent the same point, and the nearer one is used.
+/// w⁺ and w⁻ of a segment: combinations of d, a, b whose coefficients depend on inner products only.
 #[inline(always)]
-pub fn inner_handles<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
+pub fn inner_handles<const K: i32, const L: bool, S: Scalar>(
     d: &[Lane],
     prepared: &[Lane],
     a: &[S],
@@ -349,31 +348,64 @@ pub fn inner_handles<const K: i32, const L: bool, const PAIRS: bool, S: Scalar>(
     w_plus: &mut [S],
     w_minus: &mut [S],
 ) {
-    let zero = S::constant(Lane::ZERO);
-    let (mut aa, mut bb, mut ab, mut ad, mut bd) = (zero, zero, zero, zero, zero);
-    for i in 0..d.len() {
-        let (ai, bi) = if sign::<L>(i) < 0.0 { (-a[i], -b[i]) } else { (a[i], b[i]) };
-        aa = ai.fma(a[i], aa);
-        bb = bi.fma(b[i], bb);
-        ab = ai.fma(b[i], ab);
-        ad = ai.fma_lane(d[i], ad);
-        bd = bi.fma_lane(d[i], bd);
+    Handles::new::<K, L>(d, prepared, a, b).write(d, a, b, w_plus, w_minus);
+}
+
+/// The points E(−a) E(d) E(−b)·o and E(b) E(−d) E(a)·o as combinations of d, a, b, and their height cos θ.
+pub struct Handles<S> {
+    plus: [S; 3],
+    minus: [S; 3],
+    height: S,
+    opposite: Option<Lane>,
+}
+
+impl<S: Scalar> Handles<S> {
+    /// See [`inner_handles`].
+    #[inline(always)]
+    pub fn new<const K: i32, const L: bool>(d: &[Lane], prepared: &[Lane], a: &[S], b: &[S]) -> Self {
+        let zero = S::constant(Lane::ZERO);
+        let (mut aa, mut bb, mut ab, mut ad, mut bd) = (zero, zero, zero, zero, zero);
+        for i in 0..d.len() {
+            let (ai, bi) = if sign::<L>(i) < 0.0 { (-a[i], -b[i]) } else { (a[i], b[i]) };
+            aa = ai.fma(a[i], aa);
+            bb = bi.fma(b[i], bb);
+            ab = ai.fma(b[i], ab);
+            ad = ai.fma_lane(d[i], ad);
+            bd = bi.fma_lane(d[i], bd);
+        }
+        let (ta, tb) = (Trig::new(aa * kappa::<K>()), Trig::new(bb * kappa::<K>()));
+        let &[sd, kd, dd] = prepared else { unreachable!("prepared has CHORD_LEN numbers") };
+        // cos θ_d = 1 + κ (cos θ_d − 1)/θ_d² · |d|²
+        let chord = [sd, kd, kd.mul_add(dd, Lane::ONE)];
+        let (plus, height) = handle::<K, S>(chord, ta, tb, ab, ad, bd);
+        // M⁻¹ = E(b) E(−d) E(a) is M with d, a, b replaced by −d, −b, −a.
+        let (minus, _) = handle::<K, S>(chord, tb, ta, ab, bd, ad);
+        Handles { plus, minus, height, opposite: None }
     }
-    let (ta, tb) = (Trig::new(aa * kappa::<K>()), Trig::new(bb * kappa::<K>()));
-    let &[sd, kd, dd] = prepared else { unreachable!("prepared has CHORD_LEN numbers") };
-    // cos θ_d = 1 + κ (cos θ_d − 1)/θ_d² · |d|²
-    let chord = [sd, kd, kd.mul_add(dd, Lane::ONE)];
-    let (plus, height) = handle::<K, S>(chord, ta, tb, ab, ad, bd);
-    // M⁻¹ = E(b) E(−d) E(a) is M with d, a, b replaced by −d, −b, −a.
-    let (minus, _) = handle::<K, S>(chord, tb, ta, ab, bd, ad);
-    let away = if PAIRS { height.value().simd_lt(Lane::ZERO) } else { Lane::ZERO };
-    let height = if PAIRS { S::select(away, -height, height) } else { height };
-    let f = theta_over_sin(-height + Lane::ONE, || height.value() + Lane::ONE);
-    let f = if PAIRS { S::select(away, -f, f) } else { f };
-    let (plus, minus) = (plus.map(|x| f * x), minus.map(|x| -(f * x)));
-    for i in 0..d.len() {
-        w_plus[i] = plus[0].fma_lane(d[i], plus[1].fma(a[i], plus[2] * b[i]));
-        w_minus[i] = minus[0].fma_lane(d[i], minus[1].fma(b[i], minus[2] * a[i]));
+
+    /// cos θ
+    #[inline(always)]
+    pub fn height(&self) -> Lane {
+        self.height.value()
+    }
+
+    /// The opposite points on the lanes of a mask: where x and −x represent the same point, and the other is nearer.
+    #[inline(always)]
+    pub fn opposite(self, lanes: Lane) -> Self {
+        Handles { opposite: Some(lanes), height: S::select(lanes, -self.height, self.height), ..self }
+    }
+
+    /// Writes the logarithms.
+    #[inline(always)]
+    pub fn write(self, d: &[Lane], a: &[S], b: &[S], w_plus: &mut [S], w_minus: &mut [S]) {
+        let Handles { plus, minus, height, opposite } = self;
+        let f = theta_over_sin(-height + Lane::ONE, || height.value() + Lane::ONE);
+        let f = opposite.map_or(f, |lanes| S::select(lanes, -f, f));
+        let (plus, minus) = (plus.map(|x| f * x), minus.map(|x| -(f * x)));
+        for i in 0..d.len() {
+            w_plus[i] = plus[0].fma_lane(d[i], plus[1].fma(a[i], plus[2] * b[i]));
+            w_minus[i] = minus[0].fma_lane(d[i], minus[1].fma(b[i], minus[2] * a[i]));
+        }
     }
 }
 

@@ -199,7 +199,7 @@ impl<const K: i32, const L: bool> Origin for Curved<K, L> {
         w_plus: &mut [S],
         w_minus: &mut [S],
     ) {
-        cc::inner_handles::<K, L, false, S>(d, prepared, a, b, w_plus, w_minus);
+        cc::inner_handles::<K, L, S>(d, prepared, a, b, w_plus, w_minus);
     }
     #[inline(always)]
     fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {

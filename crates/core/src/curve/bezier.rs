@@ -2,7 +2,7 @@
 
 use super::data::Curves;
 use crate::scalar::{Lane, Scalar, lane};
-use crate::space::Space;
+use crate::space::Ambient;
 
 /// One cubic Bézier segment on each lane, by its end points and outer handles; reused.
 pub struct Segment<S> {
@@ -17,6 +17,8 @@ pub struct Segment<S> {
     /// Lanes in which the inner handle is too long for a ray, see
     /// [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
     long: Lane,
+    /// See [`Covered::side`](crate::space::Covered::side).
+    pub side: Lane,
     level: [Vec<S>; 3],
 }
 
@@ -31,6 +33,7 @@ impl<S: Scalar> Segment<S> {
             controls: [lanes(), lanes()],
             middle: lanes(),
             long: Lane::ZERO,
+            side: Lane::ONE,
             level: [points(), points(), points()],
         }
     }
@@ -50,14 +53,14 @@ impl<S: Scalar> Segment<S> {
 
     /// Computes control points and the inner handle from end points and outer handles.
     #[inline(always)]
-    pub fn prepare<M: Space>(&mut self, space: &M, len: usize) {
+    pub fn prepare<M: Ambient>(&mut self, space: &M, len: usize) {
         self.prepare_chosen(space, len, |_, _| {});
     }
 
     /// The same in a space that covers another one; `choose` selects one of the points over the second control point,
     /// see [`Covered::choose`](crate::space::Covered::choose).
     #[inline(always)]
-    pub fn prepare_chosen<M: Space>(
+    pub fn prepare_chosen<M: Ambient>(
         &mut self,
         space: &M,
         len: usize,
@@ -81,7 +84,7 @@ impl<S: Scalar> Segment<S> {
     /// The first three geodesics start at fixed points with known velocities. No logarithm of an outer handle is
     /// computed, so that handles close to the cut locus remain exact.
     #[inline(always)]
-    pub fn at<M: Space>(&mut self, space: &M, len: usize, t: S, gamma: &mut [S]) {
+    pub fn at<M: Ambient>(&mut self, space: &M, len: usize, t: S, gamma: &mut [S]) {
         let [p0, p1] = self.ends.each_ref().map(|x| &x[..len]);
         let [a, b] = self.handles.each_ref().map(|x| &x[..len]);
         let [x, y, z] = self.level.each_mut().map(|x| &mut x[..len]);
@@ -102,7 +105,7 @@ impl<S: Scalar> Segment<S> {
 /// Replaces points on rays from the first control point by points on the geodesic between both.
 #[cold]
 #[inline(never)]
-fn between<S: Scalar, M: Space>(space: &M, controls: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {
+fn between<S: Scalar, M: Ambient>(space: &M, controls: &[Vec<Lane>; 2], lanes: Lane, t: S, y: &mut [S]) {
     let [p, q] =
         controls.each_ref().map(|q| q[..y.len()].iter().map(|&x| S::constant(x)).collect::<Vec<S>>());
     let mut x = y.to_vec();

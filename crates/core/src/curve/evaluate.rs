@@ -133,6 +133,7 @@ impl Job<'_> {
                 self.read(cursor, ambient, &mut [&mut *p0, &mut *p1], &mut [&mut *v0, &mut *v1]);
                 let [y, z] = &mut segment.ends;
                 let [a, b] = &mut segment.handles;
+                segment.side = space.side(p0);
                 space.enter([p0, p1], [v0, v1], [y, z], [a, b]);
                 segment.prepare_chosen(&cover, len, |from, over| space.choose(from, over));
             },
@@ -142,9 +143,9 @@ impl Job<'_> {
                 if let (true, Some(w)) = (self.quantity.is_of_body(), vector) {
                     return out.write(space.body(p, w, result));
                 }
-                space.leave(p, vector, result);
+                space.leave(segment.side, p, vector, result);
                 if self.quantity.is_length() {
-                    space.leave(p, None, point);
+                    space.leave(segment.side, p, None, point);
                     out.write(&[norm(space, point, result)]);
                 } else {
                     out.write(result);
@@ -187,7 +188,7 @@ impl Job<'_> {
 
     /// Points of eight samples, and vectors there if the quantity requires them.
     #[inline(always)]
-    fn sample<'v, S: Scalar, M: Space>(
+    fn sample<'v, S: Scalar, M: Ambient>(
         &self,
         space: &M,
         cursor: &SampleCursor,
@@ -286,7 +287,12 @@ fn two(buffer: &mut [Lane], len: usize) -> [&mut [Lane]; 2] {
 
 /// Replaces the lanes outside the knots by the geodesic that continues the curve at its end.
 #[cold]
-fn go_straight<S: Scalar, M: Space>(space: &M, cursor: &SampleCursor, segment: &Segment<S>, gamma: &mut [S]) {
+fn go_straight<S: Scalar, M: Ambient>(
+    space: &M,
+    cursor: &SampleCursor,
+    segment: &Segment<S>,
+    gamma: &mut [S],
+) {
     let Segment { ends: [p0, p1], handles: [a, b], .. } = segment;
     let (beyond, third) = (Lane::new(cursor.beyond), cursor.h * lane(1.0 / 3.0));
     let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));

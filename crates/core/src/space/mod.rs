@@ -12,6 +12,7 @@
 mod algebra;
 mod erased;
 mod far_out;
+mod isometric;
 mod model;
 mod part;
 mod registry;
@@ -20,6 +21,7 @@ mod traits;
 pub use algebra::{Algebra, stretch_series};
 pub use erased::{Erased, Geometry, Kernels};
 pub use far_out::far_out;
+pub use isometric::{Isometric, Isometry};
 pub use model::Model;
 pub use part::{Part, Within};
 pub use registry::{Entry, Made, table};

@@ -209,7 +209,7 @@ pub trait Evaluation {
 /// A space whose curves are evaluated in another space that covers it locally.
 pub trait Covered: Space {
     /// The covering space.
-    type Cover: Space;
+    type Cover: Ambient;
     /// The covering space.
     fn cover(&self) -> Self::Cover;
     /// Lifts a segment of a curve to the cover: its end points and tangent vectors there.
@@ -220,9 +220,13 @@ pub trait Covered: Space {
     /// A tangent vector w at y of the cover in the body frame, in the first numbers of `out`: the element ω of the
     /// Lie algebra with p' = pω.
     fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane];
-    /// Projects a point of the cover and, if given, a tangent vector there to the space: writes the point or the
-    /// vector.
-    fn leave(&self, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);
+    /// The component of a disconnected space that contains a point: 1 or −1 in each lane. One cover serves both.
+    fn side(&self, _p: &[Lane]) -> Lane {
+        Lane::ONE
+    }
+    /// Projects a point of the cover and, if given, a tangent vector there to a component of the space: writes the
+    /// point or the vector.
+    fn leave(&self, side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]);
 }
 
 /// Replaces v by its tangential component at p; returns the size of the normal component, and of v, as arrays.

@@ -1,0 +1,569 @@
+//! SO(4) and U(2) by pairs of unit quaternions (a, b), where (−a, −b) is the same element: x ↦ a x b̄ is a rotation of
+//! four dimensions, and a phase a = e^{iψ} times a quaternion b of SU(2) is a unitary matrix. The angles of the matrix
+//! are θₐ ± θᵦ for the lengths of log a and log b.
+//!
+//! A tangent vector pΩ corresponds to two vectors (α, β), the imaginary quaternions with a' = aα, b' = bβ. Curves are
+//! evaluated on the product of two spheres. All products of quaternions and formulas of matrices that are no
+//! conversions are those of `rotations` and of `unitary`.
+
+use crate::rigid::{Quaternion, Vector, conjugate, inverse_sqrt, multiply, rotate};
+use crate::unitary::UnitaryGroup;
+use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
+use symspline_core::matrix::Known;
+use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane, max_or_nan};
+use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space};
+use symspline_core::special::{Trig, theta_over_sin};
+use symspline_vectors::{Sphere, constant_curvature as cc};
+
+const HALF: Lane = lane(0.5);
+/// The length of a tangent vector divided by that of (α, β).
+const SCALE: f64 = SQRT_2;
+
+/// Two unit quaternions.
+type Pair<S> = [Quaternion<S>; 2];
+
+/// How matrices correspond to pairs of quaternions.
+pub trait Form: Copy + Send + Sync + 'static {
+    /// The group by general formulas, for what is not done by quaternions.
+    type General: Ambient;
+    /// The number of coordinates of α; the other components are zero.
+    const FIRST: usize;
+    /// p* x
+    fn relative<S: Scalar>(p: &[S], x: &[S]) -> [S; 16];
+    /// The pair of 1 + E, accurate for small E.
+    fn pair<S: Scalar>(e: &[S; 16]) -> Pair<S>;
+    /// The vectors of a matrix Ω.
+    fn vectors(omega: &[Lane; 16]) -> [Vector<Lane>; 2];
+    /// The matrix of a pair: bilinear in a and b.
+    fn matrix<S: Scalar>(a: Quaternion<S>, b: Quaternion<S>) -> [S; 16];
+}
+
+/// Rotations of four dimensions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FourDimensional;
+
+/// The quaternion product eᵢ eⱼ is ± e_k with k = i xor j.
+const fn negative(i: usize, j: usize) -> bool {
+    matches!((i, j), (1, 1) | (2, 2) | (3, 3) | (1, 3) | (2, 1) | (3, 2))
+}
+
+/// The entry of eᵢ eⱼ ēₖ, as its index and whether it is negative.
+const fn entry(i: usize, j: usize, k: usize) -> (usize, bool) {
+    let (first, flipped) = (i ^ j, k != 0);
+    (first ^ k, negative(i, j) != (negative(first, k) != flipped))
+}
+
+/// Σ ± mᵣⱼ over the four entries of x ↦ eᵢ x ēₖ, divided by four: aᵢ bₖ of a rotation m.
+#[inline(always)]
+fn component<S: Scalar>(m: &[S; 16], i: usize, k: usize) -> S {
+    let term = |j: usize| {
+        let (row, minus) = entry(i, j, k);
+        let x = m[4 * row + j];
+        if minus { -x } else { x }
+    };
+    ((term(0) + term(1)) + (term(2) + term(3))) * lane(0.25)
+}
+
+impl Form for FourDimensional {
+    type General = UnitaryGroup<1, Known<4, 16>>;
+    const FIRST: usize = 3;
+    #[inline(always)]
+    fn relative<S: Scalar>(p: &[S], x: &[S]) -> [S; 16] {
+        few(|c| {
+            let (i, j) = (c / 4, c % 4);
+            dot(&[p[i], p[4 + i], p[8 + i], p[12 + i]], &[x[j], x[4 + j], x[8 + j], x[12 + j]])
+        })
+    }
+    /// The matrix of all products aᵢ bₖ has rank one: b is its longest row, up to scale (Shepperd's choice).
+    #[inline(always)]
+    fn pair<S: Scalar>(e: &[S; 16]) -> Pair<S> {
+        let products: [[S; 4]; 4] =
+            few(|i| few(|k| component(e, i, k) + if i + k == 0 { Lane::ONE } else { Lane::ZERO }));
+        let (mut row, mut most) = (products[0], Lane::ZERO);
+        for x in products {
+            let size = dot(&x.each(|x| x.value()), &x.each(|x| x.value()));
+            let better = size.simd_gt(most);
+            most = better.select(size, most);
+            row = few(|k| S::select(better, x[k], row[k]));
+        }
+        let scale = inverse_sqrt(dot(&row, &row));
+        let b = row.each(|x| x * scale);
+        [few(|i| dot(&products[i], &b)), b]
+    }
+    #[inline(always)]
+    fn vectors(omega: &[Lane; 16]) -> [Vector<Lane>; 2] {
+        [few(|i| component(omega, i + 1, 0)), few(|k| component(omega, 0, k + 1))]
+    }
+    #[inline(always)]
+    fn matrix<S: Scalar>(a: Quaternion<S>, b: Quaternion<S>) -> [S; 16] {
+        let products: [[S; 4]; 4] = few(|i| few(|k| a[i] * b[k]));
+        few(|c| {
+            // Four pairs (i, k) contribute to the entry (row, j): those with i ^ j ^ k = row.
+            let (row, j) = (c / 4, c % 4);
+            let term = |i: usize| {
+                let k = i ^ j ^ row;
+                let x = products[i][k];
+                if entry(i, j, k).1 { -x } else { x }
+            };
+            (term(0) + term(1)) + (term(2) + term(3))
+        })
+    }
+}
+
+/// Unitary matrices of two dimensions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TwoDimensional;
+
+/// x̄ y
+#[inline(always)]
+fn conjugate_times<S: Scalar>([a, b]: [S; 2], [c, d]: [S; 2]) -> [S; 2] {
+    [a.fma(c, b * d), a.fma(d, -(b * c))]
+}
+
+/// The entries of a complex matrix of two rows.
+#[inline(always)]
+fn entries<S: Scalar>(x: &[S]) -> [[S; 2]; 4] {
+    few(|i| [x[2 * i], x[2 * i + 1]])
+}
+
+impl Form for TwoDimensional {
+    type General = UnitaryGroup<2, Known<2, 4>>;
+    const FIRST: usize = 1;
+    #[inline(always)]
+    fn relative<S: Scalar>(p: &[S], x: &[S]) -> [S; 16] {
+        let (p, x) = (entries(p), entries(x));
+        few(|c| {
+            if c > 7 {
+                return S::constant(Lane::ZERO);
+            }
+            let (i, j) = (c / 4, c / 2 % 2);
+            let (first, second) = (conjugate_times(p[i], x[j]), conjugate_times(p[2 + i], x[2 + j]));
+            first[c % 2] + second[c % 2]
+        })
+    }
+    /// The phase is the square root of the determinant d, (1 + d)/|1 + d| or i(1 − d)/|1 − d|.
+    #[inline(always)]
+    fn pair<S: Scalar>(e: &[S; 16]) -> Pair<S> {
+        let (zero, [p, q, r, s]) = (S::constant(Lane::ZERO), entries(e));
+        // d − 1 = tr E + det E
+        let off: [S; 2] = few(|c| {
+            let det = if c == 0 {
+                p[0] * s[0] - p[1] * s[1] - (q[0] * r[0] - q[1] * r[1])
+            } else {
+                p[0] * s[1] + p[1] * s[0] - (q[0] * r[1] + q[1] * r[0])
+            };
+            p[c] + s[c] + det
+        });
+        let behind = off[0].value().simd_lt(lane(-1.0));
+        let root = [S::select(behind, off[1], off[0] + lane(2.0)), S::select(behind, -off[0], off[1])];
+        let scale = inverse_sqrt(dot(&root, &root));
+        let z = root.each(|x| x * scale);
+        // The matrix without its phase, (u, v; −v̄, ū): means of the two rows.
+        let one = |[re, im]: [S; 2]| [re + Lane::ONE, im];
+        let [u, v, w, x] = [one(p), q, r, one(s)].each(|y| conjugate_times(z, y));
+        // Im z̄(1 + p) − Im z̄(1 + s) without the ones.
+        let turn = conjugate_times(z, few(|c| p[c] - s[c]))[1];
+        let b = [u[0] + x[0], turn, v[0] - w[0], v[1] + w[1]].each(|x| x * HALF);
+        [[z[0], z[1], zero, zero], b]
+    }
+    #[inline(always)]
+    fn vectors(omega: &[Lane; 16]) -> [Vector<Lane>; 2] {
+        let [p, q, r, s] = entries(omega);
+        let phase = [(p[1] + s[1]) * HALF, Lane::ZERO, Lane::ZERO];
+        [phase, [p[1] - s[1], q[0] - r[0], q[1] + r[1]].each(|x| x * HALF)]
+    }
+    #[inline(always)]
+    fn matrix<S: Scalar>([c, s, ..]: Quaternion<S>, [w, x, y, z]: Quaternion<S>) -> [S; 16] {
+        let times = |[re, im]: [S; 2]| [c * re - s * im, c * im + s * re];
+        let [p, q, r, s] = [[w, x], [y, z], [-y, z], [w, -x]].each(times);
+        let zero = S::constant(Lane::ZERO);
+        [p[0], p[1], q[0], q[1], r[0], r[1], s[0], s[1], zero, zero, zero, zero, zero, zero, zero, zero]
+    }
+}
+
+/// A group of pairs of unit quaternions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pairs<F: Form> {
+    general: F::General,
+    cover: TwoSpheres,
+}
+
+impl Pairs<FourDimensional> {
+    /// SO(4)
+    pub fn rotations() -> Result<Self, String> {
+        Ok(Pairs { general: UnitaryGroup::new(4, true)?, cover: TwoSpheres(Sphere::new(3)?) })
+    }
+}
+
+impl Pairs<TwoDimensional> {
+    /// U(2)
+    pub fn unitary() -> Result<Self, String> {
+        Ok(Pairs { general: UnitaryGroup::new(2, false)?, cover: TwoSpheres(Sphere::new(3)?) })
+    }
+}
+
+/// e^v as a quaternion.
+#[inline(always)]
+fn exp<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
+    let Trig { c, s, .. } = Trig::new(dot(&v, &v));
+    [c, v[0] * s, v[1] * s, v[2] * s]
+}
+
+/// The vector v with e^v = q, and its length.
+#[inline(always)]
+fn log<S: Scalar>([w, v @ ..]: Quaternion<S>) -> (Vector<S>, Lane) {
+    // 1 − |cos θ| = sin²θ/(1 + |cos θ|), without cancellation.
+    let behind = w.value().simd_lt(Lane::ZERO);
+    let (size, sine2) = (S::select(behind, -w, w), dot(&v, &v));
+    let c = size.value() + Lane::ONE;
+    let inverse = size.compose([Lane::ONE / c, -(Lane::ONE / (c * c)), lane(2.0) / (c * c * c)]);
+    let small = sine2 * inverse;
+    let f = theta_over_sin(S::select(behind, -w + Lane::ONE, small), || behind.select(small.value(), c));
+    (v.each(|x| x * f), sine2.value().sqrt().atan2(w.value()))
+}
+
+/// The vectors of the nearer one of (a, b) and (−a, −b), and their lengths. Their sum is below π inside the cut locus.
+#[inline(always)]
+fn nearest<S: Scalar>(pair: Pair<S>) -> ([Vector<S>; 2], [Lane; 2]) {
+    let far = (pair[0][0].value() + pair[1][0].value()).simd_lt(Lane::ZERO);
+    let [(alpha, first), (beta, second)] = pair.each(|q| log(q.each(|x| S::select(far, -x, x))));
+    ([alpha, beta], [first, second])
+}
+
+/// a · (0, v)
+#[inline(always)]
+fn times_pure<S: Scalar>(a: Quaternion<S>, [x, y, z]: Vector<S>) -> Quaternion<S> {
+    multiply(a, [S::constant(Lane::ZERO), x, y, z])
+}
+
+impl<F: Form> Pairs<F> {
+    /// The pair of a point.
+    #[inline(always)]
+    fn of<S: Scalar>(p: &[S]) -> Pair<S> {
+        let (zero, one) = (S::constant(Lane::ZERO), S::constant(Lane::ONE));
+        let unit = [one, zero, zero, zero];
+        let identity = F::matrix(unit, unit);
+        F::pair(&few(|i| if i < p.len() { p[i] - identity[i] } else { zero }))
+    }
+
+    /// The pair of p⁻¹q, accurate for near points.
+    #[inline(always)]
+    fn between<S: Scalar>(p: &[S], q: &[S]) -> Pair<S> {
+        let mut difference = [S::constant(Lane::ZERO); 16];
+        difference.iter_mut().zip(q.iter().zip(p)).for_each(|(d, (q, p))| *d = *q - *p);
+        F::pair(&F::relative(p, &difference))
+    }
+
+    #[inline(always)]
+    fn vectors(p: &[Lane], v: &[Lane]) -> [Vector<Lane>; 2] {
+        F::vectors(&F::relative(p, v))
+    }
+
+    /// The derivative of the matrix of a pair that moves.
+    #[inline(always)]
+    fn moved([a, b]: Pair<Lane>, [da, db]: Pair<Lane>) -> [Lane; 16] {
+        let (first, second) = (F::matrix(da, b), F::matrix(a, db));
+        few(|i| first[i] + second[i])
+    }
+
+    /// The tangent vector at p of two vectors.
+    #[inline(always)]
+    fn tangent(p: &[Lane], [alpha, beta]: [Vector<Lane>; 2], out: &mut [Lane]) {
+        let [a, b] = Self::of(p);
+        let v = Self::moved([a, b], [times_pure(a, alpha), times_pure(b, beta)]);
+        out.copy_from_slice(&v[..out.len()]);
+    }
+
+    /// The two vectors of coordinates.
+    #[inline(always)]
+    fn split<S: Scalar>(x: &[S]) -> [Vector<S>; 2] {
+        let zero = S::constant(Lane::ZERO);
+        let down = lane(1.0 / SCALE);
+        [few(|i| if i < F::FIRST { x[i] * down } else { zero }), few(|i| x[F::FIRST + i] * down)]
+    }
+
+    #[inline(always)]
+    fn join<S: Scalar>([alpha, beta]: [Vector<S>; 2], x: &mut [S]) {
+        let all = [alpha[0], alpha[1], alpha[2]];
+        for (x, v) in x.iter_mut().zip(all[..F::FIRST].iter().chain(&beta)) {
+            *x = *v * lane(SCALE);
+        }
+    }
+
+    #[inline(always)]
+    fn frame(frame: &[Lane]) -> Pair<Lane> {
+        [few(|i| frame[i]), few(|i| frame[4 + i])]
+    }
+}
+
+impl<F: Form> Ambient for Pairs<F> {
+    fn point_len(&self) -> usize {
+        self.general.point_len()
+    }
+    fn point_shape(&self) -> Vec<usize> {
+        self.general.point_shape()
+    }
+    fn is_complex(&self) -> bool {
+        self.general.is_complex()
+    }
+    fn cut_angle(&self) -> f64 {
+        PI
+    }
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        let [a, b] = Self::of(p).each(|q| q.each(S::constant));
+        let [alpha, beta] = Self::vectors(p, v).each(|v| exp(v.each(|x| t * x)));
+        let x = F::matrix(multiply(a, alpha), multiply(b, beta));
+        out.copy_from_slice(&x[..out.len()]);
+    }
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        let (vectors, [first, second]) = nearest(Self::between(p, q));
+        Self::tangent(p, vectors, out);
+        first + second
+    }
+    fn distance(&self, p: &[Lane], q: &[Lane], _log: &[Lane], _angle: Lane) -> Lane {
+        let (_, [first, second]) = nearest(Self::between(p, q));
+        first.mul_add(first, second * second).sqrt() * lane(SCALE)
+    }
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        let (vectors, _) = nearest(Self::between(p, q));
+        let ([a, b], [alpha, beta]) = (Self::of(p), vectors.each(|v| exp(v.each(|x| x * t))));
+        let x = F::matrix(multiply(a, alpha), multiply(b, beta));
+        out.copy_from_slice(&x[..out.len()]);
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        self.general.transvect(p, v, x, out);
+    }
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        let vectors = Self::vectors(gamma, d);
+        Self::tangent(gamma, vectors, d);
+    }
+    fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
+        self.velocity(gamma, dd);
+    }
+    fn inner(&self, p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        self.general.inner(p, u, v)
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        self.general.project(x)
+    }
+    fn project_tangent(&self, p: &[Lane], v: &mut [Lane]) -> Lane {
+        self.general.project_tangent(p, v)
+    }
+    fn random_point(&self, noise: &mut [Lane]) {
+        self.general.random_point(noise);
+    }
+    fn violation(&self, x: &[f64]) -> String {
+        self.general.violation(x)
+    }
+}
+
+impl<F: Form> Frame for Pairs<F> {
+    fn frame_len(&self) -> usize {
+        8
+    }
+    // A frame is the pair of g_R, as for the other groups.
+    fn lift(&self, _p: &[Lane], frame: &mut [Lane]) {
+        for q in frame.chunks_exact_mut(4) {
+            q.copy_from_slice(&[Lane::ONE, Lane::ZERO, Lane::ZERO, Lane::ZERO]);
+        }
+    }
+    #[inline(always)]
+    fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
+        let (vectors, [first, second]) = nearest(Self::between(p, q));
+        let r = Self::frame(frame);
+        let delta: [Vector<Lane>; 2] = few(|k| rotate(conjugate(r[k]), vectors[k]));
+        Self::join(delta, chord);
+        for (k, out) in frame.chunks_exact_mut(4).enumerate() {
+            let next = multiply(r[k], exp(delta[k].each(|d| d * lane(-0.5))));
+            // One step of Newton's method for 1/|q|.
+            let shorten = lane(-0.5).mul_add(dot(&next, &next), lane(1.5));
+            out.copy_from_slice(&next.each(|x| x * shorten));
+        }
+        first + second
+    }
+    #[inline(always)]
+    fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
+        let (r, vectors) = (Self::frame(frame), Self::vectors(p, v));
+        Self::join(few(|k| rotate(conjugate(r[k]), vectors[k])), x);
+    }
+    #[inline(always)]
+    fn tangent(&self, frame: &[Lane], p: &[Lane], x: &[Lane], v: &mut [Lane]) {
+        let (r, vectors) = (Self::frame(frame), Self::split(x));
+        Self::tangent(p, few(|k| rotate(r[k], vectors[k])), v);
+    }
+}
+
+impl<F: Form> Origin for Pairs<F> {
+    fn dim(&self) -> usize {
+        F::FIRST + 3
+    }
+    fn chord_len(&self) -> usize {
+        2 * cc::CHORD_LEN
+    }
+    fn curvature(&self) -> f64 {
+        FRAC_1_SQRT_2
+    }
+    #[inline(always)]
+    fn prepare(&self, chord: &[Lane], prepared: &mut [Lane]) {
+        for (d, prepared) in Self::split(chord).iter().zip(prepared.chunks_exact_mut(cc::CHORD_LEN)) {
+            cc::prepare::<1, false>(d, prepared);
+        }
+    }
+    #[inline(always)]
+    fn inner_handles<S: Scalar>(
+        &self,
+        d: &[Lane],
+        prepared: &[Lane],
+        a: &[S],
+        b: &[S],
+        w_plus: &mut [S],
+        w_minus: &mut [S],
+    ) {
+        let (d, a, b) = (Self::split(d), Self::split(a), Self::split(b));
+        let handles = [0, 1].map(|k| {
+            cc::Handles::new::<1, false>(&d[k], &prepared[cc::CHORD_LEN * k..][..cc::CHORD_LEN], &a[k], &b[k])
+        });
+        let far = (handles[0].height() + handles[1].height()).simd_lt(Lane::ZERO);
+        let mut w = [[[S::constant(Lane::ZERO); 3]; 2]; 2];
+        let [plus, minus] = &mut w;
+        for (k, handles) in handles.into_iter().enumerate() {
+            handles.opposite(far).write(&d[k], &a[k], &b[k], &mut plus[k], &mut minus[k]);
+        }
+        Self::join(*plus, w_plus);
+        Self::join(*minus, w_minus);
+    }
+    #[inline(always)]
+    fn triple<S: Scalar>(&self, a: &[S], b: &[S], c: &[S], out: &mut [S]) {
+        let (a, b, c) = (Self::split(a), Self::split(b), Self::split(c));
+        let mut triple = [[S::constant(Lane::ZERO); 3]; 2];
+        for k in 0..2 {
+            cc::triple::<1, false, S>(&a[k], &b[k], &c[k], &mut triple[k]);
+        }
+        Self::join(triple, out);
+    }
+    #[inline(always)]
+    fn stretch<S: Scalar>(&self, v: &[S], x: &mut [S]) {
+        let (v, mut y) = (Self::split(v), Self::split(x));
+        for k in 0..2 {
+            cc::stretch::<1, false, S>(&v[k], &mut y[k]);
+        }
+        Self::join(y, x);
+    }
+    fn angle(&self, v: &[Lane]) -> Lane {
+        let [alpha, beta] = Self::split(v).each(|v| dot(&v, &v).sqrt());
+        alpha + beta
+    }
+}
+
+impl<F: Form> Space for Pairs<F> {
+    const HOT: bool = true;
+
+    fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
+        let [alpha, beta] = Self::vectors(p, v).each(|v| dot(&v, &v).sqrt());
+        alpha + beta
+    }
+    fn evaluate_with<E: Evaluation>(&self, evaluation: E) {
+        evaluation.covered(self);
+    }
+}
+
+impl<F: Form> Covered for Pairs<F> {
+    type Cover = TwoSpheres;
+
+    fn cover(&self) -> TwoSpheres {
+        self.cover
+    }
+    #[inline(always)]
+    fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]) {
+        for e in 0..2 {
+            let ([a, b], [alpha, beta]) = (Self::of(p[e]), Self::vectors(p[e], v[e]));
+            y[e].copy_from_slice([a, b].as_flattened());
+            w[e].copy_from_slice([times_pure(a, alpha), times_pure(b, beta)].as_flattened());
+        }
+    }
+    #[inline(always)]
+    fn choose(&self, from: &[Lane], [q, y, w]: [&mut [Lane]; 3]) {
+        let flip = dot(from, q).simd_lt(Lane::ZERO);
+        if flip.any() {
+            q.iter_mut().chain(y).chain(w).for_each(|x| *x = flip.select(-*x, *x));
+        }
+    }
+    #[inline(always)]
+    fn leave(&self, _side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]) {
+        let pair = Self::frame(y);
+        let x = match w {
+            Some(w) => Self::moved(pair, Self::frame(w)),
+            None => F::matrix(pair[0], pair[1]),
+        };
+        out.copy_from_slice(&x[..out.len()]);
+    }
+    #[inline(always)]
+    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane] {
+        let (pair, moved) = (Self::frame(y), Self::frame(w));
+        let vectors = few(|k| {
+            let [_, x, y, z] = multiply(conjugate(pair[k]), moved[k]);
+            [x, y, z]
+        });
+        let out = &mut out[..F::FIRST + 3];
+        Self::join(vectors, out);
+        out
+    }
+}
+
+/// Two points of a sphere of three dimensions, one after the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TwoSpheres(Sphere);
+
+impl Ambient for TwoSpheres {
+    fn point_len(&self) -> usize {
+        8
+    }
+    fn cut_angle(&self) -> f64 {
+        self.0.cut_angle()
+    }
+    #[inline(always)]
+    fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
+        for k in [0, 4] {
+            cc::ray::<1, false, S>(&p[k..k + 4], &v[k..k + 4], t, &mut out[k..k + 4]);
+        }
+    }
+    #[inline(always)]
+    fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
+        let [first, second] =
+            [0, 4].each(|k| cc::log::<1, false>(&p[k..k + 4], &q[k..k + 4], &mut out[k..k + 4]));
+        max_or_nan(first, second)
+    }
+    #[inline(always)]
+    fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
+        for k in [0, 4] {
+            cc::geodesic::<1, false, S>(&p[k..k + 4], &q[k..k + 4], t, &mut out[k..k + 4]);
+        }
+    }
+    fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
+        for k in [0, 4] {
+            cc::transvect::<1, false>(&p[k..k + 4], &v[k..k + 4], &x[k..k + 4], &mut out[k..k + 4]);
+        }
+    }
+    #[inline(always)]
+    fn velocity(&self, gamma: &[Lane], d: &mut [Lane]) {
+        for k in [0, 4] {
+            cc::tangential::<1, false>(&gamma[k..k + 4], &mut d[k..k + 4]);
+        }
+    }
+    #[inline(always)]
+    fn acceleration(&self, gamma: &[Lane], _d: &[Lane], dd: &mut [Lane]) {
+        self.velocity(gamma, dd);
+    }
+    fn inner(&self, _p: &[Lane], u: &[Lane], v: &[Lane]) -> Lane {
+        dot(u, v)
+    }
+    fn project(&self, x: &mut [Lane]) -> Lane {
+        x.chunks_exact_mut(4).fold(Lane::ZERO, |off, x| max_or_nan(off, self.0.project(x)))
+    }
+    fn random_point(&self, noise: &mut [Lane]) {
+        self.project(noise);
+    }
+    fn violation(&self, x: &[f64]) -> String {
+        self.0.violation(&x[..4])
+    }
+}
