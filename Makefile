@@ -65,7 +65,7 @@ docs: .venv/tools
 	SYMSPLINE_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
 	$(BIN)/python docs/links.py build/docs
 
-# One wheel for every processor of this architecture, in dist/: on x86-64 with two compiled modules, so two builds.
+# One wheel for every processor of this architecture, in dist/: on x86-64 with three compiled modules, so three builds.
 wheel: .venv/maturin
 	$(BIN)/python packaging/wheel.py
 

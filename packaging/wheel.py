@@ -1,8 +1,9 @@
 """Builds one wheel that suits every processor of this machine's architecture, into dist/.
 
-On x86-64 it holds two compiled modules, of which `symspline/_cpu.py` picks one at import: `_core` for any processor,
-and `_core_v3` for those with AVX2 and FMA. They are two builds, each with its own target folder, joined afterwards:
-nothing is put into the checkout, where a second module would be loaded in place of the one under development.
+On x86-64 it holds three compiled modules, of which `symspline/_cpu.py` picks one at import: `_core` for any processor,
+`_core_v3` for those with AVX2 and FMA, and `_core_v4` for those with AVX-512. They are three builds, each with its own
+target folder, joined afterwards: nothing is put into the checkout, where a second module would be loaded in place of
+the one under development.
 """
 
 import base64
@@ -21,7 +22,7 @@ TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 
 
 def build(folder: Path, target: Path, flags: str | None) -> Path:
-    """A wheel in ``folder`` by maturin, with the compiler's flags of .cargo/config.toml if there are no others."""
+    """A wheel in ``folder`` by maturin, with these flags of the compiler."""
     environment = {name: value for name, value in os.environ.items() if name != "RUSTFLAGS"}
     command = [
         sys.executable,
@@ -43,23 +44,25 @@ def build(folder: Path, target: Path, flags: str | None) -> Path:
     return wheel
 
 
-def join(plain: Path, fast: Path, out: Path) -> Path:
-    """Write the wheel ``plain`` with the compiled module of ``fast`` as its second one."""
-    with zipfile.ZipFile(fast) as archive:
-        (name,) = [
-            n for n in archive.namelist() if n.startswith("symspline/_core.") and not n.endswith(".pyi")
-        ]
-        info, module = archive.getinfo(name), archive.read(name)
-    info.filename = name.replace("_core", "_core_v3", 1)
-    digest = base64.urlsafe_b64encode(hashlib.sha256(module).digest()).rstrip(b"=").decode()
+def join(plain: Path, others: dict[str, Path], out: Path) -> Path:
+    """Write the wheel ``plain`` with the compiled modules of other wheels, which are for these levels."""
+    modules = []
+    for level, wheel in others.items():
+        with zipfile.ZipFile(wheel) as archive:
+            (name,) = [n for n in archive.namelist() if n.startswith("symspline/_core.") and not n.endswith(".pyi")]
+            info, module = archive.getinfo(name), archive.read(name)
+        info.filename = name.replace("_core", f"_core_{level}", 1)
+        modules.append((info, module))
     made = out / plain.name
     with zipfile.ZipFile(plain) as source, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as wheel:
         for entry in source.infolist():
             content = source.read(entry)
             if entry.filename.endswith(".dist-info/RECORD"):
                 # The folder .dist-info comes last, as the format recommends.
-                wheel.writestr(info, module)
-                content += f"{info.filename},sha256={digest},{len(module)}\n".encode()
+                for info, module in modules:
+                    wheel.writestr(info, module)
+                    digest = base64.urlsafe_b64encode(hashlib.sha256(module).digest()).rstrip(b"=").decode()
+                    content += f"{info.filename},sha256={digest},{len(module)}\n".encode()
             wheel.writestr(entry, content)
     return made
 
@@ -68,12 +71,14 @@ def main() -> None:
     out = ROOT / "dist"
     out.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
-        made = build(Path(temporary) / "default", TARGET, None)
-        if platform.machine().lower() in ("x86_64", "amd64"):
-            plain = build(Path(temporary) / "plain", TARGET / "plain", "-C target-cpu=x86-64")
-            print(join(plain, made, out))
-        else:
-            print(shutil.copy(made, out))
+        if platform.machine().lower() not in ("x86_64", "amd64"):
+            print(shutil.copy(build(Path(temporary), TARGET, None), out))
+            return
+        plain, *others = (
+            build(Path(temporary) / level, TARGET / level, f"-C target-cpu={cpu}")
+            for level, cpu in (("plain", "x86-64"), ("v3", "x86-64-v3"), ("v4", "x86-64-v4"))
+        )
+        print(join(plain, dict(zip(("v3", "v4"), others, strict=True)), out))
 
 
 if __name__ == "__main__":

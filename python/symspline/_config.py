@@ -22,8 +22,8 @@ def show_config() -> None:
 
     Notes
     -----
-    A wheel for x86-64 contains two compiled modules. ``plain`` or ``v3`` in the environment variable ``SYMSPLINE_CPU``
-    selects one of them.
+    A wheel for x86-64 contains three compiled modules. ``plain``, ``v3`` or ``v4`` in the environment variable
+    ``SYMSPLINE_CPU`` selects one of them.
 
     Examples
     --------
@@ -37,7 +37,7 @@ def show_config() -> None:
     threads     ...
     """
     file = Path(str(_core.__file__))
-    built_for = "x86-64-v3" if _cpu.MARK in file.read_bytes() else "any processor"
+    built_for = _cpu.LEVELS[_cpu.built_for(file)]
     lines = {
         "symspline": VERSION,
         "Python": f"{sys.version.split()[0]} ({platform.python_implementation()}, {'no ' * (not _locked())}GIL)",

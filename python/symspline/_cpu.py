@@ -1,7 +1,8 @@
 """Picks the compiled module that suits this processor, before any other is imported.
 
-A wheel for x86-64 holds two: ``_core``, which runs on all of them, and ``_core_v3`` for those with AVX2 and FMA
-(x86-64-v3, since about 2013). A checkout, and a wheel for another architecture, have ``_core`` only.
+A wheel for x86-64 holds three: ``_core``, which runs on all processors, ``_core_v3`` for those with AVX2 and FMA
+(x86-64-v3, since about 2013), and ``_core_v4`` for those with AVX-512 (x86-64-v4). A checkout, and a wheel for another
+architecture, have ``_core`` only; in a checkout it is built for the processor of the machine.
 """
 
 import ctypes
@@ -12,28 +13,45 @@ from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-# In the compiled file.
-MARK = b"symspline built for x86-64-v3"
-_NEEDED = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"}
+LEVELS = {"plain": "any processor", "v3": "x86-64-v3", "v4": "x86-64-v4"}
+"""What ``SYMSPLINE_CPU`` may be, and the processors for which such a module is built; slowest first."""
+_INSTRUCTIONS = {"v3": "AVX2 and FMA", "v4": "AVX-512"}
+_V3 = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"}
+_FLAGS = {"v3": _V3, "v4": _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}}
+"""Flags of Linux."""
+_SYSCTL = {"v3": (b"hw.optional.avx2_0", b"hw.optional.fma"), "v4": (b"hw.optional.avx512f", b"hw.optional.avx512vl")}
+"""Names of macOS."""
+_FEATURES = {"v3": 40, "v4": 41}
+"""PF_AVX2_INSTRUCTIONS_AVAILABLE and PF_AVX512F_INSTRUCTIONS_AVAILABLE of Windows."""
 
 # What `load` did, for `show_config`.
 reason = ""
 
 
-def _has_v3() -> bool:
-    """Whether the operating system reports that the processor has x86-64-v3; True if it is unknown."""
+def mark(level: str) -> bytes:
+    """Return what the compiled file of a level contains."""
+    return b"symspline built for " + LEVELS[level].encode()
+
+
+def built_for(file: Path) -> str:
+    """Return the level for which a compiled file was built."""
+    content = file.read_bytes()
+    return next(level for level in (*reversed(LEVELS), "plain") if level == "plain" or mark(level) in content)
+
+
+def _has(level: str) -> bool:
+    """Whether the operating system reports that the processor has a level; True if it is unknown."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return True
     try:
         if sys.platform == "linux":
             with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
                 flags = next((line for line in file if line.startswith("flags")), "")
-            return not flags or set(flags.split()) >= _NEEDED
+            return not flags or set(flags.split()) >= _FLAGS[level]
         if sys.platform == "darwin":
-            return all(_sysctl(name) != 0 for name in (b"hw.optional.avx2_0", b"hw.optional.fma"))
+            return all(_sysctl(name) != 0 for name in _SYSCTL[level])
         if sys.platform == "win32":
-            avx2_available = 40  # PF_AVX2_INSTRUCTIONS_AVAILABLE
-            return bool(ctypes.windll.kernel32.IsProcessorFeaturePresent(avx2_available))
+            return bool(ctypes.windll.kernel32.IsProcessorFeaturePresent(_FEATURES[level]))
     except OSError:
         pass
     return True
@@ -49,29 +67,29 @@ def _sysctl(name: bytes) -> int | None:
     return value.value
 
 
-def _says_v3(plain: Path) -> bool:
-    """Whether the processor itself reports that it has x86-64-v3.
+def _level(plain: Path) -> str:
+    """Return the best level that the processor itself reports.
 
     Asked through a module that it can run in any case: emulators show programs the files of another processor.
     """
-    ask = ctypes.CDLL(str(plain)).symspline_has_v3
-    ask.restype = ctypes.c_bool
-    return bool(ask())
+    ask = ctypes.CDLL(str(plain)).symspline_cpu_level
+    ask.restype = ctypes.c_int
+    return list(LEVELS)[ask()]
 
 
-def _find(folder: Path, name: str) -> Path | None:
+def _find(folder: Path, level: str) -> Path | None:
+    name = "_core" if level == "plain" else f"_core_{level}"
     files = (folder / (name + suffix) for suffix in EXTENSION_SUFFIXES)
     return next((file for file in files if file.is_file()), None)
 
 
 def check(folder: Path) -> None:
     """Raise ImportError if the compiled module in ``folder`` needs what the processor lacks."""
-    if _has_v3():
-        return
-    file = _find(folder, "_core")
-    if file and MARK in file.read_bytes():
+    file = _find(folder, "plain")
+    level = "plain" if not file or all(map(_has, _FLAGS)) else built_for(file)
+    if level != "plain" and not _has(level):
         raise ImportError(
-            "symspline was built for processors with AVX2 and FMA (x86-64-v3), which this one lacks. "
+            f"symspline was built for processors with {_INSTRUCTIONS[level]} ({LEVELS[level]}), which this one lacks. "
             'Build it for any x86-64 processor with: RUSTFLAGS="-C target-cpu=x86-64" '
             "pip install --no-binary symspline symspline"
         )
@@ -80,25 +98,32 @@ def check(folder: Path) -> None:
 def _choose(folder: Path) -> tuple[Path | None, str]:
     """The file to load as ``_core``, None for the one that Python finds by itself, and why."""
     asked = os.environ.get("SYMSPLINE_CPU", "")
-    if asked not in ("", "plain", "v3"):
-        raise ImportError(f"SYMSPLINE_CPU must be plain or v3, not {asked[:99]!r}")
-    plain, fast = _find(folder, "_core"), _find(folder, "_core_v3")
-    if not plain or not fast:
+    if asked and asked not in LEVELS:
+        raise ImportError(f"SYMSPLINE_CPU must be plain, v3 or v4, not {asked[:99]!r}")
+    modules = {level: file for level in LEVELS if (file := _find(folder, level))}
+    plain = modules.get("plain")
+    if not plain or len(modules) == 1:
         check(folder)
-        if asked and plain and (MARK in plain.read_bytes()) != (asked == "v3"):
-            other = "any processor" if asked == "v3" else "x86-64-v3"
+        if asked and plain and built_for(plain) != asked:
             raise ImportError(
                 f"SYMSPLINE_CPU={asked} cannot be done: the only compiled module here is {plain.name}, "
-                f"built for {other}"
+                f"built for {LEVELS[built_for(plain)]}"
             )
         return None, "the only one here"
     if asked == "plain":
         return None, "SYMSPLINE_CPU=plain"
-    if _says_v3(plain):
-        return fast, "SYMSPLINE_CPU=v3" if asked else "the processor has x86-64-v3"
-    if asked:
-        raise ImportError("SYMSPLINE_CPU=v3 cannot be done: this processor lacks x86-64-v3 (AVX2 and FMA)")
-    return None, "the processor lacks x86-64-v3"
+    own, levels = _level(plain), list(LEVELS)
+    runs = [level for level in modules if levels.index(level) <= levels.index(own)]
+    if asked and asked not in modules:
+        raise ImportError(f"SYMSPLINE_CPU={asked} cannot be done: there is no compiled module for {LEVELS[asked]} here")
+    if asked and asked not in runs:
+        raise ImportError(
+            f"SYMSPLINE_CPU={asked} cannot be done: this processor lacks {LEVELS[asked]} ({_INSTRUCTIONS[asked]})"
+        )
+    level = asked or runs[-1]
+    if level == "plain":
+        return None, "the processor lacks x86-64-v3"
+    return modules[level], f"SYMSPLINE_CPU={level}" if asked else f"the processor has {LEVELS[own]}"
 
 
 def load(folder: Path) -> None:

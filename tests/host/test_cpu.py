@@ -16,65 +16,76 @@ import symspline as ss
 from symspline import _core, _cpu
 
 PACKAGE = Path(ss.__file__).parent
-NAMED = {name: name + EXTENSION_SUFFIXES[0] for name in ("_core", "_core_v3")}
-FOR_V3, FOR_ANY = b"..." + _cpu.MARK + b"...", b"... symspline built for any processor ..."
+LEVELS = ("plain", "v3", "v4")
+FILE = {level: f"_core{'' if level == 'plain' else f'_{level}'}{EXTENSION_SUFFIXES[0]}" for level in LEVELS}
 
-# Only there are two modules, and only there both can run.
+# Only there are several modules, and only there two can run.
 needs_v3 = pytest.mark.skipif(
-    platform.machine().lower() not in ("x86_64", "amd64") or not _cpu._has_v3(), reason="needs x86-64-v3"
+    platform.machine().lower() not in ("x86_64", "amd64") or not _cpu._has("v3"), reason="needs x86-64-v3"
 )
-
-
-ANY, V3 = {"_core": FOR_ANY}, {"_core": FOR_V3}
-BOTH = {"_core": FOR_ANY, "_core_v3": FOR_V3}
 
 
 @pytest.fixture
 def folder_with(tmp_path, monkeypatch):
-    """A folder with these modules, on a processor with or without x86-64-v3, and SYMSPLINE_CPU."""
+    """A folder with modules for these levels, on a processor of a level, and SYMSPLINE_CPU."""
 
-    def make(modules, has_v3, asked):
-        for name, content in modules.items():
-            (tmp_path / NAMED[name]).write_bytes(content)
-        monkeypatch.setattr(_cpu, "_has_v3", lambda: has_v3)
-        monkeypatch.setattr(_cpu, "_says_v3", lambda plain: has_v3)
+    def make(files, own, asked):
+        for name, level in files.items():
+            (tmp_path / FILE[name]).write_bytes(b"..." + _cpu.mark(level) + b"...")
+        monkeypatch.setattr(_cpu, "_has", lambda level: LEVELS.index(level) <= LEVELS.index(own))
+        monkeypatch.setattr(_cpu, "_level", lambda plain: own)
         monkeypatch.setenv("SYMSPLINE_CPU", asked)
         return tmp_path
 
     return make
 
 
-@pytest.mark.parametrize(
-    "modules, has_v3, asked, name",
-    [
-        (ANY, False, "", None),
-        (ANY, True, "plain", None),
-        (V3, True, "v3", None),
-        (BOTH, True, "", "_core_v3"),
-        (BOTH, True, "v3", "_core_v3"),
-        (BOTH, True, "plain", None),
-        (BOTH, False, "", None),
-        (BOTH, False, "plain", None),
-    ],
-)
-def test_the_module_that_suits_the_processor_is_chosen(folder_with, modules, has_v3, asked, name):
-    folder = folder_with(modules, has_v3, asked)
-    assert _cpu._choose(folder)[0] == (name and folder / NAMED[name])
+ANY, V3, V4 = ({"plain": level} for level in LEVELS)
+TWO = {level: level for level in ("plain", "v3")}
+ALL = {level: level for level in LEVELS}
 
 
 @pytest.mark.parametrize(
-    "modules, has_v3, asked, message",
+    "files, own, asked, level",
     [
-        (V3, False, "", r"AVX2 and FMA.*RUSTFLAGS"),
-        (ANY, True, "v3", "SYMSPLINE_CPU=v3 cannot be done: the only compiled module"),
-        (V3, True, "plain", "SYMSPLINE_CPU=plain cannot be done: the only compiled module"),
-        (BOTH, False, "v3", "this processor lacks x86-64-v3"),
-        *((BOTH, True, asked, f"must be plain or v3, not '{asked}'") for asked in ("v4", "V3", "1", "plain ")),
+        (ANY, "plain", "", None),
+        (ANY, "v3", "plain", None),
+        (V3, "v3", "v3", None),
+        (V3, "v4", "", None),
+        (V4, "v4", "v4", None),
+        *((TWO, own, asked, "v3") for own in ("v3", "v4") for asked in ("", "v3")),
+        *((ALL, own, asked, "v3") for own, asked in (("v3", ""), ("v3", "v3"), ("v4", "v3"))),
+        *((ALL, "v4", asked, "v4") for asked in ("", "v4")),
+        *((ALL, own, "plain", None) for own in LEVELS),
+        (ALL, "plain", "", None),
     ],
 )
-def test_missing_and_unsupported_modules_raise(folder_with, modules, has_v3, asked, message):
+def test_the_module_that_suits_the_processor_is_chosen(folder_with, files, own, asked, level):
+    folder = folder_with(files, own, asked)
+    assert _cpu._choose(folder)[0] == (level and folder / FILE[level])
+
+
+@pytest.mark.parametrize(
+    "files, own, asked, message",
+    [
+        (V3, "plain", "", r"AVX2 and FMA.*RUSTFLAGS"),
+        (V4, "v3", "", r"AVX-512 \(x86-64-v4\).*RUSTFLAGS"),
+        (ANY, "v3", "v3", "SYMSPLINE_CPU=v3 cannot be done: the only compiled module"),
+        (V3, "v3", "plain", "SYMSPLINE_CPU=plain cannot be done: the only compiled module"),
+        (ALL, "plain", "v3", "this processor lacks x86-64-v3"),
+        (ALL, "v3", "v4", r"this processor lacks x86-64-v4 \(AVX-512\)"),
+        (TWO, "v4", "v4", "there is no compiled module for x86-64-v4 here"),
+        *((ALL, "v4", asked, f"must be plain, v3 or v4, not '{asked}'") for asked in ("v5", "V3", "1", "plain ")),
+    ],
+)
+def test_missing_and_unsupported_modules_raise(folder_with, files, own, asked, message):
     with pytest.raises(ImportError, match=message):
-        _cpu.load(folder_with(modules, has_v3, asked))
+        _cpu.load(folder_with(files, own, asked))
+
+
+@needs_v3
+def test_the_processor_reports_the_level_that_the_system_reports():
+    assert _cpu._level(Path(_core.__file__)) == ("v4" if _cpu._has("v4") else "v3")
 
 
 # ---- a package with both, as in a wheel ----
@@ -117,7 +128,7 @@ def test_the_processor_decides_unless_one_of_two_is_forced(both):
     for asked, start, end in (
         ("plain", "_core.", "; SYMSPLINE_CPU=plain)"),
         ("v3", "_core_v3.", "; SYMSPLINE_CPU=v3)"),
-        ("", "_core_v3.", "(for x86-64-v3; the processor has x86-64-v3)"),
+        ("", "_core_v3.", f"; the processor has {_cpu.LEVELS[_cpu._level(Path(_core.__file__))]})"),
     ):
         chosen = printed(both, asked)
         assert chosen.startswith(start) and chosen.endswith(end)
@@ -161,4 +172,4 @@ def test_macos_is_asked_without_another_program(known, has_v3, monkeypatch):
         raise AssertionError("another program was started")
 
     monkeypatch.setattr(subprocess, "Popen", refuse)
-    assert _cpu._has_v3() is has_v3
+    assert _cpu._has("v3") is has_v3

@@ -15,7 +15,10 @@ pub static FAMILY: &[Entry] = &[
     Entry {
         names: &["hpd", "hermitian-positive-definite"],
         parameters: &["n"],
-        make: |p| table(PositiveDefinite::<2>::new(p[0], false)),
+        make: |p| match p[0] {
+            2 => table(PositiveDefinite::<2, Known<2, 4>>::new(2, false)),
+            n => table(PositiveDefinite::<2>::new(n, false)),
+        },
     },
     Entry { names: &["sspd", "special-positive-definite"], parameters: &["n"], make: |p| real(p, true) },
     Entry { names: &["siegel"], parameters: &["n"], make: |p| half_space(p[0]) },

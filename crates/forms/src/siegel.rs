@@ -4,10 +4,9 @@
 
 use crate::positive_definite::PositiveDefinite;
 use std::f64::consts::FRAC_1_SQRT_2;
-use symspline_core::matrix::{Matrix, cholesky, solve_lower};
+use symspline_core::matrix::{Known, Matrix, cholesky, solve_lower};
 use symspline_core::scalar::{Each, Lane, Scalar, lane};
 use symspline_core::space::{Ambient, Isometry, Origin, Part, Within};
-use symspline_vectors::Hyperbolic;
 
 /// Siegel's upper half space of n × n matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,40 +128,40 @@ impl Part for Siegel {
     }
 }
 
-/// The half plane of complex numbers, whose points are matrices (h + x, y; y, h − x) for points (h, x, y) of the
-/// hyperbolic plane.
+/// The half space of complex numbers, whose points are the matrices of determinant one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HalfPlane {
     general: Within<Siegel>,
-    plane: Hyperbolic,
+    image: Plane,
 }
+
+type Plane = PositiveDefinite<1, Known<2, 4>>;
 
 impl HalfPlane {
     /// Siegel's half space of 1 × 1 matrices.
     pub fn new() -> Result<Self, String> {
-        Ok(HalfPlane { general: Within(Siegel::new(1)?), plane: Hyperbolic::new(2)? })
+        Ok(HalfPlane { general: Within(Siegel::new(1)?), image: PositiveDefinite::new(2, true)? })
     }
 }
 
 impl Isometry for HalfPlane {
-    type Image = Hyperbolic;
+    type Image = Plane;
     type General = Within<Siegel>;
-    const LEN: usize = 3;
-    const SCALE: f64 = std::f64::consts::SQRT_2;
-    const ANGLE: f64 = Self::SCALE;
-    fn image(&self) -> Hyperbolic {
-        self.plane
+    const LEN: usize = 4;
+    const SCALE: f64 = 1.0;
+    const ANGLE: f64 = 1.0;
+    fn image(&self) -> Plane {
+        self.image
     }
     fn general(&self) -> &Self::General {
         &self.general
     }
     #[inline(always)]
     fn enter<S: Scalar>(x: &[S], y: &mut [S]) {
-        let half = lane(0.5);
-        y.copy_from_slice(&[(x[0] + x[3]) * half, (x[0] - x[3]) * half, (x[1] + x[2]) * half]);
+        y.copy_from_slice(x);
     }
     #[inline(always)]
     fn leave<S: Scalar>(y: &[S], x: &mut [S]) {
-        x.copy_from_slice(&[y[0] + y[1], y[2], y[2], y[0] - y[1]]);
+        x.copy_from_slice(y);
     }
 }

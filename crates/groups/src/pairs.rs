@@ -469,6 +469,7 @@ impl<F: Form> Space for Pairs<F> {
 
 impl<F: Form> Covered for Pairs<F> {
     type Cover = TwoSpheres;
+    const LEN: usize = 8;
 
     fn cover(&self) -> TwoSpheres {
         self.cover
@@ -497,16 +498,8 @@ impl<F: Form> Covered for Pairs<F> {
         };
         out.copy_from_slice(&x[..out.len()]);
     }
-    #[inline(always)]
-    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane] {
-        let (pair, moved) = (Self::frame(y), Self::frame(w));
-        let vectors = few(|k| {
-            let [_, x, y, z] = multiply(conjugate(pair[k]), moved[k]);
-            [x, y, z]
-        });
-        let out = &mut out[..F::FIRST + 3];
-        Self::join(vectors, out);
-        out
+    fn body<'o>(&self, _y: &[Lane], _w: &[Lane], _out: &'o mut [Lane]) -> &'o [Lane] {
+        unreachable!("body frames are those of rotations of three dimensions")
     }
 }
 

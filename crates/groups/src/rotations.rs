@@ -306,6 +306,7 @@ impl Space for Rotations {
 
 impl Covered for Rotations {
     type Cover = Sphere;
+    const LEN: usize = 4;
 
     fn cover(&self) -> Sphere {
         self.cover

@@ -2,8 +2,9 @@
 
 use crate::members::Members;
 use std::collections::BTreeMap;
+use std::marker::PhantomData;
 use std::sync::{Mutex, OnceLock, PoisonError};
-use symspline_core::matrix::Matrix;
+use symspline_core::matrix::{Dynamic, Matrix, Storage};
 use symspline_core::scalar::{Lane, Scalar, lane};
 use symspline_core::space::stretch_series;
 
@@ -12,10 +13,11 @@ type Element = Vec<(usize, f64)>;
 
 /// A Lie algebra of n × n matrices, real for D = 1, complex for D = 2.
 #[derive(Clone, Copy)]
-pub struct Algebra<const D: usize> {
+pub struct Algebra<const D: usize, A = Dynamic> {
     n: usize,
     members: Members,
     basis: &'static OnceLock<Vec<Element>>,
+    storage: PhantomData<A>,
 }
 
 /// Bases by the number of components of an entry, the size and the group.
@@ -25,12 +27,12 @@ type Bases = BTreeMap<(usize, usize, Members), &'static OnceLock<Vec<Element>>>;
 /// computed when it is first needed, so that a name alone costs nothing.
 static BASES: Mutex<Bases> = Mutex::new(Bases::new());
 
-impl<const D: usize> Algebra<D> {
+impl<const D: usize, A: Storage> Algebra<D, A> {
     /// The algebra of a group of n × n matrices.
     pub fn new(n: usize, members: Members) -> Self {
         let mut bases = BASES.lock().unwrap_or_else(PoisonError::into_inner);
         let basis = *bases.entry((D, n, members)).or_insert_with(|| Box::leak(Box::default()));
-        Algebra { n, members, basis }
+        Algebra { n, members, basis, storage: PhantomData }
     }
 
     fn basis(&self) -> &'static [Element] {
@@ -51,7 +53,7 @@ impl<const D: usize> Algebra<D> {
     }
 
     /// Coordinates of a matrix.
-    pub fn coordinates<S: Scalar>(&self, m: &Matrix<S, D>, x: &mut [S]) {
+    pub fn coordinates<S: Scalar>(&self, m: &Matrix<S, D, A>, x: &mut [S]) {
         let numbers = m.entries().as_flattened();
         for (x, element) in x.iter_mut().zip(self.basis()) {
             let zero = S::constant(Lane::ZERO);
@@ -60,24 +62,33 @@ impl<const D: usize> Algebra<D> {
     }
 
     /// `scale` times the matrix with given coordinates.
-    pub fn multiple<S: Scalar>(&self, scale: f64, x: &[S]) -> Matrix<S, D> {
-        let mut numbers = vec![S::constant(Lane::ZERO); self.n * self.n * D];
+    pub fn multiple<S: Scalar>(&self, scale: f64, x: &[S]) -> Matrix<S, D, A> {
+        let mut m = Matrix::zeros(self.n, self.n);
         for (&x, element) in x.iter().zip(self.basis()) {
             for &(at, factor) in element {
-                numbers[at] = x.fma_lane(lane(factor * scale), numbers[at]);
+                let number = &mut m[(at / D / self.n, at / D % self.n)][at % D];
+                *number = x.fma_lane(lane(factor * scale), *number);
             }
         }
-        Matrix::read(self.n, self.n, &numbers)
+        m
     }
 
     /// The nearest matrix of the algebra.
-    pub fn part(&self, m: Matrix<Lane, D>) -> Matrix<Lane, D> {
+    pub fn part(&self, m: Matrix<Lane, D, A>) -> Matrix<Lane, D, A> {
         if self.dim() == m.entries().len() * D {
             return m;
         }
-        let mut x = vec![Lane::ZERO; self.dim()];
-        self.coordinates(&m, &mut x);
-        self.multiple(1.0, &x)
+        let mut part = Matrix::zeros(self.n, self.n);
+        for element in self.basis() {
+            let numbers = m.entries().as_flattened();
+            let x =
+                element.iter().fold(Lane::ZERO, |sum, &(at, factor)| numbers[at].mul_add(lane(factor), sum));
+            for &(at, factor) in element {
+                let number = &mut part[(at / D / self.n, at / D % self.n)][at % D];
+                *number = x.mul_add(lane(factor), *number);
+            }
+        }
+        part
     }
 
     /// `[½a, [½b, c]]`: elements of 𝔪 act by half their matrices.
@@ -96,7 +107,10 @@ impl<const D: usize> Algebra<D> {
     }
 }
 
-fn commutator<S: Scalar, const D: usize>(a: &Matrix<S, D>, x: &Matrix<S, D>) -> Matrix<S, D> {
+fn commutator<S: Scalar, const D: usize, A: Storage>(
+    a: &Matrix<S, D, A>,
+    x: &Matrix<S, D, A>,
+) -> Matrix<S, D, A> {
     &a.times(x) - &x.times(a)
 }
 
@@ -163,10 +177,10 @@ mod tests {
             Members::PseudoOrthogonal(2),
         ] {
             for n in [4, 6] {
-                let algebra = Algebra::<1>::new(n, members);
+                let algebra: Algebra<1> = Algebra::new(n, members);
                 assert_eq!(algebra.basis().len(), algebra.dim(), "{members:?}, {n}");
             }
         }
-        assert_eq!(Algebra::<2>::new(3, Members::All).basis().len(), 18);
+        assert_eq!(Algebra::<2, Dynamic>::new(3, Members::All).basis().len(), 18);
     }
 }

@@ -11,42 +11,43 @@ use crate::algebra::Algebra;
 use crate::members::{Members, condition};
 use std::f64::consts::{PI, SQRT_2};
 use symspline_core::matrix::{
-    Dynamic, Matrix, Moved, determinant, exp_any_minus_one, inverse, largest_imaginary, log_any_one_plus,
+    Dynamic, Matrix, Moved, Storage, determinant, exp_any_minus_one, inverse, largest_imaginary,
+    log_any_one_plus,
 };
 use symspline_core::scalar::{Lane, Scalar, lane, max_or_nan};
 use symspline_core::space::{Ambient, Frame, Origin, Space};
 
 /// Invertible matrices: real for D = 1, complex for D = 2.
 #[derive(Clone, Copy)]
-pub struct GeneralLinear<const D: usize> {
+pub struct GeneralLinear<const D: usize, A = Dynamic> {
     n: usize,
     members: Members,
-    algebra: Algebra<D>,
+    algebra: Algebra<D, A>,
 }
 
-impl<const D: usize> GeneralLinear<D> {
+impl<const D: usize, A: Storage> GeneralLinear<D, A> {
     /// The group, or a closed subgroup of it, for the n of its name.
     pub fn new(n: usize, members: Members) -> Result<Self, String> {
         let n = members.rows(n)?;
         Ok(GeneralLinear { n, members, algebra: Algebra::new(n, members) })
     }
 
-    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D> {
+    fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
         Matrix::read(self.n, self.n, x)
     }
 
     /// The Ω with v = pΩ.
-    fn generator(&self, p: &[Lane], v: &[Lane]) -> Matrix<Lane, D> {
+    fn generator(&self, p: &[Lane], v: &[Lane]) -> Matrix<Lane, D, A> {
         self.algebra.part(inverse(&self.read(p)).times(&self.read(v)))
     }
 
     /// `log(p⁻¹q)` and its deciding angle; `p⁻¹q − 1` without cancellation for near points.
-    fn log_between<S: Scalar>(&self, p: &Matrix<S, D>, q: &Matrix<S, D>) -> (Matrix<S, D>, Lane) {
+    fn log_between<S: Scalar>(&self, p: &Matrix<S, D, A>, q: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
         log_any_one_plus(&inverse(p).times(&(q - p)))
     }
 
     /// p e^{tΩ}, with the derivatives in t that t has.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, Dynamic> {
+    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
         let omega = self.generator(p, v);
         let p = self.read(p);
         let x = &p.times(&exp_any_minus_one(&omega.scaled(t))) + &p;
@@ -54,13 +55,13 @@ impl<const D: usize> GeneralLinear<D> {
     }
 
     /// g_R of a frame, and its inverse.
-    fn frame(&self, frame: &[Lane]) -> [Matrix<Lane, D>; 2] {
+    fn frame(&self, frame: &[Lane]) -> [Matrix<Lane, D, A>; 2] {
         let (r, back) = frame.split_at(self.point_len());
         [self.read(r), self.read(back)]
     }
 }
 
-impl<const D: usize> Ambient for GeneralLinear<D> {
+impl<const D: usize, A: Storage> Ambient for GeneralLinear<D, A> {
     fn point_len(&self) -> usize {
         self.n * self.n * D
     }
@@ -130,7 +131,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
         self.generator(p, u).inner(&self.generator(p, v))
     }
     fn project(&self, x: &mut [Lane]) -> Lane {
-        let mut p = self.read(x);
+        let mut p = self.read(x).stored();
         let off = self.members.project(&mut p);
         p.write(x);
         off
@@ -142,7 +143,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
     }
     fn violation(&self, x: &[f64]) -> String {
         let lanes: Vec<Lane> = x.iter().map(|&x| lane(x)).collect();
-        self.members.violation(&self.read(&lanes))
+        self.members.violation(&self.read(&lanes).stored())
     }
     /// The condition number of p: rounding of p changes it by this factor more, relative to p.
     fn rounding(&self, p: &[Lane]) -> Lane {
@@ -150,7 +151,7 @@ impl<const D: usize> Ambient for GeneralLinear<D> {
     }
 }
 
-impl<const D: usize> Frame for GeneralLinear<D> {
+impl<const D: usize, A: Storage> Frame for GeneralLinear<D, A> {
     fn frame_len(&self) -> usize {
         2 * self.point_len()
     }
@@ -158,7 +159,7 @@ impl<const D: usize> Frame for GeneralLinear<D> {
     // g_R⁻¹ Ω g_R.
     fn lift(&self, _p: &[Lane], frame: &mut [Lane]) {
         for half in frame.chunks_exact_mut(self.point_len()) {
-            Matrix::<Lane, D>::identity(self.n).write(half);
+            Matrix::<Lane, D, A>::identity(self.n).write(half);
         }
     }
     fn step(&self, frame: &mut [Lane], p: &[Lane], q: &[Lane], chord: &mut [Lane]) -> Lane {
@@ -188,7 +189,7 @@ impl<const D: usize> Frame for GeneralLinear<D> {
     }
 }
 
-impl<const D: usize> Origin for GeneralLinear<D> {
+impl<const D: usize, A: Storage> Origin for GeneralLinear<D, A> {
     fn dim(&self) -> usize {
         self.algebra.dim()
     }
@@ -243,4 +244,4 @@ impl<const D: usize> Origin for GeneralLinear<D> {
     }
 }
 
-impl<const D: usize> Space for GeneralLinear<D> {}
+impl<const D: usize, A: Storage> Space for GeneralLinear<D, A> {}

@@ -10,6 +10,7 @@ pub use general_linear::GeneralLinear;
 pub use indefinite_grassmannian::IndefiniteGrassmannian;
 pub use members::Members;
 
+use symspline_core::matrix::Known;
 use symspline_core::space::{Entry, Made, Within, table};
 
 /// The spaces of this family.
@@ -18,7 +19,10 @@ pub static FAMILY: &[Entry] = &[
     Entry {
         names: &["cgl", "complex-general-linear"],
         parameters: &["n"],
-        make: |p| table(GeneralLinear::<2>::new(p[0], Members::All)),
+        make: |p| match p[0] {
+            2 => table(GeneralLinear::<2, Known<2, 4>>::new(2, Members::All)),
+            n => table(GeneralLinear::<2>::new(n, Members::All)),
+        },
     },
     Entry { names: &["aff", "affine"], parameters: &["n"], make: |p| real(p, Members::Affine) },
     Entry { names: &["sim", "similarity"], parameters: &["n"], make: |p| real(p, Members::Similarity) },
@@ -32,6 +36,12 @@ pub static FAMILY: &[Entry] = &[
     },
 ];
 
+/// Common sizes are constants at compile time.
 fn real(p: &[usize], members: Members) -> Made {
-    table(GeneralLinear::<1>::new(p[0], members))
+    match members.rows(p[0])? {
+        2 => table(GeneralLinear::<1, Known<2, 4>>::new(p[0], members)),
+        3 => table(GeneralLinear::<1, Known<3, 9>>::new(p[0], members)),
+        4 => table(GeneralLinear::<1, Known<4, 16>>::new(p[0], members)),
+        _ => table(GeneralLinear::<1>::new(p[0], members)),
+    }
 }

@@ -1,6 +1,6 @@
 //! Membership of matrices in a group: the distance, the nearest member, and the condition that is violated.
 
-use symspline_core::matrix::{Matrix, Select, determinant, inverse};
+use symspline_core::matrix::{Matrix, Select, Storage, determinant, inverse};
 use symspline_core::scalar::{Lane, lane, max_or_nan};
 
 /// Closed subgroups of GL(n), and GL(n) itself.
@@ -202,6 +202,6 @@ fn put<const D: usize>(x: &mut Point<D>, part: &Point<D>) {
 }
 
 /// |p| |p⁻¹|/n: one for a multiple of a rotation.
-pub fn condition<const D: usize>(p: &Point<D>) -> Lane {
+pub fn condition<const D: usize, A: Storage>(p: &Matrix<Lane, D, A>) -> Lane {
     p.size() * inverse(p).size() / lane(p.rows() as f64)
 }

@@ -16,25 +16,30 @@ use pyo3::prelude::*;
 
 /// Found in the compiled file by `symspline/_cpu.py`, without running any of its code.
 #[used]
-static BUILT_FOR: &[u8] = if cfg!(all(target_arch = "x86_64", target_feature = "avx2")) {
+static BUILT_FOR: &[u8] = if cfg!(all(target_arch = "x86_64", target_feature = "avx512f")) {
+    b"symspline built for x86-64-v4"
+} else if cfg!(all(target_arch = "x86_64", target_feature = "avx2")) {
     b"symspline built for x86-64-v3"
 } else {
     b"symspline built for any processor"
 };
 
-/// Whether the processor has x86-64-v3. `symspline/_cpu.py` asks the module for any processor, before either is imported.
+/// The best of the three that the processor can run: 2 for x86-64-v4, 1 for x86-64-v3. `symspline/_cpu.py` asks the
+/// module for any processor, before any is imported.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "the name must be unique in the process, and is")]
 #[unsafe(no_mangle)]
-pub extern "C" fn symspline_has_v3() -> bool {
+pub extern "C" fn symspline_cpu_level() -> std::ffi::c_int {
     use std::arch::is_x86_feature_detected as has;
-    has!("avx2")
+    let v3 = has!("avx2")
         && has!("fma")
         && has!("bmi1")
         && has!("bmi2")
         && has!("f16c")
         && has!("lzcnt")
-        && has!("movbe")
+        && has!("movbe");
+    let v4 = has!("avx512f") && has!("avx512bw") && has!("avx512cd") && has!("avx512dq") && has!("avx512vl");
+    if v3 { 1 + std::ffi::c_int::from(v4) } else { 0 }
 }
 
 /// Limits the number of threads; 0 means all cores.

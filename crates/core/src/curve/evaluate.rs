@@ -121,7 +121,7 @@ impl Job<'_> {
 
     fn run_covered_with<S: Scalar, C: Covered>(&self, space: &C, out: &mut [f64]) {
         let cover = space.cover();
-        let (len, ambient) = (cover.point_len(), self.len);
+        let (len, ambient) = (C::LEN, self.len);
         let mut buffer = vec![Lane::ZERO; 4 * ambient];
         let mut result = vec![Lane::ZERO; 2 * ambient];
         self.each(

@@ -4,19 +4,27 @@ use super::base::{Matrix, Storage};
 #[cfg(feature = "dense")]
 use super::dense::determinant;
 use super::entry::{inner_add, mul_add};
-#[cfg(feature = "dense")]
-use crate::scalar::lane;
-use crate::scalar::{Each, Lane, Scalar, few};
+use crate::scalar::{Each, Lane, Scalar, few, lane};
 
 /// `A⁻¹`; not finite on lanes where A is singular.
 pub fn inverse<S: Scalar, const D: usize, A: Storage>(a: &Matrix<S, D, A>) -> Matrix<S, D, A> {
-    let mut x = of_values(&a.value()).map(S::constant);
-    // Newton's method computes the derivatives: each step doubles the number of correct ones.
-    for _ in 0..S::ORDER {
-        let rest = (-a.times(&x)).plus_identity(Lane::ONE);
-        x = &x + &x.times(&rest);
+    let x = of_values(&a.value());
+    if S::ORDER == 0 {
+        return x.map(S::constant);
     }
-    x
+    // X' = −XA'X and X'' = −XA''X − 2XA'X'
+    let part = |order: usize| a.map(|x| x.parts()[order]);
+    let turned = x.times(&part(1));
+    let first = -turned.times(&x);
+    let second = if S::ORDER > 1 {
+        -(&x.times(&part(2)).times(&x) + &turned.times(&first).scaled(lane(2.0)))
+    } else {
+        first.clone()
+    };
+    let of = |m: &Matrix<Lane, D, A>, i: usize, c: usize| m.entries()[i][c];
+    Matrix::collected(x.shape, |i| {
+        few(|c| S::from_parts([of(&x, i, c), of(&first, i, c), of(&second, i, c)]))
+    })
 }
 
 /// Gauss and Jordan, with row exchanges lane by lane.

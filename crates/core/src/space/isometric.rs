@@ -1,7 +1,7 @@
-//! A space whose formulas are those of another one, of which its arrays are linear images: small groups and forms of
-//! two rows are spheres or hyperbolic spaces.
+//! A space whose formulas are those of another one, of which its arrays are linear images: small groups of matrices are
+//! spheres.
 
-use super::traits::{Ambient, Frame, Origin, Space};
+use super::traits::{Ambient, Covered, Evaluation, Frame, Origin, Space};
 use crate::scalar::{Each, Lane, Scalar, few, lane};
 
 /// An isometry up to scale, linear in the arrays of points and vectors.
@@ -229,5 +229,31 @@ impl<I: Isometry> Space for Isometric<I> {
     fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
         let [p, v] = [p, v].each(Self::enter);
         self.0.image().angle_at(&p[..I::LEN], &v[..I::LEN]) * lane(I::ANGLE)
+    }
+    fn evaluate_with<E: Evaluation>(&self, evaluation: E) {
+        evaluation.covered(self);
+    }
+}
+
+impl<I: Isometry> Covered for Isometric<I> {
+    type Cover = I::Image;
+    const LEN: usize = I::LEN;
+
+    fn cover(&self) -> I::Image {
+        self.0.image()
+    }
+    #[inline(always)]
+    fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]) {
+        for (x, y) in p.into_iter().zip(y).chain(v.into_iter().zip(w)) {
+            I::enter(x, y);
+        }
+    }
+    fn choose(&self, _from: &[Lane], _qyw: [&mut [Lane]; 3]) {}
+    fn body<'o>(&self, _y: &[Lane], _w: &[Lane], _out: &'o mut [Lane]) -> &'o [Lane] {
+        unreachable!("body frames are those of rotations of three dimensions")
+    }
+    #[inline(always)]
+    fn leave(&self, _side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]) {
+        I::leave(w.unwrap_or(y), out);
     }
 }

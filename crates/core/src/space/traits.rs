@@ -210,6 +210,8 @@ pub trait Evaluation {
 pub trait Covered: Space {
     /// The covering space.
     type Cover: Ambient;
+    /// The number of entries of its points.
+    const LEN: usize;
     /// The covering space.
     fn cover(&self) -> Self::Cover;
     /// Lifts a segment of a curve to the cover: its end points and tangent vectors there.
