@@ -145,6 +145,32 @@ pub fn apply(
     faults.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
+/// Applies a function of eight rows to arrays of rows of `len` numbers.
+pub fn map(
+    len: usize,
+    inputs: &[&[f64]],
+    monitor: &Monitor,
+    out: &mut [f64],
+    f: impl Fn(&[Vec<Lane>], &mut [Lane]) + Sync,
+) {
+    let length = parallel::block(BLOCK, len);
+    let parallel = out.len() > PARALLEL;
+    let blocks: Vec<(usize, &mut [f64])> = out.chunks_mut(length * len).enumerate().collect();
+    parallel::for_each(blocks, parallel, monitor, |(block, out)| {
+        let mut x = vec![vec![Lane::ZERO; len]; inputs.len()];
+        let mut result = vec![Lane::ZERO; len];
+        let rows = out.len() / len;
+        for (group, out) in out.chunks_mut(LANES * len).enumerate() {
+            let at: [usize; LANES] = few(|l| block * length + (group * LANES + l).min(rows - 1));
+            for (x, input) in x.iter_mut().zip(inputs) {
+                gather(at.map(|i| &input[i * len..(i + 1) * len]), x);
+            }
+            f(&x, &mut result);
+            scatter(&result, out);
+        }
+    });
+}
+
 /// The approximate number of eight-byte numbers that one group of rows occupies in an operation on a space.
 pub fn memory(space: &Erased, operation: Option<Operation>) -> f64 {
     // Functions of a matrix occupy some dozens of its size, with one number for every lane.

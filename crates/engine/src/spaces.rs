@@ -7,6 +7,8 @@ use symspline_core::space::{Entry, Erased, Kernels};
 pub use symspline_forms::{PositiveDefinite, Siegel};
 #[cfg(feature = "groups")]
 pub use symspline_groups::{Rotations, SpecialEuclidean, matrix_of_quaternion, quaternion_of_matrix};
+#[cfg(feature = "stiefel")]
+pub use symspline_groups::{Stiefel, stiefel};
 #[cfg(feature = "unitary")]
 pub use symspline_groups::{UnitaryGroup, orthogonal, special_orthogonal};
 #[cfg(feature = "linear")]

@@ -8,8 +8,12 @@ mod pairs;
 mod rigid;
 mod rotations;
 mod special_euclidean;
+#[cfg(feature = "stiefel")]
+mod stiefel;
 mod unitary;
 
+#[cfg(feature = "stiefel")]
+pub use crate::stiefel::Stiefel;
 pub use rotations::Rotations;
 pub use special_euclidean::SpecialEuclidean;
 #[cfg(feature = "unitary")]
@@ -37,6 +41,12 @@ pub fn quaternion_of_matrix(r: &[f64]) -> [f64; 4] {
     let minus_identity: [f64; 9] = few(|i| r[i] - if i % 4 == 0 { 1.0 } else { 0.0 });
     let q = rigid::of_matrix(minus_identity.map(lane)).map(|x| x.as_array()[0]);
     if q[0] < 0.0 { q.map(|x| -x) } else { q }
+}
+
+#[cfg(feature = "stiefel")]
+/// The manifold of n × k matrices of orthonormal columns, with 1 ≤ k < n.
+pub fn stiefel(k: usize, n: usize) -> Result<Box<dyn Stiefel>, String> {
+    Ok(stiefel::stiefel(k, n, rotations(&[n.min(2 * k)])?))
 }
 
 /// The spaces of this family.

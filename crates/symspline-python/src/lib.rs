@@ -9,6 +9,7 @@ mod fit;
 mod hermite;
 mod smoothing;
 mod space;
+mod stiefel;
 mod validate;
 mod watch;
 
@@ -70,6 +71,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(smoothing::smooth, m)?)?;
     m.add_function(wrap_pyfunction!(smoothing::smoothing_variance, m)?)?;
     m.add_function(wrap_pyfunction!(smoothing::chi_squared, m)?)?;
+    m.add_function(wrap_pyfunction!(stiefel::stiefel, m)?)?;
     m.add_function(wrap_pyfunction!(set_num_threads, m)?)?;
     m.add_function(wrap_pyfunction!(num_threads, m)?)?;
     errors::register(m)
