@@ -12,7 +12,7 @@ import numpy as np
 
 import symspline as ss
 
-from . import data, geodesics, geometries, gradients, machine
+from . import data, geodesics, geometries, gradients, machine, space_rows
 from .data import Array
 from .side_by_side import QUANTITIES
 from .tables import count, table, versus
@@ -50,12 +50,16 @@ class Plan:
         samples: of every curve that is evaluated.
         pairs: most pairs of points between which geodesics are taken.
         effort: how much a measurement may cost.
+        rows: the spaces of the table with one row per space.
+        row_curves: number of its curves.
     """
 
     cases: tuple[Case, ...]
     samples: int
     pairs: int
     effort: Effort
+    rows: tuple[str, ...]
+    row_curves: int
 
     def with_large(self) -> Plan:
         """Also one curve of small subspaces of a large space."""
@@ -76,12 +80,16 @@ FULL = Plan(
     samples=100,
     pairs=500,
     effort=Effort(5, 0.02, 3),
+    rows=space_rows.NAMES,
+    row_curves=200,
 )
 QUICK = Plan(
     tuple(Case(name, 3, 2, 1) for name in ("spd:3", "so:3", "u:4", "gr:2,5", "cp:3", "se:3", "gr:2,50")),
     samples=5,
     pairs=2,
     effort=Effort(2, 0, 0.1),
+    rows=("sphere:2", "st:2,4", "cp:3"),
+    row_curves=2,
 )
 LARGE = Case("gr:10,10000", 1, 1, 1, knots=20)
 
@@ -92,6 +100,7 @@ def pieces(plan: Plan, threads: int) -> Iterator[str]:
     yield "; ".join(f"{name}: {value}" for name, value in where.items()) + "."
     points = {case: walks(ss.space(case.space), case.curves, case.knots) for case in plan.cases}
     with one_core():
+        yield space_rows.text(plan.rows, plan.row_curves, plan.samples, plan.effort)
         yield fits_text(points, plan.effort)
         yield samples_text(points, plan.samples, plan.effort)
         yield gradients.text(plan.effort)

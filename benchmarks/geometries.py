@@ -15,26 +15,37 @@ from .vectorised import Geometry, fit
 
 def velocities(points: Array, space: ss.Space) -> Array:
     """Velocities of the C² splines through points, shape (curves, knots, *point_shape)."""
-    shape = points.shape
-    # Points of projective spaces are matrices of one column.
-    return fit(points.reshape(*shape[:3], -1), _geometry(space)).reshape(shape)
+    shape, geometry = points.shape, _geometry(space)
+    if geometry is None:
+        raise ValueError(f"{space!r} has no fit in NumPy")
+    # Points of spheres and projective spaces are matrices of one column.
+    found = fit(points.reshape(*shape[:3], -1), geometry).reshape(shape)
+    return found if np.iscomplexobj(points) else found.real
 
 
-def _geometry(space: ss.Space) -> Geometry:
+def known(space: ss.Space) -> bool:
+    """Whether there is a fit in NumPy."""
+    return _geometry(space) is not None
+
+
+def _geometry(space: ss.Space) -> Geometry | None:
     match space:
-        case ss.SymmetricPositiveDefinite() | ss.HermitianPositiveDefinite():
+        case ss.SymmetricPositiveDefinite() | ss.HermitianPositiveDefinite() | ss.SpecialPositiveDefinite():
             return PositiveDefinite()
-        case ss.Unitary() | ss.SpecialUnitary():
-            return Unitary()
+        case ss.Siegel():
+            return PositiveDefinite()
         case ss.SpecialOrthogonal() if space == ss.SpecialOrthogonal(3):
             return Rotations()
+        case ss.Unitary() | ss.SpecialUnitary() | ss.SpecialOrthogonal() | ss.Orthogonal():
+            return Unitary()
         case ss.SpecialEuclidean() if space == ss.SpecialEuclidean(3):
             return Motions()
-        case ss.Grassmannian() | ss.ComplexGrassmannian():
+        case ss.Grassmannian() | ss.ComplexGrassmannian() | ss.QuaternionicProjective():
             return Subspaces(space.point_shape[1])
-        case ss.RealProjective() | ss.ComplexProjective():
+        # For short steps a sphere is the real projective space.
+        case ss.Sphere() | ss.RealProjective() | ss.ComplexProjective():
             return Subspaces(1)
-    raise ValueError(f"{space!r} has no fit in NumPy")
+    return None
 
 
 class _Matrices(ABC):

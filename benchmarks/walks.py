@@ -29,7 +29,8 @@ def walks(space: ss.Space, curves: int, knots: int, seed: int = 4) -> Array:
     for _ in range(knots - 1):
         step = _times(space, rng.uniform(LONGEST / 3, LONGEST, curves), direction)
         q = space.project(space.exp(p, step))
-        direction, p = space.transport(p, q, direction), q
+        # Parallel transport is not known on a Stiefel manifold.
+        direction, p = direction if isinstance(space, ss.Manifold) else space.transport(p, q, direction), q
         turn = _unit(space, p, space.random_tangent(rng, p))
         direction = _unit(space, p, space.project_tangent(p, direction + TURN * turn))
         points.append(p)

@@ -57,6 +57,7 @@ def test_libraries_compute_the_same(name, bounds):
 
 SPACES = [
     *("spd:1", "spd:3", "hpd:2", "so:3", "u:1", "u:4", "su:3", "se:3"),
+    *("sphere:2", "so:4", "o:3", "sspd:3", "siegel:1", "hp:1"),
     *("rp:2", "cp:3", "gr:1,3", "gr:2,5", "gr:3,4", "gr:2,40", "cgr:2,4"),
 ]
 
