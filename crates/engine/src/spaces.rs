@@ -18,23 +18,24 @@ pub use symspline_subspaces::{Lines, Subspaces};
 #[cfg(feature = "vectors")]
 pub use symspline_vectors::{AntiDeSitter, Curved, DeSitter, Euclidean, Hyperbolic, Sphere};
 
-/// The families of spaces that were compiled.
-const FAMILIES: &[&[Entry]] = &[
+/// The families of spaces that were compiled. These are references to the statics of their crates: a copy of one would
+/// contain its functions, with all their code.
+static FAMILIES: &[&&[Entry]] = &[
     #[cfg(feature = "vectors")]
-    symspline_vectors::FAMILY,
+    &symspline_vectors::FAMILY,
     #[cfg(feature = "subspaces")]
-    symspline_subspaces::FAMILY,
+    &symspline_subspaces::FAMILY,
     #[cfg(feature = "groups")]
-    symspline_groups::FAMILY,
+    &symspline_groups::FAMILY,
     #[cfg(feature = "forms")]
-    symspline_forms::FAMILY,
+    &symspline_forms::FAMILY,
     #[cfg(feature = "linear")]
-    symspline_linear::FAMILY,
+    &symspline_linear::FAMILY,
 ];
 
 /// Every kind of space.
 pub fn all() -> impl Iterator<Item = &'static Entry> {
-    FAMILIES.iter().copied().flatten()
+    FAMILIES.iter().copied().copied().flatten()
 }
 
 /// The upper limit of numbers in the name of a space, so that sizes of arrays do not overflow.

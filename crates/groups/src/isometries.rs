@@ -14,9 +14,9 @@ pub struct AsSphere<G> {
 }
 
 /// Rotations of the plane.
-pub type PlaneRotations = AsSphere<UnitaryGroup<1, Known<2, 4>>>;
+pub type PlaneRotations = AsSphere<UnitaryGroup<1>>;
 /// Complex numbers of modulus one.
-pub type Phases = AsSphere<UnitaryGroup<2, Known<1, 1>>>;
+pub type Phases = AsSphere<UnitaryGroup<2>>;
 /// SU(2), the matrices (a, b; −b̄, ā).
 pub type UnitQuaternions = AsSphere<UnitaryGroup<2, Known<2, 4>>>;
 
@@ -43,7 +43,7 @@ impl UnitQuaternions {
 
 impl Isometry for PlaneRotations {
     type Image = Sphere;
-    type General = UnitaryGroup<1, Known<2, 4>>;
+    type General = UnitaryGroup<1>;
     const LEN: usize = 2;
     const SCALE: f64 = 1.0;
     const ANGLE: f64 = 1.0;
@@ -66,7 +66,8 @@ impl Isometry for PlaneRotations {
 
 impl Isometry for Phases {
     type Image = Sphere;
-    type General = UnitaryGroup<2, Known<1, 1>>;
+    type General = UnitaryGroup<2>;
+    const HOT: bool = false;
     const LEN: usize = 2;
     const SCALE: f64 = 1.0;
     const ANGLE: f64 = 1.0;

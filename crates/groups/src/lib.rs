@@ -3,6 +3,7 @@
 #[cfg(feature = "unitary")]
 mod isometries;
 mod logarithm;
+mod motions;
 #[cfg(feature = "unitary")]
 mod pairs;
 mod rigid;
@@ -82,7 +83,6 @@ fn rotations(p: &[usize]) -> Made {
 #[cfg(feature = "unitary")]
 fn with_reflections(n: usize) -> Made {
     match n {
-        2 => table(UnitaryGroup::<1, Known<2, 4>>::new(n, false)),
         3 => table(Rotations::with_reflections()),
         n => table(orthogonal(n)),
     }

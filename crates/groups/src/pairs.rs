@@ -26,6 +26,8 @@ type Pair<S> = [Quaternion<S>; 2];
 pub trait Form: Copy + Send + Sync + 'static {
     /// The group by general formulas, for what is not done by quaternions.
     type General: Ambient;
+    /// Whether the loops of a fit are compiled for this group alone.
+    const HOT: bool;
     /// The number of coordinates of α; the other components are zero.
     const FIRST: usize;
     /// p* x
@@ -65,7 +67,8 @@ fn component<S: Scalar>(m: &[S; 16], i: usize, k: usize) -> S {
 }
 
 impl Form for FourDimensional {
-    type General = UnitaryGroup<1, Known<4, 16>>;
+    type General = UnitaryGroup<1>;
+    const HOT: bool = true;
     const FIRST: usize = 3;
     #[inline(always)]
     fn relative<S: Scalar>(p: &[S], x: &[S]) -> [S; 16] {
@@ -128,6 +131,7 @@ fn entries<S: Scalar>(x: &[S]) -> [[S; 2]; 4] {
 
 impl Form for TwoDimensional {
     type General = UnitaryGroup<2, Known<2, 4>>;
+    const HOT: bool = false;
     const FIRST: usize = 1;
     #[inline(always)]
     fn relative<S: Scalar>(p: &[S], x: &[S]) -> [S; 16] {
@@ -456,7 +460,7 @@ impl<F: Form> Origin for Pairs<F> {
 }
 
 impl<F: Form> Space for Pairs<F> {
-    const HOT: bool = true;
+    const HOT: bool = F::HOT;
 
     fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
         let [alpha, beta] = Self::vectors(p, v).each(|v| dot(&v, &v).sqrt());
@@ -497,9 +501,6 @@ impl<F: Form> Covered for Pairs<F> {
             None => F::matrix(pair[0], pair[1]),
         };
         out.copy_from_slice(&x[..out.len()]);
-    }
-    fn body<'o>(&self, _y: &[Lane], _w: &[Lane], _out: &'o mut [Lane]) -> &'o [Lane] {
-        unreachable!("body frames are those of rotations of three dimensions")
     }
 }
 

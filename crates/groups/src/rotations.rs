@@ -28,6 +28,15 @@ impl Rotations {
     pub fn with_reflections() -> Result<Self, String> {
         Ok(Rotations { general: UnitaryGroup::new(3, false)?, cover: Sphere::new(3)? })
     }
+
+    /// The angle of two points, or `apart` for a rotation and a reflection, which no curve joins.
+    #[inline(always)]
+    fn joined(&self, p: &[Lane], q: &[Lane], angle: Lane, apart: Lane) -> Lane {
+        if self.is_connected() {
+            return angle;
+        }
+        (determinant(p) * determinant(q)).simd_lt(Lane::ZERO).select(apart, angle)
+    }
 }
 
 /// The determinant of an orthogonal matrix.
@@ -114,7 +123,7 @@ fn quaternion(p: &[Lane]) -> Quaternion<Lane> {
 
 /// q · (0, v)
 #[inline(always)]
-fn times_pure(q: Quaternion<Lane>, [x, y, z]: Vector<Lane>) -> Quaternion<Lane> {
+pub fn times_pure(q: Quaternion<Lane>, [x, y, z]: Vector<Lane>) -> Quaternion<Lane> {
     multiply(q, [Lane::ZERO, x, y, z])
 }
 
@@ -177,14 +186,10 @@ impl Ambient for Rotations {
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let (omega, angle) = log(between(p, q));
         out.copy_from_slice(&times(&matrix(p), &skew(omega)));
-        angle
+        self.joined(p, q, angle, Lane::PI)
     }
     fn distance(&self, p: &[Lane], q: &[Lane], _log: &[Lane], angle: Lane) -> Lane {
-        if self.is_connected() {
-            return angle;
-        }
-        // No curve joins a rotation and a reflection.
-        (determinant(p) * determinant(q)).simd_lt(Lane::ZERO).select(lane(f64::INFINITY), angle)
+        self.joined(p, q, angle, lane(f64::INFINITY))
     }
     fn is_connected(&self) -> bool {
         self.general.is_connected()
@@ -241,7 +246,7 @@ impl Frame for Rotations {
         // One step of Newton's method for 1/|q|.
         let shorten = lane(-0.5).mul_add(dot(&next, &next), lane(1.5));
         frame.copy_from_slice(&next.each(|x| x * shorten));
-        angle
+        self.joined(p, q, angle, Lane::PI)
     }
     #[inline(always)]
     fn coordinates(&self, frame: &[Lane], p: &[Lane], v: &[Lane], x: &mut [Lane]) {
@@ -357,7 +362,7 @@ impl Covered for Rotations {
 
 /// The angular velocity ω of a quaternion q that moves with w: ω/2 is the vector part of q⁻¹w.
 #[inline(always)]
-fn angular([qw, qv @ ..]: Quaternion<Lane>, w: &[Lane]) -> [Lane; 3] {
+pub fn angular([qw, qv @ ..]: Quaternion<Lane>, w: &[Lane]) -> [Lane; 3] {
     let wv = [w[1], w[2], w[3]];
     let turn = cross(qv, wv);
     few(|i| TWO * (qw * wv[i] - w[0] * qv[i] - turn[i]))

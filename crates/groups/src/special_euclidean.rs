@@ -5,13 +5,14 @@
 //! depend on the reference frame. The implementation represents motions by a quaternion and a translation; the plane
 //! is that of x and y.
 
+use crate::motions::{self, Motions};
 use crate::rigid::{Motion, Twist, bracket, of_matrix, to_matrix};
 use crate::rotations;
 use crate::unitary::special_orthogonal;
 use std::f64::consts::PI;
 use symspline_core::matrix::Matrix;
 use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane};
-use symspline_core::space::{Ambient, Frame, Origin, Space, stretch_series};
+use symspline_core::space::{Ambient, Covered, Evaluation, Frame, Origin, Space, stretch_series};
 
 /// Rigid motions of n = 2 or 3 dimensions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -326,4 +327,56 @@ impl Origin for SpecialEuclidean {
     }
 }
 
-impl Space for SpecialEuclidean {}
+impl Space for SpecialEuclidean {
+    fn evaluate_with<E: Evaluation>(&self, evaluation: E) {
+        evaluation.covered(self);
+    }
+}
+
+impl Covered for SpecialEuclidean {
+    type Cover = Motions;
+    const LEN: usize = 7;
+
+    fn cover(&self) -> Motions {
+        Motions
+    }
+    #[inline(always)]
+    fn enter(&self, p: [&[Lane]; 2], v: [&[Lane]; 2], y: [&mut [Lane]; 2], w: [&mut [Lane]; 2]) {
+        for e in 0..2 {
+            let r = self.rotation(p[e]);
+            let q = of_matrix(few(|c| if c % 4 == 0 { r[c] - Lane::ONE } else { r[c] }));
+            motions::write(&Motion { q, t: self.translation(p[e]) }, y[e]);
+            motions::write_vector(&Motion { q, t: [Lane::ZERO; 3] }, self.twist(p[e], v[e]), w[e]);
+        }
+    }
+    #[inline(always)]
+    fn choose(&self, from: &[Lane], [q, y, w]: [&mut [Lane]; 3]) {
+        let flip = dot(&from[..4], &q[..4]).simd_lt(Lane::ZERO);
+        if flip.any() {
+            for x in [q, y, w] {
+                x[..4].iter_mut().for_each(|x| *x = flip.select(-*x, *x));
+            }
+        }
+    }
+    #[inline(always)]
+    fn leave(&self, _side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]) {
+        let (n, Motion { q, t }) = (self.n, motions::read(y));
+        let (r, t) = match w {
+            None => (to_matrix(q), t),
+            // R' = R[ω]
+            Some(w) => {
+                let (r, [x, y, z]) = (to_matrix(q), rotations::angular(q, w));
+                let column = |c: usize| [r[c], r[3 + c], r[6 + c]];
+                let [a, b, c] = [0, 1, 2].each(column);
+                let rate: [[Lane; 3]; 3] =
+                    few(|i| [b[i] * z - c[i] * y, c[i] * x - a[i] * z, a[i] * y - b[i] * x]);
+                (few(|c| rate[c / 3][c % 3]), [w[4], w[5], w[6]])
+            }
+        };
+        for i in 0..n {
+            out[i * (n + 1)..i * (n + 1) + n].copy_from_slice(&r[3 * i..3 * i + n]);
+            out[i * (n + 1) + n] = t[i];
+        }
+        self.last_row(if w.is_none() { Lane::ONE } else { Lane::ZERO }, out);
+    }
+}

@@ -13,6 +13,8 @@ pub trait Isometry: Copy + Send + Sync {
     type Image: Space;
     /// The space itself by general formulas, which recognise, project and describe its points.
     type General: Ambient;
+    /// Whether loops over knots and samples are compiled for this space alone.
+    const HOT: bool = true;
     /// The number of entries of an image.
     const LEN: usize;
     /// The length of a vector divided by that of its image.
@@ -224,14 +226,14 @@ impl<I: Isometry> Origin for Isometric<I> {
 }
 
 impl<I: Isometry> Space for Isometric<I> {
-    const HOT: bool = I::Image::HOT;
+    const HOT: bool = I::HOT;
 
     fn angle_at(&self, p: &[Lane], v: &[Lane]) -> Lane {
         let [p, v] = [p, v].each(Self::enter);
         self.0.image().angle_at(&p[..I::LEN], &v[..I::LEN]) * lane(I::ANGLE)
     }
     fn evaluate_with<E: Evaluation>(&self, evaluation: E) {
-        evaluation.covered(self);
+        if I::HOT { evaluation.covered(self) } else { evaluation.direct(self) }
     }
 }
 
@@ -249,9 +251,6 @@ impl<I: Isometry> Covered for Isometric<I> {
         }
     }
     fn choose(&self, _from: &[Lane], _qyw: [&mut [Lane]; 3]) {}
-    fn body<'o>(&self, _y: &[Lane], _w: &[Lane], _out: &'o mut [Lane]) -> &'o [Lane] {
-        unreachable!("body frames are those of rotations of three dimensions")
-    }
     #[inline(always)]
     fn leave(&self, _side: Lane, y: &[Lane], w: Option<&[Lane]>, out: &mut [Lane]) {
         I::leave(w.unwrap_or(y), out);

@@ -220,8 +220,10 @@ pub trait Covered: Space {
     /// with it the end point y of the segment and the tangent vector w there.
     fn choose(&self, from: &[Lane], qyw: [&mut [Lane]; 3]);
     /// A tangent vector w at y of the cover in the body frame, in the first numbers of `out`: the element ω of the
-    /// Lie algebra with p' = pω.
-    fn body<'o>(&self, y: &[Lane], w: &[Lane], out: &'o mut [Lane]) -> &'o [Lane];
+    /// Lie algebra with p' = pω. Only rotations of three dimensions have it.
+    fn body<'o>(&self, _y: &[Lane], _w: &[Lane], _out: &'o mut [Lane]) -> &'o [Lane] {
+        unreachable!("body frames are those of rotations of three dimensions")
+    }
     /// The component of a disconnected space that contains a point: 1 or −1 in each lane. One cover serves both.
     fn side(&self, _p: &[Lane]) -> Lane {
         Lane::ONE
