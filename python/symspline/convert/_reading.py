@@ -107,3 +107,25 @@ def largest(x: Array) -> Array:
     """Return the largest entry of every matrix by magnitude."""
     result: Array = np.abs(x).max(axis=(-2, -1))
     return result
+
+
+def hermitian_part(x: Array) -> Array:
+    """Return (X + X*) / 2."""
+    return np.asarray((x + adjoint(x)) / 2)
+
+
+def check_symmetric(x: Array, allowed: Any, name: str, kind: str = "symmetric", advice: str = "") -> None:
+    """Raise ValidationError for matrices whose entries differ by more than is allowed from those across the diagonal.
+
+    For the kind "Hermitian", the entries across the diagonal must be complex conjugates.
+    """
+    # Input that is far off may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = largest(x - (adjoint(x) if kind == "Hermitian" else np.swapaxes(x, -1, -2)))
+    refuse(~(off <= allowed), name, lambda i: f"is not {kind}: entries differ by {off[i]:.3e}{advice}")
+
+
+def check_orthonormal(x: Array, tol: float, name: str, advice: str) -> None:
+    """Raise ValidationError for matrices whose columns are not orthonormal."""
+    off = off_one(x)
+    refuse(~(off <= tol), name, lambda i: f"does not have orthonormal columns: |X*X - 1| is {off[i]:.3e}; {advice}")
