@@ -20,8 +20,8 @@ from ._smoothing.precision import read_precision
 from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of, space_named
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
+from .convert._reading import one_of
 
-_DUPLICATES = ("raise", "first", "mean")
 # Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
 # the points, so a few steps are enough for points close together.
 _STEPS = 50
@@ -231,8 +231,7 @@ def cut(
     """
     space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
-    if not isinstance(duplicates, str) or duplicates not in _DUPLICATES:
-        raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {short_repr(duplicates)}")
+    one_of(duplicates, "duplicates", "raise", "first", "mean")
     data = read(points, space)
     if data[0].batch:
         raise ValidationError(f"points has batch axes {data[0].batch}, but a recording must be a single curve")

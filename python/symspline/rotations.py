@@ -33,7 +33,7 @@ from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
-from .convert._reading import length, real_numbers
+from .convert._reading import length, one_of, real_numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -55,7 +55,6 @@ __all__ = [
 Spline = CubicSpline[Any] | HermiteSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
-_FRAMES = ("body", "world")
 _SIX = ("columns", "rows", "interleaved")
 # If the two vectors are closer to parallel than this, the third is not determined in single precision.
 _PARALLEL = 1e-6
@@ -310,8 +309,7 @@ def attitude(spline: Spline) -> CurveArrays:
 
 def check_frame(frame: Any) -> None:
     """Raise ValidationError unless frame is "body" or "world"."""
-    if not isinstance(frame, str) or frame not in _FRAMES:
-        raise ValidationError(f"frame must be 'body' or 'world', not {short_repr(frame)}")
+    one_of(frame, "frame", "body", "world")
 
 
 def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:

@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, refuse
+from .._arrays import as_array, cast, refuse, short_repr
 from .._core import ValidationError
 from .._spaces import point_tol
 
@@ -29,6 +29,14 @@ def unmoved_by_underflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
             return function(*arguments, **options)
 
     return quiet
+
+
+def one_of(value: Any, name: str, *choices: str) -> str:
+    """Return a word, or raise ValidationError if it is not one of the choices."""
+    if not isinstance(value, str) or value not in choices:
+        listed = ", ".join(map(repr, choices[:-1]))
+        raise ValidationError(f"{name} must be {listed} or {choices[-1]!r}, not {short_repr(value)}")
+    return value
 
 
 def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:

@@ -7,12 +7,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_array, refuse, short_repr
+from .._arrays import as_array, refuse
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._input import times_of
 from .._typing import TimesLike
-from ..convert._reading import Array, adjoint, largest, square_matrices
+from ..convert._reading import Array, check_symmetric, largest, one_of, square_matrices
 from ._generators import generator, hamiltonian, quantum_space
 
 
@@ -61,8 +61,7 @@ def pulses(
            [0.        , 0.78539816, 0.        ]])
     """
     space = quantum_space(spline)
-    if not isinstance(kind, str) or kind not in ("exact", "midpoint"):
-        raise ValidationError(f"kind must be 'exact' or 'midpoint', not {short_repr(kind)}")
+    one_of(kind, "kind", "exact", "midpoint")
     n = space.point_shape[0]
     basis = None if operators is None else _basis(operators, n)
     times, spacing = _edges(spline, edges)
@@ -92,9 +91,7 @@ def _basis(operators: Any, n: int) -> Array:
     basis, tol = square_matrices(operators, "operators")
     if basis.ndim != 3 or basis.shape[1] != n:
         raise ValidationError(f"operators must be of shape (q, {n}, {n}), not {basis.shape}")
-    skew = largest(basis - adjoint(basis))
-    bad = ~(skew <= tol * largest(basis))
-    refuse(bad, "operators", lambda i: f"is not Hermitian: |A - A*| is {skew[i]:.3e}; pass Hermitian operators")
+    check_symmetric(basis, tol * largest(basis), "operators", "Hermitian", "; pass Hermitian operators")
     columns = _as_columns(basis)
     # The diagonal of R is the norm of the component of every operator outside the span of its predecessors.
     new = np.zeros(len(basis))
