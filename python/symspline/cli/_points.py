@@ -154,7 +154,7 @@ def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, pl
         own = np.ascontiguousarray(numbers[:, start : start + width(factor, columns.quaternion is not None)])
         start += own.shape[1]
         if columns.quaternion is not None and factor in (ROTATIONS, POSES):
-            rotations = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
+            rotations = rotations_in_rows(own[:, -4:], file, place, POINT_TOL_FLOAT32)
             part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:
             part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)

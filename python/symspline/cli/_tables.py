@@ -342,8 +342,8 @@ def _open_parquet(path: Path) -> Table:
 def _open_tum(path: Path) -> Table:
     """Open a trajectory of the TUM RGB-D benchmark: lines of time, position and quaternion, its scalar last."""
     with reading(path):
-        rows, place = tum_rows(path)
-    return Table(path, [*TUM], [*TUM], [], dict(zip(TUM, rows.T, strict=True)).__getitem__, place=place)
+        rows, lines = tum_rows(path)
+    return Table(path, [*TUM], [*TUM], [], dict(zip(TUM, rows.T, strict=True)).__getitem__, place=lines.place)
 
 
 # ---- writing ----
