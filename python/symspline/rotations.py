@@ -276,7 +276,7 @@ def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: Frame =
            [ 2.,  0.,  0.],
            [ 0.,  0.,  0.]])
     """
-    check_frame(frame)
+    one_of(frame, "frame", "body", "world")
     r, hat = _given(rotations), _hat(real_numbers(rates, "rates", (3,))[0])
     _SO3.check_point(r)
     return (r @ hat if frame == "body" else hat @ r) + 0.0
@@ -307,11 +307,6 @@ def attitude(spline: Spline) -> CurveArrays:
     return _ATTITUDES[curve]
 
 
-def check_frame(frame: Any) -> None:
-    """Raise ValidationError unless frame is "body" or "world"."""
-    one_of(frame, "frame", "body", "world")
-
-
 def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve)
@@ -320,7 +315,7 @@ def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve
 
 def _rate(spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
-    check_frame(frame)
+    one_of(frame, "frame", "body", "world")
     body = _at(spline, x, f"body {quantity}", extrapolate, per_curve)
     return body if frame == "body" else turned(_at(spline, x, "point", extrapolate, per_curve), body)
 
