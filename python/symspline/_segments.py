@@ -303,39 +303,34 @@ def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: 
 
 
 def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: str) -> Array:
-    """Return one point per distinct time. Points whose time is unique are not changed.
+    """Return one point per distinct time, the first or the Karcher mean. Points of other times are not changed.
 
     Parameters
     ----------
     starts : ndarray of int
         Index of the first point of every time.
-    """
-    kept = points[starts]
-    if duplicates == "first":
-        return kept
-    counts = np.diff(np.append(starts, len(points)))
-    several = np.flatnonzero(counts > 1)
-    rows = np.repeat(counts > 1, counts)
-    group = np.repeat(np.arange(len(several)), counts[several])
-    kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
-    kept[several] = _means(space, space.project(points[rows]), group)
-    return kept
-
-
-def _means(space: Space, points: Array, group: NDArray[np.intp]) -> Array:
-    """Return the Karcher mean of every group of consecutive points.
 
     References
     ----------
     H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
     """
-    starts = np.flatnonzero(np.diff(group, prepend=-1))
-    counts = np.diff(np.append(starts, len(points))).reshape(-1, *[1] * len(space.point_shape))
+    kept = points[starts]
+    if duplicates == "first":
+        return kept
+    counts = np.diff(np.append(starts, len(points)))
+    several = counts > 1
+    points = space.project(points[np.repeat(several, counts)])
+    counts = counts[several]
+    starts = np.cumsum(counts) - counts
     means: Array = points[starts]
     floor = 8 * np.finfo(np.float64).eps * space._rounding(means)
+    sizes = counts.reshape(-1, *[1] * len(space.point_shape))
     for _ in range(_STEPS):
-        step = np.add.reduceat(space.log(means[group], points), starts, axis=0) / counts
+        logs = space.log(np.repeat(means, counts, axis=0), points)
+        step = np.add.reduceat(logs, starts, axis=0) / sizes
         means = space.exp(means, step)
         if (space.norm(means, step) <= floor).all():
             break
-    return means
+    kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
+    kept[several] = means
+    return kept
