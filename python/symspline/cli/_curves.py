@@ -17,7 +17,7 @@ from .._arrays import brief
 from .._cubic import CubicSpline
 from .._files import load, save
 from .._spaces import Space
-from ._errors import Problem, reading, refuse, writing
+from ._messages import Problem, reading, refuse, writing
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
 
 ENDING = (".npz",)

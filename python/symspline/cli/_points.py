@@ -17,7 +17,7 @@ from .._pose_files import join, rotations_in_rows
 from .._smoothing import SmoothingSpline
 from .._spaces import POINT_TOL_FLOAT32, Doubles, Product, Space, factors_of, parts_of, space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
-from ._errors import Problem, for_command_line
+from ._messages import Problem, for_command_line
 from ._tables import IM, RE, Place
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))

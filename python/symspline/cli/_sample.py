@@ -39,11 +39,10 @@ from .._spaces import space_named
 from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves
-from ._errors import Problem, check_target, did_you_mean, first_duplicate, refuse
+from ._messages import Problem, Progress, check_target, did_you_mean, first_duplicate, refuse
 from ._points import Columns, Samples, deviations_of, samples_of
 from ._recordings import Groups, group
 from ._tables import TUM_ENDINGS, Rows, check_ending, open_table, write_table
-from ._terminal import Progress
 from ._times import Times, every, number, spread
 
 _MOST = 10**9

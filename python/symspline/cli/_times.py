@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._input import ISO_DATE, UTC_ZONE, times_of
-from ._errors import Problem, refuse
+from ._messages import Problem, refuse
 
 Times = NDArray[Any]
 Fail = Callable[[int, str], Problem]

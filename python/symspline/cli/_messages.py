@@ -1,14 +1,18 @@
-"""Errors of the command line, and files that cannot be read or written."""
+"""Messages, errors and progress of the command line, and files that cannot be read or written."""
 
 from __future__ import annotations
 
 import os
+import sys
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Self
 
+from .._arrays import brief
 from .._disk import replacing
 from .._spaces.base import CLASSES
 
@@ -19,6 +23,11 @@ _FOR_PYTHON = (
     " (np.linalg.qr gives an orthonormal basis)",
     ", or raise max_iter",
 )
+
+# Messages may quote any part of a file.
+_LONGEST = 1000
+_WAIT = 0.3
+"""Seconds between two updates; shorter work shows nothing."""
 
 
 class Problem(Exception):
@@ -98,3 +107,36 @@ def writing(path: Path) -> Iterator[Path]:
     """Yield a temporary file that replaces ``path`` if the body succeeds."""
     with reading(path, "write"), replacing(path) as temporary:
         yield temporary
+
+
+def say(message: object) -> None:
+    """Print one line on stderr."""
+    print("symspline:", brief(message, _LONGEST), file=sys.stderr)
+
+
+class Progress:
+    """Update one line on stderr if it is a terminal, and clear it at the end.
+
+    Call an instance with the amount done and the total, from any loop or by the library.
+    """
+
+    def __init__(self, work: str) -> None:
+        self._work = work
+        self._width = 0
+
+    def __enter__(self) -> Self:
+        self._next = time.monotonic() + _WAIT
+        self._shows = sys.stderr is not None and sys.stderr.isatty()
+        return self
+
+    def __call__(self, done: int, total: int) -> None:
+        if not self._shows or total <= 0 or time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _WAIT
+        line = f"{self._work}: {100 * done // total} %"
+        self._width = max(self._width, len(line))
+        print("\r" + line, end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._width:
+            print("\r" + " " * self._width, end="\r", file=sys.stderr, flush=True)
