@@ -16,8 +16,8 @@ from ._core import ValidationError
 from ._disk import path_of, replacing
 from ._input import times_of
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
+from ._validation import length, off_one
 from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert._reading import length, off_one
 
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")

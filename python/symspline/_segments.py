@@ -20,7 +20,7 @@ from ._smoothing.precision import read_precision
 from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of, space_named
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
-from .convert._reading import one_of
+from ._validation import one_of
 
 # Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
 # the points, so a few steps are enough for points close together.

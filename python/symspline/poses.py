@@ -41,7 +41,7 @@ from ._pose_files import (
 )
 from ._spaces import Array, Euclidean, SpecialEuclidean
 from ._typing import Extrapolate, Frame, TimesLike
-from .convert._reading import one_of
+from ._validation import one_of
 from .rotations import Spline, attitude, turned
 
 __all__ = [

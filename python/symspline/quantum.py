@@ -35,7 +35,7 @@ from ._options import order_of
 from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
 from ._time import onto_ends
 from ._typing import Extrapolate, TimesLike
-from .convert._reading import (
+from ._validation import (
     Array,
     adjoint,
     check_symmetric,
@@ -527,7 +527,7 @@ def _full(kets: Any) -> Any:
     return kets
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def bloch_vector(state: ArrayLike) -> Array:
     """Compute the points of qubit states on the Bloch sphere, the expectations of the Pauli matrices.
 
@@ -565,7 +565,7 @@ def bloch_vector(state: ArrayLike) -> Array:
     return np.stack([across.real, across.imag, (np.abs(a) - np.abs(b)) * (np.abs(a) + np.abs(b))], axis=-1)
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def from_bloch_vector(vector: ArrayLike) -> Array:
     """Convert points of the Bloch sphere to qubit states, points of ``ComplexProjective(1)``.
 

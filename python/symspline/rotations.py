@@ -31,9 +31,9 @@ from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
+from ._validation import length, one_of, real_numbers
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
-from .convert._reading import length, one_of, real_numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -28,7 +28,7 @@ from ._cubic import CubicSpline
 from ._input import times_of
 from ._spaces import Euclidean, Grassmannian, SpecialOrthogonal, SymmetricPositiveDefinite
 from ._typing import AnyArray, BCWords, File, TimesLike
-from .convert._reading import check_orthonormal, numbers, one_of
+from ._validation import check_orthonormal, numbers, one_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -27,12 +27,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, refuse, short_repr
+from ._arrays import as_array, refuse, short_repr
 from ._core import ValidationError
-from ._disk import path_of, replacing
+from ._disk import damage, path_of, replacing
 from ._spaces import point_tol
 from ._typing import TensorOrder
-from .convert._reading import largest
+from ._validation import largest
 
 __all__ = ["Volume", "from_vectors", "read_nifti", "to_vectors", "write_nifti"]
 
@@ -326,14 +326,9 @@ def _path(file: Any, name: str = "file") -> Path:
 
 def _load(path: Path) -> tuple[Any, Array]:
     """Return the image in a file, and its numbers."""
-    try:
+    with damage(path, "is damaged or not a NIfTI file"):
         image = _nibabel().load(path)
         return image, np.asanyarray(image.dataobj)
-    except (OSError, MemoryError, ImportError):
-        raise
-    except Exception as error:
-        # Damaged files raise errors of nibabel, NumPy, zlib and other libraries that nibabel uses.
-        raise ValidationError(f"{path} is damaged or not a NIfTI file: {brief(error)}") from None
 
 
 def _mask(mask: Any, numbers: Array, affine: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import (
+from .._validation import (
     Array,
     adjoint,
     check_symmetric,
@@ -25,7 +25,7 @@ from ._reading import (
 )
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def hyperboloid_to_ball(x: ArrayLike) -> Array:
     """Convert points of `Hyperbolic` to the Poincaré ball, by stereographic projection.
 
@@ -52,7 +52,7 @@ def hyperboloid_to_ball(x: ArrayLike) -> Array:
     return _to_ball(_from_hyperboloid(x), "x")
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def ball_to_hyperboloid(y: ArrayLike) -> Array:
     """Convert points of the Poincaré ball to points of `Hyperbolic`.
 
@@ -79,7 +79,7 @@ def ball_to_hyperboloid(y: ArrayLike) -> Array:
     return _to_hyperboloid(_from_ball(y))
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def hyperboloid_to_half_space(x: ArrayLike) -> Array:
     """Convert points of `Hyperbolic` to the upper half-space.
 
@@ -106,7 +106,7 @@ def hyperboloid_to_half_space(x: ArrayLike) -> Array:
     return _to_half_space(_from_hyperboloid(x))
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def half_space_to_hyperboloid(z: ArrayLike) -> Array:
     """Convert points of the upper half-space to points of `Hyperbolic`.
 
@@ -133,7 +133,7 @@ def half_space_to_hyperboloid(z: ArrayLike) -> Array:
     return _to_hyperboloid(_from_half_space(z))
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def ball_to_half_space(y: ArrayLike) -> Array:
     """Convert points of the Poincaré ball to the upper half-space.
 
@@ -160,7 +160,7 @@ def ball_to_half_space(y: ArrayLike) -> Array:
     return _to_half_space(_from_ball(y))
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def half_space_to_ball(z: ArrayLike) -> Array:
     """Convert points of the upper half-space to the Poincaré ball.
 

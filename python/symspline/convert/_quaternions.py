@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 from .._arrays import checked_atol, refuse
 from .._core import ValidationError
 from .._quaternions import Rows, quaternion_rows, rotation_rows
-from ._reading import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
+from .._validation import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None) -> Array:
     """Convert rotation matrices to unit quaternions, accurately for small angles and for angles near π.
 
@@ -54,7 +54,7 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
     return q if first else np.roll(q, -1, axis=-1)
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def quaternion_to_matrix(
     quaternion: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
 ) -> Array:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import refuse
 from .._core import ValidationError
-from ._reading import (
+from .._validation import (
     Array,
     adjoint,
     check_orthonormal,
@@ -25,7 +25,7 @@ from ._reading import (
 # ---- projectors ----
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def basis_to_projector(basis: ArrayLike) -> Array:
     """Convert bases of subspaces to orthogonal projectors Y Y*, which do not depend on the basis.
 
@@ -62,7 +62,7 @@ def basis_to_projector(basis: ArrayLike) -> Array:
     return hermitian_part(q @ adjoint(q))
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def projector_to_basis(projector: ArrayLike) -> Array:
     """Convert orthogonal projectors to orthonormal bases of their subspaces, points of a Grassmannian.
 
@@ -99,7 +99,7 @@ def projector_to_basis(projector: ArrayLike) -> Array:
     return np.asarray(np.linalg.eigh(p).eigenvectors[..., p.shape[-1] - rank :])
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def state_to_density(state: ArrayLike) -> Array:
     """Convert pure states to density matrices ψψ*, which do not depend on the phase of ψ.
 
@@ -129,7 +129,7 @@ def state_to_density(state: ArrayLike) -> Array:
     return np.asarray(psi[..., :, None] * psi[..., None, :].conj())
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def density_to_state(density: ArrayLike) -> Array:
     """Convert density matrices of pure states to state vectors, points of `ComplexProjective`.
 
@@ -184,7 +184,7 @@ def _check_projectors(p: Array, tol: float, name: str, what: str, advice: str) -
 # ---- reflections in an indefinite form ----
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def basis_to_reflection(basis: ArrayLike, *, negative: int) -> Array:
     """Return the reflections of the subspaces that bases span.
 
@@ -236,7 +236,7 @@ def basis_to_reflection(basis: ArrayLike, *, negative: int) -> Array:
     return np.asarray(2 * q @ np.linalg.solve(gram, turned) - np.eye(n))
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def reflection_to_basis(reflection: ArrayLike, *, negative: int) -> Array:
     """Return bases of the subspaces that reflections leave fixed.
 

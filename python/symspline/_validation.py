@@ -1,34 +1,26 @@
-"""Validation of arrays that are to be converted."""
+"""Validation of arrays of numbers, vectors and matrices, and of words."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, refuse, short_repr
-from .._core import ValidationError
-from .._spaces import point_tol
+from ._arrays import as_array, cast, refuse, short_repr
+from ._core import ValidationError
+from ._spaces import point_tol
 
 Array = NDArray[Any]
 
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
 
-
-def unmoved_by_underflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Decorate a function so that numbers too small for double precision become zero, whatever NumPy's error
-    settings."""
-
-    @wraps(function)
-    def quiet(*arguments: _P.args, **options: _P.kwargs) -> _T:
-        with np.errstate(under="ignore"):
-            return function(*arguments, **options)
-
-    return quiet
+@contextmanager
+def unmoved_by_underflow() -> Iterator[None]:
+    """Let numbers too small for double precision become zero, whatever NumPy's error settings."""
+    with np.errstate(under="ignore"):
+        yield
 
 
 def one_of(value: Any, name: str, *choices: str) -> str:
