@@ -246,22 +246,18 @@ def given(t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]) 
 
 def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Points]) -> list[tuple[Array, float]]:
     """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
-    each = zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True)
-    return [_velocities(factor, part.numbers, own) for factor, part, own in each]
-
-
-def _velocities(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
-    """Return velocities in one factor, after checks of their shape and numbers, and how far they may be from tangent.
-
-    The array has flags of its own, so that making it read-only leaves the user's array as it is.
-    """
-    array = space._array(velocities, "velocities")
-    doubles = space._doubles(array, "velocities")
-    numbers = space._numbers(doubles).view()
-    if doubles.shape != points.shape:
-        raise ValidationError(f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}")
-    refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
-    return numbers, point_tol(array.dtype)
+    found = []
+    for factor, part, own in zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True):
+        array = factor._array(own, "velocities")
+        doubles = factor._doubles(array, "velocities")
+        # A view has flags of its own, so that making it read-only leaves the user's array as it is.
+        numbers = factor._numbers(doubles).view()
+        if doubles.shape != part.numbers.shape:
+            shape = factor._numbers(part.numbers).shape
+            raise ValidationError(f"velocities has shape {numbers.shape}, but points {shape}")
+        refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
+        found.append((numbers, point_tol(array.dtype)))
+    return found
 
 
 def fit_many(

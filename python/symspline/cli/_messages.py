@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections import Counter
@@ -16,8 +17,8 @@ from .._arrays import brief
 from .._disk import replacing
 from .._spaces.base import CLASSES
 
-# Long names first: Unitary is a part of SpecialUnitary.
-_NAMES = sorted(((cls.__name__, name) for name, cls in CLASSES.items()), key=lambda pair: -len(pair[0]))
+_NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
+_SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\((.*?)\)")
 _FOR_PYTHON = (
     "; use space.project(x) if these are meant to be points",
     " (np.linalg.qr gives an orthonormal basis)",
@@ -54,11 +55,7 @@ def for_command_line(error: Exception) -> str:
     message = str(error)
     for advice in _FOR_PYTHON:
         message = message.replace(advice, "")
-    for class_name, name in _NAMES:
-        before, *after = message.split(f"{class_name}(")
-        parts = (text.partition(")") for text in after)
-        message = before + "".join(f"{name}:{numbers.replace(' ', '')}{rest}" for numbers, _, rest in parts)
-    return message
+    return _SPACE.sub(lambda space: f"{_NAMES[space[1]]}:{space[2].replace(' ', '')}", message)
 
 
 def did_you_mean(name: str, names: Sequence[str]) -> str:

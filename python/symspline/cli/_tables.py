@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._archive import read
-from .._arrays import brief
-from .._core import ValidationError
+from .._disk import damage
 from .._pose_files import TUM, tum_rows, write_tum_rows
 from ._messages import Problem, Progress, did_you_mean, first_duplicate, reading, refuse, writing
 from ._times import is_date_like, is_number, is_packed_day, numbers, parse_times
@@ -263,8 +262,15 @@ class _Npz(Table):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        arrays = {key: a for key, a in self._arrays().items() if a.ndim and a.dtype.kind in "biufcMmSU"}
+        with reading(path), open(path, "rb") as file:
+            refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
+            file.seek(0)
+            with damage(path, "is damaged, or holds other objects than numbers"):
+                arrays = read(file, lambda name: True)
+        refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
         for key, array in arrays.items():
+            if not array.ndim or array.dtype.kind not in "biufcMmSU":
+                continue
             entries = array.reshape(len(array), math.prod(array.shape[1:])).T
             own = {key if array.ndim == 1 else f"{key}_{i}": entry for i, entry in enumerate(entries)}
             if array.dtype.kind == "c":
@@ -276,23 +282,6 @@ class _Npz(Table):
         self.names = list(kinds)
         self.numeric = [name for name, kind in kinds.items() if kind in "biuf"]
         self.dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
-
-    def _arrays(self) -> dict[str, Array]:
-        path = self.path
-        with reading(path), open(path, "rb") as file:
-            refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
-            file.seek(0)
-            try:
-                arrays = read(file, lambda name: True)
-            except (OSError, MemoryError):
-                raise
-            except ValidationError as error:
-                raise Problem(f"{path}: {error}") from None
-            except Exception as error:
-                # Damaged files raise errors of zipfile, of its decompressors and of NumPy.
-                raise Problem(f"{path} is damaged, or holds other objects than numbers: {brief(error)}") from None
-        refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
-        return arrays
 
 
 class _Parquet(Table):
