@@ -124,7 +124,11 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     '0.5 0.0 0.0 0.0 0.0 0.0 0.0 1.0\n'
     """
     r, x = split(_checked(poses))
-    write_tum_rows(file, _seconds(t, len(x)), np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1))
+    times = _moments(t, len(x))
+    if times.dtype.kind == "M":
+        times = (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+    rows = np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1)
+    write_tum_rows(file, times.astype(np.float64), rows)
 
 
 def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
@@ -402,13 +406,6 @@ def _moments(t: ArrayLike, count: int) -> Array:
     refuse(~np.isfinite(times), "t", lambda i: f"is {times[i]}, which is not a time")
     check_seconds(times, "t")
     return times
-
-
-def _seconds(t: ArrayLike, count: int) -> Doubles:
-    times = _moments(t, count)
-    if times.dtype.kind == "M":
-        return (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
-    return times.astype(np.float64)
 
 
 def check_seconds(times: Array, name: str) -> None:

@@ -165,13 +165,13 @@ def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEv
         raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
     beyond: Extrapolate = "geodesic" if spline._extrapolation_mode in ("raise", "nan") else None
     first, levels = float(spline.t[0]), spline.space.point_shape[0]
-    if dims is not None and not (
-        isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)
-    ):
-        raise ValidationError(f"dims must be a list of whole numbers, such as [2, 2], not {short_repr(dims)}")
-    if dims is not None and prod(dims) != levels:
-        raise ValidationError(f"dims {short_repr(dims)} have {prod(dims)} levels, but the curve has {levels}")
-    both = None if dims is None else [list(dims), list(dims)]
+    both = None
+    if dims is not None:
+        if not (isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)):
+            raise ValidationError(f"dims must be a list of whole numbers, such as [2, 2], not {short_repr(dims)}")
+        if prod(dims) != levels:
+            raise ValidationError(f"dims {short_repr(dims)} have {prod(dims)} levels, but the curve has {levels}")
+        both = [list(dims), list(dims)]
 
     def at(t: float) -> Any:
         # QuTiP evaluates at 0 to determine the type of the result.
