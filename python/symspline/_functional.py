@@ -28,7 +28,7 @@ from ._options import (
 )
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of, point_tol, space_named
+from ._spaces import Array, Product, Space, factors_of, parts_of, point_tol, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import (
     AnyArray,
@@ -215,18 +215,16 @@ def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Spac
         return everything
     start, stop = int(t.searchsorted(first, "right")) - 1, int(t.searchsorted(last, "right")) + 1
     start = min(start, len(t) - 2)
-    factors, arrays = factors_of(space), []
-    for value in (points, velocities):
-        each = value if isinstance(value, tuple) else (value,)
-        if len(each) != len(factors):
-            return everything
-        sliced = []
-        for factor, array in zip(factors, each, strict=True):
-            axis = array.ndim - len(factor.point_shape) - 1 if type(array) is np.ndarray else -1
-            if axis < 0 or array.shape[axis] != len(t):
+    arrays: list[Any] = []
+    for name, value in (("points", points), ("velocities", velocities)):
+        parts = list(parts_of(value, space, name))
+        for i, factor in enumerate(factors_of(space)):
+            inner, array = len(factor.point_shape), parts[i]
+            if type(array) is not np.ndarray or array.ndim <= inner or array.shape[-1 - inner] != len(t):
                 return everything
-            sliced.append(array[(slice(None),) * axis + (slice(start, stop),)])
-        arrays.append(tuple(sliced) if isinstance(value, tuple) else sliced[0])
+            nodes: Any = (..., slice(start, stop), *[slice(None)] * inner)
+            parts[i] = array[nodes]
+        arrays.append(tuple(parts) if isinstance(space, Product) else parts[0])
     return t[start:stop], arrays[0], arrays[1]
 
 
