@@ -91,17 +91,15 @@ def fit(
     (('curve', 'time', 'q'), array([ True]))
     """
     options = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate, "atol": atol}
-    spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
+    inputs, spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
     axes: list[Hashable] = [dim, *point_dims]
-    dtype = spec.space.dtype
-    variables = apply(
-        fitted, spec.inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], **spec.options
-    )
+    dtype = spec["space"].dtype
+    variables = apply(fitted, inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], **spec)
     ds = xr.Dataset(dict(zip(("points", "velocities", *COLUMNS), variables, strict=True)))
     ds.points.attrs = dict(da.attrs)
-    words = spec.options["kinds"]
+    words = spec["kinds"]
     ds.attrs = {
-        "space": str(spec.space),
+        "space": str(spec["space"]),
         "curve_dim": dim,
         "point_dims": list(point_dims),
         "bc_type": words if isinstance(words, str) else json.dumps(words),
@@ -253,13 +251,13 @@ def resample(
     >>> symspline.xarray.resample(da, "sphere:2", to=["2021-08-28T12:00"]).values.round(4)
     array([[ 0.6131,  0.7637, -0.2023]])
     """
-    spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
+    (_, *rest), spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
     times, axes = times_with_names(to, dim, point_dims, curves)
     policy = extrapolation_mode(checked_extrapolate(options.get("extrapolate")), bc_type)
-    rehearse(times, spec.options["t"], da.sizes[dim], policy)
-    inputs: Inputs = [(_bare(da, dim), [_KNOTS, *point_dims]), (times, axes), *spec.inputs[1:]]
-    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec.space.dtype], x_axes=len(axes), **spec.options)
+    rehearse(times, spec["t"], da.sizes[dim], policy)
+    inputs: Inputs = [(_bare(da, dim), [_KNOTS, *point_dims]), (times, axes), *rest]
+    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec["space"].dtype], x_axes=len(axes), **spec)
     values.attrs = dict(da.attrs)
     return _timed_by(values, times, dim).rename(da.name)
 
