@@ -27,7 +27,7 @@ LAYERS = [
     ],
     ["_spaces"],
     ["_curves", "manifolds"],
-    ["_errors", "_options", "_plotting", "_representatives"],
+    ["_errors", "_options", "_plotting", "_representatives", "_validation"],
     ["_archive"],
     ["_curve"],
     ["_base_curve", "_bspline"],

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ._arrays import short_repr
+from ._arrays import brief, short_repr
 from ._core import ValidationError
 
 # Characters of the file's own name in that of a temporary one: at most 128 bytes of the 255 that file systems allow.
@@ -64,6 +64,23 @@ def path_of(file: Any, name: str = "file", *, method: str, text: bool = False) -
 
 
 @contextmanager
+def damage(file: object, found: str) -> Iterator[None]:
+    """Raise ValidationError with the name of a file for errors in reading what it holds.
+
+    Damaged files cause errors of zipfile, of its decompressors, of NumPy, of JSON and of other libraries. They are
+    described by ``found``, such as "is damaged".
+    """
+    try:
+        yield
+    except (OSError, MemoryError, ImportError):
+        raise
+    except ValidationError as error:
+        raise ValidationError(f"{file}: {error}") from None
+    except Exception as error:
+        raise ValidationError(f"{file} {found}: {brief(error)}") from None
+
+
+@contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Write a file as a whole: a context whose value is a temporary path, which takes the place of ``path``.
 
@@ -85,7 +102,10 @@ def replacing(path: Path) -> Iterator[Path]:
     with suppress(FileNotFoundError):
         old = os.stat(target)
     if old is not None and not stat.S_ISREG(old.st_mode):
-        raise _not_regular(path, old.st_mode)
+        if stat.S_ISDIR(old.st_mode):
+            raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+        what = "it is a device, a pipe or a socket, not a regular file; pass an open file instead"
+        raise OSError(errno.EINVAL, what, str(path))
     temporary = target.with_name(f".{secrets.token_hex(8)}{target.name[-_TAIL:]}")
     # A new file has the permissions of any new file. One that replaces another gets those at the end, and until then
     # nobody else may read it.
@@ -109,10 +129,3 @@ def _keep(temporary: Path, old: os.stat_result) -> None:
         with suppress(OSError):
             os.chown(temporary, old.st_uid, old.st_gid)
     os.chmod(temporary, stat.S_IMODE(old.st_mode))
-
-
-def _not_regular(path: Path, mode: int) -> OSError:
-    if stat.S_ISDIR(mode):
-        return IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
-    what = "it is a device, a pipe or a socket, not a regular file; pass an open file instead"
-    return OSError(errno.EINVAL, what, str(path))

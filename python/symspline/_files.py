@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
 from ._archive import TEXTS, Entries, Stored, read_state, restore, write
-from ._arrays import brief, short_repr
+from ._arrays import short_repr
 from ._core import ValidationError
 from ._curve import Curve
-from ._disk import path_of
+from ._disk import damage, path_of
 from ._typing import File
 
 # Entries with one value for all curves of a file.
@@ -97,18 +98,9 @@ def load(file: File) -> Any:
     """
     path = path_of(file, method="read")
     name = getattr(file, "name", "the file") if path is None else path
-    try:
-        if path is None:
-            return _restored(read_state(file))
-        with open(path, "rb") as opened:
-            return _restored(read_state(opened))
-    except (OSError, MemoryError):
-        raise
-    except ValidationError as error:
-        raise ValidationError(f"{name}: {error}") from None
-    except Exception as error:
-        # Damage appears as errors of zipfile, of its decompressors, of NumPy and of JSON.
-        raise ValidationError(f"{name} is damaged or not a symspline curve: {brief(error)}") from None
+    damaged = damage(name, "is damaged or not a symspline curve")
+    with nullcontext(file) if path is None else open(path, "rb") as opened, damaged:
+        return _restored(read_state(opened))
 
 
 def _joined(curves: Mapping[str, Curve]) -> dict[str, Any]:

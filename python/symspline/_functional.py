@@ -28,7 +28,7 @@ from ._options import (
 )
 from ._report import Report
 from ._representatives import warn_of_representatives
-from ._spaces import Array, Space, factors_of, parts_of, point_tol, space_named
+from ._spaces import Array, Product, Space, factors_of, parts_of, point_tol, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import (
     AnyArray,
@@ -215,18 +215,16 @@ def _nodes_around(t: TimesLike | None, points: Any, velocities: Any, space: Spac
         return everything
     start, stop = int(t.searchsorted(first, "right")) - 1, int(t.searchsorted(last, "right")) + 1
     start = min(start, len(t) - 2)
-    factors, arrays = factors_of(space), []
-    for value in (points, velocities):
-        each = value if isinstance(value, tuple) else (value,)
-        if len(each) != len(factors):
-            return everything
-        sliced = []
-        for factor, array in zip(factors, each, strict=True):
-            axis = array.ndim - len(factor.point_shape) - 1 if type(array) is np.ndarray else -1
-            if axis < 0 or array.shape[axis] != len(t):
+    arrays: list[Any] = []
+    for name, value in (("points", points), ("velocities", velocities)):
+        parts = list(parts_of(value, space, name))
+        for i, factor in enumerate(factors_of(space)):
+            inner, array = len(factor.point_shape), parts[i]
+            if type(array) is not np.ndarray or array.ndim <= inner or array.shape[-1 - inner] != len(t):
                 return everything
-            sliced.append(array[(slice(None),) * axis + (slice(start, stop),)])
-        arrays.append(tuple(sliced) if isinstance(value, tuple) else sliced[0])
+            nodes: Any = (..., slice(start, stop), *[slice(None)] * inner)
+            parts[i] = array[nodes]
+        arrays.append(tuple(parts) if isinstance(space, Product) else parts[0])
     return t[start:stop], arrays[0], arrays[1]
 
 
@@ -246,22 +244,18 @@ def given(t: TimesLike | None, points: Any, velocities: Any, space: Space[Any]) 
 
 def read_velocities(velocities: Any, space: Space[Any], data: list[fitting.Points]) -> list[tuple[Array, float]]:
     """Return velocities in each factor, and how far they may be from tangent, after checks of shape and numbers."""
-    each = zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True)
-    return [_velocities(factor, part.numbers, own) for factor, part, own in each]
-
-
-def _velocities(space: Space, points: Array, velocities: Any) -> tuple[Array, float]:
-    """Return velocities in one factor, after checks of their shape and numbers, and how far they may be from tangent.
-
-    The array has flags of its own, so that making it read-only leaves the user's array as it is.
-    """
-    array = space._array(velocities, "velocities")
-    doubles = space._doubles(array, "velocities")
-    numbers = space._numbers(doubles).view()
-    if doubles.shape != points.shape:
-        raise ValidationError(f"velocities has shape {numbers.shape}, but points {space._numbers(points).shape}")
-    refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
-    return numbers, point_tol(array.dtype)
+    found = []
+    for factor, part, own in zip(factors_of(space), data, parts_of(velocities, space, "velocities"), strict=True):
+        array = factor._array(own, "velocities")
+        doubles = factor._doubles(array, "velocities")
+        # A view has flags of its own, so that making it read-only leaves the user's array as it is.
+        numbers = factor._numbers(doubles).view()
+        if doubles.shape != part.numbers.shape:
+            shape = factor._numbers(part.numbers).shape
+            raise ValidationError(f"velocities has shape {numbers.shape}, but points {shape}")
+        refuse(~np.isfinite(numbers), "velocities", lambda _: "is not finite")
+        found.append((numbers, point_tol(array.dtype)))
+    return found
 
 
 def fit_many(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array
+from ._arrays import as_array, refuse
 from ._core import ValidationError
 
 Array = NDArray[np.float64]
@@ -47,8 +47,7 @@ def from_lonlat(lon: ArrayLike, lat: ArrayLike) -> Array:
         raise ValidationError(
             f"lon of shape {east.shape} and lat of shape {north.shape} do not broadcast. Pass one of each per position."
         ) from None
-    x, y, z = np.broadcast_arrays(np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north))
-    return np.stack([x, y, z], axis=-1)
+    return np.stack([np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], axis=-1)
 
 
 def to_lonlat(points: ArrayLike) -> tuple[Array, Array]:
@@ -114,15 +113,10 @@ def compass(points: ArrayLike) -> tuple[Array, Array]:
 def _degrees(value: ArrayLike, name: str, most: float) -> Array:
     """Convert an angle from degrees to radians."""
     angles = _floats(value, name)
+    advice = "Check whether lon and lat are swapped, or whether the value represents a missing one."
     # The limit itself may be rounded up in single precision.
-    beyond = np.argwhere(np.abs(angles) > most * (1 + 1e-7))
-    if len(beyond):
-        place = tuple(map(int, beyond[0]))
-        where = name + "".join(f"[{i}]" for i in place)
-        raise ValidationError(
-            f"{where} is {angles[place]}, but {name} must be from -{most} to {most} degrees. Check whether lon and lat "
-            "are swapped, or whether the value represents a missing one."
-        )
+    beyond = np.abs(angles) > most * (1 + 1e-7)
+    refuse(beyond, name, lambda i: f"is {angles[i]}, but {name} must be from -{most} to {most} degrees. {advice}")
     return np.radians(angles)
 
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import gzip
 import os
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import as_array, brief, refuse, short_repr
+from ._arrays import as_array, brief, refuse
 from ._core import ValidationError
 from ._disk import path_of, replacing
 from ._input import times_of
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal
+from ._validation import length, off_one
 from .convert import matrix_to_quaternion, quaternion_to_matrix
-from .convert._reading import length, off_one
 
 # Columns of a TUM trajectory.
 TUM = ("time", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
@@ -28,6 +28,7 @@ _ROUNDED = 5e-3
 _FAR = 1e11
 # The last second whose nanoseconds are a number of 64 bits.
 _LAST = 9.2e9
+_KITTI = ("r11", "r12", "r13", "x", "r21", "r22", "r23", "y", "r31", "r32", "r33", "z")
 _EUROC = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []"
 
 
@@ -73,14 +74,14 @@ def read_tum(file: Any) -> tuple[Doubles, Array]:
     >>> poses[0, :3, 3].tolist()
     [1.0, 2.0, 3.0]
     """
-    rows, place = tum_rows(file)
-    check_seconds(rows[:, 0], f"{_name(file)}: time")
-    r = rotations_in_rows(rows[:, [7, 4, 5, 6]], lambda i: f"{_name(file)}, {place(i)}")
+    rows, lines = tum_rows(file)
+    check_seconds(rows[:, 0], f"{lines.file}: time")
+    r = rotations_in_rows(rows[:, [7, 4, 5, 6]], lines.file, lines.place)
     return rows[:, 0].copy(), join(r, rows[:, 1:4])
 
 
-def tum_rows(file: Any) -> tuple[Doubles, Callable[[int], str]]:
-    """Return the numbers of a TUM trajectory, shape (n, 8), and a function that names the line of a row: "line 7".
+def tum_rows(file: Any) -> tuple[Doubles, Lines]:
+    """Return the numbers of a TUM trajectory, shape (n, 8), and the lines that hold them.
 
     Raises
     ------
@@ -89,37 +90,8 @@ def tum_rows(file: Any) -> tuple[Doubles, Callable[[int], str]]:
     OSError
         If the file cannot be read.
     """
-    name, lines = _name(file), _lines(file)
-    form = f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"
-    if not lines:
-        raise ValidationError(f"{name} is empty, it has no numbers; {form}")
-    try:
-        rows = np.loadtxt([line.text for line in lines], ndmin=2)
-    except ValueError as error:
-        raise ValidationError(_bad_line(lines, name, form) or f"{name}: {form}; {brief(error)}") from None
-    if rows.shape[1] != len(TUM):
-        raise ValidationError(f"{name}, line {lines[0].number}: {rows.shape[1]} numbers, but {form}")
-    bad = np.argwhere(~np.isfinite(rows))
-    if len(bad):
-        i, j = bad[0]
-        raise ValidationError(
-            f"{name}, line {lines[i].number}: column {TUM[j]!r} holds {rows[i, j]}, which is not a finite number"
-        )
-    return rows, lambda i: f"line {lines[i].number}"
-
-
-def _bad_line(lines: list[Line], name: str, form: str) -> str | None:
-    """Describe the error in the first line that is not a pose."""
-    for number, text in lines:
-        cells = text.partition("#")[0].split()
-        if len(cells) != len(TUM):
-            return f"{name}, line {number}: {len(cells)} numbers, but {form}"
-        for column, cell in zip(TUM, cells, strict=True):
-            try:
-                np.loadtxt([cell])
-            except ValueError:
-                return f"{name}, line {number}: column {column!r} holds {cell!r}, which is not a number"
-    return None
+    lines = _lines(file)
+    return _parsed(lines, TUM, f"a line of a TUM trajectory has {len(TUM)}: {' '.join(TUM)}"), lines
 
 
 def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
@@ -152,7 +124,11 @@ def write_tum(file: Any, t: ArrayLike, poses: Any) -> None:
     '0.5 0.0 0.0 0.0 0.0 0.0 0.0 1.0\n'
     """
     r, x = split(_checked(poses))
-    write_tum_rows(file, _seconds(t, len(x)), np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1))
+    times = _moments(t, len(x))
+    if times.dtype.kind == "M":
+        times = (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+    rows = np.concatenate([x, matrix_to_quaternion(r, scalar_first=False)], axis=1)
+    write_tum_rows(file, times.astype(np.float64), rows)
 
 
 def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
@@ -163,9 +139,8 @@ def write_tum_rows(file: Any, t: Array, poses: Doubles, head: str = "") -> None:
     ValidationError
         If dates are finer than nanoseconds, or too far from 1970 to be counted in them.
     """
-    times = list(map(repr, t.tolist())) if t.dtype.kind != "M" else _exact_seconds(t)
-    rows = (f"{time} {' '.join(map(repr, pose))}\n" for time, pose in zip(times, poses.tolist(), strict=True))
-    _write_lines(file, rows, head)
+    times = _exact_seconds(t) if t.dtype.kind == "M" else t.tolist()
+    _write(file, ([time, *pose] for time, pose in zip(times, poses.tolist(), strict=True)), " ", head)
 
 
 def _exact_seconds(dates: Array) -> list[str]:
@@ -217,16 +192,17 @@ def read_kitti(file: Any, times: Any = None) -> tuple[Doubles, Array]:
     >>> poses[0, :3, 3].tolist()
     [5.0, 6.0, 7.0]
     """
-    rows = _numbers(file, 12, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
+    lines = _lines(file)
+    rows = _parsed(lines, _KITTI, "KITTI poses are lines with the twelve numbers of [R | x]").reshape(-1, 3, 4)
     r = rows[:, :, :3]
     off = off_one(r)
     bad = ~((off <= _ROUNDED) & (np.linalg.det(r) > 0))
-    refuse(bad, f"{_name(file)}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
+    refuse(bad, f"{lines.file}: pose ", lambda i: f"has no rotation: |RᵀR - 1| is {off[i]:.1e}")
     t = np.arange(len(rows), dtype=float)
     if times is not None:
-        t = _numbers(times, 1, "times of KITTI are one number a line", "times")[:, 0].copy()
+        t = _parsed(_lines(times, "times"), ("time",), "times of KITTI are one number per line")[:, 0]
     if len(t) != len(rows):
-        raise ValidationError(f"{_name(times)} has {len(t)} times, but {_name(file)} {len(rows)} poses")
+        raise ValidationError(f"{_name(times)} has {len(t)} times, but {lines.file} {len(rows)} poses")
     return t, join(_SO3.project(r), rows[:, :, 3])
 
 
@@ -302,11 +278,9 @@ def read_euroc(file: Any) -> tuple[NDArray[np.datetime64], Array]:
     form = "EuRoC poses are lines of 'nanoseconds,x,y,z,qw,qx,qy,qz'"
     lines = _lines(file)
     # Double precision cannot represent nanoseconds since 1970.
-    ns = _parsed(lines, file, form, delimiter=",", usecols=0, dtype=np.int64, ndmin=1)
-    rows = _parsed(lines, file, form, delimiter=",", usecols=range(1, 8), ndmin=2)
-    _check_rows(rows, file, form)
-    r = rotations_in_rows(rows[:, 3:], lambda i: f"{_name(file)}, line {lines[i].number}")
-    return ns.astype("datetime64[ns]"), join(r, rows[:, :3])
+    ns = _parsed(lines, ("nanoseconds",), form, 0, dtype=np.int64)[:, 0]
+    rows = _parsed(lines, ("x", "y", "z", "qw", "qx", "qy", "qz"), form, 1)
+    return ns.astype("datetime64[ns]"), join(rotations_in_rows(rows[:, 3:], lines.file, lines.place), rows[:, :3])
 
 
 def write_euroc(file: Any, t: ArrayLike, poses: Any) -> None:
@@ -434,13 +408,6 @@ def _moments(t: ArrayLike, count: int) -> Array:
     return times
 
 
-def _seconds(t: ArrayLike, count: int) -> Doubles:
-    times = _moments(t, count)
-    if times.dtype.kind == "M":
-        return (times - np.datetime64(0, "s")) / np.timedelta64(1, "s")
-    return times.astype(np.float64)
-
-
 def check_seconds(times: Array, name: str) -> None:
     """Raise if numbers look like milliseconds since 1970, or smaller units, where seconds are expected."""
     if times.dtype.kind in "iuf":
@@ -452,40 +419,45 @@ def check_seconds(times: Array, name: str) -> None:
 # ---- lines ----
 
 
-def rotations_in_rows(q: Doubles, place: Callable[[int], str], atol: float = _ROUNDED) -> Array:
+class Lines(NamedTuple):
+    """Lines of a file that are not comments.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file.
+    numbers : list of int
+        Numbers of the lines, counted from 1.
+    texts : list of str
+        Lines without white space at their ends.
+    """
+
+    file: str
+    numbers: list[int]
+    texts: list[str]
+
+    def place(self, row: int) -> str:
+        """Name the line of a row: "line 7"."""
+        return f"line {self.numbers[row]}"
+
+    def error(self, row: int, found: str) -> ValidationError:
+        """Return the error of a row."""
+        return ValidationError(f"{self.file}, {self.place(row)}: {found}")
+
+
+def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str], atol: float = _ROUNDED) -> Array:
     """Return the rotations of rounded quaternions, scalar first; `place` names the line of a row in messages."""
     sizes = length(q)
     bad = np.flatnonzero(~(np.abs(sizes - 1) <= atol))
     if len(bad):
         raise ValidationError(
-            f"{place(bad[0])}: the quaternion has length {sizes[bad[0]]:.6g}, not 1: are the columns in another order?"
+            f"{file}, {place(bad[0])}: the quaternion has length {sizes[bad[0]]:.6g}, not 1: are the columns in "
+            "another order?"
         )
     return quaternion_to_matrix(q / sizes[:, None], scalar_first=True)
 
 
-def _numbers(file: Any, columns: int, form: str, name: str = "file") -> Doubles:
-    rows: Doubles = _parsed(_lines(file, name), file, form, ndmin=2)
-    if rows.size and rows.shape[1] != columns:
-        raise ValidationError(f"{_name(file)}: {form}, not of {rows.shape[1]} numbers")
-    _check_rows(rows, file, form)
-    return rows
-
-
-def _check_rows(rows: Doubles, file: Any, form: str) -> None:
-    if not rows.size:
-        raise ValidationError(f"{_name(file)} has no numbers; {form}")
-    bad = np.asarray(~np.isfinite(rows).all(axis=1))
-    refuse(bad, f"{_name(file)}: row ", lambda i: f"is not finite: {rows[i]}")
-
-
-class Line(NamedTuple):
-    """A line of a file: its number, counted from 1, and its text."""
-
-    number: int
-    text: str
-
-
-def _lines(file: Any, name: str = "file") -> list[Line]:
+def _lines(file: Any, name: str = "file") -> Lines:
     """Return the lines that are not comments; `name` is the name of the argument."""
     path = path_of(file, name, method="read", text=True)
     if path is None:
@@ -502,27 +474,54 @@ def _lines(file: Any, name: str = "file") -> list[Line]:
             raise ValidationError(f"{_name(file)} is not text in UTF-8") from None
         except (EOFError, zlib.error):
             raise ValidationError(f"{_name(file)} is damaged: it cannot be decompressed") from None
-    lines = (Line(number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
-    return [line for line in lines if line.text and not line.text.startswith("#")]
+    numbered = ((number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
+    kept = [(number, line) for number, line in numbered if line and not line.startswith("#")]
+    return Lines(_name(file), [number for number, _ in kept], [line for _, line in kept])
 
 
-def _parsed(lines: list[Line], file: Any, form: str, **options: Any) -> Any:
-    if not lines:
-        return np.zeros((0, 0))
+def _parsed(lines: Lines, columns: Sequence[str], form: str, start: int | None = None, dtype: Any = np.float64) -> Any:
+    """Return the numbers in lines, with one column per name.
+
+    Parameters
+    ----------
+    lines : Lines
+        Lines of a file.
+    columns : sequence of str
+        Names of the columns.
+    form : str
+        Describes a line in messages.
+    start : int, optional
+        Number of the first of these columns, which are separated by commas and may have others beside them. None if
+        they are separated by spaces and are the only ones.
+    dtype : dtype
+        Type of the numbers.
+    """
+    if not lines.texts:
+        raise ValidationError(f"{lines.file} is empty, it has no numbers; {form}")
+    separator, own = (None, slice(None)) if start is None else (",", slice(start, start + len(columns)))
+    used = None if start is None else range(own.start, own.stop)
     try:
-        return np.loadtxt([line.text for line in lines], **options)
-    except ValueError:
-        raise ValidationError(_bad_row(lines, _name(file), form, options)) from None
-
-
-def _bad_row(lines: list[Line], name: str, form: str, options: dict[str, Any]) -> str:
-    """Describe the error in the first line that does not have this form."""
-    for line in lines:
-        try:
-            np.loadtxt([line.text], **options)
-        except ValueError:
-            return f"{name}, line {line.number}: {form}; this line is {short_repr(line.text)}"
-    return f"{name}: {form}; its lines differ in how many numbers they have"
+        rows = np.loadtxt(lines.texts, dtype, delimiter=separator, usecols=used, ndmin=2)
+    except ValueError as error:
+        # The first line that is wrong.
+        for i, text in enumerate(lines.texts):
+            cells = text.partition("#")[0].split(separator)
+            if len(cells[own]) != len(columns):
+                raise lines.error(i, f"{len(cells)} numbers, but {form}") from None
+            for column, cell in zip(columns, cells[own], strict=True):
+                try:
+                    dtype(cell)
+                except ValueError:
+                    kind = "number" if dtype is np.float64 else "whole number"
+                    raise lines.error(i, f"column {column!r} holds {cell!r}, which is not a {kind}") from None
+        raise ValidationError(f"{lines.file}: {form}; {brief(error)}") from None
+    if rows.shape[1] != len(columns):
+        raise lines.error(0, f"{rows.shape[1]} numbers, but {form}")
+    bad = np.argwhere(~np.isfinite(rows))
+    if len(bad):
+        i, j = bad[0]
+        raise lines.error(i, f"column {columns[j]!r} holds {rows[i, j]}, which is not a finite number")
+    return rows
 
 
 def _name(file: Any) -> str:
@@ -532,11 +531,7 @@ def _name(file: Any) -> str:
 
 def _write(file: Any, rows: Iterable[list[Any]], separator: str, head: str = "") -> None:
     # The shortest text from which the same number is read.
-    _write_lines(file, (f"{separator.join(map(repr, row))}\n" for row in rows), head)
-
-
-def _write_lines(file: Any, lines: Iterable[str], head: str) -> None:
-    text = f"{head}\n" * bool(head) + "".join(lines)
+    text = f"{head}\n" * bool(head) + "".join(f"{separator.join(map(str, row))}\n" for row in rows)
     path = path_of(file, method="write", text=True)
     if path is None:
         file.write(text)

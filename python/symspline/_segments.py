@@ -20,8 +20,8 @@ from ._smoothing.precision import read_precision
 from ._spaces import Array, Product, Space, SpecialEuclidean, factors_of, parts_of, space_named
 from ._time import Moments, time_axis_of
 from ._typing import Duplicates, FitOptions, FloatArray, P, PointsLike, PProduct, SmoothingOptions, TimesLike
+from ._validation import one_of
 
-_DUPLICATES = ("raise", "first", "mean")
 # Limit of the iteration for a Karcher mean. Each step reduces the error by about the square of the distance between
 # the points, so a few steps are enough for points close together.
 _STEPS = 50
@@ -231,8 +231,7 @@ def cut(
     """
     space = space_named(space)
     least = whole_number(min_points, "min_points", 2)
-    if not isinstance(duplicates, str) or duplicates not in _DUPLICATES:
-        raise ValidationError(f"duplicates must be 'raise', 'first' or 'mean', not {short_repr(duplicates)}")
+    one_of(duplicates, "duplicates", "raise", "first", "mean")
     data = read(points, space)
     if data[0].batch:
         raise ValidationError(f"points has batch axes {data[0].batch}, but a recording must be a single curve")
@@ -304,39 +303,34 @@ def _check_order(times: NDArray[Any], seconds: NDArray[np.float64], duplicates: 
 
 
 def _at_once(space: Space, points: Array, starts: NDArray[np.intp], duplicates: str) -> Array:
-    """Return one point per distinct time. Points whose time is unique are not changed.
+    """Return one point per distinct time, the first or the Karcher mean. Points of other times are not changed.
 
     Parameters
     ----------
     starts : ndarray of int
         Index of the first point of every time.
-    """
-    kept = points[starts]
-    if duplicates == "first":
-        return kept
-    counts = np.diff(np.append(starts, len(points)))
-    several = np.flatnonzero(counts > 1)
-    rows = np.repeat(counts > 1, counts)
-    group = np.repeat(np.arange(len(several)), counts[several])
-    kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
-    kept[several] = _means(space, space.project(points[rows]), group)
-    return kept
-
-
-def _means(space: Space, points: Array, group: NDArray[np.intp]) -> Array:
-    """Return the Karcher mean of every group of consecutive points.
 
     References
     ----------
     H. Karcher, Riemannian center of mass and mollifier smoothing, Comm. Pure Appl. Math. 30 (1977).
     """
-    starts = np.flatnonzero(np.diff(group, prepend=-1))
-    counts = np.diff(np.append(starts, len(points))).reshape(-1, *[1] * len(space.point_shape))
+    kept = points[starts]
+    if duplicates == "first":
+        return kept
+    counts = np.diff(np.append(starts, len(points)))
+    several = counts > 1
+    points = space.project(points[np.repeat(several, counts)])
+    counts = counts[several]
+    starts = np.cumsum(counts) - counts
     means: Array = points[starts]
     floor = 8 * np.finfo(np.float64).eps * space._rounding(means)
+    sizes = counts.reshape(-1, *[1] * len(space.point_shape))
     for _ in range(_STEPS):
-        step = np.add.reduceat(space.log(means[group], points), starts, axis=0) / counts
+        logs = space.log(np.repeat(means, counts, axis=0), points)
+        step = np.add.reduceat(logs, starts, axis=0) / sizes
         means = space.exp(means, step)
         if (space.norm(means, step) <= floor).all():
             break
-    return means
+    kept = kept.astype(kept.dtype if kept.dtype.kind in "fc" else np.float64)
+    kept[several] = means
+    return kept

@@ -20,9 +20,10 @@ import numpy as np
 
 from ._arrays import checked_number, short_repr
 from ._base_curve import check_curve
-from ._core import ConvergenceError, CutLocusError, ValidationError
+from ._core import ValidationError
 from ._cubic import CubicSpline
 from ._errors import warn
+from ._exceptions import SymsplineError
 from ._functional import fit_many
 from ._lonlat import compass, from_lonlat, to_lonlat
 from ._segments import check_smooth, cut
@@ -185,7 +186,6 @@ def resample(
     import pandas as pd
 
     keys: list[Any] = [] if by is None else list(by) if isinstance(by, (list, tuple)) else [by]
-
     if not isinstance(frame, pd.DataFrame):
         raise ValidationError(f"frame must be a pandas DataFrame, not {short_repr(frame)}")
     for name in (*keys, time, *columns):
@@ -213,38 +213,33 @@ def resample(
     step = pd.Timedelta(every)
     zone = stamps.dt.tz
     utc = (stamps.dt.tz_convert("UTC").dt.tz_localize(None) if zone is not None else stamps).to_numpy()
-    tracks: Any = {(): np.arange(len(frame))}
-    if keys:
-        tracks = {
-            label if len(keys) > 1 else (label,): rows
-            for label, rows in frame.groupby(keys if len(keys) > 1 else keys[0], sort=False).indices.items()
-        }
+    tracks = frame.groupby(keys if len(keys) > 1 else keys[0] if keys else np.zeros(len(frame)), sort=False)
     vectors = from_lonlat(*(frame[column].to_numpy() for column in columns))
-    curves, owners = [], []
-    for label, rows in tracks.items():
+    curves: list[tuple[Any, Any]] = []
+    names: list[str] = []
+    owners: list[dict[Any, Any]] = []
+    for label, rows in tracks.indices.items():
         # A curve needs two positions.
         if len(rows) < 2:
             continue
+        owner = dict(zip(keys, label if len(keys) > 1 else [label], strict=False))
+        of = "".join(f"{key} {value}, " for key, value in owner.items())
         own = rows[np.argsort(utc[rows], kind="stable")]
         try:
             used = np.ones(len(own), bool) if smooth else None
             segments = cut(utc[own], vectors[own], "sphere:2", max_gap, min_points, duplicates, used).curves
         except ValidationError as error:
-            of = f"{_named(keys, label)}, rows in the order of time: " if keys else ""
-            raise ValidationError(f"{of}{error}") from None
+            raise ValidationError(f"{of}rows in the order of time: {error}" if of else str(error)) from None
         curves += segments
-        owners += [label] * len(segments)
+        names += [f"{of}the segment from {np.datetime_as_string(t[0][0], 's')} on" for t, _ in segments]
+        owners += [owner] * len(segments)
     if not curves and len(frame):
         raise ValidationError(
             f"every track has fewer than {min_points} positions between gaps longer than max_gap={short_repr(max_gap)} "
             "seconds; increase max_gap or decrease min_points"
         )
-    names = [
-        f"{_named(keys, label)}{', ' if keys else ''}the segment from {np.datetime_as_string(t[0][0], 's')} on"
-        for (t, _), label in zip(curves, owners, strict=True)
-    ]
     tables = []
-    for spline, label in zip(_fitted(curves, names, smooth, options), owners, strict=True):
+    for spline, owner in zip(_fitted(curves, names, smooth, options), owners, strict=True):
         x = pd.date_range(pd.Timestamp(spline.t[0]).ceil(step), pd.Timestamp(spline.t[-1]).floor(step), freq=step)
         at = x.to_numpy()
         lon, lat = to_lonlat(spline(at))
@@ -253,15 +248,10 @@ def resample(
         values |= {"sog": sog(spline, at, radius=radius), "cog": cog(spline, at)}
         if not spline.report.converged:
             values |= dict.fromkeys((*columns, "sog", "cog"), np.nan)
-        tables.append(pd.DataFrame(dict(zip(keys, label, strict=True)) | values))
+        tables.append(pd.DataFrame(owner | values))
     if not tables:
         return pd.DataFrame(columns=[*keys, name, *columns, "sog", "cog"])
     return pd.concat(tables, ignore_index=True)
-
-
-def _named(keys: list[Any], label: tuple[Any, ...]) -> str:
-    """Return the description of a track for messages."""
-    return ", ".join(f"{key} {value}" for key, value in zip(keys, label, strict=True))
 
 
 def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, options: dict[str, Any]) -> Any:
@@ -281,12 +271,11 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
                 found: Any = smooth_many([(*curve, {}) for curve in curves], Sphere(2), **options)
             else:
                 found = fit_many(curves, Sphere(2), **options)
-    except (ValidationError, ConvergenceError, CutLocusError) as error:
+    except SymsplineError as error:
         raise error._with_message(renamed(error)) from None
     for warning in caught:
         note = warning.message
-        fields = (getattr(note, field, None) for field in ("curve", "node"))
-        warn(renamed(note), warning.category, *fields)
+        warn(renamed(note), warning.category, getattr(note, "curve", None), getattr(note, "node", None))
     return found
 
 

@@ -41,7 +41,8 @@ from ._pose_files import (
 )
 from ._spaces import Array, Euclidean, SpecialEuclidean
 from ._typing import Extrapolate, Frame, TimesLike
-from .rotations import Spline, attitude, check_frame, turned
+from ._validation import one_of
+from .rotations import Spline, attitude, turned
 
 __all__ = [
     "Imu",
@@ -138,8 +139,8 @@ def imu(
     if g.shape != (3,) or g.dtype.kind not in "iuf" or not np.isfinite(g).all():
         raise ValidationError(f"gravity must be three numbers, a vector in the world, not {short_repr(gravity)}")
     check_seconds(spline.t, "t")
-    motion = _Motion(spline, x, extrapolate, per_curve)
-    return Imu(motion.turning, motion.in_body(motion.acceleration - g))
+    motion = _Motion(spline, x, "body", extrapolate, per_curve)
+    return Imu(motion.turning, motion.in_frame(motion.position("acceleration") - g))
 
 
 def twist(
@@ -178,12 +179,12 @@ def twist(
     >>> twist(ss.CubicSpline(None, [start, end], "se:3"), 0.5).round(12) + 0.0
     array([0., 0., 0., 1., 2., 3.])
     """
-    check_frame(frame)
-    motion = _Motion(spline, x, extrapolate, per_curve)
-    if frame == "body":
-        return np.concatenate([motion.turning, motion.in_body(motion.velocity)], axis=-1)
-    omega = motion.turning_in_world
-    return np.concatenate([omega, motion.velocity - np.cross(omega, motion.place)], axis=-1)
+    motion = _Motion(spline, x, frame, extrapolate, per_curve)
+    omega, velocity = motion.turning, motion.position("velocity")
+    if frame == "world":
+        omega = turned(motion.rotation, omega)
+        velocity = velocity - np.cross(omega, motion.position("point"))
+    return np.concatenate([omega, motion.in_frame(velocity)], axis=-1)
 
 
 def linear_velocity(
@@ -217,9 +218,8 @@ def linear_velocity(
     >>> linear_velocity(ss.CubicSpline(None, [start, end], "se:3"), 0.5).round(12)
     array([1., 2., 3.])
     """
-    check_frame(frame)
-    motion = _Motion(spline, x, extrapolate, per_curve)
-    return motion.velocity if frame == "world" else motion.in_body(motion.velocity)
+    motion = _Motion(spline, x, frame, extrapolate, per_curve)
+    return motion.in_frame(motion.position("velocity"))
 
 
 def linear_acceleration(
@@ -255,16 +255,22 @@ def linear_acceleration(
     >>> linear_acceleration(ss.CubicSpline(None, (turns, places), "so:3 x r:3"), 1).round(12) + 0.0
     array([-3.,  0.,  0.])
     """
-    check_frame(frame)
-    motion = _Motion(spline, x, extrapolate, per_curve)
-    return motion.acceleration if frame == "world" else motion.in_body(motion.acceleration)
+    motion = _Motion(spline, x, frame, extrapolate, per_curve)
+    return motion.in_frame(motion.position("acceleration"))
 
 
 class _Motion:
-    """Motion of a body at times x; each quantity is evaluated on first access and cached."""
+    """Motion of a body at times x, with vectors in a frame."""
 
-    def __init__(self, spline: Spline, x: TimesLike, extrapolate: Any, per_curve: bool) -> None:
-        self._attitude, self._position = attitude(spline), _position(spline)
+    def __init__(self, spline: Spline, x: TimesLike, frame: str, extrapolate: Any, per_curve: bool) -> None:
+        self._in_body = one_of(frame, "frame", "body", "world") == "body"
+        self._attitude = attitude(spline)
+        found = [part for part in spline._curve.parts if part.space in (_SE3, _R3)]
+        if len(found) != 1:
+            raise ValidationError(
+                f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
+            )
+        self._position = found[0]
         self._time_axis, self._x = spline._time_axis, x
         self._where, self._per_curve = spline._where(extrapolate), per_curve
 
@@ -277,48 +283,20 @@ class _Motion:
         """The angular velocity in the frame of the body."""
         return self._at(self._attitude, "body velocity")
 
-    @cached_property
-    def turning_in_world(self) -> Array:
-        return turned(self.rotation, self.turning)
-
-    @cached_property
-    def place(self) -> Array:
-        return self._of_position("point")
-
-    @cached_property
-    def velocity(self) -> Array:
-        return self._of_position("velocity")
-
-    @cached_property
-    def acceleration(self) -> Array:
-        """ẍ, which on SE(3) is not the acceleration of the connection."""
-        a = self._of_position("acceleration")
-        return a + np.cross(self.turning_in_world, self.velocity) if self._position.space == _SE3 else a
-
-    def in_body(self, v: Array) -> Array:
-        """Rᵀv for vectors in the world."""
-        return turned(np.swapaxes(self.rotation, -1, -2), v)
-
-    def _of_position(self, quantity: str) -> Array:
+    def position(self, quantity: str) -> Array:
+        """The position in the frame of the world, or its velocity or acceleration."""
         values = self._at(self._position, quantity)
-        return values[..., :3, 3] if self._position.space == _SE3 else values
+        if self._position.space != _SE3:
+            return values
+        values = values[..., :3, 3]
+        if quantity == "acceleration":
+            # ẍ is not the acceleration of the connection.
+            values = values + np.cross(turned(self.rotation, self.turning), self.position("velocity"))
+        return values
+
+    def in_frame(self, v: Array) -> Array:
+        """Rᵀv for vectors in the world if the frame is that of the body."""
+        return turned(np.swapaxes(self.rotation, -1, -2), v) if self._in_body else v
 
     def _at(self, curve: CurveArrays, quantity: str) -> Array:
         return np.asarray(evaluated(curve, self._time_axis, self._x, quantity, self._where, self._per_curve))
-
-
-def _position(spline: Spline) -> CurveArrays:
-    """Return the curve that contains the positions: the one of poses, or the one on R³.
-
-    Raises
-    ------
-    ValidationError
-        If the curve does not contain exactly one position.
-    """
-    attitude(spline)
-    found = [part for part in spline._curve.parts if part.space in (_SE3, _R3)]
-    if len(found) != 1:
-        raise ValidationError(
-            f"the curve must be on se:3, or on a product with one so:3 and one r:3, not on {spline.space}"
-        )
-    return found[0]

@@ -31,9 +31,9 @@ from ._curves.fit import curve_of
 from ._hermite import HermiteSpline
 from ._spaces import Array, Doubles, SpecialEuclidean, SpecialOrthogonal, Sphere
 from ._typing import Extrapolate, Frame, RotationOrder, TimesLike
+from ._validation import length, one_of, real_numbers
 from .convert import matrix_to_quaternion, quaternion_to_matrix
 from .convert._quaternions import checked_order
-from .convert._reading import length, real_numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -55,7 +55,6 @@ __all__ = [
 Spline = CubicSpline[Any] | HermiteSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
-_FRAMES = ("body", "world")
 _SIX = ("columns", "rows", "interleaved")
 # If the two vectors are closer to parallel than this, the third is not determined in single precision.
 _PARALLEL = 1e-6
@@ -277,7 +276,7 @@ def velocities(rotations: ArrayLike | Rotation, rates: ArrayLike, frame: Frame =
            [ 2.,  0.,  0.],
            [ 0.,  0.,  0.]])
     """
-    check_frame(frame)
+    one_of(frame, "frame", "body", "world")
     r, hat = _given(rotations), _hat(real_numbers(rates, "rates", (3,))[0])
     _SO3.check_point(r)
     return (r @ hat if frame == "body" else hat @ r) + 0.0
@@ -308,12 +307,6 @@ def attitude(spline: Spline) -> CurveArrays:
     return _ATTITUDES[curve]
 
 
-def check_frame(frame: Any) -> None:
-    """Raise ValidationError unless frame is "body" or "world"."""
-    if not isinstance(frame, str) or frame not in _FRAMES:
-        raise ValidationError(f"frame must be 'body' or 'world', not {short_repr(frame)}")
-
-
 def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve: bool) -> Array:
     curve, where = attitude(spline), spline._where(extrapolate)
     values: Array = evaluated(curve, spline._time_axis, x, quantity, where, per_curve)
@@ -322,7 +315,7 @@ def _at(spline: Spline, x: TimesLike, quantity: str, extrapolate: Any, per_curve
 
 def _rate(spline: Spline, x: TimesLike, quantity: str, frame: str, extrapolate: Any, per_curve: bool) -> Array:
     """Return the angular velocity or acceleration in the given frame."""
-    check_frame(frame)
+    one_of(frame, "frame", "body", "world")
     body = _at(spline, x, f"body {quantity}", extrapolate, per_curve)
     return body if frame == "body" else turned(_at(spline, x, "point", extrapolate, per_curve), body)
 

@@ -27,7 +27,7 @@ from ._cubic import CubicSpline
 from ._input import times_of
 from ._spaces import ComplexGrassmannian, Grassmannian
 from ._typing import TimesLike
-from .convert._reading import Array, adjoint, numbers
+from ._validation import Array, adjoint, numbers
 
 # Singular values closer than this, in units of the largest, are equal but for rounding.
 _EQUAL = 1e-12

@@ -221,10 +221,14 @@ def _metric(found: Conformance, s: _Sample) -> None:
 
     # Of the half square of distance, whose gradient at q is minus the logarithm.
     w = s.tangents(s.q)
-    squares = [space.distance(s.p, space.exp(s.q, place * _STEP * w)) ** 2 / 2 for place in _PLACES]
-    slope = np.tensordot(_WEIGHTS, np.array(squares), 1) / _STEP
+    slope = _slope(lambda h: space.distance(s.p, space.exp(s.q, h * w)) ** 2 / 2, _STEP)
     expected = -space.inner(s.q, space.log(s.q, s.p), w)
     found._add("distance has its first variation", np.abs(slope - expected), _allowed(s))
+
+
+def _slope(function: Callable[[float], Array], step: float) -> Array:
+    """Return the derivative of a function at 0 by central differences."""
+    return np.asarray(np.tensordot(_WEIGHTS, np.array([function(place * step) for place in _PLACES]), 1) / step)
 
 
 def _allowed(s: _Sample) -> float:
@@ -236,9 +240,7 @@ def _derivative(found: Conformance, s: _Sample) -> None:
     space = s.space
     assert isinstance(space, Manifold)
     w = s.tangents(s.q)
-    step = _STEP * min(1.0, 2 * s.longest)
-    logs = [space.log(s.p, space.exp(s.q, place * step * w)) for place in _PLACES]
-    slope = np.tensordot(_WEIGHTS, np.array(logs), 1) / step
+    slope = _slope(lambda h: space.log(s.p, space.exp(s.q, h * w)), _STEP * min(1.0, 2 * s.longest))
     found._add("dlog is the derivative of log", s.size(space.dlog(s.p, s.q, w) - slope), _allowed(s))
 
 
@@ -257,40 +259,20 @@ def _walk(s: _Sample) -> Array:
 def _smoothness(found: Conformance, s: _Sample) -> None:
     space, p = s.space, _walk(s)
     offs: list[Any] = []
-    jumps: list[tuple[float, float, float]] = []
+    largest = np.zeros(3)
     for t in (np.arange(len(p), dtype=float), np.cumsum(s.rng.uniform(0.7, 1.3, len(p)))):
         for ends in ("natural", "not-a-knot"):
             spline = CubicSpline(t, p, space, bc_type=ends)
             offs.append(s.space.distance(spline(t), p).max())
-            jumps.append(_jumps(s, spline))
-    value, velocity, acceleration = np.max(jumps, axis=0)
+            jumps = [segments_of(spline).jumps(nu) for nu in range(3)]
+            # A straight walk has no acceleration, so that jumps are relative to the length of a step at least.
+            sizes = (1.0, *(max(own.largest, s.longest) for own in jumps[1:]))
+            largest = np.maximum(largest, np.divide([own.size.max() for own in jumps], sizes))
+    value, velocity, acceleration = largest
     found._add("splines interpolate", offs, s.tol)
     found._add("splines are continuous", value, s.tol)
     found._add("velocity is continuous", velocity, 100 * s.tol)
     found._add("acceleration is continuous", acceleration, _BENT * s.tol)
-
-
-def _jumps(s: _Sample, spline: CubicSpline) -> tuple[float, float, float]:
-    """Return the largest jumps at a knot of value, velocity and acceleration.
-
-    Each segment is evaluated by itself. The last two jumps are relative to the quantity.
-    """
-    segments = segments_of(spline)
-
-    def sides(nu: int) -> tuple[Array, Array]:
-        values = segments.at(segments.t, nu)
-        return values[:-1, 1], values[1:, 0]
-
-    def jump(nu: int) -> float:
-        left, right = sides(nu)
-        if s.size(before - behind).max() > 1e-6:
-            # One point may have several arrays.
-            left = s.space.transport(before, behind, left)
-        # A straight walk has no acceleration.
-        return float(s.size(left - right).max() / max(s.size(left).max(), s.size(right).max(), s.longest))
-
-    before, behind = sides(0)
-    return float(s.space.distance(before, behind).max()), jump(1), jump(2)
 
 
 def _order(found: Conformance, s: _Sample) -> None:

@@ -81,7 +81,7 @@ def test_other_spaces():
     [
         (40.0, 178.0, "lat is 178.0, but lat must be from -90 to 90 degrees. Check whether lon and lat are swapped"),
         ([0, -9999], [0, 0], r"lon\[1\] is -9999.0, but lon must be from -3600 to 3600"),
-        ([[0], [1]], [[0], [90.001]], r"lat\[1\]\[0\] is 90.001"),
+        ([[0], [1]], [[0], [90.001]], r"lat\[1, 0\] is 90.001"),
     ],
 )
 def test_invalid_angles_raise(lon, lat, what):

@@ -256,7 +256,7 @@ def test_euroc_files(tmp_path):
         (poses.read_tum, "0 0 0 0 0 0 0 1\n\n1 0 0 nan 0 0 0 1\n", "line 3: column 'tz' holds nan"),
         (poses.read_tum, "0 0 0 0 0 0 0 1\n# x\n1 0 0 0 0 0 1 1\n", r"line 3: the quaternion has length 1\.41421"),
         (poses.read_euroc, "# x\n1,0,0,0,1,1,0,0\n", r"line 2: the quaternion has length 1\.41421, not 1"),
-        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1\n", "not of 11 numbers"),
+        (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 1\n", "line 1: 11 numbers, but KITTI poses"),
         (poses.read_kitti, "1 0 0 0 0 1 0 0 0 0 -1 0\n", r"pose \[0\] has no rotation"),
         (poses.read_euroc, "1.5,0,0,0,1,0,0,0\n", "nanoseconds"),
         (poses.read_euroc, "1,0,0,0,1\n", "nanoseconds"),

@@ -13,7 +13,7 @@ from matplotlib.dates import date2num
 from matplotlib.figure import Figure
 
 import symspline as ss
-from symspline._plotting import chart, disk, ellipses, frames, graphs, sphere
+from symspline._plotting import chart, graphs, matrices, sphere
 from symspline._plotting.figure import picture_of
 
 DRAWN_BY = {
@@ -23,8 +23,8 @@ DRAWN_BY = {
     graphs.draw_components: "euclidean:5 sphere:15 hyperbolic:1 so:4 u:3 su:3 spd:1 spd:4 hpd:2",
     graphs.draw_circle: "sphere:1",
     sphere.draw_sphere: "sphere:2",
-    frames.draw_quaternions: "sphere:3",
-    disk.draw_disk: "hyperbolic:2",
+    matrices.draw_quaternions: "sphere:3",
+    chart.draw_disk: "hyperbolic:2",
     graphs.draw_slope: "rp:1 gr:1,2",
     sphere.draw_lines: "rp:2 gr:1,3",
     graphs.draw_principal_angles: "rp:4 cp:2 gr:2,5 gr:4,5 cgr:2,3",
@@ -32,13 +32,13 @@ DRAWN_BY = {
     graphs.draw_ratios: "ch:2",
     sphere.draw_normals: "gr:2,3",
     graphs.draw_turn: "so:2 o:2",
-    frames.draw_rotations: "so:3 o:3",
+    matrices.draw_rotations: "so:3 o:3",
     graphs.draw_phase: "u:1",
-    frames.draw_spins: "su:2",
-    ellipses.draw_ellipses: "spd:2",
-    ellipses.draw_ellipsoids: "spd:3",
-    frames.draw_flat_poses: "se:2",
-    frames.draw_poses: "se:3",
+    matrices.draw_spins: "su:2",
+    matrices.draw_ellipses: "spd:2",
+    matrices.draw_ellipsoids: "spd:3",
+    matrices.draw_flat_poses: "se:2",
+    matrices.draw_poses: "se:3",
 }
 KINDS = {name: draw for draw, names in DRAWN_BY.items() for name in names.split()}
 

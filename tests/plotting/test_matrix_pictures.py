@@ -6,8 +6,8 @@ from drawn import axes_named, lines_of, rendered, spline_on
 from matplotlib.collections import PolyCollection
 
 import symspline as ss
-from symspline._plotting import ellipses
-from symspline._plotting.frames import AXES, VIEW
+from symspline._plotting import matrices as pictures
+from symspline._plotting.matrices import AXES, VIEW
 
 PAULI = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 ROTATIONS = {
@@ -54,7 +54,7 @@ def test_principal_angles(name):
 def test_sections_lie_in_the_outline_of_an_ellipsoid():
     """The shadow of xᵀA⁻¹x ≤ 1 is the ellipse of a block of A."""
     matrices = ss.SymmetricPositiveDefinite(3).random_point(np.random.default_rng(16), 20)
-    halves = ellipses.sections(matrices)
+    halves = pictures.sections(matrices)
     inside = np.einsum("mnai,mij,mnaj->mna", halves, np.linalg.inv(matrices[:, :2, :2]), halves)
     assert np.nanmax(inside) <= 1 + 1e-12 and np.nanmax(inside) > 0.99
     # Two of the halves go through the near end of a half axis, none through the far end.

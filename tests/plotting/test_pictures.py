@@ -5,7 +5,7 @@ import pytest
 from drawn import axes_named, dots_of, lines_of, rendered, texts_of
 
 import symspline as ss
-from symspline._plotting import disk, globe, sphere
+from symspline._plotting import chart, globe, sphere
 from symspline.geo import from_lonlat
 
 # ---- maps and globes ----
@@ -103,10 +103,10 @@ def test_angle_does_not_jump(name, points):
 def test_poincare_disk():
     plane, origin = ss.Hyperbolic(2), np.array([1.0, 0, 0])
     p = plane.random_point(np.random.default_rng(7), 20)
-    places = disk.flat(p, origin)
+    places = chart.flat(p, origin)
     np.testing.assert_allclose(np.linalg.norm(places, axis=-1), np.tanh(plane.distance(origin, p) / 2))
-    np.testing.assert_allclose(disk.flat(p[0], p[0]), 0, atol=1e-14)
-    moved = disk.flat(p, p[0])
+    np.testing.assert_allclose(chart.flat(p[0], p[0]), 0, atol=1e-14)
+    moved = chart.flat(p, p[0])
     np.testing.assert_allclose(np.linalg.norm(moved, axis=-1), np.tanh(plane.distance(p[0], p) / 2), atol=1e-7)
 
 

@@ -8,7 +8,7 @@ from matplotlib.path import Path
 from test_figure import KINDS
 
 import symspline as ss
-from symspline._plotting import disk, sphere
+from symspline._plotting import chart, sphere
 
 T = np.linspace(0, 10, 40)
 
@@ -145,7 +145,7 @@ def test_caps_have_their_radius(radius):
 def test_discs_of_the_hyperbolic_plane_have_their_radius(radius):
     plane, rng = ss.Hyperbolic(2), np.random.default_rng(0)
     points = plane.random_point(rng, 20)
-    rims = disk.rims(disk.flat(points, np.array([1.0, 0, 0])), np.full(20, radius))
+    rims = chart.rims(chart.flat(points, np.array([1.0, 0, 0])), np.full(20, radius))
     square = np.sum(rims**2, axis=-1, keepdims=True)
     lifted = np.concatenate([1 + square, 2 * rims], axis=-1) / (1 - square)
     distance = plane.distance(points[:, None], plane.project(lifted))

@@ -145,18 +145,14 @@ class Curve:
             bold = self.knots[evenly(len(self.knots), number)]
             gap = np.abs(even[:, None] - self.x[bold]).min(axis=1)
             between = np.searchsorted(self.x, even[gap > 0.6 * (even[1] - even[0])])
-        else:
-            given, between = self.given_x, np.empty(0, np.intp)
-            data = np.empty(0, np.intp)
-            if len(given):
-                even = np.linspace(given[0], given[-1], number)
-                data = np.unique(np.abs(given[:, None] - even).argmin(axis=0))
-                even = given[data]
-            bold = np.unique(self._nearest(even))
-        groups = {"between": (self.times[between], self.points[between]), "bold": (self.times[bold], self.points[bold])}
-        if self.noise is not None:
-            groups["data"] = self.on_axis(given[data]), self.given[data]
-        return groups
+            return {name: (self.times[i], self.points[i]) for name, i in (("between", between), ("bold", bold))}
+        x, points = self.given_x, self.given
+        if len(x):
+            data = np.unique(np.abs(x[:, None] - np.linspace(x[0], x[-1], number)).argmin(axis=0))
+            x, points = x[data], points[data]
+        bold = np.unique(self._nearest(x if len(x) else even))
+        groups = {"between": (self.times[:0], self.points[:0]), "bold": (self.times[bold], self.points[bold])}
+        return groups | {"data": (self.on_axis(x), points)}
 
     def _nearest(self, x: Array) -> Indices:
         """Return the indices of the times x that are closest to given times."""

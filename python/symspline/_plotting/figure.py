@@ -18,9 +18,8 @@ from .._arrays import short_repr
 from .._core import ValidationError
 from .._disk import path_of, replacing
 from .._spaces import Product, Space, SpecialEuclidean, factors_of
-from . import chart, ellipses, frames, graphs, sphere
+from . import chart, graphs, matrices, sphere
 from .curves import Curve, curves_of, fill_band
-from .disk import draw_disk
 from .graphs import timelines
 from .style import DPI, INK, heading
 
@@ -54,20 +53,20 @@ _DRAWN: list[tuple[str, Callable[[SubFigure, Sequence[Curve]], None], tuple[floa
     ("euclidean:3", chart.draw_3d, ()),
     ("sphere:1", graphs.draw_circle, _GRAPH),
     ("sphere:2", sphere.draw_sphere, (11.4, 4.6)),
-    ("sphere:3", frames.draw_quaternions, _ROWS),
-    ("hyperbolic:2", draw_disk, ()),
+    ("sphere:3", matrices.draw_quaternions, _ROWS),
+    ("hyperbolic:2", chart.draw_disk, ()),
     ("rp:1 gr:1,2", graphs.draw_slope, _GRAPH),
     ("rp:2 gr:1,3", sphere.draw_lines, ()),
     ("gr:2,3", sphere.draw_normals, ()),
     ("cp:1 cgr:1,2", sphere.draw_bloch, ()),
     ("so:2 o:2", graphs.draw_turn, _GRAPH),
-    ("so:3 o:3", frames.draw_rotations, _ROWS),
+    ("so:3 o:3", matrices.draw_rotations, _ROWS),
     ("u:1", graphs.draw_phase, _GRAPH),
-    ("su:2", frames.draw_spins, _ROWS),
-    ("spd:2", ellipses.draw_ellipses, _ROWS),
-    ("spd:3", ellipses.draw_ellipsoids, _ROWS),
-    ("se:2", frames.draw_flat_poses, ()),
-    ("se:3", frames.draw_poses, (6.2, 5.8)),
+    ("su:2", matrices.draw_spins, _ROWS),
+    ("spd:2", matrices.draw_ellipses, _ROWS),
+    ("spd:3", matrices.draw_ellipsoids, _ROWS),
+    ("se:2", matrices.draw_flat_poses, ()),
+    ("se:3", matrices.draw_poses, (6.2, 5.8)),
 ]
 _PICTURES = {name: Picture(draw, *size) for names, draw, size in _DRAWN for name in names.split()}
 _FAMILIES = dict.fromkeys(("rp", "cp", "hp", "gr", "cgr"), Picture(graphs.draw_principal_angles, 10.5, 3.8))

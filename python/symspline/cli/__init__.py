@@ -22,8 +22,7 @@ from typing import Any, NoReturn
 from .._exceptions import ConvergenceError, SymsplineError
 from .._version import VERSION
 from . import _check, _fit, _plot, _sample
-from ._errors import Problem, for_command_line
-from ._terminal import say
+from ._messages import Problem, for_command_line, say
 
 __all__ = ["main"]
 

@@ -36,7 +36,7 @@ from .._pairs import segments_of
 from .._spaces import HermitianPositiveDefinite, SymmetricPositiveDefinite
 from ..manifolds import Manifold
 from ._curves import read_curves
-from ._errors import Failure, listed
+from ._messages import Failure, listed
 
 _MEASURES = ("distance", "position", "velocity", "acceleration")
 _RELATIVE = 1e-12

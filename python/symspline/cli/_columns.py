@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._spaces import Space, factors_of
-from ._errors import Problem, first_duplicate, listed, refuse
+from ._messages import Problem, first_duplicate, listed, refuse
 from ._points import POSES, ROTATIONS, complex_numbers, count_with_quaternion, described, width
 from ._tables import IM, RE, Array, Rows, Table
 

@@ -17,7 +17,7 @@ from .._arrays import brief
 from .._cubic import CubicSpline
 from .._files import load, save
 from .._spaces import Space
-from ._errors import Problem, reading, refuse, writing
+from ._messages import Problem, reading, refuse, writing
 from ._points import GLOBE, LONLAT, Columns, count_with_quaternion, labels, require_globe
 
 ENDING = (".npz",)
@@ -51,7 +51,9 @@ def write_curves(path: Path, curves: Curves) -> None:
 def read_curves(path: Path, lonlat: bool = False) -> Curves:
     """Read the curves in a file of ``symspline fit`` or of the library; ``lonlat`` as for ``symspline sample``."""
     with reading(path), open(path, "rb") as file:
-        entries = _entries(path, file)
+        if not zipfile.is_zipfile(file):
+            raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes")
+        file.seek(0)
         found = load(file)
         named = isinstance(found, dict)
         for curve in found.values() if named else [found]:
@@ -68,27 +70,17 @@ def read_curves(path: Path, lonlat: bool = False) -> Curves:
         space = next(iter(splines.values())).space
         if lonlat:
             require_globe(space)
-        file.seek(0)
-        columns = _columns(path, file, space) if f"{_COLUMNS}.npy" in entries else Columns(labels(space))
+        columns = _columns(path, file, space)
     if lonlat and not columns.lonlat:
         columns = replace(columns, points=LONLAT, lonlat=True)
     return Curves(splines, named, columns)
 
 
-def _entries(path: Path, file: BinaryIO) -> list[str]:
-    """Return the names of the entries of the file."""
-    try:
-        with zipfile.ZipFile(file) as archive:
-            return archive.namelist()
-    except (zipfile.BadZipFile, NotImplementedError, ValueError):
-        raise Problem(f"{path} is not a file of curves, such as `symspline fit` makes") from None
-    finally:
-        file.seek(0)
-
-
 def _columns(path: Path, file: BinaryIO, space: Space) -> Columns:
+    """Return the columns that `write_curves` wrote, or the usual ones if another program wrote the curves."""
     try:
-        columns = Columns(**json_in(read(file, lambda name: name == _COLUMNS), _COLUMNS))
+        entries = read(file, lambda name: name == _COLUMNS)
+        columns = Columns(**json_in(entries, _COLUMNS)) if entries else Columns(labels(space))
     except OSError:
         raise
     except Exception as error:

@@ -34,6 +34,7 @@ symspline.load reads the curve in Python; with --curve or --max-gap, it returns 
 from __future__ import annotations
 
 import argparse
+import math
 import warnings
 from collections.abc import Sequence
 from functools import partial
@@ -49,20 +50,20 @@ from .._report import long_gaps
 from .._representatives import IN_PYTHON
 from .._smoothing import SmoothingSpline, SmoothingWarning
 from .._smoothing.many import smooth_many
-from .._spaces import Space, space_named
-from . import _smoothing
+from .._spaces import Space, factors_of, space_named
 from ._columns import ORDERS, check_days, column_of_names, completed, point_entries, split_names, time_column
 from ._curves import ENDING, Curves, write_curves
-from ._errors import Problem, check_target
+from ._messages import Problem, Progress, check_target, refuse, say
 from ._points import GLOBE, Columns, points_of, require_globe
 from ._recordings import Recordings
 from ._tables import check_ending, open_table
-from ._terminal import Progress, say
-from ._times import number
+from ._times import is_number, number
 
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 _EXTRAPOLATE: dict[str, Any] = {"continue": True, "geodesic": "geodesic", "periodic": "periodic"}
 _METHODS = "auto (default), quasi-newton, newton, homotopy or fixed-point"
+_CRITERIA = ("gcv", "reml")
+_BEST = "best"
 _ENDS = "natural (default), not-a-knot, clamped, periodic; or two of the first three with a comma, for start and end"
 
 
@@ -89,15 +90,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--tol", type=number, help="relative C² residual that counts as converged (default: 1e-12)")
     add("--extrapolate", choices=_EXTRAPOLATE, help="continue the last segment outside the times, or go on along a "
         "geodesic, or periodically (default: times outside are an error)")  # fmt: skip
-    _smoothing.add_arguments(parser)
     add("-o", dest="output", type=Path, metavar="OUT", required=True, help="file of curves to write: .npz")
+    add = parser.add_argument_group("noisy data").add_argument
+    add(
+        "--smooth",
+        nargs="?",
+        const=_BEST,
+        metavar="HOW",
+        help="smooth the points; write it after IN. HOW is gcv (default; with --sigma Mallows' C_p), reml, or a number "
+        "λ >= 0, in a product perhaps one per factor with commas",
+    )
+    add(
+        "--sigma",
+        metavar="S",
+        help="known standard deviation of the noise in a coordinate: in the unit of distances, radians for rotations, "
+        "degrees with --lonlat; in a product perhaps one per factor with commas",
+    )
+    add("--robust", action="store_true", help="reduce the influence of outliers (loss 'cauchy')")
 
 
 def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
     check_ending(options.output, ENDING, "a file of curves")
     check_target(options.output)
-    smooth = _smoothing.smoothing_options(options)
+    smooth = _smoothing_options(options)
     space = _space(options.space, options.lonlat)
     table = open_table(options.input)
     curve = table.require(options.curve) if options.curve is not None else None
@@ -115,9 +131,7 @@ def run(options: argparse.Namespace) -> int:
     data = Recordings(table.path, rows, points, space, options, hint)
     fitted = _fitted(data, space, options, smooth)
     write_curves(options.output, Curves(dict(zip(data.groups, fitted, strict=True)), data.named, columns))
-    smoothed = [spline for spline in fitted if isinstance(spline, SmoothingSpline)]
-    what = _smoothing.summary(smoothed, options.lonlat) if smoothed else _summary(fitted)
-    print(f"{options.output}: {what}{_prepared(data, options.dedup)}{_gaps(fitted)}")
+    print(f"{options.output}: {_summary(fitted, options.lonlat)}{_prepared(data, options.dedup)}{_gaps(fitted)}")
     same = data.merged or data.repeated
     column = hint() if same else None
     if column is not None:
@@ -161,6 +175,51 @@ def _fitted(
     return fitted
 
 
+def _smoothing_options(options: argparse.Namespace) -> dict[str, Any] | None:
+    """Return the options of `symspline.make_smoothing_spline`; None to fit curves through the points.
+
+    Raises
+    ------
+    Problem
+        Options contradict each other.
+    """
+    how = options.smooth
+    if how is None:
+        option = "--sigma" if options.sigma is not None else "--robust" if options.robust else None
+        refuse(option, (option, " is for noisy data; give --smooth, too"))
+        return None
+    through = "is for curves through the points; omit it with --smooth"
+    bad = [cell for cell in how.split(",") if not is_number(cell)] if how not in (_BEST, *_CRITERIA) else []
+    choices = f"give {', '.join(_CRITERIA)} or a number; write the name of the table before --smooth"
+    refuse(
+        "",
+        (options.bc_type != "natural", f"--bc-type {options.bc_type} {through}: smoothing has natural ends"),
+        (options.tol is not None, f"--tol {through}"),
+        (options.method != "auto", f"--method {through}"),
+        (options.dedup == "mean", "with --smooth all points of one time count; omit --dedup mean"),
+        (bad, f"--smooth {how}: {choices}"),
+    )
+    lam = None if how in (_BEST, *_CRITERIA) else _numbers(how, "--smooth")
+    sigma = None if options.sigma is None else _numbers(options.sigma, "--sigma")
+    if sigma is not None and not np.all(np.greater(sigma, 0)):
+        raise Problem(f"--sigma {options.sigma}: the standard deviation must be greater than 0")
+    if options.lonlat and isinstance(sigma, float):
+        sigma = math.radians(sigma)
+    criterion = how if how in _CRITERIA else "cp" if how == _BEST and sigma is not None else "gcv"
+    loss = "cauchy" if options.robust else "linear"
+    return {"criterion": criterion, "lam": lam, "sigma": sigma, "loss": loss}
+
+
+def _numbers(text: str, option: str) -> Any:
+    """A number, or a tuple of several."""
+    cells = text.split(",")
+    refuse(f"{option} {text}: ", (not all(map(is_number, cells)), "give a number such as 0.1"))
+    values = tuple(map(float, cells))
+    bad = [value for value in values if not 0 <= value < np.inf]
+    refuse(f"{option} {text}: ", (bad, f"{next(iter(bad), 0):g} is not a finite number >= 0"))
+    return values if len(values) > 1 else values[0]
+
+
 def _bc_type(text: str) -> Any:
     ends = tuple(end.strip() for end in text.split(","))
     if ends != ("periodic",) and (len(ends) > 2 or not set(ends) <= {"natural", "not-a-knot", "clamped"}):
@@ -190,11 +249,39 @@ def _gaps(splines: Sequence[CubicSpline]) -> str:
     return f"; {gaps}, up to {max(found):.4g}{unit} (--max-gap cuts there)"
 
 
-def _summary(splines: Sequence[CubicSpline]) -> str:
+def _summary(splines: Sequence[CubicSpline], lonlat: bool) -> str:
+    many, most = ("s", "at most ") if len(splines) > 1 else ("", "")
+    smooth = [spline for spline in splines if isinstance(spline, SmoothingSpline)]
+    where = "near" if smooth else "through"
+    points = sum(len(spline.data[0]) for spline in smooth) or sum(len(spline.t) for spline in splines)
+    words = f"{len(splines)} curve{many} {where} {points} points of {splines[0].space}, converged: "
+    if smooth:
+        return words + _smoothing_summary(smooth, lonlat)
     reports = [spline.report for spline in splines]
     iterations, residual = max(r.iterations for r in reports), max(r.residual for r in reports)
-    many, most = ("s", "at most ") if len(splines) > 1 else ("", "")
-    return (
-        f"{len(splines)} curve{many} through {sum(len(spline.t) for spline in splines)} points of {splines[0].space}, "
-        f"converged: {reports[0].method}, {most}{iterations} iterations, residual {most}{residual:.1e}"
-    )
+    return f"{words}{reports[0].method}, {most}{iterations} iterations, residual {most}{residual:.1e}"
+
+
+def _smoothing_summary(splines: Sequence[SmoothingSpline], lonlat: bool) -> str:
+    reports = [spline.report if isinstance(spline.report, tuple) else (spline.report,) for spline in splines]
+    spaces = factors_of(splines[0].space)
+    parts = []
+    # A pose has a report for its rotation and one for its position, of which the first is shown.
+    for space, own in zip(spaces, zip(*reports, strict=True), strict=False):
+        bound = sum(bool(report.at_bound) for report in own)
+        rough = sum(bool(report.at_bound) and report.df > 2.5 for report in own)
+        at_bound = " (at its bound)" if len(own) == 1 else f" ({bound} at a bound)"
+        through = "the curve passes" if len(own) == 1 else f"{rough} curves pass"
+        no_noise = f" (no noise was found: {through} through the points; give --sigma or a λ)"
+        parts.append(
+            f"{f'{space}: ' if len(spaces) > 1 else ''}λ {_range([report.lam for report in own])}"
+            f"{at_bound if bound else ''}, {_range([report.df for report in own])} degrees of freedom, noise "
+            f"{_range([np.degrees(report.sigma) if lonlat else report.sigma for report in own])}"
+            f"{'°' if lonlat else ''}{no_noise if rough else ''}"
+        )
+    return "; ".join(parts)
+
+
+def _range(values: Sequence[float]) -> str:
+    least, most = f"{min(values):.3g}", f"{max(values):.3g}"
+    return least if least == most else f"{least} to {most}"

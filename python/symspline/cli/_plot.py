@@ -14,7 +14,7 @@ import argparse
 from pathlib import Path
 
 from ._curves import read_curves
-from ._errors import Problem, check_target, did_you_mean, listed, refuse, writing
+from ._messages import Problem, check_target, did_you_mean, listed, refuse, writing
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from .._pose_files import join, rotations_in_rows
 from .._smoothing import SmoothingSpline
 from .._spaces import POINT_TOL_FLOAT32, Doubles, Product, Space, factors_of, parts_of, space_named
 from ..rotations import angular_acceleration, angular_velocity, quaternion, quaternion_velocity
-from ._errors import Problem, for_command_line
+from ._messages import Problem, for_command_line
 from ._tables import IM, RE, Place
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
@@ -68,19 +69,17 @@ def complex_numbers(space: Space) -> list[bool]:
 
 def labels(space: Space) -> list[str]:
     """Name the numbers of a point x0, x1, … in vectors, m11, m12, … in a matrix, m1_11, … in several matrices."""
-    matrices = [factor for factor in factors_of(space) if _is_matrix(factor)]
+    factors = factors_of(space)
+    several = sum(map(_is_matrix, factors)) > 1
     names: list[str] = []
-    vectors = number = 0
-    for factor in factors_of(space):
+    vectors, matrices = count(), count(1)
+    for factor in factors:
         if _is_matrix(factor):
-            number += 1
-            start = f"m{number}_" if len(matrices) > 1 else "m"
+            start = f"m{next(matrices)}_" if several else "m"
             between = "_" if max(factor.point_shape) > 9 else ""
             names += [f"{start}{i + 1}{between}{j + 1}" for i, j in np.ndindex(*factor.point_shape)]
         else:
-            (length,) = factor.point_shape
-            names += [f"x{i}" for i in range(vectors, vectors + length)]
-            vectors += length
+            names += [f"x{next(vectors)}" for _ in range(*factor.point_shape)]
     return names
 
 
@@ -94,8 +93,8 @@ def described(space: Space) -> str:
 
 
 def _described(space: Space) -> str:
-    count = math.prod(space.point_shape)
-    text = f"{count} {'complex number' if space._complex else 'number'}{'s' if count > 1 else ''}"
+    size = math.prod(space.point_shape)
+    text = f"{size} {'complex number' if space._complex else 'number'}{'s' if size > 1 else ''}"
     text += f", A{RE} and A{IM} each" if space._complex else ""
     return f"{text}, a {matrix(space)}" if _is_matrix(space) else text
 
@@ -154,7 +153,7 @@ def points_of(space: Space, numbers: Doubles, columns: Columns, file: object, pl
         own = np.ascontiguousarray(numbers[:, start : start + width(factor, columns.quaternion is not None)])
         start += own.shape[1]
         if columns.quaternion is not None and factor in (ROTATIONS, POSES):
-            rotations = rotations_in_rows(own[:, -4:], lambda row: f"{file}, {place(row)}", POINT_TOL_FLOAT32)
+            rotations = rotations_in_rows(own[:, -4:], file, place, POINT_TOL_FLOAT32)
             part = join(rotations, own[:, :3]) if factor == POSES else rotations
         else:
             part = own.view(factor.dtype).reshape(len(own), *factor.point_shape)

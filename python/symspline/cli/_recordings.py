@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .._core import CutLocusError
 from .._segments import cut
 from .._spaces import Space
-from ._errors import Problem, refuse
+from ._messages import Problem, refuse
 from ._tables import Rows
 from ._times import longest_gap
 

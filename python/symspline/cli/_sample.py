@@ -34,20 +34,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._pose_files import TUM
 from .._smoothing import SmoothingSpline
 from .._spaces import space_named
 from .._time import onto_ends
 from ._columns import quaternion_by_names, time_column
 from ._curves import Curves, read_curves
-from ._errors import Problem, check_target, did_you_mean, first_duplicate, refuse
+from ._messages import Problem, Progress, check_target, did_you_mean, first_duplicate, refuse
 from ._points import Columns, Samples, deviations_of, samples_of
 from ._recordings import Groups, group
 from ._tables import TUM_ENDINGS, Rows, check_ending, open_table, write_table
-from ._terminal import Progress
 from ._times import Times, every, number, spread
 
 _MOST = 10**9
-_TUM_NAMES = ["tx", "ty", "tz", "qx", "qy", "qz", "qw"]
+_TUM_NAMES = list(TUM[1:])
 _TUM_SPACES = [space_named(name) for name in ("se:3", "so:3 x r:3", "r:3 x so:3")]
 
 

@@ -8,7 +8,7 @@ import math
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import date, time, timedelta
 from itertools import islice, zip_longest
 from os import fstat
@@ -19,11 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._archive import read
-from .._arrays import brief
-from .._core import ValidationError
+from .._disk import damage
 from .._pose_files import TUM, tum_rows, write_tum_rows
-from ._errors import Problem, did_you_mean, first_duplicate, reading, refuse, writing
-from ._terminal import Progress
+from ._messages import Problem, Progress, did_you_mean, first_duplicate, reading, refuse, writing
 from ._times import is_date_like, is_number, is_packed_day, numbers, parse_times
 
 Array = NDArray[Any]
@@ -34,14 +32,6 @@ RE, IM = "_re", "_im"
 _CHUNK = 2000
 # Rows that are searched for dates, as the first ones may hold units or be empty.
 _FIRST = 50
-
-
-def _row(row: int) -> str:
-    return f"row {row} (counted from 0)"
-
-
-def _problem(path: Path, place: str, name: str, found: str) -> Problem:
-    return Problem(f"{path}, {place}: column {name!r} {found}")
 
 
 @dataclass(frozen=True)
@@ -68,36 +58,39 @@ class Rows:
     place: Place
 
 
-@dataclass
 class Table:
-    """A file with named columns.
+    """A file with named columns. Its subclasses read the formats.
 
     Attributes
     ----------
     path : Path
     names, numeric, dates : list of str
         All columns in the order of the file, those with numbers, and those with dates or text that looks like dates.
-    column : callable
-        Returns a column with the type that it has in the file.
     groups : dict
         The columns of each array of an NPZ file.
-    place : callable
-        Describes the position of a row.
     is_utc : dict
         Whether a column of dates has the time zone UTC; empty if it is unknown.
-    load : callable
-        Reads columns of numbers and columns of text, if the file was not read as a whole.
+    columns : mapping
+        Columns that were read, with the type that they have in the file.
     """
 
-    path: Path
     names: list[str]
     numeric: list[str]
     dates: list[str]
-    column: Callable[[str], Array | list[str]]
-    groups: dict[str, list[str]] = field(default_factory=dict)
-    place: Place = _row
-    is_utc: dict[str, bool] = field(default_factory=dict)
-    load: Callable[[Sequence[str], Sequence[str], Progress], None] = lambda *_: None
+    groups: dict[str, list[str]]
+    is_utc: dict[str, bool]
+    columns: dict[str, Any]
+
+    def __init__(self, path: Path) -> None:
+        """Read the names of the columns."""
+        self.path, self.groups, self.is_utc, self.columns = path, {}, {}, {}
+
+    def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
+        """Read columns of numbers and columns of text, if the file was not read as a whole."""
+
+    def place(self, row: int) -> str:
+        """Describe the position of a row."""
+        return f"row {row} (counted from 0)"
 
     def require(self, name: str) -> str:
         """Return the name if there is such a column."""
@@ -137,7 +130,7 @@ class Table:
         return Rows(table, times, utc, labels, self.place)
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
-        array = np.asarray(self.column(name))
+        array = np.asarray(self.columns[name])
         if array.dtype.kind not in "biuf":
             raise Problem(f"{self.path}: column {name!r} holds {array.dtype}, not numbers")
         values = array.astype(np.float64)
@@ -147,7 +140,7 @@ class Table:
         return values
 
     def _texts(self, name: str) -> list[str]:
-        column = self.column(name)
+        column = self.columns[name]
         if isinstance(column, list):
             texts = [cell.strip() for cell in column]
         else:
@@ -161,7 +154,7 @@ class Table:
         return texts
 
     def _times(self, name: str) -> tuple[Array, bool | None]:
-        column = self.column(name)
+        column = self.columns[name]
         if isinstance(column, list) or column.dtype.kind in "OUT":
             return parse_times(self._texts(name), lambda row, found: self._problem(name, row, found))
         if column.dtype.kind in "iu":
@@ -173,24 +166,37 @@ class Table:
         return column, self.is_utc.get(name)
 
     def _problem(self, name: str, row: int, found: str) -> Problem:
-        return _problem(self.path, self.place(row), name, found)
+        return Problem(f"{self.path}, {self.place(row)}: column {name!r} {found}")
 
 
 # ---- reading ----
 
 
-class _Csv:
+class _Csv(Table):
     """Text in UTF-8 with cells separated by commas and names of columns in the first line; blank lines are skipped.
 
-    Only the columns that are needed are read.
+    Only the columns that are needed are read. A column is numeric if it has a name and its first cell is a number.
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        super().__init__(path)
         with self._reader() as (reader, _):
-            self.head = list(islice(filter(None, reader), _FIRST))
-        refuse(path, (not self.head, " is empty"))
-        self.names = [name.strip() for name in self.head[0]]
+            names, *rows = list(islice(filter(None, reader), _FIRST)) or [[]]
+        self.names = names = [name.strip() for name in names]
+        twice = first_duplicate([name for name in names if name])
+        whole = ",".join(names)
+        semicolons = len(names) == 1 and set(";\t") & set(whole)
+        refuse(
+            path,
+            (not names, " is empty"),
+            (semicolons, f": cells must be separated by commas; the first line is {whole!r}"),
+            (all(map(is_number, names)), ": the first line must name the columns, but holds numbers"),
+            (twice is not None, f": the first line names two columns {twice!r}"),
+            (not rows, " has no rows below the names of its columns"),
+        )
+        self.numeric = [name for name, cell in zip(names, rows[0], strict=False) if name and is_number(cell)]
+        columns = zip(names, zip_longest(*rows, fillvalue=""), strict=False)
+        self.dates = [name for name, cells in columns if _holds_dates(cells)]
 
     def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
         index = {name: i for i, name in enumerate(self.names)}
@@ -200,24 +206,20 @@ class _Csv:
             size = fstat(file.fileno()).st_size
             next(filter(None, reader))
             while chunk := [(reader.line_num, row) for row in islice(reader, _CHUNK)]:
-                rows = []
-                for line, row in chunk:
-                    if row and len(row) != len(self.names):
-                        width = f"{len(row)} cells, but the first line names {len(self.names)} columns"
-                        raise Problem(f"{self._path}, line {line}: {width}")
-                    rows += [row] if row else []
                 start = len(self._lines)
+                rows = [row for _, row in chunk if row]
                 self._lines += [line for line, row in chunk if row]
+                for i, row in enumerate(rows, start):
+                    if len(row) != len(self.names):
+                        width = f"{len(row)} cells, but the first line names {len(self.names)} columns"
+                        raise Problem(f"{self.path}, {self.place(i)}: {width}")
                 columns = list(zip(*rows, strict=True)) or [()] * len(self.names)
                 for name in numbers:
                     cells[name].append(self._converted(columns[index[name]], name, start))
                 for name in texts:
                     cells[name] += columns[index[name]]
                 progress(file.tell(), size)
-        self._cells: dict[str, Any] = cells | {name: np.concatenate(cells[name]) for name in numbers}
-
-    def column(self, name: str) -> Array | list[str]:
-        return self._cells[name]  # type: ignore[no-any-return]
+        self.columns = cells | {name: np.concatenate(cells[name]) for name in numbers}
 
     def place(self, row: int) -> str:
         return f"line {self._lines[row]}"
@@ -229,39 +231,20 @@ class _Csv:
             i = next(i for i, cell in enumerate(cells) if not is_number(cell))
             found = f"holds {cells[i]!r}, which is not a number" if cells[i].strip() else "is empty"
             units = "; if this line holds units, remove it" if start + i == 0 and cells[i].strip() else ""
-            raise _problem(self._path, self.place(start + i), name, found + units) from None
+            raise self._problem(name, start + i, found + units) from None
 
     @contextmanager
     def _reader(self) -> Iterator[tuple[Any, BinaryIO]]:
         """Yield a reader of rows and the file below it, whose position shows the progress."""
-        with reading(self._path), open(self._path, "rb") as file:
+        with reading(self.path), open(self.path, "rb") as file:
             text = io.TextIOWrapper(file, "utf-8-sig", newline="")
             reader = csv.reader(text, skipinitialspace=True, strict=True)
             try:
                 yield reader, file
             except UnicodeDecodeError:
-                raise Problem(f"{self._path} is not text in UTF-8") from None
+                raise Problem(f"{self.path} is not text in UTF-8") from None
             except csv.Error as error:
-                raise Problem(f"{self._path}, line {reader.line_num}: {error}") from None
-
-
-def _open_csv(path: Path) -> Table:
-    """Open a CSV file. A column is numeric if it has a name and its first cell is a number."""
-    file = _Csv(path)
-    names, rows = file.names, file.head[1:]
-    twice = first_duplicate([name for name in names if name])
-    semicolons = len(names) == 1 and set(";\t") & set(names[0])
-    refuse(
-        path,
-        (semicolons, f": cells must be separated by commas; the first line is {names[0]!r}"),
-        (all(map(is_number, names)), ": the first line must name the columns, but holds numbers"),
-        (twice is not None, f": the first line names two columns {twice!r}"),
-        (not rows, " has no rows below the names of its columns"),
-    )
-    numeric = [name for name, cell in zip(names, rows[0], strict=False) if name and is_number(cell)]
-    columns = zip(names, zip_longest(*rows, fillvalue=""), strict=False)
-    dates = [name for name, cells in columns if _holds_dates(cells)]
-    return Table(path, names, numeric, dates, file.column, place=file.place, load=file.load)
+                raise Problem(f"{self.path}, line {reader.line_num}: {error}") from None
 
 
 def _holds_dates(cells: Sequence[str]) -> bool:
@@ -270,80 +253,81 @@ def _holds_dates(cells: Sequence[str]) -> bool:
     return next((not is_number(cell) or is_packed_day(cell) for cell in found), False)
 
 
-def _open_npz(path: Path) -> Table:
-    """Open an NPZ file, whose arrays have one entry per row.
+class _Npz(Table):
+    """An NPZ file, whose arrays have one entry per row.
 
     The entries of an array ``a`` with more axes are the columns ``a_0``, ``a_1``, … row by row; complex numbers are
     two columns ``a_0_re`` and ``a_0_im``.
     """
-    arrays = {key: a for key, a in _arrays(path).items() if a.ndim and a.dtype.kind in "biufcMmSU"}
-    groups = {key: _split(key, array) for key, array in arrays.items()}
-    columns = {name: column for own in groups.values() for name, column in own.items()}
-    kinds = {name: column.dtype.kind for name, column in columns.items()}
-    first = {name: "".join(columns[name][:1]) for name, kind in kinds.items() if kind == "U"}
-    numeric = [name for name, kind in kinds.items() if kind in "biuf"]
-    dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
-    return Table(path, list(kinds), numeric, dates, columns.__getitem__, {key: [*own] for key, own in groups.items()})
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        with reading(path), open(path, "rb") as file:
+            refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
+            file.seek(0)
+            with damage(path, "is damaged, or holds other objects than numbers"):
+                arrays = read(file, lambda name: True)
+        refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
+        for key, array in arrays.items():
+            if not array.ndim or array.dtype.kind not in "biufcMmSU":
+                continue
+            entries = array.reshape(len(array), math.prod(array.shape[1:])).T
+            own = {key if array.ndim == 1 else f"{key}_{i}": entry for i, entry in enumerate(entries)}
+            if array.dtype.kind == "c":
+                own = {name + end: part for name, z in own.items() for end, part in ((RE, z.real), (IM, z.imag))}
+            self.groups[key] = [*own]
+            self.columns |= own
+        kinds = {name: column.dtype.kind for name, column in self.columns.items()}
+        first = {name: "".join(self.columns[name][:1]) for name, kind in kinds.items() if kind == "U"}
+        self.names = list(kinds)
+        self.numeric = [name for name, kind in kinds.items() if kind in "biuf"]
+        self.dates = [name for name in kinds if kinds[name] in "Mm" or is_date_like(first.get(name, ""))]
 
 
-def _arrays(path: Path) -> dict[str, Array]:
-    with reading(path), open(path, "rb") as file:
-        refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
-        file.seek(0)
-        try:
-            arrays = read(file, lambda name: True)
-        except (OSError, MemoryError):
-            raise
-        except ValidationError as error:
-            raise Problem(f"{path}: {error}") from None
-        except Exception as error:
-            # Damaged files raise errors of zipfile, of its decompressors and of NumPy.
-            raise Problem(f"{path} is damaged, or holds other objects than numbers: {brief(error)}") from None
-    refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
-    return arrays
+class _Parquet(Table):
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        pa, parquet = _pyarrow()
+        with reading(path), open(path, "rb") as file:
+            try:
+                self._table = parquet.read_table(file)
+            except pa.ArrowInvalid:
+                raise Problem(f"{path} is damaged or not a Parquet file") from None
+        types = {column.name: column.type for column in self._table.schema}
+        is_kind = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
+        self.names = self._table.column_names
+        self.numeric = [name for name, own in types.items() if any(test(own) for test in is_kind)]
+        self.dates = [name for name in types if pa.types.is_temporal(types[name]) or is_date_like(self._text(name))]
+        self.is_utc = {name: getattr(own, "tz", None) is not None for name, own in types.items()}
+
+    def _text(self, name: str) -> str:
+        """Return the first of the texts at the start of a column, empty if it holds none."""
+        cells = self._table.column(name)
+        is_text = str(cells.type) in ("string", "large_string", "string_view")
+        return next((cell.as_py() for cell in cells[:_FIRST] if is_text and cell.is_valid), "")
+
+    def load(self, numbers: Sequence[str], texts: Sequence[str], progress: Progress) -> None:
+        pa, _ = _pyarrow()
+        for name in (*numbers, *texts):
+            cells = self._table.column(name)
+            if cells.null_count:
+                raise self._problem(name, int(cells.is_null().to_numpy().argmax()), "is empty")
+            cells = cells.cast(pa.float64()) if pa.types.is_decimal(cells.type) else cells
+            self.columns[name] = np.asarray(cells.to_numpy())
 
 
-def _split(key: str, array: Array) -> dict[str, Array]:
-    """Split an array into columns."""
-    entries = array.reshape(len(array), math.prod(array.shape[1:])).T
-    columns = {key if array.ndim == 1 else f"{key}_{i}": entry for i, entry in enumerate(entries)}
-    if array.dtype.kind != "c":
-        return columns
-    return {name + end: part for name, z in columns.items() for end, part in ((RE, z.real), (IM, z.imag))}
+class _Tum(Table):
+    """A trajectory of the TUM RGB-D benchmark: lines of time, position and quaternion, its scalar last."""
 
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        with reading(path):
+            rows, self._lines = tum_rows(path)
+        self.names, self.numeric, self.dates = [*TUM], [*TUM], []
+        self.columns = dict(zip(TUM, rows.T, strict=True))
 
-def _open_parquet(path: Path) -> Table:
-    pa, parquet = _pyarrow()
-    with reading(path), open(path, "rb") as file:
-        try:
-            table = parquet.read_table(file)
-        except pa.ArrowInvalid:
-            raise Problem(f"{path} is damaged or not a Parquet file") from None
-    types = {column.name: column.type for column in table.schema}
-
-    def column(name: str) -> Array:
-        cells = table.column(name)
-        if cells.null_count:
-            raise _problem(path, _row(int(cells.is_null().to_numpy().argmax())), name, "is empty")
-        return np.asarray((cells.cast(pa.float64()) if pa.types.is_decimal(types[name]) else cells).to_numpy())
-
-    def first_text(name: str) -> str:
-        is_text = str(types[name]) in ("string", "large_string", "string_view")
-        cells = table.column(name)[:_FIRST] if is_text else ()
-        return next((cell.as_py() for cell in cells if cell.is_valid), "")
-
-    is_kind = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal)
-    numeric = [name for name, own in types.items() if any(test(own) for test in is_kind)]
-    dates = [name for name in types if pa.types.is_temporal(types[name]) or is_date_like(first_text(name))]
-    is_utc = {name: getattr(own, "tz", None) is not None for name, own in types.items()}
-    return Table(path, table.column_names, numeric, dates, column, is_utc=is_utc)
-
-
-def _open_tum(path: Path) -> Table:
-    """Open a trajectory of the TUM RGB-D benchmark: lines of time, position and quaternion, its scalar last."""
-    with reading(path):
-        rows, place = tum_rows(path)
-    return Table(path, [*TUM], [*TUM], [], dict(zip(TUM, rows.T, strict=True)).__getitem__, place=place)
+    def place(self, row: int) -> str:
+        return self._lines.place(row)
 
 
 # ---- writing ----
@@ -404,12 +388,12 @@ def _pyarrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-_FORMATS: dict[str, tuple[Callable[[Path], Table], Callable[[BinaryIO, Mapping[str, Array], bool], None]]] = {
-    ".csv": (_open_csv, _write_csv),
-    ".npz": (_open_npz, _write_npz),
-    ".parquet": (_open_parquet, _write_parquet),
-    ".tum": (_open_tum, _write_tum),
-    ".txt": (_open_tum, _write_tum),
+_FORMATS: dict[str, tuple[type[Table], Callable[[BinaryIO, Mapping[str, Array], bool], None]]] = {
+    ".csv": (_Csv, _write_csv),
+    ".npz": (_Npz, _write_npz),
+    ".parquet": (_Parquet, _write_parquet),
+    ".tum": (_Tum, _write_tum),
+    ".txt": (_Tum, _write_tum),
 }
 ENDINGS, TUM_ENDINGS = tuple(_FORMATS), (".tum", ".txt")
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .._core import ValidationError
 from .._input import ISO_DATE, UTC_ZONE, times_of
-from ._errors import Problem, refuse
+from ._messages import Problem, refuse
 
 Times = NDArray[Any]
 Fail = Callable[[int, str], Problem]
@@ -28,11 +28,9 @@ _DATE_LIKE = re.compile(
 )
 _PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
 _DURATION = re.compile(r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+) ?([a-z]*)", re.IGNORECASE | re.ASCII)
-_SECOND, _MINUTE = 10**9, 60 * 10**9
-_NANOSECONDS = {
-    **{"ns": 1, "us": 10**3, "ms": 10**6, "s": _SECOND},
-    **{"min": _MINUTE, "h": 60 * _MINUTE, "d": 24 * 60 * _MINUTE},
-}
+_SECOND = 10**9
+_NANOSECONDS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": _SECOND}
+_NANOSECONDS |= {"min": 60 * _SECOND, "h": 3600 * _SECOND, "d": 24 * 3600 * _SECOND}
 # Whole numbers up to here are exact as floating-point numbers.
 _EXACT = 2**53
 _MOST = 10**9

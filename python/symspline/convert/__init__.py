@@ -13,12 +13,6 @@ Examples
 array([0.76159416])
 """
 
-from ._embeddings import (
-    positive_definite_to_siegel,
-    quaternions_to_subspace,
-    siegel_to_positive_definite,
-    subspace_to_quaternions,
-)
 from ._models import (
     ball_to_half_space,
     ball_to_hyperboloid,
@@ -26,10 +20,20 @@ from ._models import (
     half_space_to_hyperboloid,
     hyperboloid_to_ball,
     hyperboloid_to_half_space,
+    positive_definite_to_siegel,
+    siegel_to_positive_definite,
 )
-from ._projectors import basis_to_projector, density_to_state, projector_to_basis, state_to_density
 from ._quaternions import matrix_to_quaternion, quaternion_to_matrix
-from ._reflections import basis_to_reflection, reflection_to_basis
+from ._subspaces import (
+    basis_to_projector,
+    basis_to_reflection,
+    density_to_state,
+    projector_to_basis,
+    quaternions_to_subspace,
+    reflection_to_basis,
+    state_to_density,
+    subspace_to_quaternions,
+)
 
 __all__ = [
     "ball_to_half_space",

@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 from .._arrays import checked_atol, refuse
 from .._core import ValidationError
 from .._quaternions import Rows, quaternion_rows, rotation_rows
-from ._reading import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
+from .._validation import Array, length, off_one, real_numbers, unit_vectors, unmoved_by_underflow
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None) -> Array:
     """Convert rotation matrices to unit quaternions, accurately for small angles and for angles near π.
 
@@ -46,7 +46,12 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
     """
     first = checked_order(scalar_first)
     r, tol = real_numbers(matrix, "matrix", (3, 3))
-    _check_rotations(r, tol)
+    off = off_one(r)
+    advice = "SpecialOrthogonal(3).project(matrix) projects nearby matrices onto the rotations"
+    refuse(~(off <= tol), "matrix", lambda i: f"is not a rotation: |RᵀR - 1| is {off[i]:.3e}; {advice}")
+    determinants = np.linalg.det(r)
+    what, advice = "is a reflection, not a rotation: its determinant is", "swap two columns, or change the sign of one"
+    refuse(~(determinants > 0), "matrix", lambda i: f"{what} {determinants[i]:.3g}; {advice}")
     table = _matrices(quaternion_rows(r))
     best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
     q = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
@@ -54,7 +59,7 @@ def matrix_to_quaternion(matrix: ArrayLike, *, scalar_first: bool | None = None)
     return q if first else np.roll(q, -1, axis=-1)
 
 
-@unmoved_by_underflow
+@unmoved_by_underflow()
 def quaternion_to_matrix(
     quaternion: ArrayLike, *, scalar_first: bool | None = None, atol: float | None = None
 ) -> Array:
@@ -107,12 +112,3 @@ def checked_order(scalar_first: bool | None) -> bool:
         "scalar_first is required, because the four numbers do not show their order: pass scalar_first=True for "
         f"(w, x, y, z) or scalar_first=False for (x, y, z, w) as in SciPy and ROS; got {scalar_first!r}"
     )
-
-
-def _check_rotations(r: Array, tol: float) -> None:
-    off = off_one(r)
-    advice = "SpecialOrthogonal(3).project(matrix) projects nearby matrices onto the rotations"
-    refuse(~(off <= tol), "matrix", lambda i: f"is not a rotation: |RᵀR - 1| is {off[i]:.3e}; {advice}")
-    determinants = np.linalg.det(r)
-    what, advice = "is a reflection, not a rotation: its determinant is", "swap two columns, or change the sign of one"
-    refuse(~(determinants > 0), "matrix", lambda i: f"{what} {determinants[i]:.3g}; {advice}")

@@ -11,17 +11,22 @@ import json
 from collections.abc import Hashable, Sequence
 from typing import Any, Unpack
 
+import numpy as np
 import xarray as xr
 
+from .._arrays import short_repr
+from .._core import ValidationError
 from .._options import checked_extrapolate, extrapolation_mode, quantity_of
-from .._spaces import Space
+from .._spaces import Space, space_named
 from .._typing import BCType, Extrapolate, Method, OnFailure, SolverOptions
 from .._version import VERSION
-from ._blocks import COLUMNS, Inputs, apply, fitted, resampled
-from ._results import KNOTS, along, bare, timed_by
-from ._spec import rehearse, spec_of, times_with_names
+from ._blocks import COLUMNS, Inputs, apply, fitted, resampled, values_at
+from ._spec import check_dims, rehearse, spec_of, times_with_names
 
 __all__ = ["evaluate", "fit", "lift", "resample", "speed"]
+
+# The dimension of the knots where a result has times of its own, which may have the same name.
+_KNOTS = "symspline_knots"
 
 
 def fit(
@@ -86,17 +91,15 @@ def fit(
     (('curve', 'time', 'q'), array([ True]))
     """
     options = {"method": method, "tol": tol, "max_iter": max_iter, "extrapolate": extrapolate, "atol": atol}
-    spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
+    inputs, spec = spec_of(da, space, dim, point_dims, where, bc_type, on_failure=on_failure, **options)
     axes: list[Hashable] = [dim, *point_dims]
-    dtype = spec.space.dtype
-    variables = apply(
-        fitted, spec.inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], **spec.options
-    )
+    dtype = spec["space"].dtype
+    variables = apply(fitted, inputs, [axes, axes, *([] for _ in COLUMNS)], [dtype, dtype, *COLUMNS.values()], **spec)
     ds = xr.Dataset(dict(zip(("points", "velocities", *COLUMNS), variables, strict=True)))
     ds.points.attrs = dict(da.attrs)
-    words = spec.options["kinds"]
+    words = spec["kinds"]
     ds.attrs = {
-        "space": str(spec.space),
+        "space": str(spec["space"]),
         "curve_dim": dim,
         "point_dims": list(point_dims),
         "bc_type": words if isinstance(words, str) else json.dumps(words),
@@ -140,7 +143,7 @@ def evaluate(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = 
     >>> symspline.xarray.evaluate(ds, [0.5, 1.0]).sel(time=0.5).values.round(8)
     array([ 0.61308303,  0.76368565, -0.20227067])
     """
-    return along(ds, x, quantity_of(nu), extrapolate)
+    return _along(ds, x, quantity_of(nu), extrapolate)
 
 
 def lift(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None) -> xr.DataArray:
@@ -171,7 +174,7 @@ def lift(ds: xr.Dataset, x: Any, *, nu: int = 0, extrapolate: Extrapolate = None
     >>> symspline.xarray.lift(ds, 2.0).values.round(12)
     array([-0.28,  0.96])
     """
-    return along(ds, x, quantity_of(nu), extrapolate, lifted=True)
+    return _along(ds, x, quantity_of(nu), extrapolate, lifted=True)
 
 
 def speed(ds: xr.Dataset, x: Any, *, extrapolate: Extrapolate = None) -> xr.DataArray:
@@ -199,7 +202,7 @@ def speed(ds: xr.Dataset, x: Any, *, extrapolate: Extrapolate = None) -> xr.Data
     >>> symspline.xarray.speed(ds, [0.5, 1.5]).values.round(12)
     array([3., 3.])
     """
-    return along(ds, x, "speed", extrapolate)
+    return _along(ds, x, "speed", extrapolate)
 
 
 def resample(
@@ -248,13 +251,52 @@ def resample(
     >>> symspline.xarray.resample(da, "sphere:2", to=["2021-08-28T12:00"]).values.round(4)
     array([[ 0.6131,  0.7637, -0.2023]])
     """
-    spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
+    (_, *rest), spec = spec_of(da, space, dim, point_dims, where, bc_type, **{"on_failure": "ignore"} | options)
     curves = [d for d in da.dims if d not in (dim, *point_dims)]
     times, axes = times_with_names(to, dim, point_dims, curves)
     policy = extrapolation_mode(checked_extrapolate(options.get("extrapolate")), bc_type)
-    rehearse(times, spec.options["t"], da.sizes[dim], policy)
-    first, *rest = spec.inputs
-    inputs: Inputs = [(bare(first[0], dim), [KNOTS, *point_dims]), (times, axes), *rest]
-    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec.space.dtype], x_axes=len(axes), **spec.options)
+    rehearse(times, spec["t"], da.sizes[dim], policy)
+    inputs: Inputs = [(_bare(da, dim), [_KNOTS, *point_dims]), (times, axes), *rest]
+    (values,) = apply(resampled, inputs, [[*axes, *point_dims]], [spec["space"].dtype], x_axes=len(axes), **spec)
     values.attrs = dict(da.attrs)
-    return timed_by(values, times, dim).rename(da.name)
+    return _timed_by(values, times, dim).rename(da.name)
+
+
+def _along(ds: xr.Dataset, x: Any, quantity: str, extrapolate: Any, lifted: bool = False) -> xr.DataArray:
+    """A quantity of curves at times x."""
+    if not isinstance(ds, xr.Dataset):
+        raise ValidationError(f"ds is not what symspline.xarray.fit returns: it is {short_repr(ds)}")
+    try:
+        space = space_named(ds.attrs["space"])
+        dim, point_dims, policy = (ds.attrs[name] for name in ("curve_dim", "point_dims", "extrapolate"))
+        points, velocities = ds["points"], ds["velocities"]
+    except (AttributeError, KeyError) as error:
+        raise ValidationError(f"ds is not what symspline.xarray.fit returns: it has no {error}") from None
+    # Some file formats make one text of a list with one.
+    point_dims = [point_dims] if isinstance(point_dims, str) else list(point_dims)
+    for array in (points, velocities):
+        check_dims(array, space, dim, point_dims)
+    if extrapolate is not None:
+        policy = extrapolation_mode(checked_extrapolate(extrapolate), ds.attrs.get("bc_type"))
+    times, axes = times_with_names(x, dim, point_dims, [d for d in points.dims if d not in (dim, *point_dims)])
+    t = points[dim].values if dim in points.coords else None
+    rehearse(times, t, points.sizes[dim], policy)
+    own = [_KNOTS, *point_dims]
+    shape = [] if quantity == "speed" else point_dims
+    inputs: Inputs = [(_bare(points, dim), own), (_bare(velocities, dim), own), (times, axes)]
+    fixed = {"space": space, "t": t, "quantity": quantity, "policy": policy, "x_axes": len(axes), "lifted": lifted}
+    (values,) = apply(values_at, inputs, [[*axes, *shape]], [space.dtype if shape else np.float64], **fixed)
+    if quantity == "point":
+        values.attrs = dict(points.attrs)
+    return _timed_by(values, times, dim).rename(quantity)
+
+
+def _bare(array: xr.DataArray, dim: str) -> xr.DataArray:
+    """An array whose dimension of knots has nothing to do with times of that name."""
+    return array.drop_vars([name for name, c in array.coords.items() if dim in c.dims]).rename({dim: _KNOTS})
+
+
+def _timed_by(values: xr.DataArray, times: xr.DataArray, dim: str) -> xr.DataArray:
+    """The values with their times as a coordinate, where that can have the name of the dimension of time."""
+    fits = dim not in times.dims or times.ndim == 1
+    return values.assign_coords({dim: times}) if fits else values

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,19 +20,6 @@ from ._blocks import Inputs, values_at
 LINE = Euclidean(1)
 
 
-class FitSpec(NamedTuple):
-    """A fit that was checked as far as it can be without its points.
-
-    Attributes:
-        inputs: the points, then what else has dimensions of the curves, each with its core dimensions.
-        options: for `spline_of`.
-    """
-
-    space: Space
-    inputs: Inputs
-    options: dict[str, Any]
-
-
 def spec_of(
     da: xr.DataArray,
     space: Space[Any] | str,
@@ -41,7 +28,16 @@ def spec_of(
     where: xr.DataArray | None,
     bc_type: Any,
     **options: Any,
-) -> FitSpec:
+) -> tuple[Inputs, dict[str, Any]]:
+    """Check a fit as far as that is possible without its points.
+
+    Returns
+    -------
+    inputs : list of pair
+        The points, then all else that has dimensions of the curves, each with its core dimensions.
+    spec : dict
+        Arguments of `spline_of`.
+    """
     space = space_named(space)
     if not isinstance(da, xr.DataArray):
         raise ValidationError(f"da must be an xarray.DataArray, not {type(da).__name__}")
@@ -67,7 +63,7 @@ def spec_of(
         if vector is not None:
             names.append(name)
             inputs.append((_vector(vector, name, space, point_dims, curves), list(point_dims)))
-    return FitSpec(space, inputs, {"space": space, "t": t, "kinds": kinds, "names": names, "how": options})
+    return inputs, {"space": space, "t": t, "kinds": kinds, "names": names, "how": options}
 
 
 def check_dims(da: xr.DataArray, space: Space, dim: str, point_dims: Sequence[str]) -> None:

@@ -1,24 +1,34 @@
-"""Errors of the command line, and files that cannot be read or written."""
+"""Messages, errors and progress of the command line, and files that cannot be read or written."""
 
 from __future__ import annotations
 
 import os
+import re
+import sys
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Self
 
+from .._arrays import brief
 from .._disk import replacing
 from .._spaces.base import CLASSES
 
-# Long names first: Unitary is a part of SpecialUnitary.
-_NAMES = sorted(((cls.__name__, name) for name, cls in CLASSES.items()), key=lambda pair: -len(pair[0]))
+_NAMES = {cls.__name__: name for name, cls in CLASSES.items()}
+_SPACE = re.compile(rf"\b({'|'.join(_NAMES)})\((.*?)\)")
 _FOR_PYTHON = (
     "; use space.project(x) if these are meant to be points",
     " (np.linalg.qr gives an orthonormal basis)",
     ", or raise max_iter",
 )
+
+# Messages may quote any part of a file.
+_LONGEST = 1000
+_WAIT = 0.3
+"""Seconds between two updates; shorter work shows nothing."""
 
 
 class Problem(Exception):
@@ -45,11 +55,7 @@ def for_command_line(error: Exception) -> str:
     message = str(error)
     for advice in _FOR_PYTHON:
         message = message.replace(advice, "")
-    for class_name, name in _NAMES:
-        before, *after = message.split(f"{class_name}(")
-        parts = (text.partition(")") for text in after)
-        message = before + "".join(f"{name}:{numbers.replace(' ', '')}{rest}" for numbers, _, rest in parts)
-    return message
+    return _SPACE.sub(lambda space: f"{_NAMES[space[1]]}:{space[2].replace(' ', '')}", message)
 
 
 def did_you_mean(name: str, names: Sequence[str]) -> str:
@@ -98,3 +104,36 @@ def writing(path: Path) -> Iterator[Path]:
     """Yield a temporary file that replaces ``path`` if the body succeeds."""
     with reading(path, "write"), replacing(path) as temporary:
         yield temporary
+
+
+def say(message: object) -> None:
+    """Print one line on stderr."""
+    print("symspline:", brief(message, _LONGEST), file=sys.stderr)
+
+
+class Progress:
+    """Update one line on stderr if it is a terminal, and clear it at the end.
+
+    Call an instance with the amount done and the total, from any loop or by the library.
+    """
+
+    def __init__(self, work: str) -> None:
+        self._work = work
+        self._width = 0
+
+    def __enter__(self) -> Self:
+        self._next = time.monotonic() + _WAIT
+        self._shows = sys.stderr is not None and sys.stderr.isatty()
+        return self
+
+    def __call__(self, done: int, total: int) -> None:
+        if not self._shows or total <= 0 or time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _WAIT
+        line = f"{self._work}: {100 * done // total} %"
+        self._width = max(self._width, len(line))
+        print("\r" + line, end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._width:
+            print("\r" + " " * self._width, end="\r", file=sys.stderr, flush=True)

@@ -1,34 +1,34 @@
-"""Validation of arrays that are to be converted."""
+"""Validation of arrays of numbers, vectors and matrices, and of words."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_array, cast, refuse
-from .._core import ValidationError
-from .._spaces import point_tol
+from ._arrays import as_array, cast, refuse, short_repr
+from ._core import ValidationError
+from ._spaces import point_tol
 
 Array = NDArray[Any]
 
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
+
+@contextmanager
+def unmoved_by_underflow() -> Iterator[None]:
+    """Let numbers too small for double precision become zero, whatever NumPy's error settings."""
+    with np.errstate(under="ignore"):
+        yield
 
 
-def unmoved_by_underflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Decorate a function so that numbers too small for double precision become zero, whatever NumPy's error
-    settings."""
-
-    @wraps(function)
-    def quiet(*arguments: _P.args, **options: _P.kwargs) -> _T:
-        with np.errstate(under="ignore"):
-            return function(*arguments, **options)
-
-    return quiet
+def one_of(value: Any, name: str, *choices: str) -> str:
+    """Return a word, or raise ValidationError if it is not one of the choices."""
+    if not isinstance(value, str) or value not in choices:
+        listed = ", ".join(map(repr, choices[:-1]))
+        raise ValidationError(f"{name} must be {listed} or {choices[-1]!r}, not {short_repr(value)}")
+    return value
 
 
 def numbers(value: ArrayLike, name: str, axes: int) -> tuple[Array, float]:
@@ -107,3 +107,25 @@ def largest(x: Array) -> Array:
     """Return the largest entry of every matrix by magnitude."""
     result: Array = np.abs(x).max(axis=(-2, -1))
     return result
+
+
+def hermitian_part(x: Array) -> Array:
+    """Return (X + X*) / 2."""
+    return np.asarray((x + adjoint(x)) / 2)
+
+
+def check_symmetric(x: Array, allowed: Any, name: str, kind: str = "symmetric", advice: str = "") -> None:
+    """Raise ValidationError for matrices whose entries differ by more than is allowed from those across the diagonal.
+
+    For the kind "Hermitian", the entries across the diagonal must be complex conjugates.
+    """
+    # Input that is far off may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = largest(x - (adjoint(x) if kind == "Hermitian" else np.swapaxes(x, -1, -2)))
+    refuse(~(off <= allowed), name, lambda i: f"is not {kind}: entries differ by {off[i]:.3e}{advice}")
+
+
+def check_orthonormal(x: Array, tol: float, name: str, advice: str) -> None:
+    """Raise ValidationError for matrices whose columns are not orthonormal."""
+    off = off_one(x)
+    refuse(~(off <= tol), name, lambda i: f"does not have orthonormal columns: |X*X - 1| is {off[i]:.3e}; {advice}")

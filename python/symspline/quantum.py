@@ -1,0 +1,599 @@
+"""Quantum control: Hamiltonians that steer a system along a curve, pulses, propagators, the Bloch sphere.
+
+A curve on `ComplexProjective` is a path of pure states, a curve on `ComplexGrassmannian` a path of subspaces (such as
+logical states), and a curve on `Unitary` or `SpecialUnitary` a path of gates. The module implements the second step of
+§4.2 of the paper. All functions use iψ' = Hψ with ħ = 1; the paper uses the opposite sign.
+
+Examples
+--------
+>>> import numpy as np, symspline as ss
+>>> path = ss.CubicSpline([0, 1, 2], [[1, 0], [0.8, 0.6j], [0.6, 0.8]], "cp:1")
+>>> H = ss.quantum.hamiltonian(path, np.linspace(0, 2, 5))
+>>> U = ss.quantum.propagator(path, 1.0)
+>>> ss.CubicSpline(None, [U @ path.points[0], path.points[1]], "cp:1").length().round(8)
+np.float64(0.0)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from math import prod
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._arrays import as_array, refuse, short_repr
+from ._base_curve import check_curve
+from ._core import ValidationError
+from ._cubic import CubicSpline
+from ._curves.curve import CurveArrays
+from ._curves.reduced import span_of
+from ._input import times_of
+from ._options import order_of
+from ._spaces import ComplexGrassmannian, ComplexProjective, Doubles, Space, SpecialUnitary, Unitary
+from ._time import onto_ends
+from ._typing import Extrapolate, TimesLike
+from ._validation import (
+    Array,
+    adjoint,
+    check_symmetric,
+    largest,
+    numbers,
+    one_of,
+    real_numbers,
+    square_matrices,
+    unit_vectors,
+    unmoved_by_underflow,
+)
+
+if TYPE_CHECKING:
+    from qutip import QobjEvo
+
+__all__ = ["bloch_vector", "from_bloch_vector", "from_kets", "hamiltonian", "propagator", "pulses", "qobjevo"]
+
+_STAGES = 8
+# For steps of this length, the error of eight stages is a rounding error.
+_LONGEST_STEP = 0.4
+# Bytes of the linear systems that are solved at once.
+_BLOCK = 2**26
+
+
+# ---- Hamiltonians ----
+
+
+def hamiltonian(spline: CubicSpline, x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
+    """Compute the Hamiltonian that drives states along a curve, or its derivative.
+
+    Parameters
+    ----------
+    spline : CubicSpline
+        Curve on `ComplexProjective`, `ComplexGrassmannian`, `Unitary` or `SpecialUnitary`.
+    x : array_like
+        Times, any shape.
+    nu : {0, 1}, default 0
+        0 for H, 1 for its derivative H'.
+    extrapolate : bool or str, optional
+        Extrapolation policy, as for `CubicSpline`. ODE solvers may evaluate H beyond the last knot, which raises an
+        error by default. Pass ``"geodesic"`` to continue with the final Hamiltonian.
+
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, n, n)``
+        Hermitian matrices H with iψ' = Hψ.
+
+    Raises
+    ------
+    ValidationError
+        If the curve is on another space, `nu` is not 0 or 1, or a time is outside the knots.
+
+    Notes
+    -----
+    For states and subspaces, H has the least norm at every time: H = i[P', P] for the projector P [1]_. Its Frobenius
+    norm is √2 times the speed of the curve; for single states its spectral norm is the speed. H does not depend on
+    phases or bases of the points. It is as smooth as the velocity, C¹, and ∫ ‖H'‖² dt is twice
+    `CubicSpline.bending_energy`. For gates, H = iU'U* is unique. See also §4.2 of the paper.
+
+    References
+    ----------
+    .. [1] Kato, "On the adiabatic theorem of quantum mechanics", 1950.
+
+    Examples
+    --------
+    >>> import numpy as np, symspline as ss
+    >>> from_up_to_down = ss.CubicSpline([0, 1, 2], [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    >>> (hamiltonian(from_up_to_down, 0.5) / (np.pi / 4)).round(8) + 0.0
+    array([[0.+0.j, 0.-1.j],
+           [0.+1.j, 0.+0.j]])
+    """
+    space = _quantum_space(spline)
+    nu = order_of(nu, 1)
+    point, vector = (spline(x, nu=order, extrapolate=extrapolate) for order in (0, nu + 1))
+    return _generator(space, point, vector)
+
+
+def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEvo:
+    """Convert the Hamiltonian of a curve to a ``QobjEvo`` for QuTiP's solvers.
+
+    With ħ = 1, times in ns give a Hamiltonian in rad/ns. The solver's states agree with the points of the curve up to a
+    phase.
+
+    Parameters
+    ----------
+    spline : CubicSpline
+        One curve, as for `hamiltonian`, whose times are numbers.
+    dims : sequence of int, optional
+        Levels of each part of a composite system, such as ``[2, 2]`` for two qubits. None means a single system.
+
+    Returns
+    -------
+    qutip.QobjEvo
+        Time-dependent Hamiltonian.
+
+    Raises
+    ------
+    ImportError
+        If QuTiP is not installed.
+    ValidationError
+        If the curve is on another space, is a batch, has dates as times, or `dims` has another number of levels. The
+        result raises this error for times before the first knot.
+
+    Notes
+    -----
+    Solvers evaluate the Hamiltonian beyond the last knot. If the curve raises an error there, the final Hamiltonian is
+    used instead. For SciPy's solvers, do the same with ``hamiltonian(spline, t, extrapolate="geodesic")``.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> from symspline import quantum
+    >>> flip = ss.CubicSpline([0, 10], [[1, 0], [0.6, 0.8]], "cp:1")
+    >>> quantum.qobjevo(flip)(5.0).shape
+    (2, 2)
+    """
+    _quantum_space(spline)
+    if spline._batch:
+        raise ValidationError(f"{spline!r} is a batch, but a QobjEvo needs one curve; use qobjevo(spline[0])")
+    if spline._time_axis.dates:
+        raise ValidationError(
+            "the times of this curve are dates, but a QobjEvo needs numbers; fit the curve with times in seconds"
+        )
+    try:
+        import qutip
+    except ImportError:
+        raise ImportError("a QobjEvo needs QuTiP; install it with: pip install qutip") from None
+    beyond: Extrapolate = "geodesic" if spline._extrapolation_mode in ("raise", "nan") else None
+    first, levels = float(spline.t[0]), spline.space.point_shape[0]
+    both = None
+    if dims is not None:
+        if not (isinstance(dims, (list, tuple)) and all(isinstance(n, (int, np.integer)) for n in dims)):
+            raise ValidationError(f"dims must be a list of whole numbers, such as [2, 2], not {short_repr(dims)}")
+        if prod(dims) != levels:
+            raise ValidationError(f"dims {short_repr(dims)} have {prod(dims)} levels, but the curve has {levels}")
+        both = [list(dims), list(dims)]
+
+    def at(t: float) -> Any:
+        # QuTiP evaluates at 0 to determine the type of the result.
+        if beyond and t < first and t != 0:
+            raise ValidationError(f"the time {t} is before the first knot, {first}; start the solver at {first}")
+        return qutip.Qobj(hamiltonian(spline, float(t), extrapolate=beyond), dims=both)
+
+    return qutip.QobjEvo(at)
+
+
+def _quantum_space(spline: Any) -> Space:
+    """Return the space of a curve that has a Hamiltonian, or raise ValidationError."""
+    check_curve(spline)
+    space: Space = spline.space
+    if isinstance(space, (ComplexProjective, ComplexGrassmannian, Unitary, SpecialUnitary)):
+        return space
+    raise ValidationError(
+        f"a curve on {space!r} does not define a Hamiltonian; use ComplexProjective(n) for states, "
+        "ComplexGrassmannian(k, n) for subspaces, and Unitary(n) or SpecialUnitary(n) for gates"
+    )
+
+
+def _generator(space: Space, point: Array, vector: Array) -> Array:
+    """Return the Hermitian matrix H of least norm with −iH·point = vector, for a horizontal tangent vector."""
+    if isinstance(space, ComplexProjective):
+        point, vector = point[..., None], vector[..., None]
+    half = 1j * vector @ adjoint(point)
+    # Hermitian to the last bit; of gates both halves are the same but for rounding.
+    h: Array = half + adjoint(half)
+    return h / 2 if isinstance(space, (Unitary, SpecialUnitary)) else h
+
+
+# ---- pulses ----
+
+
+def pulses(
+    spline: CubicSpline,
+    edges: TimesLike,
+    *,
+    kind: Literal["exact", "midpoint"] = "exact",
+    operators: ArrayLike | None = None,
+) -> Array:
+    """Compute piecewise constant Hamiltonians that steer along a curve.
+
+    Parameters
+    ----------
+    spline : CubicSpline
+        Curve, as for `hamiltonian`.
+    edges : array_like, shape (m + 1,)
+        Increasing times between the first and the last knot. There is one pulse between neighbouring edges.
+    kind : {"exact", "midpoint"}, default "exact"
+        ``"exact"`` for the generators of the geodesics between edges: the states agree with the curve at every edge, up
+        to rounding errors. ``"midpoint"`` for H at the middle of each interval; its error is proportional to the square
+        of the spacing.
+    operators : array_like, shape (q, n, n), optional
+        Hermitian matrices, such as Pauli matrices, in which to express the pulses. None means the matrices themselves.
+
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, m, n, n)`` or ``(*batch axes, m, q)``
+        Hermitian matrices, or their real coefficients cⱼ with H = Σ cⱼ operators[j].
+
+    Raises
+    ------
+    ValidationError
+        If the input does not meet the requirements above, or the operators do not span a pulse. The message names the
+        missing components.
+    CutLocusError
+        If ``kind="exact"``, and an edge is so far from the next that two shortest geodesics join them.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> from_up_to_down = ss.CubicSpline([0, 1, 2], [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    >>> paulis = [[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]]
+    >>> pulses(from_up_to_down, [0, 1, 2], operators=paulis).round(8) + 0.0
+    array([[0.        , 0.78539816, 0.        ],
+           [0.        , 0.78539816, 0.        ]])
+    """
+    space = _quantum_space(spline)
+    one_of(kind, "kind", "exact", "midpoint")
+    n = space.point_shape[0]
+    basis = None if operators is None else _operators(operators, n)
+    times, spacing = _pulse_edges(spline, edges)
+    if kind == "midpoint":
+        h = hamiltonian(spline, times[:-1] + (times[1:] - times[:-1]) / 2)
+    else:
+        first, last = space._neighbours(spline(times))
+        h = _generator(space, first, space.log(first, last)) / spacing[..., None, None]
+    return h if basis is None else _coefficients(h, basis)
+
+
+def _pulse_edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
+    """Return the edges in their original type, and the intervals between them."""
+    times = as_array(times_of(edges, "edges")[0], "edges")
+    if times.ndim != 1 or len(times) < 2:
+        raise ValidationError(
+            f"edges must be a one-dimensional array of at least two times, not of shape {times.shape}"
+        )
+    spacing = np.diff(spline._time_axis.at(edges, spline._batch, False, spline._times)[0])
+    advice = "edges must be strictly increasing"
+    refuse(~(spacing > 0), "edges", lambda i: f"is {times[i[-1]]}, and the next is {times[i[-1] + 1]}, but {advice}")
+    return times, spacing
+
+
+def _operators(operators: Any, n: int) -> Array:
+    """Return linearly independent Hermitian matrices."""
+    basis, tol = square_matrices(operators, "operators")
+    if basis.ndim != 3 or basis.shape[1] != n:
+        raise ValidationError(f"operators must be of shape (q, {n}, {n}), not {basis.shape}")
+    check_symmetric(basis, tol * largest(basis), "operators", "Hermitian", "; pass Hermitian operators")
+    columns = _as_columns(basis)
+    # The diagonal of R is the norm of the component of every operator outside the span of its predecessors.
+    new = np.zeros(len(basis))
+    triangle = np.abs(np.diagonal(np.linalg.qr(columns).R))
+    new[: len(triangle)] = triangle
+    why = "is zero or a linear combination of the previous operators; remove it, so that coefficients are unique"
+    refuse(~(new > 1e-10 * np.linalg.norm(columns, axis=0)), "operators", lambda _: why)
+    return basis
+
+
+def _as_columns(matrices: Array) -> Array:
+    """Return Hermitian matrices as columns of real numbers, with ⟨A, B⟩ = tr AB."""
+    numbers = np.ascontiguousarray(matrices, complex).reshape(len(matrices), -1).view(float)
+    return numbers.T
+
+
+def _coefficients(h: Array, basis: Array) -> Array:
+    flat = h.reshape(-1, *h.shape[-2:])
+    columns = _as_columns(basis)
+    wanted = _as_columns(flat)
+    found = np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    left = (wanted - columns @ found).T.copy().view(complex).reshape(h.shape)
+    size, most = np.sqrt(np.sum(np.abs(left) ** 2, axis=(-2, -1))), np.abs(left)
+    # Spectral norms of pulses are speeds, so the remainder is compared with the largest norm of all pulses.
+    allowed = 1e-9 * max(float(np.linalg.norm(flat, axis=(-2, -1)).max(initial=0)), np.finfo(float).tiny)
+
+    def say(i: Any) -> str:
+        j, k = np.unravel_index(most[i].argmax(), most[i].shape)
+        return (
+            f"cannot be expressed in the operators: {size[i]:.3e} of its norm {np.linalg.norm(h[i]):.3e} remains, "
+            f"mostly in the entries [{j}, {k}] and [{k}, {j}] ({left[i][j, k]:.3g}); add operators with these entries"
+        )
+
+    refuse(~(size <= allowed), "pulse", say)
+    return found.T.reshape(*h.shape[:-2], len(basis))
+
+
+# ---- propagators ----
+
+
+def propagator(spline: CubicSpline, x: TimesLike) -> Array:
+    """Compute the unitary U(x) that propagates states from the first knot to time x.
+
+    U satisfies iU' = HU, with U = 1 at the first knot. It moves the first point along the curve, and transports the
+    orthogonal complement in parallel.
+
+    Parameters
+    ----------
+    spline : CubicSpline
+        Curve, as for `hamiltonian`.
+    x : array_like
+        Times between the first and the last knot, any shape.
+
+    Returns
+    -------
+    ndarray, shape ``(*batch axes, *x.shape, n, n)``
+        Unitary matrices.
+
+    Raises
+    ------
+    ValidationError
+        If the curve is on another space, or a time is outside the knots.
+
+    Notes
+    -----
+    The result is accurate up to rounding errors and does not depend on the other times in `x`. It is computed by Gauss
+    collocation of order 16 inside every segment, where the curve is analytic; Gauss methods preserve U*U [1]_. For
+    states or subspaces in high dimensions, computations are in the span of the data.
+
+    References
+    ----------
+    .. [1] Hairer, Lubich & Wanner, "Geometric Numerical Integration", 2006, sections II.1.3 and IV.2.1.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> from_up_to_down = ss.CubicSpline([0, 1, 2], [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
+    >>> propagator(from_up_to_down, 2).round(8).real + 0.0
+    array([[ 0., -1.],
+           [ 1.,  0.]])
+    """
+    space = _quantum_space(spline)
+    times, curves = _times(spline, x), int(np.prod(spline._batch))
+    if not isinstance(space, (ComplexProjective, ComplexGrassmannian)):
+        first = spline.points.reshape(curves, -1, *space.point_shape)[:, :1]
+        gates = spline._curve.evaluate(times.ravel(), "point", "raise", False)
+        moved: Array = gates.reshape(curves, times.size, *space.point_shape) @ adjoint(first)
+        return moved.reshape(*spline._batch, *times.shape, *space.point_shape)
+    curve, basis = _in_span(spline)
+    edges = _edges(curve).reshape(curves, -1)
+    at_edges = _products(_steps(curve, edges[:, :-1], np.diff(edges)))
+    flat = np.broadcast_to(times.ravel(), (curves, times.size))
+    place = np.stack([np.searchsorted(own, times.ravel(), "right") for own in edges[:, :-1]]) - 1
+    start = np.take_along_axis(edges, place, axis=1)
+    result = _steps(curve, start, flat - start) @ np.take_along_axis(at_edges, place[..., None, None], axis=1)
+    result = _unitary(result)
+    if basis is not None:
+        # What is orthogonal to all points stays.
+        q = basis.reshape(curves, 1, *basis.shape[-2:])
+        result = np.eye(q.shape[-2]) + q @ (result - np.eye(q.shape[-1])) @ adjoint(q)
+    return np.asarray(result.reshape(*spline._batch, *times.shape, *result.shape[-2:]))
+
+
+def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
+    """Express a curve in an orthonormal basis of the span of its points and end vectors, on which the Hamiltonian acts.
+
+    Return the curve and the basis; if they span the whole space, return the curve unchanged and None.
+    """
+    curve: CurveArrays = spline._curve
+    width = 1 if isinstance(curve.space, ComplexProjective) else curve.space.point_shape[1]
+    if (curve.times.shape[-1] + 2) * width >= curve.space.point_shape[0]:
+        return curve, None
+    span = span_of(curve.space, curve.points, np.take(curve.velocities, [0, -1], axis=len(curve.batch)))
+    return span.inside(curve), span.basis
+
+
+def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
+    """Return the times in the units of the core, the same for all curves."""
+    times, per_curve = spline._time_axis.at(x, spline._batch, False)
+    if per_curve:
+        raise ValidationError(
+            "the curves have different first knots; compute the propagator of one curve at a time: "
+            "propagator(spline[i], x)"
+        )
+    first, last = spline._times[..., 0].max(), spline._times[..., -1].min()
+    times, _ = onto_ends(times, np.array([first, last]), (), False)
+    bad = ~((times >= first) & (times <= last))
+    refuse(bad, "x", lambda i: f"is {times[i]}, but must be between the first and last knots, {first} and {last}")
+    return times
+
+
+def _edges(curve: CurveArrays) -> Doubles:
+    """Return the knots with enough intermediate times that every step is short, shape batch axes + (m,)."""
+    knots = np.broadcast_to(curve.times, (*curve.batch, curve.times.shape[-1]))
+    lengths = np.diff(knots)
+    inner = knots[..., :-1, None] + lengths[..., None] * np.linspace(0, 1, 9)
+    # By rounding the last of them may lie behind the last knot.
+    inner = np.minimum(inner, knots[..., 1:, None])
+    speed = curve.evaluate(inner.reshape(*knots.shape[:-1], -1), "speed", "raise", True)
+    arcs = speed.reshape(inner.shape).max(axis=-1) * lengths
+    # The same number in all curves, so that they are one array.
+    number = np.maximum(1, np.ceil(arcs.reshape(-1, arcs.shape[-1]).max(axis=0) / _LONGEST_STEP)).astype(int)
+    share = np.concatenate([np.arange(n) / n for n in number])
+    starts = np.repeat(knots[..., :-1], number, axis=-1) + np.repeat(lengths, number, axis=-1) * share
+    return np.concatenate([starts, knots[..., -1:]], axis=-1)
+
+
+def _products(steps: Array) -> Array:
+    """Return the products of the first 0, 1, 2, … of m steps, shape (curves, m + 1, n, n)."""
+    products = [np.broadcast_to(np.eye(steps.shape[-1], dtype=complex), steps[:, 0].shape)]
+    for i in range(steps.shape[1]):
+        products.append(_unitary(steps[:, i] @ products[-1]))
+    return np.stack(products, axis=1)
+
+
+def _steps(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
+    """Return the propagators over short intervals inside a segment, shape (curves, m, n, n)."""
+    n = curve.space.point_shape[0]
+    block = max(1, _BLOCK // (start.shape[0] * (_STAGES * n) ** 2 * 16))
+    steps = [_step(curve, start[:, i : i + block], length[:, i : i + block]) for i in range(0, start.shape[1], block)]
+    return np.concatenate(steps, axis=1) if steps else np.zeros((*start.shape, n, n), complex)
+
+
+def _step(curve: CurveArrays, start: Doubles, length: Doubles) -> Array:
+    nodes, weights, matrix = _gauss()
+    times = start[..., None] + length[..., None] * nodes
+    point, velocity = (
+        curve.evaluate(times.reshape(*curve.batch, -1), quantity, "raise", True) for quantity in ("point", "velocity")
+    )
+    h = _generator(curve.space, point, velocity)
+    n = h.shape[-1]
+    rates = -1j * length[..., None, None, None] * h.reshape(*times.shape, n, n)
+    # Kᵢ = rateᵢ (1 + Σ aᵢⱼ Kⱼ), for all stages at once.
+    system = np.eye(_STAGES * n) - np.einsum("ij,cmiab->cmiajb", matrix, rates).reshape(
+        *start.shape, _STAGES * n, _STAGES * n
+    )
+    stages = np.linalg.solve(system, rates.reshape(*start.shape, _STAGES * n, n))
+    step = np.eye(n) + np.einsum("i,cmiab->cmab", weights, stages.reshape(rates.shape))
+    return _unitary(step)
+
+
+def _unitary(u: Array) -> Array:
+    """Return the nearest unitary matrices of nearly unitary ones, by one step of Newton and Schulz."""
+    return np.asarray(u @ (3 * np.eye(u.shape[-1]) - adjoint(u) @ u) / 2)
+
+
+@cache
+def _gauss() -> tuple[Doubles, Doubles, Doubles]:
+    """Return nodes c, weights b and the matrix a of Gauss collocation on [0, 1].
+
+    aᵢⱼ is the integral of the j-th Lagrange polynomial from 0 to cᵢ.
+    """
+    y, w = np.polynomial.legendre.leggauss(_STAGES)
+    # In Legendre's polynomials nothing cancels; the integral of Pₖ is (Pₖ₊₁ − Pₖ₋₁) / (2k + 1), of P₀ it is P₁ + P₀.
+    p = np.polynomial.legendre.legvander(y, _STAGES)
+    odd = 2 * np.arange(_STAGES) + 1
+    integrals = (p[:, 1:] - np.c_[-p[:, 0], p[:, : _STAGES - 1]]) / odd
+    return (1 + y) / 2, w / 2, integrals @ (p[:, :_STAGES] * odd * w[:, None] / 4).T
+
+
+# ---- states ----
+
+
+def from_kets(kets: Any) -> Array:
+    """Convert kets to points of `ComplexProjective`.
+
+    Parameters
+    ----------
+    kets : qutip.Qobj, array_like of shape (n, 1), or nested lists of these
+        Normalised kets.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        Unit vectors.
+
+    Raises
+    ------
+    ValidationError
+        If a ket is not a column of length 1.
+
+    Examples
+    --------
+    >>> from_kets([[[1], [0]], [[0.6], [0.8j]]])
+    array([[1. +0.j , 0. +0.j ],
+           [0.6+0.j , 0. +0.8j]])
+    """
+    columns, tol = numbers(_full(kets), "kets", 2)
+    if columns.shape[-1] != 1:
+        raise ValidationError(
+            f"kets must be columns, of shape (..., n, 1), not {columns.shape}; for rows, such as bras, pass the adjoint"
+        )
+    return unit_vectors(columns[..., 0].astype(complex), tol, "kets", "a state")
+
+
+def _full(kets: Any) -> Any:
+    """Return the arrays of objects such as ``Qobj``, which are recognised by their method ``full``."""
+    if hasattr(kets, "full"):
+        return kets.full()
+    if isinstance(kets, (list, tuple)) or (isinstance(kets, np.ndarray) and kets.dtype == object):
+        return [_full(ket) for ket in kets]
+    return kets
+
+
+@unmoved_by_underflow()
+def bloch_vector(state: ArrayLike) -> Array:
+    """Compute the points of qubit states on the Bloch sphere, the expectations of the Pauli matrices.
+
+    Distances on the Bloch sphere are twice those of ``ComplexProjective(1)``.
+
+    Parameters
+    ----------
+    state : array_like, shape (..., 2)
+        Complex unit vectors with any phase.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Unit vectors: (1, 0) is mapped to (0, 0, 1), (1, 1)/√2 to (1, 0, 0), and (1, i)/√2 to (0, 1, 0).
+
+    Raises
+    ------
+    ValidationError
+        If a state does not have two components, or its length is not 1.
+
+    References
+    ----------
+    Nielsen & Chuang, "Quantum Computation and Quantum Information", section 1.2.
+
+    Examples
+    --------
+    >>> bloch_vector([0.6, 0.8j]).round(8) + 0.0
+    array([ 0.  ,  0.96, -0.28])
+    """
+    psi, tol = numbers(state, "state", 1)
+    if psi.shape[-1] != 2:
+        raise ValidationError(f"state must be of shape (..., 2), states of one qubit, not {psi.shape}")
+    a, b = np.moveaxis(unit_vectors(psi, tol, "state", "a state"), -1, 0)
+    across = 2 * a.conj() * b
+    return np.stack([across.real, across.imag, (np.abs(a) - np.abs(b)) * (np.abs(a) + np.abs(b))], axis=-1)
+
+
+@unmoved_by_underflow()
+def from_bloch_vector(vector: ArrayLike) -> Array:
+    """Convert points of the Bloch sphere to qubit states, points of ``ComplexProjective(1)``.
+
+    The phase is chosen such that the larger component is positive.
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+        Unit vectors.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Unit vectors.
+
+    Raises
+    ------
+    ValidationError
+        If the length of a vector is not 1. Points inside the ball are mixed states.
+
+    Examples
+    --------
+    >>> from_bloch_vector([0.0, 0.96, -0.28]).round(8)
+    array([0. -0.6j, 0.8+0.j ])
+    """
+    v, tol = real_numbers(vector, "vector", (3,))
+    v = unit_vectors(v, tol, "vector", "a pure state")
+    up = v[..., 2] >= 0
+    large = np.sqrt((1 + np.abs(v[..., 2])) / 2)
+    small = (v[..., 0] + 1j * np.where(up, v[..., 1], -v[..., 1])) / (2 * large)
+    return np.stack([np.where(up, large, small), np.where(up, small, large)], axis=-1)
