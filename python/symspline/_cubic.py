@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Self
+from types import GenericAlias
+from typing import TYPE_CHECKING, Any, Generic, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,8 +26,18 @@ from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
 
-class CubicSpline(SegmentedCurve[P]):
+    # The report: that of a fit through points, or that of a smoothing fit.
+    R = TypeVar("R", covariant=True, default=Report)
+else:
+    from typing import TypeVar
+
+    R = TypeVar("R", covariant=True)
+
+
+class CubicSpline(SegmentedCurve[P], Generic[P, R]):
     r"""Interpolate points on a space by a C² cubic spline.
 
     Each segment is a cubic Bézier curve built from geodesics. At every knot the values, velocities and covariant
@@ -200,6 +211,10 @@ class CubicSpline(SegmentedCurve[P]):
         self._fill(*parts)
         return self
 
+    if not TYPE_CHECKING:
+        # The report may be omitted at run time, too, although type variables have defaults from Python 3.13 on only.
+        __class_getitem__ = classmethod(GenericAlias)
+
     # ---- sensitivity to the data ----
 
     def jvp(
@@ -344,11 +359,11 @@ class CubicSpline(SegmentedCurve[P]):
         return self._fit.reports()
 
     @property
-    def report(self) -> Report:
+    def report(self) -> R:
         """Report of the fit: convergence, solver, residual and step lengths."""
-        if len(self._reports) == 1:
-            return self._reports[0]
-        return self._product_report
+        report: Any = self._reports[0] if len(self._reports) == 1 else self._product_report
+        result: R = report
+        return result
 
     @cached_property
     def _product_report(self) -> Report:
@@ -358,7 +373,7 @@ class CubicSpline(SegmentedCurve[P]):
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
-    def _parts(self) -> tuple[CubicSpline[Any], ...]:
+    def _parts(self) -> tuple[CubicSpline[Any, Any], ...]:
         """Splines in the factors of a product; in any other space, the spline itself."""
         if len(self._reports) == 1:
             return (self,)
@@ -399,4 +414,4 @@ class CubicSpline(SegmentedCurve[P]):
 
     @property
     def _unconverged(self) -> int:
-        return int(np.size(self.report.converged) - np.sum(self.report.converged))
+        return int(np.sum(~np.all([np.asarray(report.converged) for report in self._reports], axis=0)))

@@ -53,7 +53,7 @@ else:
     noise_property = property
 
 
-class SmoothingSpline(CubicSpline[P], Generic[P, R]):
+class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     """A C² cubic spline close to noisy data.
 
     `make_smoothing_spline` and `make_lsq_spline` return objects of this class; it has no public constructor. All
@@ -102,7 +102,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
-    def report(self) -> R:  # type: ignore[override]
+    def report(self) -> R:
         """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
         reports: R = self._each([found.report for found in self._smoothed])
         return reports
@@ -319,8 +319,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     @property
     def _unconverged(self) -> int:
-        good = np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)
-        return int(np.size(good) - np.sum(good))
+        return int(np.sum(~np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)))
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(time_axis, t, curve, index)
@@ -340,7 +339,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         )
 
     @classmethod
-    def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
+    def _like(cls, spline: CubicSpline[Any, Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
         parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
         return cls._of(*parts, noisy, smoothed)

@@ -13,7 +13,7 @@ from .._typing import Extrapolate, TimesLike
 from ..convert._reading import Array, adjoint
 
 
-def hamiltonian(spline: CubicSpline, x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
+def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
     """Compute the Hamiltonian that drives states along a curve, or its derivative.
 
     Parameters

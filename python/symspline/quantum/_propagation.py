@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ _LONGEST_STEP = 0.4
 _BLOCK = 2**26
 
 
-def propagator(spline: CubicSpline, x: TimesLike) -> Array:
+def propagator(spline: CubicSpline[Any, Any], x: TimesLike) -> Array:
     """Compute the unitary U(x) that propagates states from the first knot to time x.
 
     U satisfies iU' = HU, with U = 1 at the first knot. It moves the first point along the curve, and transports the
@@ -87,7 +88,7 @@ def propagator(spline: CubicSpline, x: TimesLike) -> Array:
     return np.asarray(result.reshape(*spline._batch, *times.shape, *result.shape[-2:]))
 
 
-def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
+def _in_span(spline: CubicSpline[Any, Any]) -> tuple[CurveArrays, Array | None]:
     """Express a curve in an orthonormal basis of the span of its points and end vectors, on which the Hamiltonian acts.
 
     Return the curve and the basis; if they span the whole space, return the curve unchanged and None.
@@ -100,7 +101,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
     return span.inside(curve), span.basis
 
 
-def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
+def _times(spline: CubicSpline[Any, Any], x: TimesLike) -> Doubles:
     """Return the times in the units of the core, the same for all curves."""
     times, per_curve = spline._time_axis.at(x, spline._batch, False)
     if per_curve:

@@ -17,7 +17,7 @@ from ._generators import generator, hamiltonian, quantum_space
 
 
 def pulses(
-    spline: CubicSpline,
+    spline: CubicSpline[Any, Any],
     edges: TimesLike,
     *,
     kind: Literal["exact", "midpoint"] = "exact",
@@ -74,7 +74,7 @@ def pulses(
     return h if basis is None else _coefficients(h, basis)
 
 
-def _edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
+def _edges(spline: CubicSpline[Any, Any], edges: TimesLike) -> tuple[Array, Array]:
     """Return the edges in their original type, and the intervals between them."""
     times = as_array(times_of(edges, "edges")[0], "edges")
     if times.ndim != 1 or len(times) < 2:

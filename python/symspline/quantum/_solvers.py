@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from qutip import QobjEvo
 
 
-def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEvo:
+def qobjevo(spline: CubicSpline[Any, Any], *, dims: Sequence[int] | None = None) -> QobjEvo:
     """Convert the Hamiltonian of a curve to a ``QobjEvo`` for QuTiP's solvers.
 
     With ħ = 1, times in ns give a Hamiltonian in rad/ns. The solver's states agree with the points of the curve up to a
