@@ -61,6 +61,9 @@ class BSpline(Curve[P]):
     jump at interior knots. There, the derivatives from the right are returned, and at the end of the curve those from
     the left.
 
+    The methods ``transport`` and ``lift`` of `CubicSpline` are absent: they follow a curve through cubic Bézier
+    segments, of which a B-spline on a curved space does not consist.
+
     References
     ----------
     T. Popiel, L. Noakes, Bézier curves and C² interpolation in Riemannian manifolds, J. Approx. Theory 148 (2007).

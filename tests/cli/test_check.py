@@ -122,7 +122,9 @@ def test_positions_that_differ_by_rounding_are_measured(run):
     printed = float(run("check a.npz").splitlines()[1].split()[2])
     starts, ends = one_sided(spline, 0)
     largest = np.linalg.norm([starts, ends], axis=-1).max()
-    assert printed == pytest.approx(plane.distance(ends[:-1], starts[1:]).max() / largest, rel=0.1, abs=0) and printed > 0
+    assert (
+        printed == pytest.approx(plane.distance(ends[:-1], starts[1:]).max() / largest, rel=0.1, abs=0) and printed > 0
+    )
 
 
 def test_check_of_a_slight_bend_is_relative(run):
