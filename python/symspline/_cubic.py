@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike
 from ._archive import Entries, read_fitted
 from ._base_curve import SegmentedCurve
 from ._core import ValidationError
-from ._curves.curve import CurveArrays, Gradient, SampleTimes
-from ._curves.derivatives import sample_times
+from ._curves.curve import CurveArrays, longest_step
+from ._curves.derivatives import Gradient, SampleTimes, sample_times
 from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
 from ._curves.integrals import alternative_energy
-from ._curves.product import longest_step
 from ._errors import raise_or_warn
 from ._options import extrapolation_mode, fit_options, order_of, with_atol
 from ._report import Report, combined
