@@ -68,6 +68,13 @@ class SegmentedCurve(Curve[P]):
     # End conditions, which determine whether curves are closed.
     _bc_type: BCType
 
+    def _fill(
+        self, time_axis: TimeAxis, t: Array, curve: CurveArrays, bc_type: BCType, extrapolate: Extrapolate
+    ) -> None:
+        self._time_axis, self._t, self._curve = time_axis, t, curve
+        self._bc_type, self._extrapolate = bc_type, extrapolate
+        self._extrapolation_mode = extrapolation_mode(extrapolate, bc_type)
+
     @abstractmethod
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
         """Return the curves that an index selects from the batch."""

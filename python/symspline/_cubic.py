@@ -18,7 +18,7 @@ from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
 from ._curves.integrals import alternative_energy
 from ._errors import raise_or_warn
-from ._options import extrapolation_mode, fit_options, order_of, with_atol
+from ._options import fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, space_named
@@ -181,34 +181,20 @@ class CubicSpline(SegmentedCurve[P], Generic[P, R]):
             found = fit(problem, progress)
         except ValidationError as error:
             raise time_axis.explain(error) from None
-        self._fill(time_axis, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
+        self._fit = found
+        super()._fill(time_axis, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate)
         if found.faults:
             raise_or_warn(found.faults, on_failure, self)
         warn_of_representatives(space, [data], [found.curve], [found.columns])
 
-    def _fill(
-        self,
-        time_axis: TimeAxis,
-        t: Array,
-        curve: CurveArrays,
-        bc_type: BCType,
-        extrapolate: Extrapolate,
-        reports: list[Report] | Fit,
-    ) -> None:
-        self._time_axis, self._t, self._curve = time_axis, t, curve
-        self._bc_type, self._extrapolate = bc_type, extrapolate
+    def _fill(self, *parts: Any) -> None:
+        """Set the state of a curve, and its reports or the fit from which they are created."""
+        *own, reports = parts
+        super()._fill(*own)
         if isinstance(reports, Fit):
             self._fit = reports
         else:
             self._reports = reports
-        self._extrapolation_mode = extrapolation_mode(extrapolate, bc_type)
-
-    @classmethod
-    def _of(cls, *parts: Any) -> Self:
-        """Return a spline with the given state, without a fit."""
-        self = cls.__new__(cls)
-        self._fill(*parts)
-        return self
 
     if not TYPE_CHECKING:
         # The report may be omitted at run time, too, although type variables have defaults from Python 3.13 on only.
