@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import jax.numpy as jnp
-from jax.scipy.linalg import solve_triangular
+from jax.scipy.linalg import expm, solve_triangular
 
 from ._models import Model
-from ._spectral import adjoint, arcs, exponential, hermitian, logarithm
+from ._spectral import adjoint, arcs, hermitian, logarithm
 
 # Newton's iteration for the nearest orthonormal columns is at rounding after so many steps from singular values
 # between .4 and 1.5.
@@ -47,7 +47,7 @@ class Positive(Model):
 
     def exp(self, p: Any, v: Any) -> Any:
         root = jnp.linalg.cholesky(p)
-        return root @ exponential(_whitened(root, v)) @ adjoint(root)
+        return root @ expm(_whitened(root, v)) @ adjoint(root)
 
     def log(self, p: Any, q: Any) -> Any:
         root = jnp.linalg.cholesky(p)
@@ -56,7 +56,7 @@ class Positive(Model):
     def between(self, p: Any, q: Any, t: Any) -> Any:
         root = jnp.linalg.cholesky(p)
         step = logarithm(_whitened(root, q))
-        return root @ exponential(self.times(t, step)) @ adjoint(root)
+        return root @ expm(self.times(t, step)) @ adjoint(root)
 
 
 def orthonormal(columns: Any) -> Any:

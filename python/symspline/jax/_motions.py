@@ -19,12 +19,8 @@ class Rotations(Lines):
         self.size = size
 
     def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
-        matrices = orthonormal(points)
-        turn = jnp.swapaxes(matrices, -1, -2) @ velocities
-        if self.size == 2:
-            matrices, turn = _about_the_third_axis(matrices, 1.0), _about_the_third_axis(turn, 0.0)
-        quaternion = quaternion_of(matrices)
-        half = jnp.concatenate([jnp.zeros_like(quaternion[..., :1]), 0.5 * axis_of(turn)], axis=-1)
+        quaternion, turn = _motion_of(points, velocities)
+        half = jnp.concatenate([jnp.zeros_like(quaternion[..., :1]), 0.5 * turn], axis=-1)
         return quaternion, product(quaternion, half)
 
     def from_internal(self, points: Any) -> Any:
@@ -41,15 +37,12 @@ class Poses(Model):
 
     def to_internal(self, points: Any, velocities: Any) -> tuple[Any, Any]:
         n = self.size
-        matrices = orthonormal(points[..., :n, :n])
-        back = jnp.swapaxes(matrices, -1, -2)
-        turn, place = back @ velocities[..., :n, :n], points[..., :n, n]
-        ahead = (back @ velocities[..., :n, n:])[..., 0]
+        quaternion, turn = _motion_of(points[..., :n, :n], velocities[..., :n, :n])
+        place, ahead = points[..., :n, n], velocities[..., :n, n]
         if n == 2:
-            matrices, turn = _about_the_third_axis(matrices, 1.0), _about_the_third_axis(turn, 0.0)
-            place, ahead = _in_space(place), _in_space(ahead)
-        pose = jnp.concatenate([quaternion_of(matrices), place], axis=-1)
-        return pose, jnp.concatenate([axis_of(turn), ahead], axis=-1)
+            place, ahead = (jnp.concatenate([x, jnp.zeros_like(x[..., :1])], axis=-1) for x in (place, ahead))
+        pose = jnp.concatenate([quaternion, place], axis=-1)
+        return pose, jnp.concatenate([turn, turned(_conjugate(quaternion), ahead)], axis=-1)
 
     def from_internal(self, points: Any) -> Any:
         n = self.size
@@ -126,12 +119,12 @@ def _conjugate(quaternion: Any) -> Any:
     return jnp.concatenate([quaternion[..., :1], -quaternion[..., 1:]], axis=-1)
 
 
-def _about_the_third_axis(matrix: Any, corner: float) -> Any:
-    """2 × 2 matrices as the first rows and columns of 3 × 3 ones."""
-    padding = [(0, 0)] * (matrix.ndim - 2) + [(0, 1), (0, 1)]
-    return jnp.pad(matrix, padding).at[..., 2, 2].set(corner)
-
-
-def _in_space(vector: Any) -> Any:
-    """Vectors of a plane in space."""
-    return jnp.concatenate([vector, jnp.zeros_like(vector[..., :1])], axis=-1)
+def _motion_of(matrices: Any, velocities: Any) -> tuple[Any, Any]:
+    """Unit quaternions of rotations of the plane or of space, and their angular velocities in the body."""
+    matrices = orthonormal(matrices)
+    turn = jnp.swapaxes(matrices, -1, -2) @ velocities
+    if matrices.shape[-1] == 2:
+        # Rotations of the plane turn about the third axis of space.
+        padding = [(0, 0)] * (matrices.ndim - 2) + [(0, 1), (0, 1)]
+        matrices, turn = jnp.pad(matrices, padding).at[..., 2, 2].set(1.0), jnp.pad(turn, padding)
+    return quaternion_of(matrices), axis_of(turn)
