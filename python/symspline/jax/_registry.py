@@ -9,9 +9,7 @@ import jax.numpy as jnp
 from .. import _spaces
 from .._core import ValidationError
 from .._spaces import Space
-from ._matrices import Planes, Positive
-from ._models import Curved, Lines, Model
-from ._motions import Poses, Rotations
+from ._models import Curved, Lines, Model, Planes, Poses, Positive, Rotations
 
 _LINES = (_spaces.RealProjective, _spaces.ComplexProjective)
 _PLANES = (_spaces.Grassmannian, _spaces.ComplexGrassmannian)
