@@ -124,19 +124,19 @@ def valid_curves(
     Returns
     -------
     noisy : SmoothingData
-        The data of these curves. If some curves are left out, there is one batch axis.
+        The data of these curves. If some curves are masked, there is one batch axis.
     ends : list
         Their end conditions in every factor.
     chosen : ndarray of int or None
         Their indices in the batch of the user; None for all curves.
     faults : list of Fault
-        Faults of curves that are left out.
+        Faults of curves that became masked.
 
     Raises
     ------
     ValidationError
         If a point is invalid, or a curve has data at fewer than two times. Unless `strict`, such curves of a batch are
-        left out instead.
+        masked instead.
     """
     batch = noisy.batch
     skip = bool(batch) and not strict

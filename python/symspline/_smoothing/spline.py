@@ -53,6 +53,9 @@ else:
     noise_property = property
 
 
+_T = TypeVar("_T")
+
+
 class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     """A C² cubic spline close to noisy data.
 
@@ -93,7 +96,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         *own, self._noisy, self._smoothed = parts
         super()._fill(*own)
 
-    def _each(self, values: list[Any]) -> Any:
+    def _each(self, values: list[_T]) -> _T | tuple[_T, ...]:
         """Return one value, or a tuple with one value per space in which data were smoothed."""
         return tuple(values) if is_several(self.space) else values[0]
 
@@ -104,14 +107,14 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     @property
     def report(self) -> R:
         """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
-        reports: R = self._each([found.report for found in self._smoothed])
-        return reports
+        reports: Any = self._each([found.report for found in self._smoothed])
+        result: R = reports
+        return result
 
     @noise_property
     def lam(self) -> Number | tuple[Number, ...]:
         """Weight λ of the bending energy."""
-        lam: Number | tuple[Number, ...] = self._each([found.report.lam for found in self._smoothed])
-        return lam
+        return self._each([found.report.lam for found in self._smoothed])
 
     @noise_property
     def df(self) -> Number | tuple[Number, ...]:
@@ -119,8 +122,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
         They are 2 for a geodesic, and the number of data for interpolation.
         """
-        df: Number | tuple[Number, ...] = self._each([found.report.df for found in self._smoothed])
-        return df
+        return self._each([found.report.df for found in self._smoothed])
 
     @noise_property
     def sigma(self) -> Number | tuple[Number, ...]:
@@ -129,8 +131,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))``.
         Coordinates refer to an orthonormal frame.
         """
-        sigma: Number | tuple[Number, ...] = self._each([found.sigma for found in self._smoothed])
-        return sigma
+        return self._each([found.sigma for found in self._smoothed])
 
     @property
     def data(self) -> tuple[AnyArray, P]:
