@@ -21,7 +21,7 @@ from .derivatives import Gradient, SampleTimes, pair_of
 from .ends import ends_in_factors
 from .integrals import EXACT
 from .lift import check_reach, check_start, fiber_factors, is_quotient
-from .solve import Options, Task, solve_single, validate
+from .solve import Options, Solved, Task, solve_single, validate
 
 Tuple = tuple[Any, ...]
 NORMS = ("speed", "bend")
@@ -79,6 +79,7 @@ class CoreCurve:
     quad_rtol = EXACT
     # Both kinds of curves have attributes of the same types.
     space: Space[Any]
+    times: Doubles
     points: Any
     velocities: Any
     # Whether the core computes points in the space itself, and not in a smaller one.
@@ -95,8 +96,10 @@ class CoreCurve:
         """Whether this class can represent curves in a space."""
         return True
 
-    # The velocities of the C² curve. The core validates the points in the same call.
-    solve = staticmethod(solve_single)
+    @staticmethod
+    def solve(task: Task, options: Options, progress: Progress | None = None) -> Solved:
+        """Compute the velocities of the C² curve. The core validates the points in the same call."""
+        return solve_single(task, options, progress)
 
     @staticmethod
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
@@ -254,7 +257,8 @@ class ProductCurve:
 
     def __init__(self, space: Space[Any], parts: tuple[CoreCurve, ...]) -> None:
         self.space: Space[Any] = space
-        self._parts, self.times = parts, parts[0].times
+        self.times: Doubles = parts[0].times
+        self._parts = parts
         self.points: Any = tuple([part.points for part in parts])
         self.velocities: Any = tuple([part.velocities for part in parts])
 
