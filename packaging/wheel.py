@@ -49,7 +49,9 @@ def join(plain: Path, others: dict[str, Path], out: Path) -> Path:
     modules = []
     for level, wheel in others.items():
         with zipfile.ZipFile(wheel) as archive:
-            (name,) = [n for n in archive.namelist() if n.startswith("symspline/_core.") and not n.endswith(".pyi")]
+            (name,) = [
+                n for n in archive.namelist() if n.startswith("symspline/_core.") and not n.endswith(".pyi")
+            ]
             info, module = archive.getinfo(name), archive.read(name)
         info.filename = name.replace("_core", f"_core_{level}", 1)
         modules.append((info, module))

@@ -77,9 +77,7 @@ def layer(name):
 
 
 def test_the_graph_is_that_of_the_package():
-    assert {"_spaces.base", "_curves.curve", "_arrays"} <= GRAPH["_curves.core_curve"] | GRAPH["_spaces"] | GRAPH[
-        "_time"
-    ]
+    assert {"_spaces.base", "_curves.curve", "_arrays"} <= GRAPH["_curves.reduced"] | GRAPH["_spaces"] | GRAPH["_time"]
     # An import inside a function.
     assert "_plotting" in GRAPH["_base_curve"]
 

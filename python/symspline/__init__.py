@@ -22,7 +22,7 @@ from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from ._cubic import CubicSpline  # noqa: E402
 from ._curve import Curve  # noqa: E402
-from ._curves.curve import Gradient  # noqa: E402
+from ._curves.derivatives import Gradient  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
 from ._files import load, save  # noqa: E402
 from ._functional import evaluate, fit, fit_many  # noqa: E402

@@ -68,6 +68,13 @@ class SegmentedCurve(Curve[P]):
     # End conditions, which determine whether curves are closed.
     _bc_type: BCType
 
+    def _fill(
+        self, time_axis: TimeAxis, t: Array, curve: CurveArrays, bc_type: BCType, extrapolate: Extrapolate
+    ) -> None:
+        self._time_axis, self._t, self._curve = time_axis, t, curve
+        self._bc_type, self._extrapolate = bc_type, extrapolate
+        self._extrapolation_mode = extrapolation_mode(extrapolate, bc_type)
+
     @abstractmethod
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Self:
         """Return the curves that an index selects from the batch."""
@@ -205,7 +212,11 @@ class SegmentedCurve(Curve[P]):
         if progress is not None:
             check_progress(progress)
         quantity, where = quantity_of(nu), self._where(extrapolate)
-        values: P = lifted(self._curve, self._time_axis, x, quantity, where, per_curve, start, progress)
+
+        def call(x: Doubles, outside: str, per_curve: bool) -> Any:
+            return self._curve.lift(x, quantity, outside, per_curve, start, progress)
+
+        values: P = call_at_times(self._curve, self._time_axis, x, per_curve, where, call)
         return values
 
     def transport(self, x0: TimesLike, x1: TimesLike, v: ArrayLike) -> P:
@@ -498,28 +509,8 @@ def evaluated(
 ) -> Any:
     """Evaluate a quantity at times as a user passes them."""
 
-    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
-        if out is None:
-            return curve.evaluate(x, quantity, outside, per_curve, progress)
-        return curve.write(out, x, quantity, outside, per_curve, progress)
-
-    return call_at_times(curve, time_axis, x, per_curve, outside, call)
-
-
-def lifted(
-    curve: CurveArrays,
-    time_axis: TimeAxis,
-    x: TimesLike,
-    quantity: str,
-    outside: str,
-    per_curve: bool,
-    start: Any = None,
-    progress: Progress | None = None,
-) -> Any:
-    """Evaluate a quantity of the horizontal lift that starts at `start`, at times as a user passes them."""
-
-    def call(curve: CurveArrays, x: Doubles, per_curve: bool, outside: str) -> Any:
-        return curve.lift(x, quantity, outside, per_curve, start, progress)
+    def call(x: Doubles, outside: str, per_curve: bool) -> Any:
+        return curve.evaluate(x, quantity, outside, per_curve, progress, out)
 
     return call_at_times(curve, time_axis, x, per_curve, outside, call)
 
@@ -530,7 +521,7 @@ def call_at_times(
     x: TimesLike,
     per_curve: bool,
     outside: str,
-    call: Callable[[CurveArrays, Doubles, bool, str], Any],
+    call: Callable[[Doubles, str, bool], Any],
 ) -> Any:
     """Call a function of a curve with times as a user passes them.
 
@@ -539,7 +530,7 @@ def call_at_times(
     outside : str
         Extrapolation policy by its name in the core, or ``"nan"``, which this function implements.
     call : callable
-        Function of the curve, times as the core counts them, `per_curve`, and a policy of the core.
+        Function of times as the core counts them, a policy of the core, and `per_curve`.
     """
     per_curve = checked_flag(per_curve, "per_curve")
     if time_axis.plain and type(x) is float:
@@ -554,7 +545,7 @@ def call_at_times(
         times, per_curve, beyond = _inside(curve, times, per_curve)
         outside = "raise"
     try:
-        values = call(curve, times, per_curve, outside)
+        values = call(times, outside, per_curve)
     except ValidationError as error:
         raise time_axis.explain(error) from None
     if beyond is not None:

@@ -61,6 +61,9 @@ class BSpline(Curve[P]):
     jump at interior knots. There, the derivatives from the right are returned, and at the end of the curve those from
     the left.
 
+    The methods ``transport`` and ``lift`` of `CubicSpline` are absent: they follow a curve through cubic Bézier
+    segments, of which a B-spline on a curved space does not consist.
+
     References
     ----------
     T. Popiel, L. Noakes, Bézier curves and C² interpolation in Riemannian manifolds, J. Approx. Theory 148 (2007).
@@ -81,7 +84,7 @@ class BSpline(Curve[P]):
         degree = whole_number(degree, "degree", 1)
         doubles, tol = _control_array(control_points, space, 2)
         knots = _checked_knots(knots, space._lead(doubles)[-1], degree)
-        self._curve = ControlledCurve(space, knots, _checked_points(space, doubles, tol), degree)
+        self._fill(space, knots, _checked_points(space, doubles, tol), degree)
 
     def __call__(self, x: ArrayLike, nu: int = 0) -> P:
         """Evaluate the curve or its derivatives.
@@ -179,12 +182,8 @@ class BSpline(Curve[P]):
     def _picked(self, index: Any) -> Self:
         return self._of(self.space, self.knots, np.ascontiguousarray(self.control_points[index]), self.degree)
 
-    @classmethod
-    def _of(cls, *parts: Any) -> Self:
-        """A curve that was checked before."""
-        self = cls.__new__(cls)
+    def _fill(self, *parts: Any) -> None:
         self._curve = ControlledCurve(*parts)
-        return self
 
     def _state(self) -> dict[str, Any]:
         head = {"format": self._format, "version": VERSION, "space": self.space}

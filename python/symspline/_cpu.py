@@ -74,7 +74,7 @@ def _level(plain: Path) -> str:
     """
     ask = ctypes.CDLL(str(plain)).symspline_cpu_level
     ask.restype = ctypes.c_int
-    return list(LEVELS)[ask()]
+    return list(LEVELS)[int(ask())]
 
 
 def _find(folder: Path, level: str) -> Path | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Self
+from types import GenericAlias
+from typing import TYPE_CHECKING, Any, Generic, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,22 +12,31 @@ from numpy.typing import ArrayLike
 from ._archive import Entries, read_fitted
 from ._base_curve import SegmentedCurve
 from ._core import ValidationError
-from ._curves.curve import CurveArrays, Gradient, SampleTimes
-from ._curves.derivatives import sample_times
+from ._curves.curve import CurveArrays, longest_step
+from ._curves.derivatives import Gradient, SampleTimes, sample_times
 from ._curves.ends import ends_in_factors, freeze_bc_type, take_batch
 from ._curves.fit import Fit, Problem, curve_of, fit, mask_of, read, read_ends
 from ._curves.integrals import alternative_energy
-from ._curves.product import longest_step
 from ._errors import raise_or_warn
-from ._options import extrapolation_mode, fit_options, order_of, with_atol
+from ._options import fit_options, order_of, with_atol
 from ._report import Report, combined
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
 from ._typing import BCType, Extrapolate, Method, OnFailure, P, PointsLike, Progress, TimesLike
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
 
-class CubicSpline(SegmentedCurve[P]):
+    # The report: that of a fit through points, or that of a smoothing fit.
+    R = TypeVar("R", covariant=True, default=Report)
+else:
+    from typing import TypeVar
+
+    R = TypeVar("R", covariant=True)
+
+
+class CubicSpline(SegmentedCurve[P], Generic[P, R]):
     r"""Interpolate points on a space by a C² cubic spline.
 
     Each segment is a cubic Bézier curve built from geodesics. At every knot the values, velocities and covariant
@@ -171,34 +181,24 @@ class CubicSpline(SegmentedCurve[P]):
             found = fit(problem, progress)
         except ValidationError as error:
             raise time_axis.explain(error) from None
-        self._fill(time_axis, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate, found)
+        self._fit = found
+        super()._fill(time_axis, shown_times, found.curve, freeze_bc_type(bc_type), extrapolate)
         if found.faults:
             raise_or_warn(found.faults, on_failure, self)
         warn_of_representatives(space, [data], [found.curve], [found.columns])
 
-    def _fill(
-        self,
-        time_axis: TimeAxis,
-        t: Array,
-        curve: CurveArrays,
-        bc_type: BCType,
-        extrapolate: Extrapolate,
-        reports: list[Report] | Fit,
-    ) -> None:
-        self._time_axis, self._t, self._curve = time_axis, t, curve
-        self._bc_type, self._extrapolate = bc_type, extrapolate
+    def _fill(self, *parts: Any) -> None:
+        """Set the state of a curve, and its reports or the fit from which they are created."""
+        *own, reports = parts
+        super()._fill(*own)
         if isinstance(reports, Fit):
             self._fit = reports
         else:
             self._reports = reports
-        self._extrapolation_mode = extrapolation_mode(extrapolate, bc_type)
 
-    @classmethod
-    def _of(cls, *parts: Any) -> Self:
-        """Return a spline with the given state, without a fit."""
-        self = cls.__new__(cls)
-        self._fill(*parts)
-        return self
+    if not TYPE_CHECKING:
+        # The report may be omitted at run time, too, although type variables have defaults from Python 3.13 on only.
+        __class_getitem__ = classmethod(GenericAlias)
 
     # ---- sensitivity to the data ----
 
@@ -344,11 +344,11 @@ class CubicSpline(SegmentedCurve[P]):
         return self._fit.reports()
 
     @property
-    def report(self) -> Report:
+    def report(self) -> R:
         """Report of the fit: convergence, solver, residual and step lengths."""
-        if len(self._reports) == 1:
-            return self._reports[0]
-        return self._product_report
+        report: Any = self._reports[0] if len(self._reports) == 1 else self._product_report
+        result: R = report
+        return result
 
     @cached_property
     def _product_report(self) -> Report:
@@ -358,7 +358,7 @@ class CubicSpline(SegmentedCurve[P]):
         return combined(reports, longest_step(curve), curve.space.curvature, other)
 
     @property
-    def _parts(self) -> tuple[CubicSpline[Any], ...]:
+    def _parts(self) -> tuple[CubicSpline[Any, Any], ...]:
         """Splines in the factors of a product; in any other space, the spline itself."""
         if len(self._reports) == 1:
             return (self,)
@@ -399,4 +399,4 @@ class CubicSpline(SegmentedCurve[P]):
 
     @property
     def _unconverged(self) -> int:
-        return int(np.size(self.report.converged) - np.sum(self.report.converged))
+        return int(np.sum(~np.all([np.asarray(report.converged) for report in self._reports], axis=0)))

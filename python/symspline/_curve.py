@@ -143,6 +143,17 @@ class Curve(ABC, Generic[P]):
         """
         return bending_energy(self._curve)
 
+    @classmethod
+    def _of(cls, *parts: Any) -> Self:
+        """Return a curve with the given state, without checks or a fit."""
+        self = cls.__new__(cls)
+        self._fill(*parts)
+        return self
+
+    @abstractmethod
+    def _fill(self, *parts: Any) -> None:
+        """Set the state of the curve."""
+
     # ---- batches ----
 
     @property

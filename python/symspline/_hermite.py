@@ -12,11 +12,11 @@ from ._core import ValidationError
 from ._curves.curve import CurveArrays
 from ._curves.fit import curve_of, hermite_data, read
 from ._functional import read_velocities
-from ._options import checked_extrapolate, extrapolation_mode, with_atol
+from ._options import checked_extrapolate, with_atol
 from ._representatives import warn_of_representatives
 from ._spaces import Array, Space, space_named
 from ._time import TimeAxis, knots_of
-from ._typing import BCType, Extrapolate, P, PointsLike, TimesLike
+from ._typing import Extrapolate, P, PointsLike, TimesLike
 
 
 class HermiteSpline(SegmentedCurve[P]):
@@ -86,11 +86,11 @@ class HermiteSpline(SegmentedCurve[P]):
     array([-1.,  0.,  0.])
     """
 
+    # Hermite splines are never closed: their end conditions are "natural".
     _kind = "C¹ Hermite spline"
     _format = "symspline-hermite"
     _ends = "given velocities"
     _unconverged = 0
-    _bc_type: BCType = "natural"  # Hermite splines are never closed.
 
     def __init__(
         self,
@@ -103,11 +103,8 @@ class HermiteSpline(SegmentedCurve[P]):
         atol: float | None = None,
     ) -> None:
         space = space_named(space)
-        if extrapolate is not None:
-            checked_extrapolate(extrapolate)
-        data = read(points, space)
-        if atol is not None:
-            data = with_atol(data, atol)
+        checked_extrapolate(extrapolate)
+        data = with_atol(read(points, space), atol)
         batch, nodes = data[0].batch, data[0].nodes
         vectors = read_velocities(velocities, space, data)
         time_axis, shown_times, times = knots_of(t, batch, nodes)
@@ -116,28 +113,17 @@ class HermiteSpline(SegmentedCurve[P]):
         except ValidationError as error:
             raise time_axis.explain(error) from None
         curve = curve_of(space, times, [own[:2] for own in found], fitted=False)
-        self._fill(time_axis, shown_times, curve, extrapolate)
+        self._fill(time_axis, shown_times, curve, "natural", extrapolate)
         warn_of_representatives(space, [data], [curve], [[own[2] for own in found]])
-
-    def _fill(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, extrapolate: Any) -> None:
-        self._time_axis, self._t, self._curve, self._extrapolate = time_axis, t, curve, extrapolate
-        self._extrapolation_mode = extrapolation_mode(extrapolate, self._bc_type)
-
-    @classmethod
-    def _of(cls, *parts: Any) -> Self:
-        """Return a curve with the given state, without checks."""
-        self = cls.__new__(cls)
-        self._fill(*parts)
-        return self
 
     @classmethod
     def _from_state(cls, state: Entries) -> Self:
         time_axis, knots, curve, extrapolate = read_segments(state, fitted=False)
         check_curves(state, curve, [True] * len(curve.parts))
-        return cls._of(time_axis, knots, curve, extrapolate)
+        return cls._of(time_axis, knots, curve, "natural", extrapolate)
 
     def __repr__(self) -> str:
         return f"<HermiteSpline on {self.space!r}: {self._batch_text}{self._curve.times.shape[-1]} points>"
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
-        return HermiteSpline._of(time_axis, t, curve, self._extrapolate)
+        return HermiteSpline._of(time_axis, t, curve, "natural", self._extrapolate)

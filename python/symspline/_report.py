@@ -219,7 +219,6 @@ NUMBERS = (
     *("guaranteed_sweeps", "alternative_energy", "velocity_error"),
 )
 OPTIONAL = tuple(own.name for own in fields(Report) if own.metadata.get("optional"))
-_UNKNOWN = {name: None if name in OPTIONAL else np.nan for name in NUMBERS}
 MAX_STEP = NUMBERS.index("max_step")
 
 
@@ -254,11 +253,6 @@ class Columns(NamedTuple):
     def empty(count: int) -> Columns:
         """Return columns for curves that were not fitted."""
         return Columns(np.zeros((len(INTEGERS), count), np.int64), np.full((len(NUMBERS), count), np.nan))
-
-    @staticmethod
-    def joined(each: Sequence[Columns]) -> Columns:
-        """Concatenate columns."""
-        return Columns(*(np.concatenate(tables, axis=1) for tables in zip(*each, strict=True)))
 
 
 def combined(reports: Sequence[Report], max_step: Any, curvature: float, alternative_energy: Any = None) -> Report:
@@ -305,38 +299,25 @@ def long_gaps(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(steps > _LONG * np.median(steps))
 
 
-def longest_gap(times: NDArray[np.float64], batch: tuple[int, ...]) -> Any:
-    """Return the longest time between neighbouring knots, shape of the batch axes."""
-    # Times that were not checked may be infinite.
-    with np.errstate(all="ignore"):
-        longest = np.maximum.reduce(times[..., 1:] - times[..., :-1], axis=-1)
-    return np.broadcast_to(longest, batch).copy() if batch else float(longest)
-
-
 def shaped(
     columns: Columns, times: NDArray[np.float64], batch: tuple[int, ...], curvature: float, method: str
 ) -> Report:
     """Return the report of curves with these knots from its columns; `method` is the requested one."""
-    gap = longest_gap(times, batch)
-    found: dict[str, Any]
-    if batch == ():
-        converged, iterations, solver, bits = columns.integers[:, 0].tolist()
-        # NaN differs from itself.
-        known = {name: x for name, x in zip(NUMBERS, columns.numbers[:, 0].tolist(), strict=True) if x == x}
-        if "guaranteed_sweeps" in known:
-            known["guaranteed_sweeps"] = int(known["guaranteed_sweeps"])
-        found = {"method": SOLVERS[solver], "converged": bool(converged), "iterations": iterations}
-        return Report(max_gap=gap, curvature=curvature, skipped=_skipped(bits), **found | _UNKNOWN | known)
-    integers = {name: columns.row(name).reshape(batch) for name in INTEGERS}
-    numbers: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in NUMBERS}
-    solvers = integers["solver"]
-    for name in OPTIONAL:
-        if np.isnan(numbers[name]).all():
-            numbers[name] = None
+    values: dict[str, Any] = {name: columns.row(name).reshape(batch) for name in (*INTEGERS, *NUMBERS)}
+    values["converged"] = values["converged"].astype(bool)
+    solvers, skipped = values.pop("solver"), int(np.bitwise_or.reduce(values.pop("skipped"), axis=None))
     used = SOLVERS[solvers.max()] if solvers.size else "quasi-newton" if method == "auto" else method
-    found = {"method": used, "converged": integers["converged"].astype(bool), "iterations": integers["iterations"]}
-    skipped = _skipped(int(np.bitwise_or.reduce(integers["skipped"], axis=None)))
-    return Report(max_gap=gap, curvature=curvature, skipped=skipped, **found | numbers)
+    if not batch:
+        values = {name: value.item() for name, value in values.items()}
+    for name in OPTIONAL:
+        if np.isnan(values[name]).all():
+            values[name] = None
+    values["guaranteed_sweeps"] = _count(values["guaranteed_sweeps"])
+    # Times that were not checked may be infinite.
+    with np.errstate(all="ignore"):
+        gap = np.max(np.diff(times), axis=-1)
+    max_gap = np.broadcast_to(gap, batch).copy() if batch else float(gap)
+    return Report(used, max_gap=max_gap, curvature=curvature, skipped=_skipped(skipped), **values)
 
 
 def _count(value: Any) -> Any:

@@ -208,7 +208,7 @@ def onto_ends(
         Whether the times have the batch axes.
     """
     ends = knots[..., 0], knots[..., -1]
-    if not (x.size and knots.size) or (x.min() >= ends[0].max() and x.max() <= ends[1].min()) or np.isnan(x).any():
+    if not (x.size and knots.size) or (x.min() >= ends[0].max() and x.max() <= ends[1].min()):
         return x, per_curve
     own = x.shape[len(batch) :] if per_curve else x.shape
     if per_curve and x.shape[: len(batch)] != batch:

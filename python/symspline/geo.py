@@ -40,7 +40,7 @@ EARTH_RADIUS = 6_371_008.8
 """Mean radius in metres: R₁ of the ellipsoid GRS 80 (Moritz, Geodetic reference system 1980)."""
 
 
-def sog(spline: CubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS) -> FloatArray:
+def sog(spline: CubicSpline[Any, Any], x: TimesLike, *, radius: float = EARTH_RADIUS) -> FloatArray:
     """Compute the speed over ground.
 
     Parameters
@@ -74,7 +74,7 @@ def sog(spline: CubicSpline, x: TimesLike, *, radius: float = EARTH_RADIUS) -> F
     return checked_number(radius, "radius must be a number above 0", lambda r: 0 < r < np.inf) * spline.speed(x)
 
 
-def cog(spline: CubicSpline, x: TimesLike) -> FloatArray:
+def cog(spline: CubicSpline[Any, Any], x: TimesLike) -> FloatArray:
     """Compute the course over ground.
 
     The course is in degrees clockwise from north, in [0, 360). It is NaN where the velocity is zero. At a pole, north
@@ -279,7 +279,7 @@ def _fitted(curves: list[tuple[Any, Any]], names: list[str], smooth: bool, optio
     return found
 
 
-def _check_globe(spline: CubicSpline) -> None:
+def _check_globe(spline: CubicSpline[Any, Any]) -> None:
     check_curve(spline)
     if str(spline.space) != "sphere:2":
         raise ValidationError(f"the curve must be on Sphere(2), not on {spline.space!r}")

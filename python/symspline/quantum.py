@@ -63,7 +63,7 @@ _BLOCK = 2**26
 # ---- Hamiltonians ----
 
 
-def hamiltonian(spline: CubicSpline, x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
+def hamiltonian(spline: CubicSpline[Any, Any], x: TimesLike, *, nu: int = 0, extrapolate: Extrapolate = None) -> Array:
     """Compute the Hamiltonian that drives states along a curve, or its derivative.
 
     Parameters
@@ -113,7 +113,7 @@ def hamiltonian(spline: CubicSpline, x: TimesLike, *, nu: int = 0, extrapolate: 
     return _generator(space, point, vector)
 
 
-def qobjevo(spline: CubicSpline, *, dims: Sequence[int] | None = None) -> QobjEvo:
+def qobjevo(spline: CubicSpline[Any, Any], *, dims: Sequence[int] | None = None) -> QobjEvo:
     """Convert the Hamiltonian of a curve to a ``QobjEvo`` for QuTiP's solvers.
 
     With ħ = 1, times in ns give a Hamiltonian in rad/ns. The solver's states agree with the points of the curve up to a
@@ -208,7 +208,7 @@ def _generator(space: Space, point: Array, vector: Array) -> Array:
 
 
 def pulses(
-    spline: CubicSpline,
+    spline: CubicSpline[Any, Any],
     edges: TimesLike,
     *,
     kind: Literal["exact", "midpoint"] = "exact",
@@ -264,7 +264,7 @@ def pulses(
     return h if basis is None else _coefficients(h, basis)
 
 
-def _pulse_edges(spline: CubicSpline, edges: TimesLike) -> tuple[Array, Array]:
+def _pulse_edges(spline: CubicSpline[Any, Any], edges: TimesLike) -> tuple[Array, Array]:
     """Return the edges in their original type, and the intervals between them."""
     times = as_array(times_of(edges, "edges")[0], "edges")
     if times.ndim != 1 or len(times) < 2:
@@ -323,7 +323,7 @@ def _coefficients(h: Array, basis: Array) -> Array:
 # ---- propagators ----
 
 
-def propagator(spline: CubicSpline, x: TimesLike) -> Array:
+def propagator(spline: CubicSpline[Any, Any], x: TimesLike) -> Array:
     """Compute the unitary U(x) that propagates states from the first knot to time x.
 
     U satisfies iU' = HU, with U = 1 at the first knot. It moves the first point along the curve, and transports the
@@ -386,7 +386,7 @@ def propagator(spline: CubicSpline, x: TimesLike) -> Array:
     return np.asarray(result.reshape(*spline._batch, *times.shape, *result.shape[-2:]))
 
 
-def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
+def _in_span(spline: CubicSpline[Any, Any]) -> tuple[CurveArrays, Array | None]:
     """Express a curve in an orthonormal basis of the span of its points and end vectors, on which the Hamiltonian acts.
 
     Return the curve and the basis; if they span the whole space, return the curve unchanged and None.
@@ -399,7 +399,7 @@ def _in_span(spline: CubicSpline) -> tuple[CurveArrays, Array | None]:
     return span.inside(curve), span.basis
 
 
-def _times(spline: CubicSpline, x: TimesLike) -> Doubles:
+def _times(spline: CubicSpline[Any, Any], x: TimesLike) -> Doubles:
     """Return the times in the units of the core, the same for all curves."""
     times, per_curve = spline._time_axis.at(x, spline._batch, False)
     if per_curve:

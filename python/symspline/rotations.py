@@ -52,7 +52,7 @@ __all__ = [
     "velocities",
 ]
 
-Spline = CubicSpline[Any] | HermiteSpline[Any]
+Spline = CubicSpline[Any, Any] | HermiteSpline[Any]
 
 _SO3, _SE3, _S3 = SpecialOrthogonal(3), SpecialEuclidean(3), Sphere(3)
 _SIX = ("columns", "rows", "interleaved")

@@ -92,7 +92,7 @@ def from_snapshots(x: ArrayLike, rank: int | None = None, *, energy: float | Non
 
 
 def reduced_operator(
-    spline: CubicSpline, operator: Any | Callable[[float], Any], x: TimesLike, start: ArrayLike | None = None
+    spline: CubicSpline[Any, Any], operator: Any | Callable[[float], Any], x: TimesLike, start: ArrayLike | None = None
 ) -> Array:
     """Compute the reduced operator X*AX in bases X that vary smoothly along a curve.
 

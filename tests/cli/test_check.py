@@ -113,6 +113,20 @@ def test_check_of_a_geodesic_is_zero_up_to_rounding(run, name, p, unit):
     assert all(float(cell) < 1e-13 for cell in run("check a.npz").splitlines()[1].split()[1:])
 
 
+def test_positions_that_differ_by_rounding_are_measured(run):
+    """Far out in the hyperbolic plane, rounding moves points by visible distances, relative to large coordinates."""
+    plane = ss.Hyperbolic(2)
+    x, y = np.sinh(np.linspace(0, 6, 12)), np.linspace(0, 1, 12) ** 2
+    spline = ss.CubicSpline(None, np.stack([np.sqrt(1 + x**2 + y**2), x, y], axis=-1), plane)
+    spline.save("a.npz")
+    printed = float(run("check a.npz").splitlines()[1].split()[2])
+    starts, ends = one_sided(spline, 0)
+    largest = np.linalg.norm([starts, ends], axis=-1).max()
+    assert (
+        printed == pytest.approx(plane.distance(ends[:-1], starts[1:]).max() / largest, rel=0.1, abs=0) and printed > 0
+    )
+
+
 def test_check_of_a_slight_bend_is_relative(run):
     """A small acceleration that is not rounding is measured as before."""
     p = [[np.cos(x), np.sin(x), 0] for x in (0, 0.3, 0.7, 1.2)]

@@ -9,7 +9,6 @@ import pytest
 from cases import unit_tangent, walk
 
 import symspline as ss
-from symspline.jax import _primitives as primitives
 from symspline.jax import curve
 
 CURVES = 4
@@ -22,15 +21,14 @@ ENDS = np.stack([0.3 * unit_tangent(SPHERE, p[0], np.random.default_rng(9)) for 
 
 @pytest.fixture
 def calls(monkeypatch):
-    """How often the core was asked to fit."""
-    made = []
+    """How often a spline was fitted, for one curve or many."""
+    made, construct = [], ss.CubicSpline.__init__
 
-    def fitted(*arguments):
+    def counted(self, *arguments, **options):
         made.append(arguments)
-        return original(*arguments)
+        construct(self, *arguments, **options)
 
-    original = primitives.fitted
-    monkeypatch.setattr(primitives, "fitted", fitted)
+    monkeypatch.setattr(ss.CubicSpline, "__init__", counted)
     return made
 
 

@@ -294,6 +294,12 @@ def test_rounding_beyond_knots_of_their_own():
     )
 
 
+def test_times_beyond_knots_of_their_own_need_the_batch_axes():
+    curves = ss.CubicSpline([[0.0, 1, 2], [1.0, 2, 3]], [np.eye(3)] * 2, "sphere:2")
+    with pytest.raises(ss.ValidationError, match=r"must begin with the batch axes \(2,\); got \(3, 5\)"):
+        curves(np.full((3, 5), 9.0), per_curve=True)
+
+
 def test_times_in_single_precision_have_its_rounding():
     spline = ss.CubicSpline([0, 0.1, 0.3], THREE, S2)
     x = np.linspace(0, 0.3, 5, dtype=np.float32)

@@ -162,7 +162,34 @@ assert_type(motion(0.5), Float)
 assert_type(motion.sigma, tuple[Number, ...])
 assert_type(ss.make_lsq_spline(t, p, 2, "sphere:2").sigma, Number)
 
+
+# A smoothing spline is a cubic spline with a report of another type. An annotation without parameters means the report
+# of a spline through points.
+
+
+def first_residual(spline: ss.CubicSpline) -> Number:
+    return spline.report.residual
+
+
+def on_any_report(spline: ss.CubicSpline[Any, Any]) -> Number:
+    return spline.length()
+
+
+first_residual(spline)
+on_any_report(spline)
+on_any_report(smooth)
+on_any_report(both)
+smoothed: ss.CubicSpline[Float, ss.SmoothingReport] = smooth
+assert_type(smoothed.report, ss.SmoothingReport)
+
 # ---- other modules ----
+
+track = ss.make_smoothing_spline(t, p, "sphere:2")
+assert_type(ss.geo.sog(track, x), Float)
+assert_type(ss.quantum.hamiltonian(track, x), NDArray[Any])
+assert_type(ss.subspaces.reduced_operator(track, np.eye(3), x), NDArray[Any])
+assert_type(ss.rotations.angular_velocity(track, x, "world"), NDArray[Any])
+assert_type(ss.poses.twist(motion, x, "world"), NDArray[Any])
 
 turning = ss.CubicSpline(None, np.stack([np.eye(3)] * 2), "so:3")
 assert_type(ss.rotations.angular_velocity(turning, x, "world"), NDArray[Any])

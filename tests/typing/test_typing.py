@@ -10,7 +10,7 @@ import subprocess
 import sys
 import sysconfig
 from pathlib import Path
-from typing import get_overloads
+from typing import Any, get_overloads
 
 import interface
 import pytest
@@ -45,6 +45,11 @@ def test_pyright():
 
 def test_all_public_types_are_known():
     check("basedpyright", "--verifytypes", "symspline", "--ignoreexternal")
+
+
+def test_annotations_may_omit_the_report_at_run_time():
+    for spline in (symspline.CubicSpline, symspline.SmoothingSpline):
+        assert (spline[Any] | None) != (spline[Any, Any] | None)
 
 
 def functions_of(cls):

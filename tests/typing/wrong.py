@@ -81,3 +81,9 @@ def needs_arrays(curve: ss.CubicSpline) -> None: ...
 
 
 needs_arrays(ss.CubicSpline(t, (p, v), poses))  # type: ignore[arg-type]
+
+
+def needs_a_report_of_a_fit(curve: ss.CubicSpline) -> None: ...
+
+
+needs_a_report_of_a_fit(smooth)  # type: ignore[arg-type]

@@ -3,17 +3,82 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, Protocol
 
 import numpy as np
 
 from .. import _core
 from .._arrays import as_array, cast, short_repr
 from .._core import ValidationError
-from .._spaces import Array, Doubles
+from .._spaces import Array, Doubles, Space
 from .._time import onto_ends
-from .curve import CurveArrays, Gradient, SampleTimes
+from .._typing import FloatArray, P
 from .ends import End, ends_of
+
+
+@dataclass(frozen=True)
+class Gradient(Generic[P]):
+    """Gradient of a function of a spline with respect to its data.
+
+    `CubicSpline.vjp` returns objects of this class.
+
+    Attributes
+    ----------
+    points : ndarray or tuple of ndarray
+        Tangent vectors at the points, with their shape.
+    t : ndarray
+        One number per knot, with the shape of the knots.
+    ends : tuple
+        Tangent vectors for the velocity or acceleration prescribed at either end, with its shape; None where none was
+        prescribed.
+
+    See Also
+    --------
+    CubicSpline.vjp : Compute the gradient of a function of the curve.
+
+    Examples
+    --------
+    >>> import symspline as ss
+    >>> spline = ss.CubicSpline([0, 1, 2], [[0.0], [1.0], [0.0]], "r:1")
+    >>> gradient = spline.vjp(0.5, [1.0])
+    >>> gradient.points.shape, gradient.t.shape, gradient.ends
+    ((3, 1), (3,), (None, None))
+    """
+
+    points: P
+    t: FloatArray
+    ends: tuple[P | None, P | None]
+
+
+class SampleTimes(NamedTuple):
+    """Times on the curves of a batch at which derivatives are computed.
+
+    Attributes
+    ----------
+    x : ndarray, shape (curves, times)
+        Times of each curve.
+    shape : tuple of int
+        Shape of a result, without the axes of a point.
+    nu : {0, 1, 2}
+        Order of the derivative in time.
+    """
+
+    x: Doubles
+    shape: tuple[int, ...]
+    nu: int
+
+
+class SplineData(Protocol):
+    """C² curves through points, in a space that is not a product."""
+
+    space: Space
+    times: Doubles
+    points: Array
+    velocities: Array
+
+    @property
+    def batch(self) -> tuple[int, ...]: ...
 
 
 def sample_times(knots: Array, batch: tuple[int, ...], x: Array, per_curve: bool, nu: int) -> SampleTimes:
@@ -51,7 +116,7 @@ class _Curves(NamedTuple):
     nu: int
 
 
-def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
+def jvp(curve: SplineData, at: SampleTimes, bc_type: Any, points: Any, t: Any, ends: Any) -> Array:
     """Compute the change of the curve for a change of its data; see `symspline.CubicSpline.jvp`."""
     space, times = curve.space, curve.times
     if points is None:
@@ -71,7 +136,7 @@ def jvp(curve: CurveArrays, at: SampleTimes, bc_type: Any, points: Any, t: Any, 
     return np.asarray(space._numbers(moved.reshape(*at.shape, *space._doubles_shape)))
 
 
-def vjp(curve: CurveArrays, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient:
+def vjp(curve: SplineData, at: SampleTimes, bc_type: Any, cotangent: Any) -> Gradient:
     """Compute the gradient with respect to the data; see `symspline.CubicSpline.vjp`."""
     space, batch, nodes = curve.space, curve.batch, curve.times.shape[-1]
     doubles = space._doubles(cotangent, "cotangent")
@@ -96,7 +161,7 @@ def pair_of(ends: Any) -> tuple[Any, Any]:
     return ends[0], ends[1]
 
 
-def _curves(curve: CurveArrays, at: SampleTimes, bc_type: Any) -> _Curves:
+def _curves(curve: SplineData, at: SampleTimes, bc_type: Any) -> _Curves:
     space, batch = curve.space, curve.batch
     points, velocities = (space._as_doubles(np.ascontiguousarray(a)) for a in (curve.points, curve.velocities))
     knots, ends = _per_curve(curve.times, batch), ends_of(bc_type, space, batch)
@@ -120,7 +185,7 @@ def _given(bc_type: Any, which: int) -> Array | None:
     return None if isinstance(bc_type, str) or isinstance(bc_type[which], str) else bc_type[which][1]
 
 
-def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: int) -> Doubles:
+def _end_motion(curve: SplineData, bc_type: Any, value: Any, name: str, which: int) -> Doubles:
     space, batch = curve.space, curve.batch
     shape = batch + space._doubles_shape
     if value is None:
@@ -133,7 +198,7 @@ def _end_motion(curve: CurveArrays, bc_type: Any, value: Any, name: str, which: 
     return space._as_doubles(np.ascontiguousarray(space.project_tangent(at, vectors))).reshape(shape)
 
 
-def _end_gradient(curve: CurveArrays, bc_type: Any, gradient: Doubles, which: int) -> Any:
+def _end_gradient(curve: SplineData, bc_type: Any, gradient: Doubles, which: int) -> Any:
     given = _given(bc_type, which)
     if given is None:
         return None

@@ -24,10 +24,8 @@ from .._typing import Progress
 from ..manifolds import Manifold
 from ..manifolds._checks import hermite_on_manifold
 from ..manifolds._on_manifold import OnManifold
-from .core_curve import CoreCurve
-from .curve import CurveArrays
+from .curve import CoreCurve, CurveArrays, ProductCurve, share
 from .ends import End, ends_in_factors, ends_of
-from .product import ProductCurve, share
 from .reduced import ReducedCurve
 from .solve import Mask, Options, Solved, Task, solve, without
 

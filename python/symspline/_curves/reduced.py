@@ -17,8 +17,7 @@ from .._core import ValidationError
 from .._spaces import Array, ComplexGrassmannian, Doubles, Grassmannian, Hyperbolic, Space
 from .._spaces.base import LARGE as _LARGE
 from .._typing import Progress
-from .core_curve import CoreCurve
-from .curve import NORMS, CurveArrays
+from .curve import NORMS, CoreCurve, CurveArrays
 from .ends import map_ends
 from .solve import Options, Solved, Task, solve_in_python, solve_single
 
@@ -131,9 +130,7 @@ class ReducedCurve(CoreCurve):
         span = span_of(self.space, self.points, vectors)
         return span, span.inside(self)
 
-    def evaluate(
-        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
-    ) -> Any:
+    def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
         span, small = self.small
         values = small.evaluate(x, quantity, outside, per_curve, progress)
         return values if quantity in NORMS else span.embed_samples(values, self.batch)

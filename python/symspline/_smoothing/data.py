@@ -84,15 +84,20 @@ class Knots(NamedTuple):
         return Knots(t, np.ascontiguousarray(times))
 
 
+Ends = list[list[End] | None]
+
+
 def read_noisy(
     t: TimesLike | None, points: Any, space: Space, weights: Any, frames: Any, bc_type: Any, atol: float | None
-) -> Given:
-    """Return the data as a user passes them, after all checks except those of points.
+) -> tuple[SmoothingData, list[Points], Ends]:
+    """Return the data of a user without points, the points in every factor, and the end conditions.
+
+    The points are not checked.
 
     Raises
     ------
     ValidationError
-        If an argument is invalid.
+        If another argument is invalid.
     """
     data = with_atol(read(points, space), atol)
     batch, count = data[0].batch, data[0].nodes
@@ -108,85 +113,58 @@ def read_noisy(
                 f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
-    return Given(SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends, None)
+    return SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends
 
 
-class Given(NamedTuple):
-    """Noisy data before their points are checked.
+def valid_curves(
+    noisy: SmoothingData, data: list[Points], ends: Ends, space: Space, mask: NDArray[np.bool_] | None, strict: bool
+) -> tuple[SmoothingData, Ends, NDArray[np.intp] | None, list[Fault]]:
+    """Select the valid curves of the mask, and project their points onto the space.
 
-    Attributes
-    ----------
+    Returns
+    -------
     noisy : SmoothingData
-        The data without points.
-    data : list of Points
-        Points in every factor.
+        The data of these curves. If some curves are masked, there is one batch axis.
     ends : list
-        End conditions in every factor.
+        Their end conditions in every factor.
     chosen : ndarray of int or None
-        Indices of these curves in the batch of the user; None for all curves.
+        Their indices in the batch of the user; None for all curves.
+    faults : list of Fault
+        Faults of curves that became masked.
+
+    Raises
+    ------
+    ValidationError
+        If a point is invalid, or a curve has data at fewer than two times. Unless `strict`, such curves of a batch are
+        masked instead.
     """
+    batch = noisy.batch
+    skip = bool(batch) and not strict
+    # Only points are checked here. Times may repeat, knots need not be times of the data, and the ends of a closed
+    # curve are noisy and differ.
+    plain = np.arange(data[0].nodes, dtype=np.float64)
+    natural = read_ends("natural", space, batch)
+    points, faults = validated(
+        space, plain, data, [own or other for own, other in zip(ends, natural, strict=True)], skip, mask
+    )
+    noisy = noisy._replace(points=points)
+    kept = np.ones(batch, bool) if mask is None else mask.copy()
+    kept.flat[[fault.curve for fault in faults]] = False
+    for precision in noisy.precisions:
+        for number in np.flatnonzero(kept & ~_enough(noisy.times, precision.weights, batch)).tolist():
+            too_few = _too_few(precision.weights, batch, number)
+            if not skip:
+                raise ValidationError(too_few)
+            faults.append(Fault(number, INVALID, too_few))
+            kept.flat[number] = False
+    if kept.all():
+        return noisy, ends, None, faults
+    chosen = np.flatnonzero(kept)
 
-    noisy: SmoothingData
-    data: list[Points]
-    ends: list[list[End] | None]
-    chosen: NDArray[np.intp] | None
+    def rows(array: Any) -> Any:
+        return np.ascontiguousarray(array.reshape(-1, *array.shape[len(batch) :])[chosen])
 
-    def valid_only(self, space: Space, mask: NDArray[np.bool_] | None, strict: bool) -> tuple[Given, list[Fault]]:
-        """Return the valid curves of the mask, and the faults of the others.
-
-        Unless `strict`, curves with invalid or too few points are masked.
-        """
-        batch, times = self.noisy.batch, self.noisy.times
-        chosen = np.ones(batch, bool) if mask is None else mask.copy()
-        faults: list[Fault] = []
-        if batch and not strict:
-            _, faults = validated(*self._plain(space), skip_invalid=True, mask=chosen)
-            chosen.flat[[fault.curve for fault in faults]] = False
-            for precision in self.noisy.precisions:
-                for number in np.flatnonzero(chosen & ~_enough(times, precision.weights, batch)):
-                    too_few = _too_few(precision.weights, batch, int(number))
-                    faults.append(Fault(int(number), INVALID, too_few))
-                    chosen.flat[number] = False
-        if chosen.all():
-            return self, faults
-        return self._take_batch(np.flatnonzero(chosen)), faults
-
-    def _plain(self, space: Space) -> tuple[Space, Doubles, list[Points], list[list[End] | None]]:
-        """Return the data in a form in which only points are checked.
-
-        Times may repeat, knots need not be times of the data, and the ends of a closed curve are noisy and differ.
-        """
-        plain = np.arange(self.data[0].nodes, dtype=np.float64)
-        natural = read_ends("natural", space, self.noisy.batch)
-        ends = [own or other for own, other in zip(self.ends, natural, strict=True)]
-        return space, plain, self.data, ends
-
-    def _take_batch(self, chosen: NDArray[np.intp]) -> Given:
-        """Return some of the curves, along one batch axis."""
-        lead, batch = len(self.noisy.batch), (len(chosen),)
-
-        def rows(array: Any) -> Any:
-            return np.ascontiguousarray(array.reshape(-1, *array.shape[lead:])[chosen])
-
-        data = [part._replace(numbers=rows(part.numbers), batch=batch) for part in self.data]
-        return Given(self.noisy.map(rows, batch), data, [map_ends(own, rows) for own in self.ends], chosen)
-
-    def checked(self, space: Space) -> SmoothingData:
-        """Return the data with points projected onto the space.
-
-        Raises
-        ------
-        ValidationError
-            If a point is invalid, or a curve has data at fewer than two times.
-        """
-        points, _ = validated(*self._plain(space))
-        noisy = self.noisy._replace(points=points)
-        for own in noisy.precisions:
-            enough = _enough(noisy.times, own.weights, noisy.batch)
-            if not np.all(enough):
-                number = int(np.flatnonzero(~enough)[0])
-                raise ValidationError(_too_few(own.weights, noisy.batch, number))
-        return noisy
+    return noisy.map(rows, (len(chosen),)), [map_ends(own, rows) for own in ends], chosen, faults
 
 
 def _times_of(t: TimesLike | None, batch: tuple[int, ...], count: int) -> tuple[TimeAxis, Array, Doubles]:

@@ -35,7 +35,17 @@ from .._typing import (
     TimesLike,
 )
 from ..manifolds._manifold import refuse_functions
-from .data import Knots, SmoothingData, has_all_times, in_gaps, knots_for, points_of, read_noisy, with_enough_knots
+from .data import (
+    Knots,
+    SmoothingData,
+    has_all_times,
+    in_gaps,
+    knots_for,
+    points_of,
+    read_noisy,
+    valid_curves,
+    with_enough_knots,
+)
 from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split_ends
 from .report import SmoothingReport
 from .solve import NO_CURVE, SolverOptions, one_per_curve, smoothed
@@ -235,8 +245,8 @@ def make_smoothing_spline(
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
     options = SolverOptions(criterion, gamma, loss, method, tol, most, False)
-    given = read_noisy(t, points, space, weights, frames, bc_type, atol)
-    whole, batch = given.noisy, given.noisy.batch
+    whole, data, of_factors = read_noisy(t, points, space, weights, frames, bc_type, atol)
+    batch = whole.batch
     lams, sigmas = _in_parts(space, lam, "lam", batch), _in_parts(space, sigma, "sigma", batch)
     if loss != "linear" and sigma is None and any(own.is_singular for own in whole.precisions):
         raise ValidationError(
@@ -246,15 +256,12 @@ def make_smoothing_spline(
     if whole.times.shape[-1] == 2:
         # Two points have no outliers and do not determine the noise level.
         options = options._replace(loss="linear")
-    some_given, faults = given.valid_only(space, mask_of(where, batch), on_failure == "raise")
-    noisy, chosen = some_given.checked(space), some_given.chosen
+    strict, mask = on_failure == "raise", mask_of(where, batch)
+    noisy, of_factors, chosen, faults = valid_curves(whole, data, of_factors, space, mask, strict)
     if chosen is not None:
         lams, sigmas = ([own[chosen] for own in each] for each in (lams, sigmas))
-    ends = [
-        own
-        for factor, of_factor in zip(factors_of(space), some_given.ends, strict=True)
-        for own in split_ends(factor, of_factor)
-    ]
+    factors = factors_of(space)
+    ends = [part for factor, own in zip(factors, of_factors, strict=True) for part in split_ends(factor, own)]
     every = knots_for(whole, knots)
     free = knots is None or has_all_times(every, noisy)
 
@@ -284,9 +291,7 @@ def make_smoothing_spline(
     # Points of masked curves are NaN.
     whole = whole._replace(points=[spread(own) for own in noisy.points])
     parts, conditions = [], []
-    for factor, of_points, of_ends in zip(
-        factors_of(space), grouped(space, found), grouped(space, transported), strict=True
-    ):
+    for factor, of_points, of_ends in zip(factors, grouped(space, found), grouped(space, transported), strict=True):
         rows = join(factor, [spread(own) for own, _, _ in of_points])
         doubles = np.ascontiguousarray(factor._as_doubles(rows))
         parts.append(Points(doubles, 0.0, batch, at.times.shape[-1]))
@@ -305,11 +310,11 @@ def make_smoothing_spline(
     counts = [np.sum(own.weights > 0, axis=-1) for own in whole.precisions]
     warn_of_bounds(space, [part.report for part in noise], [spread(np.isnan(own)) for own in lams], counts)
     warn_of_spread(space, fitted.curve, whole, [part.report.df for part in noise])
-    data = [
+    smoothed_data = [
         Points(one._as_doubles(own), 0.0, batch, whole.times.shape[-1])
-        for one, own in zip(factors_of(space), whole.points, strict=True)
+        for one, own in zip(factors, whole.points, strict=True)
     ]
-    warn_of_signs(space, [data])
+    warn_of_signs(space, [smoothed_data])
     warn_of_far_points([fitted.curve], [fitted.columns])
     return spline
 

@@ -53,7 +53,10 @@ else:
     noise_property = property
 
 
-class SmoothingSpline(CubicSpline[P], Generic[P, R]):
+_T = TypeVar("_T")
+
+
+class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     """A C² cubic spline close to noisy data.
 
     `make_smoothing_spline` and `make_lsq_spline` return objects of this class; it has no public constructor. All
@@ -93,7 +96,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         *own, self._noisy, self._smoothed = parts
         super()._fill(*own)
 
-    def _each(self, values: list[Any]) -> Any:
+    def _each(self, values: list[_T]) -> _T | tuple[_T, ...]:
         """Return one value, or a tuple with one value per space in which data were smoothed."""
         return tuple(values) if is_several(self.space) else values[0]
 
@@ -102,16 +105,16 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         return tuple(values) if isinstance(self.space, Product) else values[0]
 
     @property
-    def report(self) -> R:  # type: ignore[override]
+    def report(self) -> R:
         """Report of the smoothing fit, a `SmoothingReport` or a tuple of them."""
-        reports: R = self._each([found.report for found in self._smoothed])
-        return reports
+        reports: Any = self._each([found.report for found in self._smoothed])
+        result: R = reports
+        return result
 
     @noise_property
     def lam(self) -> Number | tuple[Number, ...]:
         """Weight λ of the bending energy."""
-        lam: Number | tuple[Number, ...] = self._each([found.report.lam for found in self._smoothed])
-        return lam
+        return self._each([found.report.lam for found in self._smoothed])
 
     @noise_property
     def df(self) -> Number | tuple[Number, ...]:
@@ -119,8 +122,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
         They are 2 for a geodesic, and the number of data for interpolation.
         """
-        df: Number | tuple[Number, ...] = self._each([found.report.df for found in self._smoothed])
-        return df
+        return self._each([found.report.df for found in self._smoothed])
 
     @noise_property
     def sigma(self) -> Number | tuple[Number, ...]:
@@ -129,8 +131,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         This is the given value, or else the estimate ``sqrt(sum(weights * distance**2) / (dim * (N - df)))``.
         Coordinates refer to an orthonormal frame.
         """
-        sigma: Number | tuple[Number, ...] = self._each([found.sigma for found in self._smoothed])
-        return sigma
+        return self._each([found.sigma for found in self._smoothed])
 
     @property
     def data(self) -> tuple[AnyArray, P]:
@@ -319,8 +320,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
 
     @property
     def _unconverged(self) -> int:
-        good = np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)
-        return int(np.size(good) - np.sum(good))
+        return int(np.sum(~np.all([np.asarray(found.report.converged) for found in self._smoothed], axis=0)))
 
     def _with(self, time_axis: TimeAxis, t: Array, curve: CurveArrays, index: Any) -> Any:
         part = super()._with(time_axis, t, curve, index)
@@ -340,7 +340,7 @@ class SmoothingSpline(CubicSpline[P], Generic[P, R]):
         )
 
     @classmethod
-    def _like(cls, spline: CubicSpline[Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
+    def _like(cls, spline: CubicSpline[Any, Any], noisy: SmoothingData, smoothed: list[Smoothed]) -> Self:
         """Return a smoothing spline from a spline through the smooth points and the properties of the noise."""
         parts = (spline._time_axis, spline._t, spline._curve, spline._bc_type, spline._extrapolate, spline._reports)
         return cls._of(*parts, noisy, smoothed)

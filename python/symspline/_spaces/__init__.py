@@ -3,9 +3,21 @@
 """The spaces: points, tangent vectors and their geometry."""
 
 from .base import POINT_TOL, POINT_TOL_FLOAT32, Array, Doubles, Space, point_tol
-from .groups import Orthogonal, SpecialEuclidean, SpecialOrthogonal, SpecialUnitary, Unitary
+from .groups import (
+    Affine,
+    ComplexGeneralLinear,
+    GeneralLinear,
+    Lorentz,
+    Orthogonal,
+    Similarity,
+    SpecialEuclidean,
+    SpecialLinear,
+    SpecialOrthogonal,
+    SpecialUnitary,
+    Symplectic,
+    Unitary,
+)
 from .indefinite import AntiDeSitter, DeSitter, IndefiniteGrassmannian
-from .linear import Affine, ComplexGeneralLinear, GeneralLinear, Lorentz, Similarity, SpecialLinear, Symplectic
 from .positive import HermitianPositiveDefinite, Siegel, SpecialPositiveDefinite, SymmetricPositiveDefinite
 from .product import Product, factors_of, parts_of, product_norm, space, space_named
 from .subspaces import (

@@ -152,16 +152,11 @@ class Product(Space[PProduct]):
         return self._each("frame", p)
 
     def random_point(self, rng: np.random.Generator, shape: int | tuple[int, ...] = ()) -> PProduct:
-        each: Any = tuple(factor.random_point(rng, shape) for factor in self.factors)
-        points: PProduct = each
-        return points
+        count = len(self.factors)
+        return self._each("random_point", (rng,) * count, (shape,) * count)
 
     def random_tangent(self, rng: np.random.Generator, p: ArrayLike) -> PProduct:
-        each: Any = tuple(
-            factor.random_tangent(rng, q) for factor, q in zip(self.factors, parts_of(p, self, "p"), strict=True)
-        )
-        vectors: PProduct = each
-        return vectors
+        return self._each("random_tangent", (rng,) * len(self.factors), p)
 
     def _finite(self, operation: str, t: NDArray[np.float64] | None = None, **inputs: Any) -> Any:
         each = tuple(
@@ -192,18 +187,13 @@ def factors_of(space: Space[Any]) -> tuple[Space[AnyArray], ...]:
     return space.factors if isinstance(space, Product) else (space,)
 
 
-def check_tuple(points: Any, space: Space[Any], name: str) -> None:
-    """Raise ValidationError unless there is one array per factor of the product."""
-    count = len(factors_of(space))
-    if not isinstance(points, (tuple, list)) or len(points) != count:
-        raise ValidationError(f"{name} must be a tuple of {count} arrays, one per factor of {space!r}")
-
-
 def parts_of(value: Any, space: Space[Any], name: str) -> Tuple:
     """Return the entries of a value that belong to each factor; in a space that is not a product, the value itself."""
     if not isinstance(space, Product):
         return (value,)
-    check_tuple(value, space, name)
+    count = len(space.factors)
+    if not isinstance(value, (tuple, list)) or len(value) != count:
+        raise ValidationError(f"{name} must be a tuple of {count} arrays, one per factor of {space!r}")
     return tuple(value)
 
 

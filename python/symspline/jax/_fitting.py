@@ -14,8 +14,7 @@ from .._core import ValidationError
 from .._spaces import Space, SpecialOrthogonal, Sphere, space_named
 from ._casteljau import arrays_of
 from ._chain import Data, defects, step_of, weights
-from ._models import Curved, Model
-from ._motions import Rotations
+from ._models import Curved, Model, Rotations
 
 
 def fit(

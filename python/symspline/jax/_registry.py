@@ -9,13 +9,18 @@ import jax.numpy as jnp
 from .. import _spaces
 from .._core import ValidationError
 from .._spaces import Space
-from ._matrices import Planes, Positive
-from ._models import Curved, Lines, Model
-from ._motions import Poses, Rotations
+from ._models import Curved, Lines, Model, Planes, Poses, Positive, Rotations
 
 _LINES = (_spaces.RealProjective, _spaces.ComplexProjective)
 _PLANES = (_spaces.Grassmannian, _spaces.ComplexGrassmannian)
-_POSITIVE = (_spaces.SymmetricPositiveDefinite, _spaces.HermitianPositiveDefinite)
+_MODELS: list[tuple[tuple[type[Space[Any]], ...], Model]] = [
+    ((_spaces.Euclidean,), Model()),
+    ((_spaces.Sphere,), Curved(1)),
+    ((_spaces.Hyperbolic,), Curved(-1)),
+    (_LINES, Lines()),
+    (_PLANES, Planes()),
+    ((_spaces.SymmetricPositiveDefinite, _spaces.HermitianPositiveDefinite), Positive()),
+]
 QUOTIENTS = (*_LINES, *_PLANES)
 _COLUMN = (_spaces.Sphere, _spaces.RealProjective, _spaces.ComplexProjective)
 _COLUMNS = (_spaces.Grassmannian, _spaces.ComplexGrassmannian, _spaces.QuaternionicProjective)
@@ -30,16 +35,9 @@ def model_of(space: Space) -> Model:
     ValidationError
         If the space is not supported in JAX.
     """
-    if isinstance(space, _spaces.Euclidean):
-        return Model()
-    if isinstance(space, (_spaces.Sphere, _spaces.Hyperbolic)):
-        return Curved(1 if isinstance(space, _spaces.Sphere) else -1)
-    if isinstance(space, _LINES):
-        return Lines()
-    if isinstance(space, _PLANES):
-        return Planes()
-    if isinstance(space, _POSITIVE):
-        return Positive()
+    for classes, model in _MODELS:
+        if isinstance(space, classes):
+            return model
     if isinstance(space, _spaces.SpecialOrthogonal) and space.point_shape[0] in (2, 3):
         return Rotations(space.point_shape[0])
     if isinstance(space, _spaces.SpecialEuclidean):

@@ -32,11 +32,6 @@ def hermitian(a: Any) -> Any:
     return 0.5 * (a + adjoint(a))
 
 
-def exponential(a: Any) -> Any:
-    """exp of Hermitian matrices, shape (..., n, n)."""
-    return _function(_exp, a)
-
-
 def logarithm(a: Any) -> Any:
     """log of positive definite matrices, shape (..., n, n)."""
     return _function(_log, a)
@@ -86,34 +81,6 @@ def _next(divided: Divided, primals: Any, tangents: Any) -> Any:
 
 
 # ---- divided differences ----
-
-
-def _exp(*x: Any) -> Any:
-    if len(x) == 1:
-        return jnp.exp(x[0])
-    if len(x) == 2:
-        half = 0.5 * (x[0] - x[1])
-        return jnp.exp(0.5 * (x[0] + x[1])) * jnp.where(
-            half == 0, 1.0, jnp.sinh(half) / jnp.where(half == 0, 1.0, half)
-        )
-    # Opitz: the corner of the exponential of a bidiagonal matrix. From the least of the numbers on, all in it is
-    # positive, so that nothing cancels.
-    diagonal = jnp.stack(jnp.broadcast_arrays(*x), axis=-1)
-    least = jnp.min(diagonal, axis=-1, keepdims=True)
-    size = len(x)
-    matrix = (diagonal - least)[..., None] * np.eye(size) + np.eye(size, k=1)
-    return jnp.exp(least[..., 0]) * _exponential_of_triangle(matrix)[..., 0, -1]
-
-
-def _exponential_of_triangle(matrix: Any, halvings: int = 6, terms: int = 14) -> Any:
-    """exp of matrices without negative entries, whose norm is at most about 2^halvings."""
-    small = matrix / 2**halvings
-    total = one = jnp.broadcast_to(jnp.eye(matrix.shape[-1], dtype=matrix.dtype), matrix.shape)
-    for n in range(terms, 0, -1):
-        total = one + small @ total / n
-    for _ in range(halvings):
-        total = total @ total
-    return total
 
 
 def _log(*x: Any) -> Any:

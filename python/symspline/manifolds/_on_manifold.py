@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._core import ValidationError
-from .._curves.core_curve import CoreCurve
-from .._curves.curve import NORMS, REAL
+from .._curves.curve import NORMS, REAL, CoreCurve
 from .._curves.solve import Options, Solved, Task, solve_in_python
 from .._faults import Fault
 from .._spaces import Array, Doubles, Euclidean, Space
@@ -55,12 +54,9 @@ class OnManifold(CoreCurve):
     def validate(task: Task, options: Options) -> tuple[Task, list[Fault]]:
         return validate_on_manifold(task, options)
 
-    def evaluate(
-        self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None = None
-    ) -> Any:
+    def _evaluate(self, x: Doubles, quantity: str, outside: str, per_curve: bool, progress: Progress | None) -> Any:
         if quantity in REAL and quantity not in NORMS:
             self._refuse(f"{quantity} is that of rotations, not")
-        self._check_times(x, per_curve)
         self._check_domain(x, outside, per_curve)
         batch, space = self.batch, self.space
         count = math.prod(batch)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from .. import _base_curve
 from .._adapters import joined
+from .._base_curve import call_at_times
 from .._core import ConvergenceError, CutLocusError, ValidationError
 from .._cubic import CubicSpline
 from .._functional import given
@@ -123,7 +123,10 @@ def values_at(
     if not good.any():
         return np.full(batch + x.shape[x.ndim - x_axes :] + shape, np.nan, space.dtype if shape else float)
     time_axis, curve = given(t, points, velocities, space)
-    found = (_base_curve.lifted if lifted else _base_curve.evaluated)(curve, time_axis, x, quantity, policy, per_curve)
+    method = curve.lift if lifted else curve.evaluate
+    found = call_at_times(
+        curve, time_axis, x, per_curve, policy, lambda x, outside, own: method(x, quantity, outside, own)
+    )
     if everyone:
         return np.asarray(found)
     values = np.full(batch + found.shape[1:], np.nan, found.dtype)
