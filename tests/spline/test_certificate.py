@@ -27,9 +27,6 @@ def longest_leg(space, points, velocities):
     return space.norm(points, velocities).max() / 3
 
 
-# ---- the number ----
-
-
 @pytest.mark.parametrize("name", CURVED)
 @loop_over("kd", [1e-6, 0.01, 0.1, 0.2, 0.25, 0.26, 0.26108])
 def test_radius_is_the_smallest_of_38(name, kd, rng):
@@ -56,9 +53,6 @@ def test_radius_is_the_longest_step_in_flat_space(name, rng):
     assert report.invariant_radius == pytest.approx(report.max_step, rel=1e-15)
 
 
-# ---- the theorem ----
-
-
 @pytest.mark.parametrize("name", CURVED)
 @loop_over("kd", [0.01, 0.2, 0.26])
 @loop_over("ends", ["natural", "clamped", "velocity"])
@@ -80,9 +74,6 @@ def test_algorithm_1_stays_within(name, kd, ends, rng):
         assert done.report.converged and done.report.rate < 0.6
         assert done.report.invariant_radius == radius
         assert longest_leg(space, p, done.velocities) <= radius
-
-
-# ---- the contraction ----
 
 
 def alpha(kd, kv):
@@ -121,9 +112,6 @@ def test_guaranteed_sweeps_are_enough(name, kd, rng):
         options = {"method": "fixed-point", "tol": 0.0, "on_failure": "ignore"}
         spline = ss.CubicSpline(None, p, space, max_iter=report.guaranteed_sweeps + 1, **options)
         assert longest_leg(space, p, spline.velocities - exact) <= tol * report.invariant_radius
-
-
-# ---- when there is one ----
 
 
 RADIUS = pytest.approx(0.23405665250997934, rel=1e-9)
@@ -191,9 +179,6 @@ def test_given_velocities_widen_the_region(end, rng):
         assert report.invariant_radius == (radius and pytest.approx(radius, rel=1e-12)), leg
 
 
-# ---- batches, files, words ----
-
-
 @pytest.fixture
 def batch(rng):
     return ss.CubicSpline(None, np.array([steps(S2, kd, rng) for kd in (0.1, 0.2, 0.5)]), S2)
@@ -223,9 +208,6 @@ def test_report_states_the_radius(batch):
         assert "Theorem" not in str(some.report)
 
 
-# ---- elsewhere ----
-
-
 @pytest.mark.parametrize("first", [S2, ss.Euclidean(2)])
 def test_a_product_has_none_where_a_factor_has_none(first, rng):
     near, far = steps(S2, 0.2, rng) if first == S2 else rng.standard_normal((10, 2)), steps(S2, 0.5, rng)
@@ -234,9 +216,6 @@ def test_a_product_has_none_where_a_factor_has_none(first, rng):
     batch = np.stack([near, near]), np.stack([0.02 * far + far[:1], far])
     radius = ss.CubicSpline(None, (batch[0], S2.project(batch[1])), space).report.invariant_radius
     assert np.isnan(radius).tolist() == [False, True]
-
-
-# ---- products ----
 
 
 def test_control_polygons_of_a_product_stay_within_the_radii(rng):

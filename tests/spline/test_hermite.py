@@ -16,6 +16,7 @@ from curves import (
     tangents_at,
     vectors_off,
 )
+from refused import raises
 from scipy.interpolate import CubicHermiteSpline
 
 import symspline as ss
@@ -74,13 +75,9 @@ def test_hermite_spline_has_the_given_points_and_velocities(space):
     assert largest_difference(found.points, p) < 1e-14
 
 
-# ---- the interface ----
-
-
 def test_outside_the_knots():
     found = curve(S2)
-    with pytest.raises(ss.ValidationError, match="outside"):
-        found(5.0)
+    raises("outside", found, 5.0)
     further = S2.exp(found.points[-1], 0.3 * found.velocities[-1])
     assert np.abs(found(4.5 + 0.3, extrapolate="geodesic") - further).max() < 1e-14
     assert np.array_equal(curve(S2, extrapolate="geodesic").speed(4.8), found.speed(4.8, extrapolate="geodesic"))
@@ -103,15 +100,11 @@ def test_plots(name, tmp_path):
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
-# ---- what is refused ----
-
-
 ZERO = np.zeros((3, 3))
 
 
-@pytest.mark.parametrize(
-    ("match", "changes"),
-    [
+def test_invalid_arguments_raise():
+    for match, changes in [
         (r"velocities has shape \(2, 3\), but points \(3, 3\)", {"velocities": np.zeros((2, 3))}),
         (r"velocities\[1, 2\] is not finite", {"velocities": [[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]}),
         (r"velocities\[1\] is not tangent .* use space.project_tangent", {"velocities": [[0, 1, 0]] * 3}),
@@ -120,23 +113,21 @@ ZERO = np.zeros((3, 3))
         (r"t\[1\]", {"t": [0, 0, 1]}),
         ("extrapolate must be", {"extrapolate": "linear"}),
         ("unknown space", {"space": "round:2"}),
-    ],
-)
-def test_invalid_arguments_raise(match, changes):
-    with pytest.raises(ss.ValidationError, match=match):
-        ss.HermiteSpline(**{"t": None, "points": THREE, "velocities": ZERO, "space": S2} | changes)
+    ]:
+        with pytest.raises(ss.ValidationError, match=match):
+            ss.HermiteSpline(**{"t": None, "points": THREE, "velocities": ZERO, "space": S2} | changes)
 
 
-@pytest.mark.parametrize("batch, curve", [((), ""), ((2,), " of curve 1"), ((2, 3), " of curve 1,2")], ids=str)
-def test_control_points_beyond_reach_raise(batch, curve):
-    velocities = np.zeros((*batch, 3, 3))
-    # The second segment's inner points are (1, 0, 0) and its antipode.
-    velocities[(*(n - 1 for n in batch), 2, 0)] = 1.5 * np.pi
-    points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], velocities.shape)
-    with pytest.raises(
-        ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"
-    ):
-        ss.HermiteSpline(None, points, velocities, S2)
+def test_control_points_beyond_reach_raise():
+    for batch, curve in [((), ""), ((2,), " of curve 1"), ((2, 3), " of curve 1,2")]:
+        velocities = np.zeros((*batch, 3, 3))
+        # The second segment's inner points are (1, 0, 0) and its antipode.
+        velocities[(*(n - 1 for n in batch), 2, 0)] = 1.5 * np.pi
+        points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], velocities.shape)
+        with pytest.raises(
+            ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"
+        ):
+            ss.HermiteSpline(None, points, velocities, S2)
 
 
 def test_velocities_become_tangent_to_rounding():
