@@ -49,7 +49,7 @@ def numbered(values, mark=""):
 
 def write_table(name, columns):
     if name.endswith("csv"):
-        rows = [",".join(map(str, row)) for row in zip(*map(np.ndarray.tolist, columns.values()), strict=True)]
+        rows = [",".join(map(str, row)) for row in zip(*columns.values(), strict=True)]
         write(name, "\n".join([",".join(columns), *rows]))
     elif name.endswith("npz"):
         np.savez(name, **columns)
