@@ -38,9 +38,6 @@ def ends_on(space, p):
     return ["natural", "clamped", "not-a-knot", ((1, v), (1, w)), ((2, v), (2, w)), ("not-a-knot", (1, w))]
 
 
-# ---- Newton's method ----
-
-
 @pytest.mark.parametrize("method", ["newton", "quasi-newton"])
 @pytest.mark.parametrize("n", [3, 4, 5, 17])
 @pytest.mark.parametrize("dim", [1, 3])
@@ -104,16 +101,10 @@ def test_it_does_not_matter_where_a_closed_curve_starts(method, rng):
     assert np.ptp(found) <= 1e-12 * found[0]
 
 
-# ---- they find the same curve ----
-
-
 def test_auto_is_quasi_newton_where_that_is_quick(rng):
     p = wild(S2, 1.2, 20, rng)
     auto, quick = (ss.CubicSpline(None, p, S2, method=method) for method in ("auto", "quasi-newton"))
     assert auto == quick and auto.report == quick.report
-
-
-# ---- points far apart ----
 
 
 @pytest.mark.parametrize(
@@ -199,9 +190,6 @@ def test_points_too_far_are_an_error_with_advice():
         ss.CubicSpline(None, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]], S2)
 
 
-# ---- batches ----
-
-
 EASY, HARD, HARDEST = zigzag(0.5, 8), zigzag(2.8, 8), zigzag(2.3, 8, 0.3)
 ANTIPODES = np.concatenate([EASY[:4], -EASY[3:4], EASY[5:]])
 IMPOSSIBLE = zigzag(1.0, 8)
@@ -245,9 +233,6 @@ def test_a_product_names_the_last_solver_that_any_factor_needed():
     assert spline.report.method == "homotopy"
 
 
-# ---- limits ----
-
-
 @pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "auto"])
 def test_no_solver_exceeds_max_iter(method):
     for points in (zigzag(1.0), zigzag(2.5), zigzag(2.3, 8, 0.3), zigzag(1.9, 12, 0.02)):
@@ -263,9 +248,6 @@ def test_unfinished_homotopy_is_reported():
     t = np.cumsum([0, 20, 1, 20, 1, 20, 1, 20])
     with pytest.raises(ss.ConvergenceError, match=r"the homotopy did not reach these points .*method"):
         ss.CubicSpline(t, p, S2, method="homotopy")
-
-
-# ---- Algorithm 1 of the paper ----
 
 
 # Table 1 of the paper, and parts of it.
