@@ -11,6 +11,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
+from refused import raises
 
 import symspline as ss
 from symspline import _core, _cpu
@@ -62,22 +63,16 @@ def test_the_module_that_suits_the_processor_is_chosen(folder_with, modules, has
     assert _cpu._choose(folder)[0] == (name and folder / NAMED[name])
 
 
-@pytest.mark.parametrize(
-    "modules, has_v3, asked, message",
-    [
+def test_missing_and_unsupported_modules_raise(folder_with):
+    for modules, has_v3, asked, message in [
         (V3, False, "", r"AVX2 and FMA.*RUSTFLAGS"),
         (ANY, True, "v3", "SYMSPLINE_CPU=v3 cannot be done: the only compiled module"),
         (V3, True, "plain", "SYMSPLINE_CPU=plain cannot be done: the only compiled module"),
         (BOTH, False, "v3", "this processor lacks x86-64-v3"),
         *((BOTH, True, asked, f"must be plain or v3, not '{asked}'") for asked in ("v4", "V3", "1", "plain ")),
-    ],
-)
-def test_missing_and_unsupported_modules_raise(folder_with, modules, has_v3, asked, message):
-    with pytest.raises(ImportError, match=message):
-        _cpu.load(folder_with(modules, has_v3, asked))
+    ]:
+        raises(message, _cpu.load, folder_with(modules, has_v3, asked), error=ImportError)
 
-
-# ---- a package with both, as in a wheel ----
 
 CODE = """
 import sys, numpy as np, symspline as ss, symspline._core
