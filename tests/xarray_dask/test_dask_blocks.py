@@ -96,9 +96,6 @@ def test_a_failure_says_that_it_counts_in_its_block():
     assert type(sent) is ss.CutLocusError and sent.spline is None and sent.__notes__
 
 
-# ---- threads ----
-
-
 def test_blocks_use_one_thread_each(threads):
     seen = []
 
@@ -134,9 +131,6 @@ sx.fit(da, "sphere:2")
 print(extra() - before)
 """
     assert run_python(code, timeout=60).split() == ["0", "3"]
-
-
-# ---- files ----
 
 
 @pytest.mark.parametrize("space", ["sphere:2", "cp:2", "so:3"])
