@@ -30,29 +30,13 @@ def turns(t):
     return ss.rotations.from_rotation_vectors(np.outer(t, [0.0, 0.1, 0.3]))
 
 
-def by_spline(t, points):
-    spline = ss.CubicSpline(t, points, "sphere:2")
+def at_knots(spline):
     return spline(spline.t)
 
 
 def by_fit(t, points):
     velocities, _ = ss.fit(t, points, "sphere:2")
     return ss.evaluate(t, points, velocities, "sphere:2", t)
-
-
-def by_fit_many(t, points):
-    (spline,) = ss.fit_many([(t, points)], "sphere:2")
-    return spline(spline.t)
-
-
-def by_segments(t, points):
-    (spline,) = ss.fit_segments(t, points, "sphere:2", max_gap=1e9)
-    return spline(spline.t)
-
-
-def by_hermite(t, points):
-    spline = ss.HermiteSpline(t, points, np.zeros(np.shape(points)), "sphere:2")
-    return spline(spline.t)
 
 
 def by_xarray(t, points):
@@ -68,12 +52,19 @@ def by_command_line(t, points):
     np.savez("a.npz", t=t, points=points)
     if main(["fit", "a.npz", "--space", "sphere:2", "-o", "b.npz"]):
         raise ss.ValidationError("the command line failed")
-    spline = ss.load("b.npz")
-    return spline(spline.t)
+    return at_knots(ss.load("b.npz"))
 
 
-ENTRIES = [by_spline, by_fit, by_fit_many, by_segments, by_hermite, by_xarray, by_command_line]
-entries = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.__name__)
+ENTRIES = {
+    "CubicSpline": lambda t, points: at_knots(ss.CubicSpline(t, points, "sphere:2")),
+    "fit": by_fit,
+    "fit_many": lambda t, points: at_knots(*ss.fit_many([(t, points)], "sphere:2")),
+    "fit_segments": lambda t, points: at_knots(*ss.fit_segments(t, points, "sphere:2", max_gap=1e9)),
+    "HermiteSpline": lambda t, points: at_knots(ss.HermiteSpline(t, points, np.zeros(np.shape(points)), "sphere:2")),
+    "xarray": by_xarray,
+    "command line": by_command_line,
+}
+entries = pytest.mark.parametrize("entry", ENTRIES.values(), ids=list(ENTRIES))
 
 
 @pytest.fixture(autouse=True)
@@ -110,7 +101,6 @@ def test_offsets_and_orders_do_not_change_the_curve(kind):
 
 
 def dirty(how):
-    """Data with a fault, and what cleans it; None if nobody but the user can."""
     t, points = T.copy(), P.copy()
     if how == "repeated":
         t[7] = t[6]
