@@ -6,7 +6,8 @@ from itertools import cycle
 import numpy as np
 import pytest
 from cases import SPACES
-from curves import each, parts, points_on, same_curve
+from compare import each, parts, same_curve
+from curves import points_on
 from tabular import TIMES, assert_same_columns, numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from curves import KNOTS, S2, THREE, at_node, every_kind, failing, parts, points_on, same, same_curve, tangents_at
+from compare import parts, same, same_curve
+from curves import KNOTS, S2, THREE, at_node, every_kind, failing, points_on, tangents_at
 from refused import raises
 from stored import load, stored, with_arrays
 

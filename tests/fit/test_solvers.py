@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from algorithm_1 import sweeps
 from cases import EPS, closed_walk, condition, jumps, loop_over, walk, zigzag, zigzag_on
-from curves import S2, same
+from compare import same
+from curves import S2
 from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss

@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, points_on, same
+from compare import same
+from curves import S2, points_on
 from refused import raises
 
 import symspline as ss

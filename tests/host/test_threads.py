@@ -10,7 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from cases import COMMON
-from curves import S3, each, every_common, points_on, run_python, same, same_curve, scattered
+from compare import each, same, same_curve
+from curves import S3, every_common, points_on, run_python, scattered
 from refused import raises
 
 import symspline as ss

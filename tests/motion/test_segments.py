@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from curves import each, every_kind, factors, largest_difference, parts, points_on
+from compare import each, factors, largest_difference, parts
+from curves import every_kind, points_on
 from refused import raises
 from scipy.spatial.transform import Rotation
 

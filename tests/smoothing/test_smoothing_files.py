@@ -7,7 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
-from curves import parts, same
+from compare import parts, same
 from noisy import example
 from refused import raises
 from stored import load, stored, with_arrays

@@ -3,23 +3,8 @@
 import numpy as np
 import pytest
 from cases import COMMON, EPS, INDEFINITE, SPACES, loop_over
-from curves import (
-    S2,
-    at_node,
-    each,
-    every_kind,
-    every_space,
-    factors,
-    found,
-    largest_difference,
-    off,
-    parts,
-    pick,
-    points_on,
-    same,
-    shaped,
-    tangents_at,
-)
+from compare import each, factors, found, largest_difference, off, parts, pick, same, shaped
+from curves import S2, at_node, every_kind, every_space, points_on, tangents_at
 from refused import NAN, REFLECTION, P, raises
 
 import symspline as ss

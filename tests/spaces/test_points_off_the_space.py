@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from cases import CASES, EPS, loop_over
-from curves import KNOTS, S2, points_on, same
+from compare import same
+from curves import KNOTS, S2, points_on
 from refused import INF, NAN, TWO, P, changed, fails, fit_error, points, raises, spoiled
 
 import symspline as ss

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from cases import loop_over, unit_tangent, walk
-from curves import KNOTS, S2, at_node, each, every_kind, points_on, same, same_curve, tangents_at, vectors_off
+from compare import each, same, same_curve, vectors_off
+from curves import KNOTS, S2, at_node, every_kind, points_on, tangents_at
 from refused import INF, NAN, TWO, P, fit_error, points, raises
 
 import symspline as ss

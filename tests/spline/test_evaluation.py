@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from curves import KNOTS, S2, each, every_batch, every_common, every_kind, found, pick, points_on, same, shaped
+from compare import each, found, pick, same, shaped
+from curves import KNOTS, S2, every_batch, every_common, every_kind, points_on
 from refused import INF, NAN, TWO, P, raises
 
 import symspline as ss

@@ -3,21 +3,8 @@
 import numpy as np
 import pytest
 from cases import EPS, QUADRICS, loop_over
-from curves import (
-    KNOTS,
-    at_node,
-    bezier,
-    each,
-    every_common,
-    every_kind,
-    largest_difference,
-    off,
-    parts,
-    pick,
-    points_on,
-    same,
-    vectors_off,
-)
+from compare import each, largest_difference, off, parts, pick, same, vectors_off
+from curves import KNOTS, at_node, bezier, every_common, every_kind, points_on
 from refused import raises
 
 import symspline as ss

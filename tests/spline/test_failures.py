@@ -7,7 +7,8 @@ import warnings
 import numpy as np
 import pytest
 from cases import EPS
-from curves import S2, failing, largest_difference, points_on, same, same_curve
+from compare import largest_difference, same, same_curve
+from curves import S2, failing, points_on
 from refused import raises
 
 import symspline as ss

@@ -2,23 +2,8 @@
 
 import numpy as np
 import pytest
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    at_node,
-    each,
-    every_batch,
-    every_common,
-    every_kind,
-    parts,
-    pick,
-    points_on,
-    same,
-    same_curve,
-    tangents_at,
-    with_ends,
-)
+from compare import each, parts, pick, same, same_curve
+from curves import KNOTS, S2, THREE, at_node, every_batch, every_common, every_kind, points_on, tangents_at, with_ends
 from refused import NAN, P, raises
 
 import symspline as ss

@@ -2,20 +2,8 @@
 
 import numpy as np
 import pytest
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    bezier,
-    each,
-    every_batch,
-    every_kind,
-    largest_difference,
-    off,
-    points_on,
-    tangents_at,
-    vectors_off,
-)
+from compare import each, largest_difference, off, vectors_off
+from curves import KNOTS, S2, THREE, bezier, every_batch, every_kind, points_on, tangents_at
 from refused import raises
 from scipy.interpolate import CubicHermiteSpline
 

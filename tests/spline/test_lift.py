@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from cases import EPS, loop_over, walk
-from curves import same
+from compare import same
 from refused import raises
 from rounding import rounding
 

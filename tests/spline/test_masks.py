@@ -5,7 +5,8 @@ import warnings
 
 import numpy as np
 import pytest
-from curves import each, parts, points_on
+from compare import each, parts
+from curves import points_on
 from refused import fit_error, raises
 
 import symspline as ss

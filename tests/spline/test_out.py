@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from cases import loop_over
-from curves import points_on, same
+from compare import same
+from curves import points_on
 from refused import raises
 
 import symspline as ss

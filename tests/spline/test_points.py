@@ -5,24 +5,8 @@ import pickle
 import numpy as np
 import pytest
 from cases import COMMON, EPS, loop_over, walk
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    at_node,
-    each,
-    every_common,
-    every_kind,
-    found,
-    largest_difference,
-    off,
-    parts,
-    points_on,
-    same,
-    same_curve,
-    shaped,
-    tangents_at,
-)
+from compare import each, found, largest_difference, off, parts, same, same_curve, shaped
+from curves import KNOTS, S2, THREE, at_node, every_common, every_kind, points_on, tangents_at
 from refused import P, fit_error, points, raises
 from scipy.interpolate import CubicSpline as FlatSpline
 

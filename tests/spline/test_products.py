@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from cases import zigzag
-from curves import KNOTS, S2, found, points_on, same, shaped
+from compare import found, same, shaped
+from curves import KNOTS, S2, points_on
 from refused import TWO, P, changed, fit_error, raises
 
 import symspline as ss

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import EPS, loop_over
-from curves import KNOTS, S2, THREE, largest_difference, points_on, same
+from compare import largest_difference, same
+from curves import KNOTS, S2, THREE, points_on
 from refused import INF, NAN, TWO, P, fit_error, raises
 
 import symspline as ss

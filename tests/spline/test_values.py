@@ -7,22 +7,8 @@ import pickle
 import numpy as np
 import pytest
 from cases import COMMON, loop_over
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    at_node,
-    every_common,
-    found,
-    parts,
-    pick,
-    points_on,
-    same,
-    same_curve,
-    shaped,
-    tangents_at,
-    with_ends,
-)
+from compare import found, parts, pick, same, same_curve, shaped
+from curves import KNOTS, S2, THREE, at_node, every_common, points_on, tangents_at, with_ends
 from refused import raises
 
 import symspline as ss

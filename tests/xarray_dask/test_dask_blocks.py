@@ -7,7 +7,8 @@ import dask
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, run_python, same
+from compare import same
+from curves import S2, run_python
 from fields import field, numbers, point_dims
 
 import symspline as ss

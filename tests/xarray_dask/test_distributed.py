@@ -8,7 +8,8 @@ import dask
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, points_on, same
+from compare import same
+from curves import S2, points_on
 from distributed import Client, LocalCluster, as_completed, futures_of
 from refused import raises
 

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, points_on, same
+from compare import same
+from curves import S2, points_on
 from fields import KNOTS, LAT, LON, field, numbers, point_dims
 
 import symspline as ss
