@@ -179,33 +179,22 @@ def test_given_velocities_widen_the_region(end, rng):
         assert report.invariant_radius == (radius and pytest.approx(radius, rel=1e-12)), leg
 
 
-@pytest.fixture
-def batch(rng):
-    return ss.CubicSpline(None, np.array([steps(S2, kd, rng) for kd in (0.1, 0.2, 0.5)]), S2)
-
-
-def test_a_batch_has_an_array(batch):
+def test_every_curve_of_a_batch_has_its_radius_in_the_report_and_its_text(rng):
+    batch = ss.CubicSpline(None, np.array([steps(S2, kd, rng) for kd in (0.1, 0.2, 0.5)]), S2)
     radius = batch.report.invariant_radius
     assert radius.shape == (3,) and np.isnan(radius).tolist() == [False, False, True]
     assert [batch[i].report.invariant_radius for i in range(3)] == [radius[0], radius[1], None]
     assert np.array_equal(batch[1:].report.invariant_radius, radius[1:], equal_nan=True)
     far = ss.CubicSpline(None, batch.points[2:], S2)
     assert far.report.invariant_radius is None
-
-
-def test_own_knots_have_own_radii(batch):
+    for some, stated in ((batch[1], True), (batch[:2], True), (batch[2], False), (batch, False)):
+        assert str(some.report).endswith(", control handles stay below 0.234 (Theorem 3.1)") == stated
+        assert ("Theorem" in str(some.report)) == stated
     t = np.array([np.arange(10.0), np.arange(10.0) ** 2, np.arange(10.0)])
-    radius = ss.CubicSpline(t, batch.points, S2).report.invariant_radius
-    assert np.isnan(radius).tolist() == [False, True, True]
+    own = ss.CubicSpline(t, batch.points, S2).report.invariant_radius
+    assert np.isnan(own).tolist() == [False, True, True]
     many = ss.fit_many(list(zip(t, batch.points, strict=True)), S2)
-    assert [one.report.invariant_radius for one in many] == [radius[0], None, None]
-
-
-def test_report_states_the_radius(batch):
-    for some in (batch[1], batch[:2]):
-        assert str(some.report).endswith(", control handles stay below 0.234 (Theorem 3.1)")
-    for some in (batch[2], batch):
-        assert "Theorem" not in str(some.report)
+    assert [one.report.invariant_radius for one in many] == [own[0], None, None]
 
 
 @pytest.mark.parametrize("first", [S2, ss.Euclidean(2)])
