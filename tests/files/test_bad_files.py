@@ -125,8 +125,7 @@ def test_files_are_read_without_pickle(tmp_path, name):
     # Of an entry that curves do not have nothing is read.
     with contextlib.nullcontext() if name == "something" else pytest.raises(ss.ValidationError):
         load(with_arrays(**{name: np.array([bomb], object)}))
-    with pytest.raises(ss.ValidationError):
-        load(npy(np.array([bomb], object)))
+    raises("the file", load, npy(np.array([bomb], object)))
     assert not (tmp_path / "exploded").exists()
 
 
@@ -169,8 +168,7 @@ def test_files_with_a_wrong_array():
         {"bc_type": "{}"},
         {"bc_type": '[["x", 1], "natural"]'},
     ]:
-        with pytest.raises(ss.ValidationError):
-            load(with_arrays(**changes))
+        raises("the file", load, with_arrays(**changes))
 
 
 def test_newer_pickles_raise():

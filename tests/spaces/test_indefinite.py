@@ -104,8 +104,7 @@ def test_points_without_a_geodesic_raise(name):
     q = -space.exp(p, 0.5 * (e[0] if kappa(name) > 0 else e[1]))
     assert kappa(name) * (signs(name) * p * q).sum() < -1.1
     for operation in (space.log, space.distance):
-        with pytest.raises(ss.CutLocusError):
-            operation(p, q)
+        raises("cut locus", operation, p, q, error=ss.CutLocusError)
     raises(r"points\[1\]", ss.CubicSpline, None, [p, p, q], space, error=ss.CutLocusError)
 
 

@@ -46,8 +46,8 @@ def test_the_logarithm_up_to_the_cut_locus(theta, stretch):
 
 @pytest.mark.parametrize("values", [(-1.0, -1.0), (-1.0, -2.0), (-3.0, -3.0, 1.0)])
 def test_negative_eigenvalues_are_on_the_cut_locus(values):
-    with pytest.raises(ss.CutLocusError):
-        ss.GeneralLinear(len(values)).log(np.eye(len(values)), np.diag(values))
+    n = len(values)
+    raises("cut locus", ss.GeneralLinear(n).log, np.eye(n), np.diag(values), error=ss.CutLocusError)
     # A nilpotent part is no angle.
     shear = np.array([[1.0, 1e3], [0, 1.0]])
     np.testing.assert_allclose(ss.GeneralLinear(2).log(np.eye(2), shear), [[0, 1e3], [0, 0]], atol=1e-9)

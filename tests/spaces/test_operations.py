@@ -147,6 +147,7 @@ def test_invalid_operands_raise():
         (lambda: S2.geodesic(P[0], P[1], 1j), "t must be real numbers, not complex128"),
         (lambda: S2.distance(P, P + 0j), r"q must be an array of real numbers, not of complex128"),
         (lambda: S2.project(np.zeros((2, 3))), r"x\[0\] cannot be projected: it is not finite, or no point of"),
+        (lambda: S2.log(P[0], [NAN, 0, 0]), "pair 0 contains a number that is not finite"),
         (lambda: S2.project([1, NAN, 0]), r"x cannot be projected"),
         (lambda: ss.Hyperbolic(2).project([NAN, 0, 0]), "x cannot be projected"),
         (lambda: S2.check_point(2 * P), r"point 0 is off the space by 1\.000e0: its norm is 2"),
