@@ -191,6 +191,7 @@ def test_batches_products_and_large_spaces(rng):
 
 
 def test_invalid_representatives_raise():
+    spline = ss.CubicSpline(None, [[1, 0, 0], [0.6, 0.8, 0]], "rp:2")
     for start, what in [
         ([0.8, 0.6, 0.0], r"start is 6\.325e-01 away from the nearest representative of the first point"),
         ([-2.0, 0.0, 0.0], r"start is 1\.000e\+00 away"),
@@ -201,7 +202,6 @@ def test_invalid_representatives_raise():
         ([[1.0], [0.0, 0.0]], r"start is not an array of equally long rows"),
         ([1j, 0.0, 0.0], r"start must be .*complex128"),
     ]:
-        spline = ss.CubicSpline(None, [[1, 0, 0], [0.6, 0.8, 0]], "rp:2")
         raises(what, spline.lift, 0.5, start)
 
 

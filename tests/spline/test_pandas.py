@@ -21,13 +21,13 @@ def test_times_with_a_zone_become_utc(times):
 
 
 def test_other_times():
+    table = pd.DataFrame(np.eye(3), columns=["x", "y", "z"])
     for times, expected in [
         (pd.date_range("2026-01-01", periods=3, freq="h"), HOURS + np.timedelta64(1, "h")),
         (pd.to_timedelta([0, 1, 2], unit="h"), [0.0, 3600, 7200]),
         (pd.Series([0.0, 1, 3]), [0, 1, 3]),
         (pd.array([0, 1, 3], dtype="Int64"), [0, 1, 3]),
     ]:
-        table = pd.DataFrame(np.eye(3), columns=["x", "y", "z"])
         spline = ss.CubicSpline(times, table, "sphere:2")
         assert np.array_equal(spline.t, expected) and np.array_equal(spline.points, np.eye(3))
 

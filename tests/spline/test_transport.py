@@ -100,6 +100,7 @@ def test_batches_products_and_large_spaces(rng):
 
 
 def test_invalid_vectors_to_transport_raise():
+    spline = ss.CubicSpline(None, np.eye(3), "sphere:2", extrapolate="geodesic")
     for x0, x1, v, match in [
         (0, 2.5, [0, 1.0, 0], r"x\[1\] = 2.5 is outside the knots"),
         (-1, 1, [0, 1.0, 0], "vectors are transported between the first"),
@@ -108,7 +109,6 @@ def test_invalid_vectors_to_transport_raise():
         (0, 1, [1.0, 1.0, 0], "not tangent"),
         (0, 1, [1.0, 1.0], "shape"),
     ]:
-        spline = ss.CubicSpline(None, np.eye(3), "sphere:2", extrapolate="geodesic")
         raises(match, spline.transport, x0, x1, v)
 
 
