@@ -27,11 +27,6 @@ def far_points(n, distance, rng):
     return np.concatenate([np.hypot(1, np.linalg.norm(rest, axis=-1))[:, None], rest], axis=-1)
 
 
-def random_states(n, rng, field):
-    psi = rng.standard_normal((50, n)) + (1j * rng.standard_normal((50, n)) if field is complex else 0)
-    return psi / np.linalg.norm(psi, axis=-1, keepdims=True)
-
-
 @pytest.mark.parametrize("n", [1, 2, 5])
 @loop_over("distance", DISTANCES)
 def test_models_there_and_back(n, distance, rng):
@@ -113,7 +108,8 @@ def test_projectors_there_and_back(k, n, field, rng):
 @pytest.mark.parametrize("field", [float, complex])
 @pytest.mark.parametrize("n", [2, 3, 8])
 def test_states_there_and_back(n, field, rng):
-    psi = random_states(n, rng, field)
+    psi = rng.standard_normal((50, n)) + (1j * rng.standard_normal((50, n)) if field is complex else 0)
+    psi /= np.linalg.norm(psi, axis=-1, keepdims=True)
     # Small components too.
     psi[:n] = np.eye(n) + 1e-9 * psi[:n]
     psi /= np.linalg.norm(psi, axis=-1, keepdims=True)
