@@ -265,17 +265,14 @@ def iterate(space, p, count, ends="natural", t=None):
     return ss.CubicSpline(t, p, space, max_iter=count + 1, **options).velocities / 3
 
 
-def given_ends(space, p):
-    return 0.3 * space.log(p[0], p[1]), -0.4 * space.log(p[-1], p[-2])
-
-
 @pytest.mark.parametrize("name", TABLE_1)
 @pytest.mark.parametrize("ends", ["natural", "clamped"])
 def test_every_iterate_is_that_of_the_paper(name, ends):
     space, rng = ss.space(name), np.random.default_rng(3)
     for nodes, step in ((3, 0.9), (7, 0.5), (6, 1.2)):
         p = walk(space, step, nodes, rng, turn=3.0)
-        pair = "natural" if ends == "natural" else given_ends(space, p)
+        given = 0.3 * space.log(p[0], p[1]), -0.4 * space.log(p[-1], p[-2])
+        pair = "natural" if ends == "natural" else given
         tol = 1e-14 + 4 * EPS * condition(space, p)
         for count, (v, _) in enumerate(islice(sweeps(space, p, pair), 30)):
             off = space.norm(p, iterate(space, p, count, pair) - v).max()
