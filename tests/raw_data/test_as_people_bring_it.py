@@ -26,10 +26,6 @@ T = irregular()
 P = path(T)
 
 
-def turns(t):
-    return ss.rotations.from_rotation_vectors(np.outer(t, [0.0, 0.1, 0.3]))
-
-
 def at_knots(spline):
     return spline(spline.t)
 
@@ -140,7 +136,8 @@ def test_a_table_of_pandas_in_any_order():
 
 def test_trajectories_with_gaps_and_huge_offsets():
     t = T + EPOCH
-    ss.poses.write_tum("a.txt", t, (turns(T), P))
+    turns = ss.rotations.from_rotation_vectors(np.outer(T, [0.0, 0.1, 0.3]))
+    ss.poses.write_tum("a.txt", t, (turns, P))
     read, poses = ss.poses.read_tum("a.txt")
     assert np.array_equal(read, t)
     np.testing.assert_allclose(poses[:, :3, 3], P, atol=1e-15)
