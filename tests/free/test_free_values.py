@@ -175,6 +175,7 @@ def test_control_points_in_a_product_raise():
 
 
 def test_times_outside():
+    curve = ss.BezierCurve(P, "sphere:2")
     for x, match in [
         (-0.1, r"x = -0\.1 is outside the domain \[0\.0, 1\.0\] of the curve"),
         ([0.5, 2], r"x\[1\] = 2\.0 is outside"),
@@ -186,6 +187,5 @@ def test_times_outside():
         (1j, r"x must be real numbers, not complex128"),
         (np.datetime64("2020-01-01"), r"x must be real numbers, not datetime64"),
     ]:
-        curve = ss.BezierCurve(P, "sphere:2")
         for call in (curve, curve.speed):
             raises(match, call, x)
