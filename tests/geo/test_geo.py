@@ -89,8 +89,8 @@ def test_invalid_angles_raise():
         ([[0], [1]], [[0], [90.001]], r"lat\[1\]\[0\] is 90.001"),
     ]:
         raises(what, ss.geo.from_lonlat, lon, lat)
-        # Unwound tracks, poles in single precision, and gaps.
-        assert np.isnan(ss.geo.from_lonlat([720.0, np.nan], np.float32([90, 90]))).any(axis=1).tolist() == [0, 1]
+    # Unwound tracks, poles in single precision, and gaps.
+    assert np.isnan(ss.geo.from_lonlat([720.0, np.nan], np.float32([90, 90]))).any(axis=1).tolist() == [0, 1]
 
 
 def test_latitudes_and_directions_near_a_pole_keep_their_digits():
