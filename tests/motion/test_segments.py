@@ -163,6 +163,7 @@ def test_failed_noisy_segments_are_all_kept():
 
 
 def test_invalid_smoothing_options_raise():
+    t, p = noisy(ss.space("sphere:2"))
     for options, says in [
         ({"smooth": "gcv"}, "smooth must be True or False, not 'gcv'. Pass lam, criterion"),
         ({"duplicates": "mean"}, "all points with equal times count"),
@@ -172,6 +173,5 @@ def test_invalid_smoothing_options_raise():
         ({"criterion": "aic"}, "curve 0: "),
         ({"bc_type": "not-a-knot"}, "bc_type"),
     ]:
-        t, p = noisy(ss.space("sphere:2"))
         with pytest.raises((ss.ValidationError, TypeError), match=says):
             ss.fit_segments(t, p, "sphere:2", **{"max_gap": 2, "smooth": True, **options})
