@@ -1,4 +1,4 @@
-"""Data and helpers that the tests of the Python interface share."""
+"""Data that the tests of the Python interface share, and ways to run code."""
 
 import os
 import subprocess
@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import COMMON, QUOTIENTS, REPRESENTATIVE, SPACES, apart, loop_over, walk
+from cases import COMMON, REPRESENTATIVE, SPACES, loop_over, walk
+from compare import each, parts, pick
 
 import symspline as ss
 
@@ -29,36 +30,6 @@ def points_on(space, n=6, batch=(), step=0.7, seed=1):
     rng = np.random.default_rng(seed)
     rows = [walk(space, step, n, rng) for _ in range(int(np.prod(batch)))]
     return np.reshape(rows, (*batch, n, *space.point_shape))
-
-
-def parts(value):
-    """The arrays of a value, of which there are several in a product."""
-    return value if isinstance(value, tuple) else (value,)
-
-
-def factors(space):
-    return space.factors if isinstance(space, ss.Product) else (space,)
-
-
-def each(function, *values):
-    """A function applied to the arrays of values."""
-    made = tuple(map(function, *map(parts, values)))
-    return made if any(isinstance(value, tuple) for value in values) else made[0]
-
-
-def same(a, b):
-    """Whether two values agree to the last bit, NaN included."""
-    pairs = list(zip(parts(a), parts(b), strict=True))
-    return all(np.shape(x) == np.shape(y) and np.array_equal(x, y, equal_nan=True) for x, y in pairs)
-
-
-def largest_difference(a, b):
-    return max(np.abs(np.subtract(x, y)).max() for x, y in zip(parts(a), parts(b), strict=True))
-
-
-def same_curve(a, b):
-    """Whether two splines and their reports agree to the last bit."""
-    return a == b and same(a.velocities, b.velocities) and a.report == b.report
 
 
 def run_python(code, *arguments, timeout=20, **environment):
@@ -97,35 +68,9 @@ def tangents_at(space, points, size=0.3, seed=5):
     return each(lambda v: size * v, space.random_tangent(np.random.default_rng(seed), points))
 
 
-def pick(value, index):
-    return each(lambda array: array[index], value)
-
-
 def with_ends(space, p):
     """End conditions with a vector at either end, for every curve its own."""
     return ((1, tangents_at(space, at_node(space, p, 0))), (2, tangents_at(space, at_node(space, p, -1), seed=6)))
-
-
-def shaped(space, lead):
-    """Shapes and types of points or vectors with some leading axes."""
-    return [((*lead, *f.point_shape), f.dtype) for f in factors(space)]
-
-
-def found(value):
-    return [(np.shape(part), part.dtype) for part in parts(value)]
-
-
-def off(space, x, y):
-    """How far points are apart, whatever their arrays."""
-    return max(float(np.max(apart(f, a, b))) for f, a, b in zip(factors(space), parts(x), parts(y), strict=True))
-
-
-def vectors_off(space, x, u, y, v):
-    """How far vectors are apart at points that may have other arrays."""
-    return max(
-        float(np.abs((f.transport(a, b, p) if isinstance(f, QUOTIENTS) else p) - q).max())
-        for f, a, p, b, q in zip(factors(space), *map(parts, (x, u, y, v)), strict=True)
-    )
 
 
 def bezier(space, control, tau):

@@ -17,6 +17,14 @@ CLAMPED = [0, 0, 0, 1, 1, 1]
 NAN, INF = np.nan, np.inf
 
 
+def raises(match, call, /, *arguments, error=ss.ValidationError, **options):
+    """A call fails with a message like this. Returns the error."""
+    with pytest.raises(error, match=match) as caught:
+        call(*arguments, **options)
+        pytest.fail(f"nothing was raised where {match!r} was expected")
+    return caught.value
+
+
 def fit_error(match, t=None, points=P, space=S2, kind=ss.ValidationError, **options):
     """A fit fails with a message like this, and does nothing before."""
     calls = []

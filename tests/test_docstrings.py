@@ -117,9 +117,6 @@ def test_docstrings_are_complete(name):
     assert not found, "\n".join(found)
 
 
-# ---- names of modules ----
-
-
 def names_in(path):
     """Names in single backticks that lead to a module: dotted names, and in `__init__.py` also plain names."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

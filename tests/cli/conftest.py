@@ -46,7 +46,7 @@ def fails(capsys):
 
 @pytest.fixture
 def curves(run):
-    """Files to begin with: ``a.npz``, and ``long.csv``."""
+    """Files to begin with: ``a.csv``, its curve ``a.npz``, and ``long.csv``."""
     write("a.csv", AXES)
     run("fit a.csv --space s:2 -o a.npz")
     write("long.csv", "x\n" + "".join(f"{i}\n" for i in range(3000)))

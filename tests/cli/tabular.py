@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from curves import parts
+from compare import parts
 
 FIXES = [("00:00", 178.5, 28.0), ("06:00", -179.0, 29.1), ("12:00", -177.0, 30.0), ("18:00", -176.2, 31.5)]
 
@@ -49,7 +49,7 @@ def numbered(values, mark=""):
 
 def write_table(name, columns):
     if name.endswith("csv"):
-        rows = [",".join(map(str, row)) for row in zip(*map(np.ndarray.tolist, columns.values()), strict=True)]
+        rows = [",".join(map(str, row)) for row in zip(*columns.values(), strict=True)]
         write(name, "\n".join([",".join(columns), *rows]))
     elif name.endswith("npz"):
         np.savez(name, **columns)

@@ -13,45 +13,36 @@ import symspline as ss
 
 def test_invalid_tables(fails):
     for text, options, problem in [
-        (AXES, "--space s:2 --time tt", "a.csv has no column 'tt'; did you mean 't'?"),
-        (AXES, "--space s:2 --columns X,Y,Q", "a.csv has no column 'X'; did you mean 'x'?"),
-        (AXES, "--space s:2 --curve storm", "a.csv has no column 'storm'; there are t, x, y, z"),
-        (
-            AXES,
-            "--space r:2",
-            "a.csv: a point of euclidean:2 has 2 numbers, and there are 3 columns: x, y, z; say which",
-        ),
-        (AXES, "--space r:2 --columns x,x", "column 'x' of a.csv cannot have two meanings"),
-        (AXES, "--space r:2 --columns t,x --time t", "column 't' of a.csv cannot have two meanings"),
-        (AXES, "", "say which space the points are on with --space, such as --space sphere:2"),
-        (AXES, "--space foo:2", "unknown space 'foo:2'; known names are"),
-        (AXES + "4,1,0,n/a\n", "--space s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
-        (AXES + "\n\n4,1,0,\n", "--space s:2", "a.csv, line 7: column 'z' is empty"),
-        (AXES + "4,1,0,inf\n", "--space s:2", "a.csv, line 5: column 'z' holds inf, which is not a finite number"),
-        (AXES + "4,1,0\n", "--space s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
-        (AXES + '4,1,0,"0\n', "--space s:2", "a.csv, line 5: unexpected end of data"),
-        (AXES + "4,0,0,-1\n", "--space s:2", "the point in line 4 and the point in line 5 of the curve lie at or"),
-        ("\n\n", "--space s:2", "a.csv is empty"),
-        ("t,x\n", "--space r:1", "a.csv has no rows below the names of its columns"),
-        ("t,x\n1,2\n", "--space r:1", "a.csv, line 2: this is the only point; a curve needs two"),
-        ("1,2\n3,4\n", "--space r:2", "a.csv: the first line must name the columns, but holds numbers"),
-        ("t;x\n1;2\n", "--space r:1", "a.csv: cells must be separated by commas; the first line is 't;x'"),
-        ("t,x,x\n1,2,3\n", "--space r:1", "a.csv: the first line names two columns 'x'"),
-        (
-            "t,x,y\n1,a,3\n2,4,5\n",
-            "--space r:2",
-            "columns: y; say which with --columns (no numbers in the first row of x)",
-        ),
-        ("t,x\n0,1\n1," + "9" * 5000 + "x\n", "--space r:1", "9999999999"),
-        (
-            "t,lon,lat\n0,deg,deg\n0,1,2\n",
-            "--lonlat",
-            "line 2: column 'lon' holds 'deg', which is not a number; if this",
-        ),
+        (AXES, "s:2 --time tt", "a.csv has no column 'tt'; did you mean 't'?"),
+        (AXES, "s:2 --columns X,Y,Q", "a.csv has no column 'X'; did you mean 'x'?"),
+        (AXES, "s:2 --curve storm", "a.csv has no column 'storm'; there are t, x, y, z"),
+        (AXES, "r:2", "a.csv: a point of euclidean:2 has 2 numbers, and there are 3 columns: x, y, z; say which"),
+        (AXES, "r:2 --columns x,x", "column 'x' of a.csv cannot have two meanings"),
+        (AXES, "r:2 --columns t,x --time t", "column 't' of a.csv cannot have two meanings"),
+        (AXES, "foo:2", "unknown space 'foo:2'; known names are"),
+        (AXES + "4,1,0,n/a\n", "s:2", "a.csv, line 5: column 'z' holds 'n/a', which is not a number"),
+        (AXES + "\n\n4,1,0,\n", "s:2", "a.csv, line 7: column 'z' is empty"),
+        (AXES + "4,1,0,inf\n", "s:2", "a.csv, line 5: column 'z' holds inf, which is not a finite number"),
+        (AXES + "4,1,0\n", "s:2", "a.csv, line 5: 3 cells, but the first line names 4 columns"),
+        (AXES + '4,1,0,"0\n', "s:2", "a.csv, line 5: unexpected end of data"),
+        (AXES + "4,0,0,-1\n", "s:2", "the point in line 4 and the point in line 5 of the curve lie at or"),
+        ("\n\n", "s:2", "a.csv is empty"),
+        ("t,x\n", "r:1", "a.csv has no rows below the names of its columns"),
+        ("t,x\n1,2\n", "r:1", "a.csv, line 2: this is the only point; a curve needs two"),
+        ("1,2\n3,4\n", "r:2", "a.csv: the first line must name the columns, but holds numbers"),
+        ("t;x\n1;2\n", "r:1", "a.csv: cells must be separated by commas; the first line is 't;x'"),
+        ("t,x,x\n1,2,3\n", "r:1", "a.csv: the first line names two columns 'x'"),
+        ("t,x,y\n1,a,3\n2,4,5\n", "r:2", "columns: y; say which with --columns (no numbers in the first row of x)"),
+        ("t,x\n0,1\n1," + "9" * 5000 + "x\n", "r:1", "9999999999"),
     ]:
         write("a.csv", text)
-        message = fails(f"fit a.csv {options} -o a.npz")
+        message = fails(f"fit a.csv --space {options} -o a.npz")
         assert problem in message and len(message) < 1100
+    write("a.csv", "t,lon,lat\n0,deg,deg\n0,1,2\n")
+    problem = "line 2: column 'lon' holds 'deg', which is not a number; if this"
+    assert problem in fails("fit a.csv --lonlat -o a.npz")
+    problem = "say which space the points are on with --space, such as --space sphere:2"
+    assert problem in fails("fit a.csv -o a.npz")
 
 
 def test_unreadable_files(fails):

@@ -6,7 +6,8 @@ from itertools import cycle
 import numpy as np
 import pytest
 from cases import SPACES
-from curves import each, parts, points_on, same_curve
+from compare import each, parts, same_curve
+from curves import points_on
 from tabular import TIMES, assert_same_columns, numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss
@@ -105,9 +106,6 @@ def test_columns_of_complex_numbers(run):
     np.testing.assert_array_equal(ss.load("a.npz").points, np.stack([down.real, down.imag], 1))
 
 
-# ---- bad columns ----
-
-
 HALVES = "t,a_re,a_im,b_re,b_im\n0,1,0,0,0\n1,0.6,0,0,0.8\n"
 
 
@@ -115,44 +113,24 @@ def test_bad_columns_of_complex_numbers_and_matrices(fails):
     real, empty = "a complex number where a real one belongs: a point of", HALVES.replace("0,1,0,0,0", "0,1,0,0,")
     extra = HALVES.replace("t,a", "t,x,a").replace("\n0,", "\n0,0,").replace("\n1,", "\n1,0,")
     for text, options, problem in [
-        (
-            HALVES,
-            "--space sphere:1",
-            f"a.csv: a_re and a_im are {real} sphere:1 has 2 numbers; name its columns one by one",
-        ),
-        (HALVES, "--space r:2 --columns a", "a point of euclidean:2 has 2 numbers; name its columns one by one with"),
-        (
-            HALVES,
-            "--space 'r:1 x cp:1' --columns a,b_re,b_im,t --time t",
-            "column 't' of a.csv cannot have two meanings",
-        ),
-        (extra, "--space 'cp:1 x r:1'", f"b_re and b_im are {real} cp:1 x euclidean:1 has 3 numbers (cp:1: 2 complex"),
-        (
-            HALVES,
-            "--space su:2",
-            "a point of su:2 has 4 complex numbers, A_re and A_im each, a 2 x 2 matrix row by row, and",
-        ),
-        (
-            HALVES,
-            "--space se:2 --columns a_re,b_re",
-            "se:2 has 9 numbers, a 3 x 3 matrix row by row, and there are 2 col",
-        ),
-        (
-            HALVES,
-            "--space cp:1 --columns a,b_re",
-            "'b_re' is half of a complex number, and there is no 'b_im' in --col",
-        ),
-        (HALVES, "--space cp:1 --columns a,a_re", "column 'a_re' of a.csv cannot have two meanings"),
-        (HALVES, "--space cp:1 --columns a,c", "a.csv has no column 'c'; there are t, a_re, a_im, b_re, b_im"),
-        (HALVES.replace("b_im", "c"), "--space cp:1 --columns a,b", "a column 'b_re', but no 'b_im'; a complex number"),
-        (HALVES.replace("b_re", "c"), "--space cp:2", "'b_im' is half of a complex number, and there is no 'b_re' in"),
-        (empty, "--space cp:1", "column 'b_re' is half of a complex number, and there is no 'b_im' with numbers"),
-        (empty, "--space cp:1 --columns a,b", "a.csv, line 2: column 'b_im' is empty"),
-        (HALVES + "2,1,0,0,\n", "--space cp:1", "a.csv, line 4: column 'b_im' is empty"),
-        (HALVES + "2,1,0,0,0.1\n", "--space cp:1", "a.csv: the point in line 4 is off the space by 4.988e-3"),
+        (HALVES, "sphere:1", f"a.csv: a_re and a_im are {real} sphere:1 has 2 numbers; name its columns one by one"),
+        (HALVES, "r:2 --columns a", "a point of euclidean:2 has 2 numbers; name its columns one by one with"),
+        (HALVES, "'r:1 x cp:1' --columns a,b_re,b_im,t --time t", "column 't' of a.csv cannot have two meanings"),
+        (extra, "'cp:1 x r:1'", f"b_re and b_im are {real} cp:1 x euclidean:1 has 3 numbers (cp:1: 2 complex"),
+        (HALVES, "su:2", "a point of su:2 has 4 complex numbers, A_re and A_im each, a 2 x 2 matrix row by row, and"),
+        (HALVES, "se:2 --columns a_re,b_re", "se:2 has 9 numbers, a 3 x 3 matrix row by row, and there are 2 col"),
+        (HALVES, "cp:1 --columns a,b_re", "'b_re' is half of a complex number, and there is no 'b_im' in --col"),
+        (HALVES, "cp:1 --columns a,a_re", "column 'a_re' of a.csv cannot have two meanings"),
+        (HALVES, "cp:1 --columns a,c", "a.csv has no column 'c'; there are t, a_re, a_im, b_re, b_im"),
+        (HALVES.replace("b_im", "c"), "cp:1 --columns a,b", "a column 'b_re', but no 'b_im'; a complex number"),
+        (HALVES.replace("b_re", "c"), "cp:2", "'b_im' is half of a complex number, and there is no 'b_re' in"),
+        (empty, "cp:1", "column 'b_re' is half of a complex number, and there is no 'b_im' with numbers"),
+        (empty, "cp:1 --columns a,b", "a.csv, line 2: column 'b_im' is empty"),
+        (HALVES + "2,1,0,0,\n", "cp:1", "a.csv, line 4: column 'b_im' is empty"),
+        (HALVES + "2,1,0,0,0.1\n", "cp:1", "a.csv: the point in line 4 is off the space by 4.988e-3"),
     ]:
         write("a.csv", text)
-        assert problem in fails(f"fit a.csv {options} -o a.npz")
+        assert problem in fails(f"fit a.csv --space {options} -o a.npz")
 
 
 def test_bad_points_in_matrix_spaces(fails):

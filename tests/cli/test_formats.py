@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tabular import AXES, FIXES, TRACK, table, write
+from tabular import FIXES, TRACK, table, write
 
 import symspline as ss
 
@@ -97,12 +97,10 @@ def test_parquet_of_all_kinds(run, fails):
     assert fails("fit b.parquet --space r:3 -o b.npz") == "b.parquet is damaged or not a Parquet file"
 
 
-def test_parquet_without_pyarrow(run, fails, monkeypatch):
-    write("axes.csv", AXES)
-    run("fit axes.csv --space s:2 -o axes.npz")
+def test_parquet_without_pyarrow(curves, fails, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert "pip install 'symspline[parquet]'" in fails("sample axes.npz -n 3 -o out.parquet")
-    assert "pip install 'symspline[parquet]'" in fails("fit out.parquet --space s:2 -o a.npz")
+    assert "pip install 'symspline[parquet]'" in fails("sample a.npz -n 3 -o out.parquet")
+    assert "pip install 'symspline[parquet]'" in fails("fit out.parquet --space s:2 -o b.npz")
 
 
 def test_csv_dialects_of_other_programs(run):

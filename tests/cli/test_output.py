@@ -14,16 +14,12 @@ from tabular import AXES, write
 from symspline.cli import main
 
 
-def test_pictures_without_matplotlib(run, fails, monkeypatch):
-    write("a.csv", AXES)
-    run("fit a.csv --space s:2 -o a.npz")
+def test_pictures_without_matplotlib(curves, fails, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert "pip install 'symspline[plot]'" in fails("plot a.npz -o a.png")
 
 
-def test_output_that_cannot_be_written(run, fails, monkeypatch):
-    write("a.csv", AXES)
-    run("fit a.csv --space s:2 -o a.npz")
+def test_output_that_cannot_be_written(curves, fails, monkeypatch):
     assert fails("fit a.csv --space s:2 -o no/b.npz") == "cannot write no/b.npz: there is no folder no"
     os.mkdir("b.npz")
     assert fails("fit a.csv --space s:2 -o b.npz") == "cannot write b.npz: it is a folder"

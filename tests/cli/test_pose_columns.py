@@ -112,8 +112,6 @@ def test_rounded_and_invalid_quaternions(run, fails):
     assert problem.startswith("a.csv, line 5: the quaternion has length 1.001, not 1")
 
 
-# ---- TUM ----
-
 TUM = "# a comment\n" + "".join(
     f"{1305031102.1758 + t:.4f} {' '.join(f'{v:.4f}' for v in (*p, *np.roll(q, -1)))}\n"
     for t, p, q in zip(TIMES, PLACES, Q, strict=True)

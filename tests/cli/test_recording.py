@@ -9,9 +9,7 @@ import symspline as ss
 
 
 def line(t, x=None, **more):
-    columns = {"t": t, **more, "x": list(range(len(t))) if x is None else x}
-    rows = zip(*columns.values(), strict=True)
-    write("a.csv", "\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    write_table("a.csv", {"t": t, **more, "x": range(len(t)) if x is None else x})
 
 
 @pytest.fixture

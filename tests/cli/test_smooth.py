@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from curves import parts
+from compare import parts
 from tabular import numbered, numbers, read_table, table, write, write_table
 
 import symspline as ss

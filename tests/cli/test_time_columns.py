@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tabular import table, write, write_table
+from tabular import table, write_table
 
 import symspline as ss
 
@@ -11,9 +11,7 @@ HOURS = np.array(["2021-08-29T00", "2021-08-29T06", "2021-08-29T18"], "datetime6
 
 
 def write_columns(**columns):
-    columns |= {"x": [0, 1, 5]}
-    rows = zip(*columns.values(), strict=True)
-    write("a.csv", "\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    write_table("a.csv", columns | {"x": [0, 1, 5]})
 
 
 @pytest.fixture

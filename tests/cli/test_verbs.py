@@ -131,9 +131,7 @@ def test_samples_outside(run):
     run("check ring.npz")
 
 
-def test_invalid_usage_fails(run, fails):
-    write("a.csv", AXES)
-    run("fit a.csv --space s:2 -o a.npz")
+def test_invalid_usage_fails(curves, fails):
     assert fails("").endswith("(see symspline --help)")
     assert "invalid choice: 'ft'" in fails("ft")
     assert fails("fit a.csv --space s:2") == "the following arguments are required: -o (see symspline fit --help)"

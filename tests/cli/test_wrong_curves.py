@@ -1,7 +1,7 @@
 """Tables that would silently give wrong curves raise an error or a warning."""
 
 import numpy as np
-from curves import parts
+from compare import parts
 from tabular import read_table, write
 
 import symspline as ss

@@ -21,9 +21,6 @@ def case(request):
     return cubics.ROTATIONS
 
 
-# ---- order ----
-
-
 def test_errors_fall_with_the_orders_of_the_end_conditions():
     sizes = (41, 81)
     everywhere, middle = order.measure(sizes)
@@ -37,18 +34,12 @@ def test_errors_fall_with_the_orders_of_the_end_conditions():
     assert order.text(sizes, everywhere, middle).count("\n") == 4
 
 
-# ---- Riemannian cubics ----
-
-
 def test_spline_is_close_to_the_cubic_and_bends_more(case):
     rows = [cubics.compare(case, n) for n in (6, 12)]
     assert all(0 < row.excess < 1e-3 and row.distance < row.error for row in rows)
     falls = np.log(rows[0].distance / rows[1].distance) / np.log(11 / 5)
     assert 3 < falls < 5
     assert cubics.text(rows).count("\n") == 3
-
-
-# ---- recordings ----
 
 
 def test_recordings_of_others_can_be_read(tmp_path):
@@ -60,9 +51,6 @@ def test_recordings_of_others_can_be_read(tmp_path):
     file.write_text("0 0 0\n", encoding="utf-8")
     with pytest.raises(ValueError, match="8 numbers, not 3"):
         recordings.read(file)
-
-
-# ---- the page ----
 
 
 def test_tables_find_their_place(tmp_path):

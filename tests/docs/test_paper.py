@@ -3,7 +3,6 @@
 import re
 
 import paper_table
-import pytest
 
 TEXT = paper_table.PAGE.read_text(encoding="utf-8")
 
@@ -32,22 +31,15 @@ WANTED = [
 ]
 
 
-def test_every_item_of_the_paper_has_a_row():
+def test_the_table_is_complete_and_names_what_exists():
     found = {label for row in paper_table.ROWS for label in labels(row.item)}
     assert [item for item in WANTED if item not in found] == []
-
-
-def test_everything_that_the_table_names_exists():
     assert paper_table.problems() == []
-
-
-def test_the_page_has_the_table():
     assert paper_table.written(TEXT) == TEXT
 
 
-@pytest.mark.parametrize(
-    ("check", "there", "missing"),
-    [
+def test_missing_names_are_found():
+    for check, there, missing in [
         (paper_table.has_function, "symspline.Space.exp", "symspline.Space.exponential"),
         (paper_table.has_function, "symspline.Report.residual", "symspline.Report.residuals"),
         (paper_table.has_function, "symspline.quantum.hamiltonian", "symspline.quanta.hamiltonian"),
@@ -57,7 +49,5 @@ def test_the_page_has_the_table():
         (paper_table.has_source, "fit/condition.rs::sweep", "fit/conditions.rs::sweep"),
         (paper_table.has_page, "notation.md#the-package-of-the-paper", "notation.md#the-package"),
         (paper_table.has_page, "gallery/affine_shapes.rst", "gallery/shapes.rst"),
-    ],
-)
-def test_missing_names_are_found(check, there, missing):
-    assert check(there) and not check(missing)
+    ]:
+        assert check(there) and not check(missing)

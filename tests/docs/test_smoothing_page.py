@@ -27,27 +27,18 @@ def test_the_examples_run():
     assert np.mean(variances) / names["factor"] == pytest.approx(1, abs=0.02)
 
 
-def test_flat_table():
+def test_tables():
     ((name, *rest),) = cells(smoothing.flat_table((20,)))[:1]
     assert name == "20, even"
     assert all(float(number) < 1e-10 for cell in rest for number in cell.split(","))
-
-
-def test_iteration_table():
     rows = cells(smoothing.iteration_table(("S²",), (0.1,), 1))
     assert [row[0] for row in rows] == ["S²", "S², two turns"]
     assert all(int(cell) < 10 for cell in rows[0][2:6]) and float(rows[0][6]) < 1e-3
     assert all(int(cell) < 15 for cell in rows[1][2:6]) and float(rows[1][6]) < 2e-3
-
-
-def test_choice_table():
     (row,) = cells(smoothing.choice_table(("S²",), (0.1,), 2))
     assert row[:2] == ["S²", "0.1"] and len(row) == 11
     # No criterion is better than the best λ.
     assert all(1 <= float(cell) < 1.3 for cell in row[3:7])
-
-
-def test_time_table():
     (row,) = cells(smoothing.time_table((200,), 1))
     assert row[0] == "200" and row[-1] == "200" and all(row)
 

@@ -99,9 +99,6 @@ def test_the_three_points_of_the_paper():
     assert np.abs(spline(0.5) - [0.61308303, 0.76368565, -0.20227067]).max() < 5e-9
 
 
-# ---- loops: frames come back turned, unlike there and back ----
-
-
 @pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton"])
 @loop_over("n", [3, 4, 5, 9])
 @pytest.mark.parametrize("name", LOOPS)

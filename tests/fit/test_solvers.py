@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from algorithm_1 import sweeps
 from cases import EPS, closed_walk, condition, jumps, loop_over, walk, zigzag, zigzag_on
-from curves import S2, same
+from compare import same
+from curves import S2
 from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
@@ -36,9 +37,6 @@ def ends_on(space, p):
     """Every kind of end condition, for points that need not be closed."""
     v, w = space.log(p[0], p[1]), 0.5 * space.log(p[-1], p[-2])
     return ["natural", "clamped", "not-a-knot", ((1, v), (1, w)), ((2, v), (2, w)), ("not-a-knot", (1, w))]
-
-
-# ---- Newton's method ----
 
 
 @pytest.mark.parametrize("method", ["newton", "quasi-newton"])
@@ -104,16 +102,10 @@ def test_it_does_not_matter_where_a_closed_curve_starts(method, rng):
     assert np.ptp(found) <= 1e-12 * found[0]
 
 
-# ---- they find the same curve ----
-
-
 def test_auto_is_quasi_newton_where_that_is_quick(rng):
     p = wild(S2, 1.2, 20, rng)
     auto, quick = (ss.CubicSpline(None, p, S2, method=method) for method in ("auto", "quasi-newton"))
     assert auto == quick and auto.report == quick.report
-
-
-# ---- points far apart ----
 
 
 @pytest.mark.parametrize(
@@ -199,9 +191,6 @@ def test_points_too_far_are_an_error_with_advice():
         ss.CubicSpline(None, [[1, 0, 0], [-1, 0, 0], [0, 1, 0]], S2)
 
 
-# ---- batches ----
-
-
 EASY, HARD, HARDEST = zigzag(0.5, 8), zigzag(2.8, 8), zigzag(2.3, 8, 0.3)
 ANTIPODES = np.concatenate([EASY[:4], -EASY[3:4], EASY[5:]])
 IMPOSSIBLE = zigzag(1.0, 8)
@@ -245,9 +234,6 @@ def test_a_product_names_the_last_solver_that_any_factor_needed():
     assert spline.report.method == "homotopy"
 
 
-# ---- limits ----
-
-
 @pytest.mark.parametrize("method", ["fixed-point", "quasi-newton", "newton", "auto"])
 def test_no_solver_exceeds_max_iter(method):
     for points in (zigzag(1.0), zigzag(2.5), zigzag(2.3, 8, 0.3), zigzag(1.9, 12, 0.02)):
@@ -265,9 +251,6 @@ def test_unfinished_homotopy_is_reported():
         ss.CubicSpline(t, p, S2, method="homotopy")
 
 
-# ---- Algorithm 1 of the paper ----
-
-
 # Table 1 of the paper, and parts of it.
 TABLE_1 = [
     *("r:3", "sphere:2", "sphere:3", "h:2", "gr:2,5", "o:3", "so:3", "so:4"),
@@ -282,17 +265,14 @@ def iterate(space, p, count, ends="natural", t=None):
     return ss.CubicSpline(t, p, space, max_iter=count + 1, **options).velocities / 3
 
 
-def given_ends(space, p):
-    return 0.3 * space.log(p[0], p[1]), -0.4 * space.log(p[-1], p[-2])
-
-
 @pytest.mark.parametrize("name", TABLE_1)
 @pytest.mark.parametrize("ends", ["natural", "clamped"])
 def test_every_iterate_is_that_of_the_paper(name, ends):
     space, rng = ss.space(name), np.random.default_rng(3)
     for nodes, step in ((3, 0.9), (7, 0.5), (6, 1.2)):
         p = walk(space, step, nodes, rng, turn=3.0)
-        pair = "natural" if ends == "natural" else given_ends(space, p)
+        given = 0.3 * space.log(p[0], p[1]), -0.4 * space.log(p[-1], p[-2])
+        pair = "natural" if ends == "natural" else given
         tol = 1e-14 + 4 * EPS * condition(space, p)
         for count, (v, _) in enumerate(islice(sweeps(space, p, pair), 30)):
             off = space.norm(p, iterate(space, p, count, pair) - v).max()

@@ -44,9 +44,6 @@ def backwards(curve):
     return ss.BSpline(-curve.knots[::-1], points, curve.degree, curve.space)
 
 
-# ---- flat space ----
-
-
 INTERIOR = {
     "none": [],
     "uniform": [1.0, 2.0],
@@ -87,9 +84,6 @@ def test_flat_space_is_scipy(kind, degree, rng):
         expected = np.moveaxis(flat(x, nu), 1, 0)
         assert np.abs(ours(x, nu) - expected).max() <= 100 * degree * EPS * np.abs(points).max() * (degree / h) ** nu
     assert np.allclose(ours.speed(x), np.linalg.norm(ours(x, 1), axis=-1), rtol=1e-13, atol=1e-13)
-
-
-# ---- every space ----
 
 
 @every_family
@@ -154,9 +148,6 @@ def test_the_array_of_a_point_does_not_matter(name, rng):
     assert apart(space, one(x), two(x)) <= 100 * EPS
     for nu in (1, 2):
         assert np.abs(one(x, nu) - here(space, one(x), two(x), two(x, nu))).max() <= 1e-11
-
-
-# ---- at knots ----
 
 
 @every_family

@@ -11,6 +11,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
+from refused import raises
 
 import symspline as ss
 from symspline import _core, _cpu
@@ -87,8 +88,6 @@ def test_missing_and_unsupported_modules_raise(folder_with, files, own, asked, m
 def test_the_processor_reports_the_level_that_the_system_reports():
     assert _cpu._level(Path(_core.__file__)) == ("v4" if _cpu._has("v4") else "v3")
 
-
-# ---- a package with both, as in a wheel ----
 
 CODE = """
 import sys, numpy as np, symspline as ss, symspline._core

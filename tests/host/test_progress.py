@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from curves import S2, S3, pair_of_curves, run_python, scattered
+from refused import raises
 
 import symspline as ss
 
@@ -54,8 +55,7 @@ def test_an_exception_in_the_last_call_of_progress_comes_out():
     ):
         with pytest.raises(Enough):
             call(stop)
-        with pytest.raises(ss.ValidationError, match="progress must be a function"):
-            call(3)
+        raises("progress must be a function", call, 3)
 
 
 def test_progress_never_passes_its_total(threads):
@@ -144,9 +144,6 @@ def test_ctrl_c_stops_a_long_fit(n):
             assert out.replace("started\n", "") == "interrupted\nwell\n"
         finally:
             process.kill()
-
-
-# ---- progress of evaluations ----
 
 
 @pytest.mark.parametrize("nu", [0, 1])

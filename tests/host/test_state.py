@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from curves import every_common, points_on, run_python, same, same_curve
+from compare import same, same_curve
+from curves import every_common, points_on, run_python
 
 import symspline as ss
 

@@ -10,7 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from cases import COMMON
-from curves import S3, each, every_common, points_on, run_python, same, same_curve, scattered
+from compare import each, same, same_curve
+from curves import S3, every_common, points_on, run_python, scattered
+from refused import raises
 
 import symspline as ss
 from symspline import _core
@@ -77,9 +79,6 @@ def test_other_threads_run_during_a_fit(threads, n):
         other.join()
     # About 200 ticks fit in, fewer on a busy machine; if the lock were held, all but one or two would come later.
     assert sum(start < t < end for t in ticks) > 4
-
-
-# ---- bit-identical results ----
 
 
 def work(seed):
@@ -251,6 +250,5 @@ def test_a_panic_in_a_worker_is_an_error_within_a_second(threads):
     for n in (1, 2):
         ss.set_num_threads(n)
         begun = time.monotonic()
-        with pytest.raises(RuntimeError, match="out of range"):
-            _core.evaluate(*arguments)
+        raises("out of range", _core.evaluate, *arguments, error=RuntimeError)
         assert time.monotonic() - begun < 1

@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from made import ELLIPSOID, knots, twin, walk
+from refused import raises
 
 import symspline as ss
 
@@ -18,9 +19,6 @@ NAMELESS = ss.Manifold(**FUNCTIONS, point_shape=(5, 2))
 
 def batch():
     return np.stack([walk(SPACE, 0.5, 6, seed) for seed in range(3)])
-
-
-# ---- values ----
 
 
 def test_a_batch_is_its_curves():
@@ -57,8 +55,7 @@ def test_control_points_and_lengths():
 
 def test_outside_the_knots():
     end = SPLINE.t[-1]
-    with pytest.raises(ss.ValidationError, match=r"x\[1\] = 9 is outside the knots"):
-        SPLINE([1.0, 9.0])
+    raises(r"x\[1\] = 9 is outside the knots", SPLINE, [1.0, 9.0])
     onward = SPLINE([-0.5, end + 0.5], extrapolate="geodesic")
     assert np.abs(onward[0] - SPACE.exp(POINTS[0], -0.5 * SPLINE.velocities[0])).max() <= 1e-14
     assert np.abs(onward[1] - SPACE.exp(POINTS[-1], 0.5 * SPLINE.velocities[-1])).max() <= 1e-14
@@ -110,12 +107,8 @@ def test_pickles_and_files():
     assert ss.load(file) == SPLINE
 
 
-# ---- refusals ----
-
-
-@pytest.mark.parametrize(
-    ("call", "what"),
-    [
+def test_missing_operations_raise():
+    for call, what in [
         (lambda s: s.lift(0.5), "no horizontal lift is known"),
         (lambda s: s.transport(0, 1, s(0, nu=1)), "parallel transport along curves is not made"),
         (lambda s: s.jvp(0.5, points=0 * POINTS), "derivatives with respect to the data"),
@@ -126,33 +119,25 @@ def test_pickles_and_files():
         (lambda s: ss.make_smoothing_spline(None, POINTS, s.space), "smoothing splines are not made"),
         (lambda s: ss.CubicSpline(None, POINTS, s.space, method="newton"), "method 'newton' is not available"),
         (lambda s: ss.rotations.angular_velocity(s, 0.5), "so:3|rotations"),
-    ],
-)
-def test_missing_operations_raise(call, what):
-    with pytest.raises(ss.ValidationError, match=what):
-        call(ss.CubicSpline(None, POINTS, NAMELESS))
+    ]:
+        raises(what, call, ss.CubicSpline(None, POINTS, NAMELESS))
 
 
-@pytest.mark.parametrize(
-    ("index", "value", "error", "what"),
-    [
+def test_invalid_points_raise():
+    for index, value, error, what in [
         ((2, 0, 0), POINTS[2, 0, 0] + 0.1, ss.ValidationError, r"points\[2\]{} is off the space by"),
         ((3, 1, 1), np.nan, ss.ValidationError, r"points\[3\]{} is off the space: it is not finite"),
         (2, -POINTS[1], ss.CutLocusError, r"points\[1\] and points\[2\]{} have no geodesic between them"),
-    ],
-)
-def test_invalid_points_raise(index, value, error, what):
-    changed = POINTS.copy()
-    changed[index] = value
-    with pytest.raises(error, match=what.format("")):
-        ss.CubicSpline(None, changed, SPACE)
-    two = np.stack([POINTS, changed])
-    with pytest.raises(error, match=what.format(" of curve 1")):
-        ss.CubicSpline(None, two, SPACE)
-    kept = ss.CubicSpline(None, two, SPACE, on_failure="ignore")
-    assert kept.report.converged.tolist() == [True, False]
-    assert np.isnan(kept(0.5)[1]).all()
-    assert np.array_equal(kept[0].velocities, ss.CubicSpline(None, POINTS, SPACE).velocities)
+    ]:
+        changed = POINTS.copy()
+        changed[index] = value
+        raises(what.format(""), ss.CubicSpline, None, changed, SPACE, error=error)
+        two = np.stack([POINTS, changed])
+        raises(what.format(" of curve 1"), ss.CubicSpline, None, two, SPACE, error=error)
+        kept = ss.CubicSpline(None, two, SPACE, on_failure="ignore")
+        assert kept.report.converged.tolist() == [True, False]
+        assert np.isnan(kept(0.5)[1]).all()
+        assert np.array_equal(kept[0].velocities, ss.CubicSpline(None, POINTS, SPACE).velocities)
 
 
 def test_far_points_name_distance_and_limit():
@@ -189,35 +174,27 @@ def test_functions_that_do_not_fit_do_not_converge():
         ss.CubicSpline(None, POINTS, space, max_iter=40)
 
 
-@pytest.mark.parametrize(
-    ("bc", "what"),
-    [
+def test_invalid_ends_raise():
+    for bc, what in [
         (((1, POINTS[0]), "natural"), "the start velocity is not tangent"),
         (("natural", (2, POINTS[-1])), "the end acceleration is not tangent"),
         (((1, 40 * SPACE.log(POINTS[0], POINTS[1])), "natural"), "the start velocity has speed 20, too fast"),
         ("periodic", "needs a closed curve"),
         ("smooth", "bc_type must be 'natural'"),
-    ],
-)
-def test_invalid_ends_raise(bc, what):
-    with pytest.raises(ss.ValidationError, match=what):
-        ss.CubicSpline(None, POINTS, SPACE, bc_type=bc)
+    ]:
+        raises(what, ss.CubicSpline, None, POINTS, SPACE, bc_type=bc)
 
 
-@pytest.mark.parametrize(
-    ("changes", "what"),
-    [
+def test_invalid_manifolds_raise():
+    for changes, what in [
         ({"transport": 3}, "transport must be a function, not 3"),
         ({"point_shape": ()}, "point_shape must be a whole number or a tuple"),
         ({"point_shape": (2, 0)}, "point_shape must be at least 1"),
         ({"injectivity_radius": -1.0}, "injectivity_radius must be a positive number"),
         ({"dim": 0}, "dim must be at least 1"),
         ({"dtype": np.float32}, "dtype must be float64 or complex128"),
-    ],
-)
-def test_invalid_manifolds_raise(changes, what):
-    with pytest.raises(ss.ValidationError, match=what):
-        ss.Manifold(**FUNCTIONS | {"point_shape": (5, 2)} | changes)
+    ]:
+        raises(what, ss.Manifold, **FUNCTIONS | {"point_shape": (5, 2)} | changes)
 
 
 def test_results_of_functions_are_checked():
@@ -240,8 +217,7 @@ def test_missing_functions_of_a_manifold_raise():
         (lambda: space.random_point(np.random.default_rng(0)), "made without project="),
         (lambda: space.transvection(p, 0 * p, q), "no transvections"),
     ):
-        with pytest.raises(ss.ValidationError, match=what):
-            call()
+        raises(what, call)
     assert np.isinf(space.injectivity_radius) and np.isnan(space.curvature)
     assert "exp=Stiefel" in repr(space) == str(space)
 

@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pytest
 from made import AXES, ELLIPSOID, RADII, TORUS, ellipsoid, ellipsoid_equation, torus, twin
+from refused import raises
 from scipy.integrate import solve_ivp
 
 import symspline as ss
@@ -102,10 +103,10 @@ def test_it_is_a_value():
     assert repr(ELLIPSOID) == "Surface(ellipsoid_equation, n=3)" and ELLIPSOID.dim == 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "what"),
-    [((1, np.sin, 3), "F must be a function"), ((np.sin, None, 3), "grad must be"), ((np.sin, np.sin, 1), "n must be")],
-)
-def test_invalid_surfaces_raise(arguments, what):
-    with pytest.raises(ss.ValidationError, match=what):
-        ss.manifolds.from_surface(*arguments)
+def test_invalid_surfaces_raise():
+    for arguments, what in [
+        ((1, np.sin, 3), "F must be a function"),
+        ((np.sin, None, 3), "grad must be"),
+        ((np.sin, np.sin, 1), "n must be"),
+    ]:
+        raises(what, ss.manifolds.from_surface, *arguments)

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from curves import each, every_kind, factors, largest_difference, parts, points_on
+from compare import each, factors, largest_difference, parts
+from curves import every_kind, points_on
+from refused import raises
 from scipy.spatial.transform import Rotation
 
 import symspline as ss
@@ -74,9 +76,8 @@ def test_what_scipy_and_lists_hold():
         assert pieces == ss.fit_segments(T, plain, space, max_gap=2)
 
 
-@pytest.mark.parametrize(
-    ("match", "changes"),
-    [
+def test_invalid_arguments_raise():
+    for match, changes in [
         (r"t\[1\] and t\[2\] are both 1.0 \(and 1 more such pairs\). Pass duplicates='first'", {"t": [0, 1, 1, 1, 2]}),
         (r"t\[2\] = 0.5 is before t\[1\] = 1.0. Sort", {"t": [0, 1, 0.5, 2, 3]}),
         (r"t\[2\] = nan is not finite", {"t": [0, 1, np.nan, 2, 3]}),
@@ -94,12 +95,9 @@ def test_what_scipy_and_lists_hold():
         ("min_points must be at least 2", {"min_points": 1}),
         ("'raise', 'first' or 'mean', not 'last'", {"duplicates": "last"}),
         ("batch axes", {"points": np.ones((2, 5, 1))}),
-    ],
-)
-def test_invalid_arguments_raise(match, changes):
-    arguments = {"t": np.arange(5.0), "points": np.ones((5, 1)), "space": "r:1", "max_gap": 1.0} | changes
-    with pytest.raises(ss.ValidationError, match=match):
-        ss.fit_segments(**arguments)
+    ]:
+        arguments = {"t": np.arange(5.0), "points": np.ones((5, 1)), "space": "r:1", "max_gap": 1.0} | changes
+        raises(match, ss.fit_segments, **arguments)
 
 
 def noisy(space, seed=0):
@@ -164,9 +162,9 @@ def test_failed_noisy_segments_are_all_kept():
     assert len(ss.fit_segments(t, p, "sphere:2", max_gap=2, smooth=True, max_iter=1, on_failure="ignore")) == 2
 
 
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
+def test_invalid_smoothing_options_raise():
+    t, p = noisy(ss.space("sphere:2"))
+    for options, says in [
         ({"smooth": "gcv"}, "smooth must be True or False, not 'gcv'. Pass lam, criterion"),
         ({"duplicates": "mean"}, "all points with equal times count"),
         ({"knots": [0.0, 1.0]}, "must be the number of knots of each segment"),
@@ -174,9 +172,6 @@ def test_failed_noisy_segments_are_all_kept():
         ({"weights": np.zeros(60)}, "no segment has 2 points"),
         ({"criterion": "aic"}, "curve 0: "),
         ({"bc_type": "not-a-knot"}, "bc_type"),
-    ],
-)
-def test_invalid_smoothing_options_raise(options, says):
-    t, p = noisy(ss.space("sphere:2"))
-    with pytest.raises((ss.ValidationError, TypeError), match=says):
-        ss.fit_segments(t, p, "sphere:2", **{"max_gap": 2, "smooth": True, **options})
+    ]:
+        with pytest.raises((ss.ValidationError, TypeError), match=says):
+            ss.fit_segments(t, p, "sphere:2", **{"max_gap": 2, "smooth": True, **options})

@@ -11,6 +11,7 @@ import pytest
 from drawn import axes_named, lines_of, points_around, rendered, spline_on, texts_of
 from matplotlib.dates import date2num
 from matplotlib.figure import Figure
+from refused import raises
 
 import symspline as ss
 from symspline._plotting import chart, graphs, matrices, sphere
@@ -87,9 +88,6 @@ def test_rounding_is_not_blown_up():
         assert axes_named(figure, "speed").get_ylim()[1] > 0.5
 
 
-# ---- batches, times, products ----
-
-
 def test_the_heading_counts_curves():
     figure = spline_on("r:2", (7, 10, 4)).plot()
     assert len(axes_named(figure, "speed").lines) == 50
@@ -99,8 +97,7 @@ def test_the_heading_counts_curves():
     figure = rendered(ss.CubicSpline(None, points, "sphere:2", on_failure="ignore").plot())
     assert len(axes_named(figure, "speed").lines) == 2
     assert "2 of 3 curves, 3 points each, natural ends, 1 not converged" in texts_of(figure)
-    with pytest.raises(ss.ValidationError, match="nothing to plot"):
-        ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot()
+    raises("nothing to plot", ss.CubicSpline(None, points[1], "sphere:2", on_failure="ignore").plot)
     figure = spline_on("sphere:2", max_iter=1, on_failure="ignore").plot()
     assert any(text.endswith("not converged") for text in texts_of(figure))
     spline = ss.CubicSpline(None, (np.arange(4.0)[:, None],) * 7, " x ".join(["r:1"] * 7))
@@ -149,9 +146,6 @@ def test_product_has_a_picture_a_factor(name, shape):
     line = lines_of(axes_named(figure, "speed"))[0]
     np.testing.assert_allclose(line[:, 1], first.speed(line[:, 0]), atol=1e-12)
     assert len(figure.axes) == 4 + 2
-
-
-# ---- files, and the rest of the program ----
 
 
 def test_figure_is_saved(tmp_path):

@@ -117,9 +117,8 @@ def test_lengths_of_rigid_motions_are_those_in_the_body():
     assert {"speed\n|(ω, v)|", "acceleration\n|(ω′, v′)|"} <= labels
 
 
-@pytest.mark.parametrize(
-    "name, words",
-    [
+def test_names_of_components():
+    for name, words in [
         ("euclidean:5", "x₁ x₂ x₃ x₄ x₅"),
         ("sphere:15", "x₁ x₂ x₃ x₄ x₅ x₆ x₇ x₈ x₉ x₁₀ x₁₁ x₁₂ 4_others"),
         ("u:5", " ".join(f"{part}_x₁{i}" for i in "₁₂₃₄₅" for part in ("Re", "Im")) + " Re_x₂₁ Im_x₂₁ 38_others"),
@@ -128,12 +127,10 @@ def test_lengths_of_rigid_motions_are_those_in_the_body():
         ("spd:1", "x₁₁"),
         ("spd:4", "x₁₁ x₁₂ x₁₃ x₁₄ x₂₂ x₂₃ x₂₄ x₃₃ x₃₄ x₄₄"),
         ("hpd:2", "Re_x₁₁ Re_x₁₂ Im_x₁₂ Re_x₂₂"),
-    ],
-)
-def test_names_of_components(name, words):
-    figure = spline_on(name).plot()
-    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
-    assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
+    ]:
+        figure = spline_on(name).plot()
+        (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+        assert {text.get_text().replace(" ", "_") for text in legend.texts} == set(words.split())
 
 
 def test_imaginary_parts_are_dashed():

@@ -5,6 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from curves import points_on
+from refused import raises
 from scipy.integrate import solve_ivp
 from test_hamiltonian import GATES, KNOTS, STATES, X, adjoint, columns, curve
 
@@ -22,9 +23,6 @@ def reaches(spline, u, x):
     """How far U moves the first point from the curve."""
     moved = u @ columns(spline, spline.points[0])
     return spline.space.distance(spline.space.project(moved.reshape(-1, *spline.space.point_shape)), spline(x)).max()
-
-
-# ---- propagators ----
 
 
 @pytest.mark.parametrize("name", [*STATES, *GATES])
@@ -108,20 +106,14 @@ def test_the_adiabatic_phase_of_a_circle_of_latitude():
 def test_times_outside_the_knots():
     spline = curve("cp:1", extrapolate=True)
     for x in (-0.1, 5.1, np.nan):
-        with pytest.raises(ss.ValidationError, match=r"x\[1\] is .*between the first and last knots, 0.0 and 5.0"):
-            propagator(spline, [1.0, x])
+        raises(r"x\[1\] is .*between the first and last knots, 0.0 and 5.0", propagator, spline, [1.0, x])
     # Where one curve of a batch has ended there is none of it.
     own = ss.CubicSpline([[0, 1, 5], [1, 2, 4]], spline.points[:6].reshape(2, 3, 2), "cp:1")
     for x in (0.5, 4.5):
-        with pytest.raises(ss.ValidationError, match=r"between the first and last knots, 1.0 and 4.0"):
-            propagator(own, x)
+        raises(r"between the first and last knots, 1.0 and 4.0", propagator, own, x)
     dates = np.datetime64("2024-01-01") + np.array([[0, 1, 2], [1, 2, 4]])
     own = ss.CubicSpline(dates, spline.points[:6].reshape(2, 3, 2), "cp:1")
-    with pytest.raises(ss.ValidationError, match=r"one curve at a time: propagator\(spline\[i\], x\)"):
-        propagator(own, dates[0])
-
-
-# ---- pulses ----
+    raises(r"one curve at a time: propagator\(spline\[i\], x\)", propagator, own, dates[0])
 
 
 def edge_states(spline, edges, h):
@@ -176,9 +168,8 @@ def test_in_operators_that_are_not_orthogonal():
     assert np.abs(np.einsum("...q,qab->...ab", c, operators) - pulses(spline, edges)).max() < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("match", "options"),
-    [
+def test_invalid_pulse_trains_raise():
+    for match, options in [
         ("kind must be 'exact' or 'midpoint', not 'exakt'", {"kind": "exakt"}),
         ("edges must be a one-dimensional array of at least two times", {"edges": [1.0]}),
         (r"edges\[1\] is 1.0, and the next is 1.0, but edges must be strictly increasing", {"edges": [0, 1.0, 1.0, 2]}),
@@ -186,25 +177,14 @@ def test_in_operators_that_are_not_orthogonal():
         (r"operators\[1\] is not Hermitian", {"operators": [PAULI[0], [[0, 1], [0, 0]]]}),
         (r"operators\[1\] is zero or a linear combination", {"operators": [PAULI[0], PAULI[0] + 1e-12 * PAULI[1]]}),
         (r"pulse\[0\] cannot be expressed .* entries \[0, 1\] and \[1, 0\]", {"operators": PAULI[[0, 2]]}),
-    ],
-)
-def test_invalid_pulse_trains_raise(match, options):
-    with pytest.raises(ss.ValidationError, match=match):
-        pulses(curve("cp:1"), **{"edges": [0, 1, 2]} | options)
-
-
-def test_the_entry_that_is_missing_has_its_sign():
+    ]:
+        raises(match, pulses, curve("cp:1"), **{"edges": [0, 1, 2]} | options)
     path = ss.CubicSpline(None, [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
-    with pytest.raises(ss.ValidationError, match=r"entries \[0, 1\] and \[1, 0\] \(-?0-0.785j\)"):
-        pulses(path, [0, 1, 2], operators=PAULI[[0, 2]])
-
-
-def test_edges_too_far_apart():
-    there = ss.CubicSpline(None, [[1, 0], [2**-0.5, 2**-0.5], [0, 1]], "cp:1")
-    with pytest.raises(ss.CutLocusError):
-        pulses(there, [0, 2])
-    # The generator at the middle does not mind.
-    assert np.abs(pulses(there, [0, 2], kind="midpoint", operators=PAULI) - [0, np.pi / 4, 0]).max() < 1e-14
+    # The entry that is missing has its sign.
+    raises(r"entries \[0, 1\] and \[1, 0\] \(-?0-0.785j\)", pulses, path, [0, 1, 2], operators=PAULI[[0, 2]])
+    # Edges are too far apart for the exact pulse, but not for the generator at the middle.
+    raises("cut locus", pulses, path, [0, 2], error=ss.CutLocusError)
+    assert np.abs(pulses(path, [0, 2], kind="midpoint", operators=PAULI) - [0, np.pi / 4, 0]).max() < 1e-14
 
 
 @pytest.mark.parametrize("name", ["cp:31", "cgr:2,24"])

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from refused import raises
 from scipy.integrate import ode
 from test_hamiltonian import curve
 from test_propagator import PAULI
@@ -62,28 +63,23 @@ class Operator(Ket):
 )
 @pytest.mark.parametrize("space", ["cp:1", "cp:3"])
 def test_density_matrices_of_pure_states_are_named(points, space):
-    with pytest.raises(ss.ValidationError, match=r"density matrices.*symspline\.convert\.density_to_state"):
-        ss.CubicSpline(None, points, space)
-    with pytest.raises(ss.ValidationError, match="looks like density matrices"):
-        ss.space(space).check_point(points)
+    raises(r"density matrices.*symspline\.convert\.density_to_state", ss.CubicSpline, None, points, space)
+    raises("looks like density matrices", ss.space(space).check_point, points)
     ss.CubicSpline(None, ss.convert.density_to_state(PURE), "cp:1")
 
 
 @pytest.mark.parametrize("space, points", [("cp:1", MIXED), ("rp:1", MIXED.real)])
 def test_there_is_no_space_of_mixed_states(space, points):
-    with pytest.raises(ss.ValidationError, match=r"density matrices.*mixed.*PositiveDefinite\(2\)") as caught:
-        ss.CubicSpline(None, points, space)
-    name = str(caught.value).split("points of ")[-1].split(",")[0]
+    error = raises(r"density matrices.*mixed.*PositiveDefinite\(2\)", ss.CubicSpline, None, points, space)
+    name = str(error).split("points of ")[-1].split(",")[0]
     ss.CubicSpline(None, points, getattr(ss, name.split("(")[0])(2))
 
 
 def test_states_are_not_taken_for_density_matrices():
     # Hermitian, of trace 1, and of unit rows: of purity 3.
     ss.CubicSpline(None, np.diag([1.0, 1, -1]), "cp:2", on_failure="ignore")
-    with pytest.raises(ss.ValidationError, match="off the space"):
-        ss.CubicSpline(None, [[1, 0], [0, np.nan]], "cp:1")
-    with pytest.raises(ss.ValidationError, match=r"its norm is 0\.5, not 1"):
-        ss.CubicSpline(None, np.eye(2) / 2 + [[0, 0], [1, 0]], "cp:1")
+    raises("off the space", ss.CubicSpline, None, [[1, 0], [0, np.nan]], "cp:1")
+    raises(r"its norm is 0\.5, not 1", ss.CubicSpline, None, np.eye(2) / 2 + [[0, 0], [1, 0]], "cp:1")
 
 
 def test_kets_are_columns():
@@ -94,22 +90,15 @@ def test_kets_are_columns():
     ss.CubicSpline(None, from_kets(kets), "cp:1")
 
 
-@pytest.mark.parametrize(
-    ("match", "call"),
-    [
+def test_invalid_states_raise():
+    for match, call in [
         (r"state must be of shape \(..., 2\)", lambda: bloch_vector([1, 0, 0])),
         (r"state\[1\] is not a state: its length is 2.0", lambda: bloch_vector([[1, 0], [2, 0]])),
         (r"vector is not a pure state: its length is 0.5", lambda: from_bloch_vector([0, 0, 0.5])),
         ("kets must be columns, of shape", lambda: from_kets([[1, 0], [0, 1]])),
         (r"kets\[1\] is not a state", lambda: from_kets([Ket([1, 0]), Ket([1, 1])])),
-    ],
-)
-def test_invalid_states_raise(match, call):
-    with pytest.raises(ss.ValidationError, match=match):
-        call()
-
-
-# ---- QuTiP ----
+    ]:
+        raises(match, call)
 
 
 def test_solvers_may_step_over_the_end():
@@ -130,25 +119,20 @@ def test_solvers_may_step_over_the_end():
 
 def test_invalid_qobjevo_curves_raise():
     pytest.importorskip("qutip")
-    with pytest.raises(ss.ValidationError, match=r"is a batch, .* qobjevo\(spline\[0\]\)"):
-        qobjevo(curve("cp:2", batch=(2,)))
+    raises(r"is a batch, .* qobjevo\(spline\[0\]\)", qobjevo, curve("cp:2", batch=(2,)))
     dates = ss.CubicSpline(np.arange("2024-01-01", "2024-01-07", dtype="M8[D]"), curve("cp:2").points, "cp:2")
-    with pytest.raises(ss.ValidationError, match="are dates"):
-        qobjevo(dates)
+    raises("are dates", qobjevo, dates)
 
 
 def test_there_is_no_hamiltonian_before_the_first_knot():
     pytest.importorskip("qutip")
     later = ss.CubicSpline([100, 101, 102], curve("cp:2").points[:3], "cp:2")
     h = qobjevo(later)
-    with pytest.raises(ss.ValidationError, match=r"the time 0\.5 is before the first knot, 100\.0"):
-        h(0.5)
+    raises(r"the time 0\.5 is before the first knot, 100\.0", h, 0.5)
     # What QuTiP asks for at first.
     assert h(0.0).shape == (3, 3)
-    with pytest.raises(ss.ValidationError, match=r"dims \[2, 2\] have 4 levels, but the curve has 3"):
-        qobjevo(later, dims=[2, 2])
-    with pytest.raises(ss.ValidationError, match=r"dims must be a list of whole numbers, such as \[2, 2\], not 3"):
-        qobjevo(later, dims=3)
+    raises(r"dims \[2, 2\] have 4 levels, but the curve has 3", qobjevo, later, dims=[2, 2])
+    raises(r"dims must be a list of whole numbers, such as \[2, 2\], not 3", qobjevo, later, dims=3)
 
 
 def test_composite_systems_in_qutip():
@@ -169,8 +153,7 @@ def test_composite_systems_in_qutip():
 
 def test_without_qutip(monkeypatch):
     monkeypatch.setitem(sys.modules, "qutip", None)
-    with pytest.raises(ImportError, match="pip install qutip"):
-        qobjevo(curve("cp:1"))
+    raises("pip install qutip", qobjevo, curve("cp:1"), error=ImportError)
 
 
 @pytest.mark.parametrize("name", ["cp:1", "cp:3", "u:3", "su:4"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from cases import loop_over
+from refused import raises
 
 import symspline as ss
 from symspline.cli import main
@@ -25,33 +26,13 @@ T = irregular()
 P = path(T)
 
 
-def turns(t):
-    return ss.rotations.from_rotation_vectors(np.outer(t, [0.0, 0.1, 0.3]))
-
-
-def by_spline(t, points):
-    spline = ss.CubicSpline(t, points, "sphere:2")
+def at_knots(spline):
     return spline(spline.t)
 
 
 def by_fit(t, points):
     velocities, _ = ss.fit(t, points, "sphere:2")
     return ss.evaluate(t, points, velocities, "sphere:2", t)
-
-
-def by_fit_many(t, points):
-    (spline,) = ss.fit_many([(t, points)], "sphere:2")
-    return spline(spline.t)
-
-
-def by_segments(t, points):
-    (spline,) = ss.fit_segments(t, points, "sphere:2", max_gap=1e9)
-    return spline(spline.t)
-
-
-def by_hermite(t, points):
-    spline = ss.HermiteSpline(t, points, np.zeros(np.shape(points)), "sphere:2")
-    return spline(spline.t)
 
 
 def by_xarray(t, points):
@@ -67,12 +48,19 @@ def by_command_line(t, points):
     np.savez("a.npz", t=t, points=points)
     if main(["fit", "a.npz", "--space", "sphere:2", "-o", "b.npz"]):
         raise ss.ValidationError("the command line failed")
-    spline = ss.load("b.npz")
-    return spline(spline.t)
+    return at_knots(ss.load("b.npz"))
 
 
-ENTRIES = [by_spline, by_fit, by_fit_many, by_segments, by_hermite, by_xarray, by_command_line]
-entries = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.__name__)
+ENTRIES = {
+    "CubicSpline": lambda t, points: at_knots(ss.CubicSpline(t, points, "sphere:2")),
+    "fit": by_fit,
+    "fit_many": lambda t, points: at_knots(*ss.fit_many([(t, points)], "sphere:2")),
+    "fit_segments": lambda t, points: at_knots(*ss.fit_segments(t, points, "sphere:2", max_gap=1e9)),
+    "HermiteSpline": lambda t, points: at_knots(ss.HermiteSpline(t, points, np.zeros(np.shape(points)), "sphere:2")),
+    "xarray": by_xarray,
+    "command line": by_command_line,
+}
+entries = pytest.mark.parametrize("entry", ENTRIES.values(), ids=list(ENTRIES))
 
 
 @pytest.fixture(autouse=True)
@@ -109,7 +97,6 @@ def test_offsets_and_orders_do_not_change_the_curve(kind):
 
 
 def dirty(how):
-    """Data with a fault, and what cleans it; None if nobody but the user can."""
     t, points = T.copy(), P.copy()
     if how == "repeated":
         t[7] = t[6]
@@ -144,17 +131,16 @@ def test_a_table_of_pandas_in_any_order():
     shuffled = frame.sample(frac=1, random_state=0)
     pd.testing.assert_frame_equal(ss.geo.resample(shuffled, "1s", time="time", max_gap=9), expected)
     frame.loc[5, "lat"] = np.nan
-    with pytest.raises(ss.ValidationError, match=r"row 5.*dropna"):
-        ss.geo.resample(frame, "1s", time="time", max_gap=9)
+    raises(r"row 5.*dropna", ss.geo.resample, frame, "1s", time="time", max_gap=9)
 
 
 def test_trajectories_with_gaps_and_huge_offsets():
     t = T + EPOCH
-    ss.poses.write_tum("a.txt", t, (turns(T), P))
+    turns = ss.rotations.from_rotation_vectors(np.outer(T, [0.0, 0.1, 0.3]))
+    ss.poses.write_tum("a.txt", t, (turns, P))
     read, poses = ss.poses.read_tum("a.txt")
     assert np.array_equal(read, t)
     np.testing.assert_allclose(poses[:, :3, 3], P, atol=1e-15)
     with open("a.txt", "a") as file:
         file.write("1.8e9 0 0 nan 0 0 0 1\n")
-    with pytest.raises(ss.ValidationError, match=rf"line {len(T) + 1}.*'tz' holds nan"):
-        ss.poses.read_tum("a.txt")
+    raises(rf"line {len(T) + 1}.*'tz' holds nan", ss.poses.read_tum, "a.txt")

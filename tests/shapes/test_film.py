@@ -9,10 +9,10 @@ import pytest
 import shapes_figures as figures
 from matplotlib.patches import Polygon
 from matplotlib.text import Text
+from refused import raises
 from test_landmarks import drawings
 from test_morph import KNOTS, turned
 
-import symspline as ss
 from symspline.shapes import AffineMorph
 
 PAGE = Path(__file__).parents[2] / "docs/shapes.md"
@@ -72,8 +72,7 @@ def test_dates_of_whole_days():
 
 def test_four_dimensions_have_no_picture():
     x = drawings(3, landmarks=8, n=4, spread=0.1)
-    with pytest.raises(ss.ValidationError, match="in 2 or 3 dimensions, not in 4"):
-        AffineMorph(None, x).plot()
+    raises("in 2 or 3 dimensions, not in 4", AffineMorph(None, x).plot)
 
 
 def test_the_page():

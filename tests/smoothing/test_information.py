@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from noisy import TIGHT, acceleration_energy, both_solvers, distance_to_minimum, example, rms, truth
 from oracle import Dense
+from refused import raises
 from scipy.linalg import block_diag
 from test_smoothing_laws import NAMES
 
@@ -130,8 +131,7 @@ def test_each_of_two_sensors_knows_one_direction():
     assert spline.report.converged
     assert rms(space, spline(t), points) < 0.012
     assert spline.sigma == pytest.approx(1, rel=0.1) and 10 < spline.df < 30
-    with pytest.raises(ss.ValidationError, match="Pass sigma"):
-        ss.make_smoothing_spline(t, noisy, space, weights=w, frames=frames, loss="huber")
+    raises("Pass sigma", ss.make_smoothing_spline, t, noisy, space, weights=w, frames=frames, loss="huber")
     robust = ss.make_smoothing_spline(t, noisy, space, weights=w, frames=frames, loss="huber", sigma=1)
     assert rms(space, robust(t), points) < 0.014
 
@@ -222,9 +222,8 @@ def with_entry(array, index, value):
     return array
 
 
-@pytest.mark.parametrize(
-    "weights, frames, match",
-    [
+def test_invalid_information_raises():
+    for weights, frames, match in [
         (with_entry(ONE, (3, 0, 1), 0.1), None, r"weights\[3\] is not symmetric"),
         (with_entry(ONE, (4, 0, 0), -1), None, r"weights\[4\] has a negative eigenvalue"),
         (ONE[:9], None, r"weights has shape \(9, 2, 2\), but matrices for 10 points of Sphere\(2\)"),
@@ -234,11 +233,8 @@ def with_entry(array, index, value):
         (ONE, with_entry(FRAMES, (6, 0), FRAMES[6, 1]), r"frames\[6\] do not span"),
         (np.ones(10), FRAMES, "`weights` are numbers"),
         (0 * ONE, None, "All weights of the data are 0"),
-    ],
-)
-def test_invalid_information_raises(weights, frames, match):
-    with pytest.raises(ss.ValidationError, match=match):
-        ss.make_smoothing_spline(T, NOISY, S2, weights=weights, frames=frames)
+    ]:
+        raises(match, ss.make_smoothing_spline, T, NOISY, S2, weights=weights, frames=frames)
 
 
 def test_information_for_other_spaces_raises():

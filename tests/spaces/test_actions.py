@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from cases import CASES, EPS, apart, base_point, condition, every_family, has_metric, loop_over, unit_tangent, walk
 from lie import Lie
+from refused import raises
 
 import symspline as ss
 
 SEED = 1703
 one_per_family = pytest.mark.parametrize("case", [c for c in CASES if c.interface], ids=lambda case: case.name)
-
-
-# ---- symmetries ----
 
 
 @every_family
@@ -56,9 +54,6 @@ def test_symmetries_are_conjugate_by_the_group(case, rng):
     moved = lie.act(g, space.symmetry(p, x))
     there = space.symmetry(lie.act(g, p), lie.act(g, x))
     assert apart(space, there, moved) <= 100 * EPS * condition(space, [p, x, moved]) ** 2
-
-
-# ---- the action ----
 
 
 @every_family
@@ -137,11 +132,7 @@ def test_products_act_by_factors(rng):
 def test_single_precision_elements_have_its_tolerance():
     g = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]], np.float32)
     assert ss.Sphere(1).act(g, [1.0, 0.0]) == pytest.approx([np.cos(0.3), np.sin(0.3)], abs=1e-7)
-    with pytest.raises(ss.ValidationError, match=r"\|gᵀg − 1\| is"):
-        ss.Sphere(1).act(g.astype(float), [1.0, 0.0])
-
-
-# ---- messages ----
+    raises(r"\|gᵀg − 1\| is", ss.Sphere(1).act, g.astype(float), [1.0, 0.0])
 
 
 TURN = np.eye(3)
@@ -181,16 +172,11 @@ def test_invalid_elements_raise(name, g, message, rng):
         space.act(g, x)
 
 
-@pytest.mark.parametrize(
-    ("space", "p", "x", "match"),
-    [
+def test_invalid_points_of_a_symmetry_raise():
+    for space, p, x, match in [
         (ss.Sphere(2), [1, 0, 0], [1, 0], r"x has shape \(2,\)"),
         (ss.Sphere(2), np.eye(3), np.eye(3)[:2], "do not broadcast"),
         (ss.SymmetricPositiveDefinite(2), np.eye(2), -np.eye(2), "symmetry failed: a matrix is not a point"),
         (ss.Stiefel(1, 3), np.eye(3, 1), np.eye(3, 1), "it has no geodesic symmetries"),
-    ],
-    ids=str,
-)
-def test_invalid_points_of_a_symmetry_raise(space, p, x, match):
-    with pytest.raises(ss.ValidationError, match=match):
-        space.symmetry(p, x)
+    ]:
+        raises(match, space.symmetry, p, x)

@@ -90,9 +90,6 @@ def test_curvature_of_products_and_poses():
     assert np.isnan(ss.SpecialEuclidean(3).curvature)
 
 
-# ---- injectivity radius ----
-
-
 def unit(n, i, j, value=1.0):
     e = np.zeros((n, n), dtype=type(value))
     e[i, j] = value

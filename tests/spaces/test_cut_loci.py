@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import EPS, closed_walk, loop_over, steep_tangent, unit_tangent, walk
 from curves import S2
-from refused import CLAMPED, NAN, P, fails, fit_error
+from refused import CLAMPED, P, fails, fit_error, raises
 
 import symspline as ss
 
@@ -94,19 +94,14 @@ def test_b_splines_of_subspaces_that_reach_the_cut_locus(name):
         assert np.isclose(curve.speed(0.3), space.distance(p, q), atol=1e-12)
 
 
-# ---- at the cut locus ----
-
-
-def test_the_logarithm_of_nan_is_not_a_cut_locus():
-    with pytest.raises(ss.ValidationError):
-        S2.log(P[0], [NAN, 0, 0])
-
-
-@pytest.mark.parametrize("n", [600, 3000])
-def test_antipodal_neighbours_in_a_long_curve(n):
-    points = S2.geodesic(P[0], P[1], np.linspace(0, 1, n))
-    points[n - 100] = -points[n - 101]
-    fit_error(rf"points\[{n - 101}\] and points\[{n - 100}\]", None, points, kind=ss.CutLocusError)
+def test_faults_of_long_curves_are_named_where_they_are(rng):
+    for n in (600, 3000):
+        points = S2.geodesic(P[0], P[1], np.linspace(0, 1, n))
+        points[n - 100] = -points[n - 101]
+        fit_error(rf"points\[{n - 101}\] and points\[{n - 100}\]", None, points, kind=ss.CutLocusError)
+    closed = closed_walk(S2, 0.1, 1300, rng)
+    closed[6] = -closed[5]
+    fit_error(r"points\[5\] and points\[6\]", None, closed, kind=ss.CutLocusError, bc_type="periodic")
 
 
 def rotation(angle, n=3):
@@ -167,8 +162,7 @@ def test_points_at_the_cut_locus(name):
     space = ss.space(name)
     with pytest.raises(ss.CutLocusError, match=rf"pair 1: .*angle {angle}, limit {angle}"):
         space.log(p[0], np.array([p[1], at(limit)]))
-    with pytest.raises(ss.CutLocusError, match=rf"pair 0: .*angle {angle}, limit {angle}"):
-        space.geodesic(p[1], p[2], 0.5)
+    raises(rf"pair 0: .*angle {angle}, limit {angle}", space.geodesic, p[1], p[2], 0.5, error=ss.CutLocusError)
     # Nearer is fine, and farther is nearer on the other side.
     ss.CubicSpline(None, np.array([at(0), at(0.9 * limit), at(1.8 * limit)]), name)
     ss.CubicSpline(None, np.array([at(0), at(1.2 * limit)]), name)
@@ -194,15 +188,7 @@ def test_control_points_that_are_too_far_apart(name):
         ss.BezierCurve(bad, name)
     for batch, curve in ((np.stack([good, bad]), "1"), (np.stack([[good, good], [bad, good]]), "1,0")):
         match = rf"control_points\[1\] and control_points\[2\] of curve {curve} {lie}"
-        with pytest.raises(ss.CutLocusError, match=match):
-            ss.BSpline(CLAMPED, batch, 2, name)
-
-
-def test_a_fault_of_a_long_closed_curve_is_named_where_it_is(rng):
-    p = closed_walk(ss.Sphere(2), 0.1, 1300, rng)
-    p[6] = -p[5]
-    with pytest.raises(ss.CutLocusError, match=r"points\[5\] and points\[6\]"):
-        ss.CubicSpline(None, p, "sphere:2", bc_type="periodic")
+        raises(match, ss.BSpline, CLAMPED, batch, 2, name, error=ss.CutLocusError)
 
 
 def turned(n, planes):
@@ -239,8 +225,7 @@ def columns(n, k, shared=0):
 )
 def test_points_at_the_cut_locus_have_a_distance(name, p, q, distance, rng):
     space = ss.space(name)
-    with pytest.raises(ss.CutLocusError):
-        space.log(p, q)
+    raises("cut locus", space.log, p, q, error=ss.CutLocusError)
     assert space.distance(p, q) == pytest.approx(distance, abs=8 * EPS)
     # Beside others, which have a logarithm.
     near = space.exp(p, 0.1 * unit_tangent(space, p, rng))

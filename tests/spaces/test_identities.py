@@ -36,9 +36,6 @@ def plain_vector(space, x, v):
     return d @ adjoint(y) + y @ adjoint(d)
 
 
-# ---- the maps ----
-
-
 @dataclass(frozen=True)
 class Identity:
     """A map from a space to another that multiplies all lengths by a number.
@@ -228,9 +225,6 @@ IDENTITIES = [
 every = pytest.mark.parametrize("case", IDENTITIES, ids=lambda case: f"{case.source}={case.target}")
 
 
-# ---- the laws ----
-
-
 @every
 @loop_over("length", [1e-12, 1e-8, 1e-4, 1e-2, 0.3, 1.2])
 def test_geometry_agrees(case, length, rng):
@@ -291,9 +285,6 @@ def test_splines_agree(case, ends, step, rng):
         assert np.abs(mapped - plain_vector(there, fy, w)).max() <= 10**nu * allowed
 
 
-# ---- maps from products ----
-
-
 def quaternion_product(a, b):
     return np.stack(
         [
@@ -337,9 +328,6 @@ def test_rotations_have_two_quaternions(rng):
     there = ss.SpecialOrthogonal(3).distance(rotation(p), rotation(q))
     assert np.abs(there - 2 * np.minimum(angle, np.pi - angle)).max() <= 50 * EPS
     assert np.abs(ss.RealProjective(3).distance(p, q) - there / 2).max() <= 50 * EPS
-
-
-# ---- the representative does not matter ----
 
 
 def gauges(space, n, rng):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cases import FAMILIES, INDEFINITE, LINEAR, SINGLE, SPACES, loop_over
 from curves import every_space, points_on
-from refused import INF, fit_error
+from refused import INF, fit_error, raises
 
 import symspline as ss
 
@@ -19,22 +19,17 @@ CLASSES = [
     if inspect.isclass(cls) and issubclass(cls, ss.Space) and cls not in (ss.Space, ss.Product, ss.Manifold)
 ]
 
-# ---- names ----
 
-
-@pytest.mark.parametrize(
-    "name, space",
-    [
+def test_names_of_spaces():
+    for name, space in [
         ("r:3", ss.Euclidean(3)),
         ("Sphere:2", ss.Sphere(np.int64(2))),
         ("h:4", ss.Hyperbolic(4)),
         ("sphere:3 x r:3", ss.Product(ss.Sphere(3), ss.Euclidean(3))),
         ("h:2 x sphere:2 x r:1", ss.Product(ss.Product("h:2", "sphere:2"), "r:1")),
-    ],
-)
-def test_names_of_spaces(name, space):
-    assert ss.space(name) == space
-    assert ss.CubicSpline(None, points_on(space, 3), name).space == space
+    ]:
+        assert ss.space(name) == space
+        assert ss.CubicSpline(None, points_on(space, 3), name).space == space
 
 
 @pytest.mark.parametrize("aliases", FAMILIES, ids=lambda aliases: aliases[0])
@@ -69,12 +64,8 @@ def test_spaces_compare():
     assert ss.Sphere(2) != "sphere:2"
 
 
-# ---- what they say of themselves ----
-
-
-@pytest.mark.parametrize(
-    "space, point_shape, dtype, dim, radius, curvature",
-    [
+def test_numbers_of_some_spaces():
+    for space, point_shape, dtype, dim, radius, curvature in [
         (ss.Euclidean(3), (3,), float, 3, INF, 0),
         (ss.Sphere(2), (3,), float, 2, np.pi, 1),
         (ss.Hyperbolic(2), (3,), float, 2, INF, 1),
@@ -82,13 +73,10 @@ def test_spaces_compare():
         (ss.Product("h:2", "r:1", "h:3"), ((3,), (1,), (4,)), (float,) * 3, 6, INF, 1),
         (ss.space("u:2 x cp:1 x r:3"), ((2, 2), (2,), (3,)), (complex, complex, float), 9, np.pi / 2, 2),
         (ss.space("r:1 x se:2"), ((1,), (3, 3)), (float, float), 4, np.pi, np.nan),
-    ],
-    ids=str,
-)
-def test_numbers_of_some_spaces(space, point_shape, dtype, dim, radius, curvature):
-    assert (space.point_shape, space.dtype, space.dim) == (point_shape, dtype, dim)
-    assert space.injectivity_radius == radius
-    np.testing.assert_equal(space.curvature, curvature)
+    ]:
+        assert (space.point_shape, space.dtype, space.dim) == (point_shape, dtype, dim)
+        assert space.injectivity_radius == radius
+        np.testing.assert_equal(space.curvature, curvature)
 
 
 COMPLEX_FAMILIES = {"cp", "ch", "hp", "cgr", "u", "su", "hpd", "cgl"}
@@ -106,9 +94,6 @@ def test_properties_of_spaces(space):
     # Without an invariant metric that is positive definite there is no K.
     without = family == "se" or isinstance(space, (*LINEAR, *INDEFINITE))
     assert np.isnan(space.curvature) if without else space.curvature >= 0
-
-
-# ---- spaces that there are not ----
 
 
 @pytest.mark.parametrize(
@@ -156,8 +141,7 @@ def test_properties_of_spaces(space):
 )  # fmt: skip
 def test_invalid_spaces_raise(space, match):
     fit_error(match, space=space)
-    with pytest.raises(ss.ValidationError, match=match):
-        ss.space(space)
+    raises(match, ss.space, space)
 
 
 @loop_over("value", [-1, 2.0, "2", None, True])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cases import EPS, loop_over
 from curves import points_on
+from refused import raises
 
 import symspline as ss
 from symspline import convert
@@ -158,20 +159,17 @@ def test_distances_of_parts():
 
 def test_vectors_that_leave_a_part_are_refused():
     p = convert.siegel_to_positive_definite([[[1j]], [[1 + 2j]]])
-    with pytest.raises(ss.ValidationError, match="not tangent"):
-        ss.CubicSpline(None, p, "siegel:1", bc_type=((1, np.eye(2)), "natural"))
+    raises("not tangent", ss.CubicSpline, None, p, "siegel:1", bc_type=((1, np.eye(2)), "natural"))
     q = convert.quaternions_to_subspace([[[1.0, 0, 0, 0], [0, 0, 0, 0]], [[0.6, 0, 0, 0], [0, 0, 0.8, 0]]])
     v = np.zeros((4, 2), complex)
     v[2, 0] = 1.0
-    with pytest.raises(ss.ValidationError, match="not tangent"):
-        ss.CubicSpline(None, q, "hp:1", bc_type=((1, v), "natural"))
+    raises("not tangent", ss.CubicSpline, None, q, "hp:1", bc_type=((1, v), "natural"))
     v[3, 1] = 1.0
     assert ss.CubicSpline(None, q, "hp:1", bc_type=((1, v), "natural")).report.converged
 
 
-@pytest.mark.parametrize(
-    ("space", "points", "why"),
-    [
+def test_invalid_quadric_points_raise():
+    for space, points, why in [
         ("siegel:1", [np.eye(2), np.diag([2.0, 1.0])], r"points\[1\] is off .* it is not symplectic"),
         (
             "siegel:1",
@@ -187,16 +185,12 @@ def test_vectors_that_leave_a_part_are_refused():
         ("siegel:2", np.eye(2) * np.ones((3, 1, 1)) * 1j, "siegel_to_positive_definite converts"),
         ("hp:1", [np.eye(4)[:, :2], np.eye(4)[:, ::2]], r"points\[1\] is off .* no quaternionic line"),
         ("hp:1", np.eye(4)[:2] * np.ones((3, 1, 1)), "looks like vectors of quaternions"),
-    ],
-)
-def test_invalid_quadric_points_raise(space, points, why):
-    with pytest.raises(ss.ValidationError, match=why):
-        ss.CubicSpline(None, points, space)
+    ]:
+        raises(why, ss.CubicSpline, None, points, space)
 
 
-@pytest.mark.parametrize(
-    ("call", "value", "why"),
-    [
+def test_invalid_subspaces_raise():
+    for call, value, why in [
         (convert.siegel_to_positive_definite, [[[1j, 0], [1, 1j]]], r"z\[0\] is not symmetric"),
         (convert.siegel_to_positive_definite, [[1.0]], "imaginary part that is not positive definite"),
         (convert.siegel_to_positive_definite, [[1j, 0]], "square matrices"),
@@ -210,8 +204,5 @@ def test_invalid_quadric_points_raise(space, points, why):
         (convert.quaternions_to_subspace, [[1.0, 0, 0]], "must be real, of shape"),
         (convert.subspace_to_quaternions, np.eye(4)[:, ::2], "does not span a quaternionic line"),
         (convert.subspace_to_quaternions, np.eye(3), "2n . 2, 2"),
-    ],
-)
-def test_invalid_subspaces_raise(call, value, why):
-    with pytest.raises(ss.ValidationError, match=why):
-        call(value)
+    ]:
+        raises(why, call, value)

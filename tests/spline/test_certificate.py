@@ -27,9 +27,6 @@ def longest_leg(space, points, velocities):
     return space.norm(points, velocities).max() / 3
 
 
-# ---- the number ----
-
-
 @pytest.mark.parametrize("name", CURVED)
 @loop_over("kd", [1e-6, 0.01, 0.1, 0.2, 0.25, 0.26, 0.26108])
 def test_radius_is_the_smallest_of_38(name, kd, rng):
@@ -56,9 +53,6 @@ def test_radius_is_the_longest_step_in_flat_space(name, rng):
     assert report.invariant_radius == pytest.approx(report.max_step, rel=1e-15)
 
 
-# ---- the theorem ----
-
-
 @pytest.mark.parametrize("name", CURVED)
 @loop_over("kd", [0.01, 0.2, 0.26])
 @loop_over("ends", ["natural", "clamped", "velocity"])
@@ -80,9 +74,6 @@ def test_algorithm_1_stays_within(name, kd, ends, rng):
         assert done.report.converged and done.report.rate < 0.6
         assert done.report.invariant_radius == radius
         assert longest_leg(space, p, done.velocities) <= radius
-
-
-# ---- the contraction ----
 
 
 def alpha(kd, kv):
@@ -121,9 +112,6 @@ def test_guaranteed_sweeps_are_enough(name, kd, rng):
         options = {"method": "fixed-point", "tol": 0.0, "on_failure": "ignore"}
         spline = ss.CubicSpline(None, p, space, max_iter=report.guaranteed_sweeps + 1, **options)
         assert longest_leg(space, p, spline.velocities - exact) <= tol * report.invariant_radius
-
-
-# ---- when there is one ----
 
 
 RADIUS = pytest.approx(0.23405665250997934, rel=1e-9)
@@ -191,39 +179,22 @@ def test_given_velocities_widen_the_region(end, rng):
         assert report.invariant_radius == (radius and pytest.approx(radius, rel=1e-12)), leg
 
 
-# ---- batches, files, words ----
-
-
-@pytest.fixture
-def batch(rng):
-    return ss.CubicSpline(None, np.array([steps(S2, kd, rng) for kd in (0.1, 0.2, 0.5)]), S2)
-
-
-def test_a_batch_has_an_array(batch):
+def test_every_curve_of_a_batch_has_its_radius_in_the_report_and_its_text(rng):
+    batch = ss.CubicSpline(None, np.array([steps(S2, kd, rng) for kd in (0.1, 0.2, 0.5)]), S2)
     radius = batch.report.invariant_radius
     assert radius.shape == (3,) and np.isnan(radius).tolist() == [False, False, True]
     assert [batch[i].report.invariant_radius for i in range(3)] == [radius[0], radius[1], None]
     assert np.array_equal(batch[1:].report.invariant_radius, radius[1:], equal_nan=True)
     far = ss.CubicSpline(None, batch.points[2:], S2)
     assert far.report.invariant_radius is None
-
-
-def test_own_knots_have_own_radii(batch):
+    for some, stated in ((batch[1], True), (batch[:2], True), (batch[2], False), (batch, False)):
+        assert str(some.report).endswith(", control handles stay below 0.234 (Theorem 3.1)") == stated
+        assert ("Theorem" in str(some.report)) == stated
     t = np.array([np.arange(10.0), np.arange(10.0) ** 2, np.arange(10.0)])
-    radius = ss.CubicSpline(t, batch.points, S2).report.invariant_radius
-    assert np.isnan(radius).tolist() == [False, True, True]
+    own = ss.CubicSpline(t, batch.points, S2).report.invariant_radius
+    assert np.isnan(own).tolist() == [False, True, True]
     many = ss.fit_many(list(zip(t, batch.points, strict=True)), S2)
-    assert [one.report.invariant_radius for one in many] == [radius[0], None, None]
-
-
-def test_report_states_the_radius(batch):
-    for some in (batch[1], batch[:2]):
-        assert str(some.report).endswith(", control handles stay below 0.234 (Theorem 3.1)")
-    for some in (batch[2], batch):
-        assert "Theorem" not in str(some.report)
-
-
-# ---- elsewhere ----
+    assert [one.report.invariant_radius for one in many] == [own[0], None, None]
 
 
 @pytest.mark.parametrize("first", [S2, ss.Euclidean(2)])
@@ -234,9 +205,6 @@ def test_a_product_has_none_where_a_factor_has_none(first, rng):
     batch = np.stack([near, near]), np.stack([0.02 * far + far[:1], far])
     radius = ss.CubicSpline(None, (batch[0], S2.project(batch[1])), space).report.invariant_radius
     assert np.isnan(radius).tolist() == [False, True]
-
-
-# ---- products ----
 
 
 def test_control_polygons_of_a_product_stay_within_the_radii(rng):

@@ -2,20 +2,9 @@
 
 import numpy as np
 import pytest
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    bezier,
-    each,
-    every_batch,
-    every_kind,
-    largest_difference,
-    off,
-    points_on,
-    tangents_at,
-    vectors_off,
-)
+from compare import each, largest_difference, off, vectors_off
+from curves import KNOTS, S2, THREE, bezier, every_batch, every_kind, points_on, tangents_at
+from refused import raises
 from scipy.interpolate import CubicHermiteSpline
 
 import symspline as ss
@@ -74,13 +63,9 @@ def test_hermite_spline_has_the_given_points_and_velocities(space):
     assert largest_difference(found.points, p) < 1e-14
 
 
-# ---- the interface ----
-
-
 def test_outside_the_knots():
     found = curve(S2)
-    with pytest.raises(ss.ValidationError, match="outside"):
-        found(5.0)
+    raises("outside", found, 5.0)
     further = S2.exp(found.points[-1], 0.3 * found.velocities[-1])
     assert np.abs(found(4.5 + 0.3, extrapolate="geodesic") - further).max() < 1e-14
     assert np.array_equal(curve(S2, extrapolate="geodesic").speed(4.8), found.speed(4.8, extrapolate="geodesic"))
@@ -103,15 +88,11 @@ def test_plots(name, tmp_path):
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
-# ---- what is refused ----
-
-
 ZERO = np.zeros((3, 3))
 
 
-@pytest.mark.parametrize(
-    ("match", "changes"),
-    [
+def test_invalid_arguments_raise():
+    for match, changes in [
         (r"velocities has shape \(2, 3\), but points \(3, 3\)", {"velocities": np.zeros((2, 3))}),
         (r"velocities\[1, 2\] is not finite", {"velocities": [[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]}),
         (r"velocities\[1\] is not tangent .* use space.project_tangent", {"velocities": [[0, 1, 0]] * 3}),
@@ -120,37 +101,32 @@ ZERO = np.zeros((3, 3))
         (r"t\[1\]", {"t": [0, 0, 1]}),
         ("extrapolate must be", {"extrapolate": "linear"}),
         ("unknown space", {"space": "round:2"}),
-    ],
-)
-def test_invalid_arguments_raise(match, changes):
-    with pytest.raises(ss.ValidationError, match=match):
-        ss.HermiteSpline(**{"t": None, "points": THREE, "velocities": ZERO, "space": S2} | changes)
+    ]:
+        with pytest.raises(ss.ValidationError, match=match):
+            ss.HermiteSpline(**{"t": None, "points": THREE, "velocities": ZERO, "space": S2} | changes)
 
 
-@pytest.mark.parametrize("batch, curve", [((), ""), ((2,), " of curve 1"), ((2, 3), " of curve 1,2")], ids=str)
-def test_control_points_beyond_reach_raise(batch, curve):
-    velocities = np.zeros((*batch, 3, 3))
-    # The second segment's inner points are (1, 0, 0) and its antipode.
-    velocities[(*(n - 1 for n in batch), 2, 0)] = 1.5 * np.pi
-    points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], velocities.shape)
-    with pytest.raises(
-        ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"
-    ):
-        ss.HermiteSpline(None, points, velocities, S2)
+def test_control_points_beyond_reach_raise():
+    for batch, curve in [((), ""), ((2,), " of curve 1"), ((2, 3), " of curve 1,2")]:
+        velocities = np.zeros((*batch, 3, 3))
+        # The second segment's inner points are (1, 0, 0) and its antipode.
+        velocities[(*(n - 1 for n in batch), 2, 0)] = 1.5 * np.pi
+        points = np.broadcast_to([[0.0, 1, 0], [1, 0, 0], [0, 1, 0]], velocities.shape)
+        with pytest.raises(
+            ss.CutLocusError, match=rf"segment 1{curve}.*between t\[1\] and t\[2\].*Reduce the velocities at its ends"
+        ):
+            ss.HermiteSpline(None, points, velocities, S2)
 
 
-def test_velocities_become_tangent_to_rounding():
-    """They may be off by what rounded files are."""
+def test_an_empty_batch_and_rounded_velocities():
+    empty = ss.HermiteSpline(None, np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), "sphere:2")
+    assert empty(0.5).shape == (0, 3)
+    # Off the tangent space by what files may round.
     p = points_on(S2)
     v = S2.project_tangent(p, np.roll(p, 1, axis=1))
     curve = ss.HermiteSpline(None, p, v + 1e-10 * p, S2)
     assert np.abs(np.sum(curve.points * curve.velocities, axis=-1)).max() < 1e-15
     assert np.abs(curve.velocities - v).max() < 1e-15
-
-
-def test_an_empty_batch_and_velocities_in_single_precision():
-    empty = ss.HermiteSpline(None, np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), "sphere:2")
-    assert empty(0.5).shape == (0, 3)
     # Off the tangent space by what single precision may round.
     rounded = np.array([[1e-6, 0.5, 0], [0, 0, 0.5], [0, 0, 0]])
     assert ss.HermiteSpline(None, np.eye(3), rounded.astype(np.float32), "sphere:2").velocities[0, 0] == 0

@@ -5,24 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from cases import EPS
-from curves import (
-    KNOTS,
-    S2,
-    at_node,
-    bezier,
-    each,
-    every_batch,
-    every_common,
-    every_kind,
-    found,
-    off,
-    pick,
-    points_on,
-    run_python,
-    same,
-    shaped,
-    tangents_at,
-)
+from compare import each, found, off, pick, same, shaped
+from curves import KNOTS, S2, at_node, bezier, every_batch, every_common, every_kind, points_on, run_python, tangents_at
 from numpy.polynomial import Polynomial
 
 import symspline as ss

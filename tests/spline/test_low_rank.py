@@ -169,26 +169,6 @@ def test_error_names_the_invalid_curve(rng):
         ss.fit_many([(None, good), (None, good * [[1.0], [2], [1], [1], [1]])], space)
 
 
-# ---- random tangent vectors ----
-
-
-@every_large
-def test_random_tangents(space, rng):
-    p = space.random_point(rng, 2)
-    v = space.random_tangent(rng, np.broadcast_to(p[0], (500, *p[0].shape)))
-    space.check_tangent(p[0], v)
-    d = space.dim
-    # |v|² has mean d and variance 2d, ⟨u, v⟩/|u| has mean 0 and variance 1.
-    assert abs(np.mean(space.norm(p[0], v) ** 2) - d) < 5 * np.sqrt(2 * d / 500)
-    shadow = space.inner(p[0], v[1:], v[0]) / space.norm(p[0], v[0])
-    assert abs(np.mean(shadow)) < 5 / np.sqrt(499) and abs(np.var(shadow) - 1) < 5 * np.sqrt(2 / 499)
-    assert space.random_tangent(rng, p).shape == p.shape
-    again = [space.random_tangent(np.random.default_rng(3), p) for _ in range(2)]
-    assert np.array_equal(*again)
-
-
-# ---- really large ----
-
 SMOKE = """
 import numpy as np, symspline as ss, sys
 space = ss.space(sys.argv[1])

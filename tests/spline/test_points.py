@@ -5,30 +5,12 @@ import pickle
 import numpy as np
 import pytest
 from cases import COMMON, EPS, loop_over, walk
-from curves import (
-    KNOTS,
-    S2,
-    THREE,
-    at_node,
-    each,
-    every_common,
-    every_kind,
-    found,
-    largest_difference,
-    off,
-    parts,
-    points_on,
-    same,
-    same_curve,
-    shaped,
-    tangents_at,
-)
-from refused import P, fit_error, points
+from compare import each, found, largest_difference, off, parts, same, same_curve, shaped
+from curves import KNOTS, S2, THREE, at_node, every_common, every_kind, points_on, tangents_at
+from refused import P, fit_error, points, raises
 from scipy.interpolate import CubicSpline as FlatSpline
 
 import symspline as ss
-
-# ---- types ----
 
 
 @loop_over("dtype", [int, "i1", "u8", "f2", "f4", ">f8", bool])
@@ -49,9 +31,6 @@ def test_single_precision(space):
     assert found(spline(0.5)) == shaped(space, ())
     assert off(space, spline.points, p) < 1e-5
     space.check_point(spline.points)
-
-
-# ---- memory ----
 
 
 @every_kind
@@ -102,16 +81,12 @@ def test_splines_copy_their_input(space):
             array[...] = 0
 
 
-# ---- what is no array of points ----
-
-
 MASKED = np.ma.array(P, mask=[[0, 0, 0], [0, 0, 1], [1, 0, 0]])
 TIMES = np.ma.array([0.0, 1.0, 2.0], mask=[0, 1, 0])
 
 
-@pytest.mark.parametrize(
-    "call, what",
-    [
+def test_masked_numbers_are_refused():
+    for call, what in [
         (lambda: ss.CubicSpline(None, MASKED, S2), r"points\[1, 2\] is masked"),
         (lambda: ss.CubicSpline(None, list(MASKED), S2), r"points\[1, 2\] is masked"),
         (lambda: ss.CubicSpline(TIMES, P, S2), r"t\[1\] is masked"),
@@ -119,22 +94,15 @@ TIMES = np.ma.array([0.0, 1.0, 2.0], mask=[0, 1, 0])
         (lambda: ss.fit_many([(TIMES, P)], S2), r"curve 0: t\[1\] is masked"),
         (lambda: ss.BezierCurve(MASKED, S2), r"control_points\[1, 2\] is masked"),
         (lambda: S2.distance(np.ma.masked, P), r"p is masked"),
-    ],
-)
-def test_masked_numbers_are_refused(call, what):
-    with pytest.raises(ss.ValidationError, match=what):
-        call()
+    ]:
+        raises(what, call)
+    # Arrays without masked numbers are taken.
+    times, plain = np.ma.array([0.0, 1.0, 2.0], mask=False), np.ma.array(P)
+    assert ss.CubicSpline(times, plain, S2) == ss.CubicSpline(None, list(plain), S2) == ss.CubicSpline(None, P, S2)
 
 
-def test_masked_arrays_without_masked_numbers_are_taken():
-    points = np.ma.array(P)
-    spline = ss.CubicSpline(np.ma.array([0.0, 1.0, 2.0], mask=False), points, S2)
-    assert spline == ss.CubicSpline(None, list(points), S2) == ss.CubicSpline(None, P, S2)
-
-
-@pytest.mark.parametrize(
-    "points, match",
-    [
+def test_invalid_shapes_and_types_of_points_raise():
+    for wrong, match in [
         (np.ones((3, 4)), r"points has shape \(3, 4\), but Sphere\(2\) needs shape \(\.\.\., 3\)"),
         (np.ones((3, 1)), r"points has shape \(3, 1\), but Sphere\(2\) needs"),
         (np.ones(3), r"shape \(3,\), which is one point; a curve needs shape \(\.\.\., N\+1, \*point_shape\)"),
@@ -143,48 +111,33 @@ def test_masked_arrays_without_masked_numbers_are_taken():
         (np.ones((0, 3)), r"no points given; a curve needs at least two"),
         ([[1, 0, 0]], r"at least two points; got one"),
         (np.ones((4, 1, 3)), r"at least two points; got one"),
-    ],
-    ids=lambda x: str(np.shape(x)) if not isinstance(x, str) else "",
-)
-def test_invalid_shapes_of_points_raise(points, match):
-    fit_error(match, points=points)
+    ]:
+        fit_error(match, points=wrong)
+    for wrong in (P + 0j, P.astype(str), P.astype(int).astype(object), P.astype("M8[s]"), None, "points"):
+        fit_error(r"points must be an array of (real )?numbers, not of|no points given", points=wrong)
 
 
-@loop_over("points", [P + 0j, P.astype(str), P.astype(int).astype(object), P.astype("M8[s]"), None, "points"])
-def test_points_that_are_not_real_numbers_raise(points):
-    fit_error(r"points must be an array of (real )?numbers, not of|no points given", points=points)
+def test_ragged_lists_raise():
+    ragged, match = [[1, 0, 0], [0, 1]], "is not an array of equally long rows"
+    raises(match, ss.CubicSpline(None, P, S2), ragged)
+    for changes in ({"bc_type": ((1, ragged), "natural")}, {"points": ragged}, {"t": ragged}):
+        raises(match, ss.CubicSpline, **{"t": None, "points": P, "space": S2} | changes)
 
 
-@loop_over("argument", ["points", "t", "x", "end vector"])
-def test_ragged_lists_raise(argument):
-    ragged = [[1, 0, 0], [0, 1]]
-    with pytest.raises(ss.ValidationError):
-        if argument == "x":
-            ss.CubicSpline(None, P, S2)(ragged)
-        elif argument == "end vector":
-            ss.CubicSpline(None, P, S2, bc_type=((1, ragged), "natural"))
-        else:
-            ss.CubicSpline(**{"t": None, "points": P, argument: ragged}, space=S2)
-
-
-@pytest.mark.parametrize(
-    "name, meant",
-    [
+def test_complex_points_of_a_real_space():
+    for name, meant in [
         ("sphere:3", "ComplexProjective"),
         ("rp:2", "ComplexProjective"),
         ("gr:2,5", "ComplexGrassmannian"),
         ("so:3", "SpecialUnitary"),
         ("o:3", "Unitary"),
         ("spd:2", "HermitianPositiveDefinite"),
-    ],
-)
-def test_complex_points_of_a_real_space(name, meant):
-    p, advice = points(name) + 0j, rf"did you mean {meant}\?"
-    fit_error(rf"points must be an array of real numbers, not of complex128; {advice}", points=p, space=name)
-    fit_error(rf"factor 1, .*{advice}", points=(np.zeros((4, 1)), p), space=f"r:1 x {name}")
-    with pytest.raises(ss.ValidationError, match=rf"p must be .*{advice}"):
-        ss.space(name).exp(p, p)
-    assert hasattr(ss, meant)
+    ]:
+        p, advice = points(name) + 0j, rf"did you mean {meant}\?"
+        fit_error(rf"points must be an array of real numbers, not of complex128; {advice}", points=p, space=name)
+        fit_error(rf"factor 1, .*{advice}", points=(np.zeros((4, 1)), p), space=f"r:1 x {name}")
+        raises(rf"p must be .*{advice}", ss.space(name).exp, p, p)
+        assert hasattr(ss, meant)
 
 
 @pytest.mark.parametrize("name", ["sphere:3", "so:3", "sphere:3 x r:1", "cp:2"])
@@ -192,22 +145,17 @@ def test_rounded_points_are_taken_within_atol(name):
     space = ss.space(name)
     exact = points_on(space, 5)
     rounded = tuple(part.round(6) for part in exact) if isinstance(exact, tuple) else exact.round(6)
-    with pytest.raises(ss.ValidationError, match="off the space"):
-        ss.CubicSpline(None, rounded, space)
+    raises("off the space", ss.CubicSpline, None, rounded, space)
     spline = ss.CubicSpline(None, rounded, space, atol=1e-5)
     space.check_point(spline.points)
     assert np.max(space.distance(spline.points, exact)) < 1e-5
     assert ss.fit_many([(None, rounded)], space, atol=1e-5) == [spline]
-    with pytest.raises(ss.ValidationError, match=r"off the space.*within 1e-7 are"):
-        ss.CubicSpline(None, rounded, space, atol=1e-7)
+    raises(r"off the space.*within 1e-7 are", ss.CubicSpline, None, rounded, space, atol=1e-7)
 
 
 @loop_over("atol", [-1, 1, np.nan, "1e-5", True, [1e-5]])
 def test_invalid_atol_raises(atol):
     fit_error("atol must be a number from 0 to 1, not", atol=atol)
-
-
-# ---- curves that stand still, pause, or hardly move ----
 
 
 @every_common

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from cases import zigzag
-from curves import KNOTS, S2, found, points_on, same, shaped
-from refused import TWO, P, changed, fit_error
+from compare import found, same, shaped
+from curves import KNOTS, S2, points_on
+from refused import TWO, P, changed, fit_error, raises
 
 import symspline as ss
 
@@ -52,16 +53,12 @@ def test_another_curve_of_a_product_is_another_curve_of_a_factor(batch):
     assert np.isnan(other[1]) if batch else other > total
 
 
-# ---- bad input ----
-
-
 PRODUCT = "sphere:2 x r:1"
 FLAT, OFF = np.zeros((3, 1)), changed(2, [0, 0, 2])
 
 
-@pytest.mark.parametrize(
-    "points, options, match",
-    [
+def test_invalid_products_raise():
+    for points, options, match in [
         (P, {}, r"points must be a tuple of 2 arrays, one per factor of Product\(Sphere\(2\), Euclidean\(1\)\)"),
         ((P,), {}, r"points must be a tuple of 2 arrays"),
         ((P, FLAT, FLAT), {}, r"points must be a tuple of 2 arrays"),
@@ -73,15 +70,7 @@ FLAT, OFF = np.zeros((3, 1)), changed(2, [0, 0, 2])
         ((P, FLAT), {"bc_type": "foo"}, r"the start is 'foo'"),
         ((P, FLAT), {"bc_type": ("natural",)}, r"bc_type must be 'natural', .* or a pair .*; got \('natural',\)"),
         ((P, FLAT), {"bc_type": ("natural", (1,))}, r"bc_type must be 'natural', .*; the end is \(1,\)"),
-    ],
-)
-def test_invalid_products_raise(points, options, match):
-    fit_error(match, None, points, PRODUCT, **options)
-
-
-def test_a_product_has_factors():
-    with pytest.raises(ss.ValidationError, match="at least two factors"):
-        ss.Product("sphere:2")
-    space = ss.space(PRODUCT)
-    with pytest.raises(ss.ValidationError, match=r"needs tuples of 2 arrays, one per factor"):
-        space.exp((P, FLAT), (P,))
+    ]:
+        fit_error(match, None, points, PRODUCT, **options)
+    raises("at least two factors", ss.Product, "sphere:2")
+    raises(r"needs tuples of 2 arrays, one per factor", ss.space(PRODUCT).exp, (P, FLAT), (P,))

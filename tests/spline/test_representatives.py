@@ -88,17 +88,11 @@ def test_one_warning_names_the_curve(kind):
 
 @pytest.mark.parametrize(
     ("space", "points", "lam", "match"),
-    [
-        ("sphere:3", flipped(4), 1.0, SIGNS),
-        ("sphere:2", [[1.0, 0, 0], [-0.9, 0.19**0.5, 0]] * 4, 1e-6, FAR),
-    ],
+    [("sphere:3", flipped(4), 1.0, SIGNS), ("sphere:2", [[1.0, 0, 0], [-0.9, 0.19**0.5, 0]] * 4, 1e-6, FAR)],
 )
 def test_noisy_data_warn_too(space, points, lam, match):
     with pytest.warns(UserWarning, match=match):
         ss.make_smoothing_spline(None, points, space, lam=lam, on_failure="ignore")
-
-
-# ---- quaternions of opposite sign ----
 
 
 def test_a_flipped_sample_warns_with_advice():
@@ -126,9 +120,6 @@ def test_other_motions_do_not_warn():
     ss.CubicSpline(None, points_on(ss.Sphere(2), 4, step=1.8), "sphere:2", on_failure="ignore")
 
 
-# ---- long steps ----
-
-
 @pytest.mark.parametrize("space, points", [("so:3", orientations()), ("u:2", gates(1)), ("so:4", modes())])
 def test_data_in_representations_that_do_not_fit_warn(space, points):
     with pytest.warns(ss.FarPointsWarning, match="of 11 steps .* nearest to the previous"):
@@ -154,14 +145,12 @@ def on_plane(angles):
     return Rotation.from_rotvec(np.outer(np.cumsum(angles), [0, 0, 1])).as_matrix()
 
 
-@pytest.mark.parametrize("far, warns", [(4, False), (5, True)])
-def test_more_than_half_of_the_steps_count(far, warns):
-    angles = np.r_[0.0, np.full(far, 0.61 * np.pi), np.full(8 - far, 0.59 * np.pi)]
-    with pytest.warns(ss.FarPointsWarning, match="5 of 8 steps") if warns else warnings.catch_warnings():
-        ss.CubicSpline(None, on_plane(angles), "so:3")
-
-
-def test_curves_of_three_steps_are_silent():
+def test_more_than_half_of_the_steps_count():
+    for far, warns in ((4, False), (5, True)):
+        angles = np.r_[0.0, np.full(far, 0.61 * np.pi), np.full(8 - far, 0.59 * np.pi)]
+        with pytest.warns(ss.FarPointsWarning, match="5 of 8 steps") if warns else warnings.catch_warnings():
+            ss.CubicSpline(None, on_plane(angles), "so:3")
+    # Three steps are too few.
     ss.CubicSpline(None, on_plane([0, 2.5, 2.5, 2.5]), "so:3")
 
 

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from refused import raises
 
 import symspline as ss
 from symspline.tensors import Volume, read_nifti, to_vectors, write_nifti
@@ -77,17 +78,12 @@ def test_invalid_volumes_raise(tmp_path):
             r"mask has shape \(4, 3\), but the volume \(4, 3, 2\)",
             lambda: read_nifti(name, order="fsl", mask=np.ones((4, 3))),
         ),
-        (
-            r"the mask has 24 voxels, which need shape \(24, 3, 3\)",
-            lambda: write_nifti(name, full, order="fsl"),
-        ),
+        (r"the mask has 24 voxels, which need shape \(24, 3, 3\)", lambda: write_nifti(name, full, order="fsl")),
         ("order must be", lambda: write_nifti(name, given, order="ants")),
     ]:
-        with pytest.raises(ss.ValidationError, match=match):
-            call()
+        raises(match, call)
     nibabel.save(nibabel.Nifti1Image(np.zeros((4, 3, 2, 7), np.float32), AFFINE), name)
-    with pytest.raises(ss.ValidationError, match=r"has shape \(4, 3, 2, 7\), but tensors need"):
-        read_nifti(name, order="fsl")
+    raises(r"has shape \(4, 3, 2, 7\), but tensors need", read_nifti, name, order="fsl")
 
 
 def test_masks_that_are_none(tmp_path):
@@ -95,8 +91,7 @@ def test_masks_that_are_none(tmp_path):
     write_nifti(name, given, order="fsl")
     for value in (np.nan, -1.0):
         mask = np.where(given.mask, 1.0, value)
-        with pytest.raises(ss.ValidationError, match=rf"mask\[0, 0, 0\] is {value}; it must be 0 or more"):
-            read_nifti(name, order="fsl", mask=mask)
+        raises(rf"mask\[0, 0, 0\] is {value}; it must be 0 or more", read_nifti, name, order="fsl", mask=mask)
     turned = nibabel.Nifti1Image(given.mask.astype(np.uint8), np.diag([-1.0, 1, 1, 1]) @ AFFINE)
     nibabel.save(turned, str(tmp_path / "mask.nii"))
     with pytest.raises(ss.ValidationError, match=r"mask\.nii has another affine map than the tensors"):
@@ -106,16 +101,14 @@ def test_masks_that_are_none(tmp_path):
 def test_an_order_that_is_not_the_files(tmp_path):
     name = str(tmp_path / "tensors.nii")
     write_nifti(name, volume(), order="itk")
-    with pytest.raises(ss.ValidationError, match="in the order of NIfTI, not in that of 'fsl'; omit order"):
-        read_nifti(name, order="fsl")
+    raises("in the order of NIfTI, not in that of 'fsl'; omit order", read_nifti, name, order="fsl")
     for order in (None, "dipy", "itk"):
         assert np.array_equal(read_nifti(name, order=order).tensors, volume().tensors)
 
 
 def test_without_nibabel(monkeypatch):
     monkeypatch.setitem(sys.modules, "nibabel", None)
-    with pytest.raises(ImportError, match="pip install nibabel"):
-        read_nifti("tensors.nii", order="fsl")
+    raises("pip install nibabel", read_nifti, "tensors.nii", error=ImportError, order="fsl")
 
 
 @pytest.mark.parametrize("order", ["fsl", "itk"])

@@ -7,7 +7,8 @@ import dask
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, run_python, same
+from compare import same
+from curves import S2, run_python
 from fields import field, numbers, point_dims
 
 import symspline as ss
@@ -96,9 +97,6 @@ def test_a_failure_says_that_it_counts_in_its_block():
     assert type(sent) is ss.CutLocusError and sent.spline is None and sent.__notes__
 
 
-# ---- threads ----
-
-
 def test_blocks_use_one_thread_each(threads):
     seen = []
 
@@ -134,9 +132,6 @@ sx.fit(da, "sphere:2")
 print(extra() - before)
 """
     assert run_python(code, timeout=60).split() == ["0", "3"]
-
-
-# ---- files ----
 
 
 @pytest.mark.parametrize("space", ["sphere:2", "cp:2", "so:3"])

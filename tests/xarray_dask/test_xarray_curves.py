@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
-from curves import S2, points_on, same
+from compare import same
+from curves import S2, points_on
 from fields import KNOTS, LAT, LON, field, numbers, point_dims
 
 import symspline as ss
@@ -117,9 +118,6 @@ def test_times_of_any_dimensions(dims):
             assert set(values.time.dims) == set(dims)
 
 
-# ---- curves that are none ----
-
-
 def broken():
     """A field in which one curve has a hole, one a step beyond the cut locus, and one is not wanted."""
     da = field()
@@ -159,9 +157,6 @@ def test_what_does_not_converge_keeps_its_iterate_in_a_fit_and_is_nan_resampled(
         sx.fit(da, S2, point_dims=("r",), max_iter=2, on_failure="raise")
     with pytest.warns(ss.ConvergenceWarning):
         sx.fit(da, S2, point_dims=("r",), max_iter=2, on_failure="warn")
-
-
-# ---- end conditions ----
 
 
 def test_end_vectors_by_name():

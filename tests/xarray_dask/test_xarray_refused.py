@@ -8,6 +8,7 @@ import xarray as xr
 from cases import loop_over
 from curves import S2, run_python
 from fields import field
+from refused import raises
 
 import symspline as ss
 import symspline.xarray as sx
@@ -16,8 +17,7 @@ DATES = np.datetime64("2021-08-28", "s") + np.arange(10)
 
 
 def refused(match, call, kind=ss.ValidationError):
-    with pytest.raises(kind, match=re.escape(match)):
-        call()
+    raises(re.escape(match), call, error=kind)
 
 
 @pytest.mark.parametrize(
@@ -96,8 +96,7 @@ def test_invalid_datasets_raise():
 
 def test_coordinates_must_agree():
     where = xr.DataArray([True, False], dims="lat", coords={"lat": [10.0, 21.0]})
-    with pytest.raises(ValueError, match="exact"):
-        sx.fit(field(), S2, point_dims=("r",), where=where)
+    raises("exact", sx.fit, field(), S2, error=ValueError, point_dims=("r",), where=where)
 
 
 def test_the_package_does_not_import_xarray():
@@ -107,27 +106,23 @@ assert not {"xarray", "dask", "zarr", "pandas"} & set(sys.modules)
 """)
 
 
-@pytest.mark.parametrize(
-    "coords, names",
-    [
+def test_times_under_another_name_raise():
+    """As in files of trajectories by the CF conventions; they were replaced by 0, 1, 2."""
+    points = np.broadcast_to(np.eye(3), (2, 3, 3))
+    for coords, names in [
         ({"time": (("traj", "obs"), [[0.0, 1, 5], [0, 2, 3]])}, r"'time' with dimensions \('traj', 'obs'\)"),
         ({"when": ("obs", np.array(["2021-08-28", "2021-08-29", "2021-09-03"], "datetime64[ns]"))}, "'when'"),
         ({"s": ("obs", [0.0, 1, 5], {"units": "seconds since 2021-08-28"})}, "'s'"),
         ({"s": ("obs", [0.0, 1, 5], {"standard_name": "time"})}, "'s'"),
-    ],
-)
-def test_times_under_another_name_raise(coords, names):
-    """As in files of trajectories by the CF conventions; they were replaced by 0, 1, 2."""
-    points = np.broadcast_to(np.eye(3), (2, 3, 3))
-    da = xr.DataArray(points, dims=("traj", "obs", "q"), coords=coords)
-    for call in (lambda: sx.fit(da, "sphere:2", dim="obs"), lambda: sx.resample(da, "sphere:2", [0.5], dim="obs")):
-        with pytest.raises(ss.ValidationError, match=f"other coordinates look like times: {names}"):
-            call()
-    if "time" not in coords:
-        (name,) = coords
-        ds = sx.fit(da.swap_dims(obs=name), "sphere:2", dim=name)
-        assert ds.max_gap[0] > 1
-    assert (sx.fit(da.drop_vars(list(coords)), "sphere:2", dim="obs").max_gap == 1).all()
+    ]:
+        da = xr.DataArray(points, dims=("traj", "obs", "q"), coords=coords)
+        for call, x in ((sx.fit, ()), (sx.resample, ([0.5],))):
+            raises(f"other coordinates look like times: {names}", call, da, "sphere:2", *x, dim="obs")
+        if "time" not in coords:
+            (name,) = coords
+            ds = sx.fit(da.swap_dims(obs=name), "sphere:2", dim=name)
+            assert ds.max_gap[0] > 1
+        assert (sx.fit(da.drop_vars(list(coords)), "sphere:2", dim="obs").max_gap == 1).all()
 
 
 def test_unrelated_coordinates_are_ignored():
