@@ -11,7 +11,6 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
-from refused import raises
 
 import symspline as ss
 from symspline import _core, _cpu
