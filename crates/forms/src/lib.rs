@@ -4,10 +4,10 @@ mod positive_definite;
 mod siegel;
 
 pub use positive_definite::PositiveDefinite;
-pub use siegel::Siegel;
+pub use siegel::{HalfPlane, Siegel};
 
 use symspline_core::matrix::Known;
-use symspline_core::space::{Entry, Made, Within, table};
+use symspline_core::space::{Entry, Isometric, Made, Within, table};
 
 /// The spaces of this family.
 pub static FAMILY: &[Entry] = &[
@@ -24,9 +24,8 @@ pub static FAMILY: &[Entry] = &[
     Entry { names: &["siegel"], parameters: &["n"], make: |p| half_space(p[0]) },
 ];
 
-/// 2 × 2 matrices are symplectic if their determinant is one.
 fn half_space(n: usize) -> Made {
-    if n == 1 { real(&[2], true) } else { table(Siegel::new(n).map(Within)) }
+    if n == 1 { table(HalfPlane::new().map(Isometric)) } else { table(Siegel::new(n).map(Within)) }
 }
 
 /// Common sizes are constants at compile time.
@@ -34,6 +33,7 @@ fn real(p: &[usize], special: bool) -> Made {
     match p[0] {
         2 => table(PositiveDefinite::<1, Known<2, 4>>::new(2, special)),
         3 => table(PositiveDefinite::<1, Known<3, 9>>::new(3, special)),
+        4 => table(PositiveDefinite::<1, Known<4, 16>>::new(4, special)),
         n => table(PositiveDefinite::<1>::new(n, special)),
     }
 }

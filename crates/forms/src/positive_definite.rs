@@ -377,4 +377,6 @@ impl<const D: usize, A: Storage> Origin for PositiveDefinite<D, A> {
     }
 }
 
-impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {}
+impl<const D: usize, A: Storage> Space for PositiveDefinite<D, A> {
+    const HOT: bool = A::TINY && D == 1;
+}

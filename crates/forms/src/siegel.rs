@@ -4,9 +4,9 @@
 
 use crate::positive_definite::PositiveDefinite;
 use std::f64::consts::FRAC_1_SQRT_2;
-use symspline_core::matrix::{Matrix, cholesky, solve_lower};
+use symspline_core::matrix::{Known, Matrix, cholesky, solve_lower};
 use symspline_core::scalar::{Each, Lane, Scalar, lane};
-use symspline_core::space::{Ambient, Origin, Part};
+use symspline_core::space::{Ambient, Isometry, Origin, Part, Within};
 
 /// Siegel's upper half space of n × n matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,5 +125,44 @@ impl Part for Siegel {
             "it is not symplectic: |pJpJ + 1| = {off:.3e} (symspline.convert.siegel_to_positive_definite makes points \
              of complex symmetric matrices)"
         )
+    }
+}
+
+/// The half space of complex numbers, whose points are the matrices of determinant one: symplectic means the same for
+/// 2 × 2 matrices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HalfPlane {
+    general: Within<Siegel>,
+    image: Plane,
+}
+
+type Plane = PositiveDefinite<1, Known<2, 4>>;
+
+impl HalfPlane {
+    /// Siegel's half space of 1 × 1 matrices.
+    pub fn new() -> Result<Self, String> {
+        Ok(HalfPlane { general: Within(Siegel::new(1)?), image: PositiveDefinite::new(2, true)? })
+    }
+}
+
+impl Isometry for HalfPlane {
+    type Image = Plane;
+    type General = Within<Siegel>;
+    const LEN: usize = 4;
+    const SCALE: f64 = 1.0;
+    const ANGLE: f64 = 1.0;
+    fn image(&self) -> Plane {
+        self.image
+    }
+    fn general(&self) -> &Self::General {
+        &self.general
+    }
+    #[inline(always)]
+    fn enter<S: Scalar>(x: &[S], y: &mut [S]) {
+        y.copy_from_slice(x);
+    }
+    #[inline(always)]
+    fn leave<S: Scalar>(y: &[S], x: &mut [S]) {
+        x.copy_from_slice(y);
     }
 }

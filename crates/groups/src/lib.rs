@@ -74,6 +74,8 @@ fn rotations(p: &[usize]) -> Made {
         #[cfg(feature = "unitary")]
         4 => table(Pairs::rotations()),
         #[cfg(feature = "unitary")]
+        5 => table(UnitaryGroup::<1, Known<5, 25>>::new(5, true)),
+        #[cfg(feature = "unitary")]
         n => table(special_orthogonal(n)),
         #[cfg(not(feature = "unitary"))]
         n => Err(format!("SpecialOrthogonal({n}) was not compiled: it needs the feature \"unitary\"")),
@@ -95,6 +97,7 @@ fn complex(n: usize, special: bool) -> Made {
         1 if !special => table(Phases::new().map(Isometric)),
         2 if special => table(UnitQuaternions::new().map(Isometric)),
         2 => table(Pairs::unitary()),
+        3 => table(UnitaryGroup::<2, Known<3, 9>>::new(n, special)),
         4 => table(UnitaryGroup::<2, Known<4, 16>>::new(n, special)),
         _ => table(UnitaryGroup::<2>::new(n, special)),
     }

@@ -36,14 +36,19 @@ impl<const D: usize, A: Storage> GeneralLinear<D, A> {
         Matrix::read(self.n, self.n, x)
     }
 
+    /// p⁻¹
+    fn inverse<S: Scalar>(&self, p: &Matrix<S, D, A>) -> Matrix<S, D, A> {
+        self.members.adjoint(p).unwrap_or_else(|| inverse(p))
+    }
+
     /// The Ω with v = pΩ.
     fn generator(&self, p: &[Lane], v: &[Lane]) -> Matrix<Lane, D, A> {
-        self.algebra.part(inverse(&self.read(p)).times(&self.read(v)))
+        self.algebra.part(self.inverse(&self.read(p)).times(&self.read(v)))
     }
 
     /// `log(p⁻¹q)` and its deciding angle; `p⁻¹q − 1` without cancellation for near points.
     fn log_between<S: Scalar>(&self, p: &Matrix<S, D, A>, q: &Matrix<S, D, A>) -> (Matrix<S, D, A>, Lane) {
-        log_any_one_plus(&inverse(p).times(&(q - p)))
+        log_any_one_plus(&self.inverse(p).times(&(q - p)))
     }
 
     /// p e^{tΩ}, with the derivatives in t that t has.
@@ -110,7 +115,7 @@ impl<const D: usize, A: Storage> Ambient for GeneralLinear<D, A> {
     }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         let p = self.read(p);
-        let back = inverse(&p);
+        let back = self.inverse(&p);
         let omega = self.algebra.part(back.times(&self.read(v)));
         let half = exp_any_minus_one(&omega.scaled(lane(0.5))).plus_identity(Lane::ONE);
         p.times(&half).times(&back).times(&self.read(x)).times(&half).write(out);
@@ -122,7 +127,7 @@ impl<const D: usize, A: Storage> Ambient for GeneralLinear<D, A> {
     fn acceleration(&self, gamma: &[Lane], d: &[Lane], dd: &mut [Lane]) {
         // γ d/dt(γ⁻¹γ') = γ(γ⁻¹γ'' − (γ⁻¹γ')²)
         let p = self.read(gamma);
-        let back = inverse(&p);
+        let back = self.inverse(&p);
         let omega = back.times(&self.read(d));
         let rest = &back.times(&self.read(dd)) - &omega.times(&omega);
         p.times(&self.algebra.part(rest)).write(dd);
@@ -244,4 +249,6 @@ impl<const D: usize, A: Storage> Origin for GeneralLinear<D, A> {
     }
 }
 
-impl<const D: usize, A: Storage> Space for GeneralLinear<D, A> {}
+impl<const D: usize, A: Storage> Space for GeneralLinear<D, A> {
+    const HOT: bool = A::TINY && D == 1;
+}

@@ -1,7 +1,7 @@
 //! Membership of matrices in a group: the distance, the nearest member, and the condition that is violated.
 
 use symspline_core::matrix::{Matrix, Select, Storage, determinant, inverse};
-use symspline_core::scalar::{Lane, lane, max_or_nan};
+use symspline_core::scalar::{Lane, Scalar, lane, max_or_nan};
 
 /// Closed subgroups of GL(n), and GL(n) itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,8 +68,12 @@ impl Members {
         }
     }
 
-    /// The adjoint X* for which X*X = 1 on the group; for similarities on their linear parts, up to their scale.
-    pub fn adjoint<const D: usize>(self, x: &Point<D>) -> Option<Point<D>> {
+    /// The adjoint X* of a form, for which X*X = 1 on its group.
+    #[inline(always)]
+    pub fn adjoint<S: Scalar, const D: usize, A: Storage>(
+        self,
+        x: &Matrix<S, D, A>,
+    ) -> Option<Matrix<S, D, A>> {
         let n = x.rows();
         let entry = |i: usize, j: usize, minus: bool| {
             let x = x[(i, j)];
@@ -85,17 +89,20 @@ impl Members {
                 let p = self.negative();
                 Some(Matrix::from_fn(n, n, |i, j| entry(j, i, (i < p) != (j < p))))
             }
-            Members::Similarity => Some(Matrix::from_fn(n - 1, n - 1, |i, j| entry(j, i, false))),
             _ => None,
         }
     }
 
-    /// X*X − 1, for similarities with the mean of the diagonal as the unit.
+    /// X*X − 1; for similarities that of their linear part, with the mean of the diagonal as the unit.
     fn defect<const D: usize>(self, x: &Point<D>) -> Option<Point<D>> {
-        let adjoint = self.adjoint(x)?;
-        let m = adjoint.rows();
-        let product = adjoint.times(&linear(x, m));
-        let unit = if self == Members::Similarity { product.trace() / lane(m as f64) } else { Lane::ONE };
+        let (product, unit) = if self == Members::Similarity {
+            let part = linear(x, x.rows() - 1);
+            let product = part.adjoint_times(&part);
+            let unit = product.trace() / lane(part.rows() as f64);
+            (product, unit)
+        } else {
+            (self.adjoint(x)?.times(x), Lane::ONE)
+        };
         Some(product.scaled(Lane::ONE / unit).plus_identity(lane(-1.0)))
     }
 

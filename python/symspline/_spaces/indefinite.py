@@ -115,7 +115,7 @@ class DeSitter(Indefinite[FloatArray], Preserving[FloatArray]):
     Examples
     --------
     >>> import numpy as np, symspline as ss
-    >>> ss.DeSitter(2).log([0, 1, 0], [np.sinh(2), np.cosh(2), 0]).round(8)
+    >>> ss.DeSitter(2).log([0, 1, 0], [np.sinh(2), np.cosh(2), 0]).round(8) + 0
     array([2., 0., 0.])
     >>> ss.DeSitter(2).log([0, 1, 0], [3, 1, 3])  # null
     array([3., 0., 3.])

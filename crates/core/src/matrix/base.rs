@@ -11,6 +11,8 @@ use std::ops::{Add, Deref, DerefMut, Index, IndexMut, Neg, Sub};
 pub trait Storage: Copy + Send + Sync + 'static {
     /// Whether matrices may be of any size: functions of them are then compiled once, see [`Compiled`].
     const ANY: bool = false;
+    /// Whether matrices have so few entries that a call through a table costs more than their operations.
+    const TINY: bool = false;
     /// Rows and columns.
     type Shape: Copy;
     /// A container of entries.

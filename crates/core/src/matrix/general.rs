@@ -8,7 +8,7 @@ use super::function::{from_parts, parts_of};
 use super::inverse::{balance, inverse};
 use super::schur::{largest_argument, root};
 use super::select::{Select, by_size};
-use super::series::{Powers, exp_by, terms};
+use super::series::{LOG, LOG_LIMIT, Powers, exp_by, terms};
 use crate::scalar::{Lane, Scalar, lane, mask_bits};
 
 /// `exp(A) − 1`.
@@ -40,6 +40,23 @@ const BOUND: f64 = 1.5;
 pub fn log_any_one_plus<S: Scalar, const D: usize, A: Storage>(
     e: &Matrix<S, D, A>,
 ) -> (Matrix<S, D, A>, Lane) {
+    // The series in E is cheap where powers reduce to few coefficients; otherwise that of artanh has fewer products.
+    let short = if D == 1 && e.rows() < 5 { LOG_LIMIT } else { -1.0 };
+    let log = by_size(e.size(), &[short], |tier| {
+        if tier == 0 { Powers::of_any(e, LOG.len()).sum(&LOG) } else { by_artanh(e) }
+    });
+    // By Bendixson's theorem; eigenvalues of real matrices come in pairs.
+    let bound =
+        log.value().skew_part().size() * lane(if D == 1 { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 });
+    let sure = bound.simd_le(lane(BOUND));
+    if sure.all() {
+        return (log, bound);
+    }
+    (log, sure.select(bound, largest_argument(&e.value().plus_identity(Lane::ONE))))
+}
+
+/// The logarithm of 1 + E of any size.
+fn by_artanh<S: Scalar, const D: usize, A: Storage>(e: &Matrix<S, D, A>) -> Matrix<S, D, A> {
     let (mut near, mut factor) = (e.clone(), lane(2.0));
     let mut z = half_angle(&near);
     for _ in 0..ROOTS {
@@ -52,19 +69,11 @@ pub fn log_any_one_plus<S: Scalar, const D: usize, A: Storage>(
         factor = on.select(factor + factor, factor);
     }
     let square = z.times(&z);
-    let log = by_size(z.size(), &LIMITS[..3], |tier| {
+    by_size(z.size(), &LIMITS[..3], |tier| {
         let n = TERMS[tier];
         z.times(&Powers::of_any(&square, n).sum(terms::<S>(&ARTANH, n)))
     })
-    .scaled(factor);
-    // By Bendixson's theorem; eigenvalues of real matrices come in pairs.
-    let bound =
-        log.value().skew_part().size() * lane(if D == 1 { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 });
-    let sure = bound.simd_le(lane(BOUND));
-    if sure.all() {
-        return (log, bound);
-    }
-    (log, sure.select(bound, largest_argument(&e.value().plus_identity(Lane::ONE))))
+    .scaled(factor)
 }
 
 /// `E (2 + E)⁻¹`: for a rotation by θ, i tan(θ/2).

@@ -1,6 +1,6 @@
 //! Power series in a matrix, and the functions of Hermitian ones made of them.
 //!
-//! For a matrix of size three or less, the theorem of Cayley and Hamilton reduces powers to I, H, H², so that a
+//! For a matrix of size four or less, the theorem of Cayley and Hamilton reduces powers to I, H, H², H³, so that a
 //! series costs a few multiplications per term. Larger matrices use the scheme of Paterson & Stockmeyer (1973). Both
 //! compute derivatives and are smooth where eigenvalues coincide. Beyond the radius of a series its argument is
 //! halved, or eigenvectors are used.
@@ -30,6 +30,12 @@ enum Known<S: Scalar, const D: usize, A: Storage> {
         square: Matrix<S, D, A>,
         e: [S; 3],
     },
+    /// H⁴ = e₁H³ − e₂H² + e₃H − e₄, with e₁, −e₂, e₃, −e₄.
+    Four {
+        square: Matrix<S, D, A>,
+        cube: Matrix<S, D, A>,
+        e: [S; 4],
+    },
     /// H, H², …
     Many(Vec<Matrix<S, D, A>>),
 }
@@ -46,6 +52,18 @@ impl<S: Scalar, const D: usize, A: Storage> Known<S, D, A> {
     fn three(h: &Matrix<S, D, A>, square: Matrix<S, D, A>) -> Self {
         let e = invariants(h, &square);
         Known::Three { square, e }
+    }
+
+    /// Requires the square, and the trace of its square.
+    #[inline(always)]
+    fn four(h: &Matrix<S, D, A>, square: Matrix<S, D, A>, fourth: S) -> Self {
+        let cube = square.times(h);
+        // Newton's identities. The rounding errors are those of products of norms, as in the powers themselves.
+        let (p1, p2, p3) = (h.trace(), square.trace(), cube.trace());
+        let minus_e2 = (p2 - p1 * p1) * lane(0.5);
+        let e3 = (p3 - minus_e2 * p1 - p1 * p2) * lane(1.0 / 3.0);
+        let minus_e4 = (fourth - e3 * p1 - minus_e2 * p2 - p1 * p3) * lane(0.25);
+        Known::Four { square, cube, e: [p1, minus_e2, e3, minus_e4] }
     }
 
     #[inline(always)]
@@ -71,6 +89,11 @@ impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
                 Known::two(h, inner_add(off, off, S::constant(Lane::ZERO)))
             }
             3 => Known::three(h, h.times_adjoint_hermitian(h)),
+            4 => {
+                let square = h.times_adjoint_hermitian(h);
+                let fourth = square.inner(&square);
+                Known::four(h, square, fourth)
+            }
             _ => Known::many(h, terms),
         };
         Powers { h, known }
@@ -83,6 +106,12 @@ impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
             1 if D == 1 => Known::Itself,
             2 if D == 1 => Known::two(h, h[(0, 1)][0] * h[(1, 0)][0]),
             3 if D == 1 => Known::three(h, h.times(h)),
+            4 if D == 1 => {
+                let square = h.times(h);
+                let transposed = square.adjoint();
+                let fourth = square.inner(&transposed);
+                Known::four(h, square, fourth)
+            }
             _ => Known::many(h, terms),
         };
         Powers { h, known }
@@ -111,6 +140,17 @@ impl<'a, S: Scalar, const D: usize, A: Storage> Powers<'a, S, D, A> {
                 out
             }
             Known::Three { square, e } => combine(self.h, square, reduce(*e, c)),
+            Known::Four { square, cube, e: [e1, minus_e2, e3, minus_e4] } => {
+                let zero = S::constant(Lane::ZERO);
+                let [x0, x1, x2, x3] = c.iter().rev().fold([zero; 4], |[x0, x1, x2, x3], &c| {
+                    [x3 * *minus_e4 + lane(c), x3.fma(*e3, x0), x3.fma(*minus_e2, x1), x3.fma(*e1, x2)]
+                });
+                let mut out = self.h.zip(square, |h, s| x2.fma(s, x1 * h)).zip(cube, |sum, q| x3.fma(q, sum));
+                for i in 0..4 {
+                    out[(i, i)][0] = out[(i, i)][0] + x0;
+                }
+                out
+            }
             Known::Many(powers) => paterson_stockmeyer(powers, c),
         }
     }
@@ -293,12 +333,12 @@ pub fn exp_skew_minus_one<S: Scalar, const D: usize, A: Storage>(omega: &Matrix<
 }
 
 /// Up to this size of x [`LOG`] is used.
-const LOG_LIMIT: f64 = 0.35;
+pub(super) const LOG_LIMIT: f64 = 0.35;
 /// log(1 + x) as a polynomial: log(1 + x)/x interpolated at the 28 Chebyshev nodes of |x| ≤ 0.35, which needs
 /// fewer terms than Taylor's 36. Relative error 3e-18, of the derivatives 1e-17 and 2e-16 (at 50 digits).
 #[allow(clippy::excessive_precision)]
 #[rustfmt::skip]
-const LOG: [f64; 29] = [
+pub(super) const LOG: [f64; 29] = [
     0.0,
     1.0,
     -0.5,

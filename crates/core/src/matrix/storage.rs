@@ -58,6 +58,7 @@ impl<T, const NN: usize> DerefMut for Entries<T, NN> {
 }
 
 impl<const N: usize, const NN: usize> Storage for Known<N, NN> {
+    const TINY: bool = N < 3;
     type Shape = ();
     type Of<T: Copy> = Entries<T, NN>;
     #[inline(always)]
