@@ -32,6 +32,8 @@ pub trait Form: Copy + Send + Sync + 'static {
     const FIRST: usize;
     /// p* x
     fn relative<S: Scalar>(p: &[S], x: &[S]) -> [S; 16];
+    /// p x
+    fn times<S: Scalar>(p: &[S], x: &[S; 16]) -> [S; 16];
     /// The pair of 1 + E, accurate for small E.
     fn pair<S: Scalar>(e: &[S; 16]) -> Pair<S>;
     /// The vectors of a matrix Ω.
@@ -75,6 +77,13 @@ impl Form for FourDimensional {
         few(|c| {
             let (i, j) = (c / 4, c % 4);
             dot(&[p[i], p[4 + i], p[8 + i], p[12 + i]], &[x[j], x[4 + j], x[8 + j], x[12 + j]])
+        })
+    }
+    #[inline(always)]
+    fn times<S: Scalar>(p: &[S], x: &[S; 16]) -> [S; 16] {
+        few(|c| {
+            let (i, j) = (c / 4 * 4, c % 4);
+            dot(&p[i..i + 4], &[x[j], x[4 + j], x[8 + j], x[12 + j]])
         })
     }
     /// The matrix of all products aᵢ bₖ has rank one: b is its longest row, up to scale (Shepperd's choice).
@@ -145,6 +154,19 @@ impl Form for TwoDimensional {
             first[c % 2] + second[c % 2]
         })
     }
+    #[inline(always)]
+    fn times<S: Scalar>(p: &[S], x: &[S; 16]) -> [S; 16] {
+        let (p, x) = (entries(p), entries(x));
+        few(|c| {
+            if c > 7 {
+                return S::constant(Lane::ZERO);
+            }
+            let (i, j) = (c / 4 * 2, c / 2 % 2);
+            let conjugate = |[re, im]: [S; 2]| [re, -im];
+            let [first, second] = [0, 1].each(|k| conjugate_times(conjugate(p[i + k]), x[2 * k + j]));
+            first[c % 2] + second[c % 2]
+        })
+    }
     /// The phase is the square root of the determinant d, (1 + d)/|1 + d| or i(1 − d)/|1 − d|.
     #[inline(always)]
     fn pair<S: Scalar>(e: &[S; 16]) -> Pair<S> {
@@ -206,11 +228,19 @@ impl Pairs<TwoDimensional> {
     }
 }
 
+/// e^v − 1 as a quaternion, without cancellation.
+#[inline(always)]
+fn exp_minus_one<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
+    let square = dot(&v, &v);
+    let Trig { s, k, .. } = Trig::new(square);
+    [square * k, v[0] * s, v[1] * s, v[2] * s]
+}
+
 /// e^v as a quaternion.
 #[inline(always)]
 fn exp<S: Scalar>(v: Vector<S>) -> Quaternion<S> {
-    let Trig { c, s, .. } = Trig::new(dot(&v, &v));
-    [c, v[0] * s, v[1] * s, v[2] * s]
+    let [w, x, y, z] = exp_minus_one(v);
+    [w + Lane::ONE, x, y, z]
 }
 
 /// The vector v with e^v = q, and its length.
@@ -243,8 +273,8 @@ fn times_pure<S: Scalar>(a: Quaternion<S>, [x, y, z]: Vector<S>) -> Quaternion<S
 impl<F: Form> Pairs<F> {
     /// The pair of a point.
     #[inline(always)]
-    fn of<S: Scalar>(p: &[S]) -> Pair<S> {
-        let (zero, one) = (S::constant(Lane::ZERO), S::constant(Lane::ONE));
+    fn of(p: &[Lane]) -> Pair<Lane> {
+        let (zero, one) = (Lane::ZERO, Lane::ONE);
         let unit = [one, zero, zero, zero];
         let identity = F::matrix(unit, unit);
         F::pair(&few(|i| if i < p.len() { p[i] - identity[i] } else { zero }))
@@ -261,6 +291,19 @@ impl<F: Form> Pairs<F> {
     #[inline(always)]
     fn vectors(p: &[Lane], v: &[Lane]) -> [Vector<Lane>; 2] {
         F::vectors(&F::relative(p, v))
+    }
+
+    /// p e^Ω for the Ω of two vectors.
+    #[inline(always)]
+    fn turned<S: Scalar>(p: &[S], vectors: [Vector<S>; 2], out: &mut [S]) {
+        let [da, db] = vectors.each(exp_minus_one);
+        let (zero, one) = (S::constant(Lane::ZERO), S::constant(Lane::ONE));
+        let [w, x, y, z] = db;
+        // e^Ω − 1 without cancellation
+        let (first, second) =
+            (F::matrix(da, [w + Lane::ONE, x, y, z]), F::matrix([one, zero, zero, zero], db));
+        let step = F::times(p, &few(|i| first[i] + second[i]));
+        out.iter_mut().zip(p.iter().zip(step)).for_each(|(out, (p, step))| *out = *p + step);
     }
 
     /// The derivative of the matrix of a pair that moves.
@@ -314,10 +357,8 @@ impl<F: Form> Ambient for Pairs<F> {
         PI
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        let [a, b] = Self::of(p).each(|q| q.each(S::constant));
-        let [alpha, beta] = Self::vectors(p, v).each(|v| exp(v.each(|x| t * x)));
-        let x = F::matrix(multiply(a, alpha), multiply(b, beta));
-        out.copy_from_slice(&x[..out.len()]);
+        let start: [S; 16] = few(|i| S::constant(if i < p.len() { p[i] } else { Lane::ZERO }));
+        Self::turned(&start[..p.len()], Self::vectors(p, v).each(|v| v.each(|x| t * x)), out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let (vectors, [first, second]) = nearest(Self::between(p, q));
@@ -330,9 +371,7 @@ impl<F: Form> Ambient for Pairs<F> {
     }
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         let (vectors, _) = nearest(Self::between(p, q));
-        let ([a, b], [alpha, beta]) = (Self::of(p), vectors.each(|v| exp(v.each(|x| x * t))));
-        let x = F::matrix(multiply(a, alpha), multiply(b, beta));
-        out.copy_from_slice(&x[..out.len()]);
+        Self::turned(p, vectors.each(|v| v.each(|x| x * t)), out);
     }
     fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]) {
         self.general.transvect(p, v, x, out);
