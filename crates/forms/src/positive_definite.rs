@@ -9,7 +9,7 @@ use symspline_core::matrix::{
     Dynamic, Matrix, Moved, Storage, by_size, cholesky, diagonalize, exp_minus_one, log_one_plus,
     log_one_plus_alike, orthogonalize, solve_lower,
 };
-use symspline_core::scalar::{Each, Lane, Scalar, dot, lane, max_or_nan};
+use symspline_core::scalar::{Each, Lane, Scalar, dot, few, lane, max_or_nan};
 use symspline_core::space::{Algebra, Ambient, Frame, Origin, Space};
 
 /// Hermitian positive definite n × n matrices, real for D = 1, complex for D = 2.
@@ -120,6 +120,63 @@ fn congruent<S: Scalar, const D: usize, A: Storage>(
     g.times(x).times_adjoint_hermitian(g)
 }
 
+/// A linear function of the value and of the derivatives of a matrix; those that S does not have are zero.
+fn of_parts<S: Scalar, const D: usize, A: Storage>(
+    x: &Matrix<S, D, A>,
+    f: impl Fn(&Matrix<Lane, D, A>) -> Matrix<Lane, D, A>,
+) -> [Matrix<Lane, D, A>; 3] {
+    [0, 1, 2].map(|order| {
+        let part = x.map(|x| x.parts()[order]);
+        if order > S::ORDER { part } else { f(&part) }
+    })
+}
+
+/// The matrix with this value and these derivatives.
+fn joined<S: Scalar, const D: usize, A: Storage>(parts: &[Matrix<Lane, D, A>; 3]) -> Matrix<S, D, A> {
+    let [x, d, dd] = parts;
+    Matrix::from_fn(x.rows(), x.cols(), |i, j| {
+        few(|c| S::from_parts([x[(i, j)][c], d[(i, j)][c], dd[(i, j)][c]]))
+    })
+}
+
+/// Replaces a Hermitian matrix x, given by its parts, by (1 + r) x (1 + r) for a Hermitian r with the value 0 and these
+/// derivatives.
+fn turn<S: Scalar, const D: usize, A: Storage>(
+    [r, rr]: &[Matrix<Lane, D, A>; 2],
+    [x, d, dd]: &mut [Matrix<Lane, D, A>; 3],
+) {
+    let twice_hermitian = |x: Matrix<Lane, D, A>| x.hermitian_part().scaled(lane(2.0));
+    let rx = r.times(x);
+    if S::ORDER > 1 {
+        let first = &r.times(d).scaled(lane(2.0)) + &rr.times(x);
+        *dd = &(&*dd + &twice_hermitian(first)) + &rx.times(r).scaled(lane(2.0));
+    }
+    *d = &*d + &twice_hermitian(rx);
+}
+
+/// The geodesic as in [`Ambient::geodesic`], where factors without derivatives are not multiplied as if they had some.
+fn geodesic_by_parts<S: Scalar, const D: usize, A: Storage>(
+    p: &Matrix<S, D, A>,
+    q: &Matrix<S, D, A>,
+    t: S,
+) -> Matrix<S, D, A> {
+    let l = cholesky(&p.value());
+    let inverse = solve_lower(&l, &Matrix::identity(p.rows()));
+    let mut b = of_parts(&(q - p), |x| congruent(&inverse, x));
+    let [_, d, dd] = of_parts(p, |x| congruent(&inverse, x));
+    // (δ²)'' = 2δ'²
+    let square = d.times(&d);
+    let half = |x: &Matrix<Lane, D, A>, sign: f64| x.scaled(lane(0.5 * sign));
+    let root = [half(&d, 1.0), &half(&dd, 1.0) - &square.scaled(lane(0.25))];
+    let inverse_root = [half(&d, -1.0), &half(&dd, -1.0) + &square.scaled(lane(0.75))];
+    turn::<S, D, A>(&inverse_root, &mut b);
+    let e = exp_minus_one(&log_one_plus(&joined::<S, D, A>(&b)).times_scalar(t));
+    let mut e = of_parts(&e, Matrix::clone);
+    turn::<S, D, A>(&root, &mut e);
+    let moved = of_parts(&joined::<S, D, A>(&e), |x| congruent(&l, x));
+    &joined::<S, D, A>(&moved) + p
+}
+
 /// `log(L⁻¹ q L⁻*)` for the factor L of p.
 fn log_whitened<const D: usize, A: Storage>(
     l: &Matrix<Lane, D, A>,
@@ -178,6 +235,10 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
     }
     fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
         let (p, q) = (self.read(p), self.read(q));
+        // With storage on the stack, numbers without derivatives are in registers, and the fewer products are faster.
+        if S::ORDER > 0 && !A::ANY {
+            return geodesic_by_parts(&p, &q, t).write(out);
+        }
         // Whitened by the value of p, p is 1 + δ where δ has derivatives only, so that its square root
         // is 1 + δ/2 − δ²/8 exactly.
         let l = cholesky(&p.value());
