@@ -6,8 +6,8 @@ use crate::scalar::{LANES, Lane, few, gather, lane, scatter};
 use crate::space::{Ambient, Erased, Frame, Origin, Space, below};
 
 /// Maximum number of rows that one thread processes at a time.
-const BLOCK: usize = 4096;
-/// Number of entries from which several threads are faster.
+const BLOCK: usize = 1024;
+/// Number of entries from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 16;
 
 /// An operation on rows, with its inputs after the colon.

@@ -21,7 +21,7 @@ pub struct BSpline<'a> {
 
 /// Maximum number of samples that one thread evaluates at a time.
 const BLOCK: usize = 512;
-/// Samples times numbers from which several threads are faster.
+/// Samples times numbers from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 14;
 
 impl BSpline<'_> {

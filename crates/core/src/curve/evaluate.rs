@@ -15,7 +15,7 @@ use std::ops::DerefMut;
 const BLOCK: usize = 2048;
 /// The factor by which a block may be longer if it contains eight curves.
 const TOGETHER: usize = 4;
-/// Samples times numbers from which several threads are faster.
+/// Samples times numbers from which several threads are certainly faster.
 const PARALLEL: usize = 1 << 16;
 
 impl Quantity {

@@ -17,8 +17,8 @@ use crate::space::{Ambient, Erased, Origin};
 const CORE: usize = 480;
 /// Initial number of nodes of overlap on either side.
 pub const OVERLAP: usize = 32;
-/// Nodes times dimensions from which several threads are faster: about a fifth of a millisecond of work.
-const PARALLEL: usize = 8192;
+/// Nodes times dimensions from which several threads are certainly faster: milliseconds of work.
+const LONG: usize = 8192;
 
 /// Fits some curves, whole or in sections with a given overlap. Returns the curves whose sections do not agree.
 pub fn fit_cut(
@@ -49,7 +49,7 @@ pub fn fit_cut(
         groups.extend(same.chunks_mut(LANES));
     }
     let work: usize = groups.iter().map(|g| g[0].nodes * space.dim()).sum();
-    parallel::for_each(groups, work > PARALLEL, monitor, |group| {
+    parallel::for_each(groups, work > LONG, monitor, |group| {
         fit_lanes(space, problem, options, monitor, group);
         // Curves that are repeated with more overlap were counted before.
         if overlap.is_none_or(|nodes| nodes == OVERLAP) {

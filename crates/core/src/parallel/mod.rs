@@ -6,6 +6,8 @@ mod pool;
 use crate::monitor::Monitor;
 use crate::scalar::LANES;
 use std::sync::atomic::{AtomicUsize, Ordering};
+#[cfg(feature = "rayon")]
+use std::time::{Duration, Instant};
 
 static THREADS: AtomicUsize = AtomicUsize::new(0);
 
@@ -31,19 +33,45 @@ pub fn block(most: usize, len: usize) -> usize {
     (most * 4 / len.max(4)).max(1).next_multiple_of(LANES).min(most)
 }
 
-/// Calls `work` on every item, on all cores if `parallel` is true. Stops early if the monitor is cancelled.
-pub fn for_each<T: Send>(items: Vec<T>, parallel: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
-    // To determine the number of cores the system reads files, which takes longer than a small fit.
+/// The time after which the calling thread decides whether the items that are left are worth other threads, and the
+/// work that is: starting them takes some ten microseconds.
+#[cfg(feature = "rayon")]
+const TRIAL: Duration = Duration::from_micros(40);
+#[cfg(feature = "rayon")]
+const WORTH: f64 = 120e-6;
+
+/// Calls `work` on every item, on all cores if that is faster: at once if `long` is true, otherwise if the first items
+/// took so long that the others will, too. Stops early if the monitor is cancelled.
+pub fn for_each<T: Send>(items: Vec<T>, long: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
+    let mut items = items.into_iter();
     #[cfg(feature = "rayon")]
-    if parallel
-        && items.len() > 1
-        && let cores = num_threads()
-        && cores > 1
-        && let Some(pool) = pool::pool(cores)
     {
-        return pool::for_each(pool, cores.min(items.len()), items, monitor, work);
+        let (start, count) = (Instant::now(), items.len());
+        let mut tried = long;
+        loop {
+            if tried {
+                let rest = items.len();
+                let left = start.elapsed().as_secs_f64() / (count - rest).max(1) as f64 * rest as f64;
+                // To determine the number of cores the system reads files, which takes longer than a small fit.
+                if rest > 1
+                    && (long || left > WORTH)
+                    && let cores = num_threads()
+                    && cores > 1
+                    && let Some(pool) = pool::pool(cores)
+                {
+                    return pool::for_each(pool, cores.min(rest), items.collect(), monitor, work);
+                }
+                break;
+            }
+            let Some(item) = items.next() else { return };
+            if monitor.poll() {
+                return;
+            }
+            work(item);
+            tried = start.elapsed() > TRIAL;
+        }
     }
-    let _ = parallel;
+    let _ = long;
     for item in items {
         if monitor.poll() {
             return;
@@ -57,23 +85,34 @@ mod tests {
     use super::*;
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::sync::{Condvar, Mutex, mpsc};
-    use std::time::Duration;
 
-    #[test]
-    fn two_items_run_concurrently() {
+    /// Runs items of which the last two wait for each other; returns how many met the other one.
+    fn meetings(items: usize, long: bool) -> usize {
         set_num_threads(2);
         let quiet = |_| true;
         let both = (Mutex::new(0), Condvar::new());
         let met = AtomicUsize::new(0);
-        // Each item waits for the other.
-        for_each(vec![(); 2], true, &Monitor::new(&quiet), |()| {
+        for_each((0..items).rev().collect(), long, &Monitor::new(&quiet), |item: usize| {
+            if item > 1 {
+                return std::thread::sleep(Duration::from_millis(2));
+            }
             *both.0.lock().unwrap() += 1;
             both.1.notify_all();
             let here = both.0.lock().unwrap();
             let wait = both.1.wait_timeout_while(here, Duration::from_secs(5), |here| *here < 2);
             met.fetch_add(usize::from(!wait.unwrap().1.timed_out()), Ordering::Relaxed);
         });
-        assert_eq!(met.into_inner(), 2);
+        met.into_inner()
+    }
+
+    #[test]
+    fn two_items_run_concurrently() {
+        assert_eq!(meetings(2, true), 2);
+    }
+
+    #[test]
+    fn items_run_concurrently_if_the_first_one_takes_long() {
+        assert_eq!(meetings(3, false), 2);
     }
 
     #[test]
