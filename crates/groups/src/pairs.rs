@@ -1,10 +1,9 @@
 //! SO(4) and U(2) by pairs of unit quaternions (a, b), where (−a, −b) is the same element: x ↦ a x b̄ is a rotation of
 //! four dimensions, and a phase a = e^{iψ} times a quaternion b of SU(2) is a unitary matrix. The angles of the matrix
-//! are θₐ ± θᵦ for the lengths of log a and log b.
+//! are θₐ ± θᵦ for the lengths of log a and log b (Conway & Smith, On quaternions and octonions, 2003, chapter 4).
 //!
 //! A tangent vector pΩ corresponds to two vectors (α, β), the imaginary quaternions with a' = aα, b' = bβ. Curves are
-//! evaluated on the product of two spheres. All products of quaternions and formulas of matrices that are no
-//! conversions are those of `rotations` and of `unitary`.
+//! evaluated on the product of two spheres.
 
 use crate::rigid::{Quaternion, Vector, conjugate, inverse_sqrt, multiply, rotate};
 use crate::unitary::UnitaryGroup;

@@ -53,8 +53,10 @@ pub fn for_each<T: Send>(items: Vec<T>, long: bool, monitor: &Monitor, work: imp
                 let rest = items.len();
                 let left = start.elapsed().as_secs_f64() / (count - rest).max(1) as f64 * rest as f64;
                 // To determine the number of cores the system reads files, which takes longer than a small fit.
+                // A thread of the pool that waited for others could wait for itself.
                 if rest > 1
                     && (long || left > WORTH)
+                    && !pool::is_member()
                     && let cores = num_threads()
                     && cores > 1
                     && let Some(pool) = pool::pool(cores)
@@ -108,6 +110,21 @@ mod tests {
     #[test]
     fn two_items_run_concurrently() {
         assert_eq!(meetings(2, true), 2);
+    }
+
+    #[test]
+    fn work_within_work_ends() {
+        set_num_threads(2);
+        let quiet = |_| true;
+        let (send, receive) = mpsc::channel();
+        std::thread::spawn(move || {
+            let monitor = Monitor::new(&quiet);
+            for_each(vec![(); 4], true, &monitor, |()| {
+                for_each(vec![(); 4], true, &monitor, |()| std::thread::sleep(Duration::from_millis(2)));
+            });
+            let _ = send.send(());
+        });
+        receive.recv_timeout(Duration::from_secs(5)).expect("the call returns");
     }
 
     #[test]

@@ -34,6 +34,11 @@ pub fn pool(threads: usize) -> Option<&'static rayon::ThreadPool> {
     Some(&made.pool)
 }
 
+/// Whether this is a thread of a pool.
+pub fn is_member() -> bool {
+    rayon::current_thread_index().is_some()
+}
+
 /// Calls `work` on every item, on the threads of a pool. Stops early if the monitor is cancelled.
 pub fn for_each<T: Send>(
     pool: &rayon::ThreadPool,
