@@ -24,6 +24,9 @@ TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 def build(folder: Path, target: Path, flags: str | None) -> Path:
     """A wheel in ``folder`` by maturin, with these flags of the compiler."""
     environment = {name: value for name, value in os.environ.items() if name != "RUSTFLAGS"}
+    # Flags for a named target are not those of build scripts, which this processor must be able to run.
+    version = subprocess.run(["rustc", "-vV"], capture_output=True, encoding="utf-8", check=True).stdout
+    host = next(line.removeprefix("host: ") for line in version.splitlines() if line.startswith("host: "))
     command = [
         sys.executable,
         "-m",
@@ -33,6 +36,8 @@ def build(folder: Path, target: Path, flags: str | None) -> Path:
         "--locked",
         "--interpreter",
         sys.executable,
+        "--target",
+        host,
     ]
     subprocess.run(
         [*command, "--target-dir", str(target), "--out", str(folder)],
