@@ -5,12 +5,16 @@ mod isometries;
 mod logarithm;
 mod motions;
 #[cfg(feature = "unitary")]
+mod pair_forms;
+#[cfg(feature = "unitary")]
 mod pairs;
 mod rigid;
 mod rotations;
 mod special_euclidean;
 #[cfg(feature = "stiefel")]
 mod stiefel;
+#[cfg(feature = "unitary")]
+mod two_spheres;
 mod unitary;
 
 #[cfg(feature = "stiefel")]
@@ -27,7 +31,9 @@ use pairs::Pairs;
 #[cfg(feature = "unitary")]
 use symspline_core::matrix::Known;
 use symspline_core::scalar::{few, lane};
-use symspline_core::space::{Entry, Isometric, Made, table};
+#[cfg(feature = "unitary")]
+use symspline_core::space::Isometric;
+use symspline_core::space::{Entry, Made, table};
 
 /// The rotation matrix of a unit quaternion w, x, y, z, row by row; for any quaternion, |q|² times a rotation matrix, so
 /// that a wrong norm is noticed.

@@ -43,6 +43,7 @@ const WORTH: f64 = 120e-6;
 /// Calls `work` on every item, on all cores if that is faster: at once if `long` is true, otherwise if the first items
 /// took so long that the others will, too. Stops early if the monitor is cancelled.
 pub fn for_each<T: Send>(items: Vec<T>, long: bool, monitor: &Monitor, work: impl Fn(T) + Sync) {
+    #[cfg_attr(not(feature = "rayon"), expect(unused_mut))]
     let mut items = items.into_iter();
     #[cfg(feature = "rayon")]
     {
