@@ -34,7 +34,8 @@ LAYERS = [
     ["_cubic"],
     ["_functional"],
     ["_adapters", "_files", "_hermite", "_pairs", "_segments", "_smoothing", "convert", "jax", "torch", "xarray"],
-    ["_pose_files", "geo", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
+    ["_estimation"],
+    ["_pose_files", "geo", "measure", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors", "testing"],
     ["cli"],
     ["__init__", "__main__"],
 ]
@@ -96,7 +97,20 @@ def test_there_is_no_circle():
 
 # What users import. The name of any other module, or of a folder around it, starts with an underscore.
 PUBLIC = {
-    *("cli", "convert", "geo", "jax", "manifolds", "poses", "quantum", "rotations", "shapes", "subspaces", "tensors"),
+    *(
+        "cli",
+        "convert",
+        "geo",
+        "jax",
+        "manifolds",
+        "measure",
+        "poses",
+        "quantum",
+        "rotations",
+        "shapes",
+        "subspaces",
+        "tensors",
+    ),
     *("testing", "torch", "xarray"),
 }
 

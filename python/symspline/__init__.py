@@ -16,13 +16,14 @@ from . import _cpu
 
 _cpu.load(_Path(__file__).parent)
 
-from . import convert, geo, manifolds, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
+from . import convert, geo, manifolds, measure, poses, quantum, rotations, shapes, subspaces, tensors, testing  # noqa: E402
 from ._bspline import BezierCurve, BSpline  # noqa: E402
 from ._config import show_config  # noqa: E402
 from ._core import ConvergenceError, CutLocusError, ValidationError, num_threads  # noqa: E402
 from ._cubic import CubicSpline  # noqa: E402
 from ._curve import Curve  # noqa: E402
 from ._curves.derivatives import Gradient  # noqa: E402
+from ._estimation import estimate  # noqa: E402
 from ._exceptions import SymsplineError  # noqa: E402
 from ._files import load, save  # noqa: E402
 from ._functional import evaluate, fit, fit_many  # noqa: E402
@@ -124,6 +125,7 @@ __all__ = [
     "Unitary",
     "ValidationError",
     "convert",
+    "estimate",
     "evaluate",
     "fit",
     "fit_many",
@@ -133,6 +135,7 @@ __all__ = [
     "make_lsq_spline",
     "make_smoothing_spline",
     "manifolds",
+    "measure",
     "num_threads",
     "poses",
     "quantum",

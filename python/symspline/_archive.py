@@ -34,12 +34,13 @@ from ._version import VERSION as LIBRARY
 from .manifolds._manifold import refuse_functions
 
 # Raise it when the entries change, and keep reading files of all earlier versions.
-VERSION = 1
+VERSION = 2
 # Texts are the same for all curves of a file.
 TEXTS = ("format", "space", "t_unit", "data_t_unit")
-_JSON = ("bc_type", "extrapolate", "report", "noise", "degree", "names", "rows")
+_JSON = ("bc_type", "extrapolate", "report", "noise", "parameters", "degree", "names", "rows")
 _ARRAY = re.compile(
-    r"(?:version|t|data_t|knots)|(?:points|velocities|control_points|data|data_weights|data_information|band)(?:_\d{1,9})?"
+    r"(?:version|t|data_t|knots)|(?:points|velocities|control_points|data|data_weights|data_information|band|matrix|turn|side|corner)"
+    r"(?:_\d{1,9})?"
 )
 # Compressed entries are at most this much larger than the file, or of this size.
 _RATIO, _SMALL = 100, 2**24

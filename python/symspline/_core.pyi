@@ -110,16 +110,46 @@ def smooth(
     ends: Sequence[tuple[str, _Doubles | None]] | None,
     criterion: str,
     gamma: float,
+    penalty: str,
     loss: str,
     method: str,
     tol: float,
     max_iter: int,
     raise_lam: bool,
     progress: _Progress | None,
-) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...]]: ...
+) -> tuple[_Doubles, _Doubles, tuple[NDArray[Any], ...], tuple[_Doubles, _Doubles, int]]: ...
 def smoothing_variance(
-    knots: _Doubles, band: _Doubles, lam: float, x: _Doubles, nu: int, fixed: tuple[bool, bool] | None
+    knots: _Doubles, band: _Doubles, lam: float, x: _Doubles, nu: int, kinds: Sequence[str] | None
 ) -> _Doubles: ...
+def frames_along(handle: Handle, knots: _Doubles, points: _Doubles, x: _Doubles, gammas: _Doubles) -> _Doubles: ...
+def curvature_along(handle: Handle, velocities: _Doubles, vectors: _Doubles) -> _Doubles: ...
+def bending(
+    handle: Handle, knots: _Doubles, points: _Doubles, velocities: _Doubles, penalty: str
+) -> list[_Doubles]: ...
+
+# Times, whitened residuals, their derivatives by the motion, and by the parameters.
+_Term = tuple[_Doubles, _Doubles, Sequence[_Doubles | None], _Doubles | None]
+
+def estimate(
+    knots: _Doubles,
+    penalty: str,
+    factors: Sequence[tuple[int, _Doubles, _Doubles]],
+    priors: _Doubles,
+    terms: Sequence[_Term],
+    lams: _Doubles,
+    guesses: _Doubles,
+    criterion: str,
+    gamma: float,
+) -> tuple[Any, ...]: ...
+
+# Band, side and corner of A, the number of coupled coordinates, the kinds of the ends, and the holonomy.
+_Known = tuple[Sequence[_Doubles], int, Sequence[str] | None, _Doubles]
+
+def posterior_covariance(
+    knots: _Doubles, known: _Known, x: _Doubles, y: _Doubles | None, orders: Sequence[int]
+) -> _Doubles: ...
+def posterior_freedom(knots: _Doubles, known: _Known) -> int: ...
+def posterior_samples(knots: _Doubles, known: _Known, normal: _Doubles) -> _Doubles: ...
 def chi_squared(m: int, probability: float) -> float: ...
 def set_num_threads(n: int) -> None: ...
 def num_threads() -> int: ...

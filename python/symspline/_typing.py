@@ -71,8 +71,10 @@ BCWords = (
 )
 
 SmoothingEnd = Literal["natural", "clamped"] | tuple[int, ArrayLike]
-SmoothingBCType = Literal["natural", "clamped", "periodic"] | tuple[SmoothingEnd, SmoothingEnd]
+SmoothingBCType = Literal["natural", "clamped", "periodic", "not-a-knot"] | tuple[SmoothingEnd, SmoothingEnd]
 SmoothingMethod = Literal["auto", "linearized", "newton"]
+SmoothingPenalty = Literal["acceleration", "jerk"]
+CovarianceOrder = Literal[0, 1, "joint"]
 Criterion = Literal["gcv", "reml", "cp"]
 Loss = Literal["linear", "huber", "cauchy"]
 # One number, one for each curve of a batch, or a tuple with one of these for each factor of a product.
@@ -116,8 +118,9 @@ class LsqOptions(TypedDict, total=False):
     weights: Numbers | None
     loss: Loss
     frames: Numbers | None
+    penalty: SmoothingPenalty
     sigma: Numbers | None
-    bc_type: SmoothingBCType
+    bc_type: SmoothingBCType | None
     method: SmoothingMethod
     tol: float
     max_iter: int

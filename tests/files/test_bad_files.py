@@ -172,10 +172,10 @@ def test_files_with_a_wrong_array():
 
 
 def test_newer_pickles_raise():
-    message = rf"the format has version 99, but symspline {ss.__version__} reads versions up to 1\. Install a newer"
+    message = rf"the format has version 99, but symspline {ss.__version__} reads versions up to 2\. Install a newer"
     for curve in KINDS.values():
         restore, (state,) = curve.__reduce__()
-        assert state["version"] == 1
+        assert state["version"] == 2
         raises(message, restore, state | {"version": 99})
 
 
@@ -251,7 +251,7 @@ def test_messages_name_the_file_and_the_entry(tmp_path):
         ({"format": 3}, "entry 'format' is not a text: it holds int64"),
         ({"version": 1.5}, "entry 'version' is 1.5, but must be a positive integer"),
         ({"version": 0}, "entry 'version' is 0, but must be a positive integer"),
-        ({"version": 99}, "the format has version 99, but symspline .* reads versions up to 1. Install a newer"),
+        ({"version": 99}, "the format has version 99, but symspline .* reads versions up to 2. Install a newer"),
         ({"version": True}, "entry 'version' is True"),
         ({"space": "klein:2"}, "entry 'space': unknown space 'klein"),
         ({"space": 5.0}, "entry 'space': entry 'space' is not a text|entry 'space' is not a text"),

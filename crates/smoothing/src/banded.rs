@@ -114,6 +114,19 @@ impl Banded {
         }
     }
 
+    /// L⁻ᵀD^{−1/2}x of a factored matrix, in place: for independent normal numbers x, a sample of the normal distribution
+    /// with covariance A⁻¹.
+    pub fn sample(&self, x: &mut [Lane]) {
+        let stride = self.width + 1;
+        for i in (0..self.size).rev() {
+            x[i] /= self.entries[i * stride].sqrt();
+            for d in 1..=self.width.min(self.size - 1 - i) {
+                let l = self.entries[(i + d) * stride + d];
+                x[i] = (-l).mul_add(x[i + d], x[i]);
+            }
+        }
+    }
+
     /// The entries of A⁻¹ inside the band, of a factored matrix, by Takahashi's recursion (Erisman & Tinney 1975) `Z
     /// = D⁻¹L⁻¹ + (1 − Lᵀ)Z`.
     pub fn inverse_band(&self) -> Banded {

@@ -1,15 +1,19 @@
 //! The choice of λ from the data.
 //!
 //! At a curve with residuals r and accelerations a, the smoothing problem in frames is a linear problem. Its solution
-//! changes the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + PᵀMρ))`, or, with the energy of [`JacobiOperator`], by the
-//! same with `(S + RP)ᵀMa`. Residuals and degrees of freedom for eight λ at a time cost one banded solve.
+//! changes the coefficients by `δ(λ) = A⁻¹(BᵀWr − λ(SᵀMa + Pᵀg))` with the contribution g of curvature, or, with the
+//! energy of [`JacobiOperator`], by the same with `(S + RP)ᵀMa`. Residuals and degrees of freedom for eight λ at a time
+//! cost one banded solve.
 
 use crate::cyclic::PeriodicCorrection;
 use crate::jacobi_operator::JacobiOperator;
-use crate::linearized::{LinearProblem, times_mass};
-use crate::misfit::{Factors, Misfit};
+use crate::linearized::LinearProblem;
+use crate::misfit::{Factors, Misfit, Whole};
 use crate::problem::Criterion;
 use symspline_core::scalar::{LANES, Lane, few, lane};
+
+/// If the degrees of freedom exceed those of curves without energy by this little, every larger λ is equally good.
+pub const STRAIGHT: f64 = 0.01;
 
 /// The linearised problem at a curve: coordinates of m numbers, in units of the mean knot spacing.
 pub struct Linear<'a> {
@@ -29,12 +33,12 @@ pub struct Linear<'a> {
     pub sigma: f64,
     /// BᵀWr.
     pub pull: Vec<f64>,
-    /// SᵀMa + PᵀMρ: the gradient of half the energy.
+    /// SᵀMa + Pᵀg: the gradient of half the energy.
     pub stiffness: Vec<f64>,
 }
 
 impl<'a> Linear<'a> {
-    /// `curvature` is ρ, the part of the energy's gradient that is due to curvature.
+    /// `curvature` is g, the part of the energy's gradient that is due to curvature.
     pub fn new(
         linearized: &'a LinearProblem,
         m: usize,
@@ -46,19 +50,10 @@ impl<'a> Linear<'a> {
         sigma: f64,
     ) -> Self {
         let mut pull = misfit.pull(linearized, m);
-        let mut stiffness = vec![0.0; pull.len()];
-        if let Some(jacobi) = jacobi {
-            stiffness = jacobi.pull(linearized, accelerations);
-        } else {
-            for (rows, vectors) in
-                [(&linearized.accelerations, accelerations), (&linearized.values, curvature)]
-            {
-                let mass = times_mass(&linearized.basis, vectors, m);
-                for (row, x) in rows.iter().zip(mass.chunks_exact(m)) {
-                    row.spread(x, &mut stiffness);
-                }
-            }
-        }
+        let mut stiffness = match jacobi {
+            Some(jacobi) => jacobi.pull(linearized, accelerations),
+            None => linearized.stiffness(accelerations, curvature, m),
+        };
         if let Some(periodic) = periodic {
             periodic.fold(&mut pull);
             periodic.fold(&mut stiffness);
@@ -77,7 +72,12 @@ impl<'a> Linear<'a> {
         step
     }
 
-    /// A for eight λ.
+    /// A for one λ.
+    pub fn matrix(&self, lam: f64) -> Whole {
+        self.misfit.matrix(self.linearized, self.m, self.jacobi, self.periodic, lane(lam))
+    }
+
+    /// A for eight λ, factored.
     pub fn factored(&self, lam: Lane) -> Factors {
         self.misfit.factored(self.linearized, self.m, self.jacobi, self.periodic, lam)
     }
@@ -99,86 +99,123 @@ impl<'a> Linear<'a> {
         let freedom = self.misfit.freedom(linearized, &factors.inverse_band());
         let rss = self.misfit.rss(linearized, m, &x);
         // (a + Sδ)ᵀM(a + Sδ), with Jacobi's operator (a + (S + RP)δ)ᵀM(a + (S + RP)δ).
-        let mut energy = Lane::ZERO;
         let bend = |i: usize, c: usize| {
             let turned = self.jacobi.map_or(Lane::ZERO, |jacobi| jacobi.of_lanes(linearized, i, &x, c));
             lane(self.accelerations[i * m + c]) + linearized.accelerations[i].of_lanes(&x, m, c) + turned
         };
-        for c in 0..m {
-            let mut left = bend(0, c);
-            for i in 0..linearized.basis.knots() - 1 {
-                let right = bend(i + 1, c);
-                energy += (left * left + left * right + right * right) * lane(linearized.basis.h(i) / 3.0);
-                left = right;
-            }
-        }
+        let energy = (0..m).fold(Lane::ZERO, |sum, c| sum + linearized.energy(|i| bend(i, c)));
         // A matrix that is rounding errors only may have impossible degrees of freedom.
         let least = lane(0.9 * linearized.null().min(linearized.free() as f64));
         let sound = factors.least_pivot().simd_gt(Lane::ZERO) & freedom.simd_gt(least);
-        Look { freedom, rss, energy, sound, log_det: factors.log_det() }
+        Look { freedom, rss, energy: lam * energy, sound, log_det: factors.log_det() }
     }
 
     /// The λ with the lowest score, near a guess or in the whole range, and whether it lies at a bound.
     pub fn choose(&self, criterion: Criterion, guess: Option<f64>) -> (f64, bool) {
-        /// The range of λ in decades above the balance of data and energy (and below it on short segments, if
-        /// segments are unequal), and the range around a guess.
-        const RANGE: (f64, f64) = (-9.0, 12.5);
-        const NEAR: f64 = 0.6;
-        /// The range in decades that the first eight evaluations cover.
-        const DECADES: f64 = 7.5;
-        /// If the degrees of freedom exceed those of curves without energy by this little, every larger λ is equally
-        /// good.
-        const STRAIGHT: f64 = 0.01;
-        let straight = self.linearized.null() + STRAIGHT;
-        let start = self.linearized.balance().log10();
-        let (mut from, mut to) =
-            (start + RANGE.0 + 3.0 * self.linearized.basis.short().log10(), start + RANGE.1);
-        let bounds = (from, to);
-        if let Some(guess) = guess {
-            (from, to) = ((guess.log10() - NEAR).max(from), (guess.log10() + NEAR).min(to));
-        }
-        let passes = if guess.is_some() { 1 } else { ((to - from) / DECADES).ceil() as usize };
-        let mut seen: Vec<(f64, f64, f64)> = Vec::new();
-        let look = |seen: &mut Vec<(f64, f64, f64)>, from: f64, to: f64, part: usize, parts: usize| {
-            let at: [f64; LANES] =
-                few(|l| from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64);
-            let found = self.look(Lane::new(at.map(|x| 10f64.powf(x))));
-            let scores = self.score(criterion, Lane::new(at.map(|x| 10f64.powf(x))), &found).to_array();
-            let freedom = found.sound.select(found.freedom, lane(f64::NAN)).to_array();
-            (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
+        let linearized = self.linearized;
+        let scoring = Scoring {
+            criterion,
+            count: self.misfit.count(self.m),
+            coordinates: self.m as f64,
+            free: linearized.free() as f64,
+            null: linearized.null(),
+            energies: linearized.null(),
+            straight: linearized.null() + STRAIGHT,
+            balance: linearized.balance(),
+            sigma: self.sigma,
         };
-        (0..passes).for_each(|part| look(&mut seen, from, to, part, passes));
-        for _ in 0..4 {
-            seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
-            let (left, right) = (best.saturating_sub(1), (best + 1).min(seen.len() - 1));
-            (from, to) = (seen[left].0, seen[right].0);
-            // At the boundary of the range around a guess, the search continues outside it.
-            if best == 0 && from > bounds.0 {
-                (from, to) = ((from - 4.0 * NEAR).max(bounds.0), from);
-            } else if best == seen.len() - 1 && to < bounds.1 {
-                (from, to) = (to, (to + 4.0 * NEAR).min(bounds.1));
-            } else if to - from < 0.12 {
-                break;
-            }
-            look(&mut seen, from, to, 0, 1);
-        }
-        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-        seen.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
-        let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
-        let stiff = seen.get(best + 1).is_none_or(|next| next.2 <= straight);
-        if stiff || rough(&seen, best) {
-            return (10f64.powf(seen[best].0), true);
-        }
-        (10f64.powf(lowest([seen[best - 1], seen[best], seen[best + 1]].map(|(x, y, _)| (x, y)))), false)
+        choose(linearized, &scoring, |lam| self.look(lam), guess)
     }
+}
 
-    fn score(&self, criterion: Criterion, lam: Lane, look: &Look) -> Lane {
-        let (n, m) = (self.misfit.count(self.m), self.m as f64);
+/// What a score depends on besides λ.
+pub struct Scoring {
+    /// The criterion.
+    pub criterion: Criterion,
+    /// The number of data per coordinate.
+    pub count: f64,
+    /// The number of coordinates that have the same matrix.
+    pub coordinates: f64,
+    /// The number of coefficients to which λ applies, per coordinate.
+    pub free: f64,
+    /// The degrees of freedom without energy, per coordinate: of all coefficients, ...
+    pub null: f64,
+    /// ... and of those to which λ applies.
+    pub energies: f64,
+    /// The degrees of freedom below which every λ is equally good.
+    pub straight: f64,
+    /// The λ at which data and energy have about the same weight.
+    pub balance: f64,
+    /// The standard deviation of the noise, for [`Criterion::Cp`].
+    pub sigma: f64,
+}
+
+/// The λ with the lowest score, near a guess or in the whole range, and whether it lies at a bound.
+pub fn choose(
+    linearized: &LinearProblem,
+    scoring: &Scoring,
+    look_at: impl Fn(Lane) -> Look,
+    guess: Option<f64>,
+) -> (f64, bool) {
+    /// The range of λ in decades above the balance of data and energy (and below it on short segments, if
+    /// segments are unequal), and the range around a guess.
+    const RANGE: (f64, f64) = (-9.0, 12.5);
+    const NEAR: f64 = 0.6;
+    /// The range in decades that the first eight evaluations cover.
+    const DECADES: f64 = 7.5;
+    let straight = scoring.straight;
+    let start = scoring.balance.log10();
+    let (mut from, mut to) = (
+        start + RANGE.0 + f64::from(linearized.penalised.power()) * linearized.basis.short().log10(),
+        start + RANGE.1,
+    );
+    let bounds = (from, to);
+    if let Some(guess) = guess {
+        (from, to) = ((guess.log10() - NEAR).max(from), (guess.log10() + NEAR).min(to));
+    }
+    let passes = if guess.is_some() { 1 } else { ((to - from) / DECADES).ceil() as usize };
+    let mut seen: Vec<(f64, f64, f64)> = Vec::new();
+    let look = |seen: &mut Vec<(f64, f64, f64)>, from: f64, to: f64, part: usize, parts: usize| {
+        let at: [f64; LANES] =
+            few(|l| from + (to - from) * (l * parts + part) as f64 / (LANES * parts - 1) as f64);
+        let found = look_at(Lane::new(at.map(|x| 10f64.powf(x))));
+        let scores = scoring.score(Lane::new(at.map(|x| 10f64.powf(x))), &found).to_array();
+        let freedom = found.sound.select(found.freedom, lane(f64::NAN)).to_array();
+        (0..LANES).for_each(|l| seen.push((at[l], scores[l], freedom[l])));
+    };
+    (0..passes).for_each(|part| look(&mut seen, from, to, part, passes));
+    for _ in 0..4 {
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
+        let (left, right) = (best.saturating_sub(1), (best + 1).min(seen.len() - 1));
+        (from, to) = (seen[left].0, seen[right].0);
+        // At the boundary of the range around a guess, the search continues outside it.
+        if best == 0 && from > bounds.0 {
+            (from, to) = ((from - 4.0 * NEAR).max(bounds.0), from);
+        } else if best == seen.len() - 1 && to < bounds.1 {
+            (from, to) = (to, (to + 4.0 * NEAR).min(bounds.1));
+        } else if to - from < 0.12 {
+            break;
+        }
+        look(&mut seen, from, to, 0, 1);
+    }
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    seen.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
+    let Some(best) = least(&seen, straight) else { return (10f64.powf(from), true) };
+    let stiff = seen.get(best + 1).is_none_or(|next| next.2 <= straight);
+    if stiff || rough(&seen, best) {
+        return (10f64.powf(seen[best].0), true);
+    }
+    (10f64.powf(lowest([seen[best - 1], seen[best], seen[best + 1]].map(|(x, y, _)| (x, y)))), false)
+}
+
+impl Scoring {
+    fn score(&self, lam: Lane, look: &Look) -> Lane {
+        let (n, m) = (self.count, self.coordinates);
         // Without degrees of freedom, or if rounding errors make the matrix singular, there is no score.
         let known = (lane(n * (1.0 - 1e-6)) - look.freedom).simd_gt(Lane::ZERO) & look.sound;
         let per = look.rss / lane(m);
-        let score = match criterion {
+        let score = match self.criterion {
             Criterion::Gcv { gamma } => {
                 let left = lane(n) - look.freedom * lane(gamma);
                 // With γ > 1 the denominator has a zero. Rougher curves than that are excluded.
@@ -186,9 +223,8 @@ impl<'a> Linear<'a> {
             }
             Criterion::Cp => per + look.freedom * lane(2.0 * self.sigma * self.sigma),
             Criterion::Reml => {
-                let (count, null) = (self.linearized.free() as f64, self.linearized.null());
-                lane(n - null) * (per + lam * look.energy / lane(m)).ln() + look.log_det
-                    - lane(count - null) * lam.ln()
+                lane(n - self.null) * (per + look.energy / lane(m)).ln() + look.log_det
+                    - lane(self.free - self.energies) * lam.ln()
             }
         };
         known.select(score, lane(f64::INFINITY))
@@ -201,7 +237,7 @@ pub struct Look {
     pub freedom: Lane,
     /// Σ w|r − Bδ|².
     pub rss: Lane,
-    /// The integral of the squared acceleration.
+    /// The penalty: λ times the energy.
     pub energy: Lane,
     /// ln det A.
     pub log_det: Lane,

@@ -3,18 +3,17 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::cyclic::PeriodicCorrection;
-use crate::frames::{Frames, curvature_terms};
+use crate::frames::{Frames, curvature_gradient};
 use crate::gauss_newton::{self, Pull};
 use crate::information::{self, Root};
 use crate::jacobi_operator::JacobiOperator;
 use crate::linearized::{Basis, LinearProblem, OVERLAP};
 use crate::path::{Path, Position, moved, positions};
-use crate::problem::{Data, Ends, Options, Report, Smooth, State};
+use crate::problem::{Data, Ends, Known, Options, Penalty, Report, Smooth, State};
 use crate::progress::{Progress, larger, length};
 use crate::residuals::Residuals;
 use crate::robust::{Lam, Robust};
 use crate::variance::rows_of;
-use std::f64::consts::PI;
 use symspline_core::fit::Ends as FitEnds;
 use symspline_core::monitor::Monitor;
 use symspline_core::scalar::{Lane, lane};
@@ -58,8 +57,9 @@ pub struct CurveFit<'a> {
     strays: usize,
     /// J in full Gauss–Newton, at the last λ.
     objective: f64,
-    /// The final band of A⁻¹.
+    /// The final band of A⁻¹, and A.
     inverse: Option<Banded>,
+    known: Option<Known>,
     progress: Progress,
 }
 
@@ -70,17 +70,17 @@ impl<'a> CurveFit<'a> {
         m: usize,
         knots: Vec<f64>,
         points: Vec<f64>,
-        ends: Ends,
+        options: &Options,
         robust: Robust,
     ) -> Self {
+        let &Options { ends, penalty, .. } = options;
         let positions = positions(&knots, data.times);
         let basis = Basis::new(&knots, ends);
-        let unit = basis.spacing.powi(3);
-        let linearized = LinearProblem::new(basis, &positions, data.weights);
+        let unit = penalty.unit(basis.spacing);
+        let linearized = LinearProblem::new(basis, &positions, data.weights, penalty);
         let lam = data.lam;
         let balance = linearized.balance();
-        // From this λ on, curves are geodesics; for larger λ the data would vanish in rounding errors of A.
-        let stiffest = balance * (1e6 * (knots.len() as f64 / PI).powi(4)).max(1e8);
+        let stiffest = balance * penalty.stiffest(knots.len());
         let roots = information::roots(data.information, m);
         let mut weights: Vec<f64> = roots.iter().map(|root| root.weight).collect();
         if weights.is_empty() {
@@ -106,7 +106,8 @@ impl<'a> CurveFit<'a> {
             strays: 0,
             objective: f64::INFINITY,
             inverse: None,
-            progress: Progress::new(lam.map(|lam| lam / unit), stiffest, density),
+            known: None,
+            progress: Progress::new(lam.map(|lam| lam / unit), stiffest, density, penalty),
         }
     }
 
@@ -117,7 +118,14 @@ impl<'a> CurveFit<'a> {
             Some(inverse) => rows_of(inverse),
             None => vec![f64::NAN; self.linearized.basis.count() * 4],
         };
-        Smooth { knots: self.knots, points: self.points, velocities: self.velocities, inverse, report }
+        Smooth {
+            knots: self.knots,
+            points: self.points,
+            velocities: self.velocities,
+            inverse,
+            known: self.known,
+            report,
+        }
     }
 
     /// The report so far.
@@ -216,7 +224,7 @@ impl<'a> CurveFit<'a> {
         let mut speeds = frames.coordinates(&self.velocities, |i| i);
         accelerations.iter_mut().for_each(|x| *x *= spacing * spacing);
         speeds.iter_mut().for_each(|x| *x *= spacing);
-        let curvature = curvature_terms(space, &speeds, &accelerations);
+        let curvature = curvature_gradient(space, linearized, &speeds, &accelerations);
         let sigma = data.sigma.unwrap_or(f64::NAN);
         let closed = self.ends == Ends::Periodic;
         let periodic = closed.then(|| PeriodicCorrection { overlap: OVERLAP, m, turn: frames.round() });
@@ -251,7 +259,7 @@ impl<'a> CurveFit<'a> {
         }
         self.progress.report.exact = exact;
         let (step, ambient) = if exact {
-            let lam = lam * spacing.powi(3);
+            let lam = lam * options.penalty.unit(spacing);
             let ends = self.ends.of_fit(&velocities);
             let ambient =
                 self.gauss_newton_step(space, ends, &residuals, factors.as_deref(), lam, monitor, alone);
@@ -271,6 +279,7 @@ impl<'a> CurveFit<'a> {
         let tol = self.robust.tol(options.tol);
         let small = self.progress.judge(&step, &deviations, reach, tol, self.robust.reweighs());
         self.inverse = Some(inverse);
+        self.known = Some(Known::new(&linear.matrix(lam)));
         let taken = self.progress.report.iterations - self.progress.begun;
         let over = taken >= self.robust.most(options.max_iter);
         if !self.robust.last() && self.progress.settled && (small || over) {
@@ -285,6 +294,7 @@ impl<'a> CurveFit<'a> {
                 let system = linear.factored(lane(lam / softness));
                 let band = system.inverse_band();
                 self.inverse = Some(system.mean(&band));
+                self.known = Some(Known::new(&linear.matrix(lam / softness)));
                 self.progress.note(&linear, &band, lam / softness, softness);
             }
             self.progress.report.state =
@@ -326,7 +336,8 @@ impl<'a> CurveFit<'a> {
 
     /// J of the present curve.
     fn value(&self, space: &Erased, residuals: &Residuals) -> f64 {
-        let lam = self.progress.lam.unwrap_or(0.0) * self.linearized.basis.spacing.powi(3);
+        let lam =
+            self.progress.lam.unwrap_or(0.0) * Penalty::Acceleration.unit(self.linearized.basis.spacing);
         let terms = residuals.squares.iter().enumerate().map(|(k, square)| self.robust.value(*square, k));
         terms.sum::<f64>() + lam * gauss_newton::energy(space, &self.path())
     }

@@ -2,13 +2,10 @@
 //!
 //! The coefficients of a closed curve continue after the last one with the first ones, transformed by the holonomy H
 //! of the curve. A matrix A that is banded in the coefficients with `overlap` of them repeated at the end becomes
-//! EᵀAE, where E repeats and transforms them. The first coefficients border the others, which are banded:
-//!
-//! ```text
-//! EᵀAE = (C Wᵀ; W B),    (EᵀAE)⁻¹ = (S⁻¹, −S⁻¹Vᵀ; −VS⁻¹, B⁻¹ + VS⁻¹Vᵀ),    V = B⁻¹W,    S = C − WᵀV.
-//! ```
+//! EᵀAE, where E repeats and transforms them. The first coefficients border the others, which are banded.
 
 use crate::banded::Banded;
+use crate::bordered::Bordered;
 use symspline_core::scalar::{Lane, lane};
 
 /// The periodic correction of a closed curve: how its coefficients continue at its start.
@@ -65,31 +62,19 @@ impl PeriodicCorrection {
     }
 }
 
-/// A factored matrix.
+/// The factored matrix of an open or a closed curve.
 pub struct Factored {
-    /// The number of coefficients, or of those that do not belong to the border.
-    band: Banded,
-    border: Option<Border>,
-}
-
-struct Border {
-    /// The number of entries in the border.
-    size: usize,
-    /// H.
-    turn: Vec<f64>,
-    /// W and V, row by row.
-    sides: [Vec<Lane>; 2],
-    /// S, factored.
-    corner: Banded,
+    matrix: Bordered,
+    /// H of a closed curve.
+    turn: Option<Vec<f64>>,
 }
 
 impl Factored {
     /// Factors a matrix in coefficients of `coupled` numbers. The correction of a closed curve must have as many
     /// coordinates.
-    pub fn new(mut whole: Banded, periodic: Option<&PeriodicCorrection>) -> Self {
+    pub fn new(whole: Banded, periodic: Option<&PeriodicCorrection>) -> Self {
         let Some(periodic) = periodic else {
-            whole.factor();
-            return Factored { band: whole, border: None };
+            return Factored::open(Bordered::new(whole, Vec::new(), Banded::default()));
         };
         let (m, width) = (periodic.m, whole.width);
         let size = periodic.overlap * m;
@@ -104,11 +89,10 @@ impl Factored {
                 sum + near(i, count + block * m + row) * lane(periodic.turn[row * m + c])
             })
         };
-        let mut band = Banded::of(inner, width, |at| {
+        let band = Banded::of(inner, width, |at| {
             let (i, d) = (at / (width + 1), at % (width + 1));
             if d <= i { whole.at(size + i, size + i - d) } else { Lane::ZERO }
         });
-        band.factor();
         let mut w = vec![Lane::ZERO; inner * size];
         for i in 0..inner {
             for b in 0..size {
@@ -117,8 +101,6 @@ impl Factored {
                 }
             }
         }
-        let mut v = w.clone();
-        band.solve(size, &mut v);
         let mut corner = Banded::zeros(size, size.saturating_sub(1));
         for a in 0..size {
             for b in 0..=a {
@@ -127,91 +109,48 @@ impl Factored {
                 let twice = (0..m).fold(Lane::ZERO, |sum, row| {
                     sum + again(count + block * m + row, b) * lane(periodic.turn[row * m + c])
                 });
-                let mut sum = near(a, b) + again(a, b) + again(b, a) + twice;
-                for i in 0..inner {
-                    sum -= w[i * size + a] * v[i * size + b];
-                }
-                *corner.entry(a, b) = sum;
+                *corner.entry(a, b) = near(a, b) + again(a, b) + again(b, a) + twice;
             }
         }
-        corner.factor();
-        let border = Border { size, turn: periodic.turn.clone(), sides: [w, v], corner };
-        Factored { band, border: Some(border) }
+        Factored { matrix: Bordered::new(band, w, corner), turn: Some(periodic.turn.clone()) }
+    }
+
+    /// The matrix of an open curve, with a border of parameters.
+    pub fn open(matrix: Bordered) -> Self {
+        Factored { matrix, turn: None }
+    }
+
+    /// Replaces independent normal numbers by a sample of the normal distribution whose covariance is the inverse.
+    pub fn sample(&self, x: &mut [Lane]) {
+        self.matrix.sample(x);
     }
 
     /// The smallest pivot.
     pub fn least_pivot(&self) -> Lane {
-        let least = self.band.least_pivot();
-        self.border.as_ref().map_or(least, |border| {
-            let own = border.corner.least_pivot();
-            own.simd_lt(least).select(own, least)
-        })
+        self.matrix.least_pivot()
     }
 
     /// ln det.
     pub fn log_det(&self) -> Lane {
-        let own = self.band.log_det();
-        self.border.as_ref().map_or(own, |border| own + border.corner.log_det())
+        self.matrix.log_det()
     }
 
     /// Multiplies rows of several numbers by the inverse, in place.
     pub fn solve(&self, columns: usize, x: &mut [Lane]) {
-        let Some(border) = &self.border else { return self.band.solve(columns, x) };
-        let [w, v] = &border.sides;
-        let (first, rest) = x.split_at_mut(border.size * columns);
-        self.band.solve(columns, rest);
-        for (i, row) in rest.chunks_exact(columns).enumerate() {
-            for b in 0..border.size {
-                let factor = w[i * border.size + b];
-                let own = &mut first[b * columns..][..columns];
-                own.iter_mut().zip(row).for_each(|(x, y)| *x = (-factor).mul_add(*y, *x));
-            }
-        }
-        border.corner.solve(columns, first);
-        for (i, row) in rest.chunks_exact_mut(columns).enumerate() {
-            for b in 0..border.size {
-                let factor = v[i * border.size + b];
-                let own = &first[b * columns..][..columns];
-                row.iter_mut().zip(own).for_each(|(x, y)| *x = (-factor).mul_add(*y, *x));
-            }
-        }
+        self.matrix.solve(columns, x);
     }
 
     /// The band of the inverse; for a closed curve that of E(EᵀAE)⁻¹Eᵀ.
     pub fn inverse_band(&self) -> Banded {
-        let own = self.band.inverse_band();
-        let Some(border) = &self.border else { return own };
-        let (size, width, v) = (border.size, self.band.width, &border.sides[1]);
-        let m = (border.turn.len() as f64).sqrt() as usize;
-        let mut corner = vec![Lane::ZERO; size * size];
-        (0..size).for_each(|a| corner[a * size + a] = Lane::ONE);
-        border.corner.solve(size, &mut corner);
-        let count = size + own.size;
-        // −VS⁻¹.
-        let mut side = vec![Lane::ZERO; own.size * size];
-        for (row, out) in v.chunks_exact(size).zip(side.chunks_exact_mut(size)) {
-            for (b, x) in row.iter().enumerate() {
-                let from = &corner[b * size..][..size];
-                out.iter_mut().zip(from).for_each(|(out, c)| *out = (-*x).mul_add(*c, *out));
-            }
-        }
-        // An entry among the coefficients that are not repeated.
-        let plain = |i: usize, j: usize| {
-            let (i, j) = (i.max(j), i.min(j));
-            if i < size {
-                corner[i * size + j]
-            } else if j < size {
-                side[(i - size) * size + j]
-            } else {
-                let (i, j) = (i - size, j - size);
-                let dot =
-                    (0..size).fold(Lane::ZERO, |sum, b| v[j * size + b].mul_add(side[i * size + b], sum));
-                own.at(i, j) - dot
-            }
-        };
+        let inverse = self.matrix.inverse();
+        let Some(turn) = &self.turn else { return inverse.band };
+        let m = (turn.len() as f64).sqrt() as usize;
+        let (size, width) = (inverse.border(), inverse.band.width);
+        let count = size + inverse.band.size;
+        let plain = |i: usize, j: usize| inverse.at(i, j);
         let turned = |i: usize, j: &dyn Fn(usize) -> Lane| {
             let (block, row) = ((i - count) / m, (i - count) % m);
-            (0..m).fold(Lane::ZERO, |sum, c| sum + j(block * m + c) * lane(border.turn[row * m + c]))
+            (0..m).fold(Lane::ZERO, |sum, c| sum + j(block * m + c) * lane(turn[row * m + c]))
         };
         Banded::of(count + size, width, |at| {
             let (i, d) = (at / (width + 1), at % (width + 1));

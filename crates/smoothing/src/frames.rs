@@ -4,6 +4,8 @@
 //! frame to the frame at the end of the preceding run is stored, so that coordinates refer to one frame transported
 //! along the whole polygon.
 
+use crate::linearized::{LinearProblem, times_metric};
+use crate::problem::Penalty;
 use symspline_core::scalar::{LANES, Lane, few, gather, scatter};
 use symspline_core::space::{Ambient, Erased, Frame, Origin};
 
@@ -168,19 +170,57 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// ρ = −[u, [u, a]]: the contribution of curvature to the gradient of the energy.
+/// R(a, u)u = −[u, [u, a]]: the curvature term of the acceleration if a curve of velocity u moves by a.
 pub fn curvature_terms(space: &Erased, speeds: &[f64], accelerations: &[f64]) -> Vec<f64> {
+    let mut out = triples(space, [speeds, speeds, accelerations]);
+    out.iter_mut().for_each(|x| *x = -*x);
+    out
+}
+
+/// g, the contribution of curvature to half the gradient of the energy, for velocities u and accelerations a at the
+/// knots.
+///
+/// If the curve moves by ξ, a changes by ξ'' + R(ξ, u)u, and ∇a by the derivative of that and by R(ξ, u)a. R is
+/// symmetric in pairs, so that the gradients are R(a, u)u and, for the jerk j, R(Da, u)u + R(j, a)u, where D is the
+/// stiffness matrix of hat functions.
+pub fn curvature_gradient(
+    space: &Erased,
+    linearized: &LinearProblem,
+    speeds: &[f64],
+    accelerations: &[f64],
+) -> Vec<f64> {
+    let (m, basis, penalty) = (space.dim(), &linearized.basis, linearized.penalised);
+    if penalty == Penalty::Acceleration {
+        return times_metric(basis, penalty, &curvature_terms(space, speeds, accelerations), m);
+    }
+    let mut out = curvature_terms(space, speeds, &times_metric(basis, penalty, accelerations, m));
+    for end in 0..2 {
+        // The integral over a segment by the trapezoidal rule: half of it belongs to either end.
+        let segments = basis.knots() - 1;
+        let jerk = |at: usize| (accelerations[at + m] - accelerations[at]) / basis.h(at / m);
+        let jerks: Vec<f64> = (0..segments * m).map(jerk).collect();
+        let at = |x: &[f64]| x[end * m..][..segments * m].to_vec();
+        let terms = triples(space, [&at(speeds), &jerks, &at(accelerations)]);
+        for (i, x) in terms.iter().enumerate() {
+            out[end * m + i] += 0.5 * basis.h(i / m) * x;
+        }
+    }
+    out
+}
+
+/// The triple products [x, [y, z]] of coordinates, one after another.
+fn triples(space: &Erased, arrays: [&[f64]; 3]) -> Vec<f64> {
     let m = space.dim();
-    let count = accelerations.len() / m;
-    let mut out = vec![0.0; accelerations.len()];
-    let [mut u, mut a, mut rho] = [(); 3].map(|_| vec![Lane::ZERO; m]);
+    let count = arrays[0].len() / m;
+    let mut out = vec![0.0; arrays[0].len()];
+    let [mut x, mut y, mut z, mut product] = [(); 4].map(|_| vec![Lane::ZERO; m]);
     for (group, out) in out.chunks_mut(LANES * m).enumerate() {
         let at = lanes_of(group, count);
-        gather(at.map(|i| &speeds[i * m..][..m]), &mut u);
-        gather(at.map(|i| &accelerations[i * m..][..m]), &mut a);
-        space.triple(&u, &u, &a, &mut rho);
-        rho.iter_mut().for_each(|x| *x = -*x);
-        scatter(&rho, out);
+        for (own, array) in [&mut x, &mut y, &mut z].into_iter().zip(arrays) {
+            gather(at.map(|i| &array[i * m..][..m]), own);
+        }
+        space.triple(&x, &y, &z, &mut product);
+        scatter(&product, out);
     }
     out
 }

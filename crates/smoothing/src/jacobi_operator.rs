@@ -5,7 +5,8 @@
 
 use crate::banded::stride;
 use crate::frames::curvature_terms;
-use crate::linearized::{LinearProblem, times_mass};
+use crate::linearized::{LinearProblem, times_metric};
+use crate::problem::Penalty;
 use symspline_core::scalar::{Lane, lane};
 use symspline_core::space::{Erased, Origin};
 
@@ -101,7 +102,7 @@ impl JacobiOperator {
     /// (S + RP)ᵀMa: half the gradient of the energy at accelerations a.
     pub fn pull(&self, linearized: &LinearProblem, accelerations: &[f64]) -> Vec<f64> {
         let m = self.m;
-        let mass = times_mass(&linearized.basis, accelerations, m);
+        let mass = times_metric(&linearized.basis, Penalty::Acceleration, accelerations, m);
         let mut out = vec![0.0; linearized.basis.count() * m];
         for (knot, x) in mass.chunks_exact(m).enumerate() {
             let turn = self.turn(knot);

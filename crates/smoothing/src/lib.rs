@@ -12,11 +12,14 @@
 //! costs little more than the fit; otherwise curvature enters the matrix, too. The other solver is *full
 //! Gauss–Newton*.
 
+pub mod along;
 mod banded;
+mod bordered;
 pub mod chi;
 mod choice;
 mod curve_fit;
 mod cyclic;
+pub mod estimation;
 mod frames;
 mod gauss_newton;
 mod information;
@@ -26,6 +29,7 @@ mod loss;
 mod misfit;
 mod observations;
 mod path;
+pub mod posterior;
 mod problem;
 mod progress;
 mod residuals;
@@ -35,6 +39,9 @@ mod start;
 mod variance;
 
 pub use observations::Observations;
-pub use problem::{Criterion, Data, EndCondition, Ends, Loss, Options, Report, Smooth, State, Tier};
+pub use path::{Position, positions};
+pub use problem::{
+    Criterion, Data, EndCondition, Ends, Known, Loss, Options, Penalty, Report, Smooth, State, Tier,
+};
 pub use smooth::smooth;
 pub use variance::variance;

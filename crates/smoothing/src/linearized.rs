@@ -1,12 +1,13 @@
 //! The linear smoothing problem of scalar splines: natural cubic B-splines, their values at data and knots, and their
 //! energy.
 //!
-//! A spline with coefficients c has the values Bc at the data, Pc at the knots and second derivatives Sc there; its
-//! energy ∫ x''² is cᵀΩc with Ω = SᵀMS, M being the mass matrix of hat functions. Times are divided by the mean knot
+//! A spline with coefficients c has the values Bc at the data, Pc at the knots and second derivatives Sc there. Its
+//! energy is cᵀΩc with Ω = SᵀMS. For ∫ x''², M is the mass matrix of hat functions; for ∫ x'''², it is their stiffness
+//! matrix, because the third derivative is a difference of second derivatives. Times are divided by the mean knot
 //! spacing.
 
 use crate::banded::{Banded, WIDTH};
-use crate::problem::{EndCondition, Ends};
+use crate::problem::{EndCondition, Ends, Penalty};
 use symspline_core::scalar::{Lane, lane};
 
 const BAND: usize = WIDTH + 1;
@@ -105,6 +106,11 @@ impl Basis {
         matches!(self.ends, Ends::Open(ends) if ends[end] == EndCondition::Natural)
     }
 
+    /// Whether the velocity at an end is given.
+    pub fn has_velocity(&self, end: usize) -> bool {
+        matches!(self.ends, Ends::Open(ends) if ends[end] == EndCondition::Velocity)
+    }
+
     /// Length of a segment, divided by the mean.
     pub fn h(&self, segment: usize) -> f64 {
         self.tau[segment + 1] - self.tau[segment]
@@ -130,6 +136,11 @@ impl Basis {
 
     /// Value (`nu` = 0) or derivative of a spline at a position between 0 and 1 in a segment.
     pub fn row(&self, segment: usize, position: f64, nu: usize) -> Row {
+        self.folded(segment, self.unfolded(segment, position, nu))
+    }
+
+    /// The same for the four B-splines that do not vanish on the segment, before end conditions are applied.
+    fn unfolded(&self, segment: usize, position: f64, nu: usize) -> [f64; 4] {
         let t = |k: usize| self.extended(segment + k);
         let x = t(3) + position * (t(4) - t(3));
         // B-splines of increasing degree that do not vanish on the segment: the j-th begins at t(3 − degree + j).
@@ -154,7 +165,7 @@ impl Basis {
             }
             b = next;
         }
-        self.folded(segment, b)
+        b
     }
 
     /// Eliminates the outermost coefficients, which the end conditions determine.
@@ -169,10 +180,11 @@ impl Basis {
         for (j, factor) in factors.into_iter().enumerate() {
             let full = segment + j;
             if full == 0 || full == n + 2 {
-                let (end, near, far) = if full == 0 { (0, 0, 1) } else { (1, n, n - 1) };
-                let [at_near, at_far] = self.outermost(end);
-                row.factors[near - first] += factor * at_near;
-                row.factors[far - first] += factor * at_far;
+                let end = usize::from(full > 0);
+                for (k, weight) in self.outermost(end).into_iter().enumerate().filter(|(_, w)| *w != 0.0) {
+                    let kept = if end == 0 { k } else { n - k };
+                    row.factors[kept - first] += factor * weight;
+                }
             } else {
                 row.factors[full - 1 - first] += factor;
             }
@@ -180,17 +192,30 @@ impl Basis {
         row
     }
 
-    /// The outermost coefficient as a combination of the next two. A given velocity adds a constant, which does not
+    /// The outermost coefficient as a combination of the next four. A given velocity adds a constant, which does not
     /// enter changes.
-    fn outermost(&self, end: usize) -> [f64; 2] {
+    fn outermost(&self, end: usize) -> [f64; 4] {
         let n = self.tau.len() - 1;
-        if !self.is_natural(end) {
-            return [1.0, 0.0];
+        match self.ends {
+            Ends::Open(ends) if ends[end] == EndCondition::Natural => {
+                let (h, next) = if end == 0 { (0, 1) } else { (n - 1, n.saturating_sub(2)) };
+                let both = self.h(h) + if n > 1 { self.h(next) } else { 0.0 };
+                let ratio = self.h(h) / both;
+                [1.0 + ratio, -ratio, 0.0, 0.0]
+            }
+            // The third derivative is the same on the last two segments.
+            Ends::Open(ends) if ends[end] == EndCondition::NotAKnot => {
+                let segments = if end == 0 { [0, 1] } else { [n - 1, n - 2] };
+                let [mut far, mut near] = segments.map(|segment| self.unfolded(segment, 0.0, 3));
+                if end == 1 {
+                    far.reverse();
+                    near.reverse();
+                }
+                let other = |k: usize| far.get(k + 1).copied().unwrap_or(0.0);
+                std::array::from_fn(|k| (near[k] - other(k)) / far[0])
+            }
+            _ => [1.0, 0.0, 0.0, 0.0],
         }
-        let (h, next) = if end == 0 { (0, 1) } else { (n - 1, n.saturating_sub(2)) };
-        let both = self.h(h) + if n > 1 { self.h(next) } else { 0.0 };
-        let ratio = self.h(h) / both;
-        [1.0 + ratio, -ratio]
     }
 
     /// A derivative at every knot.
@@ -200,16 +225,24 @@ impl Basis {
     }
 }
 
-/// The product of M with vectors at the knots, where M is the mass matrix of hat functions: `∫ a b` of functions that
-/// are linear between knots.
-pub fn times_mass(basis: &Basis, a: &[f64], m: usize) -> Vec<f64> {
+/// The entries of M that belong to a segment of length h: on the diagonal and beside it. `∫ a b` of functions that are
+/// linear between knots, or `∫ a' b'`.
+fn of_segment(penalty: Penalty, h: f64) -> (f64, f64) {
+    match penalty {
+        Penalty::Acceleration => (h / 3.0, h / 6.0),
+        Penalty::Jerk => (1.0 / h, -1.0 / h),
+    }
+}
+
+/// The product of M with vectors at the knots.
+pub fn times_metric(basis: &Basis, penalty: Penalty, a: &[f64], m: usize) -> Vec<f64> {
     let mut out = vec![0.0; a.len()];
     for i in 0..basis.knots() - 1 {
-        let sixth = basis.h(i) / 6.0;
+        let (own, other) = of_segment(penalty, basis.h(i));
         for c in 0..m {
             let (left, right) = (a[i * m + c], a[(i + 1) * m + c]);
-            out[i * m + c] += sixth * (2.0 * left + right);
-            out[(i + 1) * m + c] += sixth * (left + 2.0 * right);
+            out[i * m + c] += own * left + other * right;
+            out[(i + 1) * m + c] += other * left + own * right;
         }
     }
     out
@@ -247,22 +280,25 @@ pub struct LinearProblem {
     pub gram: Vec<f64>,
     /// Ω, likewise.
     pub penalty: Vec<f64>,
+    /// The derivative whose square Ω integrates.
+    pub penalised: Penalty,
 }
 
 impl LinearProblem {
     /// The problem for data at positions in segments, with their weights.
-    pub fn new(basis: Basis, positions: &[(usize, f64)], weights: &[f64]) -> Self {
+    pub fn new(basis: Basis, positions: &[(usize, f64)], weights: &[f64], penalised: Penalty) -> Self {
         let count = basis.count();
         let data: Vec<Row> =
             positions.iter().map(|&(segment, position)| basis.row(segment, position, 0)).collect();
         let (values, accelerations) = (basis.at_knots(0), basis.at_knots(2));
         let hats = (0..basis.knots() - 1).flat_map(|i| {
-            let (s, sixth) = (&accelerations, basis.h(i) / 6.0);
-            let (l, r) = (s[i], s[i + 1]);
-            [(l, l, 2.0 * sixth), (r, r, 2.0 * sixth), (l, r, sixth), (r, l, sixth)]
+            let (l, r) = (accelerations[i], accelerations[i + 1]);
+            let (own, other) = of_segment(penalised, basis.h(i));
+            [(l, l, own), (r, r, own), (l, r, other), (r, l, other)]
         });
         let penalty = gram(count, hats);
-        let mut linearized = LinearProblem { data, values, accelerations, gram: Vec::new(), penalty, basis };
+        let mut linearized =
+            LinearProblem { data, values, accelerations, gram: Vec::new(), penalty, penalised, basis };
         linearized.gram = linearized.gram_of(weights);
         linearized
     }
@@ -272,10 +308,39 @@ impl LinearProblem {
         gram(self.basis.count(), self.data.iter().zip(weights).map(|(row, w)| (*row, *row, *w)))
     }
 
-    /// Degrees of freedom of the curves without energy: straight lines. Given velocities and closed ends reduce them
-    /// to constants.
+    /// Half the gradient of the energy with respect to the coefficients, for accelerations a at the knots:
+    /// SᵀMa + Pᵀg, with the contribution g of curvature.
+    pub fn stiffness(&self, accelerations: &[f64], curvature: &[f64], m: usize) -> Vec<f64> {
+        let mut out = vec![0.0; self.basis.count() * m];
+        let metric = times_metric(&self.basis, self.penalised, accelerations, m);
+        for (rows, vectors) in [(&self.accelerations, &metric[..]), (&self.values, curvature)] {
+            rows.iter().zip(vectors.chunks_exact(m)).for_each(|(row, x)| row.spread(x, &mut out));
+        }
+        out
+    }
+
+    /// The energy aᵀMa of one coordinate, given its acceleration at every knot.
+    pub fn energy(&self, acceleration: impl Fn(usize) -> Lane) -> Lane {
+        let mut energy = Lane::ZERO;
+        let mut left = acceleration(0);
+        for i in 0..self.basis.knots() - 1 {
+            let right = acceleration(i + 1);
+            let (own, other) = of_segment(self.penalised, self.basis.h(i));
+            energy += (left * left + right * right) * lane(own) + left * right * lane(2.0 * other);
+            left = right;
+        }
+        energy
+    }
+
+    /// Degrees of freedom of the curves without energy: straight lines, and parabolas if the jerk is penalised. Given
+    /// velocities and closed ends reduce them to constants.
     pub fn null(&self) -> f64 {
-        if self.basis.is_natural(0) && self.basis.is_natural(1) { 2.0 } else { 1.0 }
+        let constant = self.basis.is_closed() || self.basis.has_velocity(0) || self.basis.has_velocity(1);
+        match self.penalised {
+            _ if constant => 1.0,
+            Penalty::Acceleration => 2.0,
+            Penalty::Jerk => 3.0,
+        }
     }
 
     /// The number of coefficients without repetitions.
@@ -286,8 +351,8 @@ impl LinearProblem {
     /// The λ at which data and energy have about the same weight for splines that change direction at every knot: the
     /// mean weight of a coefficient divided by that of Ω on equal knots.
     pub fn balance(&self) -> f64 {
-        const EQUAL: f64 = 8.0 / 3.0;
-        self.gram.chunks(BAND).map(|row| row[0]).sum::<f64>() / (EQUAL * self.basis.count() as f64)
+        self.gram.chunks(BAND).map(|row| row[0]).sum::<f64>()
+            / (self.penalised.stiffness() * self.basis.count() as f64)
     }
 }
 
@@ -345,7 +410,7 @@ mod tests {
     #[test]
     fn energy_matches_the_second_derivative() {
         let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::Natural; 2]));
-        let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0]);
+        let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0], Penalty::Acceleration);
         let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
         let mut accelerations = vec![0.0; 6];
         linearized
@@ -353,7 +418,7 @@ mod tests {
             .iter()
             .zip(&mut accelerations)
             .for_each(|(row, x)| row.apply(&c, std::slice::from_mut(x)));
-        let mass = times_mass(&linearized.basis, &accelerations, 1);
+        let mass = times_metric(&linearized.basis, Penalty::Acceleration, &accelerations, 1);
         let energy: f64 = accelerations.iter().zip(&mass).map(|(a, b)| a * b).sum();
         let form: f64 = (0..6)
             .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
@@ -366,5 +431,31 @@ mod tests {
             })
             .sum();
         assert!((energy / simpson - 1.0).abs() < 1e-13 && (form / simpson - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn not_a_knot_ends_reproduce_cubics() {
+        let basis = Basis::new(&KNOTS, Ends::Open([EndCondition::NotAKnot; 2]));
+        let linearized = LinearProblem::new(basis, &[(0, 0.0)], &[0.0], Penalty::Jerk);
+        let basis = &linearized.basis;
+        let c: Vec<f64> = (0..6).map(|i| (2.0 * i as f64).sin()).collect();
+        for [outer, inner] in [[0, 1], [4, 3]] {
+            let [a, b] = [outer, inner].map(|segment| value(basis, &c, segment, 0.5, 3));
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+        // ∫ x'''² of a function whose third derivative is constant on every segment.
+        let square = |s: usize| value(basis, &c, s, 0.5, 3).powi(2) * basis.h(s);
+        let exact: f64 = (0..5).map(square).sum();
+        let acceleration = |i: usize| {
+            let mut x = [0.0];
+            linearized.accelerations[i].apply(&c, &mut x);
+            lane(x[0])
+        };
+        let energy = linearized.energy(acceleration).as_array()[0];
+        let form: f64 = (0..6)
+            .flat_map(|i| (0..=WIDTH.min(i)).map(move |d| (i, d)))
+            .map(|(i, d)| linearized.penalty[i * BAND + d] * c[i] * c[i - d] * if d > 0 { 2.0 } else { 1.0 })
+            .sum();
+        assert!((energy / exact - 1.0).abs() < 1e-12 && (form / exact - 1.0).abs() < 1e-11);
     }
 }

@@ -43,6 +43,16 @@ pub struct Factors {
     coupled: usize,
 }
 
+/// The matrix A, before it is factored.
+pub struct Whole {
+    /// Its band; of a closed curve that with repeated coefficients.
+    pub matrix: Banded,
+    /// The number of coupled coordinates.
+    pub coupled: usize,
+    /// The continuation of a closed curve, for the coupled coordinates.
+    pub periodic: Option<PeriodicCorrection>,
+}
+
 impl<'a> Misfit<'a> {
     /// For information matrices.
     pub fn matrices(linearized: &LinearProblem, m: usize, seen: Seen) -> Self {
@@ -101,8 +111,7 @@ impl<'a> Misfit<'a> {
         pull
     }
 
-    /// A for eight λ.
-    /// The holonomy of a closed curve couples the coordinates, too.
+    /// A for eight λ, factored.
     pub fn factored(
         &self,
         linearized: &LinearProblem,
@@ -111,6 +120,19 @@ impl<'a> Misfit<'a> {
         periodic: Option<&PeriodicCorrection>,
         lam: Lane,
     ) -> Factors {
+        let Whole { matrix, coupled, periodic } = self.matrix(linearized, m, jacobi, periodic, lam);
+        Factors { matrix: Factored::new(matrix, periodic.as_ref()), coupled }
+    }
+
+    /// A for eight λ. The holonomy of a closed curve couples the coordinates, too.
+    pub fn matrix(
+        &self,
+        linearized: &LinearProblem,
+        m: usize,
+        jacobi: Option<&JacobiOperator>,
+        periodic: Option<&PeriodicCorrection>,
+        lam: Lane,
+    ) -> Whole {
         let count = linearized.basis.count();
         // If the coupled matrix would be too large, the holonomy is omitted in the matrix, but not in its right-hand
         // side.
@@ -123,10 +145,15 @@ impl<'a> Misfit<'a> {
                 jacobi.map_or_else(|| of_each(&linearized.penalty, coupled, at), |jacobi| jacobi.penalty[at]);
             lam.mul_add(lane(stiff), lane(self.gram(coupled, at)))
         };
-        let banded = Banded::of(count * coupled, stride(coupled) - 1, entry);
-        let plain = PeriodicCorrection::plain(OVERLAP, coupled);
-        let periodic = periodic.map(|given| if given.m == coupled && few { given } else { &plain });
-        Factors { matrix: Factored::new(banded, periodic), coupled }
+        let matrix = Banded::of(count * coupled, stride(coupled) - 1, entry);
+        let periodic = periodic.map(|given| {
+            if given.m == coupled && few {
+                given.clone()
+            } else {
+                PeriodicCorrection::plain(OVERLAP, coupled)
+            }
+        });
+        Whole { matrix, coupled, periodic }
     }
 
     /// An entry of BᵀWB, either for each coordinate separately or for all of them.

@@ -1,5 +1,9 @@
 //! The smoothing problem, its options and its report.
 
+use crate::banded::stride;
+use crate::cyclic::PeriodicCorrection;
+use crate::misfit::Whole;
+use std::f64::consts::PI;
 use symspline_core::fit::{End, Ends as FitEnds};
 use symspline_core::scalar::few;
 
@@ -44,6 +48,47 @@ pub enum EndCondition {
     Natural,
     /// The first derivative is given.
     Velocity,
+    /// The third derivative is the same on the last two segments.
+    NotAKnot,
+}
+
+/// The derivative whose square the smoothing penalises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Penalty {
+    /// The acceleration ∇γ'.
+    Acceleration,
+    /// Its derivative ∇²γ', which is constant on every segment of a cubic spline in flat space. The ends are free.
+    Jerk,
+}
+
+impl Penalty {
+    /// The unit of λ for times in multiples of `spacing`.
+    pub fn unit(self, spacing: f64) -> f64 {
+        spacing.powi(self.power())
+    }
+
+    /// The power of time in the unit of λ.
+    pub fn power(self) -> i32 {
+        match self {
+            Penalty::Acceleration => 3,
+            Penalty::Jerk => 5,
+        }
+    }
+
+    /// The λ from which on curves have hardly any energy, in multiples of the λ at which data and energy have about the
+    /// same weight. For larger λ the data would vanish in rounding errors of A.
+    pub fn stiffest(self, knots: usize) -> f64 {
+        let power = self.power();
+        (10f64.powi(9 - power) * (knots as f64 / PI).powi(power + 1)).max(1e8)
+    }
+
+    /// The entries of Ω on the diagonal for equal knots: the energy of a cubic B-spline.
+    pub fn stiffness(self) -> f64 {
+        match self {
+            Penalty::Acceleration => 8.0 / 3.0,
+            Penalty::Jerk => 20.0,
+        }
+    }
 }
 
 /// The end conditions.
@@ -62,7 +107,8 @@ impl Ends {
             Ends::Periodic => FitEnds::Periodic,
             Ends::Open(kinds) => FitEnds::Open(few(|e| match kinds[e] {
                 EndCondition::Velocity => End::Velocity(&velocities[e]),
-                _ => End::Natural,
+                EndCondition::NotAKnot => End::NotAKnot,
+                EndCondition::Natural => End::Natural,
             })),
         }
     }
@@ -98,6 +144,8 @@ pub enum Loss {
 pub struct Options {
     /// The criterion that chooses λ if it is not given.
     pub criterion: Criterion,
+    /// The derivative whose square is penalised.
+    pub penalty: Penalty,
     /// The loss function.
     pub loss: Loss,
     /// The solver.
@@ -170,6 +218,49 @@ pub struct Smooth {
     /// The band of A⁻¹, see [`variance`](crate::variance): four numbers per coefficient. Open curves have as many
     /// coefficients as knots, closed curves two more.
     pub inverse: Vec<f64>,
+    /// The posterior of the coefficients; none if the iteration failed.
+    pub known: Option<Known>,
     /// The report.
     pub report: Report,
+}
+
+/// The matrix A of the linearised problem at the end of the iteration, see [`Posterior`](crate::posterior::Posterior).
+#[derive(Clone)]
+pub struct Known {
+    /// The number of coordinates that A couples: one if it is the same for all of them.
+    pub coupled: usize,
+    /// Its band, the entries (i, i − d) at i · 4 · coupled + d.
+    pub matrix: Vec<f64>,
+    /// The holonomy of a closed curve, coupled × coupled numbers; empty for an open curve.
+    pub turn: Vec<f64>,
+}
+
+impl Known {
+    /// From A for one λ.
+    pub(crate) fn new(whole: &Whole) -> Self {
+        let Whole { matrix, coupled, periodic } = whole;
+        let rows = stride(*coupled);
+        let entry = |at: usize| {
+            let (i, d) = (at / rows, at % rows);
+            if d <= i { matrix.at(i, i - d).as_array()[0] } else { 0.0 }
+        };
+        let turn = periodic.as_ref().map_or_else(Vec::new, |periodic| periodic.turn.clone());
+        Known { coupled: *coupled, matrix: (0..matrix.size * rows).map(entry).collect(), turn }
+    }
+
+    /// The same for m coupled coordinates.
+    pub fn of_all(&self, m: usize) -> Known {
+        if self.coupled == m {
+            return self.clone();
+        }
+        let (own, wide) = (stride(1), stride(m));
+        let mut matrix = vec![0.0; self.matrix.len() * m * m];
+        for (i, row) in self.matrix.chunks_exact(own).enumerate() {
+            for c in 0..m {
+                row.iter().enumerate().for_each(|(d, x)| matrix[(i * m + c) * wide + d * m] = *x);
+            }
+        }
+        let turn = if self.turn.is_empty() { Vec::new() } else { PeriodicCorrection::plain(1, m).turn };
+        Known { coupled: m, matrix, turn }
+    }
 }

@@ -3,7 +3,7 @@
 use crate::banded::Banded;
 use crate::choice::Linear;
 use crate::misfit::COUPLED;
-use crate::problem::{Criterion, Report, Tier};
+use crate::problem::{Criterion, Penalty, Report, Tier};
 use crate::robust::{Lam, ROUGH_ROUNDS, Robust, Stage};
 use symspline_core::space::{Erased, Origin};
 
@@ -46,6 +46,7 @@ pub struct Progress {
     /// The number of iterations before this stage of the fit.
     pub begun: usize,
     density: f64,
+    penalty: Penalty,
     /// The report so far.
     pub report: Report,
 }
@@ -53,7 +54,7 @@ pub struct Progress {
 impl Progress {
     /// For a given λ, unless it is too large, or for a λ to be chosen. `density` is the weight per knot where data
     /// are sparse.
-    pub fn new(lam: Option<f64>, stiffest: f64, density: f64) -> Self {
+    pub fn new(lam: Option<f64>, stiffest: f64, density: f64, penalty: Penalty) -> Self {
         let report = Report { at_bound: lam.is_some_and(|lam| lam > stiffest), ..Report::default() };
         Progress {
             lam: lam.map(|lam| lam.min(stiffest)),
@@ -68,6 +69,7 @@ impl Progress {
             least: 0.0,
             begun: 0,
             density,
+            penalty,
             report,
         }
     }
@@ -113,7 +115,10 @@ impl Progress {
     /// Whether full Gauss–Newton is allowed.
     pub fn may_take_gauss_newton(&self, space: &Erased, tier: Tier) -> bool {
         // In flat space the linearised solver equals full Gauss–Newton, whose dense blocks would limit the dimension.
-        tier == Tier::Auto && space.curvature() != 0.0 && space.dim() <= LARGE
+        self.penalty == Penalty::Acceleration
+            && tier == Tier::Auto
+            && space.curvature() != 0.0
+            && space.dim() <= LARGE
     }
 
     /// Updates λ at a curve, unless it is given or has converged, and the expected contraction of the linearised
@@ -153,16 +158,19 @@ impl Progress {
     }
 
     /// The expected contraction of the linearised solver without curvature in its matrix: `K²|γ'|²√(λ/w)`, with the
-    /// mean squared speed and the weight w per time where data are sparse.
+    /// mean squared speed and the weight w per time where data are sparse. √(λ/w) is the square of the time over which
+    /// the data are averaged; for the jerk it is the cube root.
     fn expect(&mut self, space: &Erased, speeds: &[f64], lam: f64) {
         let m = space.dim();
         let knots = speeds.len() / m;
         let square = speeds.iter().map(|u| u * u).sum::<f64>() / knots as f64;
         // Groups without a metric have no curvature bound K.
         let k = if space.curvature().is_nan() { 1.0 } else { space.curvature() };
-        self.report.kappa = k * k * square * (lam / self.density).sqrt();
-        self.with_curvature |=
-            self.report.kappa > SLOW && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
+        let exponent = 2.0 / f64::from(self.penalty.power() + 1);
+        self.report.kappa = k * k * square * (lam / self.density).powf(exponent);
+        self.with_curvature |= self.penalty == Penalty::Acceleration
+            && self.report.kappa > SLOW
+            && m.saturating_pow(3).saturating_mul(knots) <= COUPLED;
     }
 
     /// Records λ, degrees of freedom and noise of the present curve.
@@ -171,7 +179,7 @@ impl Progress {
     pub fn note(&mut self, linear: &Linear, inverse: &Banded, lam: f64, softness: f64) {
         let Linear { linearized, m, misfit, .. } = linear;
         let (count, rss) = (misfit.count(*m), misfit.rss_now(*m));
-        let unit = linearized.basis.spacing.powi(3);
+        let unit = self.penalty.unit(linearized.basis.spacing);
         let freedom = misfit.freedom(linearized, inverse).as_array()[0];
         // If λ hardly affects the curve, as for a geodesic, its best value fluctuates.
         self.settled |= self.report.rounds > 1 && (freedom - self.report.freedom).abs() < SETTLED * freedom;

@@ -72,8 +72,7 @@ pub fn smooth(space: &Erased, data: &[Data], options: &Options, monitor: &Monito
         track.unwrap_or_else(|| {
             let points = vec![f64::NAN; data.knots.len() * len];
             let plain = Robust::new(Loss::Linear, space.dim(), 0.0, true, true);
-            let mut none =
-                CurveFit::new(*data, space.dim(), data.knots.to_vec(), points, options.ends, plain);
+            let mut none = CurveFit::new(*data, space.dim(), data.knots.to_vec(), points, options, plain);
             none.retreat(space, options);
             none
         })
@@ -201,7 +200,7 @@ fn start<'a>(
             }
             let (m, own, sigma) = (space.dim(), data[*c], beginnings[*c].sigma);
             let robust = Robust::new(options.loss, m, sigma, own.sigma.is_some(), own.lam.is_none());
-            tracks[*c] = Some(CurveFit::new(own, m, knots.to_vec(), points, options.ends, robust));
+            tracks[*c] = Some(CurveFit::new(own, m, knots.to_vec(), points, options, robust));
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::banded::{Banded, WIDTH};
 use crate::cyclic::{Factored, PeriodicCorrection};
-use crate::linearized::Basis;
-use crate::path::positions;
+use crate::linearized::{Basis, Row};
+use crate::path::{Position, positions};
 use crate::problem::{EndCondition, Ends};
 use symspline_core::scalar::lane;
 
@@ -28,28 +28,19 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
     let basis = Basis::new(knots, ends);
     let inverse = Banded::of(basis.count(), WIDTH, |at| lane(rows[at]));
     let velocities = velocities_given_points(knots, ends);
-    let last = knots.len() - 1;
     let one = |t: &f64| {
-        let t = match ends {
-            Ends::Open(_) => *t,
-            Ends::Periodic => knots[0] + (t - knots[0]).rem_euclid(knots[last] - knots[0]),
-        };
-        let near = t.clamp(knots[0], knots[last]);
-        let (segment, s) = positions(knots, &[near])[0];
-        let (h, beyond) = (knots[segment + 1] - knots[segment], t - near);
-        let mut row = basis.row(segment, s, nu);
+        let ((segment, s), beyond) = position_of(knots, &basis, *t);
+        let h = knots[segment + 1] - knots[segment];
+        let row = row_at(knots, &basis, *t, nu);
         // The contribution of the velocities at the two knots: cubic Hermite functions.
         let mut hermite = match nu {
             0 => [h * s * (1.0 - s) * (1.0 - s), h * s * s * (s - 1.0)],
             _ => [(1.0 - s) * (1.0 - 3.0 * s), s * (3.0 * s - 2.0)],
         };
         if nu == 0 && beyond != 0.0 {
-            let slope = basis.row(segment, s, 1);
-            row.factors.iter_mut().zip(slope.factors).for_each(|(b, d)| *b += beyond / basis.spacing * d);
             hermite[s as usize] += beyond;
         }
-        let unit = if nu == 0 { 1.0 } else { basis.spacing * basis.spacing };
-        let known = row.square(&inverse).as_array()[0] / unit;
+        let known = row.square(&inverse).as_array()[0];
         if lam == 0.0 {
             return known;
         }
@@ -63,6 +54,34 @@ pub fn variance(knots: &[f64], rows: &[f64], lam: f64, ends: Ends, times: &[f64]
         known + (a * a * v(0, 0) + 2.0 * a * b * v(0, 1) + b * b * v(1, 1) + between) / lam
     };
     times.iter().map(one).collect()
+}
+
+/// The position of a time on the curve, and the time beyond its end. Closed curves continue periodically.
+fn position_of(knots: &[f64], basis: &Basis, t: f64) -> (Position, f64) {
+    let last = knots.len() - 1;
+    let t = if basis.is_closed() { knots[0] + (t - knots[0]).rem_euclid(knots[last] - knots[0]) } else { t };
+    let near = t.clamp(knots[0], knots[last]);
+    (positions(knots, &[near])[0], t - near)
+}
+
+/// The factors of the coefficients in a derivative at any time, in the unit of the knots. Beyond its ends the curve
+/// continues with constant velocity.
+pub fn row_at(knots: &[f64], basis: &Basis, t: f64, nu: usize) -> Row {
+    let ((segment, s), beyond) = position_of(knots, basis, t);
+    let mut row = basis.row(segment, s, nu);
+    let unit = basis.spacing.powi(-(nu as i32));
+    row.factors.iter_mut().for_each(|x| *x *= unit);
+    if beyond != 0.0 {
+        match nu {
+            0 => {
+                let slope = basis.row(segment, s, 1);
+                row.factors.iter_mut().zip(slope.factors).for_each(|(b, d)| *b += beyond / basis.spacing * d);
+            }
+            1 => {}
+            _ => row.factors = [0.0; 4],
+        }
+    }
+    row
 }
 
 /// The band of T⁻¹, where vᵀTv is the contribution of the velocities at knots to ∫ x''²: `4(v₀² + v₀v₁ + v₁²)/h` per

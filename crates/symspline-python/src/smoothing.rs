@@ -3,14 +3,15 @@
 use crate::arrays::{in_order, reserve, zeros};
 use crate::curves::EndOf;
 use crate::errors::invalid;
+use crate::estimation::{ends_named, penalty_named};
 use crate::space::Handle;
 use crate::watch::{Progress, is_heavy, watched};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyListMethods, PyTuple, PyTupleMethods};
 use symspline_engine::smoothing::{
-    Criterion, Data, EndCondition, Ends, Loss, Observations, Options, Report, Smooth, State, Tier, chi,
-    smooth as run, variance as variance_at,
+    Criterion, Data, Loss, Observations, Options, Report, Smooth, State, Tier, chi, smooth as run,
+    variance as variance_at,
 };
 use symspline_engine::space::{Ambient, Origin};
 
@@ -19,8 +20,12 @@ const HEAVY_FACTORS: usize = 1_000_000;
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Points at the knots, the band of A⁻¹, and the columns of the report.
-type Smoothed<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>);
+/// Points at the knots, the band of A⁻¹, the columns of the report, and A: its band, the holonomy of closed curves, and
+/// the number of coordinates that it couples.
+type Smoothed<'py> =
+    (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyTuple>, Systems<'py>);
+
+type Systems<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, usize);
 
 /// Smooths curves. `t` and `weights` contain all data, (N,) or (..., N); `information`, (..., N, m, m), contains
 /// matrices whose mean diagonals are `weights`; `knots` is (K,) or (..., K). `lam` and `sigma` have one value per
@@ -39,6 +44,7 @@ pub fn smooth<'py>(
     ends: Option<[EndOf<'py>; 2]>,
     criterion: &str,
     gamma: f64,
+    penalty: &str,
     loss: &str,
     method: &str,
     tol: f64,
@@ -48,6 +54,7 @@ pub fn smooth<'py>(
 ) -> PyResult<Smoothed<'py>> {
     let options = Options {
         criterion: criterion_named(criterion, gamma)?,
+        penalty: penalty_named(penalty)?,
         loss: match loss {
             "linear" => Loss::Linear,
             "huber" => Loss::Huber,
@@ -67,10 +74,7 @@ pub fn smooth<'py>(
         tol,
         max_iter,
         raise_lam,
-        ends: match &ends {
-            None => Ends::Periodic,
-            Some(kinds) => Ends::Open([kind(&kinds[0])?, kind(&kinds[1])?]),
-        },
+        ends: ends_named(ends.as_ref().map(|kinds| [0, 1].map(|e| kinds[e].0.clone())))?,
     };
     let none: &[f64] = &[];
     let vectors: [&[f64]; 2] = match &ends {
@@ -129,15 +133,39 @@ pub fn smooth<'py>(
         gathered(py, &shape, &found, |smooth| &smooth.points)?,
         gathered(py, &[batch, &[coefficients, 4]].concat(), &found, |smooth| &smooth.inverse)?,
         columns(py, &found)?,
+        systems(py, batch, coefficients, space.dim(), ends.is_none(), &found)?,
     ))
 }
 
-fn kind((name, _): &EndOf) -> PyResult<EndCondition> {
-    match name.as_str() {
-        "natural" => Ok(EndCondition::Natural),
-        "velocity" => Ok(EndCondition::Velocity),
-        _ => Err(invalid(format!("a smoothing spline cannot have the end condition {name:?}"))),
+/// A of all curves. It couples all coordinates if it does so for any of the curves.
+fn systems<'py>(
+    py: Python<'py>,
+    batch: &[usize],
+    coefficients: usize,
+    m: usize,
+    closed: bool,
+    found: &[Smooth],
+) -> PyResult<Systems<'py>> {
+    let coupled = found.iter().filter_map(|smooth| smooth.known.as_ref()).map(|known| known.coupled);
+    let size = coupled.max().unwrap_or(1).min(m.max(1));
+    let turns = if closed { size } else { 0 };
+    let matrix = zeros(py, &[batch, &[coefficients * size, 4 * size]].concat())?;
+    let turn = zeros(py, &[batch, &[turns, turns]].concat())?;
+    let (mut all, mut around) = (matrix.readwrite(), turn.readwrite());
+    let (mut all, mut around) = (all.as_slice_mut()?, around.as_slice_mut()?);
+    for smooth in found {
+        let (own, own_turn);
+        (own, all) = all.split_at_mut(coefficients * size * 4 * size);
+        (own_turn, around) = around.split_at_mut(turns * turns);
+        match smooth.known.as_ref().map(|known| known.of_all(size)) {
+            Some(known) => {
+                own.copy_from_slice(&known.matrix);
+                own_turn.copy_from_slice(&known.turn);
+            }
+            None => own.fill(f64::NAN),
+        }
     }
+    Ok((matrix, turn, size))
 }
 
 /// One component of all curves in an array.
@@ -159,7 +187,8 @@ fn gathered<'py>(
     Ok(out)
 }
 
-fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
+/// The criterion of this name.
+pub fn criterion_named(name: &str, gamma: f64) -> PyResult<Criterion> {
     Ok(match name {
         "gcv" => Criterion::Gcv { gamma },
         "reml" => Criterion::Reml,
@@ -195,8 +224,8 @@ fn columns<'py>(py: Python<'py>, found: &[Smooth]) -> PyResult<Bound<'py, PyTupl
     Ok(all.to_tuple())
 }
 
-/// Variances of a coordinate of one smoothed curve at given times, for noise of variance one. `fixed` marks the ends
-/// with a given velocity; it is None for a closed curve.
+/// Variances of a coordinate of one smoothed curve at given times, for noise of variance one. `kinds` are the kinds of
+/// the ends; None for a closed curve.
 #[pyfunction]
 pub fn smoothing_variance<'py>(
     py: Python<'py>,
@@ -205,14 +234,9 @@ pub fn smoothing_variance<'py>(
     lam: f64,
     x: Array<'py>,
     nu: usize,
-    fixed: Option<[bool; 2]>,
+    kinds: Option<[String; 2]>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let ends = match fixed {
-        None => Ends::Periodic,
-        Some(fixed) => {
-            Ends::Open(fixed.map(|fixed| if fixed { EndCondition::Velocity } else { EndCondition::Natural }))
-        }
-    };
+    let ends = ends_named(kinds)?;
     let (knots, band, x) = (in_order(&knots)?, in_order(&band)?, in_order(&x)?);
     Ok(PyArray1::from_vec(py, variance_at(knots, band, lam, ends, x, nu)))
 }

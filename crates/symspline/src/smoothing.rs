@@ -209,6 +209,7 @@ impl Smoothing {
                 Criterion::Reml => engine::Criterion::Reml,
                 Criterion::Cp => engine::Criterion::Cp,
             },
+            penalty: engine::Penalty::Acceleration,
             loss: match self.loss {
                 Loss::Linear => engine::Loss::Linear,
                 Loss::Huber => engine::Loss::Huber,

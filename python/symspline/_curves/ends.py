@@ -97,13 +97,12 @@ def is_closed(bc_type: Any) -> bool:
     return isinstance(bc_type, str) and bc_type == "periodic"
 
 
-def fixed_velocities(bc_type: Any) -> tuple[bool, bool] | None:
-    """Whether each end has a prescribed velocity; None for a closed curve."""
+def end_kinds(bc_type: Any) -> list[str] | None:
+    """Return the kind of each end as the core names it, without vectors; None for a closed curve."""
     if is_closed(bc_type):
         return None
-    first, last = (bc_type, bc_type) if isinstance(bc_type, str) else bc_type
-    fixed = [end == "clamped" if isinstance(end, str) else end[0] == 1 for end in (first, last)]
-    return fixed[0], fixed[1]
+    ends = (bc_type, bc_type) if isinstance(bc_type, str) else bc_type
+    return ["velocity" if end == "clamped" else end if isinstance(end, str) else _ORDERS[end[0]] for end in ends]
 
 
 def take_batch(bc_type: Any, index: Any, batch_axes: int, space: Space[Any]) -> Any:

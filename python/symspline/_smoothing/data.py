@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .._arrays import as_array, refuse, short_repr
 from .._core import ValidationError
-from .._curves.ends import End, map_ends
+from .._curves.ends import End, end_kinds, map_ends, split_ends
 from .._curves.fit import Points, read, read_ends, validated
 from .._faults import INVALID, Fault
 from .._input import times_of
@@ -19,6 +19,7 @@ from .._options import with_atol
 from .._spaces import Array, Doubles, Space, factors_of
 from .._time import TimeAxis, knots_of
 from .._typing import TimesLike
+from .._validation import one_of
 from .factors import grouped, smoothed_spaces, split
 from .precision import Precision, read_precision
 
@@ -107,13 +108,36 @@ def read_noisy(
         each = zip(data, grouped(space, precisions), strict=True)
         data = [_without_missing(part, [one.weights for one in own]) for part, own in each]
     ends = read_ends(bc_type, space, batch)
-    for kind, _ in (end for own in ends for end in own or []):
+    return SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends
+
+
+def checked_ends(bc_type: Any, penalty: Any, method: Any) -> Any:
+    """Return the end conditions, by default those that belong to the penalty.
+
+    Raises
+    ------
+    ValidationError
+        If the penalty is unknown, or the end conditions or the method are not available for it.
+    """
+    if one_of(penalty, "penalty", "acceleration", "jerk") == "jerk":
+        if isinstance(method, str) and method == "newton":
+            raise ValidationError("method='newton' is not available for penalty='jerk'. Use 'auto' or 'linearized'.")
+        if bc_type is not None and not (isinstance(bc_type, str) and bc_type in ("not-a-knot", "periodic")):
+            raise ValidationError(
+                f"bc_type {short_repr(bc_type)} is not available for penalty='jerk', whose ends are free. Use "
+                "'not-a-knot' or 'periodic'."
+            )
+        return bc_type or "not-a-knot"
+    ends = "natural" if bc_type is None else bc_type
+    if not isinstance(ends, str):
+        split_ends(ends)
+    for kind in end_kinds(ends) or []:
         if kind not in ("natural", "velocity"):
             raise ValidationError(
                 f"bc_type {kind!r} is not available for smoothing splines. Use 'natural', 'clamped', 'periodic' or "
                 "(1, velocity)."
             )
-    return SmoothingData(time_axis, shown_times, times, [], precisions, batch), data, ends
+    return ends
 
 
 def valid_curves(

@@ -32,12 +32,14 @@ from .._typing import (
     Progress,
     SmoothingBCType,
     SmoothingMethod,
+    SmoothingPenalty,
     TimesLike,
 )
 from ..manifolds._manifold import refuse_functions
 from .data import (
     Knots,
     SmoothingData,
+    checked_ends,
     has_all_times,
     in_gaps,
     knots_for,
@@ -96,8 +98,9 @@ def make_smoothing_spline(
     knots: TimesLike | None = None,
     criterion: Criterion = "gcv",
     gamma: float = 1.4,
+    penalty: SmoothingPenalty = "acceleration",
     sigma: Numbers | None = None,
-    bc_type: SmoothingBCType = "natural",
+    bc_type: SmoothingBCType | None = None,
     loss: Loss = "linear",
     method: SmoothingMethod = "auto",
     tol: float = 1e-3,
@@ -110,9 +113,9 @@ def make_smoothing_spline(
 ) -> SmoothingSpline[Any, Any]:
     r"""Fit a C² curve close to noisy points.
 
-    The curve minimises a weighted sum of squared distances to the data and the integrated squared acceleration. The
-    data determine the weight λ between the two, unless `lam` is given. On a Euclidean space the result equals SciPy's
-    ``make_smoothing_spline`` with the same λ.
+    The curve minimises a weighted sum of squared distances to the data and the integrated squared acceleration or
+    jerk. The data determine the weight λ between the two, unless `lam` is given. On a Euclidean space the result equals
+    SciPy's ``make_smoothing_spline`` with the same λ.
 
     Parameters
     ----------
@@ -126,9 +129,9 @@ def make_smoothing_spline(
         and noise level, because rigid motions have no invariant metric. The curve is the spline of the space through
         the smoothed poses.
     lam : float, array_like or tuple, optional
-        Weight λ ≥ 0 of the bending energy, in units of weight · time³. With 0 the curve is as close to the data as its
-        knots allow; large values give a geodesic. For a batch also an array with one value per curve; for products and
-        poses also a tuple with one entry per part. By default `criterion` chooses λ.
+        Weight λ ≥ 0 of the penalty, in units of weight · time³, or weight · time⁵ for the jerk. With 0 the curve is as
+        close to the data as its knots allow; large values give a geodesic. For a batch also an array with one value per
+        curve; for products and poses also a tuple with one entry per part. By default `criterion` chooses λ.
     weights : array_like or tuple, optional
         Weights ≥ 0 of the data, shape (N,) or (..., N): the inverse variances of their noise up to a common factor.
         Points of weight 0 are ignored and may be NaN. Alternatively information matrices W, shape (N, m, m) or (...,
@@ -149,12 +152,17 @@ def make_smoothing_spline(
     gamma : float, default 1.4
         Weight of a degree of freedom in ``"gcv"``, at least 1. With 1, which is cross-validation as Craven and Wahba
         define it, the chosen curve occasionally passes through all data.
+    penalty : {"acceleration", "jerk"}, default "acceleration"
+        The derivative whose squared integral is the penalty. With ``"jerk"``, which suits motions with accelerations,
+        large λ give curves of constant acceleration, and the ends are free.
     sigma : float, array_like or tuple, optional
         Standard deviation of the noise in one coordinate for weight one, as a length in the space: radians on the unit
         sphere. Also an array with one value per curve, or a tuple for products and poses.
-    bc_type : {"natural", "clamped", "periodic"} or pair, default "natural"
-        End conditions, or ``(1, velocity)`` at either end, as for `CubicSpline`. Velocities must be tangent at the
-        first and the last datum; they are transported to the curve. The period of a closed curve is that of its knots.
+    bc_type : {"natural", "clamped", "periodic", "not-a-knot"} or pair, optional
+        End conditions, or ``(1, velocity)`` at either end, as for `CubicSpline`. The default is ``"natural"``, and
+        ``"not-a-knot"`` for the jerk, for which only this and ``"periodic"`` are available. Velocities must be tangent
+        at the first and the last datum; they are transported to the curve. The period of a closed curve is that of its
+        knots.
     loss : {"linear", "huber", "cauchy"}, default "linear"
         Least squares, or a loss that limits the influence of outliers. Use ``"cauchy"`` for many or distant outliers.
     method : {"auto", "linearized", "newton"}, default "auto"
@@ -210,8 +218,9 @@ def make_smoothing_spline(
 
     .. math:: \sum_j w_j\, d(y_j, \gamma(t_j))^2 + \lambda \int \lVert\nabla_{\gamma'}\gamma'\rVert^2 \, dt
 
-    among the C² splines with the given knots. For information matrices, :math:`e_j^T W_j e_j` replaces
-    :math:`w_j d^2`, where :math:`e_j` are the coordinates of ``space.log(y, γ(t))``.
+    among the C² splines with the given knots, or the same with :math:`\nabla_{\gamma'}^2\gamma'`, whose integral is a
+    sum over the segments of differences of the accelerations at the knots. For information matrices,
+    :math:`e_j^T W_j e_j` replaces :math:`w_j d^2`, where :math:`e_j` are the coordinates of ``space.log(y, γ(t))``.
 
     References
     ----------
@@ -238,13 +247,14 @@ def make_smoothing_spline(
     check_progress(progress)
     if criterion == "cp" and sigma is None:
         raise ValidationError("criterion='cp' needs the standard deviation of the noise. Pass sigma.")
+    bc_type = checked_ends(bc_type, penalty, method)
     for name, word in (("criterion", criterion), ("loss", loss), ("method", method)):
         if not isinstance(word, str):
             raise ValidationError(f"{name} must be a word, not {short_repr(word)}")
     gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
     tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
     most = whole_number(max_iter, "max_iter", 1)
-    options = SolverOptions(criterion, gamma, loss, method, tol, most, False)
+    options = SolverOptions(criterion, gamma, penalty, loss, method, tol, most, False)
     whole, data, of_factors = read_noisy(t, points, space, weights, frames, bc_type, atol)
     batch = whole.batch
     lams, sigmas = _in_parts(space, lam, "lam", batch), _in_parts(space, sigma, "sigma", batch)
@@ -271,6 +281,11 @@ def make_smoothing_spline(
         each = zip(points_of(noisy, space), noisy.precisions, _chosen(lams, at), sigmas, ends, strict=True)
         return [smoothed(part, own, p, lam, sigma, end, *shared) for (part, own), p, lam, sigma, end in each]
 
+    if penalty == "jerk" and every.times.shape[-1] < 4:
+        raise ValidationError(
+            f"penalty='jerk' needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data, or use "
+            "penalty='acceleration'."
+        )
     if is_closed(bc_type) and every.times.shape[-1] < 4:
         raise ValidationError(
             f"A closed curve needs at least 4 knots, but there are {every.times.shape[-1]}. Pass more data or knots."

@@ -15,6 +15,7 @@ from .._faults import UNCONVERGED, Fault
 from .._spaces import Array, Doubles, Space
 from .._typing import Progress
 from .data import Knots, SmoothingData
+from .posterior import Posterior
 from .precision import Precision
 from .report import METHODS, SmoothingReport
 
@@ -36,6 +37,8 @@ class Smoothed(NamedTuple):
         The λ that belongs to `band`; for a robust loss, that of the pseudo-data.
     sigma : float or ndarray
         Standard deviation of one coordinate that scales the bands, estimated or given.
+    posterior : Posterior or None
+        Matrix from which covariances and samples follow; None for curves from files of older versions.
     between : bool
         Whether the variance between the knots is included. It is if there is a knot at every time of the data: the
         curve is then the mean of a process. With other knots it is a spline, which has no such freedom.
@@ -46,11 +49,17 @@ class Smoothed(NamedTuple):
     band_lam: Any
     sigma: Any
     between: bool
+    posterior: Posterior | None = None
 
     def map(self, function: Any) -> Smoothed:
         """Apply a function to all arrays, such as the selection of some curves."""
         return Smoothed(
-            self.report.map(function), function(self.band), function(self.band_lam), function(self.sigma), self.between
+            self.report.map(function),
+            function(self.band),
+            function(self.band_lam),
+            function(self.sigma),
+            self.between,
+            self.posterior and self.posterior.map(function),
         )
 
 
@@ -59,6 +68,7 @@ class SolverOptions(NamedTuple):
 
     criterion: str
     gamma: float
+    penalty: str
     loss: str
     method: str
     tol: float
@@ -88,7 +98,7 @@ def smoothed(
     if matrices is not None:
         matrices = np.ascontiguousarray(np.broadcast_to(matrices, (*batch, *matrices.shape[-3:])))
     t, y, at = (np.ascontiguousarray(x) for x in (noisy.times, small._as_doubles(inside), knots.times))
-    found, band, columns = _core.smooth(
+    found, band, columns, (matrix, turn, size) = _core.smooth(
         small._handle, t, y, precision.weights, matrices, at, lam, sigma, ends, *options, progress
     )
     state, iterations, lams, band_lam, at_bound, df, noise, step, rate, _, exact, scale = (
@@ -103,7 +113,9 @@ def smoothed(
         if kind
     ]
     on_space = numbers if span is None else span.embed(numbers)
-    return on_space, Smoothed(report, band, band_lam, scale, between), faults
+    # Coordinates in a span of lower dimension are not those of the space.
+    posterior = Posterior.of(matrix, turn, size) if span is None or size == 1 else None
+    return on_space, Smoothed(report, band, band_lam, scale, between, posterior), faults
 
 
 def _reason(state: str, number: int, report: SmoothingReport, options: SolverOptions) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Generic, Self, overload
 
@@ -10,17 +10,18 @@ import numpy as np
 
 from .. import _core
 from .._archive import Entries, read_fitted, read_times
-from .._arrays import checked_number
+from .._arrays import checked_number, short_repr, whole_number
 from .._core import ValidationError
 from .._cubic import CubicSpline
 from .._curves.curve import CurveArrays, UncertaintyBand
-from .._curves.ends import fixed_velocities, is_closed
+from .._curves.ends import end_kinds, is_closed
 from .._options import order_of
 from .._spaces import Array, Doubles, Product, Space, factors_of
 from .._time import TimeAxis
-from .._typing import AnyArray, FloatArray, Number, P, TimesLike
+from .._typing import AnyArray, AnyArrays, CovarianceOrder, FloatArray, Number, P, TimesLike
 from .data import SmoothingData
-from .factors import grouped, is_several, smoothed_spaces
+from .factors import grouped, is_several, join, parts_of_factor, smoothed_spaces, split
+from .posterior import Parameter, Posterior, frames_at
 from .report import SmoothingReport
 from .solve import Smoothed
 from .stored import noise_state, read_noise
@@ -134,6 +135,11 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return self._each([found.sigma for found in self._smoothed])
 
     @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Unknown constants that `estimate` found, by name, each with ``value``, ``std`` and ``cov``."""
+        return {}
+
+    @property
     def data(self) -> tuple[AnyArray, P]:
         """Times and points that were smoothed."""
         return self._noisy.t, self._in_factors(self._noisy.points)
@@ -216,11 +222,8 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         True
         """
         nu = order_of(nu, 1)
-        times, per_curve = self._time_axis.at(x, self._batch, False)
-        if not np.isfinite(times).all():
-            raise ValidationError("x must be finite")
+        times, own, per_curve = self._finite_times(x)
         batch = self._batch
-        own = times.shape[len(batch) :] if per_curve else times.shape
         found = []
         for part in self._smoothed:
             out = np.empty((*batch, *own))
@@ -232,13 +235,13 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
 
     def _spread(self, part: Smoothed, index: tuple[int, ...], x: Doubles, nu: int) -> Doubles:
         """Return the standard deviation of one curve in one part at times x of the core."""
-        knots = self._times[index] if self._times.ndim > 1 else self._times
+        knots = self._knots_of(index)
         lam, sigma = (np.asarray(value)[index].item() for value in (part.band_lam, part.sigma))
         if not part.between:
             # With λ = 0 the curve has no variance between the knots besides that of the spline.
             lam = 0.0
         knots, band, x = (np.ascontiguousarray(own) for own in (knots, part.band[index], x))
-        variance = _core.smoothing_variance(knots, band, lam, x, nu, fixed_velocities(self._bc_type))
+        variance = _core.smoothing_variance(knots, band, lam, x, nu, end_kinds(self._bc_type))
         return np.asarray(sigma * np.sqrt(variance))
 
     @overload
@@ -294,8 +297,259 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         spreads = whole.std(x)
         each = spreads if is_several(self.space) else (spreads,)
         return self._each(
-            [_radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
+            [radius(part, level) * spread for part, spread in zip(smoothed_spaces(self.space), each, strict=True)]
         )
+
+    @overload
+    def cov(
+        self: SmoothingSpline[Any, SmoothingReport],
+        x: TimesLike,
+        y: TimesLike | None = None,
+        *,
+        nu: CovarianceOrder = 0,
+    ) -> FloatArray: ...
+
+    @overload
+    def cov(
+        self: SmoothingSpline[Any, tuple[SmoothingReport, ...]],
+        x: TimesLike,
+        y: TimesLike | None = None,
+        *,
+        nu: CovarianceOrder = 0,
+    ) -> tuple[FloatArray, ...]: ...
+
+    def cov(self, x: TimesLike, y: TimesLike | None = None, *, nu: CovarianceOrder = 0) -> Any:
+        r"""Compute the covariance of the curve in the frames along it.
+
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times, of any shape.
+        y : array_like of float or datetime64, optional
+            Other times of the same shape. By default, the covariance at each time of x is returned.
+        nu : {0, 1, "joint"}, default 0
+            0 for the point, 1 for the velocity, ``"joint"`` for both, point first. With `y` it must be 0.
+
+        Returns
+        -------
+        ndarray or tuple, shape ``(*batch axes, *x.shape, m, m)``
+            Covariance of the coordinates in ``frames(x)``, with m = ``space.dim`` or twice that for ``"joint"``; for
+            products and poses a tuple with one entry per part. With `y`, rows belong to x and columns to y.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite, `nu` is invalid, or the curve comes from a file of an older version.
+
+        See Also
+        --------
+        SmoothingSpline.frames : Compute the frames to which covariances refer.
+        SmoothingSpline.std : Compute the standard deviation of the curve.
+        SmoothingSpline.sample : Draw curves from the posterior.
+
+        Notes
+        -----
+        The covariance is :math:`\sigma^2 b(t)^T A^{-1} b(t)` for the B-splines b and the matrix A of the linearised
+        problem, which couples the coordinates if weights are matrices or the space is strongly curved. `std` adds
+        the variance between the knots as described there, and so do the covariances of one time for ``nu`` 0 and 1.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 1, 50)
+        >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
+        >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1")
+        >>> bool(np.isclose(s.cov(0.5)[0, 0], s.std(0.5) ** 2)), s.cov(0.5, nu="joint").shape
+        (True, (2, 2))
+        """
+        joint = isinstance(nu, str)
+        if joint and nu != "joint":
+            raise ValidationError(f"nu must be 0, 1 or 'joint', not {short_repr(nu)}")
+        orders = [0, 1] if joint else [order_of(nu, 1)]
+        if y is not None and orders != [0]:
+            raise ValidationError("nu must be 0 for the covariance of two times")
+        x, shape, per_curve = self._finite_times(x)
+        other = None
+        if y is not None:
+            other, other_shape, _ = self._finite_times(y)
+            if other_shape != shape:
+                raise ValidationError(f"y has shape {other_shape}, but x has shape {shape}")
+        found = []
+        for part, space in zip(self._smoothed, smoothed_spaces(self.space), strict=True):
+            size = len(orders) * space.dim
+            out = np.empty((*self._batch, *shape, size, size))
+            for index in np.ndindex(self._batch):
+                at, to = (None if own is None else np.ravel(own[index] if per_curve else own) for own in (x, other))
+                out[index] = self._covariance(part, space, index, at, to, orders).reshape(*shape, size, size)
+            found.append(out)
+        return self._each(found)
+
+    def _covariance(
+        self, part: Smoothed, space: Space, index: tuple[int, ...], x: Any, y: Any, orders: list[int]
+    ) -> Doubles:
+        knots, kinds = self._knots_of(index), end_kinds(self._bc_type)
+        sigma = np.asarray(part.sigma)[index].item()
+        found = self._posterior(part).covariance(space, knots, index, kinds, x, y, orders)
+        if part.between and y is None and len(orders) == 1:
+            lam = np.asarray(part.band_lam)[index].item()
+            band = np.ascontiguousarray(part.band[index])
+            own, plain = (_core.smoothing_variance(knots, band, lam, x, orders[0], kinds) for lam in (lam, 0.0))
+            found += (own - plain)[:, None, None] * np.eye(space.dim)
+        return np.asarray(sigma**2 * found)
+
+    def _posterior(self, part: Smoothed) -> Posterior:
+        if part.posterior is None:
+            raise ValidationError(
+                "this curve comes from a file of an older version, which has no covariances. Fit it again."
+            )
+        return part.posterior
+
+    def _knots_of(self, index: tuple[int, ...]) -> Doubles:
+        return np.ascontiguousarray(self._times[index] if self._times.ndim > 1 else self._times)
+
+    def _finite_times(self, x: TimesLike) -> tuple[Doubles, tuple[int, ...], bool]:
+        """Return times of the core, their shape for one curve, and whether every curve has its own."""
+        times, per_curve = self._time_axis.at(x, self._batch, False)
+        if not np.isfinite(times).all():
+            raise ValidationError("x must be finite")
+        return times, times.shape[len(self._batch) :] if per_curve else times.shape, per_curve
+
+    @overload
+    def frames(self: SmoothingSpline[P, SmoothingReport], x: TimesLike) -> P: ...
+
+    @overload
+    def frames(self: SmoothingSpline[Any, tuple[SmoothingReport, ...]], x: TimesLike) -> AnyArrays: ...
+
+    def frames(self, x: TimesLike) -> Any:
+        """Compute the frames along the curve to which covariances refer.
+
+        Parameters
+        ----------
+        x : array_like of float or datetime64
+            Times between the knots, of any shape.
+
+        Returns
+        -------
+        ndarray or tuple, shape ``(*batch axes, *x.shape, m, *point_shape)``
+            Tangent vectors at the points of the curve, m = ``space.dim`` at each; for products and poses a tuple with
+            one entry per part. They are orthonormal if the space has a metric, and change along the curve by parallel
+            transport.
+
+        Raises
+        ------
+        ValidationError
+            If a time is not finite or lies outside the knots.
+
+        See Also
+        --------
+        SmoothingSpline.cov : Compute the covariance in these frames.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> noisy = ss.Sphere(2).project(np.random.default_rng(0).standard_normal((20, 3)) * 0.1 + [0, 0, 1])
+        >>> ss.make_smoothing_spline(None, noisy, "sphere:2", lam=1.0).frames([1.5, 2.0]).shape
+        (2, 2, 3)
+        """
+        times, shape, per_curve = self._finite_times(x)
+        found = []
+        for space, points, p in self._in_parts(times, per_curve):
+            out = np.empty((*self._batch, *shape, space.dim, *space.point_shape), space.dtype)
+            for index in np.ndindex(self._batch):
+                at = np.ravel(times[index] if per_curve else times)
+                rows = frames_at(
+                    space, self._knots_of(index), points[index], at, p[index].reshape(-1, *space.point_shape)
+                )
+                out[index] = rows.reshape(*shape, *rows.shape[1:])
+            found.append(out)
+        return self._each(found)
+
+    def _in_parts(self, times: Doubles, per_curve: bool) -> list[tuple[Space, Array, Array]]:
+        """Return every space in which data were smoothed, the points at the knots, and those at times of the core."""
+        found: list[tuple[Space, Array, Array]] = []
+        for factor, curve in zip(factors_of(self.space), self._curve.parts, strict=True):
+            values = curve.evaluate(times, "point", "raise", per_curve)
+            found += zip(parts_of_factor(factor), split(factor, curve.points), split(factor, values), strict=True)
+        return found
+
+    def sample(self, rng: np.random.Generator, n: int) -> CubicSpline[P]:
+        """Draw curves from the posterior distribution.
+
+        Anything that is computed from such curves has the distribution that noise and smoothness imply: lengths,
+        courses, times of arrival.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of random numbers.
+        n : int
+            Number of curves.
+
+        Returns
+        -------
+        CubicSpline
+            A batch of n curves. For a batch of shape (...), the result has the batch axes (n, ...).
+
+        Raises
+        ------
+        ValidationError
+            If n is not a positive integer.
+        ConvergenceError
+            If no spline joins the points of a sample: the posterior is too wide for the knots.
+
+        See Also
+        --------
+        SmoothingSpline.cov : Compute the covariance of the curve.
+
+        Notes
+        -----
+        The knots move by a sample of the normal distribution in the frames along the curve, and one batched fit joins
+        them. The variance between the knots, which `std` includes, is not part of it.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import symspline as ss
+        >>> t = np.linspace(0, 1, 50)
+        >>> y = np.sin(6 * t) + 0.1 * np.random.default_rng(0).standard_normal(50)
+        >>> s = ss.make_smoothing_spline(t, y[:, None], "r:1")
+        >>> lengths = s.sample(np.random.default_rng(1), 200).length()
+        >>> lengths.shape, bool(0 < lengths.std() < 0.2)
+        ((200,), True)
+        """
+        if not hasattr(rng, "standard_normal"):
+            raise TypeError(f"rng must be a numpy.random.Generator, not {short_repr(rng)}")
+        n = whole_number(n, "n", 1)
+        kinds = end_kinds(self._bc_type)
+        moved: list[Array] = []
+        drawn: dict[tuple[int, tuple[int, ...]], Doubles] = {}
+        per_curve = self._times.ndim > 1
+        parts = self._in_parts(self._times, per_curve)
+        for part, (space, whole, _) in zip(self._smoothed, parts, strict=True):
+            posterior = self._posterior(part)
+            out = np.empty((n, *whole.shape), space.dtype)
+            for index in np.ndindex(self._batch):
+                knots = self._knots_of(index)
+                # Coupled parts share one sample.
+                key = (id(posterior.band), index)
+                if key not in drawn:
+                    drawn[key] = posterior.samples(space, knots, index, kinds, rng, n)
+                first = posterior.first
+                own = drawn[key][..., first : first + space.dim] * np.asarray(part.sigma)[index].item()
+                points = whole[index]
+                frames = frames_at(space, knots, points, knots, points)
+                vectors = np.einsum("nkj,kj...->nk...", own, frames)
+                out[(slice(None), *index)] = space.project(space._apply("exp", p=points, v=vectors))
+            if kinds is None:
+                axis = len(self._batch) + 1
+                out[(slice(None),) * axis + (-1,)] = out[(slice(None),) * axis + (0,)]
+            moved.append(out)
+        factors = factors_of(self.space)
+        joined = [join(factor, rows) for factor, rows in zip(factors, grouped(self.space, moved), strict=True)]
+        through: P = self._in_factors(joined)
+        return CubicSpline(self._t, through, self.space, bc_type=self._bc_type, extrapolate=self._extrapolate)
 
     # ---- plots ----
 
@@ -311,7 +565,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         noisy = self._noisy.map(itemgetter(index), ())
         # The parts of a pose have different units; plots show the band of the position.
         radii = [
-            _radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
+            radius(own[-1][0], 0.95) * self._spread(own[-1][1], index, x, 0)
             for own in grouped(self.space, zip(smoothed_spaces(self.space), self._smoothed, strict=True))
         ]
         several = is_several(self.space)
@@ -360,7 +614,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         return f"<SmoothingSpline on {self.space!r}: {self._batch_text}{data} data, {knots} knots>"
 
 
-def _radius(space: Space, level: float) -> float:
+def radius(space: Space, level: float) -> float:
     """Return the radius of the ball that contains a normal vector with this probability, in standard deviations."""
     return float(np.sqrt(_core.chi_squared(space.dim, level)))
 

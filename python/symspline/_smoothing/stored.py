@@ -14,6 +14,7 @@ from .._spaces import Space, factors_of
 from .._time import TimeAxis
 from .data import SmoothingData
 from .factors import is_several, smoothed_spaces
+from .posterior import Posterior
 from .precision import Precision
 from .report import SmoothingReport
 from .solve import Smoothed
@@ -24,7 +25,10 @@ def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed
     state: dict[str, Any] = {
         **times_state("data_t", noisy.t, noisy.time_axis),
         "noise": [
-            vars(own.report) | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
+            vars(own.report)
+            | {"band_lam": own.band_lam, "scale": own.sigma, "between": own.between}
+            # Version 1 has no matrices.
+            | ({} if own.posterior is None else {"posterior": True})
             for own in smoothed
         ],
     }
@@ -36,6 +40,8 @@ def noise_state(space: Space[Any], noisy: SmoothingData, smoothed: list[Smoothed
     for i, (precision, own) in enumerate(zip(noisy.precisions, smoothed, strict=True)):
         suffix = _suffix(space, i)
         state["band" + suffix] = own.band
+        if own.posterior is not None:
+            state |= {"matrix" + suffix: own.posterior.band, "turn" + suffix: own.posterior.turn}
         if not alike:
             state["data_weights" + suffix] = precision.weights
         if precision.information is not None:
@@ -103,12 +109,29 @@ def read_noise(
             band, numbers = state["band" + suffix], dict(numbers)
             lam, scale = (read_field(key, numbers.pop(key), batch, dtype=np.float64) for key in ("band_lam", "scale"))
             between = read_field("between", numbers.pop("between"), (), dtype=np.bool_)
+            known = numbers.pop("posterior", False)
             report = read_report(SmoothingReport, numbers, batch)
             # A closed curve repeats its first coefficients at the end.
             good = np.asarray(report.converged)
             _check("bands", band, (*batch, knots + (2 if closed else 0), 4), finite=good)
-            smoothed.append(Smoothed(report, band, lam, scale, between))
+            posterior = None
+            if known:
+                posterior = read_posterior(state, suffix, own.dim, band.shape[-2], batch, closed, good)
+            smoothed.append(Smoothed(report, band, lam, scale, between, posterior))
     return SmoothingData(time_axis, t, times, points, precisions, batch), smoothed
+
+
+def read_posterior(
+    state: Entries, suffix: str, m: int, coefficients: int, batch: tuple[int, ...], closed: bool, good: Any
+) -> Posterior:
+    """Return the posterior of a curve with a number of coefficients, each of m coordinates."""
+    matrix, turn = state["matrix" + suffix], state["turn" + suffix]
+    size = turn.shape[-1] if closed else matrix.shape[-1] // 4
+    if size not in (1, m):
+        raise ValidationError(f"the matrices have shape {matrix.shape}")
+    _check("matrices", matrix, (*batch, coefficients * size, 4 * size), finite=good)
+    _check("matrices", turn, (*batch, *(2 * (size if closed else 0,))), finite=good)
+    return Posterior.of(matrix, turn, size)
 
 
 def _check(what: str, array: NDArray[Any], *shapes: tuple[int, ...], finite: Any = True) -> None:

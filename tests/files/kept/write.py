@@ -11,11 +11,16 @@ import numpy as np
 
 import symspline as ss
 
-VERSION = 1
+VERSION = 2
 FOLDER = Path(__file__).parent
 P = np.eye(3)
 DATES = np.array(["2024-01-01T00", "2024-01-01T06", "2024-01-02T00"], "M8[m]")
 POSES = (np.broadcast_to(np.eye(3), (3, 3, 3)), np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]]))
+TURNS = ss.rotations.from_rotation_vectors(np.arange(6)[:, None] * [0, 0.1, 0.2])
+MEASURED = [
+    ss.measure.Points(np.arange(6), TURNS, sigma=0.1),
+    ss.measure.BodyRates([1, 2.5, 4], [[0, 0.1, 0.25]] * 3, sigma=0.05, bias=ss.measure.Constant(3)),
+]
 
 
 def curves():
@@ -32,6 +37,7 @@ def curves():
         "complex": ss.CubicSpline(None, [[1, 0], [0.6, 0.8j]], "cp:1", bc_type=((1, [0, 0.5j]), "natural")),
         "hermite": ss.HermiteSpline([0, 1], P[:2], [[0, 0.5, 0], [0.25, 0, 0]], "sphere:2"),
         "smoothing": smooth,
+        "estimate": ss.estimate(MEASURED, 5, "so:3", lam=0.1),
         "bspline": ss.BSpline([0, 0, 0, 1, 2, 2, 2], [*P, P[0]], 2, "sphere:2"),
         "bezier": ss.BezierCurve([P, P[::-1]], "sphere:2"),
         "several": {"a": spline, "b": spline},
@@ -52,7 +58,11 @@ def values(found):
         numbers["converged"] = plain(found.report.converged)
         numbers["iterations"] = plain(found.report.iterations)
     if hasattr(found, "std"):
-        numbers |= {"std": plain(found.std(1.5)), "lam": found.lam, "residuals": plain(found.residuals)}
+        numbers |= {"std": plain(found.std(1.5)), "lam": found.lam}
+        numbers |= {name: [plain(own.value), plain(own.std)] for name, own in found.parameters.items()}
+        # Files of estimates do not hold their measurements.
+        if not found.parameters:
+            numbers["residuals"] = plain(found.residuals)
     return numbers
 
 

@@ -1,0 +1,78 @@
+//! Frames along a curve: those at its knots, transported along geodesics to positions nearby.
+
+use crate::frames::{Frames, curvature_gradient, curvature_terms, lanes_of};
+use crate::linearized::{Basis, LinearProblem};
+use crate::path::{Path, nearest, positions};
+use crate::problem::{Ends, Penalty};
+use symspline_core::scalar::{LANES, Lane, gather, scatter};
+use symspline_core::space::{Ambient, Erased, Origin};
+
+/// Velocities, accelerations and the curvature term of the energy at the knots, in coordinates of the frames there and
+/// in units of the mean knot spacing.
+pub struct Bending {
+    /// γ'.
+    pub speeds: Vec<f64>,
+    /// ∇γ'.
+    pub accelerations: Vec<f64>,
+    /// See [`curvature_gradient`].
+    pub curvature: Vec<f64>,
+}
+
+/// A curve with frames, transported along the polygon of its knots.
+pub struct Along<'a> {
+    space: &'a Erased<'a>,
+    path: Path<'a>,
+    frames: Frames<'a>,
+}
+
+impl<'a> Along<'a> {
+    /// The frames of a curve.
+    pub fn new(space: &'a Erased<'a>, t: &'a [f64], points: &'a [f64], velocities: &'a [f64]) -> Self {
+        Along { space, path: Path { t, points, velocities }, frames: Frames::new(space, points) }
+    }
+
+    /// The frames at points of the curve at times x: m vectors each.
+    pub fn frames(&self, x: &[f64], points: &[f64]) -> Vec<f64> {
+        let (m, len) = (self.space.dim(), self.space.point_len());
+        let near: Vec<usize> = positions(self.path.t, x).into_iter().map(nearest).collect();
+        let mut out = vec![0.0; x.len() * m * len];
+        let [mut p, mut q, mut v, mut way, mut there] = [(); 5].map(|_| vec![Lane::ZERO; len]);
+        let mut rows = vec![0.0; LANES * len];
+        let unit = |j: usize| (0..self.path.t.len() * m).map(|i| f64::from(i % m == j)).collect::<Vec<f64>>();
+        let at_knots: Vec<Vec<f64>> = (0..m).map(|j| self.frames.tangents(&unit(j))).collect();
+        for group in 0..x.len().div_ceil(LANES) {
+            let at = lanes_of(group, x.len());
+            gather(at.map(|i| &self.path.points[near[i] * len..][..len]), &mut p);
+            gather(at.map(|i| &points[i * len..][..len]), &mut q);
+            self.space.log(&p, &q, &mut way);
+            for (j, vectors) in at_knots.iter().enumerate() {
+                gather(at.map(|i| &vectors[near[i] * len..][..len]), &mut v);
+                self.space.parallel_transport(&p, &q, &way, &v, &mut there);
+                scatter(&there, &mut rows);
+                for (i, row) in at.iter().zip(rows.chunks_exact(len)) {
+                    out[(i * m + j) * len..][..len].copy_from_slice(row);
+                }
+            }
+        }
+        out
+    }
+
+    /// R(ξ, γ')γ' for vectors ξ, in coordinates of a frame along the curve: see [`curvature_terms`].
+    pub fn curvature(space: &Erased, velocities: &[f64], vectors: &[f64]) -> Vec<f64> {
+        curvature_terms(space, velocities, vectors)
+    }
+
+    /// The motion of the curve at its knots.
+    pub fn bending(&self, penalty: Penalty, ends: Ends) -> Bending {
+        let linearized = LinearProblem::new(Basis::new(self.path.t, ends), &[], &[], penalty);
+        let spacing = linearized.basis.spacing;
+        let in_frames = |vectors: &[f64], unit: f64| -> Vec<f64> {
+            self.frames.coordinates(vectors, |i| i).into_iter().map(|x| x * unit).collect()
+        };
+        let speeds = in_frames(self.path.velocities, spacing);
+        let accelerations =
+            in_frames(&self.path.accelerations(self.space, &self.path.knots()), spacing * spacing);
+        let curvature = curvature_gradient(self.space, &linearized, &speeds, &accelerations);
+        Bending { speeds, accelerations, curvature }
+    }
+}

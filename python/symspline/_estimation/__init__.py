@@ -1,0 +1,5 @@
+"""Estimation of curves from measurements of any kind."""
+
+from .make import estimate
+
+__all__ = ["estimate"]

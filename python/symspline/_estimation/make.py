@@ -1,0 +1,562 @@
+"""Estimation of a curve from measurements of any kind."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any, TypedDict, Unpack, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import as_array, checked_number, short_repr, whole_number
+from .._core import ValidationError
+from .._curve import Curve
+from .._curves.fit import FitProblem, fit, read_ends
+from .._curves.fit import Points as CorePoints
+from .._curves.solve import Options
+from .._errors import raise_or_warn, warn
+from .._faults import UNCONVERGED, Fault
+from .._input import times_of
+from .._options import check_on_failure, check_progress, checked_extrapolate
+from .._smoothing import SmoothingReport, SmoothingSpline, SmoothingWarning, make_smoothing_spline
+from .._smoothing.data import Knots, thin_knots
+from .._smoothing.factors import grouped, join, smoothed_spaces, split
+from .._smoothing.posterior import Parameter
+from .._smoothing.warned import warn_of_bounds
+from .._spaces import (
+    Array,
+    Doubles,
+    Euclidean,
+    Product,
+    Space,
+    SpecialEuclidean,
+    SpecialOrthogonal,
+    factors_of,
+    space_named,
+)
+from .._time import Moments, TimeAxis, knots_of, time_axis_of
+from .._typing import (
+    Criterion,
+    Extrapolate,
+    FloatArray,
+    Loss,
+    Numbers,
+    OnFailure,
+    P,
+    PProduct,
+    Progress,
+    SmoothingPenalty,
+    TimesLike,
+)
+from .._validation import one_of
+from ..convert import matrix_to_quaternion
+from ..manifolds._manifold import refuse_functions
+from .measurements import Constant, Measurement, Points
+from .rates import integrate_from
+from .solve import Iteration, Setup, Solution, read_lams
+from .spline import EstimatedSpline, joint
+from .terms import Body, DirectionTerm, PointTerm, RateTerm, Term, bind
+
+_FIT = Options("auto", 1e-12, None)
+# Automatic knots: the first number of them, per degree of freedom, and how often they are chosen.
+_FIRST, _PER_FREEDOM, _TRIES = 60, 4, 4
+# The noise may exceed the given standard deviations by this factor without a warning.
+_FACTOR = 2.0
+
+
+class EstimateOptions(TypedDict, total=False):
+    """The keywords of `estimate` that do not affect the type of the result."""
+
+    penalty: SmoothingPenalty
+    lam: Numbers | None
+    criterion: Criterion
+    gamma: float
+    loss: Loss
+    start: Curve[Any] | None
+    tol: float
+    max_iter: int
+    extrapolate: Extrapolate
+    on_failure: OnFailure
+    progress: Progress | None
+
+
+@overload
+def estimate(  # type: ignore[overload-overlap]
+    measurements: Sequence[Measurement], knots: TimesLike, space: Product[PProduct], **options: Unpack[EstimateOptions]
+) -> SmoothingSpline[PProduct, tuple[SmoothingReport, ...]]: ...
+
+
+@overload
+def estimate(
+    measurements: Sequence[Measurement], knots: TimesLike, space: SpecialEuclidean, **options: Unpack[EstimateOptions]
+) -> SmoothingSpline[FloatArray, tuple[SmoothingReport, ...]]: ...
+
+
+@overload
+def estimate(
+    measurements: Sequence[Measurement], knots: TimesLike, space: Space[P] | str, **options: Unpack[EstimateOptions]
+) -> SmoothingSpline[P]: ...
+
+
+def estimate(
+    measurements: Sequence[Measurement],
+    knots: TimesLike,
+    space: Space[Any] | str,
+    *,
+    penalty: SmoothingPenalty = "acceleration",
+    lam: Numbers | None = None,
+    criterion: Criterion = "gcv",
+    gamma: float = 1.4,
+    loss: Loss = "linear",
+    start: Curve[Any] | None = None,
+    tol: float = 1e-3,
+    max_iter: int = 50,
+    extrapolate: Extrapolate = None,
+    on_failure: OnFailure = "raise",
+    progress: Progress | None = None,
+) -> SmoothingSpline[Any, Any]:
+    r"""Fit a C² curve to measurements of any kind, such as points, rates, directions and accelerations.
+
+    The curve minimises the sum of squared residuals of all measurements, divided by their standard deviations, and the
+    integrated squared acceleration or jerk. Unknown constants, such as the bias of a gyroscope, are estimated together
+    with the curve.
+
+    Parameters
+    ----------
+    measurements : sequence of measurements
+        Objects of `symspline.measure`. Each has its own times.
+    knots : int, array_like or "auto"
+        Knots of the curve: their number, or an increasing array that includes all times. With ``"auto"``, their number
+        follows from the degrees of freedom of the curve. About four knots per degree of freedom are enough.
+    space : Space or str
+        A space or its name. On ``se:3``, rotations and positions are estimated, each with its own λ, and the curve is
+        the spline of the space through the estimated poses.
+    penalty : {"acceleration", "jerk"}, default "acceleration"
+        The derivative whose squared integral is the penalty. Use ``"jerk"`` for vehicles and for accelerometers.
+    lam : float or tuple, optional
+        Weight λ ≥ 0 of the penalty, for products and poses also a tuple with one entry per part. None, the default,
+        lets `criterion` choose λ.
+    criterion : {"gcv", "reml", "cp"}, default "gcv"
+        Criterion for λ, as for `make_smoothing_spline`. With ``"cp"``, the standard deviations must be right.
+    gamma : float, default 1.4
+        Weight of a degree of freedom in ``"gcv"``.
+    loss : {"linear", "huber", "cauchy"}, default "linear"
+        Loss of measurements that do not have their own. The others limit the influence of outliers, which begins where
+        the given standard deviations make a residual improbable.
+    start : Curve, optional
+        Initial curve on the space. By default it follows from points, rates and directions.
+    tol : float, default 1e-3
+        The iteration ends when no point and no constant moves by more than this fraction of its standard deviation.
+    max_iter : int, default 50
+        Largest number of iterations.
+    extrapolate, on_failure, progress : optional
+        As for `CubicSpline`; `progress` receives the number of iterations and `max_iter`.
+
+    Returns
+    -------
+    SmoothingSpline
+        The curve, with its covariance. `parameters` holds the constants, `measurements` and `residuals` the data.
+
+    Raises
+    ------
+    ValidationError
+        If the input is invalid, a measurement lies outside the knots, or the measurements do not determine a constant.
+    ConvergenceError
+        If the iteration does not converge. Its attribute ``spline`` holds the last curve.
+
+    Warns
+    -----
+    SmoothingWarning
+        If a chosen λ is at a bound, or the residuals are much larger than the given standard deviations.
+
+    See Also
+    --------
+    symspline.measure : Measurements.
+    make_smoothing_spline : Fit a curve to points only.
+
+    Notes
+    -----
+    The problem is linearised in frames :math:`E` that are parallel along the curve. If the curve moves by
+    :math:`E\xi`, its velocity changes by :math:`E\xi'` and its acceleration by :math:`E\xi'' + R(\xi, \gamma')\gamma'`.
+    The matrix is banded, with a border of one row per constant. The covariance is that of the linear problem. It uses
+    the given standard deviations; without any, the noise level is estimated.
+
+    References
+    ----------
+    T. D. Barfoot, State Estimation for Robotics, Cambridge University Press (2017), Section 3.4.
+
+    Examples
+    --------
+    A gyroscope with an unknown bias, and a few measured attitudes:
+
+    >>> import numpy as np
+    >>> import symspline as ss
+    >>> rng = np.random.default_rng(0)
+    >>> t, s = np.linspace(0, 5, 26), np.linspace(0, 5, 501)
+    >>> truth = ss.rotations.from_rotation_vectors(np.sin(t)[:, None] * [0.0, 0.0, 1.0])
+    >>> seen = ss.SpecialOrthogonal(3).exp(truth, 0.03 * ss.SpecialOrthogonal(3).random_tangent(rng, truth))
+    >>> omega = np.cos(s)[:, None] * [0, 0, 1] + [0.1, 0, 0] + 0.02 * rng.standard_normal((501, 3))
+    >>> curve = ss.estimate(
+    ...     [
+    ...         ss.measure.Points(t, seen, sigma=0.03),
+    ...         ss.measure.BodyRates(s, omega, sigma=0.02, bias=ss.measure.Constant(3)),
+    ...     ],
+    ...     20,
+    ...     "so:3",
+    ... )
+    >>> bias = curve.parameters["gyro bias"]
+    >>> bool(np.all(np.abs(bias.value - [0.1, 0, 0]) < 4 * bias.std))
+    True
+    """
+    space = space_named(space)
+    refuse_functions(space, "curves are not estimated")
+    policy = checked_extrapolate(extrapolate)
+    check_on_failure(on_failure)
+    check_progress(progress)
+    if isinstance(measurements, Measurement):
+        measurements = [measurements]
+    if not isinstance(measurements, (list, tuple)):
+        raise ValidationError(f"measurements must be a list of symspline.measure, not {short_repr(measurements)}")
+    given = list(measurements)
+    for i, own in enumerate(given):
+        if not isinstance(own, Measurement):
+            raise ValidationError(f"measurements[{i}] must be one of symspline.measure, not {short_repr(own)}")
+    if not given:
+        raise ValidationError("there are no measurements")
+    one_of(penalty, "penalty", "acceleration", "jerk")
+    one_of(criterion, "criterion", "gcv", "reml", "cp")
+    one_of(loss, "loss", "linear", "huber", "cauchy")
+    gamma = checked_number(gamma, "gamma must be a number >= 1", lambda x: 1 <= x < np.inf)
+    tol = checked_number(tol, "tol must be a number > 0", lambda x: 0 < x < np.inf)
+    most = whole_number(max_iter, "max_iter", 1)
+    spaces = smoothed_spaces(space)
+    lams = read_lams(lam, len(spaces))
+    axis, shown, automatic = _knots(knots, given)
+    if len(given) == 1 and isinstance(given[0], Points) and _is_plain(given[0]) and start is None:
+        return _smoothed(
+            given[0], shown, knots, space, penalty, lam, criterion, gamma, loss, tol, most, policy, on_failure, progress
+        )
+    terms, losses = _terms(given, axis, space, loss)
+    constants = _constants(terms)
+    while True:
+        times = axis.knots(shown)
+        _check_range(terms, times)
+        if penalty == "jerk" and len(times) < 4:
+            raise ValidationError(f"penalty='jerk' needs at least 4 knots, but there are {len(times)}")
+        setup = Setup(spaces, times, terms, losses, constants, penalty, criterion, gamma, tol, lams, most)
+        points = _start(setup, space, axis, shown, start)
+        found = Iteration(setup, points, progress).run()
+        if found.failure or not automatic:
+            break
+        wanted = _PER_FREEDOM * int(np.ceil(max(report.df for report in found.reports))) + 8
+        if automatic[0] == 0 or wanted <= 1.25 * len(times) or len(times) >= len(automatic[1]):
+            break
+        automatic = (automatic[0] - 1, automatic[1])
+        shown = thin_knots(Knots(automatic[1], axis.knots(automatic[1])), wanted).t
+    return _curve(setup, found, given, space, axis, shown, policy, on_failure)
+
+
+def _is_plain(points: Points) -> bool:
+    """Whether the points are data of `make_smoothing_spline`."""
+    return points.time_offset is None and points.factor is None
+
+
+def _smoothed(
+    given: Points,
+    shown: Array,
+    knots: Any,
+    space: Space[Any],
+    penalty: Any,
+    lam: Any,
+    criterion: Any,
+    gamma: float,
+    loss: Any,
+    tol: float,
+    most: int,
+    policy: Any,
+    on_failure: Any,
+    progress: Any,
+) -> SmoothingSpline[Any, Any]:
+    """Fit points only."""
+    t, _ = times_of(given.t, "measurements[0].t")
+    order = np.argsort(as_array(t, "measurements[0].t"), kind="stable")
+
+    def in_order(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(in_order(own) for own in value)
+        array = None if value is None else np.asarray(value)
+        return value if array is None or array.shape[:1] != order.shape else array[order]
+
+    weights, sigma = given.weights, given.sigma
+    several = sigma is None or isinstance(sigma, tuple) or np.ndim(sigma) == 0
+    if not several:
+        if weights is not None:
+            raise ValidationError("measurements[0].sigma has one entry per point. Combine it with the weights.")
+        weights, sigma = np.asarray(sigma, np.float64) ** -2.0, 1.0
+    return make_smoothing_spline(
+        in_order(t),
+        in_order(given.y),
+        space,
+        lam,
+        weights=in_order(weights),
+        frames=in_order(given.frames),
+        knots=None if isinstance(knots, str) else shown,
+        criterion=criterion,
+        gamma=gamma,
+        penalty=penalty,
+        sigma=sigma,
+        loss=given.loss or loss,
+        tol=tol,
+        max_iter=most,
+        extrapolate=policy,
+        on_failure=on_failure,
+        progress=progress,
+    )
+
+
+def _knots(knots: Any, given: list[Measurement]) -> tuple[TimeAxis, Array, Any]:
+    """Return the time axis, the knots as the user sees them, and for automatic knots all times."""
+    each, zone = [], None
+    for i, own in enumerate(given):
+        times, own_zone = times_of(own.t, f"measurements[{i}].t")
+        zone = zone or own_zone
+        array = as_array(times, f"measurements[{i}].t")
+        if array.ndim != 1 or not len(array):
+            raise ValidationError(f"measurements[{i}].t has shape {array.shape}, but shape (n,) is needed")
+        bad = np.flatnonzero(np.isnat(array) if array.dtype.kind in "Mm" else ~np.isfinite(array.astype(float)))
+        if len(bad):
+            raise ValidationError(f"measurements[{i}].t[{bad[0]}] is {array[bad[0]]}, but times must be finite")
+        each.append(array)
+    if len({array.dtype.kind in "Mm" for array in each}) > 1:
+        raise ValidationError("some measurements have dates and others have numbers as times. Use one of them.")
+    automatic = isinstance(knots, str)
+    if automatic and knots != "auto":
+        raise ValidationError(f"knots must be a number, an array or 'auto', not {short_repr(knots)}")
+    if automatic or (isinstance(knots, (int, np.integer)) and not isinstance(knots, bool)):
+        union = np.unique(np.concatenate(each))
+        if len(union) < 2:
+            raise ValidationError("the measurements have one time only. A curve needs measurements at two or more.")
+        # The other measurements are compared with this zone when their times are read.
+        axis, shown = time_axis_of(Moments(union, zone))
+        count = _FIRST if automatic else int(knots)
+        if count < 2:
+            raise ValidationError(f"knots must be at least 2, not {count}")
+        if not automatic and count > len(union):
+            return axis, _even(shown, count), None
+        return axis, thin_knots(Knots(shown, axis.knots(shown)), count).t, (_TRIES, shown) if automatic else None
+    array = as_array(times_of(knots, "knots")[0], "knots")
+    if array.ndim != 1 or len(array) < 2:
+        raise ValidationError(f"knots has shape {array.shape}, but an increasing array of at least two is needed")
+    axis, shown, times = knots_of(knots, (), len(array))
+    back = np.flatnonzero(~(np.diff(times) > 0))
+    if len(back):
+        raise ValidationError(f"knots[{back[0] + 1}] is not after knots[{back[0]}], but knots must increase")
+    return axis, shown, None
+
+
+def _even(union: Array, count: int) -> Array:
+    """Return equally spaced knots from the first to the last time."""
+    fraction = np.linspace(0, 1, count)
+    whole = union.dtype.kind in "Mm"
+    step = (union[-1] - union[0]).astype(np.float64) * fraction if whole else (union[-1] - union[0]) * fraction
+    found: Array = union[0] + (step.astype(np.int64).astype((union[-1] - union[0]).dtype) if whole else step)
+    return found
+
+
+def _terms(given: list[Measurement], axis: TimeAxis, space: Space[Any], loss: str) -> tuple[list[Term], list[str]]:
+    terms, losses = [], []
+    for i, own in enumerate(given):
+        label = f"measurements[{i}]"
+        try:
+            times, _ = axis.at(own.t, (), False)
+        except ValidationError as error:
+            raise ValidationError(f"{label}.t: {error}") from None
+        for term in bind(own, label, np.ascontiguousarray(times), space):
+            terms.append(term)
+            losses.append(own.loss or loss)
+    return terms, losses
+
+
+def _constants(terms: list[Term]) -> dict[str, Constant]:
+    found: dict[str, Constant] = {}
+    for term in terms:
+        for name, own in term.constants.items():
+            if found.setdefault(name, own) is not own:
+                raise ValidationError(
+                    f"two different constants have the name {name!r}. Pass Constant(..., name=...), or the same object "
+                    "if they are equal."
+                )
+    return found
+
+
+def _check_range(terms: list[Term], times: Doubles) -> None:
+    for term in terms:
+        bad = np.flatnonzero((term.times < times[0]) | (term.times > times[-1]))
+        if len(bad):
+            where = "before the first" if term.times[bad[0]] < times[0] else "after the last"
+            raise ValidationError(
+                f"{term.label}.t[{bad[0]}] is {where} knot. Extend the knots, or leave that measurement out "
+                f"({len(bad)} of {len(term.times)} are outside)."
+            )
+
+
+# ---- the initial curve ----
+
+
+def _start(setup: Setup, space: Space[Any], axis: TimeAxis, shown: Array, start: Any) -> list[Array]:
+    """Return initial points at the knots in every part."""
+    if start is not None:
+        if not isinstance(start, Curve) or start.space != space:
+            raise ValidationError(f"start must be a curve on {space!r}, not {short_repr(start)}")
+        extended: Any = start
+        points = extended(shown, extrapolate="geodesic")
+        each = points if isinstance(space, Product) else (points,)
+        return [part for factor, own in zip(factors_of(space), each, strict=True) for part in split(factor, own)]
+    return [_initial(setup, part, own) for part, own in enumerate(setup.spaces)]
+
+
+def _initial(setup: Setup, part: int, space: Space[Any]) -> Array:
+    """Return initial points of one part: smoothed points, integrated rates, or the attitudes of seen directions."""
+    knots = setup.knots
+    points = [term for term in setup.terms if isinstance(term, PointTerm) and term.parts == [part]]
+    times = np.concatenate([term.times for term in points]) if points else np.empty(0)
+    rates = [term for term in setup.terms if isinstance(term, RateTerm) and term.parts == [part]]
+    seen = [term for term in setup.terms if isinstance(term, DirectionTerm) and term.parts == [part]]
+    spread = len(np.unique(times)) > 1 and (not rates or np.ptp(times) > 0.8 * (knots[-1] - knots[0]))
+    if spread:
+        order = np.argsort(times, kind="stable")
+        y = np.concatenate([term.y for term in points])[order]
+        weights = np.concatenate([term.noise[:, 0] ** -2.0 for term in points])[order]
+        count = min(len(np.unique(times)), len(knots), 200)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            curve = make_smoothing_spline(
+                times[order],
+                y,
+                space,
+                weights=weights / weights.max(),
+                knots=count,
+                on_failure="ignore",
+                loss="linear" if all(loss == "linear" for loss in setup.losses) else "cauchy",
+            )
+        found = curve(knots, extrapolate="geodesic")
+        if np.isfinite(found).all():
+            return np.asarray(found)
+    if rates and rates[0].body.is_rotation:
+        return _integrated(knots, space, rates[0], points, seen)
+    if seen:
+        return _seen(setup, space, seen)
+    if len(times):
+        return np.asarray(np.repeat(points[0].y[:1], len(knots), axis=0))
+    if isinstance(space, Euclidean):
+        return np.zeros((len(knots), *space.point_shape))
+    raise ValidationError(
+        f"there is no initial curve on {space!r}: no measurement has points of it, rates or directions. Pass `start`."
+    )
+
+
+def _integrated(knots: Doubles, space: Space[Any], rate: RateTerm, points: list[PointTerm], seen: list[Any]) -> Array:
+    """Return the attitudes that follow from the rates, turned as the points and directions require."""
+    order = np.argsort(rate.times, kind="stable")
+    matrices = integrate_from(rate.times[order], rate.omega[order], knots)
+    profile = np.zeros((3, 3))
+    for term in points:
+        own = Body(space).matrices(term.y)
+        profile += np.einsum("nij,nkj->ik", own, matrices[_closest(knots, term.times)])
+    for term in seen:
+        near = matrices[_closest(knots, term.times)]
+        profile += np.einsum("nki,njl,nkl->ij", term.reference, near, term.seen)
+    return _rotations(space, _nearest(profile) @ matrices)
+
+
+def _closest(grid: Doubles, x: Doubles) -> NDArray[np.intp]:
+    """Return the index of the closest number of an increasing grid."""
+    return np.searchsorted(0.5 * (grid[1:] + grid[:-1]), x)
+
+
+def _seen(setup: Setup, space: Space[Any], seen: list[DirectionTerm]) -> Array:
+    """Return the attitudes at the knots from the directions seen near them (Wahba's problem)."""
+    knots = setup.knots
+    profile = np.zeros((len(knots), 3, 3))
+    for term in seen:
+        np.add.at(profile, _closest(knots, term.times), np.einsum("nki,nkl->nil", term.reference, term.seen))
+    # Attitudes of knots without two directions are those of their neighbours.
+    good = np.flatnonzero(np.linalg.svd(profile, compute_uv=False)[:, 1] > 1e-6)
+    if not len(good):
+        total = _nearest(profile.sum(axis=0))
+        return _rotations(space, np.repeat(total[None], len(knots), axis=0))
+    found = np.stack([_nearest(own) for own in profile[good]])
+    return _rotations(space, found[_closest(good.astype(np.float64), np.arange(float(len(knots))))])
+
+
+def _nearest(profile: Doubles) -> Doubles:
+    """Return the rotation R with the largest trace of RᵀB."""
+    u, _, v = np.linalg.svd(profile)
+    u[:, -1] *= np.sign(np.linalg.det(u) * np.linalg.det(v)) or 1.0
+    return np.asarray(u @ v)
+
+
+def _rotations(space: Space[Any], matrices: Doubles) -> Array:
+    if isinstance(space, SpecialOrthogonal):
+        return np.asarray(space.project(matrices))
+    quaternions = matrix_to_quaternion(matrices, scalar_first=True)
+    signs = np.cumprod([1.0, *np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0, -1.0, 1.0)])
+    return np.asarray(signs[:, None] * quaternions)
+
+
+# ---- the result ----
+
+
+def _curve(
+    setup: Setup,
+    found: Solution,
+    given: list[Measurement],
+    space: Space[Any],
+    axis: TimeAxis,
+    shown: Array,
+    policy: Any,
+    on_failure: Any,
+) -> SmoothingSpline[Any, Any]:
+    factors = factors_of(space)
+    parts, ends = [], []
+    for factor, own in zip(factors, grouped(space, found.points), strict=True):
+        doubles = np.ascontiguousarray(factor._as_doubles(join(factor, own)))
+        parts.append(CorePoints(doubles, 0.0, (), len(setup.knots)))
+        ends.append(read_ends(setup.bc_type, factor, ())[0])
+    through = fit(FitProblem(space, setup.knots, parts, ends, _FIT, check=False))
+    band, side, corner = found.matrices
+    size, first, smoothed = sum(own.dim for own in setup.spaces), 0, []
+    for part, report in zip(setup.spaces, found.reports, strict=True):
+        smoothed.append(joint(report, band, side, corner, size, first))
+        first += part.dim
+    parameters, at = {}, 0
+    for name, constant in setup.constants.items():
+        block = slice(at, at + constant.size)
+        parameters[name] = Parameter(found.values[name], found.covariance[block, block])
+        at += constant.size
+    curve = EstimatedSpline._of(
+        axis,
+        shown,
+        through.curve,
+        setup.bc_type,
+        policy,
+        through.reports(),
+        None,
+        smoothed,
+        parameters,
+        tuple(given),
+        tuple(found.residuals),
+    )
+    if found.failure:
+        raise_or_warn([Fault(0, UNCONVERGED, found.failure)], on_failure, curve)
+    chosen = [np.isnan(np.asarray(own)) for own in setup.lams]
+    warn_of_bounds(space, list(found.reports), chosen, [np.asarray(np.inf)] * len(setup.spaces))
+    sigma = found.reports[0].sigma
+    if sigma > _FACTOR and np.isnan(setup.lams).all():
+        warn(
+            f"The residuals are {sigma:.2g} times as large as the given standard deviations suggest. Check sigma: the "
+            "weights of the measurements and the covariance depend on it.",
+            SmoothingWarning,
+        )
+    return curve

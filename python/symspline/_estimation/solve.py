@@ -1,0 +1,452 @@
+"""The iteration of an estimate: linearise all measurements, solve the banded problem, move the curve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._arrays import short_repr
+from .._core import ValidationError
+from .._curves.curve import CoreCurve
+from .._curves.fit import FitProblem, Points, fit, read_ends
+from .._curves.solve import Options
+from .._smoothing.posterior import frames_at
+from .._smoothing.report import SmoothingReport
+from .._spaces import Array, Doubles, Space
+from .along import Motion
+from .measurements import Constant
+from .terms import Linearised, Term, Values
+
+_FIT = Options("auto", 1e-12, None)
+# λ has converged if its logarithm changes by less than the first number; after so many rounds it is kept.
+_SETTLED, _ROUNDS = 3e-3, 12
+# Steps of more standard deviations than this lead from a linearisation that is not yet informative about λ.
+_NEAR = 3.0
+# The number of times that a step is halved.
+_RETREATS = 6
+# The relative accuracy of the objective: a step changes it by less where the gradient is that of the linear problem.
+_ROUNDING = 1e-5
+# Parameters are not determined if the measurements leave less than this fraction of their information.
+_SINGULAR = 1e-12
+# Quantiles of χ² at which the losses begin to grow more slowly, see `make_smoothing_spline`.
+_CORNERS = {"huber": 0.82, "cauchy": 0.95}
+
+
+class Setup(NamedTuple):
+    """The problem and the options of an estimate.
+
+    Attributes
+    ----------
+    spaces : tuple of Space
+        The parts of the space.
+    knots : ndarray
+        Knots as the core counts them.
+    terms : list of Term
+        Measurements.
+    losses : list of str
+        Loss of each term.
+    constants : dict
+        Parameters by name.
+    penalty, criterion : str
+        Options.
+    gamma, tol : float
+        Options.
+    lams : ndarray
+        Given λ of each part, NaN if it is to be chosen.
+    max_iter : int
+        Largest number of iterations.
+    """
+
+    spaces: tuple[Space, ...]
+    knots: Doubles
+    terms: list[Term]
+    losses: list[str]
+    constants: dict[str, Constant]
+    penalty: str
+    criterion: str
+    gamma: float
+    tol: float
+    lams: Doubles
+    max_iter: int
+
+    @property
+    def bc_type(self) -> str:
+        """End conditions of the curves."""
+        return "natural" if self.penalty == "acceleration" else "not-a-knot"
+
+
+class Solution(NamedTuple):
+    """The result of the iteration.
+
+    Attributes
+    ----------
+    points : list of ndarray
+        Points at the knots in every part.
+    values, variances : dict
+        Parameters by name, and their covariance for noise of variance one.
+    reports : list of SmoothingReport
+        Reports of all parts.
+    matrices : list of ndarray
+        Band, side and corner of the matrix of the linear problem.
+    covariance : ndarray, shape (p, p)
+        Covariance of the parameters for noise of variance one.
+    residuals : list of ndarray
+        Whitened residuals of each term.
+    failure : str
+        What went wrong, or "".
+    """
+
+    points: list[Array]
+    values: Values
+    reports: list[SmoothingReport]
+    matrices: list[Doubles]
+    covariance: Doubles
+    residuals: list[Doubles]
+    failure: str
+
+
+class Linear(NamedTuple):
+    """The solution of the linear problem at a curve, as the core returns it.
+
+    Attributes
+    ----------
+    lams : ndarray
+        λ of every part, and whether it is at a bound.
+    at_bound : list of bool
+        Whether λ is at a bound.
+    step : ndarray, shape (knots, m)
+        Move of the curve in the frames at the knots.
+    changes : ndarray, shape (p,)
+        Changes of the parameters.
+    variances : list of ndarray
+        Variances of the coordinates at the knots, and of the parameters.
+    df : ndarray
+        Degrees of freedom of every part per coordinate.
+    freedom : float
+        All degrees of freedom.
+    information : ndarray, shape (p, p)
+        Information about the parameters.
+    determined : bool
+        Whether the measurements determine the curve.
+    squares, number : float, int
+        Sum of squared residuals, and their number.
+    matrices : list of ndarray
+        Band, side and corner of the matrix.
+    """
+
+    lams: Doubles
+    at_bound: list[bool]
+    step: Doubles
+    changes: Doubles
+    variances: list[Doubles]
+    df: Doubles
+    freedom: float
+    information: Doubles
+    determined: bool
+    squares: float
+    number: int
+    matrices: list[Doubles]
+
+
+class Step(NamedTuple):
+    """A step: where it begins, tangent vectors at the points in every part, and changes of the parameters."""
+
+    points: list[Array]
+    values: Values
+    tangents: list[Array]
+    changes: Doubles
+
+
+class Choice:
+    """The choice of λ during the iteration."""
+
+    def __init__(self, lams: Doubles) -> None:
+        self.lams, self.found = lams, np.full(len(lams), np.nan)
+        self.settled, self._rounds = bool(np.isfinite(lams).all()), 0
+
+    def asked(self, size: float) -> tuple[Doubles, Doubles]:
+        """Return the λ that are fixed and those near which the others are chosen, after a step of a size."""
+        nothing = np.full_like(self.lams, np.nan)
+        if self.settled:
+            return np.where(np.isnan(self.lams), self.found, self.lams), nothing
+        # Far from the solution, λ is chosen from its whole range.
+        return self.lams, self.found if size < _NEAR else nothing
+
+    def update(self, lams: Doubles, size: float) -> None:
+        """Record the λ that were chosen after a step of a size."""
+        if self.settled:
+            return
+        self._rounds += size < _NEAR
+        moved = np.abs(np.log(lams / self.found))[np.isnan(self.lams)]
+        self.settled = (size < _NEAR and bool(np.all(moved < _SETTLED))) or self._rounds >= _ROUNDS
+        # If λ oscillates, the mean is used.
+        oscillates = self._rounds > _ROUNDS // 2 and not self.settled
+        self.found = np.sqrt(lams * self.found) if oscillates else lams
+
+
+def fitted(setup: Setup, points: list[Array]) -> list[CoreCurve] | None:
+    """Return the splines through points in every part, or None if one of them does not exist."""
+    curves: list[Any] = []
+    for space, rows in zip(setup.spaces, points, strict=True):
+        data = Points(np.ascontiguousarray(space._as_doubles(rows)), 0.0, (), len(setup.knots))
+        ends = read_ends(setup.bc_type, space, ())
+        found = fit(FitProblem(space, setup.knots, [data], ends, _FIT, check=False))
+        if any(fault.failed for fault in found.faults):
+            return None
+        curves.append(found.curve)
+    return curves
+
+
+class Iteration:
+    """The iteration of one estimate."""
+
+    def __init__(self, setup: Setup, points: list[Array], progress: Callable[[int, int], object] | None) -> None:
+        self.setup, self.points, self.progress = setup, points, progress
+        self.values: Values = {name: np.array(own.start) for name, own in setup.constants.items()}
+        self.first = np.cumsum([0, *(space.dim for space in setup.spaces)]).tolist()
+        self.curves: list[Any] = []
+
+    def motion_at(self, x: Doubles, parts: list[int], nu: int) -> list[Motion]:
+        """Return the motion of parts at times x, with derivatives up to the order `nu`."""
+        knots = self.setup.knots
+        outside = np.flatnonzero((x < knots[0]) | (x > knots[-1]))
+        if len(outside):
+            raise ValidationError(
+                f"the time offset moves measurement {outside[0]} beyond the knots. Extend the knots beyond the "
+                "measurements."
+            )
+        found = []
+        for part in parts:
+            curve, space = self.curves[part], self.setup.spaces[part]
+            p = curve.evaluate(x, "point", "raise", False)
+            empty = np.empty(0)
+            v = curve.evaluate(x, "velocity", "raise", False) if nu > 0 else empty
+            a = curve.evaluate(x, "acceleration", "raise", False) if nu > 1 else empty
+            found.append(Motion(space, self.first[part], p, v, a, self._frames(part, x, p)))
+        return found
+
+    def _frames(self, part: int, x: Doubles, p: Array) -> Array:
+        return frames_at(self.setup.spaces[part], self.setup.knots, self.points[part], x, p)
+
+    def run(self) -> Solution:
+        """Iterate until the step is small."""
+        setup = self.setup
+        choice = Choice(setup.lams)
+        before: Step | None = None
+        objective, retreats, last, rate, size = np.inf, 0, np.inf, np.nan, np.inf
+        failure = ""
+        curves = fitted(setup, self.points)
+        if curves is None:
+            raise ValidationError("No spline joins the initial points. Pass more knots, or `start`.")
+        for number in count(1):
+            self.curves = curves
+            linear = self._linearised()
+            weights, value = self._weighted(linear)
+            found = self._solve(linear, weights, *choice.asked(size))
+            value += sum(float(lam) * energy(own, setup.penalty) for lam, own in zip(found.lams, curves, strict=True))
+            if self.progress is not None:
+                self.progress(number, setup.max_iter)
+            if not found.determined:
+                failure = (
+                    "The measurements do not determine the curve: no measurement depends on one of its factors, or on "
+                    "one of its knots. Pass fewer knots, a larger lam, or more measurements."
+                )
+                break
+            self._check_parameters(found.information)
+            if choice.settled and before and value > objective * (1 + _ROUNDING) and retreats < _RETREATS:
+                # The last step was too long.
+                retreats += 1
+                curves = self._moved(before, 0.5**retreats)
+            else:
+                retreats, objective = 0, value if choice.settled else np.inf
+                choice.update(found.lams, size)
+                size = _largest(found)
+                longest = float(np.abs(found.step).max())
+                rate, last = longest / last if 0 < last < np.inf else np.nan, longest
+                if choice.settled and (size <= setup.tol or longest == 0.0):
+                    break
+                before = Step(self.points, self.values, self._tangents(found.step), found.changes)
+                curves = self._moved(before, 1.0)
+            while curves is None and retreats < _RETREATS:
+                retreats += 1
+                curves = self._moved(before, 0.5**retreats)
+            if curves is None:
+                failure = "No spline joins the points of the next iteration. Pass more knots, or a larger lam."
+                break
+            if number >= setup.max_iter:
+                failure = (
+                    f"No convergence of the estimate: the last step is {size:.1e} standard deviations after {number} "
+                    f"iterations (tol {setup.tol:.1e}). Raise max_iter, pass lam, or a better `start`."
+                )
+                break
+        left = found.number - found.freedom
+        sigma = float(np.sqrt(found.squares / left)) if left > 1e-9 * found.number else float("nan")
+        reports = [
+            SmoothingReport("linearized", not failure, number, size, rate, float(lam), bool(bound), float(df), sigma)
+            for lam, bound, df in zip(found.lams, found.at_bound, found.df, strict=True)
+        ]
+        covariance = np.asarray(np.linalg.pinv(found.information, hermitian=True), np.float64)
+        residuals = [own.residuals for own in linear]
+        return Solution(self.points, self.values, reports, found.matrices, covariance, residuals, failure)
+
+    def _linearised(self) -> list[Linearised]:
+        setup = self.setup
+        spacing = float(setup.knots[-1] - setup.knots[0]) / (len(setup.knots) - 1)
+        return [term.linearised(self.motion_at, self.values, spacing) for term in setup.terms]
+
+    def _weighted(self, linear: list[Linearised]) -> tuple[list[Doubles | None], float]:
+        """Return the roots of the weights of a robust loss, and the sum of all losses."""
+        weights: list[Doubles | None] = []
+        value = 0.0
+        for own, loss in zip(linear, self.setup.losses, strict=True):
+            squares = np.sum(own.residuals**2, axis=1)
+            if loss == "linear":
+                weights.append(None)
+                value += float(squares.sum())
+                continue
+            corner = _core.chi_squared(own.residuals.shape[1], _CORNERS[loss])
+            if loss == "huber":
+                factor = np.minimum(1.0, np.sqrt(corner / np.maximum(squares, corner)))
+                value += float(np.where(squares > corner, 2 * np.sqrt(corner * squares) - corner, squares).sum())
+            else:
+                factor = 1.0 / (1.0 + squares / corner)
+                value += float(corner * np.log1p(squares / corner).sum())
+            weights.append(np.sqrt(factor)[:, None])
+        for name, constant in self.setup.constants.items():
+            if constant.sigma is not None:
+                value += float(np.sum(((self.values[name] - constant.start) / constant.sigma) ** 2))
+        return weights, value
+
+    def _solve(self, linear: list[Linearised], weights: list[Any], given: Doubles, near: Doubles) -> Linear:
+        setup = self.setup
+        factors, priors, terms = [], [], []
+        for space, curve in zip(setup.spaces, self.curves, strict=True):
+            _, accelerations, curvature = bending(curve, setup.penalty)
+            factors.append((space.dim, accelerations, curvature))
+        for name, constant in setup.constants.items():
+            off = self.values[name] - np.asarray(constant.start)
+            precision = np.zeros(constant.size) if constant.sigma is None else np.asarray(constant.sigma) ** -2.0
+            priors.append(np.stack([precision, off], axis=-1))
+        for term, own, weight in zip(setup.terms, linear, weights, strict=True):
+            residuals, jacobians = own.residuals, [self._in_columns(x, own.residuals.shape) for x in own.jacobians]
+            parameters = self._of_parameters(own)
+            if weight is not None:
+                residuals = residuals * weight
+                jacobians = [None if x is None else np.ascontiguousarray(x * weight[..., None]) for x in jacobians]
+                parameters = None if parameters is None else np.ascontiguousarray(parameters * weight[..., None])
+            offset = 0.0 if term.time_offset is None else float(self.values[term.time_offset][0])
+            terms.append((term.times + offset, np.ascontiguousarray(residuals), jacobians, parameters))
+        flat = np.ascontiguousarray(np.concatenate(priors)) if priors else np.empty((0, 2))
+        found = _core.estimate(
+            setup.knots, setup.penalty, factors, flat, terms, given, near, setup.criterion, setup.gamma
+        )
+        return Linear(*found)
+
+    def _in_columns(self, by_part: dict[int, Doubles], shape: tuple[int, ...]) -> Doubles | None:
+        if not by_part:
+            return None
+        out = np.zeros((*shape, self.first[-1]))
+        for part, own in by_part.items():
+            out[..., self.first[part] : self.first[part + 1]] = own
+        return out
+
+    def _of_parameters(self, own: Linearised) -> Doubles | None:
+        if not own.parameters:
+            return None
+        columns = [
+            own.parameters.get(name, np.zeros((*own.residuals.shape, constant.size)))
+            for name, constant in self.setup.constants.items()
+        ]
+        return np.ascontiguousarray(np.concatenate(columns, axis=-1))
+
+    def _check_parameters(self, information: Doubles) -> None:
+        """Raise ValidationError if the measurements do not determine the parameters."""
+        if not len(information):
+            return
+        size = np.sqrt(np.maximum(np.diag(information), 0.0))
+        scaled = information / np.where(size > 0, size, 1.0) / np.where(size > 0, size, 1.0)[:, None]
+        values, vectors = np.linalg.eigh(scaled)
+        if values[0] > _SINGULAR and np.all(size > 0):
+            return
+        vector = vectors[:, 0] / np.where(size > 0, size, 1.0) if np.all(size > 0) else (size == 0).astype(float)
+        vector = vector / vector[np.abs(vector).argmax()]
+        names = [name for name, own in self.setup.constants.items() for _ in range(own.size)]
+        involved = list(dict.fromkeys(name for name, x in zip(names, vector, strict=True) if abs(x) > 1e-3))
+        described = {
+            name: [round(float(x), 3) for own, x in zip(names, vector, strict=True) if own == name] for name in involved
+        }
+        raise ValidationError(
+            f"The measurements do not determine {' and '.join(map(repr, involved))} in the direction {described}. Pass "
+            "a Constant with sigma, which is a prior, or measurements that depend on it."
+        )
+
+    def _tangents(self, step: Doubles) -> list[Array]:
+        """Return the step at the knots as tangent vectors in every part."""
+        found: list[Array] = []
+        for i in range(len(self.setup.spaces)):
+            frames = self._frames(i, self.setup.knots, self.points[i])
+            own = step[:, self.first[i] : self.first[i + 1]]
+            found.append(np.einsum("ij,ij...->i...", own, frames))
+        return found
+
+    def _moved(self, step: Step, factor: float) -> list[CoreCurve] | None:
+        """Move points and parameters by a part of a step, and return the new curves if there are any."""
+        self.points = [
+            np.asarray(space.project(space._apply("exp", p=p, v=factor * v)))
+            for space, p, v in zip(self.setup.spaces, step.points, step.tangents, strict=True)
+        ]
+        found, first = {}, 0
+        for name, constant in self.setup.constants.items():
+            found[name] = step.values[name] + factor * step.changes[first : first + constant.size]
+            first += constant.size
+        self.values = found
+        return fitted(self.setup, self.points)
+
+
+def bending(curve: CoreCurve, penalty: str) -> list[Doubles]:
+    """Return velocities, accelerations and the curvature term at the knots, in units of their mean distance."""
+    space = curve.space
+    points, velocities = (np.ascontiguousarray(space._as_doubles(x)) for x in (curve.points, curve.velocities))
+    return _core.bending(space._handle, curve.times, points, velocities, penalty)
+
+
+def energy(curve: CoreCurve, penalty: str) -> float:
+    """Return the integral of the squared acceleration or jerk, by two points per segment or from the knots."""
+    knots = curve.times
+    h = np.diff(knots)
+    if penalty == "jerk":
+        spacing = (knots[-1] - knots[0]) / len(h)
+        accelerations = bending(curve, penalty)[1] / spacing**2
+        return float(np.sum(np.diff(accelerations, axis=0) ** 2 / h[:, None]))
+    root = 0.5 / np.sqrt(3.0)
+    x = (knots[:-1, None] + h[:, None] * np.array([0.5 - root, 0.5 + root])).ravel()
+    squares = curve.evaluate(x, "bend", "raise", False) ** 2
+    return float(np.sum(np.repeat(h / 2, 2) * squares))
+
+
+def _largest(found: Linear) -> float:
+    """Return the largest step in standard deviations of the points and parameters."""
+    of_points, of_parameters = found.variances
+    lengths = np.linalg.norm(found.step, axis=1) / np.sqrt(of_points.sum(axis=1))
+    return float(np.max(np.concatenate([lengths, np.abs(found.changes) / np.sqrt(of_parameters)])))
+
+
+def read_lams(value: Any, count: int) -> NDArray[np.float64]:
+    """Return λ of each part; NaN if it is to be chosen."""
+    values = value if isinstance(value, tuple) else (value,) * count
+    if len(values) != count:
+        raise ValidationError(f"lam has {len(values)} entries, but there are {count} parts. Pass one entry per part.")
+    found = np.full(count, np.nan)
+    for i, own in enumerate(values):
+        if own is None:
+            continue
+        array = np.asarray(own)
+        if array.ndim or array.dtype.kind not in "iuf" or not (np.isfinite(array) and array >= 0):
+            raise ValidationError(f"lam must be a number >= 0, or a tuple with one per part, not {short_repr(own)}")
+        found[i] = float(array)
+    return found

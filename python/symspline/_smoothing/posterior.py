@@ -1,0 +1,126 @@
+"""The posterior distribution of a smoothed curve, in frames along it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .._spaces import Array, Doubles, Space
+from .._typing import FloatArray
+
+
+class Parameter(NamedTuple):
+    """An estimated constant.
+
+    Attributes
+    ----------
+    value : ndarray, shape (size,)
+        Estimate.
+    cov : ndarray, shape (size, size)
+        Covariance.
+    """
+
+    value: FloatArray
+    cov: FloatArray
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations, shape (size,)."""
+        return np.sqrt(np.diag(self.cov))
+
+
+class Posterior(NamedTuple):
+    """The matrix A of the linear problem.
+
+    Its inverse is the covariance of the coefficients for noise of variance one.
+
+    Attributes
+    ----------
+    band : ndarray, shape (..., coefficients · size, 4 size)
+        Its band: the entries (i, i − d).
+    turn : ndarray, shape (..., size, size) or (..., 0, 0)
+        Holonomy of a closed curve.
+    size : int
+        Number of coordinates that A couples: 1 if it is the same for every coordinate.
+    side, corner : ndarray, shape (coefficients · size, p) and (p, p)
+        Rows and columns of the parameters.
+    first : int
+        Number of the first of the coordinates of the space among the coupled ones.
+    """
+
+    band: Doubles
+    turn: Doubles
+    size: int
+    side: Doubles
+    corner: Doubles
+    first: int = 0
+
+    @classmethod
+    def of(cls, band: Doubles, turn: Doubles, size: int) -> Posterior:
+        """Return the posterior of a curve without parameters."""
+        return cls(band, turn, size, np.zeros((band.shape[-2], 0)), np.zeros((0, 0)))
+
+    def map(self, function: Any) -> Posterior:
+        """Apply a function to the arrays with batch axes, such as the selection of some curves."""
+        return self._replace(band=function(self.band), turn=function(self.turn))
+
+    def _known(self, index: tuple[int, ...], kinds: Any) -> Any:
+        arrays = [np.ascontiguousarray(x) for x in (self.band[index], self.side, self.corner)]
+        return arrays, self.size, kinds, np.ascontiguousarray(self.turn[index])
+
+    def covariance(
+        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, x: Doubles, y: Any, orders: list[int]
+    ) -> Doubles:
+        """Return covariances of one curve at times x for noise of variance one.
+
+        Parameters
+        ----------
+        space : Space
+            The space of the coordinates.
+        knots : ndarray
+            Knots of the curve.
+        index : tuple of int
+            Index of the curve in the batch.
+        kinds : list of str or None
+            Kinds of the ends.
+        x, y : ndarray
+            Times; y is None for the covariance of derivatives at the same time.
+        orders : list of int
+            Orders of the derivatives.
+
+        Returns
+        -------
+        ndarray, shape (n, d, d)
+            Covariances, with d = ``len(orders) * space.dim``.
+        """
+        found = _core.posterior_covariance(knots, self._known(index, kinds), x, y, orders)
+        count, m = len(orders), space.dim
+        if self.size == 1 and m > 1:
+            whole = np.zeros((len(x), count, m, count, m))
+            each = np.arange(m)
+            whole[:, :, each, :, each] = found
+            return whole.reshape(len(x), count * m, count * m)
+        own = slice(self.first, self.first + m)
+        square = found.reshape(len(x), count, self.size, count, self.size)[:, :, own, :, own]
+        return np.ascontiguousarray(square.reshape(len(x), count * m, count * m))
+
+    def samples(
+        self, space: Space, knots: Doubles, index: tuple[int, ...], kinds: Any, rng: np.random.Generator, n: int
+    ) -> Doubles:
+        """Return moves of one curve at its knots, shape (n, knots, size or dim), for noise of variance one."""
+        known = self._known(index, kinds)
+        rows = n * space.dim if self.size == 1 else n
+        normal = rng.standard_normal((rows, _core.posterior_freedom(knots, known)))
+        found = _core.posterior_samples(knots, known, normal)
+        if self.size == 1:
+            return np.moveaxis(found.reshape(n, space.dim, len(knots)), 1, 2)
+        return found.reshape(n, len(knots), self.size)
+
+
+def frames_at(space: Space, knots: Doubles, points: Array, x: Doubles, p: Array) -> Array:
+    """Return frames along a curve at the points p for the times x, shape (n, dim, *point_shape)."""
+    doubles = [np.ascontiguousarray(space._as_doubles(rows)) for rows in (points, p)]
+    found = _core.frames_along(space._handle, knots, doubles[0], np.ascontiguousarray(x), doubles[1])
+    return space._numbers(found.reshape(len(x), space.dim, *space._doubles_shape))

@@ -1,0 +1,166 @@
+"""Estimates against dense linear algebra: flat posteriors, Gauss–Newton, and the true minimiser."""
+
+import numpy as np
+import pytest
+import sensors
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+import symspline as ss
+from symspline import measure
+from symspline._estimation import solve
+
+KNOTS = np.array([0, 0.4, 1.1, 1.5, 2.6, 3.0, 4.1, 5.0])
+ENDS = {"acceleration": "natural", "jerk": "not-a-knot"}
+
+
+def basis(x, nu, penalty):
+    """Values at times x of the splines that are one at one knot and zero at the others."""
+    return CubicSpline(KNOTS, np.eye(len(KNOTS)), bc_type=ENDS[penalty])(x, nu)
+
+
+def stiffness(penalty):
+    """The energy as a quadratic form of the values at the knots, by Gauss points."""
+    h, root = np.diff(KNOTS), 0.5 / np.sqrt(3)
+    x = (KNOTS[:-1, None] + h[:, None] * [0.5 - root, 0.5 + root]).ravel()
+    rows = basis(x, 2 if penalty == "acceleration" else 3, penalty)
+    return (rows * np.repeat(h / 2, 2)[:, None]).T @ rows
+
+
+@pytest.mark.parametrize("penalty", ["acceleration", "jerk"])
+def test_flat_posterior(penalty):
+    rng = np.random.default_rng(0)
+    t, s, f = (sensors.times(rng, 0, 5, n) for n in (9, 7, 6))
+    y, v, z = (0.3 * rng.standard_normal(shape) for shape in [(9, 2), (7, 2), 6])
+    sigma = rng.uniform(0.1, 0.3, 9)
+    bias = measure.Constant(1, start=0.3, sigma=2.0)
+    # The acceleration along one axis with an unknown bias.
+    axis = np.array([0.6, 0.8])
+    sensor = measure.Function(f, lambda x, d, a, p: a @ axis + p["b"] - z, nu=2, sigma=0.5, parameters={"b": bias})
+    given = [measure.Points(t, y, sigma=sigma), measure.Velocities(s, np.zeros((7, 2)), v, sigma=0.2), sensor]
+    lam = 0.07
+    curve = ss.estimate(given, KNOTS, "r:2", lam=lam, penalty=penalty, tol=1e-10)
+    rows = [np.kron(basis(t, 0, penalty) / sigma[:, None], np.eye(2)), np.kron(basis(s, 1, penalty) / 0.2, np.eye(2))]
+    rows.append(np.kron(basis(f, 2, penalty), axis[None]) / 0.5)
+    whole = np.zeros((18 + 14 + 6 + 1, 17))
+    whole[:38, :16] = np.concatenate(rows)
+    whole[32:38, 16], whole[38, 16] = 1 / 0.5, 1 / 2.0
+    right = np.concatenate([(y / sigma[:, None]).ravel(), v.ravel() / 0.2, z / 0.5, [0.3 / 2.0]])
+    matrix = whole.T @ whole
+    matrix[:16, :16] += lam * np.kron(stiffness(penalty), np.eye(2))
+    mean, cov = np.linalg.solve(matrix, whole.T @ right), np.linalg.inv(matrix)
+    assert np.abs(curve.points - mean[:16].reshape(8, 2)).max() < 1e-9
+    found = curve.parameters["b"]
+    assert abs(found.value[0] - mean[16]) < 1e-9 and abs(found.cov[0, 0] - cov[16, 16]) < 1e-9
+    for x, y in [(0.9, 4.4), (2.6, 2.7), (0.0, 5.0)]:
+        a, b, d = (np.kron(basis(at, nu, penalty), np.eye(2)) for at, nu in [(x, 0), (y, 0), (x, 1)])
+        part = cov[:16, :16]
+        assert np.abs(curve.cov(x) - a @ part @ a.T).max() < 1e-9
+        assert np.abs(curve.cov(x, y) - a @ part @ b.T).max() < 1e-9
+        assert np.abs(curve.cov(x, nu=1) - d @ part @ d.T).max() < 1e-9
+        joint = np.concatenate([a, d])
+        assert np.abs(curve.cov(x, nu="joint") - joint @ part @ joint.T).max() < 1e-9
+    whole[38] = 0
+    freedom = np.diag(cov @ whole.T @ whole)
+    assert abs(freedom[:16].sum() / 2 - curve.df) < 1e-9
+
+
+def fused(rng, n=12):
+    truth = sensors.turning(5, rng, rate=0.3)
+    t, s = sensors.times(rng, 0, 5, n), sensors.times(rng, 0, 5, 3 * n)
+    seen = sensors.SO3.exp(truth(t), 0.05 * sensors.SO3.random_tangent(rng, truth(t)))
+    omega = ss.rotations.angular_velocity(truth, s) + [0.1, -0.2, 0.05] + 0.05 * rng.standard_normal((3 * n, 3))
+    return truth, [
+        measure.Points(t, seen, sigma=0.05),
+        measure.BodyRates(s, omega, sigma=0.05, bias=measure.Constant(3)),
+    ]
+
+
+@pytest.mark.parametrize("penalty", ["acceleration", "jerk"])
+def test_dense_gauss_newton(penalty, monkeypatch):
+    """The same linearisation, with dense matrices in the place of the banded core."""
+    _, given = fused(np.random.default_rng(1))
+    lam = 0.3
+    curve = ss.estimate(given, KNOTS, "so:3", lam=lam, penalty=penalty, tol=1e-11)
+    monkeypatch.setattr(solve.Iteration, "_solve", lambda own, linear, *_: dense_step(own, linear, lam, penalty))
+    again = ss.estimate(given, KNOTS, "so:3", lam=lam, penalty=penalty, tol=1e-11)
+    assert np.abs(curve.points - again.points).max() < 1e-8
+    assert np.abs(curve.parameters["gyro bias"].value - again.parameters["gyro bias"].value).max() < 1e-8
+
+
+def dense_step(own, linear, lam, penalty):
+    """What the core returns, from dense matrices."""
+    n, m = len(KNOTS), 3
+    rows, right = [], []
+    for term, at in zip(own.setup.terms, linear, strict=True):
+        d = at.residuals.shape[1]
+        block = np.zeros((len(term.times), d, n * m + 3))
+        for nu in range(3):
+            for jacobian in at.jacobians[nu].values():
+                b = basis(term.times, nu, penalty)
+                block[..., : n * m] += np.einsum("tdc,tk->tdkc", jacobian, b).reshape(len(term.times), d, n * m)
+        for jacobian in at.parameters.values():
+            block[..., n * m :] += jacobian
+        rows.append(block.reshape(-1, n * m + 3))
+        right.append(-at.residuals.ravel())
+    whole, right = np.concatenate(rows), np.concatenate(right)
+    _, acceleration, curvature = solve.bending(own.curves[0], penalty)
+    spacing = KNOTS[-1] / (n - 1)
+    h = np.diff(KNOTS)
+    metric = np.zeros((n, n))
+    for i in range(n - 1):
+        pair = (
+            [[h[i] / 3, h[i] / 6], [h[i] / 6, h[i] / 3]] if penalty == "acceleration" else [[1 / h[i], -1 / h[i]]] * 2
+        )
+        pair = np.array(pair) * (1 if penalty == "acceleration" else np.array([[1], [-1]]))
+        metric[i : i + 2, i : i + 2] += pair
+    power = 3 if penalty == "acceleration" else 5
+    gradient = basis(KNOTS, 2, penalty).T @ metric @ (acceleration / spacing**2) + curvature / spacing**power
+    matrix = whole.T @ whole
+    matrix[: n * m, : n * m] += lam * np.kron(stiffness(penalty), np.eye(m))
+    vector = whole.T @ right
+    vector[: n * m] -= lam * gradient.ravel()
+    cov, x = np.linalg.inv(matrix), np.linalg.solve(matrix, vector)
+    squares = float(right @ right)
+    information = np.linalg.inv(cov[n * m :, n * m :])
+    variances = (np.diag(cov)[: n * m].reshape(n, m), np.diag(cov)[n * m :])
+    bands = [np.zeros((n * m, 4 * m)), np.zeros((n * m, 3)), np.eye(3)]
+    step, dp = x[: n * m].reshape(n, m), x[n * m :]
+    df, count = np.array([1.0]), len(right)
+    return solve.Linear(
+        np.array([lam]), [False], step, dp, variances, df, 1.0, information, True, squares, count, bands
+    )
+
+
+@pytest.mark.parametrize("penalty", ["acceleration", "jerk"])
+def test_near_the_true_minimiser(penalty):
+    """The estimate solves an equation whose solution differs from the minimiser by a small part of its deviation."""
+    rng = np.random.default_rng(2)
+    _, given = fused(rng, 20)
+    lam = 0.3
+    curve = ss.estimate(given, KNOTS, "so:3", lam=lam, penalty=penalty, tol=1e-9)
+    frames = curve.frames(KNOTS)
+    pts, rates = given
+
+    def residuals(x):
+        v = np.einsum("kj,kj...->k...", x[:-3].reshape(-1, 3), frames)
+        moved = ss.CubicSpline(KNOTS, sensors.SO3.exp(curve.points, v), "so:3", bc_type=ENDS[penalty])
+        a = sensors.SO3.log(moved(pts.t), pts.y)
+        b = ss.rotations.angular_velocity(moved, rates.t) + curve.parameters["gyro bias"].value + x[-3:] - rates.omega
+        root, h = 0.5 / np.sqrt(3), np.diff(KNOTS)
+        at = (KNOTS[:-1, None] + h[:, None] * [0.5 - root, 0.5 + root]).ravel()
+        if penalty == "acceleration":
+            bend = moved(at, 2) * np.sqrt(lam * np.repeat(h / 2, 2) / 2)[:, None, None]
+        else:
+            e = 1e-4 * h
+            ends = [np.stack([KNOTS[:-1] + e, KNOTS[1:] - e])]
+            parts = [moved.transport(float(y), float(x), moved(y, 2)) for x, y in ends[0].T]
+            jerk = np.array(parts) - moved(KNOTS[:-1] + e, 2)
+            bend = jerk / (h - 2 * e)[:, None, None] * np.sqrt(lam * h / 2)[:, None, None]
+        return np.concatenate([a.ravel() / 0.05 / np.sqrt(2), b.ravel() / 0.05, bend.ravel()])
+
+    best = least_squares(residuals, np.zeros(len(KNOTS) * 3 + 3), xtol=1e-12, ftol=1e-14)
+    deviation = np.sqrt(np.trace(curve.cov(KNOTS), axis1=-2, axis2=-1))
+    off = np.linalg.norm(best.x[:-3].reshape(-1, 3), axis=1) / deviation
+    assert off.max() < (0.02 if penalty == "acceleration" else 0.05), off
+    assert np.all(np.abs(best.x[-3:]) < 0.02 * curve.parameters["gyro bias"].std)
