@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -244,8 +244,9 @@ def space(name: str | Space[Any]) -> Space[Any]:
     """
     if isinstance(name, Space):
         return name
-    factors = spaces_named(name)
-    return factors[0] if len(factors) == 1 else Product(*factors)
+    if isinstance(name, str):
+        return _space_of(name)
+    raise _not_a_name(name)
 
 
 # The same function, for modules in which `space` is the name of an argument.
@@ -258,11 +259,23 @@ def spaces_named(name: Any) -> list[Space]:
     >>> spaces_named("sphere:3 x r:3")
     [Sphere(3), Euclidean(3)]
     """
-    if isinstance(name, type) and issubclass(name, Space):
-        raise ValidationError(f"{name.__name__} is a family of spaces; {_whole(name)}")
     if not isinstance(name, str):
-        raise ValidationError(f"a space or its name is needed, not {short_repr(name)}")
+        raise _not_a_name(name)
     return [_named(factor) for factor in name.split(" x ")]
+
+
+@lru_cache
+def _space_of(name: str) -> Space[Any]:
+    """Return the space with a name. Spaces do not change, and to create one takes longer than a fit of few points."""
+    factors = spaces_named(name)
+    return factors[0] if len(factors) == 1 else Product(*factors)
+
+
+def _not_a_name(value: Any) -> ValidationError:
+    """Return the error for a value that is neither a space nor a text."""
+    if isinstance(value, type) and issubclass(value, Space):
+        return ValidationError(f"{value.__name__} is a family of spaces; {_whole(value)}")
+    return ValidationError(f"a space or its name is needed, not {short_repr(value)}")
 
 
 def _rows() -> list[list[str]]:
