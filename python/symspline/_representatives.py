@@ -50,10 +50,17 @@ def warn_of_representatives(
     for each in longest_steps:
         for factor, own in zip(factors, each, strict=True):
             limit = factor.__dict__.get("_longest_near_step") or _longest_near_step(factor)
-            if np.count_nonzero(_longest(own) > limit):
+            if _any_exceeds(own, limit):
                 warn_of_signs(space, points)
                 warn_of_far_points(curves, longest_steps)
                 return
+
+
+def _any_exceeds(steps: Columns | Doubles, limit: float) -> bool:
+    """Whether the longest step of any curve exceeds a limit."""
+    longest = _longest(steps)
+    # Operations on arrays would take longer than the rest of this module's work for one curve.
+    return longest.item() > limit if longest.size == 1 else bool((longest > limit).any())
 
 
 def _longest(steps: Columns | Doubles) -> Doubles:

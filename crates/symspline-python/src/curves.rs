@@ -18,6 +18,9 @@ pub type EndOf<'py> = (String, Option<Array<'py>>);
 /// points a message. `_faults.py` describes the other kinds.
 pub type Fault = (usize, &'static str, Option<usize>, f64, f64, Option<String>);
 
+/// Up to this many numbers are copied into a new array.
+const FEW: usize = 1024;
+
 /// Curves to fit. Points are contiguous, with the numbers of one point last.
 pub struct Curves<'a> {
     pub space: Erased<'a>,
@@ -171,7 +174,8 @@ impl<'a> Curves<'a> {
         own: Vec<f64>,
         shape: &[usize],
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        if self.chosen.is_none() {
+        // To take over memory takes longer than to copy a few numbers.
+        if self.chosen.is_none() && own.len() > FEW {
             return Ok(PyArray1::from_vec(py, own).reshape(shape)?.to_dyn().clone());
         }
         let out = zeros(py, shape)?;

@@ -27,7 +27,7 @@ from ..manifolds._on_manifold import OnManifold
 from .curve import CoreCurve, CurveArrays, ProductCurve, share
 from .ends import End, ends_in_factors, ends_of
 from .reduced import ReducedCurve
-from .solve import Mask, Options, Solved, Task, solve, without
+from .solve import Mask, Options, Solved, Task, solve, solve_single, without
 
 _T = TypeVar("_T")
 _Times = TypeVar("_Times")
@@ -202,7 +202,7 @@ def fit(problem: FitProblem, progress: Progress | None = None) -> Fit:
         data = points[0]
         tol = data.tol if check else None
         task = Task(space, times, data.numbers, ends[0], tol, None, mask, check and skip)
-        (found,) = solve((task,), options, progress)
+        found = solve_single(task, options, progress)
         single = CoreCurve(space, times, found.points, found.velocities)
         return Fit(single, [found.columns], options.method, found.faults)
     tasks = [

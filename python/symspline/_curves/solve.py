@@ -87,22 +87,27 @@ def solve(tasks: Sequence[Task], options: Options, progress: Progress | None = N
     _, times, _, _, _, offsets, mask, skip = tasks[0]
     factors = [(task.space._handle, task.points, task.ends, task.tol) for task in tasks]
     each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
-    solved = []
-    for task, (points, velocities, tables, raw) in zip(tasks, each, strict=True):
-        space, columns = task.space, Columns(*tables)
-        faults = []
-        if raw:
-            quaternions = space._name == "sphere"
-            faults = [from_core(one, columns, options.tol, quaternions) for one in raw]
-        if space._complex:
-            points, velocities = space._numbers(points), space._numbers(velocities)
-        solved.append(Solved(points, velocities, columns, faults))
-    return solved
+    return [_solved(task.space, options, own) for task, own in zip(tasks, each, strict=True)]
 
 
 def solve_single(task: Task, options: Options, progress: Progress | None = None) -> Solved:
-    """Validate and solve the task of one space."""
-    return solve((task,), options, progress)[0]
+    """Validate and solve the task of one space, as `solve` but without its loops."""
+    space, times, points, ends, tol, offsets, mask, skip = task
+    factors = ((space._handle, points, ends, tol),)
+    each = _core.fit(factors, times, *options, offsets, None if mask is None else mask.ravel().tolist(), skip, progress)
+    return _solved(space, options, each[0])
+
+
+def _solved(space: Space, options: Options, found: Any) -> Solved:
+    """Return what the core found for one task."""
+    points, velocities, tables, raw = found
+    columns, faults = Columns(*tables), []
+    if raw:
+        quaternions = space._name == "sphere"
+        faults = [from_core(one, columns, options.tol, quaternions) for one in raw]
+    if space._complex:
+        points, velocities = space._numbers(points), space._numbers(velocities)
+    return Solved(points, velocities, columns, faults)
 
 
 def validate(task: Task) -> tuple[Task, list[Fault]]:
