@@ -3,7 +3,6 @@
 use numpy::{PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
 
 /// Memory for this many numbers is assumed to be available.
 const SMALL: usize = 1 << 16;
@@ -19,14 +18,21 @@ pub fn in_order<'a>(array: &'a PyReadonlyArrayDyn<f64>) -> PyResult<&'a [f64]> {
 
 /// A result array of zeros.
 pub fn zeros<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    array(py, shape, "zeros")
+}
+
+/// A result array of any numbers, all of which will be replaced. To clear large arrays takes a twentieth of an evaluation.
+pub fn unwritten<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    array(py, shape, "empty")
+}
+
+/// The array that a function of NumPy makes; small arrays are always zeros.
+fn array<'py>(py: Python<'py>, shape: &[usize], function: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     if shape.iter().product::<usize>() <= SMALL {
         return Ok(PyArrayDyn::zeros(py, shape, false));
     }
     // NumPy raises MemoryError; its Rust bindings panic.
-    static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    let make =
-        ZEROS.get_or_try_init(py, || Ok::<_, PyErr>(py.import("numpy")?.getattr("zeros")?.unbind()))?;
-    Ok(make.bind(py).call1((shape.to_vec(),))?.cast_into()?)
+    Ok(py.import("numpy")?.getattr(function)?.call1((shape.to_vec(),))?.cast_into()?)
 }
 
 /// Raises MemoryError unless memory for about this many numbers is available. `work` describes the computation and a
