@@ -60,8 +60,14 @@ pub(crate) const ARC: [f64; 46] = {
 /// The polynomial `Σ cᵢ xⁱ` with as many derivatives as S has.
 #[inline(always)]
 fn polynomial<S: Scalar>(c: &[f64], x: Lane) -> [Lane; 3] {
-    let mut p = [lane(c[c.len() - 1]), Lane::ZERO, Lane::ZERO];
-    for &coefficient in c[..c.len() - 1].iter().rev() {
+    let (others, last) = c.split_at(c.len() - 1);
+    horner::<S>([lane(last[0]), Lane::ZERO, Lane::ZERO], others, x)
+}
+
+/// `p xⁿ + Σ cᵢ xⁱ` with n coefficients, where p is a number with its derivatives.
+#[inline(always)]
+fn horner<S: Scalar>(mut p: [Lane; 3], c: &[f64], x: Lane) -> [Lane; 3] {
+    for &coefficient in c.iter().rev() {
         if S::ORDER > 1 {
             p[2] = p[2].mul_add(x, p[1] + p[1]);
         }
@@ -71,6 +77,14 @@ fn polynomial<S: Scalar>(c: &[f64], x: Lane) -> [Lane; 3] {
         p[0] = p[0].mul_add(x, lane(coefficient));
     }
     p
+}
+
+/// The same with the first `few` terms on the lanes of a mask, and with all terms on the others. The higher terms are
+/// dropped before the lower ones are added, so that a result is bit-identical to that of a shorter polynomial.
+#[inline(always)]
+fn graded<S: Scalar>(c: &[f64], few: usize, mask: Lane, x: Lane) -> [Lane; 3] {
+    let higher = polynomial::<S>(&c[few..], x);
+    horner::<S>(select::<S>(mask, [Lane::ZERO; 3], higher), &c[..few], x)
 }
 
 #[inline(always)]
@@ -100,41 +114,31 @@ impl<S: Scalar> Trig<S> {
     /// All four at x, which may have either sign: at x < 0 they are cosh√−x, sinh√−x/√−x, …
     #[inline(always)]
     pub fn new(x: S) -> Self {
-        let xv = x.value();
-        let ax = xv.abs();
-        let series = ax.simd_le(lane(TRIG_SERIES));
-        let (versine, defect) = if ax.simd_le(lane(TRIG_SHORT)).all() {
-            // On this range the two tiers agree up to rounding but are not bit-identical. Every short lane uses the
-            // short tier in mixed cases, too (see `taylor`).
-            (polynomial::<S>(&VERSINE[..6 + S::ORDER], xv), polynomial::<S>(&SINC_DEFECT[..6 + S::ORDER], xv))
-        } else if series.all() {
-            taylor::<S>(xv)
-        } else {
-            let (a, b) = taylor::<S>(xv);
-            let (c, d) = full_range(xv);
-            (select::<S>(series, a, c), select::<S>(series, b, d))
-        };
+        let (versine, defect) = defects::<S>(x.value());
         let k = -x.compose(versine);
         let j = x.compose(defect);
         Trig { c: k.fma(x, S::constant(Lane::ONE)), s: (-j).fma(x, S::constant(Lane::ONE)), k, j }
     }
 }
 
+/// (1 − cos√x)/x and (1 − sin√x/√x)/x, with derivatives in x.
 #[inline(always)]
-fn taylor<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
-    let short = x.abs().simd_le(lane(TRIG_SHORT));
+fn defects<S: Scalar>(x: Lane) -> ([Lane; 3], [Lane; 3]) {
     let n = 6 + S::ORDER;
-    let long = (polynomial::<S>(&VERSINE, x), polynomial::<S>(&SINC_DEFECT, x));
-    if short.none() {
-        return long;
+    let ax = x.abs();
+    let (short, series) = (ax.simd_le(lane(TRIG_SHORT)), ax.simd_le(lane(TRIG_SERIES)));
+    if short.all() {
+        return (polynomial::<S>(&VERSINE[..n], x), polynomial::<S>(&SINC_DEFECT[..n], x));
     }
-    (
-        select::<S>(short, polynomial::<S>(&VERSINE[..n], x), long.0),
-        select::<S>(short, polynomial::<S>(&SINC_DEFECT[..n], x), long.1),
-    )
+    let near = (graded::<S>(&VERSINE, n, short, x), graded::<S>(&SINC_DEFECT, n, short, x));
+    if series.all() {
+        return near;
+    }
+    let far = full_range(x);
+    (select::<S>(series, near.0, far.0), select::<S>(series, near.1, far.1))
 }
 
-/// (1 − cos√x)/x and (1 − sin√x/√x)/x away from 0, with derivatives in x.
+/// The same away from 0.
 #[inline(never)]
 fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
     let r = x.abs().sqrt();
@@ -161,27 +165,26 @@ fn full_range(x: Lane) -> ([Lane; 3], [Lane; 3]) {
 /// represents it. It is called only where it matters.
 #[inline(always)]
 pub fn theta_over_sin<S: Scalar>(y: S, rest: impl FnOnce() -> Lane) -> S {
-    let yv = y.value();
-    let ay = yv.abs();
+    y.compose(arc::<S>(y.value(), rest))
+}
+
+/// The same with its derivatives in y.
+#[inline(always)]
+fn arc<S: Scalar>(y: Lane, rest: impl FnOnce() -> Lane) -> [Lane; 3] {
+    let ay = y.abs();
     let within = ARC_TIERS.map(|(limit, _)| ay.simd_le(lane(limit)));
-    let series = |tier: usize| polynomial::<S>(&ARC[..ARC_TIERS[tier].1 + S::ORDER], yv);
-    let f = if within[0].all() {
-        series(0)
-    } else {
-        // From the widest range to the narrowest, so that each lane finally has its own tier.
-        let mut f = series(1);
-        if !within[1].all() {
-            f = select::<S>(within[1], f, series(2));
-            if !within[2].all() {
-                f = select::<S>(within[2], f, arc_full_range(yv, rest()));
-            }
+    let terms = ARC_TIERS.map(|(_, terms)| terms + S::ORDER);
+    if within[0].all() {
+        return polynomial::<S>(&ARC[..terms[0]], y);
+    }
+    let mut f = graded::<S>(&ARC[..terms[1]], terms[0], within[0], y);
+    if !within[1].all() {
+        f = select::<S>(within[1], f, polynomial::<S>(&ARC[..terms[2]], y));
+        if !within[2].all() {
+            f = select::<S>(within[2], f, arc_full_range(y, rest()));
         }
-        if within[0].any() {
-            f = select::<S>(within[0], series(0), f);
-        }
-        f
-    };
-    y.compose(f)
+    }
+    f
 }
 
 /// (θ/sin θ − 1)/y as a function of y = 1 − cos θ ≤ 1.
@@ -226,18 +229,47 @@ pub(crate) fn arc_full_range(y: Lane, rest: Lane) -> [Lane; 3] {
 /// y = 1 − cos θ; at y < 0 the hyperbolic ones, at y = 0 the weights 1 − t and t of a line.
 #[inline(always)]
 pub fn slerp<S: Scalar>(t: S, y: S, rest: impl Fn() -> Lane) -> [S; 2] {
-    let f = theta_over_sin(y, &rest);
     let yv = y.value();
+    let f = arc::<S>(yv, &rest);
     let far = yv.simd_gt(Lane::ONE);
     let two = lane(2.0);
     let rest = if far.any() { far.select(rest(), two - yv) } else { two - yv };
-    // θ² = f² sin²θ
-    let theta2 = f * f * y * (S::constant(rest) - (y - yv));
-    [slerp_weight(-t + Lane::ONE, theta2, f), slerp_weight(t, theta2, f)]
+    // θ² = f² sin²θ, whose derivative in y is 2f.
+    let theta2 = y.compose([f[0] * f[0] * yv * rest, two * f[0], two * f[1]]);
+    let f = y.compose(f);
+    [f * sine(-t + Lane::ONE, theta2), f * sine(t, theta2)]
 }
 
-/// sin(tθ)/sin θ = t · sin(tθ)/(tθ) · θ/sin θ
+/// h = sin(tθ)/θ as a function of t and θ² = x. With s(z) = sin√z/√z at z = t²x it is t s, and its derivatives are
+///
+/// ```text
+/// h_t = cos(tθ) = s + 2z s',  h_x = t³ s',  h_tt = −x h,  h_tx = −t h/2,  h_xx = t⁵ s''.
+/// ```
+///
+/// They take far fewer operations than derivatives of every product and of s.
 #[inline(always)]
-fn slerp_weight<S: Scalar>(t: S, theta2: S, f: S) -> S {
-    f * t * Trig::new(t * t * theta2).s
+fn sine<S: Scalar>(t: S, x: S) -> S {
+    let ([t, t1, t2], [x, x1, x2]) = (t.parts(), x.parts());
+    let square = t * t;
+    let z = square * x;
+    let (_, [j, j1, j2]) = defects::<S>(z);
+    // s = 1 − z j
+    let s = j.mul_neg_add(z, Lane::ONE);
+    let h = t * s;
+    if S::ORDER == 0 {
+        return S::constant(h);
+    }
+    let s1 = -z.mul_add(j1, j);
+    let by_t = (z + z).mul_add(s1, s);
+    let cube = square * t;
+    let by_x = cube * s1;
+    let first = by_t.mul_add(t1, by_x * x1);
+    if S::ORDER == 1 {
+        return S::from_parts([h, first, Lane::ZERO]);
+    }
+    let s2 = -z.mul_add(j2, j1 + j1);
+    // h_tt t'² + 2 h_tx t'x' + h_xx x'²
+    let turn = -h * t1 * x.mul_add(t1, t * x1);
+    let bend = (cube * square * s2).mul_add(x1 * x1, turn);
+    S::from_parts([h, first, by_t.mul_add(t2, by_x.mul_add(x2, bend))])
 }

@@ -56,13 +56,18 @@ const fn position<const L: bool>(i: usize) -> usize {
 /// y = 1 − cos θ = κ ⟨q−p, q−p⟩/2: no cancellation for near points.
 #[inline(always)]
 fn versine<const K: i32, const L: bool, S: Scalar>(p: &[S], q: &[S]) -> S {
-    let d = q[0] - p[0];
-    let mut sum = if negative::<K, L>(0) { -(d * d) } else { d * d };
-    for i in 1..p.len() {
-        let d = q[i] - p[i];
-        sum = if negative::<K, L>(i) { (-d).fma(d, sum) } else { d.fma(d, sum) };
+    // Half the squares of d = q − p and, with each product of derivatives once, its derivatives ⟨d,d'⟩ and
+    // ⟨d,d''⟩ + ⟨d',d'⟩.
+    let [mut value, mut first, mut second] = [Lane::ZERO; 3];
+    for i in 0..p.len() {
+        let [d, d1, d2] = (q[i] - p[i]).parts();
+        let (e, e1) = if negative::<K, L>(i) { (-d, -d1) } else { (d, d1) };
+        value = e.mul_add(d, value);
+        first = e.mul_add(d1, first);
+        second = e.mul_add(d2, e1.mul_add(d1, second));
     }
-    sum * lane(0.5 * K as f64)
+    let k = kappa::<K>();
+    S::from_parts([value * lane(0.5 * K as f64), first * k, second * k])
 }
 
 /// 2 − y = 1 + cos θ = κ ⟨q+p, q+p⟩/2: no cancellation near the antipode.

@@ -29,11 +29,12 @@ impl Scalar for Jet {
 
     #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
-        let cross = self.d * b.d;
+        // Of a vector times a number, the number comes first, and this is computed once.
+        let twice = self.d + self.d;
         Jet {
             v: self.v.mul_add(b.v, c.v),
             d: self.v.mul_add(b.d, self.d.mul_add(b.v, c.d)),
-            dd: self.v.mul_add(b.dd, self.dd.mul_add(b.v, c.dd + (cross + cross))),
+            dd: self.v.mul_add(b.dd, self.dd.mul_add(b.v, twice.mul_add(b.d, c.dd))),
         }
     }
 
@@ -84,11 +85,11 @@ impl Mul for Jet {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        let cross = self.d * o.d;
+        let twice = self.d + self.d;
         Jet {
             v: self.v * o.v,
             d: self.v.mul_add(o.d, self.d * o.v),
-            dd: self.v.mul_add(o.dd, self.dd.mul_add(o.v, cross + cross)),
+            dd: self.v.mul_add(o.dd, self.dd.mul_add(o.v, twice * o.d)),
         }
     }
 }
