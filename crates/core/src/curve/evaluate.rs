@@ -199,7 +199,8 @@ impl Job<'_> {
     ) -> (&'v [Lane], Option<&'v [Lane]>) {
         // Exactly 1 at the last knot.
         let tau = (cursor.x - cursor.knot) / cursor.h;
-        segment.at(space, len, S::from_parts([tau, cursor.rate, Lane::ZERO]), gamma);
+        // Derivatives in units of the segment take fewer operations, because that of tau is the constant 1.
+        segment.at(space, len, S::from_parts([tau, Lane::ONE, Lane::ZERO]), gamma);
         if self.outside == Outside::Geodesic && cursor.beyond != [0.0; LANES] {
             go_straight(space, cursor, segment, gamma);
         }
@@ -207,7 +208,14 @@ impl Job<'_> {
         let (d, dd) = derivatives.split_at_mut(len);
         let (d, dd) = (&mut d[..len], &mut dd[..len]);
         for (i, g) in gamma[..len].iter().enumerate() {
-            [p[i], d[i], dd[i]] = g.parts();
+            let [value, first, second] = g.parts();
+            p[i] = value;
+            if S::ORDER > 0 {
+                d[i] = first * cursor.rate;
+            }
+            if S::ORDER > 1 {
+                dd[i] = second * cursor.rate * cursor.rate;
+            }
         }
         match self.quantity.order() {
             0 => (p, None),
@@ -285,7 +293,7 @@ fn two(buffer: &mut [Lane], len: usize) -> [&mut [Lane]; 2] {
     [a, &mut b[..len]]
 }
 
-/// Replaces the lanes outside the knots by the geodesic that continues the curve at its end.
+/// Replaces the lanes outside the knots by the geodesic that continues the curve at its end, in units of the segment.
 #[cold]
 fn go_straight<S: Scalar, M: Ambient>(
     space: &M,
@@ -294,14 +302,19 @@ fn go_straight<S: Scalar, M: Ambient>(
     gamma: &mut [S],
 ) {
     let Segment { ends: [p0, p1], handles: [a, b], .. } = segment;
-    let (beyond, third) = (Lane::new(cursor.beyond), cursor.h * lane(1.0 / 3.0));
+    let beyond = Lane::new(cursor.beyond);
     let (before, behind) = (beyond.simd_lt(Lane::ZERO), beyond.simd_gt(Lane::ZERO));
     let pick = |x: &[Lane], y: &[Lane]| -> Vec<Lane> {
         x.iter().zip(y).map(|(x, y)| before.select(*x, *y)).collect()
     };
-    let velocity: Vec<Lane> = pick(a, b).iter().map(|handle| *handle / third).collect();
+    let velocity: Vec<Lane> = pick(a, b).iter().map(|handle| *handle * lane(3.0)).collect();
     let mut straight = gamma.to_vec();
-    space.ray(&pick(p0, p1), &velocity, S::from_parts([beyond, Lane::ONE, Lane::ZERO]), &mut straight);
+    space.ray(
+        &pick(p0, p1),
+        &velocity,
+        S::from_parts([beyond / cursor.h, Lane::ONE, Lane::ZERO]),
+        &mut straight,
+    );
     for (g, s) in gamma.iter_mut().zip(&straight) {
         *g = S::select(before | behind, *s, *g);
     }
