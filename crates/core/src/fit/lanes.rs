@@ -11,7 +11,7 @@ use super::solve::Workspace;
 use crate::monitor::Monitor;
 use crate::scalar::{LANES, Lane, dot, few, lane, mask_from, scatter};
 use crate::space::{Ambient, Erased};
-use std::cell::RefCell;
+use std::cell::Cell;
 
 #[derive(Default)]
 struct Thread {
@@ -20,7 +20,7 @@ struct Thread {
 }
 
 thread_local! {
-    static THREAD: RefCell<Thread> = RefCell::default();
+    static THREAD: Cell<Option<Box<Thread>>> = const { Cell::new(None) };
 }
 
 /// Fits up to eight sections of equal length.
@@ -33,9 +33,9 @@ pub fn fit_lanes(
 ) {
     // The memory is taken out and put back, because Python may start another fit when it is asked whether to
     // continue.
-    let mut memory = THREAD.take();
+    let mut memory = THREAD.take().unwrap_or_default();
     fit_in(space, problem, options, monitor, group, &mut memory);
-    THREAD.set(memory);
+    THREAD.set(Some(memory));
 }
 
 fn fit_in(
