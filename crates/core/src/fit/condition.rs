@@ -32,7 +32,13 @@ pub fn residual(
 ) -> C2Residual {
     chain.with_velocities(|chain, u| {
         let mut r = std::mem::take(&mut chain.r);
-        let at_rest = u.iter().fold(Lane::ZERO.simd_eq(Lane::ZERO), |rest, u| rest & u.simd_eq(Lane::ZERO));
+        let mut at_rest = Lane::ZERO.simd_eq(Lane::ZERO);
+        for u in u {
+            at_rest &= u.simd_eq(Lane::ZERO);
+            if at_rest.none() {
+                break;
+            }
+        }
         let residual = space.0.sweep(chain, ends, u, &mut r, work, at_rest);
         chain.r = r;
         residual
@@ -84,6 +90,7 @@ fn inside<S: Scalar, M: Space>(
     let (mut left, right, mut next_left) = (&mut left[..m], &mut right[..m], &mut next_left[..m]);
     let mut result = C2Residual { residual: Lane::ZERO, speed: Lane::ZERO, handle: Lane::ZERO };
     let mut first_right = Lane::ZERO;
+    let (mut scaled, mut scale) = (Lane::ZERO, Lane::ZERO);
     for i in 0..=n {
         let (h_left, h_right) = (chain.h[i.max(1) - 1], chain.h[i.min(n - 1)]);
         let u = &all_u[i * m..][..if i < n { 2 * m } else { m }];
@@ -103,7 +110,10 @@ fn inside<S: Scalar, M: Space>(
                     next_left[c] = S::select(at_rest, S::constant(-chord[c]), next_left[c]);
                 }
             }
-            let scale = Lane::ONE / (h_right * h_right);
+            // Divisions are slow, and segments are often of equal length.
+            if !h_right.simd_eq(scaled).all() {
+                (scaled, scale) = (h_right, Lane::ONE / (h_right * h_right));
+            }
             for c in 0..m {
                 right[c] = (right[c] - a[c]) * scale;
                 next_left[c] = (next_left[c] + b[c]) * scale;
@@ -116,8 +126,7 @@ fn inside<S: Scalar, M: Space>(
 
         let r = &mut all_r[i * m..][..m];
         if i > 0 && i < n {
-            join(space, h_left, h_right, &u[..m], left, right, r);
-            let weight = h_left * h_right / (h_left + h_right);
+            let weight = join(space, h_left, h_right, &u[..m], left, right, r);
             result.residual = max_or_nan(result.residual, length2(r) * (weight * weight));
         } else {
             // An open end: keep the side of its only segment. The end condition is applied below.
@@ -140,7 +149,8 @@ fn inside<S: Scalar, M: Space>(
     result
 }
 
-/// The residual at a knot, `S(v⁻) right − S(v⁺) left`; `left` and `right` are overwritten.
+/// The residual at a knot, `S(v⁻) right − S(v⁺) left`; `left` and `right` are overwritten. Returns the factor that makes
+/// it a velocity, 1/(1/h + 1/h) of the two segments.
 #[inline(always)]
 fn join<S: Scalar, M: Space>(
     space: &M,
@@ -150,7 +160,7 @@ fn join<S: Scalar, M: Space>(
     left: &mut [S],
     right: &mut [S],
     r: &mut [S],
-) {
+) -> Lane {
     let m = u.len();
     // Spacing that is equal up to the rounding of the knots needs no S, which would change the residual by less than
     // rounding.
@@ -159,13 +169,14 @@ fn join<S: Scalar, M: Space>(
         r[c] = right[c] - left[c];
     }
     if equal.all() {
-        return;
+        return h_right * lane(0.5);
     }
     stretch_by(space, h_left * THIRD, u, right);
     stretch_by(space, h_right * THIRD, u, left);
     for c in 0..m {
         r[c] = S::select(equal, r[c], right[c] - left[c]);
     }
+    h_left * h_right / (h_left + h_right)
 }
 
 /// The residual at the first node of a closed curve: the left-hand side comes from the last node.
@@ -183,9 +194,8 @@ fn close<S: Scalar>(
     right.copy_from_slice(&all_r[..m]);
     chain.across_closure(space, false, left);
     let h_left = chain.h[n - 1];
-    join(space, h_left, h_right, &all_u[..m], left, right, r);
+    let weight = join(space, h_left, h_right, &all_u[..m], left, right, r);
     all_r[..m].copy_from_slice(r);
     all_r[n * m..].fill(S::constant(Lane::ZERO));
-    let weight = h_left * h_right / (h_left + h_right);
     length2(r) * (weight * weight)
 }

@@ -15,12 +15,9 @@ const DEPTH: usize = 5;
 /// The contraction above which mixing is worth its additional vectors.
 const MIX_ABOVE: f64 = 0.15;
 
-/// `step ← T⁻¹ 3r`.
+/// `step ← T⁻¹ 3r` for the residual in `chain.r`.
 pub fn update(space: &Erased, chain: &mut Chain, ends: &ChainEnds, t: &mut Tridiagonal, step: &mut [Lane]) {
-    for (s, r) in step.iter_mut().zip(&chain.r) {
-        *s = lane(3.0) * *r;
-    }
-    t.solve(space, chain, ends, step);
+    t.solve(space, chain, ends, lane(3.0), step);
 }
 
 /// The history of Anderson mixing. A lane takes part from the iteration at which its own contraction requires it.

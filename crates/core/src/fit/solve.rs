@@ -214,15 +214,18 @@ pub fn solve(
         }
         let long = state.handle.simd_gt(lane(0.5 * limit.min(space.injectivity_radius()))) & !done;
         chain.update(space, |chain, u| {
-            for ((u, s), n) in u.iter_mut().zip(&mut *step).zip(&*next_step) {
+            for (u, n) in u.iter_mut().zip(&*next_step) {
                 *u = done.select(*u, *u + *n);
-                // After a step back, the rest of the step is as long as the part that was taken back.
-                *s = worse.select(-*n, *n);
             }
             if long.any() {
                 shorten(space, chain, limit, |node| !long | ends.given(chain.n, node), u);
             }
         });
+        std::mem::swap(step, next_step);
+        if worse.any() {
+            // After a step back, the rest of the step is as long as the part that was taken back.
+            step.iter_mut().for_each(|s| *s = worse.select(-*s, *s));
+        }
     }
     best.restore(space, chain, idle, &mut state);
     let converged = state.converged;

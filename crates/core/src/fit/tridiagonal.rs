@@ -17,6 +17,7 @@ pub struct Tridiagonal {
     /// Diagonal, also the divisor of Algorithm 1.
     pub diagonal: Vec<Lane>,
     lower: Vec<Lane>,
+    /// In rows that are factored, except for the last: divided by the pivot.
     upper: Vec<Lane>,
     inverse_pivot: Vec<Lane>,
     /// For closed curves: the solutions α, β for a unit velocity at the first and the last node.
@@ -53,7 +54,7 @@ impl Tridiagonal {
                 answer.clear();
                 answer.resize(n + 1, Lane::ZERO);
                 answer[node] = -coupling;
-                self.solve_open(1, n - 1, 1, &mut answer);
+                self.solve_open(1, n - 1, 1, None, &mut answer);
                 self.answers[end] = answer;
             }
         }
@@ -62,40 +63,72 @@ impl Tridiagonal {
     fn factor(&mut self, first: usize, last: usize) {
         self.inverse_pivot[first] = Lane::ONE / self.diagonal[first];
         for i in first + 1..=last {
-            let eliminated = self.lower[i] * self.inverse_pivot[i - 1] * self.upper[i - 1];
-            self.inverse_pivot[i] = Lane::ONE / (self.diagonal[i] - eliminated);
+            self.upper[i - 1] *= self.inverse_pivot[i - 1];
+            self.inverse_pivot[i] = Lane::ONE / (self.diagonal[i] - self.lower[i] * self.upper[i - 1]);
         }
     }
 
-    /// Solves on the rows `first..=last` in place, for vectors of m numbers.
-    fn solve_open(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
-        with_size!(true, m, m => self.solve_rows(first, last, m, x));
+    /// Solves on the rows `first..=last` for vectors of m numbers. The right-hand side is in `x`, or it is a factor
+    /// times another vector.
+    fn solve_open(
+        &self,
+        first: usize,
+        last: usize,
+        m: usize,
+        right: Option<(Lane, &[Lane])>,
+        x: &mut [Lane],
+    ) {
+        with_size!(true, m, m => match right {
+            None => self.solve_rows(first, last, m, |_, x| x, x),
+            Some((factor, right)) => self.solve_rows(first, last, m, |i, _| factor * right[i], x),
+        });
     }
 
+    /// The same with a function of an index and the number in `x`. To write the right-hand side to memory first takes as
+    /// long as the elimination.
     #[inline(always)]
-    fn solve_rows(&self, first: usize, last: usize, m: usize, x: &mut [Lane]) {
-        x[first * m..][..m].iter_mut().for_each(|x| *x *= self.inverse_pivot[first]);
+    fn solve_rows(
+        &self,
+        first: usize,
+        last: usize,
+        m: usize,
+        right: impl Fn(usize, Lane) -> Lane,
+        x: &mut [Lane],
+    ) {
+        for c in first * m..(first + 1) * m {
+            x[c] = right(c, x[c]) * self.inverse_pivot[first];
+        }
         for i in first + 1..=last {
             let (before, here) = x[(i - 1) * m..][..2 * m].split_at_mut(m);
             let (lower, pivot) = (self.lower[i], self.inverse_pivot[i]);
             for c in 0..m {
-                here[c] = lower.mul_neg_add(before[c], here[c]) * pivot;
+                here[c] = lower.mul_neg_add(before[c], right(i * m + c, here[c])) * pivot;
             }
         }
         for i in (first..last).rev() {
             let (here, behind) = x[i * m..][..2 * m].split_at_mut(m);
-            let factor = self.upper[i] * self.inverse_pivot[i];
+            let factor = self.upper[i];
             for c in 0..m {
                 here[c] = factor.mul_neg_add(behind[c], here[c]);
             }
         }
     }
 
-    /// Solves `T x = f` in place for the whole chain.
-    pub fn solve(&mut self, space: &Erased, chain: &mut Chain, ends: &ChainEnds, f: &mut [Lane]) {
+    /// Solves `T x = factor · r` for the residual r of the whole chain.
+    pub fn solve(
+        &mut self,
+        space: &Erased,
+        chain: &mut Chain,
+        ends: &ChainEnds,
+        factor: Lane,
+        x: &mut [Lane],
+    ) {
         match ends {
-            ChainEnds::Open(_) => self.solve_open(0, chain.n, chain.m, f),
-            ChainEnds::Periodic => self.solve_closed(space, chain, f),
+            ChainEnds::Open(_) => self.solve_open(0, chain.n, chain.m, Some((factor, &chain.r)), x),
+            ChainEnds::Periodic => {
+                x.iter_mut().zip(&chain.r).for_each(|(x, r)| *x = factor * *r);
+                self.solve_closed(space, chain, x);
+            }
         }
     }
 
@@ -104,7 +137,7 @@ impl Tridiagonal {
     fn solve_closed(&mut self, space: &Erased, chain: &mut Chain, f: &mut [Lane]) {
         let (n, m) = (chain.n, chain.m);
         if n > 1 {
-            self.solve_open(1, n - 1, m, f);
+            self.solve_open(1, n - 1, m, None, f);
             let [alpha, beta] = &self.answers;
             // rhs = f₀ − y₁/h₀ − H⁻¹ yₙ₋₁/hₙ₋₁
             self.rhs.clear();
