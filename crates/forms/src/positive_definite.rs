@@ -61,19 +61,23 @@ impl<const D: usize, A: Storage> PositiveDefinite<D, A> {
         Algebra { n: self.n, skew: false, traceless: self.special, storage: PhantomData }
     }
 
-    /// L e^{tw} L* with p = L L* and v = L w L*, with the derivatives in t that t has.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
-        let p = self.read(p);
-        let l = cholesky(&p);
+    /// The L and w of a ray with p = L L* and v = L w L*.
+    fn aimed(&self, p: &[Lane], v: &[Lane]) -> [Matrix<Lane, D, A>; 2] {
+        let l = cholesky(&self.read(p));
         let w = whiten(&l, &self.read(v));
+        [l, w]
+    }
+
+    /// L e^{tw} L* with p = L L*, with the derivatives in t that t has.
+    fn moved(&self, p: &[Lane], [l, w]: &[Matrix<Lane, D, A>; 2], t: Lane, order: usize) -> Moved<D, A> {
         let e = exp_minus_one(&w.scaled(t));
-        let x = &congruent(&l, &e) + &p;
+        let x = &congruent(l, &e) + &self.read(p);
         if order == 0 {
             return Moved(x, None);
         }
-        let d = &w.times(&e) + &w;
-        let dd = if order > 1 { congruent(&l, &w.times(&d)) } else { d.clone() };
-        Moved(x, Some([congruent(&l, &d), dd]))
+        let d = &w.times(&e) + w;
+        let dd = if order > 1 { congruent(l, &w.times(&d)) } else { d.clone() };
+        Moved(x, Some([congruent(l, &d), dd]))
     }
 
     fn read<S: Scalar>(&self, x: &[S]) -> Matrix<S, D, A> {
@@ -221,7 +225,19 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         17.0
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        self.moved(p, v, t.value(), S::ORDER).write(t, out);
+        self.moved(p, &self.aimed(p, v), t.value(), S::ORDER).write(t, out);
+    }
+    fn ray_len(&self) -> usize {
+        2 * self.point_len()
+    }
+    fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]) {
+        for (m, out) in self.aimed(p, v).iter().zip(prepared.chunks_exact_mut(self.point_len())) {
+            m.write(out);
+        }
+    }
+    fn prepared_ray<S: Scalar>(&self, p: &[Lane], _v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
+        let (l, w) = prepared.split_at(self.point_len());
+        self.moved(p, &[l, w].map(|x| self.read(x)), t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let (p, q) = (self.read(p), self.read(q));

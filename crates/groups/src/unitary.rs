@@ -95,11 +95,10 @@ impl<const D: usize, A: Storage> UnitaryGroup<D, A> {
     }
 
     /// p e^{tΩ}, with the derivatives in t that t has.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
+    fn moved(&self, p: &[Lane], omega: &Matrix<Lane, D, A>, t: Lane, order: usize) -> Moved<D, A> {
         let p = self.read(p);
-        let omega = self.generator(&p, v);
         let x = &p.times(&exp_skew_minus_one(&omega.scaled(t))) + &p;
-        Moved::by_generator(x, &omega, order)
+        Moved::by_generator(x, omega, order)
     }
 
     /// `log(p⁻¹q)` and its deciding angle.
@@ -138,7 +137,16 @@ impl<const D: usize, A: Storage> Ambient for UnitaryGroup<D, A> {
         if self.is_su() { SQRT_2 * PI } else { PI }
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        self.moved(p, v, t.value(), S::ORDER).write(t, out);
+        self.moved(p, &self.generator(&self.read(p), v), t.value(), S::ORDER).write(t, out);
+    }
+    fn ray_len(&self) -> usize {
+        self.point_len()
+    }
+    fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]) {
+        self.generator(&self.read(p), v).write(prepared);
+    }
+    fn prepared_ray<S: Scalar>(&self, p: &[Lane], _v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
+        self.moved(p, &self.read(prepared), t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let p = self.read(p);

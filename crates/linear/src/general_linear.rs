@@ -52,11 +52,10 @@ impl<const D: usize, A: Storage> GeneralLinear<D, A> {
     }
 
     /// p e^{tΩ}, with the derivatives in t that t has.
-    fn moved(&self, p: &[Lane], v: &[Lane], t: Lane, order: usize) -> Moved<D, A> {
-        let omega = self.generator(p, v);
+    fn moved(&self, p: &[Lane], omega: &Matrix<Lane, D, A>, t: Lane, order: usize) -> Moved<D, A> {
         let p = self.read(p);
         let x = &p.times(&exp_any_minus_one(&omega.scaled(t))) + &p;
-        Moved::by_generator(x, &omega, order)
+        Moved::by_generator(x, omega, order)
     }
 
     /// g_R of a frame, and its inverse.
@@ -91,7 +90,16 @@ impl<const D: usize, A: Storage> Ambient for GeneralLinear<D, A> {
         if D == 1 { SQRT_2 * PI } else { PI }
     }
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
-        self.moved(p, v, t.value(), S::ORDER).write(t, out);
+        self.moved(p, &self.generator(p, v), t.value(), S::ORDER).write(t, out);
+    }
+    fn ray_len(&self) -> usize {
+        self.point_len()
+    }
+    fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]) {
+        self.generator(p, v).write(prepared);
+    }
+    fn prepared_ray<S: Scalar>(&self, p: &[Lane], _v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
+        self.moved(p, &self.read(prepared), t.value(), S::ORDER).write(t, out);
     }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let p = self.read(p);

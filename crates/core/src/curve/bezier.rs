@@ -14,6 +14,8 @@ pub struct Segment<S> {
     controls: [Vec<Lane>; 2],
     /// `log_{q⁺}(q⁻)`.
     middle: Vec<Lane>,
+    /// What [`Ambient::prepare_ray`](crate::space::Ambient::prepare_ray) computes for the geodesics of the first level.
+    rays: [Vec<Lane>; 3],
     /// Lanes in which the inner handle is too long for a ray, see
     /// [`Ambient::longest_ray`](crate::space::Ambient::longest_ray).
     long: Lane,
@@ -32,6 +34,7 @@ impl<S: Scalar> Segment<S> {
             handles: [lanes(), lanes()],
             controls: [lanes(), lanes()],
             middle: lanes(),
+            rays: Default::default(),
             long: Lane::ZERO,
             side: Lane::ONE,
             level: [points(), points(), points()],
@@ -69,10 +72,16 @@ impl<S: Scalar> Segment<S> {
         let [p0, p1] = self.ends.each_mut().map(|x| &mut x[..len]);
         let [a, b] = self.handles.each_mut().map(|x| &mut x[..len]);
         let [q0, q1] = self.controls.each_mut().map(|x| &mut x[..len]);
-        space.ray(p0, a, Lane::ONE, q0);
+        let middle = &mut self.middle[..len];
+        self.rays.iter_mut().for_each(|ray| ray.resize(space.ray_len(), Lane::ZERO));
+        let [first, between, last] = &mut self.rays;
+        space.prepare_ray(p0, a, first);
+        space.prepared_ray(p0, a, first, Lane::ONE, q0);
         space.ray(p1, b, lane(-1.0), q1);
         choose(q0, [q1, p1, b]);
-        let angle = space.log(q0, q1, &mut self.middle[..len]);
+        let angle = space.log(q0, q1, middle);
+        space.prepare_ray(q0, middle, between);
+        space.prepare_ray(p1, b, last);
         // Most spaces have no such limit, which the compiler can see.
         if space.longest_ray().is_finite() {
             self.long = angle.simd_gt(lane(space.longest_ray()));
@@ -89,12 +98,13 @@ impl<S: Scalar> Segment<S> {
         let [a, b] = self.handles.each_ref().map(|x| &x[..len]);
         let [x, y, z] = self.level.each_mut().map(|x| &mut x[..len]);
         let gamma = &mut gamma[..len];
-        space.ray(p0, a, t, x);
-        space.ray(&self.controls[0][..len], &self.middle[..len], t, y);
+        let [first, middle, last] = &self.rays;
+        space.prepared_ray(p0, a, first, t, x);
+        space.prepared_ray(&self.controls[0][..len], &self.middle[..len], middle, t, y);
         if space.longest_ray().is_finite() && self.long.any() {
             between(space, &self.controls, self.long, t, y);
         }
-        space.ray(p1, b, t - Lane::ONE, z);
+        space.prepared_ray(p1, b, last, t - Lane::ONE, z);
         space.geodesic(x, y, t, gamma);
         space.geodesic(y, z, t, x);
         space.geodesic(gamma, x, t, y);

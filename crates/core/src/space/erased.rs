@@ -43,6 +43,8 @@ macro_rules! table {
             fn $name(&self $(, $arg: $kind)*) $(-> $result)?;)*)*
             /// See [`Ambient::ray`].
             fn ray(&self, p: &[Lane], v: &[Lane], t: Row, out: RowMut);
+            /// See [`Ambient::prepared_ray`].
+            fn prepared_ray(&self, p: &[Lane], v: &[Lane], prepared: &[Lane], t: Row, out: RowMut);
             /// See [`Ambient::geodesic`].
             fn geodesic(&self, p: Row, q: Row, t: Row, out: RowMut);
             /// See [`Origin::inner_handles`].
@@ -60,6 +62,14 @@ macro_rules! table {
                     (Row::Lane(t), RowMut::Lane(out)) => Ambient::ray(self, p, v, t[0], out),
                     (Row::Dual(t), RowMut::Dual(out)) => Ambient::ray(self, p, v, t[0], out),
                     (Row::Jet(t), RowMut::Jet(out)) => Ambient::ray(self, p, v, t[0], out),
+                    _ => mixed(),
+                }
+            }
+            fn prepared_ray(&self, p: &[Lane], v: &[Lane], prepared: &[Lane], t: Row, out: RowMut) {
+                match (t, out) {
+                    (Row::Lane(t), RowMut::Lane(out)) => Ambient::prepared_ray(self, p, v, prepared, t[0], out),
+                    (Row::Dual(t), RowMut::Dual(out)) => Ambient::prepared_ray(self, p, v, prepared, t[0], out),
+                    (Row::Jet(t), RowMut::Jet(out)) => Ambient::prepared_ray(self, p, v, prepared, t[0], out),
                     _ => mixed(),
                 }
             }
@@ -107,6 +117,9 @@ macro_rules! table {
             fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
                 self.0.ray(p, v, S::row(&[t]), S::row_mut(out));
             }
+            fn prepared_ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
+                self.0.prepared_ray(p, v, prepared, S::row(&[t]), S::row_mut(out));
+            }
             fn geodesic<S: Scalar>(&self, p: &[S], q: &[S], t: S, out: &mut [S]) {
                 self.0.geodesic(S::row(p), S::row(q), S::row(&[t]), S::row_mut(out));
             }
@@ -145,6 +158,8 @@ table! {
         fn longest_handle(&self) -> f64;
         fn injectivity_radius(&self) -> f64;
         fn longest_ray(&self) -> f64;
+        fn ray_len(&self) -> usize;
+        fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]);
         fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
         fn distance(&self, p: &[Lane], q: &[Lane], log: &[Lane], angle: Lane) -> Lane;
         fn transvect(&self, p: &[Lane], v: &[Lane], x: &[Lane], out: &mut [Lane]);

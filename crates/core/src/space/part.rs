@@ -116,6 +116,15 @@ impl<P: Part> Ambient for Within<P> {
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]) {
         self.0.whole().ray(p, v, t, out);
     }
+    fn ray_len(&self) -> usize {
+        self.0.whole().ray_len()
+    }
+    fn prepare_ray(&self, p: &[Lane], v: &[Lane], prepared: &mut [Lane]) {
+        self.0.whole().prepare_ray(p, v, prepared);
+    }
+    fn prepared_ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], prepared: &[Lane], t: S, out: &mut [S]) {
+        self.0.whole().prepared_ray(p, v, prepared, t, out);
+    }
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane {
         let whole = self.0.whole();
         let angle = whole.log(p, q, out);

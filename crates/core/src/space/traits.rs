@@ -63,6 +63,17 @@ pub trait Ambient: Copy + Send + Sync {
 
     /// `exp_p(t v)`: the geodesic from p with velocity v.
     fn ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], t: S, out: &mut [S]);
+    /// The number of entries that [`prepare_ray`](Ambient::prepare_ray) computes.
+    fn ray_len(&self) -> usize {
+        0
+    }
+    /// Precomputes, once per ray, what every call of [`prepared_ray`](Ambient::prepared_ray) requires of it.
+    fn prepare_ray(&self, _p: &[Lane], _v: &[Lane], _prepared: &mut [Lane]) {}
+    /// [`ray`](Ambient::ray) of the p and v that were prepared.
+    #[inline(always)]
+    fn prepared_ray<S: Scalar>(&self, p: &[Lane], v: &[Lane], _prepared: &[Lane], t: S, out: &mut [S]) {
+        self.ray(p, v, t, out);
+    }
     /// `log_p(q)`, (11); returns the deciding angle.
     fn log(&self, p: &[Lane], q: &[Lane], out: &mut [Lane]) -> Lane;
     /// Distance, given `log_p(q)` and the deciding angle; also defined beyond the cut locus.
