@@ -8,7 +8,7 @@ use super::function::{from_parts, parts_of};
 use super::inverse::{balance, inverse};
 use super::schur::{largest_argument, root};
 use super::select::{Select, by_size};
-use super::series::{LOG, LOG_LIMIT, Powers, exp_by, terms};
+use super::series::{LOG_LIMITS, Powers, exp_by, log_terms, terms};
 use crate::scalar::{Lane, Scalar, lane, mask_bits};
 
 /// `exp(A) − 1`.
@@ -41,9 +41,13 @@ pub fn log_any_one_plus<S: Scalar, const D: usize, A: Storage>(
     e: &Matrix<S, D, A>,
 ) -> (Matrix<S, D, A>, Lane) {
     // The series in E is cheap where powers reduce to few coefficients; otherwise that of artanh has fewer products.
-    let short = if D == 1 && e.rows() < 5 { LOG_LIMIT } else { -1.0 };
-    let log = by_size(e.size(), &[short], |tier| {
-        if tier == 0 { Powers::of_any(e, LOG.len()).sum(&LOG) } else { by_artanh(e) }
+    let limits = if D == 1 && e.rows() < 5 { &LOG_LIMITS[..] } else { &[] };
+    let log = by_size(e.size(), limits, |tier| {
+        if tier == limits.len() {
+            return by_artanh(e);
+        }
+        let c = log_terms::<S>(tier);
+        Powers::of_any(e, c.len()).sum(c)
     });
     // By Bendixson's theorem; eigenvalues of real matrices come in pairs.
     let bound =
