@@ -31,6 +31,9 @@ impl<T: Select, const F: usize> Select for [T; F] {
 pub fn by_size<R: Select>(size: Lane, limits: &[f64], mut f: impl FnMut(usize) -> R) -> R {
     let within = |i: usize| size.simd_le(lane(limits[i]));
     let top = (0..limits.len()).find(|&i| within(i).all()).unwrap_or(limits.len());
+    if !(0..top).any(|i| within(i).any()) {
+        return f(top);
+    }
     let mut result = f(top);
     for i in (0..top).rev() {
         if within(i).any() {
